@@ -1,0 +1,39 @@
+# calibeam: `make demo` and `make test` do all their own set-up in .venv
+PYTHON ?= $(firstword $(foreach p,python3.11 python3.12 python3.13 python3,$(shell command -v $(p) 2>/dev/null)))
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+
+.PHONY: setup demo test lint bench pins clean
+
+setup: $(READY)
+
+$(READY): requirements/all.txt pyproject.toml
+	@test -n "$(PYTHON)" || { echo "calibeam needs Python 3.11 or newer (Debian: apt-get install python3 python3-venv)"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/all.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@
+
+demo: $(READY)
+	$(BIN)/calibeam demo --out out/demo
+
+test: $(READY)
+	$(BIN)/python -m pytest
+
+lint: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports
+	$(BIN)/pyright
+
+bench: $(READY)
+	$(BIN)/python -m benchmarks
+
+# Renew the pins after changing pyproject.toml (needs pip-tools). Hashes only: no address enters the file.
+pins:
+	pip-compile --quiet --generate-hashes --strip-extras --extra dev --allow-unsafe \
+	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host -o requirements/all.txt pyproject.toml
+
+clean:
+	rm -rf $(VENV) out .pytest_cache .ruff_cache

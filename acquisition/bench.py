@@ -1,0 +1,67 @@
+"""What servo and session see of the devices: move, look, stop. Whether wires or an in-process world lie below is not theirs."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Spot:
+    """Light on one face, averaged over a dwell. Positions are NaN when the face is dark."""
+
+    x_m: float
+    y_m: float
+    sum_v: float
+    sigma_x_m: float  # of the mean
+    sigma_y_m: float
+    lit: bool
+    saturated: bool = False
+
+
+@dataclass(frozen=True)
+class Look:
+    """One settled reading of everything, averaged over the same dwell."""
+
+    host_s: float
+    t_s: float  # since the start of the session, by the PSD box's clock
+    q_rad: Floats  # (joint,) as the controller reports
+    qd_rad_s: Floats  # (joint,)
+    cmd_rad: Floats  # (joint,) as commanded
+    encoder_rad: Floats | None  # (joint,) link-side encoders
+    psd1: Spot
+    psd2: Spot
+    temperatures_degC: dict[str, float]
+    settled: bool
+
+    def spots_m(self) -> Floats:
+        """psd1 x, y, psd2 x, y (4,), NaN where dark."""
+        return np.array([self.psd1.x_m, self.psd1.y_m, self.psd2.x_m, self.psd2.y_m])
+
+    def lit(self, first: int) -> tuple[bool, bool]:
+        """Whether the first and the second face have light, in the order in which the beam strikes them."""
+        pair = (self.psd1.lit, self.psd2.lit)
+        return pair if first == 1 else (pair[1], pair[0])
+
+
+class Bench(Protocol):
+    """The devices, as few verbs. Raises DeviceError; every call ends."""
+
+    def move(self, q_rad: Floats) -> None:
+        """Go there and stand still."""
+        ...
+
+    def look(self, dwell_s: float) -> Look:
+        """Wait until the readings have settled, then average `dwell_s` of device time."""
+        ...
+
+    def place_fixture(self, placement: int) -> None:
+        """Have the fixture stand at this place: asks the operator, or the emulated world."""
+        ...
+
+    def stop(self) -> None:
+        """Stop the arm, from any thread and in any state."""
+        ...

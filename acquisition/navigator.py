@@ -1,0 +1,144 @@
+"""Keeps the beam on the faces while the arm is still strange: find the light, land on the next pose, centre.
+
+The arm's zeros are unknown by degrees, so a pose far from the last one may miss the faces. The navigator therefore
+remembers every lit pose of a block with the fixture pose that is right *there*, jumps from the nearest one, and where a
+jump loses the light goes part of the way and learns.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.aiming.pose import BeamTarget, between, flange_for
+from acquisition.aiming.reach import reach
+from acquisition.aiming.search import Found, Search
+from acquisition.bench import Bench
+from acquisition.errors import SpotLostError
+from acquisition.journal import Journal
+from acquisition.learner import Learner
+from acquisition.servo.centring import Limits, centre
+from acquisition.servo.registered import Registered
+from acquisition.servo.status import Centring
+
+Floats = NDArray[np.float64]
+
+LANDING_TRIES = 12  # on the way to a pose: halvings of the jump and stops to learn, together
+GLANCE_S = 0.01  # enough to tell light from dark: 10 samples at 1 kHz
+FINDING_STAND_OFF_M = 0.2
+NEAR = Limits(tolerance_m=1.5e-3, max_steps=8)  # anywhere near the asked-for spots will do
+
+
+@dataclass(frozen=True)
+class LitPose:
+    """A pose with light on both faces."""
+
+    target: BeamTarget
+    q_rad: Floats
+    T_base_fixture: Floats  # as it must be believed for the believed arm to agree with the spots here
+
+
+class Navigator:
+    """Owns where the arm stands (as commanded), which way its joints last moved, and where this block had light."""
+
+    def __init__(self, bench: Bench, learner: Learner, journal: Journal, home_rad: Floats, seed: int) -> None:
+        self._bench, self._learner, self._journal = bench, learner, journal
+        self._rng = np.random.default_rng(seed)
+        self._lit: list[LitPose] = []
+        self._placement = 0
+        self.q_rad = home_rad
+        self.approach = np.zeros(home_rad.size, dtype=np.int64)  # -1, 0, +1 by joint
+
+    def move(self, q_rad: Floats) -> None:
+        """Go there, and remember which way every joint moved."""
+        self._bench.move(q_rad)
+        self._note(q_rad)
+
+    def find(self, placement: int, first: int, roll_rad: float) -> None:
+        """Begin a block: aim by what is believed, search if that misses, come near the centres. SpotLostError."""
+        self._placement = placement
+        T = self._learner.T_base_fixture(placement)
+        target = BeamTarget(first, (0.0, 0.0, 0.0, 0.0), FINDING_STAND_OFF_M, roll_rad)
+        self.move(self._reach(T, target, self.q_rad))
+        if not all(self._bench.look(GLANCE_S).lit(first)):
+            self._search(first, T)
+        self._lit = []
+        self._centre(target, T, NEAR)
+
+    def visit(self, target: BeamTarget, limits: Limits | None) -> Centring:
+        """Land on the target and bring the spots there: within `limits`, or only near it. SpotLostError,
+        UnreachableError; the arm is then back at a lit pose."""
+        back = self._nearest(target)
+        try:
+            return self._centre(target, self._land(target), limits or NEAR)
+        except Exception:
+            self.move(back.q_rad)
+            raise
+
+    def relearned(self) -> None:
+        """The believed rig was refitted: what was right at single poses before is now worse than the fit."""
+        T = self._learner.T_base_fixture(self._placement)
+        self._lit = [replace(pose, T_base_fixture=T) for pose in self._lit]
+
+    def _land(self, target: BeamTarget) -> Floats:
+        """Reach light near the target; returns the fixture pose believed there."""
+        share = 1.0
+        for _ in range(LANDING_TRIES):
+            near = self._nearest(target)
+            way = between(near.target, target, share)
+            self.move(self._reach(near.T_base_fixture, way, near.q_rad))
+            if not all(self._bench.look(GLANCE_S).lit(way.first)):
+                share /= 2.0
+                continue
+            if share == 1.0:
+                return near.T_base_fixture
+            self._centre(way, near.T_base_fixture, NEAR)
+            share = 1.0
+        raise SpotLostError(f"no light on the way to roll {target.roll_rad:.2f} rad in {LANDING_TRIES} tries")
+
+    def _centre(self, target: BeamTarget, T: Floats, limits: Limits) -> Centring:
+        strategy = Registered(self._learner.arm, self._learner.optics, T, target.first)
+        run = centre(self._bench, self._learner.arm, strategy, self.q_rad, np.array(target.spots_m), limits)
+        for step in run.trace[1:]:
+            self._note(step.q_rad)
+        self._journal.event("centring", _told(run, self._placement, target, limits))
+        if not all(run.look.lit(target.first)):
+            raise SpotLostError(f"the light was lost while centring: {run.status.value}")
+        self._lit.append(LitPose(target, self.q_rad, strategy.T_base_fixture))
+        return run
+
+    def _search(self, first: int, T: Floats) -> None:
+        result = Search(self._bench, self._learner.arm, self._learner.optics, T, first).run(self.q_rad)
+        self._note(result.q_rad)
+        self._journal.event("search", {"found": result.found.name, "motions": result.motions})
+        if result.found is not Found.BOTH:
+            raise SpotLostError(
+                f"place {self._placement}, PSD {first} first: {result.found.value} ({result.motions} positions tried); "
+                "check that the laser is on and that the fixture stands where the rig file says, to a few centimetres "
+                "and degrees"
+            )
+
+    def _nearest(self, target: BeamTarget) -> LitPose:
+        return min(self._lit, key=lambda pose: abs(pose.target.roll_rad - target.roll_rad))
+
+    def _reach(self, T: Floats, target: BeamTarget, near_rad: Floats) -> Floats:
+        arm = self._learner.arm
+        return reach(arm, flange_for(arm, self._learner.optics, T, target), near_rad, self._rng)
+
+    def _note(self, q_rad: Floats) -> None:
+        moved = q_rad - self.q_rad
+        self.approach = np.where(np.abs(moved) > 1e-7, np.sign(moved).astype(np.int64), self.approach)
+        self.q_rad = q_rad
+
+
+def _told(run: Centring, placement: int, target: BeamTarget, limits: Limits) -> dict[str, object]:
+    return {
+        "placement": placement,
+        "first_psd": target.first,
+        "strategy": run.strategy,
+        "status": run.status.name,
+        "tolerance_m": limits.tolerance_m,
+        "target_m": list(target.spots_m),
+        "spots_m": [step.spots_m.tolist() for step in run.trace],
+        "purpose": [step.purpose for step in run.trace],
+    }

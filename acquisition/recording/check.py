@@ -1,0 +1,88 @@
+"""What is wrong with a recording, as data: gaps, times that do not rise, silent streams, a file cut short."""
+
+import enum
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from acquisition.recording.recording import Recording
+from acquisition.recording.stream import Floats, Stream
+
+
+class Problem(enum.Enum):
+    """Kinds of findings."""
+
+    INCOMPLETE = "incomplete"
+    DAMAGED = "damaged"
+    SILENT = "silent"
+    GAP = "gap"
+    TIME_ORDER = "time-order"
+    DUPLICATE_TIME = "duplicate-time"
+    NO_SAMPLES = "no-samples"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One problem: its kind, where it is ("stream psd", "samples", "file"), and a sentence for a person."""
+
+    problem: Problem
+    where: str
+    says: str
+
+
+def check(recording: Recording) -> tuple[Finding, ...]:
+    """Everything found, the file first, then stream by stream, then the samples; empty when all is well."""
+    return (*_file(recording), *_streams(recording), *_samples(recording))
+
+
+def _file(recording: Recording) -> Iterator[Finding]:
+    for damage in recording.damage:
+        yield Finding(Problem.DAMAGED, "file", damage)
+    if not recording.complete:
+        yield Finding(
+            Problem.INCOMPLETE, "file", "the session was cut short or its end is missing; what is here is good"
+        )
+
+
+def _streams(recording: Recording) -> Iterator[Finding]:
+    for stream in recording.streams.values():
+        where = f"stream {stream.name}"
+        if stream.host_s.size == 0:
+            yield Finding(Problem.SILENT, where, "declared, but not one sample came")
+            continue
+        for gap in stream.gaps:
+            count = "an unknown number of" if gap.missing < 0 else str(gap.missing)
+            between = f"between {_since(recording, gap.from_s)} and {_since(recording, gap.to_s)}"
+            yield Finding(Problem.GAP, where, f"{count} samples missing {between}: {gap.reason}")
+        yield from _device_times(where, stream)
+        yield from _order(where, "host_s", stream.host_s)
+
+
+def _device_times(where: str, stream: Stream) -> Iterator[Finding]:
+    yield from _order(where, "device_s", stream.device_s)
+    repeats = int(np.count_nonzero(np.diff(stream.device_s) == 0.0))
+    if repeats:
+        yield Finding(Problem.DUPLICATE_TIME, where, f"device_s repeats {repeats} times: samples came twice")
+
+
+def _order(where: str, name: str, times_s: Floats) -> Iterator[Finding]:
+    back = np.flatnonzero(np.diff(times_s) < 0.0)
+    if back.size:
+        at = int(back[0])
+        says = f"{name} goes back {back.size} times, first from {times_s[at]:.6f} to {times_s[at + 1]:.6f} s"
+        yield Finding(Problem.TIME_ORDER, where, says)
+
+
+def _samples(recording: Recording) -> Iterator[Finding]:
+    times_s = recording.samples.column("t_s")
+    if times_s.size == 0:
+        yield Finding(Problem.NO_SAMPLES, "samples", "not one settled sample was taken")
+    yield from _order("samples", "t_s", times_s)
+    repeats = int(np.count_nonzero(np.diff(times_s) == 0.0))
+    if repeats:
+        yield Finding(Problem.DUPLICATE_TIME, "samples", f"t_s repeats {repeats} times in consecutive rows")
+
+
+def _since(recording: Recording, host_s: float) -> str:
+    return f"{host_s - recording.host_s0:.3f} s"

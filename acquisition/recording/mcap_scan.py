@@ -1,0 +1,107 @@
+"""Every readable record of an MCAP file, in file order, however the file ends.
+
+Reads from the front, because the index at the end is missing when a session was killed. Layout of the records:
+https://mcap.dev/spec. A batch whose checksum is wrong is left out and told; the batches after it are still read.
+"""
+
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO
+
+import zstandard
+from mcap.exceptions import McapError
+from mcap.records import Channel, Chunk, DataEnd, Header, McapRecord, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader, breakup_chunk
+
+from acquisition.recording.errors import RecordingError
+
+# What the parser raises on bytes that make no sense; CRC errors are ValueErrors.
+DAMAGE = (
+    McapError,
+    ValueError,
+    struct.error,
+    zstandard.ZstdError,
+    RuntimeError,
+    EOFError,
+    KeyError,
+    OverflowError,
+    MemoryError,
+)
+
+
+class Scan:
+    """One pass over a file; `damage` says afterwards what could not be read, `whole` whether the end was reached."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.damage: list[str] = []
+        self.whole = False
+
+    def records(self) -> Iterator[Header | Schema | Channel | Message | Metadata]:
+        """The records that carry content. RecordingError if the file is missing, empty or not MCAP."""
+        try:
+            with self._path.open("rb") as file:
+                size = file.seek(0, 2)
+                file.seek(0)
+                _check_magic(self._path, file.read(8), size)
+                file.seek(0)
+                yield from self._contents(file, size)
+        except OSError as error:
+            raise RecordingError(
+                f"{self._path}: cannot read the recording ({error.strerror}); check the path"
+            ) from error
+
+    def _contents(self, file: IO[bytes], size: int) -> Iterator[Header | Schema | Channel | Message | Metadata]:
+        reader = StreamReader(_Exact(file), emit_chunks=True, validate_crcs=True, record_size_limit=size)  # pyright: ignore[reportArgumentType]
+        records = iter(reader.records)
+        in_summary = False  # what follows the data repeats it
+        while True:
+            at = file.tell()
+            try:
+                record = next(records)
+            except StopIteration:
+                self.whole = True
+                return
+            except DAMAGE as error:
+                self.damage.append(f"byte {at} of {size}: {_says(error)}; everything before it was read")
+                return
+            if isinstance(record, Chunk):
+                yield from self._chunk(record, at)
+            elif isinstance(record, DataEnd):
+                in_summary = True
+            elif isinstance(record, Header | Schema | Channel | Message | Metadata) and not in_summary:
+                yield record
+
+    def _chunk(self, chunk: Chunk, at: int) -> Iterator[Schema | Channel | Message]:
+        try:
+            records: list[McapRecord] = breakup_chunk(chunk, validate_crc=True)
+        except DAMAGE as error:
+            self.damage.append(f"byte {at}: a batch is damaged ({_says(error)}) and was left out")
+            return
+        for record in records:
+            if isinstance(record, Schema | Channel | Message):
+                yield record
+
+
+class _Exact:
+    """A file whose reads are never short: half a record is the end, not a record with a shorter text."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file = file
+
+    def read(self, length: int) -> bytes:
+        data = self._file.read(length)
+        if len(data) < length:
+            raise EOFError(f"the file ends in the middle of a record, {length - len(data)} bytes are missing")
+        return data
+
+
+def _check_magic(path: Path, start: bytes, size: int) -> None:
+    if start != b"\x89MCAP0\r\n":
+        what = "the file is empty" if size == 0 else f"the file begins with {start[:8]!r}, not with MCAP's signature"
+        raise RecordingError(f"{path}: not a recording: {what}; give a recording or a session folder")
+
+
+def _says(error: BaseException) -> str:
+    return str(error) or type(error).__name__

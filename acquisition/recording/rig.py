@@ -1,0 +1,134 @@
+"""Reads a rig file: TOML text to frozen records, with one clear error that names file, line, key and remedy."""
+
+import hashlib
+import math
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, cast
+
+import msgspec
+
+from acquisition.recording.errors import RigFileError
+from acquisition.recording.rig_faults import explain, unknown_key
+from acquisition.recording.rig_lines import KeyPath, key_lines, line_of
+from acquisition.recording.rig_quantity import si_value, suffix_of
+from acquisition.recording.rig_rules import faults
+from acquisition.recording.rig_schema import EMULATION_KEYS, ArmModel, Rig
+
+
+def load_rig(path: Path | str) -> Rig:
+    """The rig of a file. RigFileError naming file, line, key, value and remedy."""
+    return parse_rig(rig_text(path), str(path))
+
+
+def rig_text(path: Path | str) -> str:
+    """The text of a rig file to the letter, line ends included. RigFileError if it cannot be read as UTF-8."""
+    try:
+        return Path(path).read_bytes().decode("utf-8")
+    except OSError as error:
+        raise RigFileError(f"{path}: cannot read the rig file ({error.strerror}); check the path") from error
+    except UnicodeDecodeError as error:
+        line = Path(path).read_bytes()[: error.start].count(b"\n") + 1
+        raise RigFileError(f"{path} line {line}: byte {error.start} is not UTF-8; save the file as UTF-8") from error
+
+
+def rig_sha256(text: str) -> str:
+    """What identifies a rig in results: the SHA-256 of its text, hexadecimal."""
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def parse_rig(text: str, name: str) -> Rig:
+    """The rig of a text; `name` stands for the file in errors. RigFileError naming line, key, value and remedy."""
+    document = plain_rig(text, name)
+    lines = key_lines(text)
+    try:
+        rig = msgspec.convert(document, type=Rig)
+    except msgspec.ValidationError as error:
+        raise _fault(name, lines, *explain(error, document)) from error
+    for path, says in faults(rig):
+        raise _fault(name, lines, path, says)
+    return _completed(rig)
+
+
+def plain_rig(text: str, name: str) -> dict[str, Any]:
+    """The rig as `tomllib` gives it, but with quantities such as "0.2 mm" in SI; what emulators are built from.
+
+    RigFileError for bad TOML, a quantity that does not fit its key, a number that is not finite, and in [emulation].
+    All else is checked by `parse_rig`.
+    """
+    try:
+        document = tomllib.loads(text.removeprefix("\ufeff"))
+    except tomllib.TOMLDecodeError as error:
+        raise _syntax_fault(name, text, str(error)) from error
+    lines = key_lines(text.removeprefix("\ufeff"))
+    try:
+        converted = cast("dict[str, Any]", _in_si(document, (), ""))
+    except _MisfitError as misfit:
+        raise _fault(name, lines, misfit.path, misfit.says) from misfit
+    for path, says in _emulation_faults(converted.get("emulation")):
+        raise _fault(name, lines, path, says)
+    return converted
+
+
+class _MisfitError(ValueError):
+    """A value that cannot be taken as an SI number, on its way up to where file and line are known."""
+
+    def __init__(self, path: KeyPath, says: str) -> None:
+        super().__init__(says)
+        self.path, self.says = path, says
+
+
+def _in_si(value: Any, path: KeyPath, key: str) -> Any:
+    """The same tree; texts under keys with a unit suffix become numbers."""
+    if isinstance(value, dict):
+        items = cast("dict[str, Any]", value).items()
+        return {name: _in_si(inner, (*path, name), name) for name, inner in items}
+    if isinstance(value, list):
+        return [_in_si(inner, (*path, index), key) for index, inner in enumerate(cast("list[Any]", value))]
+    if isinstance(value, str) and suffix_of(key) is not None:
+        try:
+            value = si_value(key, value)
+        except ValueError as error:
+            raise _MisfitError(path, f"{key}: {error}") from error
+    if isinstance(value, float) and not math.isfinite(value):
+        raise _MisfitError(path, f"{key} = {value} is not a finite number; correct it or leave the key out")
+    return value
+
+
+def _emulation_faults(section: Any) -> Iterator[tuple[KeyPath, str]]:
+    if not isinstance(section, Mapping):  # absent, or no table: that is told by the type check
+        return
+    for key, value in cast("Mapping[str, object]", section).items():
+        path = ("emulation", key)
+        if key not in EMULATION_KEYS:
+            yield path, unknown_key(key, ("emulation",), EMULATION_KEYS)
+        elif isinstance(value, bool) or not isinstance(value, int | float):
+            yield path, f"{key} = {value!r} in [emulation]: expected a number; correct it"
+
+
+def _completed(rig: Rig) -> Rig:
+    """What the rest of the program may rely on: theta offsets filled in, the beam's direction of length 1."""
+    replace = msgspec.structs.replace
+    if rig.arm.model is not ArmModel.LOCAL_POE:
+        joints = tuple(replace(joint, theta_offset_rad=joint.theta_offset_rad or 0.0) for joint in rig.arm.joints)
+        rig = replace(rig, arm=replace(rig.arm, joints=joints))
+    if (beam := rig.tool.laser_direction) is not None:
+        length = math.hypot(*beam)
+        unit = beam if length == 1.0 else tuple(component / length for component in beam)
+        rig = replace(rig, tool=replace(rig.tool, laser_direction=unit))
+    return rig
+
+
+def _fault(name: str, lines: Mapping[KeyPath, int], path: KeyPath, says: str) -> RigFileError:
+    return RigFileError(f"{name} line {line_of(lines, path)}: {says}")
+
+
+def _syntax_fault(name: str, text: str, says: str) -> RigFileError:
+    """The words of tomllib; their place is "(at line 3, column 5)" or "(at end of document)"."""
+    place = re.search(r"\(at line (\d+), column (\d+)\)", says)
+    line = int(place[1]) if place else text.count("\n") + 1
+    wrong = re.sub(r"\s*\(at [^)]*\)$", "", says)
+    column = f", column {place[2]}" if place else ""
+    return RigFileError(f"{name} line {line}{column}: not TOML: {wrong}; correct the line")

@@ -1,0 +1,94 @@
+"""What must hold between the keys of a rig file, beyond the type of each one.
+
+Every rule yields faults as (key path, what is wrong and what to do); the reader adds file and line.
+"""
+
+import math
+from collections.abc import Iterator
+
+from acquisition.recording.rig_lines import KeyPath
+from acquisition.recording.rig_schema import ArmModel, Joint, Rig
+
+Fault = tuple[KeyPath, str]
+
+_DH_KEYS = ("a_m", "alpha_rad", "d_m", "theta_offset_rad")
+_POE_KEYS = ("origin_m", "rotation_rad")
+
+
+def faults(rig: Rig) -> Iterator[Fault]:
+    """All that contradicts itself in a rig whose types are right, in the order of the file's sections."""
+    for index, joint in enumerate(rig.arm.joints):
+        yield from _joint_faults(("arm", "joint", index), joint, rig.arm.model)
+    yield from _laser_faults(rig)
+    yield from _placement_faults(rig)
+    yield from _twice(("bar",), tuple(bar.id for bar in rig.bar_list))
+    yield from _device_faults(rig)
+
+
+def _joint_faults(path: KeyPath, joint: Joint, model: ArmModel) -> Iterator[Fault]:
+    own, other = (_POE_KEYS, _DH_KEYS) if model is ArmModel.LOCAL_POE else (_DH_KEYS, _POE_KEYS)
+    for key in other:
+        if getattr(joint, key) is not None:
+            yield (
+                (*path, key),
+                f"'{key}' does not belong to an arm of model \"{model.value}\"; it takes {', '.join(own)}",
+            )
+    for key in own:
+        if getattr(joint, key) is None and key != "theta_offset_rad":
+            yield path, f"[[arm.joint]] needs the key '{key}' in an arm of model \"{model.value}\""
+    if joint.lower_rad >= joint.upper_rad:
+        yield (
+            (*path, "lower_rad"),
+            f"lower_rad = {joint.lower_rad!r} is not below upper_rad = {joint.upper_rad!r}; exchange or correct them",
+        )
+
+
+def _laser_faults(rig: Rig) -> Iterator[Fault]:
+    origin, direction = rig.tool.laser_origin_m, rig.tool.laser_direction
+    if (origin is None) != (direction is None):
+        missing = "laser_origin_m" if origin is None else "laser_direction"
+        yield ("tool",), f"[tool] has half a laser: add '{missing}'"
+    if direction is not None and math.hypot(*direction) < 1e-6:  # feels right: no hand writes a unit vector so short
+        yield (
+            ("tool", "laser_direction"),
+            f"laser_direction = {list(direction)} points nowhere; give the beam's direction",
+        )
+
+
+def _placement_faults(rig: Rig) -> Iterator[Fault]:
+    yield from _twice(("placement",), tuple(placement.id for placement in rig.placement_list))
+    if rig.placement_list and rig.fixture is None:
+        yield ("placement",), "[[placement]] says where the fixture stood, but there is no [fixture]; add it"
+    known = sorted(rig.placements)
+    for index, distance in enumerate(rig.known_distances):
+        path = ("known_distance", index)
+        for key, number in (("from", distance.from_placement), ("to", distance.to_placement)):
+            if number not in rig.placements:
+                yield (*path, key), f"{key} = {number} is no placement of this rig (it has {known}); correct it"
+        if distance.from_placement == distance.to_placement:
+            yield (*path, "to"), f"from and to are the same placement {distance.to_placement}; a distance needs two"
+
+
+def _twice(section: KeyPath, ids: tuple[int, ...]) -> Iterator[Fault]:
+    for index, number in enumerate(ids):
+        if number in ids[:index]:
+            yield (*section, index, "id"), f"id = {number} is used twice in [[{section[0]}]]; give every one its own"
+
+
+def _device_faults(rig: Rig) -> Iterator[Fault]:
+    psd, encoders = rig.devices.psd, rig.devices.encoders
+    if psd is not None and (psd.port is None) == (psd.serial_number is None):
+        yield (
+            ("devices", "psd"),
+            "[devices.psd] needs either 'port' (a path) or 'serial_number' (of its USB), and one only",
+        )
+    if encoders is None:
+        return
+    nodes = encoders.nodes
+    if len(nodes) != rig.n_joints:
+        yield (
+            ("devices", "encoders", "nodes"),
+            f"nodes = {list(nodes)} names {len(nodes)} encoders, the arm has {rig.n_joints} joints; name one per joint",
+        )
+    if len(set(nodes)) != len(nodes):
+        yield ("devices", "encoders", "nodes"), f"nodes = {list(nodes)} names a node twice; every encoder has its own"

@@ -1,0 +1,58 @@
+"""What a recording holds: declared channels, streams of samples, settled samples, events.
+
+The recording imports nothing of the drivers, so that fits run without any port: `Channel` here repeats the
+five fields of the driver's record on purpose.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One declared quantity; the unit is also the suffix of the name."""
+
+    name: str
+    unit: str
+    shape: tuple[int, ...] = ()
+    full_scale: float = math.inf
+    resolution: float = 0.0
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A stretch of host time in which samples of a stream are known to be missing, and why."""
+
+    from_s: float
+    to_s: float
+    missing: int  # number of samples, -1 where it cannot be known
+    reason: str
+
+
+@dataclass(frozen=True)
+class Stream:
+    """All samples of one device."""
+
+    name: str
+    channels: tuple[Channel, ...]
+    host_s: Floats  # (sample,)
+    device_s: Floats  # (sample,)
+    sequence: NDArray[np.int64]  # (sample,)
+    values: Mapping[str, NDArray[Any]]  # channel name -> (sample, *shape), SI
+    gaps: tuple[Gap, ...] = ()
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened: a servo step, a placement, a stop, an error; `detail` is JSON-like."""
+
+    host_s: float
+    kind: str
+    detail: Mapping[str, Any]

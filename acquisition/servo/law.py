@@ -1,0 +1,55 @@
+"""The servo law of the source with a fixed guess of the fixture pose.
+
+    q' = k [Jp Ad(T) Jr]^+ (yd - yp)        Deng, Ding, Zhang, Food & Machinery 2019(3), equation (8)
+
+The sensor Jacobian Jp is taken at the beam that the measured spots imply, so that only the robot's motion is turned
+by the guess T, not the place where the sensor is linearised.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.believed import BelievedArm, FixtureOptics
+from acquisition.servo.strategy import Proposal
+
+Floats = NDArray[np.float64]
+
+# The laser can stand neither inside the fixture nor further away than a small arm reaches.
+STAND_OFF_RANGE_M = (0.02, 1.0)
+
+
+def correction(
+    arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, q_rad: Floats, error_m: Floats, spots_m: Floats,
+    first: int,
+) -> Floats:
+    """The joint step (joint,) that removes the spot error (4,) m by law (8) with gain 1."""
+    hit_m, direction = optics.line(spots_m, first)
+    origin_base_m, _ = arm.beam(q_rad)
+    R = T_base_fixture[:3, :3]
+    origin_m = R.T @ (origin_base_m - T_base_fixture[:3, 3])
+    stand_off_m = float(np.clip((hit_m - origin_m) @ direction, *STAND_OFF_RANGE_M))
+    beam_jacobian = arm.beam_jacobian(q_rad)
+    robot = np.vstack([R.T @ beam_jacobian[:3], R.T @ beam_jacobian[3:]])
+    sensor = optics.spots_by_beam(hit_m - stand_off_m * direction, direction, first)
+    return np.linalg.pinv(sensor @ robot) @ error_m
+
+
+class FixedGuess:
+    """Law (8): the guess of the fixture pose stays as it was given."""
+
+    name = "law8"
+
+    def __init__(
+        self, arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, first: int, gain: float = 0.5
+    ) -> None:
+        self._arm, self._optics, self._T, self._first, self._gain = arm, optics, T_base_fixture, first, gain
+        self._q_rad = np.empty(0)
+        self._spots_m = np.empty(0)
+
+    def learn(self, q_rad: Floats, spots_m: Floats) -> None:
+        self._q_rad, self._spots_m = q_rad, spots_m
+
+    def propose(self, target_m: Floats) -> Proposal:
+        error_m = target_m - self._spots_m
+        full = correction(self._arm, self._optics, self._T, self._q_rad, error_m, self._spots_m, self._first)
+        return Proposal(self._gain * full, "correct")

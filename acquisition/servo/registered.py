@@ -1,0 +1,92 @@
+"""Law (8) with the fixture pose corrected from every reading: the strategy that sessions use.
+
+Two spots fix the whole incoming beam in the fixture's frame: point on the first face, and direction by mirroring. The same
+beam is known in the base frame from the joints. One reading therefore leaves only two of the fixture's six freedoms open,
+the turn about the beam and the slide along it; any second reading closes those. So a guess that is wrong by 80 deg is
+worth a usable Jacobian after one motion. Errors of the arm itself fall out, because only differences between
+nearby poses enter. Derived in docs/decisions/0002.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from acquisition.believed import BelievedArm, FixtureOptics, spots_at
+from acquisition.servo.law import STAND_OFF_RANGE_M, correction
+from acquisition.servo.strategy import Proposal
+
+Floats = NDArray[np.float64]
+
+# The first step is taken with a turn about the beam that may be wrong by most of a right angle: shortened so that it
+# teaches without leaving the face.
+FIRST_GAIN = 0.6
+TURN_PRIOR_RAD = 0.7  # how wrong the guess may be about the beam, one sigma
+SLIDE_PRIOR_M = 0.05  # and along it
+SPOT_SIGMA_M = 3e-5  # floor of the trust in a prediction between poses
+ARM_DOUBT = 0.05  # predicted motion is wrong by this share (2 deg of joint zero: 3.5 %)
+
+
+class Registered:
+    """Re-estimates T_base_fixture from all readings of the run, then steps by law (8) with gain 1."""
+
+    name = "registered"
+
+    def __init__(self, arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, first: int) -> None:
+        self._arm, self._optics, self._first = arm, optics, first
+        self.T_base_fixture = T_base_fixture
+        self._q_rad: list[Floats] = []
+        self._spots_m: list[Floats] = []
+
+    def learn(self, q_rad: Floats, spots_m: Floats) -> None:
+        self._q_rad.append(q_rad)
+        self._spots_m.append(spots_m)
+        self.T_base_fixture = self._onto_beam(self.T_base_fixture, q_rad, spots_m)
+        if len(self._q_rad) > 1:
+            self.T_base_fixture = self._turn_and_slide(self.T_base_fixture)
+
+    def propose(self, target_m: Floats) -> Proposal:
+        q_rad, spots_m = self._q_rad[-1], self._spots_m[-1]
+        step = correction(
+            self._arm, self._optics, self.T_base_fixture, q_rad, target_m - spots_m, spots_m, self._first
+        )
+        return Proposal(step if len(self._q_rad) > 1 else FIRST_GAIN * step, "correct")
+
+    def _onto_beam(self, T_guess: Floats, q_rad: Floats, spots_m: Floats) -> Floats:
+        """The guess, turned and shifted as little as possible so that the measured beam lies on the believed one."""
+        hit_m, direction = self._optics.line(spots_m, self._first)
+        origin_base_m, direction_base = self._arm.beam(q_rad)
+        turned, _ = Rotation.align_vectors(direction_base[None], (T_guess[:3, :3] @ direction)[None])
+        R = turned.as_matrix() @ T_guess[:3, :3]
+        guessed_hit_m = T_guess[:3, :3] @ hit_m + T_guess[:3, 3]
+        stand_off_m = float(np.clip((guessed_hit_m - origin_base_m) @ direction_base, *STAND_OFF_RANGE_M))
+        T = np.eye(4)
+        T[:3, :3] = R
+        T[:3, 3] = origin_base_m + stand_off_m * direction_base - R @ hit_m
+        return T
+
+    def _turn_and_slide(self, T_on_beam: Floats) -> Floats:
+        """Turn about the current beam and slide along it until the earlier readings are explained best."""
+        hit_m, _ = self._optics.line(self._spots_m[-1], self._first)
+        hit_base_m = T_on_beam[:3, :3] @ hit_m + T_on_beam[:3, 3]
+        _, axis = self._arm.beam(self._q_rad[-1])
+
+        def moved(x: Floats) -> Floats:
+            R = Rotation.from_rotvec(axis * x[0]).as_matrix()
+            T = np.eye(4)
+            T[:3, :3] = R @ T_on_beam[:3, :3]
+            T[:3, 3] = R @ (T_on_beam[:3, 3] - hit_base_m) + hit_base_m + x[1] * axis
+            return T
+
+        def residual(x: Floats) -> Floats:
+            T = moved(x)
+            rows = [np.array([x[0] / TURN_PRIOR_RAD, x[1] / SLIDE_PRIOR_M])]
+            for q_rad, spots_m in zip(self._q_rad[:-1], self._spots_m[:-1], strict=True):
+                sigma_m = SPOT_SIGMA_M + ARM_DOUBT * float(np.linalg.norm(spots_m - self._spots_m[-1]))
+                rows.append((spots_at(self._arm, self._optics, T, q_rad, self._first) - spots_m) / sigma_m)
+            return np.concatenate(rows)
+
+        # The cost has a second valley on the far side of the turn; three starts cover the circle.
+        starts = [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0]] if len(self._q_rad) == 2 else [[0.0, 0.0]]
+        best = min((least_squares(residual, start, x_scale=(0.1, 0.01)) for start in starts), key=lambda s: s.cost)
+        return moved(best.x)

@@ -1,0 +1,75 @@
+"""The console command `calibeam`: one line a subcommand, errors as one sentence, exit codes a script can rely on.
+
+0 good, 1 failed, 2 wrong usage, 3 partial (what was recorded is kept, but the job did not end as asked).
+"""
+
+import sys
+from importlib.metadata import version
+
+from cyclopts import App, CycloptsError
+from rich.console import Console
+
+from acquisition.errors import AcquisitionError
+from acquisition.recording.errors import RecordingError, RigFileError, SamplesError
+from calibeam.commands.demo import demo
+from calibeam.commands.emulate import emulate
+from calibeam.commands.export import export_command, import_command
+from calibeam.commands.identify import identify_command
+from calibeam.commands.report import report_command
+from calibeam.commands.session import session
+from calibeam.emulation import EmulationError
+from calibeam.outcome import PartialResult
+from calibrate.errors import DataError
+from drivers.errors import DeviceError
+from simulators.host.errors import HostError
+from simulators.world.errors import WorldError
+
+# What is told in one sentence instead of a traceback: everything that is about the user's world, not about our code.
+TOLD = (
+    AcquisitionError,
+    DataError,
+    DeviceError,
+    EmulationError,
+    HostError,
+    RecordingError,
+    RigFileError,
+    SamplesError,
+    WorldError,
+)
+
+app = App(
+    name="calibeam",
+    version=version("calibeam"),
+    help="Record, calibrate and diagnose robot arms with a laser and two position-sensitive detectors.",
+)
+app.command(demo)
+app.command(session)
+app.command(emulate)
+app.command(identify_command, name="identify")
+app.command(report_command, name="report")
+app.command(export_command, name="export")
+app.command(import_command, name="import")
+
+
+def main() -> None:
+    """Run the command line; ends the process with one of the four exit codes."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: list[str]) -> int:
+    """The exit code of one command line."""
+    errors = Console(stderr=True, soft_wrap=True, highlight=False)
+    try:
+        app(arguments, exit_on_error=False, print_error=True, result_action="return_value")
+    except CycloptsError:
+        return 2  # cyclopts has printed what was wrong
+    except PartialResult as partial:
+        errors.print(f"[bold]stopped:[/bold] {partial}", markup=True)
+        return 3
+    except KeyboardInterrupt:
+        errors.print("stopped by Ctrl-C")
+        return 1
+    except TOLD as error:
+        errors.print("error:", str(error), markup=False)
+        return 1
+    return 0

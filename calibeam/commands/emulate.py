@@ -1,0 +1,58 @@
+"""`calibeam emulate`: the rig's devices as emulators on real wires, until stopped."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from acquisition.recording.rig import load_rig, plain_rig, rig_text
+
+
+def emulate(
+    rig: Path,
+    *,
+    json_: Annotated[bool, Parameter(name="--json")] = False,
+    robot_host: str | None = None,
+    seed: int | None = None,
+    time_scale: float | None = None,
+    truth: Path | None = None,
+    links: bool = True,
+    end_with_stdin: Annotated[bool, Parameter(show=False)] = False,
+) -> None:
+    """Emulate every device of a rig file on real wires, and stay up until Ctrl-C.
+
+    Example: calibeam emulate rigs/ur5e-dual-psd.toml
+
+    Parameters
+    ----------
+    rig
+        The rig file; devices without a section in [devices] are not emulated.
+    json_
+        Print one line of JSON when all are ready: where each device listens.
+    robot_host
+        Address of the controller, 127.0.0.x; "auto" takes the first that is free. Default: as in the rig file.
+    seed
+        Which concealed truth is drawn. Default: as in the rig file.
+    time_scale
+        Emulated seconds per real second. Default: as in the rig file.
+    truth
+        Write the concealed truth to this file.
+    links
+        Make the symbolic links to the pseudo-terminals that the rig file names as ports.
+    """
+    from simulators.serve import ServeOptions, serve  # the physics takes a second to load: only here
+
+    load_rig(rig)  # tells what is wrong with the file in its own words
+    options = ServeOptions(robot_host, truth, seed, time_scale, links, end_with_stdin)
+    serve(plain_rig(rig_text(rig), str(rig)), options, _print_json if json_ else _print_table)
+
+
+def _print_json(where: dict[str, dict[str, Any]]) -> None:
+    print(json.dumps(where), flush=True)
+
+
+def _print_table(where: dict[str, dict[str, Any]]) -> None:
+    for device, address in where.items():
+        print(f"{device:8s}", "  ".join(f"{key} {value}" for key, value in address.items()), flush=True)
+    print("ready; Ctrl-C ends the emulators", flush=True)

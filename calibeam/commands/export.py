@@ -1,0 +1,39 @@
+"""`calibeam export` and `calibeam import`: session folders in and out of recordings."""
+
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from acquisition.recording.folder import export, import_folder
+from acquisition.recording.read import read
+
+
+def export_command(recording: Path, *, out: Annotated[Path, Parameter(help="The folder to make.")]) -> None:
+    """Write a recording's rig and settled samples as a session folder: rig.toml and samples.csv.
+
+    Example: calibeam export out/demo/recording.mcap --out session
+
+    Parameters
+    ----------
+    recording
+        A recording, or a session folder.
+    """
+    source = read(recording)
+    export(source, out)
+    print(f"{out}: rig.toml and samples.csv with {len(source.samples)} samples")
+
+
+def import_command(folder: Path, *, out: Annotated[Path, Parameter(help="The recording to make.")]) -> None:
+    """Make a recording of a session folder (rig.toml and samples.csv or samples.parquet).
+
+    Example: calibeam import session --out session.mcap
+
+    Parameters
+    ----------
+    folder
+        The session folder.
+    """
+    import_folder(folder, out, software=f"calibeam {version('calibeam')}")
+    print(f"{out}: {len(read(out).samples)} samples")

@@ -1,0 +1,91 @@
+"""The believed rig at one pose: expected spots and their derivative by the joints."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.recording.rig_schema import Rig
+from calibrate.believed_arm import BelievedArm, turned
+from calibrate.believed_fixture import BelievedFixture, FixtureView, Light
+from calibrate.dual_psd_rig import dual_psd_chain
+from calibrate.errors import DataError
+from calibrate.parameters import values_by_name
+from calibrate.sensors.dual_psd import DualPsd
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Expected:
+    """Spots at one pose and their derivative by the joints; defined off the faces too."""
+
+    spots_m: Floats  # (4,) psd1_x, psd1_y, psd2_x, psd2_y
+    by_joint: Floats  # (4, joint) m/rad
+    light: Light
+
+
+class BelievedRig:
+    """Rig file plus, if there are any, fitted corrections by parameter name; immutable."""
+
+    def __init__(self, rig: Rig, corrections: Mapping[str, float] | None = None) -> None:
+        """DataError for a rig without laser or fixture, KeyError for a correction that no parameter has."""
+        ids = np.array(sorted(rig.placements), dtype=np.int64)
+        chain = dual_psd_chain(rig, ids, np.ones_like(ids))
+        phi = values_by_name(chain.parameters, corrections or {})[len(chain.model.parameters) :]
+        sensor = chain.sensor
+        if not isinstance(sensor, DualPsd):  # the chain above is built with one; this tells the type checker
+            raise DataError(f"rig {rig.name}: no dual PSD")
+        pair, half_size_m = sensor.T_psd1_psd2(phi), sensor.fixture.half_size_m
+        self.arm = BelievedArm(rig, corrections)
+        self.fixture = BelievedFixture(pair, half_size_m)
+        self._gain = phi[4:8]
+        self._poses = {int(k): sensor.T_base_psd1(phi, int(k)) for k in ids}
+        self._views = {
+            (k, first): FixtureView(pose, pair, first, half_size_m)
+            for k, pose in self._poses.items()
+            for first in (1, 2)
+        }
+
+    @property
+    def placements(self) -> tuple[int, ...]:
+        """Ids, rising."""
+        return tuple(self._poses)
+
+    def T_base_psd1(self, placement: int) -> Floats:
+        """(4, 4) where PSD 1 is believed to be. DataError for an unknown placement."""
+        if placement not in self._poses:
+            known = ", ".join(map(str, self._poses))
+            raise DataError(f"placement {placement} is not in the rig (known: {known}); add a [[placement]]")
+        return self._poses[placement].copy()
+
+    def flange(self, q_rad: Floats) -> Floats:
+        """T_base_flange (4, 4) at joint readings (joint,)."""
+        return self.arm.flange(q_rad)
+
+    def joint_jacobian(self, q_rad: Floats) -> Floats:
+        """(6, joint) base-frame twist [v; w] of the flange by each joint."""
+        return self.arm.joint_jacobian(q_rad)
+
+    def beam(self, q_rad: Floats) -> tuple[Floats, Floats]:
+        """Origin (3,) m and unit direction (3,) of the laser beam in the base."""
+        return self.arm.beam(q_rad)
+
+    def expect(self, q_rad: Floats, placement: int, first_psd: int) -> Expected:
+        """Spots and their derivative. DataError for an unknown placement or order."""
+        view = self._views.get((placement, first_psd))
+        if view is None:
+            self.T_base_psd1(placement)
+            raise DataError(f"first_psd {first_psd}: the beam strikes PSD 1 or PSD 2 first; give 1 or 2")
+        T = self.arm.frames(q_rad)
+        origin, direction = self.arm.beam_from(T[-1])
+        hit = view.strike(origin, direction)
+        meet = origin + hit.travel[:, None] * direction  # (face, 3) on the unreflected beam
+        velocity = turned(meet[:, None, :] - T[:-1, :3, 3], T[:-1, :3, 2])  # (face, joint, 3)
+        by_joint = (hit.by_origin @ velocity.transpose(0, 2, 1)).reshape(4, -1)
+        return Expected(hit.spots_m * self._gain, by_joint * self._gain[:, None], hit.light)
+
+    def spots(self, q_rad: Floats, placement: int, first_psd: int) -> Floats:
+        """(4,) m, as in `expect`."""
+        return self.expect(q_rad, placement, first_psd).spots_m

@@ -1,0 +1,174 @@
+"""model.json: an identified model with its doubt, version 1.
+
+    schema          1
+    kind            "calibeam-model"
+    software        "calibeam 0.1.0"
+    rig             {"name", "sha256"}: which rig file the corrections belong to (sha256 of its text)
+    arm_model       "dh": what the parameter names mean (arms/)
+    status, says    named outcome of the fit and its sentence
+    poses           settled samples used
+    rank, free      of the scaled whitened Jacobian with drawing priors, at the estimate
+    condition, singular_values
+    unseen          [{"words", "members", "structural"}]: what can only be told together
+    parameters      [{"name", "unit", "value", "sigma", "undetermined"}]: corrections to the nominal rig, SI;
+                    value and sigma are null where `undetermined` says why
+    chain           {name: value}: one complete set for predictions. Entries of undetermined parameters are one choice
+                    among many that predict the same; alone they mean nothing
+    covariance      {"names", "rows"}: posterior of the free parameters, in the units above
+    noise, repeats, held_out, rms_before_m, rms_after_m: as calibrate/zeros/result.py explains; null where there is none
+
+Angles are rad, lengths m. A joint's true angle is its reading plus `joint<i>.zero`.
+"""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+import numpy as np
+
+from calibrate.errors import DataError
+from calibrate.zeros.result import HeldOut, NoiseFound, Repeats, ZeroResult
+
+Fields = dict[str, float | int | str | bool | None]
+SCHEMA = 1
+
+
+class RigIdentity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Which rig file the model corrects."""
+
+    name: str
+    sha256: str
+
+
+class Unseen(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Parameters that can only be told together."""
+
+    words: str
+    members: tuple[str, ...]
+    structural: bool
+
+
+class ModelParameter(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One correction, or why there is none."""
+
+    name: str
+    unit: str
+    value: float | None
+    sigma: float | None
+    undetermined: str | None
+
+
+class Covariance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Posterior of the free parameters."""
+
+    names: tuple[str, ...]
+    rows: tuple[tuple[float, ...], ...]
+
+
+class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Content of model.json; the module's text explains each field."""
+
+    schema: Literal[1]
+    kind: Literal["calibeam-model"]
+    software: str
+    rig: RigIdentity
+    arm_model: str
+    status: str
+    says: str
+    poses: int
+    rank: int
+    free: int
+    condition: float | None
+    singular_values: tuple[float, ...]
+    unseen: tuple[Unseen, ...]
+    parameters: tuple[ModelParameter, ...]
+    chain: dict[str, float]
+    covariance: Covariance | None
+    noise: Fields
+    repeats: Fields | None
+    held_out: Fields | None
+    rms_before_m: float
+    rms_after_m: float
+
+
+def model_of(result: ZeroResult, rig: RigIdentity, arm_model: str) -> ModelFile:
+    """The record to write for a result."""
+    seen = result.identifiability
+    return ModelFile(
+        schema=SCHEMA,
+        kind="calibeam-model",
+        software=result.software,
+        rig=rig,
+        arm_model=arm_model,
+        status=result.status.name,
+        says=result.status.value,
+        poses=result.n_poses,
+        rank=seen.rank,
+        free=seen.n_free,
+        condition=seen.condition if np.isfinite(seen.condition) else None,
+        singular_values=tuple(seen.singular_values.tolist()),
+        unseen=tuple(Unseen(c.words, c.members, c.structural) for c in seen.combinations),
+        parameters=tuple(ModelParameter(e.name, e.unit, e.value, e.sigma, e.why) for e in result.estimates),
+        chain={p.name: float(v) for p, v in zip(result.parameters, result.theta, strict=True)},
+        covariance=_covariance(result),
+        noise=_fields(result.noise),
+        repeats=None if result.repeats is None else _fields(result.repeats),
+        held_out=None if result.held_out is None else _fields(result.held_out),
+        rms_before_m=result.rms_before_m,
+        rms_after_m=result.rms_after_m,
+    )
+
+
+def write_model(path: Path, model: ModelFile) -> None:
+    """Write model.json, whole or not at all. OSError where the folder cannot be written."""
+    partial = path.with_name(path.name + ".partial")
+    partial.write_bytes(msgspec.json.format(msgspec.json.encode(model), indent=1) + b"\n")
+    partial.replace(path)
+
+
+def read_model(path: Path) -> ModelFile:
+    """Read model.json. DataError naming file, place and remedy where it is none or of another version."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise DataError(
+            f"{path}: cannot be read ({error.strerror}); give the model.json of an identification"
+        ) from error
+    try:
+        version = msgspec.json.decode(data, type=_Version)
+    except msgspec.DecodeError as error:
+        raise DataError(f"{path}: not a model.json ({error}); identify the recording again") from error
+    if version.kind != "calibeam-model" or version.schema != SCHEMA:
+        raise DataError(
+            f"{path}: kind '{version.kind}', schema {version.schema}; expected 'calibeam-model', schema {SCHEMA}"
+        )
+    try:
+        return msgspec.json.decode(data, type=ModelFile)
+    except msgspec.DecodeError as error:
+        raise DataError(f"{path}: damaged model.json ({error}); identify the recording again") from error
+
+
+def corrections(model: ModelFile) -> dict[str, float]:
+    """The complete set of values for predictions, by parameter name: what believed.BelievedRig takes."""
+    return dict(model.chain)
+
+
+class _Version(msgspec.Struct, frozen=True):
+    """The two fields that every version has."""
+
+    schema: int
+    kind: str
+
+
+def _covariance(result: ZeroResult) -> Covariance | None:
+    free = np.flatnonzero(np.diag(result.covariance) > 0.0)
+    if not np.all(np.isfinite(result.covariance)):
+        return None
+    rows = result.covariance[np.ix_(free, free)]
+    return Covariance(tuple(result.parameters[i].name for i in free), tuple(map(tuple, rows.tolist())))
+
+
+def _fields(record: NoiseFound | Repeats | HeldOut) -> Fields:
+    """Fields of a result record; what is not a finite number becomes null, since JSON has no other word for it."""
+    return {k: None if isinstance(v, float) and not np.isfinite(v) else v for k, v in asdict(record).items()}

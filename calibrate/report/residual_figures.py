@@ -1,0 +1,89 @@
+"""What the model leaves of the spots: before and after the fit, pose by pose, and whether the rest looks like noise."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from scipy.stats import beta, norm
+
+from calibrate.observations import Observations
+from calibrate.report.elements import Html
+from calibrate.report.svg import drawn
+from calibrate.report.tones import Tone, tone_of
+
+Floats = NDArray[np.float64]
+
+COORDINATES = ("PSD 1 x", "PSD 1 y", "PSD 2 x", "PSD 2 y")
+MARKERS = {1: "o", 2: "^"}  # by the face that is struck first
+CORRIDOR = 0.95  # pointwise, of the order statistics
+
+
+def by_pose(
+    data: Observations, residual_m: Floats, sigma_m: Floats | None, places: Sequence[int], name: str, title: str
+) -> Html:
+    """Residual (pose, 4) of each coordinate against the number of the pose; a band of two sigma where given."""
+    says = f"{title} of the four spot coordinates against the number of the pose"
+    return drawn(name, says, 4.8, 6.4, lambda figure: _paint(figure, data, residual_m, sigma_m, places, title))
+
+
+def _paint(
+    figure: Figure, data: Observations, residual_m: Floats, sigma_m: Floats | None, places: Sequence[int], title: str
+) -> None:
+    unit, scale = ("mm", 1e3) if np.abs(residual_m).max() >= 1e-3 else ("µm", 1e6)
+    limit = 1.1 * scale * float(np.abs(residual_m).max())
+    number = np.arange(1, len(data) + 1)
+    all_axes = figure.subplots(4, 1, sharex=True, squeeze=False)[:, 0]
+    for k, axes in enumerate(all_axes):
+        if sigma_m is not None:
+            band = 2.0 * sigma_m[:, k] * scale
+            axes.fill_between(number, -band, band, step="mid", color=Tone.FAINT.value, lw=0)
+        axes.axhline(0.0, color=Tone.SOFT.value, lw=0.7)
+        for i, place in enumerate(places):
+            for first, marker in MARKERS.items():
+                rows = (data.placement == place) & (data.first_psd == first)
+                axes.plot(
+                    number[rows], residual_m[rows, k] * scale, marker, ms=3.6, mfc="none", mew=1.0,
+                    mec=tone_of(i).value,
+                )
+        axes.set(ylim=(-limit, limit), ylabel=f"{COORDINATES[k]} ({unit})")
+        axes.grid(visible=False)
+    all_axes[0].set_title(title)
+    all_axes[-1].set_xlabel("pose")
+
+
+def quantiles(whitened: Floats) -> Html:
+    """Whitened residuals in order against those of a normal law, with the corridor in which 95 % of each should lie.
+
+    Source: order statistics of n uniform numbers follow Beta(i, n + 1 - i) (David, Nagaraja, Order Statistics, 2003).
+    """
+    says = "ordered residuals in units of their noise against the quantiles of a normal law"
+    return drawn("residual-quantiles", says, 4.6, 3.9, lambda figure: _paint_quantiles(figure, np.sort(whitened.ravel())))
+
+
+def _paint_quantiles(figure: Figure, ordered: Floats) -> None:
+    axes = figure.add_subplot()
+    n = len(ordered)
+    rank = np.arange(1, n + 1)
+    expected = norm.ppf((rank - 0.5) / n)
+    low, high = (norm.ppf(beta.ppf(p, rank, n + 1 - rank)) for p in ((1 - CORRIDOR) / 2, (1 + CORRIDOR) / 2))
+    axes.fill_between(expected, low, high, color=Tone.FAINT.value, lw=0)
+    axes.plot(expected, expected, color=Tone.SOFT.value, lw=0.9)
+    axes.plot(expected, ordered, "o", ms=2.8, color=Tone.PLACE_1.value, mew=0)
+    axes.set(xlabel="expected of pure noise (sigma)", ylabel="found (sigma)", title="Ordered residuals")
+
+
+def histogram(whitened: Floats) -> Html:
+    """The same residuals as a histogram beside the normal law."""
+    says = "histogram of the residuals in units of their noise beside the normal law"
+    return drawn("residual-histogram", says, 4.6, 3.9, lambda figure: _paint_histogram(figure, whitened.ravel()))
+
+
+def _paint_histogram(figure: Figure, values: Floats) -> None:
+    axes = figure.add_subplot()
+    reach = max(4.0, float(np.ceil(np.abs(values).max())))
+    width = reach / 12.0 if reach <= 6.0 else reach / 24.0
+    axes.hist(values, bins=np.arange(-reach, reach + width, width).tolist(), color=Tone.PLACE_1.value, alpha=0.55)
+    x = np.linspace(-reach, reach, 160)
+    axes.plot(x, norm.pdf(x) * len(values) * width, color=Tone.INK.value, lw=1.4)
+    axes.set(xlabel="residual (sigma)", ylabel="coordinates", title="Residuals beside pure noise (line)")

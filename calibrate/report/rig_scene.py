@@ -1,0 +1,86 @@
+"""The rig in space, from the fit: arms at chosen poses, faces where they stood, the beam from laser to second face."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.believed import BelievedRig
+from calibrate.observations import Observations
+from calibrate.report.evidence import Evidence
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StandingArm:
+    """The arm at one recorded pose, in the base frame."""
+
+    placement: int
+    first_psd: int
+    bones_m: Floats  # (corner, 3) from base to laser, along the axes and common normals of the D-H table
+    axes_m: Floats  # (joint, 3) a point of each joint's axis: the origin in front of it
+    beam_m: Floats  # (3, 3) laser, spot on the first face, spot on the second
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything that is drawn, in the base frame."""
+
+    arms: tuple[StandingArm, ...]  # one a placement
+    faces_m: dict[int, Floats]  # placement -> (2, 4, 3) corners of PSD 1, PSD 2
+    normals: dict[int, Floats]  # placement -> (2, 3) outward
+
+
+def scene(evidence: Evidence) -> Scene:
+    """DataError for an arm that has no single-pose model."""
+    rig = BelievedRig(evidence.recording.rig, evidence.corrections)
+    half_m = rig.fixture.half_size_m
+    poses = {k: face_poses(rig, k) for k in evidence.places}
+    square = half_m * np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]])
+    return Scene(
+        tuple(standing(rig, evidence.data, most_centred(evidence.data, k)) for k in evidence.places),
+        {k: square @ np.swapaxes(T[:, :3, :3], 1, 2) + T[:, None, :3, 3] for k, T in poses.items()},
+        {k: T[:, :3, 2] for k, T in poses.items()},
+    )
+
+
+def face_poses(rig: BelievedRig, placement: int) -> Floats:
+    """(2, 4, 4) T_base_psd1, T_base_psd2 of one placement."""
+    T_base_psd1 = rig.T_base_psd1(placement)
+    return np.stack([T_base_psd1, T_base_psd1 @ rig.fixture.T_psd1_psd2])
+
+
+def most_centred(data: Observations, placement: int, first_psd: int | None = None) -> int:
+    """The pose of a placement (and order) whose spots are nearest to the centres."""
+    wanted = data.placement == placement
+    if first_psd is not None:
+        wanted &= data.first_psd == first_psd
+    off_m = np.abs(data.spots_m).max(axis=1)
+    return int(np.argmin(np.where(wanted, off_m, np.inf)))
+
+
+def standing(rig: BelievedRig, data: Observations, pose: int) -> StandingArm:
+    """The arm at a recorded pose with its beam, which ends on the spots that were observed there."""
+    q_rad, placement, first = data.q_rad[pose], int(data.placement[pose]), int(data.first_psd[pose])
+    frames = rig.arm.frames(q_rad)
+    laser_m, _ = rig.beam(q_rad)
+    beam_m = np.stack([laser_m, *struck_m(rig, placement, first, data.spots_m[pose])])
+    return StandingArm(placement, first, _bones(frames, laser_m), frames[:-1, :3, 3], beam_m)
+
+
+def struck_m(rig: BelievedRig, placement: int, first_psd: int, spots_m: Floats) -> Floats:
+    """(2, 3) spots (4,) in the base frame, that of the face that is struck first in front."""
+    faces = face_poses(rig, placement)
+    local = np.concatenate([spots_m.reshape(2, 2), np.zeros((2, 1))], axis=1)
+    points = np.einsum("fij,fj->fi", faces[:, :3, :3], local) + faces[:, :3, 3]
+    return points if first_psd == 1 else points[::-1]
+
+
+def _bones(frames: Floats, laser_m: Floats) -> Floats:
+    """From each origin along the joint axis, then along the common normal to the next; at the end to the laser."""
+    corners = [frames[0, :3, 3]]
+    for before, after in zip(frames[:-1], frames[1:], strict=True):
+        along = before[:3, 2] * (before[:3, 2] @ (after[:3, 3] - before[:3, 3]))
+        corners += [before[:3, 3] + along, after[:3, 3]]
+    return np.stack([*corners, laser_m])

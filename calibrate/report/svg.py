@@ -1,0 +1,89 @@
+"""A matplotlib figure as SVG inside the page: its text in the page's font, its colours the page's, its ids its own."""
+
+import io
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from calibrate.report.elements import Html, escaped
+from calibrate.report.tones import Tone
+
+FONT = "DejaVu Sans"  # comes with matplotlib, so that layouts are the same everywhere; the page puts in its own
+STYLE = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "calibeam",  # the same figure gives the same bytes
+    "font.family": [FONT],
+    "font.size": 10.0,
+    "text.parse_math": False,
+    "text.color": Tone.INK.value,
+    "axes.labelcolor": Tone.SOFT.value,
+    "axes.edgecolor": Tone.SOFT.value,
+    "axes.linewidth": 0.8,
+    "axes.titlesize": 10.0,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.formatter.use_mathtext": False,
+    "grid.color": Tone.FAINT.value,
+    "grid.linewidth": 0.8,
+    "xtick.color": Tone.SOFT.value,
+    "ytick.color": Tone.SOFT.value,
+    "xtick.minor.visible": False,
+    "ytick.minor.visible": False,
+    "legend.frameon": False,
+    "legend.fontsize": 9.0,
+    "legend.handlelength": 1.4,
+    "figure.facecolor": "none",
+    "axes.facecolor": "none",
+    "savefig.facecolor": "none",
+}
+POINT_PX = 1.25  # largest magnification on a wide page
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """Figures made and written inside look alike, whatever the user's own matplotlib settings are."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        yield
+
+
+def drawn(name: str, says: str, width_in: float, height_in: float, paint: Callable[[Figure], None]) -> Html:
+    """What `paint` draws, as inline SVG. `name` is unique in the page; `says` is read to who cannot see it."""
+    with house_style():
+        figure = Figure(figsize=(width_in, height_in), layout="constrained")
+        paint(figure)
+        text = io.StringIO()
+        figure.savefig(text, format="svg")
+    return inlined(text.getvalue(), name, says)
+
+
+def inlined(svg: str, name: str, says: str) -> Html:
+    """The SVG without what only a file of its own needs, with ids that begin with `name` and the page's colours."""
+    svg = svg[svg.index("<svg") :]
+    for needless in (r"<metadata>.*?</metadata>", r"<style[^>]*>.*?</style>", r"<!--.*?-->", r"<defs>\s*</defs>"):
+        svg = re.sub(needless, "", svg, flags=re.DOTALL)
+    svg = re.sub(r'\bid="', f'id="{name}-', svg)
+    svg = re.sub(r'(?:xlink:)?href="#', f'href="#{name}-', svg)
+    svg = svg.replace("url(#", f"url(#{name}-")
+    for tone in Tone:
+        svg = svg.replace(tone.value, tone.css)
+    svg = svg.replace(f"'{FONT}'", "var(--sans)").replace(f'"{FONT}"', "var(--sans)")
+    return Html(_own_root(svg, says).strip())
+
+
+def _own_root(svg: str, says: str) -> str:
+    """Only the view box stays of the root element, so that the page gives the size."""
+    box = re.search(r'viewBox="([^"]*)"', svg)
+    if box is None:
+        raise ValueError("matplotlib wrote an SVG without a viewBox; this version of it is not known")
+    width = float(box[1].split()[2]) * POINT_PX
+    root = f'<svg viewBox="{box[1]}" role="img" aria-label="{escaped(says)}" style="max-width: {width:.0f}px">'
+    return re.sub(r"<svg[^>]*>", lambda _: root, svg, count=1)

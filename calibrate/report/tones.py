@@ -1,0 +1,36 @@
+"""Colours of the figures: matplotlib draws in stand-ins, the page puts in its own, so that light and dark both read.
+
+The six colours of the placements are those of Okabe and Ito (Color Universal Design, 2008), which colour-blind readers
+tell apart; on dark paper lighter ones of the same hues stand for them (report.css).
+"""
+
+from enum import Enum
+
+
+class Tone(Enum):
+    """What is drawn; the value is the stand-in, which no figure uses for anything else."""
+
+    INK = "#010203"
+    SOFT = "#020304"
+    FAINT = "#030405"
+    PAPER = "#040506"
+    BEAM = "#050607"
+    PLACE_1 = "#060708"
+    PLACE_2 = "#070809"
+    PLACE_3 = "#08090a"
+    PLACE_4 = "#090a0b"
+    PLACE_5 = "#0a0b0c"
+    PLACE_6 = "#0b0c0d"
+
+    @property
+    def css(self) -> str:
+        """The page's variable for it."""
+        return f"var(--{self.name.lower().replace('_', '-')})"
+
+
+PLACES = (Tone.PLACE_1, Tone.PLACE_2, Tone.PLACE_3, Tone.PLACE_4, Tone.PLACE_5, Tone.PLACE_6)
+
+
+def tone_of(number: int) -> Tone:
+    """The colour of the n-th placement, from 0; they come round again after six."""
+    return PLACES[number % len(PLACES)]

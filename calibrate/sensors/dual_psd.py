@@ -1,0 +1,195 @@
+"""Instrument: laser on the flange, beam reflected from one PSD face to the other, in either order.
+
+Observed at a pose: psd1_x, psd1_y, psd2_x, psd2_y (m). Spots are those of the planes, not of the finite faces, so
+that a servo can predict them off the face too; `lit` says what light would really fall.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.errors import DataError
+from calibrate.parameters import Parameter
+from calibrate.rigid import adjoint, inverse, pose_offset, pose_offset_twists
+from calibrate.sensors import laser, optics
+from calibrate.sensors.laser import LaserMount
+from calibrate.sensors.optics import Strike
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+PLACE_PLAUSIBLE_M = 0.05  # a fixture set down by hand where the rig file says
+PLACE_PLAUSIBLE_RAD = 0.2
+PAIR_PLAUSIBLE_M = 1e-3  # PSD 2 in PSD 1: a machined bracket
+PAIR_PLAUSIBLE_RAD = 0.02
+GAIN_PLAUSIBLE = 0.05
+AXES = ("x", "y", "z", "roll", "pitch", "yaw")  # shifts, then rotation vector, in the frame's own axes
+GAINS = ("psd1.gain_x", "psd1.gain_y", "psd2.gain_x", "psd2.gain_y")
+N_FIXED = laser.N_PARAMETERS + len(GAINS) + len(AXES)  # columns before the placements
+
+
+@dataclass(frozen=True)
+class Fixture:
+    """The dual-PSD fixture as drawn, and where it is believed to have stood."""
+
+    half_size_m: float
+    T_psd1_psd2: Floats  # (4, 4)
+    T_base_psd1: dict[int, Floats]  # placement id -> (4, 4)
+
+
+@dataclass(frozen=True)
+class DualPsd:
+    """Sensor over a data set in which pose j used `placement[j]` and struck `first_psd[j]` first.
+
+    Parameters: laser mount 4, PSD gains 4 and PSD 2 in PSD 1 6 (held unless a prior frees them), each placement 6.
+    """
+
+    mount: LaserMount
+    fixture: Fixture
+    placement: Ints  # (pose,)
+    first_psd: Ints  # (pose,) 1 or 2
+    gain_prior: float | None = None  # one sigma of the four gains; None: exact, held
+    pair_prior: tuple[float, float] | None = None  # one sigma (m, rad) of PSD 2 in PSD 1; None: exact, held
+
+    unit = "m"
+
+    def __post_init__(self) -> None:
+        unknown = set(self.placement.tolist()) - set(self.fixture.T_base_psd1)
+        if unknown:
+            known = ", ".join(map(str, sorted(self.fixture.T_base_psd1)))
+            raise DataError(f"placement {sorted(unknown)[0]} is not in the rig (known: {known}); add a [[placement]]")
+        odd = np.flatnonzero((self.first_psd != 1) & (self.first_psd != 2))
+        if len(odd):
+            raise DataError(f"first_psd of pose {odd[0]} is {self.first_psd[odd[0]]}; it must be 1 or 2")
+
+    @cached_property
+    def places(self) -> tuple[int, ...]:
+        """Placement ids in the order of their parameters."""
+        return tuple(sorted(self.fixture.T_base_psd1))
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return self._parameters
+
+    @cached_property
+    def _parameters(self) -> tuple[Parameter, ...]:
+        gains = tuple(_held_unless(name, "1", GAIN_PLAUSIBLE, self.gain_prior, start=1.0) for name in GAINS)
+        length, angle = self.pair_prior or (None, None)
+        pair = tuple(
+            _held_unless(
+                f"psd2.{a}",
+                "m" if i < 3 else "rad",
+                (PAIR_PLAUSIBLE_M, PAIR_PLAUSIBLE_RAD)[i // 3],
+                (length, angle)[i // 3],
+            )
+            for i, a in enumerate(AXES)
+        )
+        used = set(self.placement.tolist())
+        places = tuple(
+            Parameter(
+                f"placement{k}.{a}",
+                "m" if i < 3 else "rad",
+                PLACE_PLAUSIBLE_M if i < 3 else PLACE_PLAUSIBLE_RAD,
+                free=k in used,
+            )
+            for k in self.places
+            for i, a in enumerate(AXES)
+        )
+        return self.mount.parameters + gains + pair + places
+
+    def select(self, rows: NDArray[np.intp]) -> Self:
+        return replace(self, placement=self.placement[rows], first_psd=self.first_psd[rows])
+
+    def strike(self, phi: Floats, T_base_flange: Floats) -> Strike:
+        """Geometry of light at every pose, before the gains."""
+        return optics.strike(self.mount.beam(phi[:4], T_base_flange), self._unfolded(phi)[self._group])
+
+    def lit(self, phi: Floats, T_base_flange: Floats) -> NDArray[np.bool_]:
+        """(pose, 2) True where light falls on the face of PSD 1, PSD 2."""
+        return optics.is_lit(self.strike(phi, T_base_flange), self.first_psd, self.fixture.half_size_m)
+
+    def expect(self, phi: Floats, T_base_flange: Floats) -> Floats:
+        return self.strike(phi, T_base_flange).spots_m.reshape(-1, 4) * phi[4:8]
+
+    def by_twist(self, phi: Floats, T_base_flange: Floats) -> Floats:
+        hit = self.strike(phi, T_base_flange)
+        return optics.by_twist(hit.slope, hit.continuation_m).reshape(-1, 4, 6) * phi[4:8, None]
+
+    def by_parameter(self, phi: Floats, T_base_flange: Floats) -> Floats:
+        hit = self.strike(phi, T_base_flange)
+        twist = optics.by_twist(hit.slope, hit.continuation_m).reshape(-1, 4, 6)
+        gain = phi[4:8, None]
+        out = np.zeros((len(T_base_flange), 4, len(self.parameters)))
+        out[:, :, 0:4] = gain * self._by_mount(hit, T_base_flange)
+        out[:, range(4), range(4, 8)] = hit.spots_m.reshape(-1, 4)
+        if self.pair_prior is not None:
+            out[:, :, 8:14] = gain * self._by_pair(phi, twist)
+        for k, place in enumerate(self.places):
+            rows = np.flatnonzero(self.placement == place)
+            if len(rows):  # the fixture moving by a twist is the beam moving by its opposite
+                first = N_FIXED + 6 * k
+                fixture_twists = pose_offset_twists(self.fixture.T_base_psd1[place], phi[first : first + 6])
+                out[rows, :, first : first + 6] = -gain * (twist[rows] @ fixture_twists)
+        return out
+
+    def T_base_psd1(self, phi: Floats, place: int) -> Floats:
+        """(4, 4) where the fixture stands according to phi."""
+        first = N_FIXED + 6 * self.places.index(place)
+        return self.fixture.T_base_psd1[place] @ pose_offset(phi[first : first + 6])
+
+    def T_psd1_psd2(self, phi: Floats) -> Floats:
+        """(4, 4) PSD 2 in PSD 1 according to phi."""
+        return self.fixture.T_psd1_psd2 @ pose_offset(phi[8:14])
+
+    @cached_property
+    def _group(self) -> Ints:
+        """(pose,) row of `_unfolded`: placement and order together."""
+        return 2 * np.searchsorted(np.array(self.places), self.placement) + self.first_psd - 1
+
+    def _unfolded(self, phi: Floats) -> Floats:
+        pair = self.T_psd1_psd2(phi)
+        return np.stack(
+            [optics.unfolded_faces(self.T_base_psd1(phi, k), pair, first) for k in self.places for first in (1, 2)]
+        )
+
+    def _by_mount(self, hit: Strike, T_base_flange: Floats) -> Floats:
+        across = T_base_flange[:, :3, :3] @ np.stack([self.mount.u, self.mount.v], axis=-1)  # (pose, 3, 2)
+        shift = hit.slope @ across[:, None]  # (pose, face, xy, uv)
+        tilt = hit.travel_m[..., None, None] * shift
+        return np.concatenate([shift, tilt], axis=-1).reshape(-1, 4, 4)
+
+    def _by_pair(self, phi: Floats, twist: Floats) -> Floats:
+        """(pose, 4, 6) from the derivative `twist` (pose, 4, 6) by base twists of the incoming beam."""
+        pair_twists = pose_offset_twists(self.fixture.T_psd1_psd2, phi[8:14])
+        out = np.zeros_like(twist)
+        for group in np.unique(self._group):
+            place, first_psd = self.places[group // 2], group % 2 + 1
+            seen = _beam_motions(self.T_psd1_psd2(phi), int(first_psd)) @ pair_twists  # (face, 6, 6)
+            in_base = adjoint(self.T_base_psd1(phi, place)) @ seen
+            rows = np.flatnonzero(self._group == group)
+            out[rows, :2] = twist[rows, :2] @ in_base[0]
+            out[rows, 2:] = twist[rows, 2:] @ in_base[1]
+        return out
+
+
+def _beam_motions(T_psd1_psd2: Floats, first_psd: int) -> Floats:
+    """(2, 6, 6) how the incoming beam seems to face 1, 2 to move, when PSD 2 moves by a twist; PSD 1 frame.
+
+    PSD 2 struck second: the reflected beam seems to move by the opposite, so the incoming one by its mirror image.
+    PSD 2 struck first: the incoming beam seems to move by the opposite; PSD 1 sees a mirror N that moves, N l going
+    over into exp(e) N exp(-e) l, which is to first order l moving by Ad(N) e - e.
+    """
+    if first_psd == 1:
+        return np.stack([np.zeros((6, 6)), -adjoint(optics.MIRROR_Z)])
+    mirror = T_psd1_psd2 @ optics.MIRROR_Z @ inverse(T_psd1_psd2)
+    return np.stack([adjoint(mirror) - np.eye(6), -np.eye(6)])
+
+
+def _held_unless(name: str, unit: str, plausible: float, prior: float | None, start: float = 0.0) -> Parameter:
+    """Known exactly, hence held, unless a prior sigma says how well it is known."""
+    if prior is None:
+        return Parameter(name, unit, plausible, start=start, free=False)
+    return Parameter(name, unit, max(plausible, prior), start=start, prior=prior)

@@ -1,0 +1,166 @@
+"""The process loop: one thread carries the bytes of a bench and advances its world, tick by tick.
+
+Each turn waits for bytes until the next tick is due, serves them, and runs at most one tick, in the order that
+simulators/wire.py gives. A client that is slow, gone or talks rubbish holds up nobody.
+"""
+
+import selectors
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Protocol
+
+from simulators.host.faults import Log, Report, log_to_stderr
+from simulators.host.link import check_link
+from simulators.host.pace import Pace
+from simulators.host.serial_line import SerialLine
+from simulators.host.tcp import Connection, Listener
+from simulators.wire import TICK_S, Bench, SerialPort, TcpPort
+
+STOP_LATENCY_S = 0.1  # a turn never waits longer, so that a stop is noticed whatever the time scale
+
+
+class Physics(Protocol):
+    """What the loop wants of a world."""
+
+    @property
+    def time_s(self) -> float: ...
+
+    def advance(self, until_s: float) -> None: ...
+
+
+class Host:
+    """Owns every socket and pseudo-terminal of a bench, from construction to `close`.
+
+    Raises PortBusy or HostError when a port cannot be opened; nothing stays open then.
+    """
+
+    def __init__(
+        self,
+        bench: Bench,
+        world: Physics,
+        *,
+        time_scale: float = 1.0,
+        now_s: Callable[[], float] = time.monotonic,
+        log: Log = log_to_stderr,
+    ) -> None:
+        self._bench, self._world, self._now_s = bench, world, now_s
+        self.faults = Report(log)
+        # select() and not epoll: Python rounds epoll's time-out up to whole milliseconds, half a tick
+        self._selector = selectors.SelectSelector()
+        self._lines: list[SerialLine] = []
+        self._watched: set[int] = set()
+        self._listeners: dict[str, Listener] = {}
+        self._connections: dict[Connection, Listener] = {}
+        try:
+            self._open(bench)
+        except BaseException:
+            self.close()
+            raise
+        self._first_tick = round(world.time_s / TICK_S)
+        self.ticks = 0
+        self.pace = Pace(TICK_S / time_scale, now_s())
+
+    def serial_address(self, name: str) -> str:
+        """The path where clients reach a serial port: its link, or the pseudo-terminal itself."""
+        return next(line.address for line in self._lines if line.name == name)
+
+    def tcp_address(self, name: str) -> tuple[str, int]:
+        """Host and port number of a listening socket."""
+        return self._listeners[name].address
+
+    def watch(self, fd: int, readable: Callable[[], None]) -> None:
+        """Calls `readable` whenever there is something to read at a file descriptor of somebody else's."""
+        self._selector.register(fd, selectors.EVENT_READ, readable)
+
+    def run(self, stopped: Callable[[], bool]) -> None:
+        """Turns until `stopped()`."""
+        while not stopped():
+            self.turn(STOP_LATENCY_S)
+
+    def turn(self, wait_limit_s: float) -> None:
+        """Serves the bytes that have come, waiting for them no longer than until the next tick; then runs it if due."""
+        wait_s = min(wait_limit_s, max(0.0, self.pace.next_s - self._now_s()))
+        for key, _ in self._selector.select(wait_s):
+            key.data()
+        if self.pace.take(self._now_s()):
+            self._tick()
+
+    def close(self) -> None:
+        """Drops all clients, closes all ports, removes links; safe more than once."""
+        for connection in list(self._connections):
+            self._drop(connection)
+        for line in self._lines:
+            line.close()
+        for listener in self._listeners.values():
+            listener.close()
+        self._lines, self._listeners = [], {}
+        self._selector.close()
+
+    def _open(self, bench: Bench) -> None:
+        names = [port.name for port in bench.ports]
+        if len(set(names)) != len(names):
+            raise ValueError(f"bench: port names {names} are not unique")
+        for port in bench.ports:
+            if isinstance(port, SerialPort) and port.link is not None:
+                check_link(port.name, Path(port.link))
+        for port in bench.ports:
+            if isinstance(port, TcpPort):
+                self._open_listener(port)
+            else:
+                self._lines.append(SerialLine(port, self.faults))
+
+    def _open_listener(self, port: TcpPort) -> None:
+        listener = Listener(port, self.faults)
+        self._listeners[port.name] = listener
+        self._selector.register(listener.socket, selectors.EVENT_READ, lambda: self._accept(listener))
+
+    def _accept(self, listener: Listener) -> None:
+        connection = listener.accept()
+        if connection is not None:
+            self._connections[connection] = listener
+            self._selector.register(connection.client, selectors.EVENT_READ, lambda: self._receive(connection))
+
+    def _receive(self, connection: Connection) -> None:
+        if connection in self._connections:  # it may have been dropped earlier in this very turn
+            connection.receive()
+            self._drop_dead(connection)
+
+    def _tick(self) -> None:
+        t_s = (self._first_tick + self.ticks) * TICK_S
+        for instrument in self._bench.instruments:
+            instrument.before_step(t_s)
+        self._world.advance(t_s + TICK_S)
+        for instrument in self._bench.instruments:
+            instrument.after_step(t_s)
+        self.ticks += 1
+        for line in self._lines:
+            line.send_due()
+            self._follow(line)
+        for connection in list(self._connections):
+            connection.send_due()
+            self._drop_dead(connection)
+
+    def _follow(self, line: SerialLine) -> None:
+        """Listens to a serial line while a client is there: a terminal without one is always "readable"."""
+        if line.attached and line.fd not in self._watched:
+            self._watched.add(line.fd)
+            self._selector.register(line.fd, selectors.EVENT_READ, lambda: self._receive_serial(line))
+        elif not line.attached and line.fd in self._watched:
+            self._watched.discard(line.fd)
+            self._selector.unregister(line.fd)
+
+    def _receive_serial(self, line: SerialLine) -> None:
+        line.receive()
+        self._follow(line)
+
+    def _drop_dead(self, connection: Connection) -> None:
+        if not connection.alive:
+            self._drop(connection)
+
+    def _drop(self, connection: Connection) -> None:
+        listener = self._connections.pop(connection)
+        with suppress(KeyError):
+            self._selector.unregister(connection.client)
+        listener.bid_farewell(connection)

@@ -1,0 +1,147 @@
+"""The emulators as a process: a world, its instruments and a side channel, served until told to stop.
+
+serve(rig, ServeOptions(robot_host="auto"), announce=print)
+"""
+
+import math
+import os
+import signal
+import sys
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from simulators.devices import EmulatedDevices, addresses, build_devices, with_robot_on, without_links
+from simulators.host.errors import HostError, PortBusy
+from simulators.host.loop import Host
+from simulators.host.side_channel import side_channel
+from simulators.wire import Bench
+from simulators.world.rig import read_rig
+from simulators.world.truth import write_truth
+from simulators.world.world import World
+
+AUTO = "auto"
+AUTO_HOSTS = tuple(f"127.0.0.{x}" for x in range(2, 255))  # Linux answers on all of 127/8; elsewhere name 127.0.0.1
+
+Announcement = dict[str, dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class ServeOptions:
+    """What a start may set beside the rig; None leaves what the rig says."""
+
+    robot_host: str | None = None  # an address, or "auto": the first 127.0.0.x that is free
+    truth_path: Path | None = None  # where the concealed truth is written, outside of any recording
+    seed: int | None = None
+    time_scale: float | None = None  # emulated seconds per real second
+    links: bool = True  # make the symbolic links that the rig names as serial ports
+    end_with_stdin: bool = False  # stop when stdin closes, so that a parent that dies leaves no emulators behind
+
+
+class _Stop:
+    """Set by signals and by the end of stdin; a plain flag, because a signal may come while it is being set."""
+
+    def __init__(self) -> None:
+        self.asked = False
+
+    def ask(self) -> None:
+        self.asked = True
+
+
+def serve(rig: Mapping[str, Any], options: ServeOptions, announce: Callable[[Announcement], None]) -> None:
+    """Emulates until SIGTERM or SIGINT (or end of stdin); `announce` is called once when every port is open.
+
+    Must run in the main thread, for only that takes signals. Raises WorldError for a rig that cannot be emulated,
+    PortBusy and HostError for ports that cannot be opened.
+    """
+    time_scale = _time_scale(rig, options)
+    world = World.from_rig(rig, seed=options.seed, q_rad=rig.get("motion", {}).get("home_rad"))
+    auto = options.robot_host == AUTO
+    devices = build_devices(world, rig, AUTO_HOSTS[0] if auto else options.robot_host)
+    if not options.links:
+        devices = without_links(devices)
+    if options.truth_path is not None:
+        write_truth(world.truth, options.truth_path)
+    with _stop_on_signals() as stop:
+        robot_hosts = AUTO_HOSTS if auto and devices.robot is not None else (None,)
+        host, devices = _open_host(devices, world, time_scale, robot_hosts)
+        try:
+            if options.end_with_stdin:
+                _stop_at_end_of(sys.stdin.fileno(), host, stop)
+            announce(addresses(host, devices, rig))
+            host.run(lambda: stop.asked)
+        finally:
+            host.close()
+
+
+def _time_scale(rig: Mapping[str, Any], options: ServeOptions) -> float:
+    time_scale = read_rig(rig).emulation.time_scale if options.time_scale is None else options.time_scale
+    if not (math.isfinite(time_scale) and time_scale > 0.0):
+        raise HostError(f"time scale {time_scale!r}; give emulated seconds per real second, above 0")
+    return time_scale
+
+
+def _open_host(
+    devices: EmulatedDevices, world: World, time_scale: float, robot_hosts: Sequence[str | None]
+) -> tuple[Host, EmulatedDevices]:
+    """Opens all ports, the robot's on the first of `robot_hosts` that is free (None: where it was built for).
+
+    Trying is opening, so two emulators that start at the same time cannot choose the same address.
+    """
+    for robot_host in robot_hosts:
+        moved = devices if robot_host is None else with_robot_on(devices, robot_host)
+        try:
+            return _start_host(moved, world, time_scale), moved
+        except PortBusy as busy:
+            if robot_host is None or busy.host != robot_host:
+                raise
+    raise HostError(f"robot: no address from {robot_hosts[0]} to {robot_hosts[-1]} is free; stop some emulators")
+
+
+def _start_host(devices: EmulatedDevices, world: World, time_scale: float) -> Host:
+    def place(id: int) -> None:  # noqa: A002 - the verb's argument is called id
+        world.place_fixture(id)
+
+    def pace() -> dict[str, float]:
+        return {"ticks": host.ticks, "stalls": host.pace.stalls, "lost_s": host.pace.lost_s}
+
+    verbs: dict[str, Callable[..., Any]] = {
+        "fixture.place": place,
+        "world.time": lambda: world.time_s,
+        "host.pace": pace,
+    }
+    for bench in devices.benches:
+        verbs.update(bench.verbs)
+    bench = Bench(
+        instruments=[instrument for bench in devices.benches for instrument in bench.instruments],
+        ports=[*(port for bench in devices.benches for port in bench.ports), side_channel(verbs)],
+    )
+    host = Host(bench, world, time_scale=time_scale)
+    return host
+
+
+@contextmanager
+def _stop_on_signals() -> Generator[_Stop, None, None]:
+    """Turns SIGTERM and SIGINT into a wish to stop, so that links are removed and clients see a clean end."""
+    stop = _Stop()
+
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        stop.ask()
+
+    before = {number: signal.signal(number, on_signal) for number in (signal.SIGTERM, signal.SIGINT)}
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _stop_at_end_of(fd: int, host: Host, stop: _Stop) -> None:
+    def readable() -> None:
+        if not os.read(fd, 4096):
+            stop.ask()
+
+    host.watch(fd, readable)

@@ -1,0 +1,177 @@
+"""UR5e controller, PolyScope 5.12: RTDE, script ports and dashboard over one arm of the emulated world.
+
+    bench = build(world, rig, "127.0.0.2")
+
+What it does not imitate: Modbus, the primary and secondary state streams, PolyScope X, stored programs, URCaps,
+speed of the controller's own start. What each port leaves out stands in its own file: rtde_server, script_port,
+script_text, dashboard_server, control_script; what the arm leaves out, in motion.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+from simulators.ur.control_script import ControlScript
+from simulators.ur.dashboard_server import Dashboard
+from simulators.ur.kinematics import NominalArm
+from simulators.ur.motion import ArmController, ArmWorld, MoveRefused
+from simulators.ur.program import ProgramRunner
+from simulators.ur.readout import Readout
+from simulators.ur.registers import Installation, Memory
+from simulators.ur.rtde_server import RtdeServer
+from simulators.ur.script_port import ScriptWire
+from simulators.ur.script_program import LineProgram
+from simulators.ur.script_text import ScriptRefused, is_control_program, read_control_program, read_lines
+from simulators.wire import Bench, TcpPort, Wire
+
+RTDE_PORT, DASHBOARD_PORT, SCRIPT_PORTS = 30004, 29999, (30001, 30002, 30003)
+VERSION = (5, 12, 0, 1101)  # later than 5.22 changes recipes and breaks upper registers of ur_rtde 1.6.5
+SERIAL_NUMBER, MODEL = "20195000001", "UR5"  # a UR5e calls itself UR5 on the dashboard
+FULL_TURN_RAD = 6.283185307179586
+
+
+class Closable(Wire, Protocol):
+    """A wire that the host lets go of once `closing` is set and everything has been sent."""
+
+    closing: bool
+
+
+class UrController:
+    """The controller behind its wires; one `Instrument`."""
+
+    name = "ur"
+
+    def __init__(self, arm: ArmController, memory: Memory) -> None:
+        self.arm, self.memory = arm, memory
+        self.runner = ProgramRunner(arm)
+        self.rtde = RtdeServer(memory, VERSION, self._read)
+        self.dashboard = Dashboard(arm, self.runner, ".".join(map(str, VERSION)), SERIAL_NUMBER, MODEL)
+        self._tick = 0
+        self._wires: list[Closable] = []
+
+    def before_step(self, t_s: float) -> None:
+        self.memory.apply_outputs()
+        self.runner.before_step(t_s, self.memory.speed_slider)
+        self.arm.before_step(t_s)
+
+    def after_step(self, t_s: float) -> None:
+        self._tick += 1
+        self.rtde.new_cycle()
+
+    def run_script(self, text: str) -> None:
+        """A program from a script port replaces the running one; a refused one leaves a reason and nothing else."""
+        try:
+            if is_control_program(text):
+                program = ControlScript(read_control_program(text), self.arm, self.memory)
+            else:
+                program = LineProgram(read_lines(text), self.arm, self.memory)
+        except (ScriptRefused, MoveRefused) as refused:
+            self.runner.last_error = str(refused)
+            return
+        self.runner.start(program)
+
+    def port(self, name: str, host: str, number: int, accept: Callable[[], Closable]) -> TcpPort:
+        """A port whose clients `disconnect` reaches."""
+
+        def accepted() -> Wire:
+            wire = accept()
+            self._wires.append(wire)
+            return wire
+
+        return TcpPort(name, host, number, accepted, self._closed)
+
+    def disconnect(self) -> None:
+        """Drops every client, as a controller does that shuts down; they may connect again."""
+        for wire in self._wires:
+            wire.closing = True
+
+    def script_wire(self) -> ScriptWire:
+        return ScriptWire(self.run_script)
+
+    def _closed(self, wire: Wire) -> None:
+        self._wires = [other for other in self._wires if other is not wire]
+        self.memory.release(wire)
+
+    def _read(self) -> Readout:
+        return Readout(self._tick, self.arm, self.memory, self.runner.state)
+
+
+def build(world: ArmWorld, rig: Mapping[str, Any], host: str, *, unlock_delay_s: float = 0.0) -> Bench:
+    """Everything that the host loop serves on `host`. ValueError when the rig's arm is none it can drive.
+
+    `unlock_delay_s`: for how long a protective stop refuses to be unlocked (5 s on a real controller).
+    """
+    tool = rig.get("tool", {})
+    installation = Installation(float(tool.get("mass_kg", 0.0)), tuple(tool.get("com_m", (0.0, 0.0, 0.0))))
+    controller = UrController(arm_controller(world, rig, unlock_delay_s=unlock_delay_s), Memory(installation))
+    verbs = Safety(controller)
+    ports = [
+        controller.port("rtde", host, RTDE_PORT, controller.rtde.accept),
+        controller.port("dashboard", host, DASHBOARD_PORT, controller.dashboard.accept),
+        *(controller.port(f"script-{port}", host, port, controller.script_wire) for port in SCRIPT_PORTS),
+    ]
+    return Bench(
+        [controller],
+        ports,
+        {
+            "robot.protective_stop": verbs.protective_stop,
+            "robot.unlock": verbs.unlock,
+            "robot.emergency_stop": verbs.emergency_stop,
+            "robot.silence": verbs.silence,
+            "robot.disconnect": controller.disconnect,
+            "robot.unlock_delay": verbs.unlock_delay,
+            "robot.remote_control": verbs.remote_control,
+            "robot.state": verbs.state,
+        },
+    )
+
+
+def arm_controller(world: ArmWorld, rig: Mapping[str, Any], *, unlock_delay_s: float = 0.0) -> ArmController:
+    """The motion controller alone, for use without a wire. ValueError as `build`."""
+    arm = NominalArm.from_rig(rig)
+    joints = rig["arm"]["joint"]
+    counts = [joint.get("encoder_counts") for joint in joints]
+    return ArmController(
+        world,
+        arm,
+        [joint.get("lower_rad", -FULL_TURN_RAD) for joint in joints],
+        [joint.get("upper_rad", FULL_TURN_RAD) for joint in joints],
+        reading_step_rad=max(FULL_TURN_RAD / count if count else 0.0 for count in counts),
+        unlock_delay_s=unlock_delay_s,
+    )
+
+
+class Safety:
+    """Side-channel verbs: what a person at the pendant, or a fault, would do."""
+
+    def __init__(self, controller: UrController) -> None:
+        self._controller = controller
+
+    def protective_stop(self) -> None:
+        self._controller.arm.protective_stop("side channel")
+
+    def unlock(self) -> bool:
+        """False while the controller still refuses."""
+        return self._controller.arm.unlock()
+
+    def emergency_stop(self, on: bool = True) -> None:
+        self._controller.arm.emergency_stop(on)
+
+    def silence(self, on: bool = True) -> None:
+        """RTDE stops streaming; connections stay open."""
+        self._controller.rtde.silent = on
+
+    def unlock_delay(self, seconds: float) -> None:
+        self._controller.arm.power.unlock_delay_s = float(seconds)
+
+    def remote_control(self, on: bool) -> None:
+        self._controller.dashboard.remote_control = on
+
+    def state(self) -> dict[str, str]:
+        """The states by name, and why the last program ended."""
+        power = self._controller.arm.power
+        return {
+            "robot_mode": power.robot_mode.name,
+            "safety_mode": power.safety_mode.name,
+            "runtime_state": self._controller.runner.state.name,
+            "last_error": self._controller.runner.last_error,
+        }

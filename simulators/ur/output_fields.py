@@ -1,0 +1,149 @@
+"""Every output variable a recipe may name: its type, and where the value comes from.
+
+Emulated are time, joints (position, speed, current, moment, temperature, mode), tool pose and speed, states, speed
+scaling, load, digital outputs and registers. target_current, target_moment and joint_control_output repeat the actual
+values. Plausible constants are: actual_current_window, actual_TCP_force and ft_raw_wrench (no contact), tool and base
+accelerations, analog inputs and outputs, digital inputs, tool inputs, voltages and robot current, momentum, execution
+times, accelerometer, elbow, Euromap67, encoder inputs, energies, collision and deviation ratios.
+Source of names and types: Universal Robots, "Real-Time Data Exchange (RTDE) Guide", table of controller outputs.
+"""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from simulators.ur.readout import Readout
+from simulators.ur.registers import N_BITS, N_REGISTERS, Registers
+
+Source = Callable[[Readout], float | Sequence[float]]
+
+
+@dataclass(frozen=True)
+class Field:
+    """A variable: its RTDE type, and its value in one cycle."""
+
+    type_name: str
+    read: Source
+    constant: float | tuple[float, ...] | None = None  # where the value is always the same
+
+
+ZERO3, ZERO6 = (0.0,) * 3, (0.0,) * 6
+
+
+LIVE: dict[str, Field] = {
+    "timestamp": Field("DOUBLE", lambda r: r.timestamp_s),
+    "control_step": Field("UINT64", lambda r: r.tick),
+    "target_q": Field("VECTOR6D", lambda r: r.target_q_rad),
+    "target_qd": Field("VECTOR6D", lambda r: r.target_qd_rad_s),
+    "target_qdd": Field("VECTOR6D", lambda r: r.target_qdd_rad_s2),
+    "target_current": Field("VECTOR6D", lambda r: r.current_a),
+    "target_moment": Field("VECTOR6D", lambda r: r.torque_nm),
+    "actual_q": Field("VECTOR6D", lambda r: r.q_rad),
+    "actual_qd": Field("VECTOR6D", lambda r: r.qd_rad_s),
+    "actual_current": Field("VECTOR6D", lambda r: r.current_a),
+    "actual_current_as_torque": Field("VECTOR6D", lambda r: r.torque_nm),
+    "joint_control_output": Field("VECTOR6D", lambda r: r.current_a),
+    "actual_TCP_pose": Field("VECTOR6D", lambda r: r.tool_pose),
+    "actual_TCP_speed": Field("VECTOR6D", lambda r: r.tool_speed),
+    "target_TCP_pose": Field("VECTOR6D", lambda r: r.target_tool_pose),
+    "target_TCP_speed": Field("VECTOR6D", lambda r: r.target_tool_speed),
+    "joint_temperatures": Field("VECTOR6D", lambda r: r.temperature_degC),
+    "joint_mode": Field("VECTOR6INT32", lambda r: r.joint_mode),
+    "robot_mode": Field("INT32", lambda r: r.arm.power.robot_mode),
+    "safety_mode": Field("INT32", lambda r: r.arm.power.safety_mode),
+    "safety_status": Field("INT32", lambda r: r.arm.power.safety_mode),
+    "runtime_state": Field("UINT32", lambda r: r.runtime),
+    "robot_status_bits": Field("UINT32", lambda r: r.robot_bits),
+    "safety_status_bits": Field("UINT32", lambda r: r.safety_bits),
+    "speed_scaling": Field("DOUBLE", lambda r: r.arm.speed_scaling),
+    "target_speed_fraction": Field("DOUBLE", lambda r: r.memory.speed_slider),
+    "tcp_offset": Field("VECTOR6D", lambda r: r.tool_offset),
+    "payload": Field("DOUBLE", lambda r: r.memory.installation.payload_kg),
+    "payload_cog": Field("VECTOR3D", lambda r: r.memory.installation.payload_cog_m),
+    "payload_inertia": Field("VECTOR6D", lambda r: r.memory.installation.payload_inertia_kg_m2),
+    "target_gravity": Field("VECTOR3D", lambda r: r.memory.installation.gravity_m_s2),
+    "actual_digital_output_bits": Field("UINT64", lambda r: r.memory.digital_outputs),
+    "actual_configurable_digital_output_bits": Field("UINT64", lambda r: (r.memory.digital_outputs >> 8) & 0xFF),
+    "output_bit_registers0_to_31": Field("UINT32", lambda r: r.memory.outputs.word(0)),
+    "output_bit_registers32_to_63": Field("UINT32", lambda r: r.memory.outputs.word(32)),
+    "input_bit_registers0_to_31": Field("UINT32", lambda r: r.memory.inputs.word(0)),
+    "input_bit_registers32_to_63": Field("UINT32", lambda r: r.memory.inputs.word(32)),
+}
+
+CONSTANT: dict[str, tuple[str, float | tuple[float, ...]]] = {
+    "actual_execution_time": ("DOUBLE", 0.0002),
+    "target_execution_time": ("DOUBLE", 0.002),
+    "actual_momentum": ("DOUBLE", 0.0),
+    "actual_main_voltage": ("DOUBLE", 48.0),
+    "actual_robot_voltage": ("DOUBLE", 48.0),
+    "actual_robot_current": ("DOUBLE", 0.6),
+    "actual_joint_voltage": ("VECTOR6D", (48.0,) * 6),
+    "actual_current_window": ("VECTOR6D", (1.0,) * 6),
+    "actual_TCP_force": ("VECTOR6D", ZERO6),
+    "ft_raw_wrench": ("VECTOR6D", ZERO6),
+    "wrench_calc_from_currents": ("VECTOR6D", ZERO6),
+    "tcp_force_scalar": ("DOUBLE", 0.0),
+    "actual_TCP_acceleration": ("VECTOR6D", ZERO6),
+    "target_TCP_acceleration": ("VECTOR6D", ZERO6),
+    "target_base_acceleration": ("VECTOR6D", ZERO6),
+    "target_base_wrench": ("VECTOR6D", ZERO6),
+    "actual_tool_accelerometer": ("VECTOR3D", (0.0, 0.0, 9.82)),
+    "elbow_position": ("VECTOR3D", ZERO3),
+    "elbow_velocity": ("VECTOR3D", ZERO3),
+    "actual_digital_input_bits": ("UINT64", 0),
+    "actual_configurable_digital_input_bits": ("UINT64", 0),
+    "analog_io_types": ("UINT32", 3),
+    "io_current": ("DOUBLE", 0.02),
+    "standard_analog_input0": ("DOUBLE", 0.0),
+    "standard_analog_input1": ("DOUBLE", 0.0),
+    "standard_analog_output0": ("DOUBLE", 0.0),
+    "standard_analog_output1": ("DOUBLE", 0.0),
+    "tool_mode": ("UINT32", 253),
+    "tool_analog_input_types": ("UINT32", 3),
+    "tool_analog_input0": ("DOUBLE", 0.0),
+    "tool_analog_input1": ("DOUBLE", 0.0),
+    "tool_output_voltage": ("INT32", 0),
+    "tool_output_current": ("DOUBLE", 0.0),
+    "tool_temperature": ("DOUBLE", 30.0),
+    "tool_output_mode": ("UINT8", 0),
+    "tool_digital_output0_mode": ("UINT8", 0),
+    "tool_digital_output1_mode": ("UINT8", 0),
+    "joint_position_deviation_ratio": ("DOUBLE", 0.0),
+    "collision_detection_ratio": ("DOUBLE", 0.0),
+    "time_scale_source": ("INT32", 0),
+    "script_control_line": ("UINT32", 0),
+    "encoder0_raw": ("INT32", 0),
+    "encoder1_raw": ("INT32", 0),
+    "euromap67_input_bits": ("UINT32", 0),
+    "euromap67_output_bits": ("UINT32", 0),
+    "euromap67_24V_voltage": ("DOUBLE", 0.0),
+    "euromap67_24V_current": ("DOUBLE", 0.0),
+    "actual_robot_energy_consumed": ("DOUBLE", 0.0),
+    "actual_robot_braking_energy_dissipated": ("DOUBLE", 0.0),
+}
+
+REGISTER = re.compile(r"(input|output)_(int|double|bit)_register_(\d+)")
+
+
+def output_field(name: str) -> Field | None:
+    """The variable of that name, None when there is none (the controller then answers NOT_FOUND)."""
+    if name in LIVE:
+        return LIVE[name]
+    if name in CONSTANT:
+        field_type, value = CONSTANT[name]
+        return Field(field_type, lambda r: value, value)
+    match = REGISTER.fullmatch(name)
+    return None if match is None else _register_field(match[1] == "input", match[2], int(match[3]))
+
+
+def _register_field(is_input: bool, kind: str, index: int) -> Field | None:
+    def side(readout: Readout) -> Registers:
+        return readout.memory.inputs if is_input else readout.memory.outputs
+
+    if kind == "int" and index < N_REGISTERS:
+        return Field("INT32", lambda r: side(r).ints[index])
+    if kind == "double" and index < N_REGISTERS:
+        return Field("DOUBLE", lambda r: side(r).doubles[index])
+    if kind == "bit" and 64 <= index < N_BITS:
+        return Field("BOOL", lambda r: side(r).bit(index))
+    return None

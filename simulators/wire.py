@@ -1,0 +1,76 @@
+"""The seams between a world, its instruments and the process that carries their bytes.
+
+An instrument is advanced by emulated time and never reads a clock. A wire is one client's connection to an
+instrument: bytes in, bytes out, no I/O. The host loop (simulators/host) owns sockets and pseudo-terminals.
+
+Each tick of TICK_S emulated seconds runs in this order:
+    instrument.before_step(t)      the controller sets its next set-point, ...
+    world.advance(t + TICK_S)      physics
+    instrument.after_step(t)       devices sample the new state
+    wire.due()                     what each open connection has to send now
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+TICK_S = 0.002  # one cycle of an e-Series controller, 500 Hz (reference: RTDE guide)
+
+
+class Wire(Protocol):
+    """One connection's protocol. Its docstring says what it does NOT imitate.
+
+    A wire of a TcpPort may have an attribute `closing`: once it is true and all bytes are sent, the host closes the
+    connection (dashboard `quit`, a controller that drops its clients). A wire that raises loses its connection.
+    """
+
+    def handle(self, data: bytes) -> bytes:
+        """Bytes from the client, in any split; returns the answer that is ready at once."""
+        ...
+
+    def due(self) -> bytes:
+        """Bytes to send that became due since the last call; the line's speed is modelled here."""
+        ...
+
+
+class Instrument(Protocol):
+    """A device over the world."""
+
+    name: str
+
+    def before_step(self, t_s: float) -> None: ...
+
+    def after_step(self, t_s: float) -> None: ...
+
+
+@dataclass(frozen=True)
+class SerialPort:
+    """A pseudo-terminal; `link` is a symbolic link that the host makes to it, so that a rig file can name it."""
+
+    name: str
+    wire: Wire
+    link: str | None = None
+
+
+@dataclass(frozen=True)
+class TcpPort:
+    """A listening socket; every client gets a wire of its own. `close` is told when a client has gone."""
+
+    name: str
+    host: str
+    port: int
+    accept: Callable[[], Wire]
+    closed: Callable[[Wire], None] = lambda wire: None
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Everything that the host loop serves: instruments, where clients reach them, and side-channel verbs.
+
+    `verbs` are called by the loopback side channel with JSON arguments, for example "fixture.place" with {"id": 2}.
+    What `emulate --json` prints is put together in simulators/serve.py from where the ports were opened.
+    """
+
+    instruments: Sequence[Instrument]
+    ports: Sequence[SerialPort | TcpPort]
+    verbs: Mapping[str, Callable[..., Any]] = field(default_factory=dict[str, Callable[..., Any]])

@@ -1,0 +1,93 @@
+"""The moving arm: MuJoCo, servo, reference and repeatability joined, one physics step at a time.
+
+When everything stands (reference arrived, gears seated, error and speed below what double precision can still
+change) the state is frozen: stepping on would move no joint by more than 1e-12 rad.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulators.world.engine import Engine
+from simulators.world.model import build_mjcf, torque_limits_nm
+from simulators.world.optics import Ray
+from simulators.world.reference import Reference
+from simulators.world.repeatability import Repeatability
+from simulators.world.rig import WorldRig
+from simulators.world.servo import Servo
+from simulators.world.truth import Truth
+
+Floats = NDArray[np.float64]
+STANDS_RAD = 1e-13
+STANDS_RAD_S = 1e-11  # dies out within about 1/150 s of the servo, so less than 1e-13 rad is still to come
+
+
+class ArmBody:
+    """Owns the physics state. Joint vectors are (n,), in joint order."""
+
+    def __init__(self, rig: WorldRig, truth: Truth, q_rad: Floats, rng: np.random.Generator) -> None:
+        n = len(truth.links)
+        self._engine = Engine(build_mjcf(rig, truth))
+        self._at, self._driven = self._engine.joint_addresses([f"joint{number}" for number in range(1, n + 1)])
+        self._laser_origin, self._laser_axes = self._engine.site("laser")
+        self._zero_rad: Floats = np.array(truth.joint_zero_rad)
+        self._reference = Reference(q_rad)
+        self._repeatability = Repeatability(rig.emulation.joint_repeatability_rad, n, rng)
+        self._servo = Servo(self._engine, self._driven, np.array(torque_limits_nm(rig.arm, rig.tool)))
+        self._engine.qpos[self._at] = q_rad + self._offset_rad()
+        self._engine.refresh()
+        self._servo.drive(np.zeros(n), np.zeros(n))
+        self.stands = True
+
+    def aim(self, q_rad: Floats) -> None:
+        """A new set-point, in the controller's own readings."""
+        if self._reference.aim(q_rad):
+            self._repeatability.setpoint_changed()
+            self.stands = False
+
+    def step(self) -> None:
+        """One physics step; afterwards all poses are those of the new joint angles."""
+        if self.stands:
+            return
+        self._reference.step()
+        self._repeatability.step(moving=not self._reference.arrived)
+        error_rad = self._reference.q_rad + self._offset_rad() - self.true_rad()
+        error_rad_s = self._reference.qd_rad_s - self.speed_rad_s()
+        self._servo.drive(error_rad, error_rad_s)
+        self._engine.step()
+        if self._reference.arrived and self._repeatability.seated:
+            self.stands = self._at_rest(error_rad)
+
+    def _at_rest(self, error_rad: Floats) -> bool:
+        """Every joint of the model, driven or not, has come to rest."""
+        return bool(np.abs(error_rad).max() < STANDS_RAD and np.abs(self._engine.qvel).max() < STANDS_RAD_S)
+
+    def true_rad(self) -> Floats:
+        """True joint angles, as an ideal encoder at the link would see them."""
+        return self._engine.qpos[self._at]
+
+    def reading_rad(self) -> Floats:
+        """What the controller's own sensors see: the truth less zero and repeatability."""
+        return self.true_rad() - self._offset_rad()
+
+    def speed_rad_s(self) -> Floats:
+        return self._engine.qvel[self._driven]
+
+    def torque_nm(self) -> Floats:
+        return self._servo.torque_nm
+
+    def beam(self) -> Ray:
+        """The laser in the base frame."""
+        x, y, z = self._laser_origin.tolist()
+        along = self._laser_axes.tolist()
+        return Ray(x, y, z, along[2], along[5], along[8])
+
+    def T_base_flange(self) -> Floats:
+        """The true flange pose, (4, 4)."""
+        origin_m, axes = self._engine.site("flange")
+        pose = np.eye(4)
+        pose[:3, :3] = axes.reshape(3, 3)
+        pose[:3, 3] = origin_m
+        return pose
+
+    def _offset_rad(self) -> Floats:
+        return self._zero_rad + self._repeatability.offset_rad

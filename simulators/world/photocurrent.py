@@ -1,0 +1,61 @@
+"""From light on a face to the four currents of a duo-lateral detector, with noise.
+
+    X1 + X2 = Y1 + Y2 = S = responsivity * absorbed power
+    x = (L/2) (X2 - X1) / (X1 + X2),   y likewise,   L the length of the face
+
+Source: On-Trak Photonics, "PSD theory", duo-lateral type (sign as in the DAQ protocol: X2 grows with x).
+
+Noise: what limits a spot in a workshop is not the amplifier but air and vibration, hence noise of position, the same
+at any brightness. One current with sigma s moves the position by (L/2)/S sqrt(2 (1 + u^2)) s with u = x / (L/2), so
+each current gets s = psd_noise S / ((L/2) sqrt(2 (1 + u^2))), which is also how an amplifier behind an automatic range
+behaves. White in time: sigma grows with the root of the sampling rate. A dark face has the noise of its amplifier.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulators.world.optics import Spot, Spots
+
+Floats = NDArray[np.float64]
+RESPONSIVITY_A_W = 0.4  # silicon at 635 nm; On-Trak duo-lateral data sheets, typical curve
+SATURATION_A = 500e-6  # an electrode's current ends here: range of the DAQ's transimpedance stage, above 1 mW full on
+DARK_NOISE_A = 2e-9  # sigma of one sample at 1 kHz in the dark; a few ppm of the range
+NOISE_RATE_HZ = 1000.0  # the rate for which psd_noise_m and DARK_NOISE_A are stated
+ELECTRODES = 8  # psd1 x1, x2, y1, y2, psd2 x1, x2, y1, y2
+
+
+class Photodetectors:
+    """Both detectors of a fixture: spots to mean currents and their noise, those to samples."""
+
+    def __init__(self, half_size_m: float, laser_power_w: float, noise_m: float) -> None:
+        self._half_size_m = half_size_m
+        self._full_a = RESPONSIVITY_A_W * laser_power_w
+        self._noise_of_range = noise_m / (half_size_m * math.sqrt(2.0))
+
+    def see(self, spots: Spots) -> Floats:
+        """(2, 8) A: mean currents, and the sigma of one sample of each at NOISE_RATE_HZ."""
+        first_a, first_sigma_a = self._four(spots.psd1)
+        second_a, second_sigma_a = self._four(spots.psd2)
+        return np.array((first_a + second_a, first_sigma_a + second_sigma_a))
+
+    def _four(self, spot: Spot | None) -> tuple[list[float], list[float]]:
+        """Means and sigmas of x1, x2, y1, y2."""
+        if spot is None or self._full_a == 0.0:
+            return [0.0] * 4, [DARK_NOISE_A] * 4
+        half_a = 0.5 * self._full_a * spot.share
+        u, v = spot.x_m / self._half_size_m, spot.y_m / self._half_size_m
+        sigma_a = 2.0 * half_a * self._noise_of_range
+        along_x_a, along_y_a = sigma_a / math.sqrt(1.0 + u * u), sigma_a / math.sqrt(1.0 + v * v)
+        return (
+            [half_a * (1.0 - u), half_a * (1.0 + u), half_a * (1.0 - v), half_a * (1.0 + v)],
+            [along_x_a, along_x_a, along_y_a, along_y_a],
+        )
+
+
+def sample_a(seen: Floats, rate_hz: float, rng: np.random.Generator) -> Floats:
+    """Noisy, clipped currents (sample, 8) A for what was seen, (sample, 2, 8) A; draws 8 numbers a sample, in order."""
+    noise = rng.standard_normal((len(seen), ELECTRODES))
+    noisy_a = seen[:, 0] + (rate_hz / NOISE_RATE_HZ) ** 0.5 * seen[:, 1] * noise
+    return np.minimum(np.maximum(noisy_a, -SATURATION_A), SATURATION_A)

@@ -1,0 +1,120 @@
+"""The part of a rig file that the emulated world is built from, checked and frozen.
+
+Keys that are not of the world (devices, motion, tolerance) are not looked at: misspelt ones are refused where the rig
+file itself is read. A missing deviation is zero, as a perfect arm would have it.
+"""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import msgspec
+
+from simulators.world.errors import WorldError
+
+Vector = tuple[float, float, float]
+Sigma = Annotated[float, msgspec.Meta(ge=0.0)]
+Positive = Annotated[float, msgspec.Meta(gt=0.0)]
+ZERO: Vector = (0.0, 0.0, 0.0)
+
+
+class Pose(msgspec.Struct, frozen=True):
+    """A frame in another: origin and rotation vector."""
+
+    origin_m: Vector = ZERO
+    rotation_rad: Vector = ZERO
+
+
+class Joint(msgspec.Struct, frozen=True):
+    """One axis and the link after it, standard Denavit-Hartenberg."""
+
+    a_m: float
+    alpha_rad: float
+    d_m: float
+    theta_offset_rad: float = 0.0
+    encoder_counts: Annotated[int, msgspec.Meta(ge=1)] | None = None
+    mass_kg: Sigma = 0.0
+    com_m: Vector = ZERO
+
+
+class Arm(msgspec.Struct, frozen=True):
+    """The arm as drawn."""
+
+    joint: Annotated[tuple[Joint, ...], msgspec.Meta(min_length=1)]
+    model: str = "dh"
+    gravity_m_s2: Vector = (0.0, 0.0, -9.81)
+    flange: Pose = Pose()
+
+
+class Tool(msgspec.Struct, frozen=True):
+    """What hangs at the flange: the laser and its holder."""
+
+    laser_origin_m: Vector
+    laser_direction: Vector
+    mass_kg: Sigma = 0.0
+    com_m: Vector = ZERO
+
+
+class Fixture(msgspec.Struct, frozen=True):
+    """Two square faces that see each other."""
+
+    half_size_m: Positive
+    psd2_in_psd1: Pose
+
+
+class Placement(msgspec.Struct, frozen=True):
+    """One place where the fixture can stand; id 0 means no fixture."""
+
+    id: Annotated[int, msgspec.Meta(ge=1)]
+    psd1_in_base: Pose
+
+
+class Emulation(msgspec.Struct, frozen=True):
+    """How far the truth lies from the drawing: one sigma, or the limit where the name says max."""
+
+    seed: Annotated[int, msgspec.Meta(ge=0)] = 0
+    time_scale: Positive = 1.0
+    length_sigma_m: Sigma = 0.0
+    angle_sigma_rad: Sigma = 0.0
+    joint_zero_max_rad: Sigma = 0.0
+    placement_origin_sigma_m: Sigma = 0.0
+    placement_rotation_sigma_rad: Sigma = 0.0
+    laser_origin_sigma_m: Sigma = 0.0
+    laser_direction_sigma_rad: Sigma = 0.0
+    joint_repeatability_rad: Sigma = 0.0
+    psd_noise_m: Sigma = 0.0
+    laser_power_w: Sigma = 1e-3  # class 2 pointer (IEC 60825-1: at most 1 mW)
+
+
+class WorldRig(msgspec.Struct, frozen=True):
+    """Everything the world wants to know, as believed; the deviations come on top."""
+
+    arm: Arm
+    tool: Tool
+    fixture: Fixture
+    placement: Annotated[tuple[Placement, ...], msgspec.Meta(min_length=1)]
+    emulation: Emulation = Emulation()
+
+
+def read_rig(rig: Mapping[str, Any]) -> WorldRig:
+    """The world's view of a rig as `tomllib` gives it. WorldError naming the key, or what cannot be emulated."""
+    try:
+        checked = msgspec.convert(dict(rig), type=WorldRig)
+    except msgspec.ValidationError as error:
+        raise WorldError(
+            f"rig file: {error}; the emulated world needs [arm], [tool], [fixture], [[placement]]"
+        ) from error
+    _refuse_what_cannot_be_built(checked)
+    return checked
+
+
+def _refuse_what_cannot_be_built(rig: WorldRig) -> None:
+    if rig.arm.model != "dh":
+        raise WorldError(f'rig file: arm.model = "{rig.arm.model}" cannot be emulated; write the arm as "dh"')
+    if not any(rig.tool.laser_direction):
+        raise WorldError(
+            "rig file: tool.laser_direction = [0, 0, 0] points nowhere; give a direction in the flange frame"
+        )
+    ids = [placement.id for placement in rig.placement]
+    for placement_id in ids:
+        if ids.count(placement_id) > 1:
+            raise WorldError(f"rig file: placement id {placement_id} stands twice; give every [[placement]] its own id")

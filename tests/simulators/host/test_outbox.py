@@ -1,0 +1,53 @@
+"""Bytes for a client that reads slowly, or never."""
+
+from simulators.host.outbox import ANSWER_LIMIT_BYTES, STREAM_LIMIT_BYTES, Outbox
+
+
+class Pipe:
+    """Takes as many bytes as there is room."""
+
+    def __init__(self, room: int) -> None:
+        self.room = room
+        self.taken = b""
+
+    def write(self, data: bytes) -> int:
+        if self.room == 0:
+            raise BlockingIOError
+        part = data[: self.room]
+        self.room -= len(part)
+        self.taken += part
+        return len(part)
+
+
+def test_what_does_not_fit_follows_in_order():
+    pipe = Pipe(3)
+    outbox = Outbox(pipe.write)
+    outbox.stream(b"abcdef")
+    outbox.stream(b"ghi")
+    assert (pipe.taken, outbox.empty) == (b"abc", False)
+    pipe.room = 100
+    outbox.flush()
+    assert (pipe.taken, outbox.empty) == (b"abcdefghi", True)
+
+
+def test_streamed_outputs_are_dropped_whole_when_too_much_waits():
+    pipe = Pipe(0)
+    outbox = Outbox(pipe.write)
+    package = bytes(1000)
+    for _ in range(100):
+        outbox.stream(package)
+    kept = STREAM_LIMIT_BYTES // 1000 + 1
+    assert outbox.dropped == 100 - kept
+    pipe.room = 10**6
+    outbox.flush()
+    assert len(pipe.taken) == 1000 * kept
+    outbox.stream(b"next")
+    assert pipe.taken.endswith(b"next")
+
+
+def test_answers_are_kept_when_the_stream_is_not_and_refused_in_the_end():
+    outbox = Outbox(Pipe(0).write)
+    outbox.stream(bytes(STREAM_LIMIT_BYTES + 1))
+    assert outbox.answer(b"yes")
+    assert outbox.answer(bytes(ANSWER_LIMIT_BYTES))
+    assert not outbox.answer(b"one too many")
