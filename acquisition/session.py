@@ -47,6 +47,11 @@ class Session:
         self._skipped = 0
         self._learned = 0
 
+    @property
+    def taken(self) -> int:
+        """Samples so far, also after the session was cut short."""
+        return len(self._samples)
+
     def run(self, placements: tuple[int, ...]) -> Summary:
         """Take every block of the plan. DeviceError, SpotLostError and the recording's errors end it."""
         plan = tuple(blocks(placements, self._learner.optics.half_size_m, self._options))

@@ -12,13 +12,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.bench import Look, Spot
+from acquisition.bench import Look
+from acquisition.psd_view import NO_LIGHT, PsdView, PsdWindow
 from acquisition.recording.rig_schema import Rig
 from acquisition.settling import SettleRule, settled_from
+from drivers.psd_daq.messages import FaceIdentity
+from drivers.psd_faces import FaceKind
 from simulators.wire import TICK_S
 from simulators.world.world import World
 
 Floats = NDArray[np.float64]
+
+DARK_A = 1e-6  # photocurrent below this is no light; a lit face gives tens of microamperes, a dark one nanoamperes
+TRANSIMPEDANCE_V_A = 1e4
 
 
 @dataclass
@@ -37,6 +43,8 @@ class DirectBench:
     def __post_init__(self) -> None:
         self.world.psd_rate(self.rate_hz)
         self._cmd_rad = self.world.joints().q_rad
+        face = FaceIdentity(FaceKind.DUO_LATERAL, 2.0 * self.half_size_m)
+        self._view = PsdView((face, face), TRANSIMPEDANCE_V_A)
 
     @property
     def standing_rad(self) -> Floats:
@@ -62,21 +70,17 @@ class DirectBench:
         self.moves += 1
 
     def look(self, dwell_s: float) -> Look:
-        times: list[Floats] = []
-        currents: list[Floats] = []
-        start_s: float | None = None
         begin_s = self.world.time_s
+        samples: list[tuple[Floats, Floats]] = []
         while True:
-            sampled_s, sampled_a = self._sample(max(dwell_s, 2.0 * self.rule.window_s))
-            times.append(sampled_s)
-            currents.append(sampled_a)
-            t, a = np.concatenate(times), np.concatenate(currents)
-            start_s = settled_from(t, self._spots_or_nan(a), self.rule)
-            late = t[-1] - begin_s > self.rule.limit_s + dwell_s
-            if late or (start_s is not None and t[-1] - start_s >= dwell_s):
-                first = start_s if start_s is not None else t[-1] - dwell_s
-                keep = (t >= first) & (t <= first + dwell_s)
-                return self._summed(t[keep], a[keep], settled=start_s is not None)
+            samples.append(self._sample(max(dwell_s, 2.0 * self.rule.window_s)))
+            window = self._window(samples)
+            last_s = float(window.device_s[-1])
+            start_s = settled_from(window.device_s, self._view.each(window), self.rule)
+            if start_s is not None and last_s - start_s >= dwell_s:
+                return self._summed(window.between(start_s, start_s + dwell_s), settled=True)
+            if start_s is None and last_s - begin_s > self.rule.limit_s + dwell_s:
+                return self._summed(window.between(last_s - dwell_s, last_s), settled=False)
 
     def place_fixture(self, placement: int) -> None:
         self.world.place_fixture(placement)
@@ -97,31 +101,28 @@ class DirectBench:
             currents.append(self.world.photocurrents_a(t))
         return np.concatenate(times), np.concatenate(currents)
 
-    def _spots_or_nan(self, currents_a: Floats) -> Floats:
-        pairs = currents_a.reshape(-1, 4, 2)
-        sums = pairs.sum(axis=2)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            spots = self.half_size_m * (pairs[:, :, 1] - pairs[:, :, 0]) / sums
-        return np.where(sums > LIT_A, spots, np.nan)
+    def _window(self, samples: list[tuple[Floats, Floats]]) -> PsdWindow:
+        t_s = np.concatenate([times for times, _ in samples])
+        current_a = np.concatenate([currents for _, currents in samples])
+        pair_a = current_a.reshape(-1, 2, 4).sum(axis=2) / 2.0
+        no_light = (pair_a < DARK_A) * np.array(NO_LIGHT)
+        return PsdWindow(t_s, t_s, current_a, no_light.sum(axis=1), np.full(len(t_s), self.world.psd_temperature_degC))
 
-    def _summed(self, t_s: Floats, currents_a: Floats, *, settled: bool) -> Look:
-        mean = self._spots_or_nan(currents_a.mean(axis=0, keepdims=True))[0]
-        each = self._spots_or_nan(currents_a)
-        sigma = each.std(axis=0, ddof=1) / math.sqrt(len(each))
-        sums_v = currents_a.mean(axis=0).reshape(2, 4).sum(axis=1) * SUM_V_PER_A
+    def _summed(self, window: PsdWindow, *, settled: bool) -> Look:
+        psd1, psd2 = self._view.mean(window)
         joints = self.world.joints()
-        faces = [
-            Spot(
-                float(mean[2 * k]), float(mean[2 * k + 1]), float(sums_v[k]), float(sigma[2 * k]),
-                float(sigma[2 * k + 1]), lit=bool(np.isfinite(mean[2 * k : 2 * k + 2]).all()),
-            )
-            for k in range(2)
-        ]
         temperatures = {f"joint{i + 1}": float(degC) for i, degC in enumerate(joints.temperature_degC)}
         return Look(
-            host_s=float(t_s[-1]), t_s=float(t_s.mean()), q_rad=joints.q_rad, qd_rad_s=joints.qd_rad_s,
-            cmd_rad=self._cmd_rad.copy(), encoder_rad=self.world.link_encoders_rad(), psd1=faces[0], psd2=faces[1],
-            temperatures_degC={"psd": self.world.psd_temperature_degC, **temperatures}, settled=settled,
+            host_s=float(window.host_s[-1]),
+            t_s=float(window.device_s.mean()),
+            q_rad=joints.q_rad,
+            qd_rad_s=joints.qd_rad_s,
+            cmd_rad=self._cmd_rad.copy(),
+            encoder_rad=self.world.link_encoders_rad(),
+            psd1=psd1,
+            psd2=psd2,
+            temperatures_degC={"psd": float(window.temperature_degC.mean()), **temperatures},
+            settled=settled,
         )
 
 
@@ -132,6 +133,3 @@ def direct_bench(rig: Rig, plain_rig: Mapping[str, Any], *, seed: int) -> Direct
     world = World.from_rig(plain_rig, seed=seed, q_rad=rig.motion.home_rad)
     return DirectBench(world, rig.fixture.half_size_m, rig.motion.speed_rad_s, rig.motion.acceleration_rad_s2)
 
-
-LIT_A = 1e-6  # per electrode pair; a lit face gives tens of microamperes, a dark one nanoamperes
-SUM_V_PER_A = 1e4  # the emulated box's transimpedance

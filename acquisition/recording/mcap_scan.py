@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import IO
 
 import zstandard
-from mcap.exceptions import McapError
+from mcap.exceptions import EndOfFile, McapError
 from mcap.records import Channel, Chunk, DataEnd, Header, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 
@@ -23,7 +23,6 @@ DAMAGE = (
     struct.error,
     zstandard.ZstdError,
     RuntimeError,
-    EOFError,
     KeyError,
     OverflowError,
     MemoryError,
@@ -53,7 +52,7 @@ class Scan:
             ) from error
 
     def _contents(self, file: IO[bytes], size: int) -> Iterator[Header | Schema | Channel | Message | Metadata]:
-        reader = StreamReader(_Exact(file), emit_chunks=True, validate_crcs=True, record_size_limit=size)  # pyright: ignore[reportArgumentType]
+        reader = StreamReader(file, emit_chunks=True, validate_crcs=True, record_size_limit=size)
         records = iter(reader.records)
         in_summary = False  # what follows the data repeats it
         while True:
@@ -84,19 +83,6 @@ class Scan:
                 yield record
 
 
-class _Exact:
-    """A file whose reads are never short: half a record is the end, not a record with a shorter text."""
-
-    def __init__(self, file: IO[bytes]) -> None:
-        self._file = file
-
-    def read(self, length: int) -> bytes:
-        data = self._file.read(length)
-        if len(data) < length:
-            raise EOFError(f"the file ends in the middle of a record, {length - len(data)} bytes are missing")
-        return data
-
-
 def _check_magic(path: Path, start: bytes, size: int) -> None:
     if start != b"\x89MCAP0\r\n":
         what = "the file is empty" if size == 0 else f"the file begins with {start[:8]!r}, not with MCAP's signature"
@@ -104,4 +90,6 @@ def _check_magic(path: Path, start: bytes, size: int) -> None:
 
 
 def _says(error: BaseException) -> str:
+    if isinstance(error, EndOfFile | struct.error):  # the parser's words for a record that is shorter than it says
+        return "the file ends too early"
     return str(error) or type(error).__name__

@@ -23,6 +23,7 @@ def faults(rig: Rig) -> Iterator[Fault]:
     yield from _placement_faults(rig)
     yield from _twice(("bar",), tuple(bar.id for bar in rig.bar_list))
     yield from _device_faults(rig)
+    yield from _motion_faults(rig)
 
 
 def _joint_faults(path: KeyPath, joint: Joint, model: ArmModel) -> Iterator[Fault]:
@@ -41,6 +42,24 @@ def _joint_faults(path: KeyPath, joint: Joint, model: ArmModel) -> Iterator[Faul
             (*path, "lower_rad"),
             f"lower_rad = {joint.lower_rad!r} is not below upper_rad = {joint.upper_rad!r}; exchange or correct them",
         )
+
+
+def _motion_faults(rig: Rig) -> Iterator[Fault]:
+    home_rad = rig.motion.home_rad
+    if home_rad is None:
+        return
+    if len(home_rad) != rig.n_joints:
+        yield (
+            ("motion", "home_rad"),
+            f"home_rad has {len(home_rad)} joint readings, but the arm has {rig.n_joints} joints; give one for each",
+        )
+        return
+    for index, (value, joint) in enumerate(zip(home_rad, rig.arm.joints, strict=True), start=1):
+        if not joint.lower_rad <= value <= joint.upper_rad:
+            yield (
+                ("motion", "home_rad"),
+                f"home_rad of joint {index} is {value!r}, outside its range {joint.lower_rad!r} to {joint.upper_rad!r}",
+            )
 
 
 def _laser_faults(rig: Rig) -> Iterator[Fault]:

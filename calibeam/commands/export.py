@@ -6,7 +6,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from acquisition.recording.folder import export, import_folder
+from acquisition.recording.folder import export
+from acquisition.recording.import_folder import import_folder
 from acquisition.recording.read import read
 
 

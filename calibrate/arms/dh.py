@@ -3,10 +3,11 @@
 T_i = Rz(q_i + theta_offset_i + zero_i) Tz(d_i + offset_i) Tx(a_i + length_i) Rx(alpha_i + twist_i) Ry(tilt_i),
 T_base_flange = T_1 ... T_n T_n_flange.
 Sources: Denavit, Hartenberg, J. Appl. Mech. 22, 1955; Hayati, Mirmirani, J. Robotic Systems 2(4), 1985 (tilt, there
-for near-parallel axes only). On a link with alpha = +-90 deg and a = 0 the tilt turns about the link's own joint
-axis: `joint.zero` and `link.tilt` then only add up, and the prior on the tilt limits the sigma of the zero.
+for near-parallel axes only). On a link with alpha = +-90 deg the tilt turns about an axis parallel to the link's own
+joint: zero and tilt then only add up. So there the tilt is held, and `joint.zero` is by definition the whole turn.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,7 @@ Floats = NDArray[np.float64]
 
 ZERO_PLAUSIBLE_RAD = 0.0785  # 4.5 deg: the bound of the point-constraint paper (Deng, Ding, Zhang 2019)
 PER_LINK = 5  # zero, offset, length, twist, tilt
+PARALLEL_COSINE = 0.9  # of the twist: within 25 deg of parallel a tilt is something of its own
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,9 @@ class DhArm:
         self._T_last_flange = np.eye(4) if T_last_flange is None else T_last_flange
         self.n_joints = len(links)
         self.parameters = tuple(
-            p for i in range(1, self.n_joints + 1) for p in _link_parameters(i, length_sigma_m, angle_sigma_rad)
+            p
+            for i, link in enumerate(links, start=1)
+            for p in _link_parameters(i, link, length_sigma_m, angle_sigma_rad)
         )
 
     def flange(self, theta: Floats, q_rad: Floats) -> Floats:
@@ -115,18 +119,19 @@ class DhArm:
         return _Frames(T, flange, angle)
 
 
-def _link_parameters(i: int, length_sigma_m: float, angle_sigma_rad: float) -> tuple[Parameter, ...]:
+def _link_parameters(i: int, link: DhLink, length_sigma_m: float, angle_sigma_rad: float) -> tuple[Parameter, ...]:
+    tilt_sigma_rad = angle_sigma_rad if abs(math.cos(link.alpha_rad)) > PARALLEL_COSINE else 0.0
     return (
         Parameter(f"joint{i}.zero", "rad", ZERO_PLAUSIBLE_RAD),
         _as_drawn(f"link{i}.offset", "m", length_sigma_m),
         _as_drawn(f"link{i}.length", "m", length_sigma_m),
         _as_drawn(f"link{i}.twist", "rad", angle_sigma_rad),
-        _as_drawn(f"link{i}.tilt", "rad", angle_sigma_rad),
+        _as_drawn(f"link{i}.tilt", "rad", tilt_sigma_rad),
     )
 
 
 def _as_drawn(name: str, unit: str, sigma: float) -> Parameter:
-    """Believed to `sigma`; exact, hence held, where the tolerance is zero."""
+    """Believed to `sigma`; held where that is zero."""
     if sigma > 0.0:
         return Parameter(name, unit, sigma, prior=sigma)
     return Parameter(name, unit, 1e-3, free=False)

@@ -35,8 +35,13 @@ def _paint_courses(figure: Figure, runs: Sequence[Trace], tolerance_m: float, pl
         axes.plot(np.maximum(run.error_m, 1e-8), "o-", color=tone.value, lw=1.0, ms=2.8, alpha=0.55)
     axes.axhline(tolerance_m, color=Tone.INK.value, lw=1.2, linestyle=(0, (4, 3)))
     axes.annotate(
-        f"wanted: {length(tolerance_m)}", (1.0, tolerance_m), xycoords=("axes fraction", "data"), xytext=(0, 4),
-        textcoords="offset points", ha="right", fontsize=9,
+        f"wanted: {length(tolerance_m)}",
+        (1.0, tolerance_m),
+        xycoords=("axes fraction", "data"),
+        xytext=(0, 4),
+        textcoords="offset points",
+        ha="right",
+        fontsize=9,
     )
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: length(value, 1)))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))

@@ -22,7 +22,7 @@ def join(*parts: str) -> Html:
     return Html("".join(escaped(part) for part in parts))
 
 
-def tag(name: str, *children: str, **attributes: str) -> Html:
+def tag(name: str, /, *children: str, **attributes: str) -> Html:
     """One element. `cls` stands for class, and an underscore in an attribute's name for a hyphen.
 
     >>> tag("p", "a < b", cls="note")
@@ -52,7 +52,9 @@ def panels(*figures: Html, cls: str = "panels") -> Html:
     return tag("div", *figures, cls=cls)
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[str]], *, numeric: Iterable[int] = (), caption: str = "") -> Html:
+def table(
+    head: Sequence[str], rows: Iterable[Sequence[str]], *, numeric: Iterable[int] = (), caption: str = ""
+) -> Html:
     """A table; `numeric` columns stand right-aligned. A row shorter than the head lets its last cell span the rest."""
     right = frozenset(numeric)
     cells = [tag("th", text, scope="col", cls="n" if i in right else "t") for i, text in enumerate(head)]

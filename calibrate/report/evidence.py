@@ -69,7 +69,9 @@ def evidence(recording: Recording, result: ZeroResult, angles: Angles) -> Eviden
             "identify this recording again"
         )
     finite = np.all(np.isfinite(result.theta)) and np.all(np.isfinite(result.residual_after_m))
-    return Evidence(recording, result, data, _expected(chain.by_joint(result.theta, data.q_rad), result, data) if finite else None)
+    return Evidence(
+        recording, result, data, _expected(chain.by_joint(result.theta, data.q_rad), result, data) if finite else None
+    )
 
 
 def _expected(by_joint: Floats, result: ZeroResult, data: Observations) -> Expected:

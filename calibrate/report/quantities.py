@@ -8,6 +8,7 @@ DIGIT_SPACE = "\N{FIGURE SPACE}"  # as wide as a digit
 POINT_SPACE = "\N{PUNCTUATION SPACE}"  # as wide as a point
 DASH = "\N{EN DASH}"
 
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 LENGTHS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
 ANGLES = ((1.0, "rad"), (1e-3, "mrad"), (1e-6, "µrad"), (1e-9, "nrad"))
 
@@ -20,13 +21,19 @@ def fixed(value: float, decimals: int) -> str:
 
 
 def significant(value: float, digits: int = 3) -> str:
-    """A number with so many significant digits, not in powers of ten between 1e-4 and 1e6."""
+    """A number with so many significant digits; '1.8 × 10⁻¹⁰' outside 1e-4 to 1e5."""
     if not math.isfinite(value) or value == 0.0:
         return DASH if not math.isfinite(value) else "0"
-    size = math.floor(math.log10(abs(value)))
-    if not -5 < size < 6:
-        return f"{value:.{digits - 1}e}".replace("-", MINUS)
+    mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
+    size = int(exponent)
+    if not -5 < size < 5:
+        return f"{mantissa} × {power_of_ten(size)}".replace("-", MINUS)
     return fixed(round(value, digits - 1 - size), max(0, digits - 1 - size))
+
+
+def power_of_ten(exponent: int) -> str:
+    """'10⁵', in plain text."""
+    return "10" + str(exponent).translate(RAISED)
 
 
 def length(value_m: float, digits: int = 3) -> str:
@@ -42,8 +49,35 @@ def angle(value_rad: float, digits: int = 3) -> str:
 def _in_unit(value: float, digits: int, units: Sequence[tuple[float, str]]) -> str:
     if not math.isfinite(value):
         return DASH
-    size, name = next(((s, n) for s, n in units if abs(value) >= s), units[-1])
+    size, name = _fitting(value, units)
     return f"{significant(value / size, digits)} {name}"
+
+
+def stated(value_m: float) -> str:
+    """A length that somebody chose, without digits that nobody chose: '5 µm'."""
+    size, name = _fitting(value_m, LENGTHS)
+    return f"{value_m / size:.6g} {name}"
+
+
+def doubted_length(value_m: float, sigma_m: float) -> str:
+    """A length with its doubt in one unit: '136 ± 17 nm'."""
+    return _doubted(value_m, sigma_m, LENGTHS)
+
+
+def doubted_angle(value_rad: float, sigma_rad: float) -> str:
+    """An angle with its doubt in one unit: '3.12 ± 0.16 µrad'."""
+    return _doubted(value_rad, sigma_rad, ANGLES)
+
+
+def _doubted(value: float, sigma: float, units: Sequence[tuple[float, str]]) -> str:
+    size, name = _fitting(value, units)
+    decimals = decimals_of(sigma / size)
+    return f"{fixed(value / size, decimals)} ± {fixed(sigma / size, decimals)} {name}"
+
+
+def _fitting(value: float, units: Sequence[tuple[float, str]]) -> tuple[float, str]:
+    """The largest unit of which there is at least one; rounding 999.7 nm up to 1000 nm is allowed for."""
+    return next(((s, n) for s, n in units if abs(value) >= 0.9995 * s), units[-1])
 
 
 def decimals_of(sigma: float) -> int:

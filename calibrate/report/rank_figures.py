@@ -77,7 +77,14 @@ def _paint_doubts(figure: Figure, zeros: Sequence[JointZero]) -> None:
         alone = total = None
     for row, zero in enumerate(zeros):
         if zero.sigma_rad is None:
-            axes.annotate("not determined", (0.01, row), xycoords=("axes fraction", "data"), va="center", fontsize=9, color=Tone.SOFT.value)
+            axes.annotate(
+                "not determined",
+                (0.01, row),
+                xycoords=("axes fraction", "data"),
+                va="center",
+                fontsize=9,
+                color=Tone.SOFT.value,
+            )
     axes.set_yticks(range(len(zeros)), [f"J{z.joint}" for z in zeros])
     axes.tick_params(axis="y", length=0, colors=Tone.INK.value)
     axes.set_ylim(len(zeros) - 0.5, -0.5)

@@ -5,11 +5,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from calibrate.believed import BelievedRig
 from calibrate.observations import Observations
 from calibrate.report.elements import Html
-from calibrate.report.evidence import Evidence
-from calibrate.report.rig_scene import face_poses, most_centred, struck_m
+from calibrate.report.rig_scene import FittedRig, most_centred
 from calibrate.report.svg import drawn
 from calibrate.report.tones import Tone
 
@@ -19,24 +17,26 @@ SHOWN = 40  # beams behind the two that stand out; more only blacken the picture
 IN_FRONT = 0.8  # of the distance between the faces: how much of the arriving beam is shown
 
 
-def reflection(evidence: Evidence, placement: int) -> Html:
+def reflection(rig: FittedRig, data: Observations, placement: int) -> Html:
     """Beams of one placement in the plane that is square to both faces."""
-    rig = BelievedRig(evidence.recording.rig, evidence.corrections)
     says = f"the two faces of the fixture at placement {placement} seen on edge, with the beam reflected between them"
-    return drawn("rig-close", says, 4.6, 4.4, lambda figure: _paint(figure, rig, evidence.data, placement))
+    return drawn("rig-close", says, 4.6, 4.4, lambda figure: _paint(figure, rig, data, placement))
 
 
-def _paint(figure: Figure, rig: BelievedRig, data: Observations, placement: int) -> None:
+def _paint(figure: Figure, rig: FittedRig, data: Observations, placement: int) -> None:
     axes = figure.add_subplot()
     axes.set_aspect("equal")
     axes.axis("off")
-    faces = face_poses(rig, placement)
+    faces = rig.faces(placement)
     origin_m, view = _on_edge(faces)
-    for rows, style in ((_behind(data, placement), {"lw": 0.6, "alpha": 0.22}), (_leading(data, placement), {"lw": 1.8})):
+    for rows, style in (
+        (_behind(data, placement), {"lw": 0.6, "alpha": 0.22}),
+        (_leading(data, placement), {"lw": 1.8}),
+    ):
         for pose in rows:
             _beam(axes, (_path(rig, data, pose) - origin_m) @ view * 1e3, int(data.first_psd[pose]), style)
     for number, T in enumerate(faces, start=1):
-        _face(axes, T, number, rig.fixture.half_size_m, origin_m, view)
+        _face(axes, T, number, rig.half_size_m, origin_m, view)
     _scale_bar(axes)
 
 
@@ -64,10 +64,10 @@ def _behind(data: Observations, placement: int) -> list[int]:
     return rows[:: max(1, -(-len(rows) // SHOWN))].tolist()
 
 
-def _path(rig: BelievedRig, data: Observations, pose: int) -> Floats:
+def _path(rig: FittedRig, data: Observations, pose: int) -> Floats:
     """(3, 3) m: some way in front of the first face, first spot, second spot."""
-    points = struck_m(rig, int(data.placement[pose]), int(data.first_psd[pose]), data.spots_m[pose])
-    _, direction = rig.beam(data.q_rad[pose])
+    points = rig.struck_m(int(data.placement[pose]), int(data.first_psd[pose]), data.spots_m[pose])
+    _, direction = rig.believed.beam(data.q_rad[pose])
     return np.stack([points[0] - IN_FRONT * float(np.linalg.norm(points[1] - points[0])) * direction, *points])
 
 

@@ -43,7 +43,12 @@ def _paint(
             for first, marker in MARKERS.items():
                 rows = (data.placement == place) & (data.first_psd == first)
                 axes.plot(
-                    number[rows], residual_m[rows, k] * scale, marker, ms=3.6, mfc="none", mew=1.0,
+                    number[rows],
+                    residual_m[rows, k] * scale,
+                    marker,
+                    ms=3.6,
+                    mfc="none",
+                    mew=1.0,
                     mec=tone_of(i).value,
                 )
         axes.set(ylim=(-limit, limit), ylabel=f"{COORDINATES[k]} ({unit})")
@@ -58,7 +63,9 @@ def quantiles(whitened: Floats) -> Html:
     Source: order statistics of n uniform numbers follow Beta(i, n + 1 - i) (David, Nagaraja, Order Statistics, 2003).
     """
     says = "ordered residuals in units of their noise against the quantiles of a normal law"
-    return drawn("residual-quantiles", says, 4.6, 3.9, lambda figure: _paint_quantiles(figure, np.sort(whitened.ravel())))
+    return drawn(
+        "residual-quantiles", says, 4.6, 3.9, lambda figure: _paint_quantiles(figure, np.sort(whitened.ravel()))
+    )
 
 
 def _paint_quantiles(figure: Figure, ordered: Floats) -> None:

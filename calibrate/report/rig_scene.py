@@ -6,10 +6,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.believed import BelievedRig
+from calibrate.dual_psd_rig import fixture_of
 from calibrate.observations import Observations
 from calibrate.report.evidence import Evidence
+from calibrate.rigid import pose_offset
+from calibrate.sensors.dual_psd import AXES
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FittedRig:
+    """The rig with everything that the fit corrected."""
+
+    believed: BelievedRig
+    T_psd1_psd2: Floats  # (4, 4)
+    half_size_m: float
+
+    def faces(self, placement: int) -> Floats:
+        """(2, 4, 4) T_base_psd1, T_base_psd2 of one placement."""
+        T_base_psd1 = self.believed.T_base_psd1(placement)
+        return np.stack([T_base_psd1, T_base_psd1 @ self.T_psd1_psd2])
+
+    def struck_m(self, placement: int, first_psd: int, spots_m: Floats) -> Floats:
+        """(2, 3) spots (4,) in the base frame, that of the face that is struck first in front."""
+        faces = self.faces(placement)
+        local = np.concatenate([spots_m.reshape(2, 2), np.zeros((2, 1))], axis=1)
+        points = np.einsum("fij,fj->fi", faces[:, :3, :3], local) + faces[:, :3, 3]
+        return points if first_psd == 1 else points[::-1]
+
+
+def fitted_rig(evidence: Evidence) -> FittedRig:
+    """DataError for an arm that has no single-pose model."""
+    rig, corrections = evidence.recording.rig, evidence.corrections
+    fixture = fixture_of(rig)
+    pair = pose_offset(np.array([corrections.get(f"psd2.{axis}", 0.0) for axis in AXES]))
+    return FittedRig(BelievedRig(rig, corrections), fixture.T_psd1_psd2 @ pair, fixture.half_size_m)
 
 
 @dataclass(frozen=True)
@@ -29,26 +61,17 @@ class Scene:
 
     arms: tuple[StandingArm, ...]  # one a placement
     faces_m: dict[int, Floats]  # placement -> (2, 4, 3) corners of PSD 1, PSD 2
-    normals: dict[int, Floats]  # placement -> (2, 3) outward
 
 
-def scene(evidence: Evidence) -> Scene:
-    """DataError for an arm that has no single-pose model."""
-    rig = BelievedRig(evidence.recording.rig, evidence.corrections)
-    half_m = rig.fixture.half_size_m
-    poses = {k: face_poses(rig, k) for k in evidence.places}
-    square = half_m * np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]])
+def scene(rig: FittedRig, data: Observations, places: tuple[int, ...]) -> Scene:
+    """One arm a placement, at its best centred pose, and all faces."""
+    h = rig.half_size_m
+    square = np.array([[h, h, 0.0], [-h, h, 0.0], [-h, -h, 0.0], [h, -h, 0.0]])
+    poses = {k: rig.faces(k) for k in places}
     return Scene(
-        tuple(standing(rig, evidence.data, most_centred(evidence.data, k)) for k in evidence.places),
+        tuple(_standing(rig, data, most_centred(data, k)) for k in places),
         {k: square @ np.swapaxes(T[:, :3, :3], 1, 2) + T[:, None, :3, 3] for k, T in poses.items()},
-        {k: T[:, :3, 2] for k, T in poses.items()},
     )
-
-
-def face_poses(rig: BelievedRig, placement: int) -> Floats:
-    """(2, 4, 4) T_base_psd1, T_base_psd2 of one placement."""
-    T_base_psd1 = rig.T_base_psd1(placement)
-    return np.stack([T_base_psd1, T_base_psd1 @ rig.fixture.T_psd1_psd2])
 
 
 def most_centred(data: Observations, placement: int, first_psd: int | None = None) -> int:
@@ -60,21 +83,12 @@ def most_centred(data: Observations, placement: int, first_psd: int | None = Non
     return int(np.argmin(np.where(wanted, off_m, np.inf)))
 
 
-def standing(rig: BelievedRig, data: Observations, pose: int) -> StandingArm:
-    """The arm at a recorded pose with its beam, which ends on the spots that were observed there."""
+def _standing(rig: FittedRig, data: Observations, pose: int) -> StandingArm:
     q_rad, placement, first = data.q_rad[pose], int(data.placement[pose]), int(data.first_psd[pose])
-    frames = rig.arm.frames(q_rad)
-    laser_m, _ = rig.beam(q_rad)
-    beam_m = np.stack([laser_m, *struck_m(rig, placement, first, data.spots_m[pose])])
+    frames = rig.believed.arm.frames(q_rad)
+    laser_m, _ = rig.believed.beam(q_rad)
+    beam_m = np.stack([laser_m, *rig.struck_m(placement, first, data.spots_m[pose])])
     return StandingArm(placement, first, _bones(frames, laser_m), frames[:-1, :3, 3], beam_m)
-
-
-def struck_m(rig: BelievedRig, placement: int, first_psd: int, spots_m: Floats) -> Floats:
-    """(2, 3) spots (4,) in the base frame, that of the face that is struck first in front."""
-    faces = face_poses(rig, placement)
-    local = np.concatenate([spots_m.reshape(2, 2), np.zeros((2, 1))], axis=1)
-    points = np.einsum("fij,fj->fi", faces[:, :3, :3], local) + faces[:, :3, 3]
-    return points if first_psd == 1 else points[::-1]
 
 
 def _bones(frames: Floats, laser_m: Floats) -> Floats:

@@ -32,9 +32,7 @@ def _paint(figure: Figure, data: Observations, psd: int, half_size_m: float, pla
     for number, place in enumerate(places):
         for direct, marker in ((True, "o"), (False, "^")):
             rows = (data.placement == place) & ((data.first_psd == psd) == direct)
-            axes.plot(
-                *spots_mm[rows].T, marker, ms=5.5, mfc="none", mec=tone_of(number).value, mew=1.3, clip_on=False
-            )
+            axes.plot(*spots_mm[rows].T, marker, ms=5.5, mfc="none", mec=tone_of(number).value, mew=1.3, clip_on=False)
     for spine in axes.spines.values():
         spine.set_visible(False)
     axes.set(xlim=(-1.06 * half_mm, 1.06 * half_mm), ylim=(-1.06 * half_mm, 1.06 * half_mm))

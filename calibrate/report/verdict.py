@@ -39,7 +39,9 @@ def verdict(evidence: Evidence) -> Verdict:
     if not found or result.status in (Status.NOT_FINITE, Status.OUT_OF_STEPS):
         return Verdict(Trust.NONE, "No joint zero was determined.", (result.status.value, *_doubts(evidence)))
     doubts = tuple(_doubts(evidence))
-    explained = f"The model explains the spots to {length(result.rms_after_m)} rms (before: {length(result.rms_before_m)})"
+    explained = (
+        f"The model explains the spots to {length(result.rms_after_m)} rms (before: {length(result.rms_before_m)})"
+    )
     if not doubts:
         return Verdict(Trust.GOOD, f"{_count(result)} {explained}; what remains is noise.", ())
     return Verdict(Trust.CARE, f"{_count(result)} {explained}, but use the numbers with care.", doubts)

@@ -31,7 +31,7 @@ def held_out_error(
     after = solve(train, start=theta, damping=NEAR_START)
     as_drawn = np.where([p.free for p in nominal], theta, start_values(nominal))
     before = solve(train.with_parameters(nominal), start=as_drawn)
-    if Status.CONVERGED not in (after.status,) or before.status is Status.NOT_FINITE:
+    if after.status is not Status.CONVERGED or before.status is Status.NOT_FINITE:
         return None
     return HeldOut(
         f"random {share:.0%} of the poses",

@@ -70,7 +70,9 @@ class ControlScript:
             self._begun, self._heard_s = True, t_s
             self._report(self._status.finished())
         if 0.0 < self._silence_limit_s < t_s - self._heard_s:
-            return False  # nobody at the other end: the script's watchdog stops the program
+            raise MoveRefused(
+                f"watchdog: no command for {t_s - self._heard_s:.2f} s, limit {self._silence_limit_s:.2f} s"
+            )
         self._watch_async()
         if self._wait is not None:
             if self._wait():

@@ -9,13 +9,14 @@ Source of names and types: Universal Robots, "Real-Time Data Exchange (RTDE) Gui
 """
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from simulators.ur.readout import Readout
 from simulators.ur.registers import N_BITS, N_REGISTERS, Registers
 
-Source = Callable[[Readout], float | Sequence[float]]
+Source = Callable[[Readout], Any]  # a number, or as many as the type is long
 
 
 @dataclass(frozen=True)

@@ -55,7 +55,7 @@ class OutputRecipe:
         """Appends a field's place; a constant is written once, here."""
         at, length = len(self._values), LENGTHS.get(field.type_name)
         if field.constant is not None:
-            self._values += [field.constant] if length is None else cast(tuple[float, ...], field.constant)
+            self._values += [field.constant] if length is None else list(cast(tuple[float, ...], field.constant))
             return
         self._values.extend([0.0] * (length or 1))
         if length is None:

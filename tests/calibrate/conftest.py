@@ -4,33 +4,22 @@ Nothing here uses calibrate, so that agreement means something.
 """
 
 import math
+import tomllib
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-# UR5e, standard D-H: d, a, alpha (Universal Robots, "DH Parameters for calculations of kinematics and dynamics")
-UR5E = np.array(
-    [
-        [0.1625, 0.0, math.pi / 2],
-        [0.0, -0.425, 0.0],
-        [0.0, -0.3922, 0.0],
-        [0.1333, 0.0, math.pi / 2],
-        [0.0997, 0.0, -math.pi / 2],
-        [0.0996, 0.0, 0.0],
-    ]
-)
-LASER_ORIGIN = np.array([0.0, 0.03, 0.05])
-LASER_DIRECTION = np.array([0.0, 1.0, 0.0])
-HALF_SIZE = 0.010
-PLACES = {
-    1: ([0.55, 0.10, 0.15], [0.0, 0.0, -math.pi / 2]),
-    2: ([0.45, -0.25, 0.30], [0.0, 0.0, -2.1]),
-    3: ([0.40, 0.35, 0.05], [0.0, 0.0, -1.0]),
-}
-PSD2 = ([0.0, 0.045886, 0.065532], [math.radians(110.0), 0.0, 0.0])
-LENGTH_SIGMA, ANGLE_SIGMA = 3e-4, 5e-4
+RIG = tomllib.loads((Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml").read_text())
+UR5E = np.array([[j["d_m"], j["a_m"], j["alpha_rad"]] for j in RIG["arm"]["joint"]])  # all theta offsets are zero
+LASER_ORIGIN = np.array(RIG["tool"]["laser_origin_m"])
+LASER_DIRECTION = np.array(RIG["tool"]["laser_direction"])
+HALF_SIZE = RIG["fixture"]["half_size_m"]
+PLACES = {k["id"]: tuple(k["psd1_in_base"].values()) for k in RIG["placement"]}
+PSD2 = tuple(RIG["fixture"]["psd2_in_psd1"].values())
+LENGTH_SIGMA, ANGLE_SIGMA = RIG["tolerance"]["length_m"], RIG["tolerance"]["angle_rad"]
 
 
 def pose(origin, rotation):
@@ -46,7 +35,7 @@ def axis_turn(axis, angle):
     return pose([0, 0, 0], vector)
 
 
-@dataclass
+@dataclass(eq=False)
 class Truth:
     """What the session truly was; `links` rows: d, a, alpha, tilt."""
 
@@ -92,6 +81,7 @@ def draw_truth(rng, zero_max=0.0349):
     links = np.column_stack([UR5E, np.zeros(6)])
     links[:, :2] += rng.normal(0, LENGTH_SIGMA, (6, 2))
     links[:, 2:] += rng.normal(0, ANGLE_SIGMA, (6, 2))
+    links[np.abs(np.cos(UR5E[:, 2])) < 0.9, 3] = 0.0  # between crossing axes a tilt is part of the joint's zero
     places = {
         k: pose(np.array(o) + rng.normal(0, 3e-3, 3), r) @ pose([0, 0, 0], rng.normal(0, 0.0087, 3))
         for k, (o, r) in PLACES.items()
@@ -103,7 +93,7 @@ def draw_truth(rng, zero_max=0.0349):
 
 
 def exact_truth():
-    """Everything as drawn, zeros too."""
+    """Everything as drawn, zeros too; a new one each time, since it can be changed."""
     places = {k: pose(*v) for k, v in PLACES.items()}
     return Truth(np.zeros(6), np.column_stack([UR5E, np.zeros(6)]), places, pose(*PSD2), LASER_ORIGIN, LASER_DIRECTION)
 
@@ -194,4 +184,4 @@ def ur5e_truth():
 
 @pytest.fixture(scope="session")
 def ur5e_exact():
-    return exact_truth()
+    return exact_truth

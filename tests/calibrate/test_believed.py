@@ -41,7 +41,7 @@ def test_nominal_rig_follows_the_ray_and_lights_both_faces(rig, sessions, ur5e_e
     angles = session.q_rad + session.truth.zeros
     for q, place, first in zip(angles, session.placement, session.first_psd, strict=True):
         expected = believed.expect(q, int(place), int(first))
-        np.testing.assert_allclose(expected.spots_m, ur5e_exact.spots(q, place, first), atol=1e-13)
+        np.testing.assert_allclose(expected.spots_m, ur5e_exact().spots(q, place, first), atol=1e-13)
     assert believed.expect(angles[0] + np.array([np.pi, 0, 0, 0, 0, 0]), 1, 1).light is not Light.BOTH_LIT
 
 

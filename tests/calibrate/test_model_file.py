@@ -61,7 +61,7 @@ def test_the_file_names_rig_software_rank_noise_and_proof(written):
     assert content["free"] - content["rank"] == len(content["unseen"]) == 2
     assert content["noise"]["joint_rad"] > 0.0
     assert content["held_out"]["rms_after_m"] < content["held_out"]["rms_before_m"]
-    assert len(content["covariance"]["rows"]) == len(content["covariance"]["names"]) == 50
+    assert len(content["covariance"]["rows"]) == len(content["covariance"]["names"]) == 47
 
 
 def test_corrections_of_the_file_predict_the_spots(identified, written):

@@ -26,7 +26,7 @@ CHUNK = 0x06  # MCAP specification, "Records"
 @pytest.fixture
 def whole(open_writer: Callable[..., RecordingWriter]) -> bytes:
     """A session of BATCHES flushes; in each ten samples of a stream, one settled sample and one event."""
-    with open_writer() as writer:
+    with open_writer(notes={"seed": "31415926"}) as writer:
         stream = writer.stream("psd", (Channel("spot_x_m", "m"),))
         rng = np.random.default_rng(5)
         for batch in range(BATCHES):
@@ -82,12 +82,19 @@ def test_of_a_torn_file_every_complete_batch_is_read(whole: bytes, tmp_path: Pat
         assert len(recording.samples) == len(recording.events) == batches
         if batches:
             assert recording.streams["psd"].sequence.tolist() == list(range(10 * batches))
-            assert recording.damage != ()
+            assert "the file ends too early" in recording.damage[0]
 
 
 def test_a_file_torn_before_its_rig_is_refused(whole: bytes, tmp_path: Path) -> None:
     for cut in range(0, whole.index(b"calibeam.notes") - 13, 7):  # 13: length of what precedes a name
         assert read_bytes(tmp_path / "torn.mcap", whole[:cut]) is None
+
+
+def test_half_a_note_is_no_note(whole: bytes, tmp_path: Path) -> None:
+    for cut in range(whole.index(b"calibeam.notes"), whole.index(b"calibeam.stream.psd")):
+        recording = read_bytes(tmp_path / "torn.mcap", whole[:cut])
+        assert recording is not None
+        assert recording.notes in ({}, {"seed": "31415926"})
 
 
 def test_a_flipped_bit_is_noticed_or_harmless(whole: bytes, tmp_path: Path) -> None:

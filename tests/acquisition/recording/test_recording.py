@@ -207,7 +207,8 @@ def test_the_caller_may_reuse_its_buffers(open_writer: Open) -> None:
         stream = writer.stream("psd", (SPOT,))
         stream.append(buffer, buffer, np.arange(4), {"spot_x_m": buffer})
         buffer[:] = -1.0
-    assert read(writer.path).streams["psd"].values["spot_x_m"].tolist() == [0.0, 1.0, 2.0, 3.0]
+    psd = read(writer.path).streams["psd"]
+    assert psd.values["spot_x_m"].tolist() == psd.host_s.tolist() == psd.device_s.tolist() == [0.0, 1.0, 2.0, 3.0]
 
 
 @pytest.mark.parametrize(

@@ -37,16 +37,9 @@ def centred(session, each):
 @pytest.fixture(scope="module")
 def exact(sessions, ur5e_exact):
     """Nothing off but the zeros, no noise."""
-    ur5e_exact.zeros = np.random.default_rng(1).uniform(-0.03, 0.03, 6)
-    return sessions(21, n=40, truth=Frozen(ur5e_exact), spread=0.0, places=(1,), joint_noise=0.0, psd_noise=0.0)
-
-
-class Frozen:
-    """A truth that can be part of a key."""
-
-    def __init__(self, truth):
-        self.__dict__.update(truth.__dict__)
-        self.flange, self.spots = truth.flange, truth.spots
+    truth = ur5e_exact()
+    truth.zeros = np.random.default_rng(1).uniform(-0.03, 0.03, 6)
+    return sessions(21, n=40, truth=truth, spread=0.0, places=(1,), joint_noise=0.0, psd_noise=0.0)
 
 
 def test_enough_poses_of_an_exact_rig_give_every_zero_but_the_first(rig, exact):
@@ -86,7 +79,7 @@ def test_drawing_errors_are_in_the_sigma(rig, sessions):
 
 
 def test_a_zero_at_its_bound_silences_the_whole_answer(rig, sessions, ur5e_exact):
-    truth = Frozen(ur5e_exact)
+    truth = ur5e_exact()
     truth.zeros = np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])  # beyond the bound of 0.0785
     session = sessions(22, n=40, truth=truth, spread=0.0, places=(1,), joint_noise=0.0, psd_noise=0.0)
     result = identify_by_point(arm_of(rig), laser_of(rig), centred(session, 5), DOUBT)

@@ -1,0 +1,45 @@
+"""`make bench`: every benchmark, or those named: `python -m benchmarks centring zeros`."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from acquisition.recording.rig import load_rig, plain_rig, rig_text
+from benchmarks import centring, zeros
+
+RIG = Path(__file__).parents[1] / "rigs" / "ur5e-dual-psd.toml"
+
+
+def run_centring() -> None:
+    rig, plain = load_rig(RIG), plain_rig(rig_text(RIG), str(RIG))
+    print("centring from 100 random starts, fixture pose wrong by up to 80 deg and 50 mm, orders alternating")
+    print("\n".join(centring.lines(centring.run(rig, plain))))
+    print("\n".join(centring.search_lines(centring.run_search(rig, plain))))
+
+
+def run_zeros() -> None:
+    rig, text = load_rig(RIG), rig_text(RIG)
+    print("joint zeros of 20 concealed truths, deviation from the truth in stated sigmas")
+    results: list[zeros.SeedResult] = []
+    for result in zeros.run(rig, plain_rig(text, str(RIG)), text, range(1, 21)):
+        results.append(result)
+        print(zeros.line(result), flush=True)
+    print(zeros.summary_line(results))
+
+
+BENCHMARKS: dict[str, Callable[[], None]] = {"centring": run_centring, "zeros": run_zeros}
+
+
+def main(names: list[str]) -> int:
+    unknown = [name for name in names if name not in BENCHMARKS]
+    if unknown:
+        print(f"no benchmark named {', '.join(unknown)}; there are {', '.join(BENCHMARKS)}", file=sys.stderr)
+        return 2
+    for name in names or BENCHMARKS:
+        print(f"--- {name}")
+        BENCHMARKS[name]()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

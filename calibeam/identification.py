@@ -1,0 +1,89 @@
+"""From a recording to joint zeros, by both methods: the full dual-PSD model, and the source's four-pose point constraint."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.recording.recording import Recording
+from acquisition.recording.rig import rig_sha256
+from acquisition.recording.rig_schema import Rig
+from calibrate.arms.catalogue import arm_of
+from calibrate.dual_psd_rig import believed_noise, dual_psd_chain, laser_of
+from calibrate.model_file import RigIdentity, model_of, write_model
+from calibrate.observations import Observations
+from calibrate.read_samples import observations
+from calibrate.zeros.identify import identify
+from calibrate.zeros.point_constraint import (
+    CENTRED_M,
+    DrawingDoubt,
+    PointConstraintResult,
+    identify_by_four_poses,
+)
+from calibrate.zeros.result import ZeroResult
+
+SPLIT_SEED = 1  # of the held-out poses: fixed, so that the same recording always gives the same report
+
+
+@dataclass(frozen=True)
+class Identified:
+    """What both methods say. `four_poses` is None where the recording has no two centred poses of each order."""
+
+    zeros: ZeroResult
+    four_poses: PointConstraintResult | None
+
+
+def identify_recording(recording: Recording) -> Identified:
+    """Joint zeros of a dual-PSD recording. DataError when it holds nothing to fit."""
+    data, rig = observations(recording.samples), recording.rig
+    chain = dual_psd_chain(rig, data.placement, data.first_psd)
+    zeros = identify(chain, data, believed_noise(rig), rng=np.random.default_rng(SPLIT_SEED))
+    return Identified(zeros, _four_poses(rig, data))
+
+
+def write_identified(identified: Identified, recording: Recording, path: Path) -> None:
+    """model.json of the full model."""
+    identity = RigIdentity(recording.rig.name, rig_sha256(recording.rig_text))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_model(path, model_of(identified.zeros, identity, recording.rig.arm.model.value))
+
+
+def _four_poses(rig: Rig, data: Observations) -> PointConstraintResult | None:
+    rows = four_centred_poses(data)
+    if rows is None:
+        return None
+    noise, tolerance = believed_noise(rig), rig.tolerance
+    doubt = DrawingDoubt(
+        # A centred line at the fixture stands off by what the detectors and, over half a metre of arm, the joints allow.
+        line_m=float(np.hypot(noise.psd_m, 0.5 * np.sqrt(rig.n_joints) * noise.joint_rad)),
+        length_m=tolerance.length_m if tolerance is not None else 0.0,
+        angle_rad=tolerance.angle_rad if tolerance is not None else 0.0,
+    )
+    return identify_by_four_poses(arm_of(rig), laser_of(rig), data.select(rows), doubt)
+
+
+def four_centred_poses(data: Observations) -> NDArray[np.intp] | None:
+    """Rows of two centred poses of each order at one placement, the two of an order as different as there are.
+
+    In the order of the source: 1, 2 with PSD 1 first, 3, 4 with PSD 2 first. None where no placement has them.
+    """
+    centred = np.all(np.abs(data.spots_m) < CENTRED_M, axis=1)
+    for placement in np.unique(data.placement):
+        pairs = [
+            _most_different(data, np.flatnonzero(centred & (data.placement == placement) & (data.first_psd == first)))
+            for first in (1, 2)
+        ]
+        if pairs[0] is not None and pairs[1] is not None:
+            return np.array([*pairs[0], *pairs[1]], dtype=np.intp)
+    return None
+
+
+def _most_different(data: Observations, rows: NDArray[np.intp]) -> tuple[int, int] | None:
+    if len(rows) < 2:
+        return None
+    apart = np.linalg.norm(data.q_rad[rows][:, None] - data.q_rad[rows][None], axis=2)
+    i, j = np.unravel_index(int(np.argmax(apart)), apart.shape)
+    if apart[i, j] < 0.01:  # repeats of one pose are one pose
+        return None
+    return int(rows[i]), int(rows[j])

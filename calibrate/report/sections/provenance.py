@@ -1,0 +1,38 @@
+"""The chapter that lets a result be traced: versions, seeds, the rig to the letter."""
+
+from acquisition.recording.recording import Recording
+from acquisition.recording.rig import rig_sha256
+from calibrate.report.elements import Html, facts, folded, section, tag
+from calibrate.report.evidence import Evidence
+from calibrate.report.quantities import significant
+
+TITLE = "Provenance"
+
+
+def provenance(evidence: Evidence) -> Html:
+    """Everything needed to do it again."""
+    recording, result = evidence.recording, evidence.result
+    samples = recording.samples
+    span_s = float(samples.column("t_s").max() - samples.column("t_s").min()) if len(samples) else 0.0
+    pairs = [
+        ("recording", recording.path.name),
+        ("state", _state(recording)),
+        ("settled samples", f"{len(samples)}, of which {result.n_poses} with both spots, over {significant(span_s)} s"),
+        ("started (UTC)", recording.started_utc or "not stated"),
+        ("recorded by", _by(recording)),
+        ("identified by", f"{result.software}, {result.steps} steps"),
+        ("rig", recording.rig.name),
+        ("rig SHA-256", rig_sha256(recording.rig_text)),
+        *((f"note: {name}", text) for name, text in recording.notes.items()),
+    ]
+    rig_text = folded("Rig file, as recorded", tag("pre", recording.rig_text))
+    return section("provenance", TITLE, "What it takes to do it again.", facts(pairs), rig_text)
+
+
+def _state(recording: Recording) -> str:
+    return "complete" if recording.complete else "cut short or damaged"
+
+
+def _by(recording: Recording) -> str:
+    software = recording.software or "not stated"
+    return f"{software} on {recording.host}" if recording.host else software

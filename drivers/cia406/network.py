@@ -1,0 +1,74 @@
+"""The CAN bus of the driver: python-can with a limit on every wait, canopen for SDO and NMT on top.
+
+python-can and canopen raise CanError, OSError and pyserial's exceptions when an adapter has gone: here they become
+DeviceLost, with the cause kept.
+"""
+
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import can
+import canopen
+from serial import SerialException
+
+from drivers.errors import DeviceLost
+
+SEND_LIMIT_S = 0.5  # an adapter that takes no frame for so long has stopped
+LISTEN_S = 0.02  # how soon the listening thread of the set-up ends when told
+SLCAN_SETTLE_S = 0.05  # python-can waits 2 s by default, for boards that reset when opened; ours need not
+GONE = (can.CanError, SerialException, OSError)
+
+OpenBus = Callable[[], can.BusABC]
+
+
+class BoundedNetwork(canopen.Network):
+    """canopen's network whose sending never waits without limit, as its own does on a full serial port."""
+
+    def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
+        message = can.Message(arbitration_id=can_id, is_extended_id=can_id > 0x7FF, data=data, is_remote_frame=remote)
+        if self.bus is None:
+            raise can.CanOperationError("the bus is closed")
+        with self.send_lock:
+            self.bus.send(message, SEND_LIMIT_S)
+        self.check()
+
+
+def bus_opener(interface: str, channel: str, bitrate: int, options: Mapping[str, Any] | None = None) -> OpenBus:
+    """How to open a bus of any python-can interface, from these arguments only: no configuration file is read."""
+    settings: dict[str, Any] = {"sleep_after_open": SLCAN_SETTLE_S} if interface == "slcan" else {}
+    settings |= options or {}
+
+    def open_bus() -> can.BusABC:
+        return can.Bus(channel, interface=interface, bitrate=bitrate, ignore_config=True, **settings)
+
+    return open_bus
+
+
+def opened(open_bus: OpenBus, name: str) -> can.BusABC:
+    """The open bus. DeviceLost naming the cause when there is none."""
+    try:
+        return open_bus()
+    except (*GONE, ValueError, ImportError, NotImplementedError) as cause:
+        raise DeviceLost(
+            f"{name}: the CAN bus cannot be opened ({cause}); check adapter, interface, channel and bitrate in the rig file"
+        ) from cause
+
+
+@contextmanager
+def lost_as_device_lost(name: str, doing: str) -> Generator[None]:
+    """Converts what python-can raises when its adapter has gone."""
+    try:
+        yield
+    except GONE as cause:
+        raise DeviceLost(f"{name}: CAN adapter gone while {doing} ({cause}); check its cable and power") from cause
+
+
+@contextmanager
+def listening(network: canopen.Network, bus: can.BusABC, also: Callable[[can.Message], None]) -> Generator[None]:
+    """Answers reach canopen for as long as this lasts, by a thread that ends with it; `also` sees every frame."""
+    notifier = can.Notifier(bus, [*network.listeners, also], LISTEN_S)
+    try:
+        yield
+    finally:
+        notifier.stop(10 * LISTEN_S)

@@ -1,0 +1,235 @@
+"""Moves a UR arm through ur_rtde, which runs in a child process that may hang or crash without harm.
+
+    control = UrControl("192.168.0.10"); control.connect(); control.move_joints(q_rad, 1.0, 3.0); control.close()
+
+How a stop reaches the arm: the child watches a line of its own for it and brakes; if it does not answer within tenths,
+the program is stopped through the dashboard, which needs neither the child nor RTDE. If that fails too, the child is killed
+and the controller's watchdog, which nobody kicks any more, ends the program.
+After any fault the child is killed: call `connect` again, it starts a new one.
+"""
+
+import contextlib
+import math
+import threading
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from drivers.clock import Clock, SystemClock
+from drivers.device import Floats
+from drivers.errors import DeviceError, DeviceLost, DeviceRefused
+from drivers.ur.control_link import (
+    Ended,
+    MoveJoints,
+    MoveLine,
+    Outcome,
+    Ready,
+    Request,
+    ServoJoints,
+    ServoStop,
+)
+from drivers.ur.dashboard import UrDashboard
+from drivers.ur.supervised import SupervisedChild
+
+CONNECT_LIMIT_S = 15.0  # ur_rtde itself waits 5 s for its program to run
+MARGIN_S = 3.0  # settling, round trips, a busy machine
+SLOWEST_SPEED_SLIDER = 0.1  # an operator may slow the arm down to this without making a move fail
+FULL_RANGE_RAD = 4.0 * math.pi  # -360..360 deg: the longest way of a joint
+LONGEST_LINE_M = 2.7  # across the sphere that the longest arm of the series reaches (UR10e: 1.3 m)
+STOP_DECELERATION_RAD_S2 = 5.0  # from 1 rad/s within 0.1 rad; feels right for a laser on the flange
+N_JOINTS = 6
+
+
+class UrControl:
+    """A `Movable`. One thread moves, any thread may stop."""
+
+    def __init__(
+        self,
+        host: str,
+        *,
+        name: str = "robot",
+        watchdog_hz: float = 1.0,
+        dashboard: UrDashboard | None = None,
+        clock: Clock | None = None,
+    ) -> None:
+        """`watchdog_hz`: the arm stops when this program was silent for one period of it."""
+        self.name = name
+        self.ready: Ready | None = None  # how long the last connect took
+        self._host, self._watchdog_hz = host, watchdog_hz
+        self._clock: Clock = clock or SystemClock()
+        self._dashboard = dashboard or UrDashboard(host)
+        self._child: SupervisedChild | None = None
+        self._calling = threading.Lock()
+        self._stopping = threading.Lock()
+        self._q_rad: Floats | None = None  # where the last move ended, when known
+
+    @property
+    def place(self) -> str:
+        return f"{self.name} at {self._host}"
+
+    def connect(self, limit_s: float = CONNECT_LIMIT_S) -> None:
+        """Starts the child and the control program.
+
+        DeviceRefused: stopped, switched off, or not in remote control. DeviceLost, DeviceStale: no controller there.
+        """
+        self.close()
+        self._check_state()
+        child = SupervisedChild(self._host, self._watchdog_hz, self.place, self._clock)
+        try:
+            answer = child.wait_ready(limit_s)
+            if isinstance(answer, Ended):
+                raise DeviceRefused(f"{self.place}: no control: {answer.text}; look at the pendant, then connect again")
+        except BaseException:
+            child.kill()
+            raise
+        self.ready, self._child = answer, child
+
+    def move_joints(self, q_rad: ArrayLike, speed_rad_s: float, acceleration_rad_s2: float) -> None:
+        """To joint readings (6,) in rad; blocks until the arm has arrived.
+
+        DeviceRefused: stopped meanwhile (the message says by what), or the controller does not take the numbers.
+        DeviceLost, DeviceStale: no control any more; the arm was told to stop by another way.
+        """
+        target_rad = _six_numbers(q_rad, "q_rad")
+        _check_rates(speed_rad_s, acceleration_rad_s2)
+        way_rad = FULL_RANGE_RAD if self._q_rad is None else float(np.abs(target_rad - self._q_rad).max())
+        self._q_rad = None
+        request = MoveJoints(target_rad.tolist(), speed_rad_s, acceleration_rad_s2)
+        self._call(request, _limit_s(way_rad, speed_rad_s, acceleration_rad_s2))
+        self._q_rad = target_rad
+
+    def move_linear(self, pose: ArrayLike, speed_m_s: float, acceleration_m_s2: float) -> None:
+        """The tool straight to [x, y, z, rx, ry, rz] (m, rotation vector, base frame). Raises as `move_joints`."""
+        target = _six_numbers(pose, "pose")
+        _check_rates(speed_m_s, acceleration_m_s2)
+        self._q_rad = None
+        way_m = max(LONGEST_LINE_M, speed_m_s * FULL_RANGE_RAD)  # a pure turn goes at about 1 rad/s
+        self._call(
+            MoveLine(target.tolist(), speed_m_s, acceleration_m_s2), _limit_s(way_m, speed_m_s, acceleration_m_s2)
+        )
+
+    def servo_joints(
+        self, q_rad: ArrayLike, period_s: float = 0.002, lookahead_s: float = 0.1, gain: float = 300.0
+    ) -> None:  # noqa: E501
+        """One set-point (6,) of a stream; returns at once. End the stream with `servo_stop`. Raises as `move_joints`."""
+        self._q_rad = None
+        target_rad = _six_numbers(q_rad, "q_rad")
+        self._call(ServoJoints(target_rad.tolist(), period_s, lookahead_s, gain), MARGIN_S)
+
+    def servo_stop(self, deceleration_rad_s2: float = STOP_DECELERATION_RAD_S2) -> None:
+        """Ends a stream of set-points; blocks until the arm stands. Raises as `move_joints`."""
+        self._call(ServoStop(deceleration_rad_s2), MARGIN_S)
+
+    def stop(self) -> None:
+        """Brakes, from any thread and in every state; a move that is under way ends with DeviceRefused.
+
+        DeviceLost when no way to the controller is left: press the emergency stop.
+        """
+        with self._stopping:
+            child = self._child
+            if child is None or not child.stop(STOP_DECELERATION_RAD_S2):
+                self._stop_independently(child)
+
+    def close(self) -> None:
+        """Ends the control program and the child; safe in every state and more than once."""
+        child, self._child = self._child, None
+        self._q_rad = None
+        if child is not None:
+            child.close()
+
+    # --- inside
+
+    def _call(self, request: Request, limit_s: float) -> None:
+        with self._calling:
+            child = self._child
+            if child is None:
+                raise DeviceLost(f"{self.place}: not connected; call connect() first")
+            try:
+                ended = child.call(request, limit_s)
+            except DeviceError:
+                self._give_up(child)
+                raise
+            if ended.outcome is not Outcome.DONE:
+                raise self._explained(child, ended)
+
+    def _explained(self, child: SupervisedChild, ended: Ended) -> DeviceError:
+        match ended.outcome:
+            case Outcome.STOPPED:
+                return DeviceRefused(f"{self.place}: the motion was ended by stop()")
+            case Outcome.DISCONNECTED:
+                self._give_up(child)
+                return DeviceLost(
+                    f"{self.place}: ur_rtde has lost the controller; check power and cable, then connect again"
+                )
+            case Outcome.NOT_RUNNING:
+                self._give_up(child)
+                return self._why_not_running()
+            case _:
+                return DeviceRefused(f"{self.place}: {ended.text}")
+
+    def _why_not_running(self) -> DeviceError:
+        """What the dashboard says about it."""
+        try:
+            self._check_state()
+        except DeviceError as error:
+            return error
+        return DeviceRefused(
+            f"{self.place}: the control program was stopped (pendant, dashboard, stop() or watchdog); connect again"
+        )
+
+    def _check_state(self) -> None:
+        state = self._dashboard.state()
+        if state.safety_status != "NORMAL":
+            raise DeviceRefused(f"{self.place}: safety is {state.safety_status}; {_remedy(state.safety_status)}")
+        if state.robot_mode != "RUNNING":
+            raise DeviceRefused(
+                f"{self.place}: the arm is in {state.robot_mode}; power it on and release the brakes, then connect again"
+            )
+        if not state.remote_control:
+            raise DeviceRefused(f"{self.place}: it is in local control; switch to remote control on the pendant")
+
+    def _give_up(self, child: SupervisedChild) -> None:
+        """The arm stopped by the other way, the child killed."""
+        with contextlib.suppress(DeviceError):
+            self._dashboard.stop()
+        self._drop(child)
+
+    def _stop_independently(self, child: SupervisedChild | None) -> None:
+        try:
+            self._dashboard.stop()
+        except DeviceError as error:
+            raise DeviceLost(
+                f"{self.place}: neither ur_rtde nor the dashboard takes the stop; the watchdog ends the program within "
+                f"{1.0 / self._watchdog_hz:.3g} s: press the emergency stop if the arm moves"
+            ) from error
+        finally:
+            if child is not None:
+                self._drop(child)
+
+    def _drop(self, child: SupervisedChild) -> None:
+        if self._child is child:
+            self._child = None
+        child.kill()
+
+
+def _six_numbers(values: ArrayLike, what: str) -> Floats:
+    array = np.array(values, dtype=np.float64)
+    if array.shape != (N_JOINTS,) or not np.isfinite(array).all():
+        raise ValueError(f"{what} = {array.tolist()}: six finite numbers are needed")
+    return array
+
+
+def _check_rates(speed: float, acceleration: float) -> None:
+    if not (0.0 < speed < math.inf and 0.0 < acceleration < math.inf):
+        raise ValueError(f"speed {speed}, acceleration {acceleration}: both must be positive and finite")
+
+
+def _limit_s(way: float, speed: float, acceleration: float) -> float:
+    """How long a move over at most `way` may take: trapezoidal time law, slowed down by the operator's slider."""
+    return (way / speed + speed / acceleration) / SLOWEST_SPEED_SLIDER + MARGIN_S
+
+
+def _remedy(safety_status: str) -> str:
+    if "EMERGENCY" in safety_status:
+        return "release the emergency stop, power on and release the brakes on the pendant, then connect again"
+    return "clear the cause, unlock on the pendant, then connect again"

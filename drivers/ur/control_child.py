@@ -1,0 +1,202 @@
+"""The child process that holds ur_rtde's control object: it may hang or crash there without taking anything with it.
+
+    python -m drivers.ur.control_child HOST CALLS_FD STOPS_FD WATCHDOG_HZ
+
+Every motion is started asynchronously and watched, so that a stop never waits behind it. When the parent has gone, the
+child stops the arm and ends; when the child has gone, the controller's watchdog stops the arm.
+"""
+
+import os
+import select
+import signal
+import socket
+import sys
+import time
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+from drivers.ur.control_link import (
+    Alive,
+    Close,
+    Ended,
+    Link,
+    MoveJoints,
+    MoveLine,
+    Outcome,
+    Ready,
+    Request,
+    ServoJoints,
+    ServoStop,
+    Stop,
+)
+
+WATCH_S = 0.001  # between two looks at a running motion; the control object itself learns of its end every 2 ms
+ALIVE_S = 0.1  # the parent gives up after many of these
+KICKS_PER_WATCHDOG = 20  # kicks in the time that the watchdog allows, so that a busy machine may miss many
+NO_REAL_TIME_PRIORITY = -1  # the control object would otherwise try to raise its own priority
+DEFAULT_FREQUENCY = -1.0
+CAP_PORT = 50002  # of ur_rtde's constructor; not used without the URCap flag
+
+
+class Control(Protocol):
+    """The part of rtde_control.RTDEControlInterface that is used here."""
+
+    def moveJ(self, q: Sequence[float], speed: float, acceleration: float, asynchronous: bool) -> bool: ...
+    def moveL(self, pose: Sequence[float], speed: float, acceleration: float, asynchronous: bool) -> bool: ...
+    def servoJ(self, q: Sequence[float], v: float, a: float, t: float, lookahead: float, gain: float) -> bool: ...
+    def servoStop(self, a: float) -> bool: ...
+    def stopJ(self, a: float) -> None: ...
+    def stopScript(self) -> None: ...
+    def setWatchdog(self, min_frequency: float) -> bool: ...
+    def kickWatchdog(self) -> bool: ...
+    def getAsyncOperationProgress(self) -> int: ...
+    def isConnected(self) -> bool: ...
+    def isProgramRunning(self) -> bool: ...
+
+
+class ParentGone(Exception):  # noqa: N818 - an event, no error of the child
+    """Nobody is left to obey."""
+
+
+class ControlChild:
+    """Obeys one call at a time, and a stop at any time."""
+
+    def __init__(
+        self, control: Control, calls: Link, stops: Link, watchdog_hz: float, now_s: Callable[[], float]
+    ) -> None:
+        self._control, self._calls, self._stops, self._now_s = control, calls, stops, now_s
+        self._kick_every_s = 1.0 / (watchdog_hz * KICKS_PER_WATCHDOG)
+        self._kicked_s = self._told_s = now_s()
+        self._servoing = False
+
+    def run(self) -> None:
+        """Until Close. ParentGone when the other end of a line closes."""
+        waiter = select.poll()
+        for link in (self._calls, self._stops):
+            waiter.register(link.line, select.POLLIN)
+        while True:
+            waiter.poll(1e3 * self._kick_every_s)
+            self._kick()
+            try:
+                self._take_stop(0.0)
+                request = self._calls.next_request(0.0)
+                if isinstance(request, Close):
+                    return
+                if request is not None:
+                    self._calls.send(self._obey(request))
+            except ConnectionError as error:
+                raise ParentGone from error
+
+    def halt(self) -> None:
+        """The arm to rest, whatever it does."""
+        self._brake(2.0)
+
+    def _obey(self, request: Request) -> Ended:
+        fault = self._fault()
+        if fault is not None:
+            return fault
+        try:
+            match request:
+                case MoveJoints(q, speed, acceleration):
+                    return self._watch(self._control.moveJ(q, speed, acceleration, True))
+                case MoveLine(pose, speed, acceleration):
+                    return self._watch(self._control.moveL(pose, speed, acceleration, True))
+                case ServoJoints(q, period, lookahead, gain):
+                    self._servoing = True
+                    return self._judge(self._control.servoJ(q, 0.0, 0.0, period, lookahead, gain))
+                case ServoStop(deceleration):
+                    self._servoing = False
+                    return self._judge(self._control.servoStop(deceleration))
+                case _:
+                    return Ended(Outcome.REFUSED, f"{type(request).__name__} belongs on the stop line")
+        except (RuntimeError, ValueError, TypeError) as error:  # what ur_rtde throws for arguments out of range
+            return Ended(Outcome.REFUSED, str(error))
+
+    def _watch(self, accepted: bool) -> Ended:
+        """Until the motion has ended; ConnectionError when the parent has gone."""
+        if not accepted:
+            return self._judge(accepted)
+        while self._control.getAsyncOperationProgress() >= 0:
+            if self._take_stop(WATCH_S):
+                return Ended(Outcome.STOPPED)
+            self._kick()
+            fault = self._fault()
+            if fault is not None:
+                return fault
+            if self._now_s() - self._told_s > ALIVE_S:
+                self._told_s = self._now_s()
+                self._calls.send(Alive())
+        return self._fault() or Ended(Outcome.DONE)
+
+    def _judge(self, accepted: bool) -> Ended:
+        if accepted:
+            return Ended(Outcome.DONE)
+        return self._fault() or Ended(Outcome.REFUSED, "the control program did not take the command")
+
+    def _fault(self) -> Ended | None:
+        """Return values of ur_rtde alone say nothing after a loss: its own flags are asked as well."""
+        if not self._control.isConnected():
+            return Ended(Outcome.DISCONNECTED)
+        return None if self._control.isProgramRunning() else Ended(Outcome.NOT_RUNNING)
+
+    def _take_stop(self, timeout_s: float) -> bool:
+        request = self._stops.next_request(timeout_s)
+        if not isinstance(request, Stop):
+            return False
+        self._stops.send(Alive())
+        self._brake(request.deceleration_rad_s2)
+        self._stops.send(self._fault() or Ended(Outcome.DONE))
+        return True
+
+    def _brake(self, deceleration_rad_s2: float) -> None:
+        if self._servoing:  # the script's servo thread would go on under a stopj
+            self._servoing = False
+            self._control.servoStop(deceleration_rad_s2)
+        else:
+            self._control.stopJ(deceleration_rad_s2)
+
+    def _kick(self) -> None:
+        if self._now_s() - self._kicked_s >= self._kick_every_s:
+            self._kicked_s = self._now_s()
+            if self._control.isConnected():
+                self._control.kickWatchdog()
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Exit code 0 after Close, 1 when there is no control, 3 when the parent has gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C belongs to the parent, which then says what to do
+    host, watchdog_hz = arguments[0], float(arguments[3])
+    calls, stops = (Link(socket.socket(fileno=int(fd))) for fd in arguments[1:3])
+    try:
+        control, ready = _take_control(host, watchdog_hz)
+    except Exception as error:  # ur_rtde throws many types; each means that there is no control
+        calls.send(Ended(Outcome.REFUSED, str(error)))
+        return 1
+    child = ControlChild(control, calls, stops, watchdog_hz, time.monotonic)
+    try:
+        calls.send(ready)
+        child.run()
+    except (ParentGone, ConnectionError):
+        child.halt()
+        control.stopScript()
+        return 3
+    control.stopScript()
+    return 0
+
+
+def _take_control(host: str, watchdog_hz: float) -> tuple[Control, Ready]:
+    start_s = time.monotonic()
+    import rtde_control
+
+    imported_s = time.monotonic()
+    interface: Any = rtde_control.RTDEControlInterface
+    flags: int = interface.FLAGS_DEFAULT
+    control: Control = interface(host, DEFAULT_FREQUENCY, flags, CAP_PORT, NO_REAL_TIME_PRIORITY)
+    if not control.setWatchdog(watchdog_hz):
+        raise RuntimeError("the control program does not take the watchdog")
+    return control, Ready(imported_s - start_s, time.monotonic() - imported_s)
+
+
+if __name__ == "__main__":
+    code = main(sys.argv[1:])
+    os._exit(code)  # not the destructor of the control object: it takes 0.5 s, and may hang

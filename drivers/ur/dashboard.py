@@ -1,0 +1,118 @@
+"""The dashboard server of a UR controller: a second, independent way to ask for states, to stop, and to unlock.
+
+One short connection for each conversation, so that a controller that was restarted in between is no trouble.
+Source: Universal Robots, "Dashboard Server e-Series": port 29999, one ASCII line in, one line out, a banner first.
+PolyScope X has no dashboard server.
+"""
+
+import socket
+from dataclasses import dataclass
+
+from drivers.clock import Clock, SystemClock
+from drivers.errors import DeviceLost, DeviceRefused, DeviceStale, WireError
+
+DASHBOARD_PORT = 29999
+TIMEOUT_S = 2.0  # for a whole conversation; replies come within tenths
+BANNER = "Connected: Universal Robots Dashboard Server"
+MAX_LINE_BYTES = 4096
+
+
+@dataclass(frozen=True)
+class ArmState:
+    """What the dashboard says, for example ("RUNNING", "NORMAL", True)."""
+
+    robot_mode: str
+    safety_status: str
+    remote_control: bool
+
+    @property
+    def ready(self) -> bool:
+        return self.robot_mode == "RUNNING" and self.safety_status == "NORMAL"
+
+
+class UrDashboard:
+    """Verbs of the dashboard. Each raises DeviceLost, DeviceStale, or DeviceRefused with the controller's own words."""
+
+    def __init__(
+        self, host: str, *, port: int = DASHBOARD_PORT, timeout_s: float = TIMEOUT_S, clock: Clock | None = None
+    ) -> None:
+        self._host, self._port, self._timeout_s = host, port, timeout_s
+        self._clock: Clock = clock or SystemClock()
+
+    def state(self) -> ArmState:
+        """Mode, safety and whether it obeys from outside; CB3 controllers know no remote control: always True there."""
+        mode, safety, remote = self._converse(["robotmode", "safetystatus", "is in remote control"])
+        return ArmState(_after_colon(mode), _after_colon(safety), "false" not in remote.lower())
+
+    def stop(self) -> None:
+        """Ends the running program; the arm brakes."""
+        self._command("stop", "Stopped")
+
+    def unlock_protective_stop(self) -> None:
+        """Refused for the first 5 s. Look for the cause before: the arm may move again afterwards."""
+        self._converse(["close safety popup"])
+        self._command("unlock protective stop", "Protective stop releasing")
+
+    def power_on(self) -> None:
+        self._command("power on", "Powering on")
+
+    def brake_release(self) -> None:
+        self._command("brake release", "Brake releasing")
+
+    @property
+    def _place(self) -> str:
+        return f"dashboard at {self._host}:{self._port}"
+
+    def _command(self, line: str, expected: str) -> None:
+        (reply,) = self._converse([line])
+        if reply != expected:
+            raise DeviceRefused(f'{self._place}: "{line}" is refused: {reply}; look at the pendant')
+
+    def _converse(self, lines: list[str]) -> list[str]:
+        deadline_s = self._clock.now_s() + self._timeout_s
+        try:
+            with socket.create_connection((self._host, self._port), self._timeout_s) as line:
+                replies = _Lines(line, self._clock, deadline_s)
+                banner = replies.next()
+                if not banner.startswith(BANNER):
+                    raise WireError(f"{self._place}: no dashboard server: it says {banner[:32]!r}; check the address")
+                return [replies.ask(text) for text in lines]
+        except TimeoutError as error:
+            raise DeviceStale(
+                f"{self._place}: no reply to {lines} within {self._timeout_s:.3g} s; is the controller hung?"
+            ) from error
+        except ConnectionError as error:
+            raise DeviceLost(
+                f"{self._place}: {error.strerror or error}; check power, address and cable of the controller"
+            ) from error
+        except OSError as error:
+            raise DeviceLost(f"{self._place}: {error.strerror or error}; check the address and the network") from error
+
+
+class _Lines:
+    """Lines of one connection, all of them before one deadline."""
+
+    def __init__(self, line: socket.socket, clock: Clock, deadline_s: float) -> None:
+        self._line, self._clock, self._deadline_s = line, clock, deadline_s
+        self._pending = b""
+
+    def ask(self, text: str) -> str:
+        self._line.sendall(f"{text}\n".encode())
+        return self.next()
+
+    def next(self) -> str:
+        """TimeoutError, ConnectionError; a line without an end counts as silence."""
+        while b"\n" not in self._pending and len(self._pending) < MAX_LINE_BYTES:
+            self._line.settimeout(max(1e-3, self._deadline_s - self._clock.now_s()))
+            data = self._line.recv(MAX_LINE_BYTES)
+            if not data:
+                raise ConnectionResetError("the controller closed the connection")
+            if self._clock.now_s() > self._deadline_s:
+                raise TimeoutError
+            self._pending += data
+        first, _, self._pending = self._pending.partition(b"\n")
+        return first.decode("ascii", errors="replace").strip()
+
+
+def _after_colon(reply: str) -> str:
+    return reply.rpartition(":")[2].strip()

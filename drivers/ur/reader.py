@@ -1,0 +1,266 @@
+"""Lossless recorder of a UR controller over RTDE; it never moves anything.
+
+    reader = UrReader("192.168.0.10"); reader.connect(); block = reader.read(0.5)
+
+ur_rtde's own receive object drops samples by design (only the latest counts), so this one has its own codec. No thread
+of its own: whoever reads must read often enough for the socket buffer (0.5 s at least), or the controller drops samples
+and the gap shows in `sequence`.
+"""
+
+import contextlib
+import logging
+import select
+import socket
+from collections.abc import Mapping, Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from drivers.clock import Clock, SystemClock
+from drivers.device import Block, Channel
+from drivers.errors import DeviceLost, DeviceRefused, DeviceStale, WireError
+from drivers.ur.recipe import NOT_FOUND, REQUIRED, TIMESTAMP, VARIABLES
+from drivers.ur.rtde_codec import (
+    DTYPES,
+    ControllerVersion,
+    Data,
+    Junk,
+    Message,
+    OutputsAnswer,
+    ProtocolAnswer,
+    RtdeCodec,
+    StartAnswer,
+    TextMessage,
+    Unknown,
+    encode_outputs_request,
+    encode_protocol_request,
+    encode_start,
+    encode_version_request,
+)
+
+RTDE_PORT = 30004
+ANSWER_TIMEOUT_S = 2.0  # real controllers answer within a few cycles; busy ones within tenths
+CONNECT_TIMEOUT_S = 2.0
+READ_BYTES = 1 << 18
+RECEIVE_BUFFER_BYTES = 1 << 20  # about 3 s of this recipe at 500 Hz (349 bytes), if the system grants it
+WAKE_S = 0.01  # wait for so much of the stream: reading one package costs as much as five, and 10 ms hurt nobody
+
+Answer = TypeVar("Answer", ProtocolAnswer, ControllerVersion, OutputsAnswer, StartAnswer)
+log = logging.getLogger(__name__)
+
+
+class UrReader:
+    """A `Device`: joints, currents, temperatures and states at up to 500 Hz."""
+
+    def __init__(
+        self,
+        host: str,
+        rate_hz: float = 500.0,
+        *,
+        port: int = RTDE_PORT,
+        name: str = "robot",
+        clock: Clock | None = None,
+    ) -> None:
+        self.name = name
+        self.version: ControllerVersion | None = None
+        self.missing: tuple[str, ...] = ()  # variables that this controller does not have
+        self._host, self._port, self._rate_hz = host, port, rate_hz
+        self._clock: Clock = clock or SystemClock()
+        self._socket: socket.socket | None = None
+        self._codec = RtdeCodec()
+        self._channels: tuple[tuple[str, Channel], ...] = ()
+        self._unread: list[Message] = []
+        self._first_s: float | None = None  # device time of the first sample: number 0
+
+    @property
+    def place(self) -> str:
+        return f"{self.name} at {self._host}:{self._port}"
+
+    def connect(self) -> None:
+        """Opens the line and starts the stream.
+
+        DeviceLost: nobody there. DeviceStale: no answer. DeviceRefused or WireError: not an RTDE server of version 2.
+        """
+        self.close()
+        self._codec, self._unread, self._first_s = RtdeCodec(), [], None
+        self._open()
+        try:
+            self._negotiate()
+        except BaseException:
+            self.close()
+            raise
+
+    def describe(self) -> tuple[Channel, ...]:
+        """The channels of this controller; known after `connect`."""
+        return tuple(channel for _, channel in self._channels)
+
+    def read(self, timeout_s: float) -> Block:
+        """All samples since the last read, at least one.
+
+        DeviceStale: none within `timeout_s`. DeviceLost: the line is closed. WireError: bytes that are no RTDE.
+        """
+        deadline_s = self._clock.now_s() + timeout_s
+        while True:
+            packages = [message.packages for message in self._take_messages() if isinstance(message, Data)]
+            if packages:
+                return self._block(np.concatenate(packages))
+            if not self._receive(deadline_s - self._clock.now_s()):
+                raise DeviceStale(
+                    f"{self.place}: no sample for {timeout_s:.3g} s while the line is open; "
+                    "the controller is hung or its stream is paused: look at the pendant, then connect again"
+                )
+
+    def close(self) -> None:
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    # --- the line
+
+    def _open(self) -> None:
+        try:
+            self._socket = socket.create_connection((self._host, self._port), CONNECT_TIMEOUT_S)
+        except OSError as error:
+            raise DeviceLost(
+                f"{self.place}: cannot connect within {CONNECT_TIMEOUT_S:.3g} s ({error.strerror or error}); "
+                "check that the controller is on, the address in [devices.robot] and the network cable"
+            ) from error
+        self._socket.setblocking(False)
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        with contextlib.suppress(OSError):  # a system that grants less is good enough
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+
+    def _receive(self, timeout_s: float) -> bool:
+        """Bytes into messages; False when none came in time. DeviceLost when the line is closed."""
+        line = self._line()
+        # a timeout with fewer bytes than the low-water mark is no silence: read what there is
+        waiter = select.poll()
+        waiter.register(line, select.POLLIN)
+        waiter.poll(1e3 * max(0.0, timeout_s))
+        try:
+            data = line.recv(READ_BYTES)
+        except BlockingIOError:
+            return False
+        except OSError as error:
+            raise self._lost(error.strerror or str(error)) from error
+        if not data:
+            raise self._lost("the controller closed the connection")
+        self._unread += self._codec.feed(data)
+        return True
+
+    def _take_messages(self) -> list[Message]:
+        """What has come; text is logged. WireError when it is no RTDE."""
+        messages, self._unread = self._unread, []
+        for message in messages:
+            if isinstance(message, Junk):
+                raise WireError(
+                    f"{self.place}: no RTDE at byte {message.offset} of the stream: {message.head.hex(' ')}; "
+                    "is this the RTDE port of a UR controller (30004)?"
+                )
+            if isinstance(message, TextMessage):
+                log.info("%s: %s: %s", self.place, message.source, message.text)
+        return messages
+
+    def _line(self) -> socket.socket:
+        if self._socket is None:
+            raise DeviceLost(f"{self.place}: not connected; call connect() first")
+        return self._socket
+
+    def _send(self, data: bytes) -> None:
+        try:
+            self._line().sendall(data)  # a few dozen bytes into an empty buffer: never partial
+        except OSError as error:
+            raise self._lost(error.strerror or str(error)) from error
+
+    def _lost(self, reason: str) -> DeviceLost:
+        self.close()
+        return DeviceLost(f"{self.place}: {reason}; check power and cable of the controller, then connect again")
+
+    # --- the conversation
+
+    def _negotiate(self) -> None:
+        self._send(encode_protocol_request())
+        if not self._await(ProtocolAnswer).accepted:
+            raise DeviceRefused(
+                f"{self.place}: the controller does not speak RTDE version 2; update PolyScope (>= 3.10)"
+            )
+        self._send(encode_version_request())
+        self.version = self._await(ControllerVersion)
+        names = (TIMESTAMP, *(variable.rtde_name for variable in VARIABLES))
+        answer = self._ask_for(names)
+        self.missing = tuple(name for name, kind in zip(names, answer.types, strict=True) if kind == NOT_FOUND)
+        if self.missing:
+            names = tuple(name for name in names if name not in self.missing)
+            answer = self._ask_for(names)
+            log.warning("%s: not recorded, this controller does not have: %s", self.place, ", ".join(self.missing))
+        self._codec.expect(answer.recipe_id, names, answer.types)
+        self._channels = tuple((v.rtde_name, v.channel) for v in VARIABLES if v.rtde_name in names)
+        self._check_shapes(dict(zip(names, answer.types, strict=True)))
+        self._send(encode_start())
+        if not self._await(StartAnswer).accepted:
+            raise DeviceRefused(f"{self.place}: the controller refuses to start the stream; restart it")
+        size_bytes = 4 + sum(np.dtype(DTYPES[kind]).itemsize for kind in answer.types)
+        self._line().setsockopt(
+            socket.SOL_SOCKET, socket.SO_RCVLOWAT, max(1, round(WAKE_S * self._rate_hz)) * size_bytes
+        )
+
+    def _ask_for(self, names: Sequence[str]) -> OutputsAnswer:
+        """The answer with one known type, or NOT_FOUND, for each name. DeviceRefused when a needed one is missing."""
+        self._send(encode_outputs_request(self._rate_hz, names))
+        answer = self._await(OutputsAnswer)
+        odd = [kind for kind in answer.types if kind not in DTYPES and kind != NOT_FOUND]
+        if odd or len(answer.types) != len(names):
+            raise WireError(
+                f"{self.place}: asked for {len(names)} variables, answered types {','.join(answer.types)!r}; "
+                "this controller's RTDE is not the one of the RTDE guide"
+            )
+        for name in REQUIRED:
+            if answer.types[names.index(name)] == NOT_FOUND:
+                raise DeviceRefused(f"{self.place}: the controller has no variable {name!r}; it cannot be recorded")
+        return answer
+
+    def _check_shapes(self, types: Mapping[str, str]) -> None:
+        for name, channel in self._channels:
+            if DTYPES[types[name]][1] != channel.shape:
+                raise WireError(f"{self.place}: {name} comes as {types[name]}, the shape {channel.shape} is expected")
+
+    def _await(self, kind: type[Answer]) -> Answer:
+        """The next message of that kind. DeviceRefused when the controller says otherwise, DeviceStale on silence."""
+        deadline_s = self._clock.now_s() + ANSWER_TIMEOUT_S
+        while True:
+            messages = self._take_messages()
+            for index, message in enumerate(messages):
+                if isinstance(message, kind):
+                    self._unread = messages[index + 1 :] + self._unread
+                    return message
+                self._refuse(message)
+            if not self._receive(deadline_s - self._clock.now_s()):
+                raise DeviceStale(
+                    f"{self.place}: no {kind.__name__} within {ANSWER_TIMEOUT_S:.3g} s; "
+                    "is this the RTDE port of a UR controller (30004)?"
+                )
+
+    def _refuse(self, message: Message) -> None:
+        if isinstance(message, TextMessage) and message.level <= 1:
+            raise DeviceRefused(f"{self.place}: the controller says: {message.text}")
+        if isinstance(message, Unknown):
+            raise WireError(
+                f"{self.place}: unexpected package of type {message.kind}: {message.payload[:32].hex(' ')}; "
+                "is this the RTDE port of a UR controller (30004)?"
+            )
+
+    def _block(self, packages: np.ndarray) -> Block:
+        device_s = packages[TIMESTAMP].astype(np.float64)
+        if self._first_s is None:
+            self._first_s = float(device_s[0])
+        return Block(
+            host_s=np.full(len(packages), self._clock.now_s()),
+            device_s=device_s,
+            sequence=np.round((device_s - self._first_s) * self._rate_hz).astype(np.int64),
+            values={channel.name: _native(packages[name]) for name, channel in self._channels},
+        )
+
+
+def _native(values: np.ndarray) -> np.ndarray:
+    """Native byte order; floats as float64, states as int64."""
+    return values.astype(np.float64 if values.dtype.kind == "f" else np.int64)

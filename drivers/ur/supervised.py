@@ -1,0 +1,138 @@
+"""The parent's hold on the control child: start it, talk to it with limits, kill it."""
+
+import contextlib
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+
+from drivers.clock import Clock
+from drivers.errors import DeviceLost, DeviceStale
+from drivers.ur.control_link import Alive, Answer, Close, Ended, Link, Ready, Request, Stop
+
+SILENCE_LIMIT_S = 2.0  # twenty heartbeats of the child; ur_rtde itself blocks up to 4 s when it waits in vain
+STOP_NOTICE_S = 0.3  # the child looks at its stop line every millisecond; a busy machine may take tenths
+STOP_LIMIT_S = 4.0  # braking from full speed at 1 rad/s2 takes 3.1 s
+CLOSE_LIMIT_S = 1.0
+CHILD_MODULE = "drivers.ur.control_child"
+SHOWN_BYTES = 300  # of what ur_rtde printed last
+
+
+class SupervisedChild:
+    """One child; after a fault it is killed and never used again."""
+
+    def __init__(self, host: str, watchdog_hz: float, place: str, clock: Clock) -> None:
+        self._place, self._clock = place, clock
+        calls, child_calls = socket.socketpair()
+        stops, child_stops = socket.socketpair()
+        self._calls, self._stops = Link(calls), Link(stops)
+        self._printed = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the child; a pipe could fill and block it
+        with child_calls, child_stops:
+            fds = (child_calls.fileno(), child_stops.fileno())
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", CHILD_MODULE, host, str(fds[0]), str(fds[1]), str(watchdog_hz)],
+                pass_fds=fds,
+                stdin=subprocess.DEVNULL,
+                stdout=self._printed,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,  # Ctrl-C in the terminal must not reach it before its parent
+            )
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    @property
+    def alive(self) -> bool:
+        return self._process.poll() is None
+
+    def wait_ready(self, limit_s: float) -> Ready | Ended:
+        """The first answer. DeviceStale when there is none in time, DeviceLost when the child died."""
+        answer = self._next_answer(self._calls, limit_s)
+        if isinstance(answer, Ready | Ended):
+            return answer
+        raise DeviceStale(
+            f"{self._place}: no control within {limit_s:.3g} s; the controller answers but sends no data: "
+            "restart it, then connect again"
+        )
+
+    def call(self, request: Request, limit_s: float) -> Ended:
+        """A call and its end. DeviceStale: no sign of life, or not ended within `limit_s`. DeviceLost: the child died."""
+        deadline_s = self._clock.now_s() + limit_s
+        self._send(self._calls, request)
+        while True:
+            left_s = deadline_s - self._clock.now_s()
+            answer = self._next_answer(self._calls, min(SILENCE_LIMIT_S, left_s))
+            if isinstance(answer, Ended):
+                return answer
+            if answer is None:
+                name = type(request).__name__
+                if self._clock.now_s() < deadline_s:
+                    raise DeviceStale(f"{self._place}: {name}: ur_rtde is silent for {SILENCE_LIMIT_S:.3g} s")
+                raise DeviceStale(f"{self._place}: {name} has not ended within {limit_s:.3g} s")
+
+    def stop(self, deceleration_rad_s2: float) -> bool:
+        """From any thread, also in the middle of a call. False when the child did not obey in time."""
+        try:
+            while self._stops.next_answer(0.0) is not None:
+                pass  # late answers to a stop that was given up
+            self._stops.send(Stop(deceleration_rad_s2))
+            if not isinstance(self._stops.next_answer(STOP_NOTICE_S), Alive):
+                return False
+            return isinstance(self._stops.next_answer(STOP_LIMIT_S), Ended)
+        except OSError:
+            return False
+
+    def close(self) -> None:
+        """Asks it to end, then makes it end."""
+        with contextlib.suppress(OSError, subprocess.TimeoutExpired):
+            self._calls.send(Close())
+            self._process.wait(CLOSE_LIMIT_S)
+        self.kill()
+
+    def kill(self) -> None:
+        """SIGKILL; safe in every state and more than once."""
+        if self.alive:
+            self._process.kill()
+        self._process.wait()
+        self._calls.close()
+        self._stops.close()
+        self._printed.close()
+
+    def _send(self, link: Link, request: Request) -> None:
+        try:
+            link.send(request)
+        except OSError as error:
+            raise self._died() from error
+
+    def _next_answer(self, link: Link, timeout_s: float) -> Answer | None:
+        try:
+            return link.next_answer(timeout_s)
+        except OSError as error:
+            raise self._died() from error
+
+    def _died(self) -> DeviceLost:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(CLOSE_LIMIT_S)
+        code = self._process.returncode
+        how = (
+            "still ends"
+            if code is None
+            else f"signal {signal.Signals(-code).name}"
+            if code < 0
+            else f"exit code {code}"
+        )
+        return DeviceLost(
+            f"{self._place}: the control process has gone ({how}){self._last_words()}; "
+            "the controller was probably switched off or restarted: check it, then connect again"
+        )
+
+    def _last_words(self) -> str:
+        with contextlib.suppress(OSError, ValueError):
+            size = self._printed.seek(0, os.SEEK_END)
+            self._printed.seek(max(0, size - SHOWN_BYTES))
+            text = self._printed.read().decode(errors="replace").strip()
+            return f', saying "{text.splitlines()[-1]}"' if text else ""
+        return ""

@@ -1,0 +1,124 @@
+"""The object dictionary of a node: typed entries from an EDS file, values as bytes, hooks for live objects."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import canopen
+from canopen.objectdictionary import ODArray, ODRecord, ODVariable, datatypes
+
+from simulators.encoders.abort import AbortCode, SdoAbort
+
+EDS_PATH = Path(__file__).with_name("encoder.eds")
+Address = tuple[int, int]  # index, subindex
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What the EDS says of one sub-object; `size` in bytes, None for text."""
+
+    size: int | None
+    signed: bool
+    readable: bool
+    writable: bool
+    mappable: bool
+    low: int | None
+    high: int | None
+    default: bytes
+
+
+class NodeDictionary:
+    """Values of one node. `read` and `write` are what SDO does; the node itself uses `number` and `put`."""
+
+    def __init__(self, node_id: int, eds_path: Path = EDS_PATH) -> None:
+        self.entries = dict(_entries(node_id, eds_path))
+        self._values = {address: entry.default for address, entry in self.entries.items()}
+        self._stored: dict[Address, bytes] = {}
+        self._read_hooks: dict[Address, Callable[[], int]] = {}
+        self._write_hooks: dict[Address, Callable[[int], None]] = {}
+
+    def on_read(self, index: int, subindex: int, value: Callable[[], int]) -> None:
+        """`value()` is asked whenever the object is read."""
+        self._read_hooks[index, subindex] = value
+
+    def on_write(self, index: int, subindex: int, accept: Callable[[int], None]) -> None:
+        """`accept(number)` is called before a number is written; it may raise SdoAbort, then nothing is written."""
+        self._write_hooks[index, subindex] = accept
+
+    def read(self, index: int, subindex: int) -> bytes:
+        entry = self._entry(index, subindex)
+        if not entry.readable:
+            raise SdoAbort(AbortCode.WRITE_ONLY)
+        return self.data(index, subindex)
+
+    def write(self, index: int, subindex: int, data: bytes) -> None:
+        entry = self._entry(index, subindex)
+        if not entry.writable:
+            raise SdoAbort(AbortCode.READ_ONLY)
+        if entry.size is None or len(data) != entry.size:
+            raise SdoAbort(AbortCode.WRONG_LENGTH)
+        number = int.from_bytes(data, "little", signed=entry.signed)
+        if entry.high is not None and number > entry.high:
+            raise SdoAbort(AbortCode.TOO_HIGH)
+        if entry.low is not None and number < entry.low:
+            raise SdoAbort(AbortCode.TOO_LOW)
+        accept = self._write_hooks.get((index, subindex))
+        if accept is not None:
+            accept(number)
+        self._values[index, subindex] = data
+
+    def data(self, index: int, subindex: int = 0) -> bytes:
+        """The present value as it goes over the wire, little endian."""
+        live = self._read_hooks.get((index, subindex))
+        if live is not None:
+            entry = self.entries[index, subindex]
+            return live().to_bytes(entry.size or 0, "little", signed=entry.signed)
+        return self._values[index, subindex]
+
+    def number(self, index: int, subindex: int = 0) -> int:
+        return int.from_bytes(self.data(index, subindex), "little", signed=self.entries[index, subindex].signed)
+
+    def put(self, index: int, subindex: int, number: int) -> None:
+        """Sets a value from inside: no access right, limit or hook is asked."""
+        entry = self.entries[index, subindex]
+        self._values[index, subindex] = number.to_bytes(entry.size or 0, "little", signed=entry.signed)
+
+    def store(self) -> None:
+        """What 1010h does: the writable values survive the next reset."""
+        self._stored = {address: self._values[address] for address, entry in self.entries.items() if entry.writable}
+
+    def forget(self) -> None:
+        """What 1011h does: defaults again after the next reset."""
+        self._stored = {}
+
+    def reset(self) -> None:
+        """Values as after power-on: defaults, with what was stored."""
+        self._values = {address: entry.default for address, entry in self.entries.items()} | self._stored
+
+    def _entry(self, index: int, subindex: int) -> Entry:
+        entry = self.entries.get((index, subindex))
+        if entry is None:
+            known = any(index == known_index for known_index, _ in self.entries)
+            raise SdoAbort(AbortCode.NO_SUBINDEX if known else AbortCode.NO_OBJECT)
+        return entry
+
+
+def _entries(node_id: int, eds_path: Path) -> Iterator[tuple[Address, Entry]]:
+    dictionary = canopen.import_od(str(eds_path), node_id)
+    for index in dictionary:
+        found = dictionary[index]
+        variables = list(found.values()) if isinstance(found, ODArray | ODRecord) else [found]
+        for variable in variables:
+            yield (variable.index, variable.subindex), _entry_of(variable)
+
+
+def _entry_of(variable: ODVariable) -> Entry:
+    text = variable.data_type == datatypes.VISIBLE_STRING
+    signed = variable.data_type in datatypes.SIGNED_TYPES
+    size = None if text else len(variable) // 8
+    default = variable.default
+    encoded = str(default or "").encode() if size is None else int(default or 0).to_bytes(size, "little", signed=signed)
+    access = variable.access_type
+    return Entry(
+        size, signed, access != "wo", "w" in access, variable.pdo_mappable, variable.min, variable.max, encoded
+    )

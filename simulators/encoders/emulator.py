@@ -1,0 +1,83 @@
+"""Six encoders, their bus and its adapter as one bench, with the verbs of the side channel."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulators.encoders.bus import CanBus
+from simulators.encoders.node import EncoderNode
+from simulators.encoders.slcan import SlcanAdapter
+from simulators.wire import Bench, SerialPort
+
+DEFAULT_BITRATE = 1_000_000
+
+
+class TurningShafts(Protocol):
+    """What encoders need of a world."""
+
+    @property
+    def time_s(self) -> float: ...
+
+    def link_encoders_rad(self) -> NDArray[np.float64]: ...
+
+
+class EncoderBus:
+    """An instrument of `simulators.wire`: the nodes' timers and the bus follow the world's time."""
+
+    name = "encoders"
+
+    def __init__(self, world: TurningShafts, bus: CanBus) -> None:
+        self._world = world
+        self._bus = bus
+
+    def before_step(self, t_s: float) -> None:
+        """Nothing: encoders only look."""
+
+    def after_step(self, t_s: float) -> None:
+        self._bus.poll_nodes(self._world.time_s)
+        self._bus.run(self._world.time_s)
+
+
+def build(world: TurningShafts, rig: Mapping[str, Any]) -> Bench:
+    """One node for each of `rig["devices"]["encoders"]["nodes"]`, the first on joint 1; linked when a path is named.
+
+    Verbs: "encoders.silence" {node, on}, "encoders.emergency" {node, code} (0 ends it), "encoders.reset" {node} (a
+    power dip: boot-up without being asked). ValueError for more nodes than joints or a node twice.
+    """
+    device = rig["devices"]["encoders"]
+    numbers = [int(number) for number in device["nodes"]]
+    joints = len(world.link_encoders_rad())
+    if len(numbers) > joints or len(set(numbers)) != len(numbers):
+        raise ValueError(
+            f"devices.encoders.nodes {numbers}: give different nodes, at most one for each of {joints} joints"
+        )
+    nodes = [EncoderNode(number, _shaft(world, joint)) for joint, number in enumerate(numbers)]
+    bus = CanBus(int(device.get("bitrate", DEFAULT_BITRATE)), nodes)
+    channel = str(device.get("channel", ""))
+    port = SerialPort("can", SlcanAdapter(bus, world), channel if "/" in channel else None)
+    return Bench((EncoderBus(world, bus),), (port,), _verbs(nodes))
+
+
+def _shaft(world: TurningShafts, joint: int) -> Callable[[], float]:
+    return lambda: float(world.link_encoders_rad()[joint])
+
+
+def _verbs(nodes: list[EncoderNode]) -> dict[str, Callable[..., Any]]:
+    def named(number: int) -> EncoderNode:
+        for node in nodes:
+            if node.node_id == number:
+                return node
+        raise ValueError(f"encoder node {number}: there are {[node.node_id for node in nodes]}")
+
+    def silence(node: int, on: bool = True) -> None:
+        named(node).silent = on
+
+    def emergency(node: int, code: int) -> None:
+        named(node).raise_emergency(code)
+
+    def reset(node: int) -> None:
+        named(node).reset()
+
+    return {"encoders.silence": silence, "encoders.emergency": emergency, "encoders.reset": reset}
