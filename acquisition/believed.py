@@ -54,9 +54,7 @@ def in_fixture(T_base_fixture: Floats, origin_m: Floats, direction: Floats) -> t
     return R.T @ (origin_m - T_base_fixture[:3, 3]), R.T @ direction
 
 
-def spots_at(
-    arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, q_rad: Floats, first: int
-) -> Floats:
+def spots_at(arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, q_rad: Floats, first: int) -> Floats:
     """Spots (4,) m expected at joint readings `q_rad`."""
     return optics.spots(*in_fixture(T_base_fixture, *arm.beam(q_rad)), first)
 

@@ -1,4 +1,4 @@
-"""What servo and session see of the devices: move, look, stop. Whether wires or an in-process world lie below is not theirs."""
+"""What servo and session see of the devices, whether wires or a world in this process lie below: move, look, stop."""
 
 from dataclasses import dataclass
 from typing import Protocol

@@ -67,7 +67,8 @@ class Navigator:
 
     def visit(self, target: BeamTarget, limits: Limits | None) -> Centring:
         """Land on the target and bring the spots there: within `limits`, or only near it. SpotLostError,
-        UnreachableError; the arm is then back at a lit pose."""
+        UnreachableError; the arm is then back at a lit pose.
+        """
         back = self._nearest(target)
         try:
             return self._centre(target, self._land(target), limits or NEAR)

@@ -50,7 +50,8 @@ class Block:
 
 def blocks(placements: tuple[int, ...], half_size_m: float, options: PlanOptions) -> Iterator[Block]:
     """One block a place and order. Roll grows by small steps from where the light was found, so that the arm, whose
-    zeros are not known yet, never jumps further than its error lets the spots survive."""
+    zeros are not known yet, never jumps further than its error lets the spots survive.
+    """
     rng = np.random.default_rng(options.seed)
     for placement in placements:
         for first in (1, 2):

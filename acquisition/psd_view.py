@@ -1,4 +1,4 @@
-"""From windows of photocurrents to spots: what one PSD box's samples mean, averaged as currents and not as positions."""
+"""From windows of photocurrents to spots: what a PSD box's samples mean, averaged as currents, not as positions."""
 
 from dataclasses import dataclass
 

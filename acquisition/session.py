@@ -36,8 +36,15 @@ class Session:
     """Runs a plan on a bench; the only owner of what was taken. Stopping the arm after an error is the caller's."""
 
     def __init__(
-        self, bench: Bench, learner: Learner, journal: Journal, options: PlanOptions, home_rad: Floats, *,
-        limits: Limits | None = None, progress: Progress = lambda done, total, text: None,
+        self,
+        bench: Bench,
+        learner: Learner,
+        journal: Journal,
+        options: PlanOptions,
+        home_rad: Floats,
+        *,
+        limits: Limits | None = None,
+        progress: Progress = lambda done, total, text: None,
     ) -> None:
         self._bench, self._learner, self._journal, self._options = bench, learner, journal, options
         self._navigator = Navigator(bench, learner, journal, home_rad, options.seed)

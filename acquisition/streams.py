@@ -18,8 +18,14 @@ class Pump:
     """Reads one device until stopped. `failed` is called once, from the reader thread, with what went wrong."""
 
     def __init__(
-        self, device: Device, clock: Clock, sink: Sink, failed: Callable[[Exception], None], *,
-        stale_s: float = 0.5, memory: int = 400,
+        self,
+        device: Device,
+        clock: Clock,
+        sink: Sink,
+        failed: Callable[[Exception], None],
+        *,
+        stale_s: float = 0.5,
+        memory: int = 400,
     ) -> None:
         self._device, self._clock, self._sink, self._failed = device, clock, sink, failed
         self._stale_s = stale_s
@@ -50,7 +56,7 @@ class Pump:
             return self._blocks[-1] if self._blocks else None
 
     def wait(self, after_host_s: float, timeout_s: float) -> list[Block]:
-        """Blocks that arrived after this host time; waits for the first. The failure is raised; DeviceStale in the end."""
+        """Blocks that arrived after this host time; waits for one. Raises the device's failure, or DeviceStale."""
         with self._news:
             arrived = self._news.wait_for(lambda: self.failure or self._newer(after_host_s), timeout_s)
         if self.failure is not None:

@@ -16,8 +16,8 @@ from drivers.device import Block, Movable
 
 Floats = NDArray[np.float64]
 
-# After the controller says that the motion has ended, samples still on their way were taken before: at 3 Mbaud a frame of
-# ten samples arrives 11 ms after its first one.
+# After the controller says that the motion has ended, samples still on their way were taken before: at 3 Mbaud a frame
+# of ten samples arrives 11 ms after its first one.
 IN_FLIGHT_S = 0.015
 SILENCE_S = 0.5  # host time without a sample after which a wait gives up
 
@@ -78,7 +78,7 @@ class WiredBench:
             blocks += [block for block in arrived if block.device_s[-1] >= begin_s]
             if not blocks:
                 continue
-            window = _joined(blocks).between(begin_s, np.inf)
+            window = psd_window(blocks).between(begin_s, np.inf)
             start_s = settled_from(window.device_s, self.view.each(window), self.rule)
             last_s = float(window.device_s[-1])
             if start_s is not None and last_s - start_s >= dwell_s:
@@ -120,7 +120,7 @@ class WiredBench:
         return np.where(count > 0, np.where(answered, each, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
 
     def _during(self, pump: Pump, window: PsdWindow) -> list[Block]:
-        """Blocks that arrived since the window began, at least one: the arm stands still, so the next serves as well."""
+        """Blocks that arrived since the window began, at least one: the arm stands, so the next serves as well."""
         begin_s = float(window.host_s[0])
         return pump.recent(begin_s) or pump.wait(begin_s, SILENCE_S)
 
@@ -129,7 +129,9 @@ def _mean(blocks: list[Block], name: str) -> Floats:
     return np.concatenate([block.values[name] for block in blocks]).mean(axis=0)
 
 
-def _joined(blocks: list[Block]) -> PsdWindow:
+def psd_window(blocks: list[Block]) -> PsdWindow:
+    """The samples of consecutive blocks of a PSD box."""
+
     def column(name: str) -> NDArray[np.float64]:
         return np.concatenate([block.values[name] for block in blocks])
 

@@ -1,7 +1,7 @@
 """How many motions centring takes, and whether the search finds the light: distributions over random starts.
 
-Each case is an emulated arm with zeros off by up to 2 deg and a fixture pose guessed wrong by up to 80 deg and 50 mm; both spots
-start somewhere on the faces, orders alternate. Every motion counts: probes and going back too.
+Each case is an emulated arm with zeros off by up to 2 deg and a fixture pose guessed wrong by up to 80 deg and 50 mm;
+both spots start somewhere on the faces, orders alternate. Every motion counts: probes and going back too.
 """
 
 from collections.abc import Callable, Mapping

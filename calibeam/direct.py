@@ -1,7 +1,7 @@
 """The bench without wires: the same world, stepped by the session itself.
 
-For the many sessions of benchmarks and proofs. What it leaves out is the wire: protocols, line time, threads, other processes;
-world, optics, noise and settling are those of the emulators. `tests/calibeam` checks that both paths tell the same.
+For the many sessions of benchmarks and proofs. What it leaves out is the wire: protocols, line time, threads, other
+processes; world, optics, noise and settling are those of the emulators. tests/calibeam checks that both tell the same.
 """
 
 import math
@@ -127,9 +127,8 @@ class DirectBench:
 
 
 def direct_bench(rig: Rig, plain_rig: Mapping[str, Any], *, seed: int) -> DirectBench:
-    """A bench over the emulated world that `seed` draws; `plain_rig` is the same file as `rig`, as the world reads it."""
+    """A bench over the emulated world that `seed` draws; `plain_rig` is the same file, as the world reads it."""
     if rig.fixture is None:
         raise ValueError(f"rig {rig.name} has no [fixture]; a dual-PSD session needs one")
     world = World.from_rig(plain_rig, seed=seed, q_rad=rig.motion.home_rad)
     return DirectBench(world, rig.fixture.half_size_m, rig.motion.speed_rad_s, rig.motion.acceleration_rad_s2)
-

@@ -40,7 +40,11 @@ class Emulation:
         command += [] if self.truth is None else ["--truth", str(self.truth)]
         # A session of its own: Ctrl-C shall reach the program, which stops the arm, and not the arm's controller.
         self._process = subprocess.Popen(  # noqa: S603 - our own interpreter and arguments
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
             start_new_session=True,
         )
         self.address = self._announcement(self._process)
@@ -78,9 +82,9 @@ class Emulation:
         return answer["result"]
 
     def _announcement(self, process: subprocess.Popen[str]) -> Mapping[str, Any]:
-        assert process.stdout is not None and process.stderr is not None  # noqa: S101 - both were asked for
-        ready, _, _ = select.select([process.stdout], [], [], READY_S)
-        line = process.stdout.readline() if ready else ""
+        out = process.stdout
+        ready = [] if out is None else select.select([out], [], [], READY_S)[0]
+        line = out.readline() if out is not None and ready else ""
         if line:
             return json.loads(line)
         process.kill()

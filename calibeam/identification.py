@@ -1,4 +1,4 @@
-"""From a recording to joint zeros, by both methods: the full dual-PSD model, and the source's four-pose point constraint."""
+"""From a recording to joint zeros, by the full dual-PSD model and by the source's four-pose point constraint."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,14 +10,13 @@ from acquisition.recording.recording import Recording
 from acquisition.recording.rig import rig_sha256
 from acquisition.recording.rig_schema import Rig
 from calibrate.arms.catalogue import arm_of
-from calibrate.dual_psd_rig import believed_noise, dual_psd_chain, laser_of
+from calibrate.dual_psd_rig import believed_noise, drawing_doubt, dual_psd_chain, laser_of
 from calibrate.model_file import RigIdentity, model_of, write_model
 from calibrate.observations import Observations
 from calibrate.read_samples import observations
 from calibrate.zeros.identify import identify
 from calibrate.zeros.point_constraint import (
     CENTRED_M,
-    DrawingDoubt,
     PointConstraintResult,
     identify_by_four_poses,
 )
@@ -53,14 +52,7 @@ def _four_poses(rig: Rig, data: Observations) -> PointConstraintResult | None:
     rows = four_centred_poses(data)
     if rows is None:
         return None
-    noise, tolerance = believed_noise(rig), rig.tolerance
-    doubt = DrawingDoubt(
-        # A centred line at the fixture stands off by what the detectors and, over half a metre of arm, the joints allow.
-        line_m=float(np.hypot(noise.psd_m, 0.5 * np.sqrt(rig.n_joints) * noise.joint_rad)),
-        length_m=tolerance.length_m if tolerance is not None else 0.0,
-        angle_rad=tolerance.angle_rad if tolerance is not None else 0.0,
-    )
-    return identify_by_four_poses(arm_of(rig), laser_of(rig), data.select(rows), doubt)
+    return identify_by_four_poses(arm_of(rig), laser_of(rig), data.select(rows), drawing_doubt(rig))
 
 
 def four_centred_poses(data: Observations) -> NDArray[np.intp] | None:

@@ -31,7 +31,7 @@ Interrupted = (DeviceError, AcquisitionError, RecordingError, KeyboardInterrupt)
 def record_session(
     bench: Bench, rig: Rig, writer: RecordingWriter, options: PlanOptions, clock: Clock, console: Console
 ) -> Summary:
-    """Take every place of the rig. PartialResult when it ended early; then the arm stands and what was taken is kept."""
+    """Take every place of the rig. PartialResult when it ended early: the arm stands, what was taken is kept."""
     home_rad = np.zeros(rig.n_joints) if rig.motion.home_rad is None else np.array(rig.motion.home_rad)
     with _progress(console) as progress:
         task = progress.add_task("collecting", total=None)
@@ -40,8 +40,13 @@ def record_session(
             progress.update(task, completed=done, total=total, description=text)
 
         session = Session(
-            bench, FittedLearner(rig), RecordingJournal(writer, clock), options, home_rad,
-            limits=Limits(step_rad=rig.motion.step_limit_rad), progress=tell,
+            bench,
+            FittedLearner(rig),
+            RecordingJournal(writer, clock),
+            options,
+            home_rad,
+            limits=Limits(step_rad=rig.motion.step_limit_rad),
+            progress=tell,
         )
         try:
             summary = session.run(tuple(rig.placements))
@@ -87,8 +92,14 @@ def uninterrupted() -> Generator[None, None, None]:
 
 def _progress(console: Console) -> Progress:
     return Progress(
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("left"),
-        TimeRemainingColumn(), console=console, transient=False,
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        console=console,
+        transient=False,
     )
 
 

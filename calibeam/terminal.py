@@ -25,12 +25,16 @@ def print_revealed(console: Console, revealed: tuple[Revealed, ...]) -> None:
         table.add_column(heading, justify="right")
     for one in revealed:
         if one.value_rad is None or one.sigma_rad is None or one.deviation is None:
-            table.add_row(f"J{one.joint}", "-", "-", f"{np.degrees(one.truth_rad):+.5f}", "-", one.why or "-")
+            table.add_row(f"J{one.joint}", "-", "-", f"{np.degrees(one.truth_rad):+.5f}", "-", "not said")
             continue
         off_rad = one.value_rad - one.truth_rad
         table.add_row(
-            f"J{one.joint}", f"{np.degrees(one.value_rad):+.5f}", f"{np.degrees(one.sigma_rad):.5f}",
-            f"{np.degrees(one.truth_rad):+.5f}", f"{np.degrees(off_rad):+.5f}", f"{one.deviation:+.2f}",
+            f"J{one.joint}",
+            f"{np.degrees(one.value_rad):+.5f}",
+            f"{np.degrees(one.sigma_rad):.5f}",
+            f"{np.degrees(one.truth_rad):+.5f}",
+            f"{np.degrees(off_rad):+.5f}",
+            f"{one.deviation:+.2f}",
         )
     console.print(table)
 
@@ -63,9 +67,7 @@ def _print_full(console: Console, result: ZeroResult) -> None:
 
 def _print_rank(console: Console, seen: Identifiability) -> None:
     console.print(f"rank {seen.rank} of {seen.n_free} unknowns, condition {seen.condition:.3g}")
-    console.print("singular values: " + " ".join(f"{value:.2g}" for value in seen.singular_values))
-    for combination in seen.combinations:
-        console.print(f"  not determined: {combination.words}")
+    console.print("singular values: " + " ".join(f"{v:.2g}" for v in seen.singular_values), highlight=False)
 
 
 def _print_zeros(console: Console, zeros: tuple[JointZero, ...]) -> None:
@@ -74,11 +76,17 @@ def _print_zeros(console: Console, zeros: tuple[JointZero, ...]) -> None:
         table.add_column(heading, justify="right")
     for zero in zeros:
         if zero.value_rad is None or zero.sigma_rad is None:
-            table.add_row(f"J{zero.joint}", "-", "-", "-", zero.why or "not determined")
+            table.add_row(f"J{zero.joint}", "not determined", "-", "-", "-")
             continue
         alone = "-" if zero.measurement_sigma_rad is None else f"{1e6 * zero.measurement_sigma_rad:.1f}"
         table.add_row(
-            f"J{zero.joint}", f"{np.degrees(zero.value_rad):+.5f}", f"{np.degrees(zero.sigma_rad):.5f}",
-            f"{1e6 * zero.sigma_rad:.1f}", alone,
+            f"J{zero.joint}",
+            f"{np.degrees(zero.value_rad):+.5f}",
+            f"{np.degrees(zero.sigma_rad):.5f}",
+            f"{1e6 * zero.sigma_rad:.1f}",
+            alone,
         )
     console.print(table)
+    for zero in zeros:
+        if zero.value_rad is None:
+            console.print(f"  J{zero.joint} not determined: {zero.why}", highlight=False)

@@ -4,6 +4,7 @@ Four spot coordinates fix the line; stand-off (along the beam) and roll (about i
 (Deng, Ding, Zhang 2019: "slide along the beam, roll about it").
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,7 +64,8 @@ def _axes(beam: Floats, reference: Floats, roll_rad: float) -> Floats:
     if abs(float(beam @ reference)) > 0.99:  # nearly along the beam: any other reference serves
         reference = np.array([1.0, 0.0, 0.0])
     square = reference - beam * float(reference @ beam)
-    square /= np.linalg.norm(square)
+    square = square / float(np.linalg.norm(square))
     side = np.cross(beam, square)
-    rolled = np.cos(roll_rad) * square + np.sin(roll_rad) * side
-    return np.stack([beam, rolled, np.cross(beam, rolled)], axis=1)
+    rolled = math.cos(roll_rad) * square + math.sin(roll_rad) * side
+    third: Floats = np.cross(beam, rolled)
+    return np.stack([beam, rolled, third], axis=1)

@@ -1,6 +1,7 @@
-"""Joint readings that bring the flange to a pose: damped least squares on the believed arm, whatever its parameters.
+"""Joint readings that bring the flange to a pose, by damped least squares on any believed arm.
 
-Calibrated arms have no closed form. Source of the damping: Y. Nakamura, H. Hanafusa, J. Dyn. Sys. Meas. Control 108 (1986) 163.
+Calibrated arms have no closed form. Source of the damping: Y. Nakamura, H. Hanafusa, J. Dyn. Sys. Meas. Control 108
+(1986) 163.
 """
 
 from collections.abc import Iterator
@@ -21,7 +22,9 @@ CLOSE = 1e-8  # m and rad
 TABLE_M = 0.02  # no joint centre beyond the elbow may come lower than this above the base plane
 
 
-def reach(arm: BelievedArm, T_base_flange: Floats, near_rad: Floats, rng: np.random.Generator, starts: int = 12) -> Floats:
+def reach(
+    arm: BelievedArm, T_base_flange: Floats, near_rad: Floats, rng: np.random.Generator, starts: int = 12
+) -> Floats:
     """Joint readings (joint,) that put the flange there, the first found close to `near_rad`. UnreachableError."""
     for start in _starts(near_rad, rng, starts):
         found = _solve(arm, T_base_flange, start)
@@ -58,8 +61,9 @@ def _solve(arm: BelievedArm, T_goal: Floats, q_rad: Floats) -> Floats | None:
         if float(np.max(np.abs(error))) < CLOSE:
             return q_rad
         axes = frames[:-1, :3, 2]
-        J = np.concatenate([np.cross(axes, T[:3, 3] - frames[:-1, :3, 3]), axes], axis=1).T
-        step = J.T @ np.linalg.solve(J @ J.T + DAMPING * np.eye(6), error)
+        levers_m = np.asarray(np.cross(axes, T[:3, 3] - frames[:-1, :3, 3]), dtype=np.float64)
+        J = np.concatenate([levers_m, axes], axis=1).T
+        step = J.T @ np.asarray(np.linalg.solve(J @ J.T + DAMPING * np.eye(6), error), dtype=np.float64)
         q_rad = q_rad + step * min(1.0, STEP_RAD / float(np.max(np.abs(step))))
     return None
 

@@ -1,8 +1,8 @@
 """Finding the light: a spiral of the beam across the first face, then of its tilt about the point found there.
 
 Takes the place of the camera of the source: the coarse aim is the nominal rig. An arm whose zeros are off by 2 deg
-misses a 20 mm face by up to 40 mm, so the first spiral covers that; with the beam on the first face the direction is off by
-the same few degrees only, so the second one is short.
+misses a 20 mm face by up to 40 mm, so the first spiral covers that; with the beam on the first face the direction is
+off by the same few degrees only, so the second one is short.
 """
 
 from collections.abc import Callable, Iterator
@@ -12,8 +12,8 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.bench import Bench, Look
 from acquisition.believed import BelievedArm, FixtureOptics, spots_by_joints
+from acquisition.bench import Bench, Look
 
 Floats = NDArray[np.float64]
 
@@ -54,7 +54,12 @@ class Search:
     """One search for one fixture place and order; moves in small joint steps from where the arm stands."""
 
     def __init__(
-        self, bench: Bench, arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, first: int,
+        self,
+        bench: Bench,
+        arm: BelievedArm,
+        optics: FixtureOptics,
+        T_base_fixture: Floats,
+        first: int,
         plan: SearchPlan | None = None,
     ) -> None:
         self._bench, self._arm, self._optics, self._T, self._first = bench, arm, optics, T_base_fixture, first

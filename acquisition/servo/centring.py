@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.bench import Bench, Look
 from acquisition.believed import BelievedArm
+from acquisition.bench import Bench, Look
 from acquisition.servo.status import Centring, Status, Step
 from acquisition.servo.strategy import Proposal, Strategy
 

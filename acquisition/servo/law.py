@@ -19,7 +19,12 @@ STAND_OFF_RANGE_M = (0.02, 1.0)
 
 
 def correction(
-    arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, q_rad: Floats, error_m: Floats, spots_m: Floats,
+    arm: BelievedArm,
+    optics: FixtureOptics,
+    T_base_fixture: Floats,
+    q_rad: Floats,
+    error_m: Floats,
+    spots_m: Floats,
     first: int,
 ) -> Floats:
     """The joint step (joint,) that removes the spot error (4,) m by law (8) with gain 1."""

@@ -1,7 +1,7 @@
 """The variant that measures its own Jacobian by small probing moves and corrects it after every step (Broyden).
 
-Needs no trust in the fixture pose at all; costs four probing moves. Spots are first turned into the four coordinates of the
-incoming beam in the fixture frame, because those follow the robot almost linearly where the spots do not.
+Needs no trust in the fixture pose at all; costs four probing moves. Spots are first turned into the four coordinates
+of the incoming beam in the fixture frame, because those follow the robot almost linearly where the spots do not.
 Source of the update: C. G. Broyden, Math. Comp. 19 (1965) 577, "good" form.
 """
 
@@ -56,7 +56,7 @@ class Measured:
             self._probe = min(PROBE_SPOT_M / self._gains[k], PROBE_LIMIT_RAD)
             return Proposal(self._probe * self._directions[:, k], "probe", stay=True)
         wanted = self._beam_coordinates(target_m) - self._base_c
-        amounts = np.linalg.lstsq(self._jacobian, wanted, rcond=None)[0]
+        amounts = np.asarray(np.linalg.lstsq(self._jacobian, wanted, rcond=None)[0], dtype=np.float64)
         return Proposal(self._directions @ amounts, "correct")
 
     def _plan_probes(self, q_rad: Floats) -> None:

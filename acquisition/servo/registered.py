@@ -1,10 +1,10 @@
 """Law (8) with the fixture pose corrected from every reading: the strategy that sessions use.
 
-Two spots fix the whole incoming beam in the fixture's frame: point on the first face, and direction by mirroring. The same
-beam is known in the base frame from the joints. One reading therefore leaves only two of the fixture's six freedoms open,
-the turn about the beam and the slide along it; any second reading closes those. So a guess that is wrong by 80 deg is
-worth a usable Jacobian after one motion. Errors of the arm itself fall out, because only differences between
-nearby poses enter. Derived in docs/decisions/0002.
+Two spots fix the whole incoming beam in the fixture's frame: point on the first face, and direction by mirroring. The
+same beam is known in the base frame from the joints. One reading therefore leaves only two of the fixture's six
+freedoms open, the turn about the beam and the slide along it; any second reading closes those. So a guess that is wrong
+by 80 deg is worth a usable Jacobian after one motion. Errors of the arm itself fall out, because only differences
+between nearby poses enter. Derived in docs/decisions/0002.
 """
 
 import numpy as np
@@ -47,16 +47,14 @@ class Registered:
 
     def propose(self, target_m: Floats) -> Proposal:
         q_rad, spots_m = self._q_rad[-1], self._spots_m[-1]
-        step = correction(
-            self._arm, self._optics, self.T_base_fixture, q_rad, target_m - spots_m, spots_m, self._first
-        )
+        step = correction(self._arm, self._optics, self.T_base_fixture, q_rad, target_m - spots_m, spots_m, self._first)
         return Proposal(step if len(self._q_rad) > 1 else FIRST_GAIN * step, "correct")
 
     def _onto_beam(self, T_guess: Floats, q_rad: Floats, spots_m: Floats) -> Floats:
         """The guess, turned and shifted as little as possible so that the measured beam lies on the believed one."""
         hit_m, direction = self._optics.line(spots_m, self._first)
         origin_base_m, direction_base = self._arm.beam(q_rad)
-        turned, _ = Rotation.align_vectors(direction_base[None], (T_guess[:3, :3] @ direction)[None])
+        turned = Rotation.align_vectors(direction_base[None], (T_guess[:3, :3] @ direction)[None])[0]
         R = turned.as_matrix() @ T_guess[:3, :3]
         guessed_hit_m = T_guess[:3, :3] @ hit_m + T_guess[:3, 3]
         stand_off_m = float(np.clip((guessed_hit_m - origin_base_m) @ direction_base, *STAND_OFF_RANGE_M))
@@ -88,5 +86,6 @@ class Registered:
 
         # The cost has a second valley on the far side of the turn; three starts cover the circle.
         starts = [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0]] if len(self._q_rad) == 2 else [[0.0, 0.0]]
-        best = min((least_squares(residual, start, x_scale=(0.1, 0.01)) for start in starts), key=lambda s: s.cost)
-        return moved(best.x)
+        found = [least_squares(residual, start, x_scale=(0.1, 0.01)) for start in starts]
+        best = int(np.argmin([solution.cost for solution in found]))
+        return moved(found[best].x)

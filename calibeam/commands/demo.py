@@ -37,25 +37,31 @@ def demo(*, out: Path = Path("out/demo"), rig: Path = RIG, seed: int = 1, time_s
         Which concealed truth the emulated world has.
     time_scale
         Emulated seconds per real second.
+
     """
     console, clock = Console(), SystemClock()
     fresh(out, RESULTS)
     loaded, text = load_rig(rig), rig_text(rig)
     console.print(f"starting the emulators of {rig.name} ({time_scale:g} x real time)")
-    with Emulation(rig, seed=seed, time_scale=time_scale, truth=out / "truth.json") as emulation:
-        with (
-            RecordingWriter(
-                out / "recording.mcap", rig_text=text, software=f"calibeam {version('calibeam')}", clock=clock,
-                notes={"emulation_seed": str(seed), "time_scale": f"{time_scale:g}"},
-            ) as writer,
-            connected(loaded, addresses_of(loaded, emulation.address), writer, clock, emulation.place_fixture) as bench,
-        ):
-            summary = record_session(bench, loaded, writer, PlanOptions(), clock, console)
+    with (
+        Emulation(rig, seed=seed, time_scale=time_scale, truth=out / "truth.json") as emulation,
+        RecordingWriter(
+            out / "recording.mcap",
+            rig_text=text,
+            software=f"calibeam {version('calibeam')}",
+            clock=clock,
+            notes={"emulation_seed": str(seed), "time_scale": f"{time_scale:g}"},
+        ) as writer,
+        connected(
+            loaded, addresses_of(loaded, emulation.address, time_scale), writer, clock, emulation.place_fixture
+        ) as bench,
+    ):
+        summary = record_session(bench, loaded, writer, PlanOptions(), clock, console)
     console.print(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {out / 'recording.mcap'}")
     recording = read(out / "recording.mcap")
     identified = identify_recording(recording)
     write_identified(identified, recording, out / "model.json")
     print_identified(console, identified)
-    write_report(out / "report.html", recording, identified.zeros, identified.four_poses)
+    write_report(out / "report.html", recording, identified.zeros, point_constraint=identified.four_poses)
     print_revealed(console, reveal(identified.zeros, out / "truth.json"))
     console.print(f"report: {out / 'report.html'}")

@@ -38,8 +38,11 @@ def emulate(
         Emulated seconds per real second. Default: as in the rig file.
     truth
         Write the concealed truth to this file.
+    end_with_stdin
+        End when standard input closes.
     links
         Make the symbolic links to the pseudo-terminals that the rig file names as ports.
+
     """
     from simulators.serve import ServeOptions, serve  # the physics takes a second to load: only here
 

@@ -2,16 +2,13 @@
 
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from acquisition.recording.folder import export
 from acquisition.recording.import_folder import import_folder
 from acquisition.recording.read import read
 
 
-def export_command(recording: Path, *, out: Annotated[Path, Parameter(help="The folder to make.")]) -> None:
+def export_command(recording: Path, *, out: Path) -> None:
     """Write a recording's rig and settled samples as a session folder: rig.toml and samples.csv.
 
     Example: calibeam export out/demo/recording.mcap --out session
@@ -20,13 +17,16 @@ def export_command(recording: Path, *, out: Annotated[Path, Parameter(help="The 
     ----------
     recording
         A recording, or a session folder.
+    out
+        The folder to make.
+
     """
     source = read(recording)
     export(source, out)
     print(f"{out}: rig.toml and samples.csv with {len(source.samples)} samples")
 
 
-def import_command(folder: Path, *, out: Annotated[Path, Parameter(help="The recording to make.")]) -> None:
+def import_command(folder: Path, *, out: Path) -> None:
     """Make a recording of a session folder (rig.toml and samples.csv or samples.parquet).
 
     Example: calibeam import session --out session.mcap
@@ -35,6 +35,9 @@ def import_command(folder: Path, *, out: Annotated[Path, Parameter(help="The rec
     ----------
     folder
         The session folder.
+    out
+        The recording to make.
+
     """
     import_folder(folder, out, software=f"calibeam {version('calibeam')}")
     print(f"{out}: {len(read(out).samples)} samples")

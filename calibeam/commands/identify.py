@@ -1,9 +1,7 @@
 """`calibeam identify`: joint zeros of a recording or session folder."""
 
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import Parameter
 from rich.console import Console
 
 from acquisition.recording.read import read
@@ -11,9 +9,7 @@ from calibeam.identification import identify_recording, write_identified
 from calibeam.terminal import print_identified
 
 
-def identify_command(
-    recording: Path, *, out: Annotated[Path, Parameter(help="Where to write the model.")] = Path("model.json")
-) -> None:
+def identify_command(recording: Path, *, out: Path = Path("model.json")) -> None:
     """Identify joint zeros: rank and what cannot be determined first, then numbers with their sigma.
 
     Example: calibeam identify out/demo/recording.mcap --out model.json
@@ -22,6 +18,9 @@ def identify_command(
     ----------
     recording
         A recording, or a session folder with rig.toml and samples.csv.
+    out
+        Where to write the model.
+
     """
     source = read(recording)
     identified = identify_recording(source)

@@ -31,6 +31,7 @@ def session(rig: Path, *, out: Path = Path("session"), seed: int = 1) -> None:
         Folder for recording.mcap, model.json and report.html; nothing in it is overwritten.
     seed
         Of the pose plan.
+
     """
     console, clock = Console(), SystemClock()
     loaded, text = load_rig(rig), rig_text(rig)
@@ -43,7 +44,10 @@ def session(rig: Path, *, out: Path = Path("session"), seed: int = 1) -> None:
 
     with (
         RecordingWriter(
-            out / "recording.mcap", rig_text=text, software=f"calibeam {version('calibeam')}", clock=clock,
+            out / "recording.mcap",
+            rig_text=text,
+            software=f"calibeam {version('calibeam')}",
+            clock=clock,
             notes={"plan_seed": str(seed)},
         ) as writer,
         connected(loaded, addresses_of(loaded), writer, clock, ask_for) as bench,
@@ -53,6 +57,6 @@ def session(rig: Path, *, out: Path = Path("session"), seed: int = 1) -> None:
     recording = read(out / "recording.mcap")
     identified = identify_recording(recording)
     write_identified(identified, recording, out / "model.json")
-    write_report(out / "report.html", recording, identified.zeros, identified.four_poses)
+    write_report(out / "report.html", recording, identified.zeros, point_constraint=identified.four_poses)
     print_identified(console, identified)
     console.print(f"report: {out / 'report.html'}")

@@ -4,14 +4,15 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.ticker import MaxNLocator
 
 from calibrate.report.centring_traces import Trace
 from calibrate.report.elements import Html
-from calibrate.report.quantities import length
-from calibrate.report.svg import drawn
+from calibrate.report.quantities import length, stated
+from calibrate.report.svg import drawn, log_axis
 from calibrate.report.tones import Tone, tone_of
 
+FLOOR_M = 1e-8  # an error of exactly zero has no place on a log axis
 DRAWN = 120  # traces in one picture; of more, every n-th
 
 
@@ -23,19 +24,18 @@ def courses(runs: Sequence[Trace], tolerance_m: float, places: Sequence[int], na
 
 def step_counts(runs: Sequence[Trace], tolerance_m: float, name: str) -> Html:
     """How many runs took how many steps."""
-    says = f"histogram of the steps of {len(runs)} centring runs to {length(tolerance_m)}"
+    says = f"histogram of the steps of {len(runs)} centring runs to {stated(tolerance_m)}"
     return drawn(name, says, 4.6, 3.4, lambda figure: _paint_counts(figure, runs))
 
 
 def _paint_courses(figure: Figure, runs: Sequence[Trace], tolerance_m: float, places: Sequence[int]) -> None:
     axes = figure.add_subplot()
-    axes.set_yscale("log")
     for run in runs[:: -(-len(runs) // DRAWN)]:
         tone = tone_of(places.index(run.placement)) if run.placement in places else Tone.SOFT
-        axes.plot(np.maximum(run.error_m, 1e-8), "o-", color=tone.value, lw=1.0, ms=2.8, alpha=0.55)
+        axes.plot(np.maximum(run.error_m, FLOOR_M), "o-", color=tone.value, lw=1.0, ms=2.8, alpha=0.55)
     axes.axhline(tolerance_m, color=Tone.INK.value, lw=1.2, linestyle=(0, (4, 3)))
     axes.annotate(
-        f"wanted: {length(tolerance_m)}",
+        f"wanted: {stated(tolerance_m)}",
         (1.0, tolerance_m),
         xycoords=("axes fraction", "data"),
         xytext=(0, 4),
@@ -43,7 +43,8 @@ def _paint_courses(figure: Figure, runs: Sequence[Trace], tolerance_m: float, pl
         ha="right",
         fontsize=9,
     )
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: length(value, 1)))
+    seen = np.concatenate([[tolerance_m], *(run.error_m[np.isfinite(run.error_m)] for run in runs)])
+    log_axis(axes, "y", np.maximum(seen, FLOOR_M).tolist(), lambda value: length(value, 1))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set(xlabel="step", title="Largest distance of a spot from its target")
 
@@ -54,6 +55,7 @@ def _paint_counts(figure: Figure, runs: Sequence[Trace]) -> None:
     counts = np.bincount(steps)
     bars = axes.bar(np.arange(len(counts)), counts, width=0.72, color=Tone.SOFT.value)
     axes.bar_label(bars, labels=[str(c) if c else "" for c in counts], padding=2, fontsize=9)
+    axes.margins(y=0.12)
     axes.grid(visible=False)
     axes.spines["left"].set_visible(False)
     axes.set_yticks([])

@@ -39,7 +39,8 @@ def tag(name: str, /, *children: str, **attributes: str) -> Html:
 
 def section(anchor: str, title: str, lead: str, *children: str) -> Html:
     """A chapter of the report: heading, one sentence that says what it shows, content."""
-    return tag("section", tag("h2", title), tag("p", lead, cls="lead"), *children, id=anchor)
+    opening = tag("header", tag("h2", title), tag("p", lead, cls="lead"), cls="opening")
+    return tag("section", opening, *children, id=anchor)
 
 
 def figure(drawing: Html, caption: str) -> Html:
@@ -69,7 +70,7 @@ def _row(row: Sequence[str], width: int, right: frozenset[int]) -> Html:
     for i, content in enumerate(row):
         rest = width - i if i == len(row) - 1 else 1
         if rest > 1:
-            cells.append(tag("td", content, cls="t why", colspan=str(rest)))
+            cells.append(tag("td", tag("span", content), cls="t why", colspan=str(rest)))
         else:
             cells.append(tag("th" if i == 0 else "td", content, cls="n" if i in right else "t"))
     return tag("tr", *cells)

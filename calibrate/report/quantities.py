@@ -7,6 +7,7 @@ MINUS = "\N{MINUS SIGN}"
 DIGIT_SPACE = "\N{FIGURE SPACE}"  # as wide as a digit
 POINT_SPACE = "\N{PUNCTUATION SPACE}"  # as wide as a point
 DASH = "\N{EN DASH}"
+TIED = "\N{NO-BREAK SPACE}"  # a number and its unit stay on one line
 
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 LENGTHS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
@@ -27,7 +28,7 @@ def significant(value: float, digits: int = 3) -> str:
     mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
     size = int(exponent)
     if not -5 < size < 5:
-        return f"{mantissa} × {power_of_ten(size)}".replace("-", MINUS)
+        return f"{mantissa}{TIED}×{TIED}{power_of_ten(size)}".replace("-", MINUS)
     return fixed(round(value, digits - 1 - size), max(0, digits - 1 - size))
 
 
@@ -50,13 +51,13 @@ def _in_unit(value: float, digits: int, units: Sequence[tuple[float, str]]) -> s
     if not math.isfinite(value):
         return DASH
     size, name = _fitting(value, units)
-    return f"{significant(value / size, digits)} {name}"
+    return f"{significant(value / size, digits)}{TIED}{name}"
 
 
 def stated(value_m: float) -> str:
     """A length that somebody chose, without digits that nobody chose: '5 µm'."""
     size, name = _fitting(value_m, LENGTHS)
-    return f"{value_m / size:.6g} {name}"
+    return f"{value_m / size:.6g}{TIED}{name}"
 
 
 def doubted_length(value_m: float, sigma_m: float) -> str:
@@ -72,7 +73,7 @@ def doubted_angle(value_rad: float, sigma_rad: float) -> str:
 def _doubted(value: float, sigma: float, units: Sequence[tuple[float, str]]) -> str:
     size, name = _fitting(value, units)
     decimals = decimals_of(sigma / size)
-    return f"{fixed(value / size, decimals)} ± {fixed(sigma / size, decimals)} {name}"
+    return f"{fixed(value / size, decimals)}{TIED}±{TIED}{fixed(sigma / size, decimals)}{TIED}{name}"
 
 
 def _fitting(value: float, units: Sequence[tuple[float, str]]) -> tuple[float, str]:

@@ -81,7 +81,8 @@ def _beam(axes: Axes, path_mm: Floats, first_psd: int, style: dict[str, float]) 
         axes.annotate(
             "", 0.62 * b + 0.38 * a, 0.5 * (a + b), arrowprops={"arrowstyle": "-|>", "color": tone.value, "lw": 1.2}
         )
-    axes.text(*path_mm[0], f"  PSD {first_psd} first", color=tone.value, fontsize=9, va="center")
+    words = f"PSD {first_psd} first"
+    axes.annotate(words, path_mm[0], (6, 0), textcoords="offset points", color=tone.value, fontsize=9, va="center")
 
 
 def _face(axes: Axes, T: Floats, number: int, half_m: float, origin_m: Floats, view: Floats) -> None:
@@ -91,8 +92,10 @@ def _face(axes: Axes, T: Floats, number: int, half_m: float, origin_m: Floats, v
     back = middle - normal * 1.6
     corners = np.stack([middle + along, middle - along, back - along, back + along])
     axes.fill(*corners.T, color=Tone.INK.value, zorder=5)
-    x, y = middle - normal * 6.0
-    axes.text(x, y, f"PSD {number}", ha="center", va="center", fontsize=10, fontweight="bold")
+    x, y = middle - normal * 3.0
+    side = "right" if normal[0] > 0.2 else "left" if normal[0] < -0.2 else "center"
+    height = "bottom" if normal[1] < -0.2 else "top" if normal[1] > 0.2 else "center"
+    axes.text(x, y, f"PSD {number}", ha=side, va=height, fontsize=10, fontweight="bold")
 
 
 def _scale_bar(axes: Axes) -> None:

@@ -1,4 +1,4 @@
-"""Pictures of the rig: from the side in parallel projection, from above, and the reflection close up."""
+"""Pictures of the rig: from the side in parallel projection, and from above."""
 
 import math
 
@@ -19,20 +19,23 @@ TILE_M = 0.2  # of the floor
 ELEVATION_RAD = math.radians(22.0)
 ABOVE_RAD = math.radians(90.0)
 TRIAD_M = 0.12
+STAND_M = 0.075  # radius of the base ring, of the picture only
+APART_M = 0.3  # two fixtures this far apart in the picture do not hide each other
+WIDTH_IN = 5.0
 
 
 def oblique(scene: Scene) -> Html:
-    """The whole rig from the side that shows it widest."""
-    view = _camera(_widest_azimuth(scene), ELEVATION_RAD)
+    """The whole rig from the side that shows it best."""
+    view = _camera(_best_azimuth(scene), ELEVATION_RAD)
     says = "the arm at one pose of every placement, with fixture faces and laser beam, seen from the side"
-    return drawn("rig-oblique", says, 5.6, 4.7, lambda figure: _paint(figure, scene, view, shadow=True))
+    return drawn("rig-oblique", says, WIDTH_IN, _height_in(scene, view), lambda figure: _paint(figure, scene, view))
 
 
 def from_above(scene: Scene) -> Html:
     """The same from above, x to the right."""
     view = _camera(-math.pi / 2.0, ABOVE_RAD)
     says = "the arm at one pose of every placement, with fixture faces and laser beam, seen from above"
-    return drawn("rig-above", says, 4.6, 4.7, lambda figure: _paint(figure, scene, view, shadow=False))
+    return drawn("rig-above", says, WIDTH_IN, _height_in(scene, view), lambda figure: _paint(figure, scene, view))
 
 
 def _camera(azimuth_rad: float, elevation_rad: float) -> Floats:
@@ -45,52 +48,83 @@ def _points(scene: Scene) -> Floats:
     return np.concatenate([np.concatenate([a.bones_m, a.beam_m]) for a in scene.arms])
 
 
-def _widest_azimuth(scene: Scene) -> float:
-    """Of 24 directions the one in which arms and beams cover most of the picture."""
+def _height_in(scene: Scene, view: Floats) -> float:
+    """Height of the picture that the drawing fills, floor included."""
+    low, high, level = _floor_extent(_points(scene))
+    corners = np.array([[x, y, level] for x in (low[0], high[0]) for y in (low[1], high[1])])
+    wide, tall = np.ptp(np.concatenate([_points(scene), corners]) @ view, axis=0)
+    return float(np.clip(WIDTH_IN * tall / wide, 0.6 * WIDTH_IN, 1.1 * WIDTH_IN))
+
+
+def _best_azimuth(scene: Scene) -> float:
+    """Of 24 directions the one in which arms and beams fill the picture and no fixture hides another."""
     points = _points(scene)
+    middles = np.stack([corners.mean(axis=(0, 1)) for corners in scene.faces_m.values()])
 
-    def spread(azimuth_rad: float) -> float:
-        flat = points @ _camera(azimuth_rad, ELEVATION_RAD)
-        return float(np.linalg.det(np.cov(flat.T)))
+    def merit(azimuth_rad: float) -> float:
+        view = _camera(azimuth_rad, ELEVATION_RAD)
+        flat = middles @ view
+        apart = np.linalg.norm(flat[:, None] - flat[None], axis=2)[np.triu_indices(len(flat), 1)]
+        return float(np.linalg.det(np.cov((points @ view).T))) * float(apart.min(initial=APART_M))
 
-    return max((math.radians(15.0 * k) for k in range(24)), key=spread)
+    return max((math.radians(15.0 * k) for k in range(24)), key=merit)
 
 
-def _paint(figure: Figure, scene: Scene, view: Floats, *, shadow: bool) -> None:
+def _floor_extent(points: Floats) -> tuple[Floats, Floats, float]:
+    """Corners (2,), (2,) and height of the floor: whole tiles round everything, below the lowest point."""
+    low = np.floor((points[:, :2].min(axis=0) - 0.05) / TILE_M).clip(max=-1) * TILE_M
+    high = np.ceil((points[:, :2].max(axis=0) + 0.05) / TILE_M).clip(min=1) * TILE_M
+    return low, high, min(0.0, 0.1 * math.floor(float(points[:, 2].min()) / 0.1))
+
+
+def _paint(figure: Figure, scene: Scene, view: Floats) -> None:
     axes = figure.add_subplot()
     axes.set_aspect("equal")
     axes.axis("off")
-    _floor(axes, _points(scene), view)
-    _triad(axes, view)
+    points = _points(scene)
+    level = _floor(axes, points, view)
+    _line(axes, _on_floor(scene.arms[0].bones_m, level) @ view, Tone.FAINT, 5.0, solid_capstyle="round")
+    _base(axes, view, level)
     for number, arm in reversed(list(enumerate(scene.arms))):
-        _arm(axes, arm, view, tone_of(number), leading=number == 0, shadow=shadow)
+        _arm(axes, arm, view, tone_of(number), leading=number == 0)
+    centre = points.mean(axis=0) @ view
     for number, (placement, corners) in enumerate(scene.faces_m.items()):
-        _fixture(axes, corners, view, tone_of(number), f"place {placement}")
+        _fixture(axes, corners, view, tone_of(number), level)
+        _name(axes, corners, view, tone_of(number), f"place {placement}", centre)
 
 
-def _floor(axes: Axes, points: Floats, view: Floats) -> None:
-    """Tiles in the plane z = 0 of the base, under everything."""
-    low = np.floor((points[:, :2].min(axis=0) - 0.1) / TILE_M).clip(max=-1)
-    high = np.ceil((points[:, :2].max(axis=0) + 0.1) / TILE_M).clip(min=1)
-    for x in np.arange(low[0], high[0] + 1) * TILE_M:
-        _line(axes, np.array([[x, low[1] * TILE_M, 0.0], [x, high[1] * TILE_M, 0.0]]) @ view, Tone.FAINT, 0.8)
-    for y in np.arange(low[1], high[1] + 1) * TILE_M:
-        _line(axes, np.array([[low[0] * TILE_M, y, 0.0], [high[0] * TILE_M, y, 0.0]]) @ view, Tone.FAINT, 0.8)
+def _floor(axes: Axes, points: Floats, view: Floats) -> float:
+    """Tiles under everything; their height."""
+    low, high, level = _floor_extent(points)
+    for x in np.arange(low[0], high[0] + TILE_M / 2, TILE_M):
+        _line(axes, np.array([[x, low[1], level], [x, high[1], level]]) @ view, Tone.FAINT, 0.8)
+    for y in np.arange(low[1], high[1] + TILE_M / 2, TILE_M):
+        _line(axes, np.array([[low[0], y, level], [high[0], y, level]]) @ view, Tone.FAINT, 0.8)
+    return level
 
 
-def _triad(axes: Axes, view: Floats) -> None:
+def _on_floor(points_m: Floats, level_m: float) -> Floats:
+    return points_m * [1.0, 1.0, 0.0] + [0.0, 0.0, level_m]
+
+
+def _base(axes: Axes, view: Floats, level_m: float) -> None:
+    """The base frame's axes, and the stand that carries it."""
+    turn = np.linspace(0.0, 2.0 * math.pi, 49)
+    ring = STAND_M * np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=1)
+    for height in {level_m, 0.0}:
+        _line(axes, (ring + [0.0, 0.0, height]) @ view, Tone.SOFT, 1.0)
+    for side in (view[:, 0], -view[:, 0]):
+        edge = STAND_M * side
+        _line(axes, np.stack([edge, _on_floor(edge, level_m)]) @ view, Tone.SOFT, 1.0)
     for axis, name in zip(np.eye(3) * TRIAD_M, "xyz", strict=True):
         tip = axis @ view
-        if np.linalg.norm(tip) < 0.02:  # seen from its end
-            continue
-        _line(axes, np.array([[0.0, 0.0], tip]), Tone.SOFT, 1.2)
-        axes.text(*(1.25 * tip), name, ha="center", va="center", fontsize=9, color=Tone.SOFT.value)
+        if np.linalg.norm(tip) > 0.02:  # else seen from its end
+            _line(axes, np.array([[0.0, 0.0], tip]), Tone.SOFT, 1.2)
+            axes.text(*(1.25 * tip), name, ha="center", va="center", fontsize=9, color=Tone.SOFT.value)
 
 
-def _arm(axes: Axes, arm: StandingArm, view: Floats, tone: Tone, *, leading: bool, shadow: bool) -> None:
+def _arm(axes: Axes, arm: StandingArm, view: Floats, tone: Tone, *, leading: bool) -> None:
     bones, joints = arm.bones_m @ view, arm.axes_m @ view
-    if shadow and leading:
-        _line(axes, (arm.bones_m * [1.0, 1.0, 0.0]) @ view, Tone.FAINT, 5.0, solid_capstyle="round")
     if leading:
         _line(axes, bones, Tone.INK, 5.5, solid_capstyle="round")
         _line(axes, bones, Tone.PAPER, 2.6, solid_capstyle="round")
@@ -103,16 +137,36 @@ def _arm(axes: Axes, arm: StandingArm, view: Floats, tone: Tone, *, leading: boo
     axes.plot(*(arm.beam_m[0] @ view), "o", ms=4, color=Tone.BEAM.value, zorder=5)
 
 
-def _fixture(axes: Axes, corners_m: Floats, view: Floats, tone: Tone, name: str) -> None:
+def _fixture(axes: Axes, corners_m: Floats, view: Floats, tone: Tone, level_m: float) -> None:
     """Both faces to scale, in a ring that lets them be found, and a line down to the floor."""
     middle = corners_m.mean(axis=(0, 1))
-    _line(axes, np.stack([middle, middle * [1.0, 1.0, 0.0]]) @ view, tone, 0.9, linestyle=(0, (1, 2)))
+    _line(axes, np.stack([middle, _on_floor(middle, level_m)]) @ view, tone, 0.9, linestyle=(0, (1, 2)))
     for corners in corners_m:
-        axes.fill(*(corners @ view).T, color=tone.value, lw=1.0, zorder=6)
+        axes.fill(*(corners @ view).T, facecolor=tone.value, edgecolor=tone.value, lw=1.0, zorder=6)
     x, y = middle @ view
-    size = 2.2 * float(np.linalg.norm(corners_m - middle, axis=2).max())
-    axes.add_patch(Circle((x, y), size, fill=False, ec=tone.value, lw=1.2, zorder=6))
-    axes.text(x + size, y - size, name, color=tone.value, fontsize=10, fontweight="bold", va="top", zorder=7)
+    axes.add_patch(Circle((float(x), float(y)), _ring_m(corners_m), fill=False, ec=tone.value, lw=1.2, zorder=6))
+
+
+def _ring_m(corners_m: Floats) -> float:
+    return 1.5 * float(np.linalg.norm(corners_m - corners_m.mean(axis=(0, 1)), axis=2).max())
+
+
+def _name(axes: Axes, corners_m: Floats, view: Floats, tone: Tone, name: str, centre: Floats) -> None:
+    """Beside the ring, on the side away from the middle of the picture."""
+    middle, size = corners_m.mean(axis=(0, 1)) @ view, _ring_m(corners_m)
+    right, up = bool(middle[0] >= centre[0]), bool(middle[1] >= centre[1])
+    x, y = middle + 0.78 * size * np.array([1.0 if right else -1.0, 1.0 if up else -1.0])
+    axes.text(
+        float(x),
+        float(y),
+        name,
+        ha="left" if right else "right",
+        va="bottom" if up else "top",
+        color=tone.value,
+        fontsize=10,
+        fontweight="bold",
+        zorder=7,
+    )
 
 
 def _line(axes: Axes, points: Floats, tone: Tone, width: float, **style: object) -> None:

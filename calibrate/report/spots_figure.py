@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from calibrate.observations import Observations
@@ -36,4 +37,6 @@ def _paint(figure: Figure, data: Observations, psd: int, half_size_m: float, pla
     for spine in axes.spines.values():
         spine.set_visible(False)
     axes.set(xlim=(-1.06 * half_mm, 1.06 * half_mm), ylim=(-1.06 * half_mm, 1.06 * half_mm))
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 5, 10]))
     axes.set(xlabel="x (mm)", ylabel="y (mm)", title=f"PSD {psd}")

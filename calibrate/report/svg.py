@@ -2,11 +2,14 @@
 
 import io
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import Literal
 
 import matplotlib as mpl
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
 
 from calibrate.report.elements import Html, escaped
 from calibrate.report.tones import Tone
@@ -63,6 +66,20 @@ def drawn(name: str, says: str, width_in: float, height_in: float, paint: Callab
         text = io.StringIO()
         figure.savefig(text, format="svg")
     return inlined(text.getvalue(), name, says)
+
+
+def log_axis(axes: Axes, which: Literal["x", "y"], values: Sequence[float], says: Callable[[float], str]) -> None:
+    """A logarithmic axis round these values, labelled 1 2 5 over less than two decades, else 1."""
+    low, high = min(values) / 1.8, max(values) * 1.8
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    if which == "x":
+        axes.set(xscale="log", xlim=(low, high))
+    else:
+        axes.set(yscale="log", ylim=(low, high))
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 100.0 * low else (1.0,)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: says(value)))
+    axis.set_minor_locator(NullLocator())
+    axis.set_minor_formatter(NullFormatter())
 
 
 def inlined(svg: str, name: str, says: str) -> Html:

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 
 from drivers.cia406.objects import Operating
 
-SPEED_LIMIT_RAD_S = 100.0  # 16 turns a second: no arm joint turns so fast, even in an emulation run at ten times the pace
+SPEED_LIMIT_RAD_S = (
+    100.0  # 16 turns a second: no arm joint turns so fast, even in an emulation run at ten times the pace
+)
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,8 @@ def opened(open_bus: OpenBus, name: str) -> can.BusABC:
         return open_bus()
     except (*GONE, ValueError, ImportError, NotImplementedError) as cause:
         raise DeviceLost(
-            f"{name}: the CAN bus cannot be opened ({cause}); check adapter, interface, channel and bitrate in the rig file"
+            f"{name}: the CAN bus cannot be opened ({cause}); check the adapter, and interface, channel and bitrate "
+            "in the rig file"
         ) from cause
 
 
@@ -64,11 +65,33 @@ def lost_as_device_lost(name: str, doing: str) -> Generator[None]:
         raise DeviceLost(f"{name}: CAN adapter gone while {doing} ({cause}); check its cable and power") from cause
 
 
+class _Listener(can.Listener):
+    """Shows every frame to `take` and keeps the error that ends the listening, which python-can would only print."""
+
+    def __init__(self, take: Callable[[can.Message], None]) -> None:
+        self._take = take
+        self.error: Exception | None = None
+
+    def on_message_received(self, msg: can.Message) -> None:
+        self._take(msg)
+
+    def on_error(self, exc: Exception) -> None:
+        self.error = exc
+
+    def stop(self) -> None:
+        """Nothing to release."""
+
+
 @contextmanager
-def listening(network: canopen.Network, bus: can.BusABC, also: Callable[[can.Message], None]) -> Generator[None]:
-    """Answers reach canopen for as long as this lasts, by a thread that ends with it; `also` sees every frame."""
-    notifier = can.Notifier(bus, [*network.listeners, also], LISTEN_S)
+def listening(network: canopen.Network, bus: can.BusABC, take: Callable[[can.Message], None]) -> Generator[None]:
+    """Answers reach canopen for as long as this lasts, by a thread that ends with it; `take` sees every frame."""
+    listener = _Listener(take)
+    notifier = can.Notifier(bus, [*network.listeners, listener], LISTEN_S)
     try:
         yield
+    except Exception as outcome:
+        if listener.error is not None:  # the reason behind an answer that did not come
+            raise can.CanOperationError(str(listener.error)) from outcome
+        raise
     finally:
         notifier.stop(10 * LISTEN_S)

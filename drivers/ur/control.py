@@ -3,8 +3,8 @@
     control = UrControl("192.168.0.10"); control.connect(); control.move_joints(q_rad, 1.0, 3.0); control.close()
 
 How a stop reaches the arm: the child watches a line of its own for it and brakes; if it does not answer within tenths,
-the program is stopped through the dashboard, which needs neither the child nor RTDE. If that fails too, the child is killed
-and the controller's watchdog, which nobody kicks any more, ends the program.
+the program is stopped through the dashboard, which needs neither the child nor RTDE. If that fails too, the child is
+killed and the controller's watchdog, which nobody kicks any more, ends the program.
 After any fault the child is killed: call `connect` again, it starts a new one.
 """
 
@@ -81,6 +81,7 @@ class UrControl:
                 raise DeviceRefused(f"{self.place}: no control: {answer.text}; look at the pendant, then connect again")
         except BaseException:
             child.kill()
+            child.release()
             raise
         self.ready, self._child = answer, child
 
@@ -110,8 +111,8 @@ class UrControl:
 
     def servo_joints(
         self, q_rad: ArrayLike, period_s: float = 0.002, lookahead_s: float = 0.1, gain: float = 300.0
-    ) -> None:  # noqa: E501
-        """One set-point (6,) of a stream; returns at once. End the stream with `servo_stop`. Raises as `move_joints`."""
+    ) -> None:
+        """One set-point (6,) of a stream; returns at once. `servo_stop` ends the stream. Raises as `move_joints`."""
         self._q_rad = None
         target_rad = _six_numbers(q_rad, "q_rad")
         self._call(ServoJoints(target_rad.tolist(), period_s, lookahead_s, gain), MARGIN_S)
@@ -134,8 +135,17 @@ class UrControl:
         """Ends the control program and the child; safe in every state and more than once."""
         child, self._child = self._child, None
         self._q_rad = None
-        if child is not None:
-            child.close()
+        if child is None:
+            return
+        if not self._calling.acquire(blocking=False):  # a move of another thread: it ends with DeviceRefused
+            child.kill()
+            return
+        try:
+            child.end()
+            child.kill()
+            child.release()
+        finally:
+            self._calling.release()
 
     # --- inside
 
@@ -146,7 +156,10 @@ class UrControl:
                 raise DeviceLost(f"{self.place}: not connected; call connect() first")
             try:
                 ended = child.call(request, limit_s)
-            except DeviceError:
+            except DeviceError as error:
+                if child.killed:  # by stop() or close() of another thread
+                    child.release()
+                    raise DeviceRefused(f"{self.place}: the motion was ended by stop(); connect again") from error
                 self._give_up(child)
                 raise
             if ended.outcome is not Outcome.DONE:
@@ -183,7 +196,7 @@ class UrControl:
             raise DeviceRefused(f"{self.place}: safety is {state.safety_status}; {_remedy(state.safety_status)}")
         if state.robot_mode != "RUNNING":
             raise DeviceRefused(
-                f"{self.place}: the arm is in {state.robot_mode}; power it on and release the brakes, then connect again"
+                f"{self.place}: the arm is in {state.robot_mode}; power on, release the brakes, then connect again"
             )
         if not state.remote_control:
             raise DeviceRefused(f"{self.place}: it is in local control; switch to remote control on the pendant")
@@ -192,7 +205,8 @@ class UrControl:
         """The arm stopped by the other way, the child killed."""
         with contextlib.suppress(DeviceError):
             self._dashboard.stop()
-        self._drop(child)
+        self._forget(child)
+        child.release()
 
     def _stop_independently(self, child: SupervisedChild | None) -> None:
         try:
@@ -204,9 +218,12 @@ class UrControl:
             ) from error
         finally:
             if child is not None:
-                self._drop(child)
+                self._forget(child)
+                if self._calling.acquire(blocking=False):  # otherwise the thread whose call has just ended does it
+                    child.release()
+                    self._calling.release()
 
-    def _drop(self, child: SupervisedChild) -> None:
+    def _forget(self, child: SupervisedChild) -> None:
         if self._child is child:
             self._child = None
         child.kill()

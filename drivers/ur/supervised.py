@@ -25,13 +25,14 @@ class SupervisedChild:
 
     def __init__(self, host: str, watchdog_hz: float, place: str, clock: Clock) -> None:
         self._place, self._clock = place, clock
+        self.killed = False
         calls, child_calls = socket.socketpair()
         stops, child_stops = socket.socketpair()
         self._calls, self._stops = Link(calls), Link(stops)
-        self._printed = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the child; a pipe could fill and block it
+        self._printed = tempfile.TemporaryFile()  # noqa: SIM115 - closed in `release`; a pipe could fill and block it
         with child_calls, child_stops:
             fds = (child_calls.fileno(), child_stops.fileno())
-            self._process = subprocess.Popen(
+            self._process = subprocess.Popen(  # noqa: S603 - our own interpreter and module; no shell
                 [sys.executable, "-m", CHILD_MODULE, host, str(fds[0]), str(fds[1]), str(watchdog_hz)],
                 pass_fds=fds,
                 stdin=subprocess.DEVNULL,
@@ -59,7 +60,7 @@ class SupervisedChild:
         )
 
     def call(self, request: Request, limit_s: float) -> Ended:
-        """A call and its end. DeviceStale: no sign of life, or not ended within `limit_s`. DeviceLost: the child died."""
+        """A call and its end. DeviceStale: no sign of life, or no end within `limit_s`. DeviceLost: the child died."""
         deadline_s = self._clock.now_s() + limit_s
         self._send(self._calls, request)
         while True:
@@ -85,18 +86,21 @@ class SupervisedChild:
         except OSError:
             return False
 
-    def close(self) -> None:
-        """Asks it to end, then makes it end."""
+    def end(self) -> None:
+        """Asks it to end, and waits for that; no call may be under way."""
         with contextlib.suppress(OSError, subprocess.TimeoutExpired):
             self._calls.send(Close())
             self._process.wait(CLOSE_LIMIT_S)
-        self.kill()
 
     def kill(self) -> None:
-        """SIGKILL; safe in every state and more than once."""
+        """SIGKILL; safe in every state and from any thread: a call that is under way ends with DeviceLost."""
+        self.killed = True
         if self.alive:
             self._process.kill()
         self._process.wait()
+
+    def release(self) -> None:
+        """Closes the lines; no call may be under way."""
         self._calls.close()
         self._stops.close()
         self._printed.close()

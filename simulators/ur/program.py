@@ -49,7 +49,7 @@ class ProgramRunner:
         if not self._arm.power.ready:
             self.last_error = f"program not started: robot {self._arm.power.robot_mode.name}, safety {self._arm.power.safety_mode.name}"  # noqa: E501
             return
-        self._program = program
+        self._program, self.last_error = program, ""
         self._starts_s = self._now_s + START_DELAY_S
 
     def stop(self) -> None:

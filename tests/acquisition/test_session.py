@@ -81,8 +81,21 @@ def test_repeats_share_their_command_and_one_of_them_comes_from_the_other_side(t
 
 def test_a_row_has_the_columns_of_the_session_folder(taken) -> None:
     row = taken[0].samples[0].row()
-    for name in ("t_s", "q6_rad", "placement", "first_psd", "psd1_x_m", "psd2_sum_v", "cmd1_rad", "enc6_rad",
-                 "approach1", "repeat", "qd1_rad_s", "temp_psd_degC", "temp_joint1_degC"):
+    for name in (
+        "t_s",
+        "q6_rad",
+        "placement",
+        "first_psd",
+        "psd1_x_m",
+        "psd2_sum_v",
+        "cmd1_rad",
+        "enc6_rad",
+        "approach1",
+        "repeat",
+        "qd1_rad_s",
+        "temp_psd_degC",
+        "temp_joint1_degC",
+    ):
         assert name in row
 
 

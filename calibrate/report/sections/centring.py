@@ -7,9 +7,10 @@ import numpy as np
 
 from calibrate.report.centring_figures import courses, step_counts
 from calibrate.report.centring_traces import Trace, Traces, traces_of
+from calibrate.report.colour_key import colour_key
 from calibrate.report.elements import Html, figure, panels, section, table, tag
 from calibrate.report.evidence import Evidence
-from calibrate.report.quantities import length
+from calibrate.report.quantities import stated
 
 TITLE = "Laser centring"
 PICTURED = 3  # tolerances, the finest first; all are in the table
@@ -23,7 +24,9 @@ def centring(evidence: Evidence) -> Html:
     lead = "The servo loop moves the arm until all four spot coordinates are within the tolerance of where they are wanted."
     groups = traces.by_tolerance()
     drawings = [_pictures(runs, wanted, evidence.places) for wanted, runs in list(groups.items())[:PICTURED]]
-    return section("centring", TITLE, lead, *drawings, _endings(groups), *_unreadable(traces))
+    return section(
+        "centring", TITLE, lead, colour_key(evidence.places), *drawings, _endings(groups), *_unreadable(traces)
+    )
 
 
 def _pictures(runs: Sequence[Trace], wanted_m: float, places: Sequence[int]) -> Html:
@@ -32,13 +35,18 @@ def _pictures(runs: Sequence[Trace], wanted_m: float, places: Sequence[int]) -> 
     return panels(
         figure(
             courses(runs, wanted_m, places, f"course-{name}"),
-            f"{len(runs)} runs to {length(wanted_m)}, coloured by fixture place. A line breaks where a face was dark.",
+            f"{len(runs)} runs that wanted {stated(wanted_m)}. A line breaks where a face was dark.",
         ),
         figure(
             step_counts(runs, wanted_m, f"steps-{name}"),
-            f"Half of the runs took {np.median(steps):g} steps or fewer, the longest {max(steps)}.",
+            f"{_at_once(steps)}The median is {np.median(steps):g} steps, the longest run took {max(steps)}.",
         ),
     )
+
+
+def _at_once(steps: Sequence[int]) -> str:
+    none = sum(s == 0 for s in steps)
+    return f"{none} of {len(steps)} runs were there at the first look. " if none else ""
 
 
 def _endings(groups: dict[float, tuple[Trace, ...]]) -> Html:
@@ -53,7 +61,7 @@ def _ending_rows(groups: dict[float, tuple[Trace, ...]]) -> Iterator[tuple[str, 
             steps = [r.steps for r in same]
             said = status.replace("_", " ").lower()
             numbers = (str(count), f"{np.median(steps):g}", str(max(steps)), str(sum(r.probes for r in same)))
-            yield (length(wanted), strategy, said, *numbers)
+            yield (stated(wanted), strategy, said, *numbers)
 
 
 def _unreadable(traces: Traces) -> list[Html]:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from math import degrees, hypot
 
-from calibrate.report.elements import Html, figure, join, panels, section, table, tag
+from calibrate.report.elements import Html, figure, panels, section, table, tag
 from calibrate.report.quantities import angle, decimals_of, fixed, length, significant
 from calibrate.report.rank_figures import spectrum
 from calibrate.report.reasons import plain_reason
@@ -25,7 +25,7 @@ def point(result: PointConstraintResult | None, full: Sequence[JointZero], why_n
     seen = result.identifiability
     caption = "Singular values of the point constraint: few poses see few combinations."
     drawing = figure(spectrum(seen.singular_values, seen.rank, "point-spectrum", with_drawing=False), caption)
-    words = join(tag("h3", f"Rank {seen.rank} of {seen.n_free} zeros"), rank_words(seen))
+    words = tag("div", tag("h3", f"Rank {seen.rank} of {seen.n_free} zeros"), rank_words(seen))
     met = (
         f"The lines miss their common point by {length(result.rms_before_m)} before and {length(result.rms_after_m)} after, "
         f"rms. Fit: {result.status.value}."

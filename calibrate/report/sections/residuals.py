@@ -3,9 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.report.colour_key import colour_key, place_name
 from calibrate.report.elements import Html, figure, panels, section, table, tag
 from calibrate.report.evidence import Evidence, Expected
-from calibrate.report.quantities import angle, fixed, length, significant
+from calibrate.report.quantities import angle, doubted_angle, doubted_length, fixed, length, significant
 from calibrate.report.residual_figures import COORDINATES, by_pose, histogram, quantiles
 from calibrate.report.verdict import UNLIKELY
 from calibrate.zeros.result import ZeroResult
@@ -25,6 +26,7 @@ def residuals(evidence: Evidence) -> Html:
         "residuals",
         TITLE,
         lead,
+        colour_key(evidence.places),
         _courses(evidence, expected),
         _by_place(evidence),
         tag("h3", "Is what remains noise?"),
@@ -40,7 +42,8 @@ def _courses(evidence: Evidence, expected: Expected) -> Html:
     after = by_pose(data, result.residual_after_m, expected.sigma_m, places, "residual-after", "After")
     return panels(
         figure(
-            before, f"Before the fit, {length(result.rms_before_m)} rms: on its own scale. Colour by fixture place."
+            before,
+            f"Before the fit, {length(result.rms_before_m)} rms: on its own scale, without the noise, which would be a hairline here.",
         ),
         figure(
             after,
@@ -54,10 +57,10 @@ def _by_place(evidence: Evidence) -> Html:
     rows: list[tuple[str, ...]] = []
     for place in evidence.places:
         at = evidence.data.placement == place
-        rows.append((f"place {place}", *_rms_pairs(evidence.result, at)))
+        rows.append((place_name(place), *_rms_pairs(evidence.result, at)))
     rows.append(("all", *_rms_pairs(evidence.result, np.ones(len(evidence.data), dtype=bool))))
-    head = ("Rms in µm, before → after", *COORDINATES)
-    return table(head, rows, numeric=(1, 2, 3, 4))
+    head = ("Place", *COORDINATES)
+    return table(head, rows, numeric=(1, 2, 3, 4), caption="Rms in µm, before → after")
 
 
 def _rms_pairs(result: ZeroResult, rows: NDArray[np.bool_]) -> list[str]:
@@ -89,13 +92,13 @@ def _noise(result: ZeroResult) -> Html:
         (
             "joints",
             angle(n.joint_believed_rad),
-            f"{angle(n.joint_rad)} ± {angle(n.joint_sigma_rad, 2)}",
+            doubted_angle(n.joint_rad, n.joint_sigma_rad),
             _ratio(n.joint_rad, n.joint_believed_rad),
         ),
         (
             "detectors (median of the averaged spots)",
             length(n.psd_believed_m),
-            f"{length(n.psd_m)} ± {length(n.psd_sigma_m, 2)}",
+            doubted_length(n.psd_m, n.psd_sigma_m),
             _ratio(n.psd_m, n.psd_believed_m),
         ),
     ]

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from calibrate.report.colour_key import colour_key
 from calibrate.report.elements import Html, figure, panels, section
 from calibrate.report.evidence import Evidence
 from calibrate.report.spots_figure import face
@@ -20,7 +21,7 @@ def spots(evidence: Evidence) -> Html:
         figure(face(data, psd, half_m, evidence.places), _reach(data.spots_m[:, 2 * psd - 2 : 2 * psd], half_m))
         for psd in (1, 2)
     ]
-    return section("spots", TITLE, lead, panels(*figures))
+    return section("spots", TITLE, lead, colour_key(evidence.places), panels(*figures))
 
 
 def _reach(spots_m: np.ndarray, half_m: float) -> str:

@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from math import degrees, radians
 
-from calibrate.report.elements import Html, bullets, figure, join, panels, table, tag
+from calibrate.report.elements import Html, bullets, figure, panels, table, tag
 from calibrate.report.evidence import Evidence
 from calibrate.report.quantities import aligned, angle, decimals_of, fixed, length, significant
-from calibrate.report.rank_figures import doubts
+from calibrate.report.summary_figures import doubts, explained
 from calibrate.report.reasons import plain_reason
 from calibrate.report.verdict import limited_by_measurement, verdict
 from calibrate.zeros.result import JointZero
@@ -36,7 +36,7 @@ def summary(evidence: Evidence) -> Html:
             "How well each zero is known, on a logarithmic axis. A long line means that measuring more will not help: "
             "the tolerance of the drawing is the limit, because these data cannot tell the zero from the links."
         )
-        content.append(panels(figure(doubts(zeros), caption)))
+        content.append(panels(figure(doubts(zeros), caption), *_explained(evidence)))
     return tag("div", *content, id="summary")
 
 
@@ -89,21 +89,36 @@ def _tiles(evidence: Evidence) -> Html:
     return tag("div", *tiles, cls="tiles")
 
 
+def _explained(evidence: Evidence) -> list[Html]:
+    """How far the spots are explained, against the floor below which there is only noise."""
+    result, expected, unseen = evidence.result, evidence.expected, evidence.result.held_out
+    if expected is None:
+        return []
+    sizes = [("before the fit", result.rms_before_m), ("after the fit", result.rms_after_m)]
+    sizes += [] if unseen is None else [("unseen poses", unseen.rms_after_m)]
+    caption = (
+        "How far the spots are from where the model expects them. The dashed line is the noise floor: no model of the arm "
+        "can get below it on poses that it has not seen."
+    )
+    return [figure(explained(sizes, expected.floor_m), caption)]
+
+
 def _zeros(evidence: Evidence) -> Html:
     """Value and sigma in degrees, one line a joint."""
     zeros = evidence.result.zeros
     known = [z for z in zeros if z.value_rad is not None and z.sigma_rad is not None]
     values = aligned([fixed(degrees(z.value_rad or 0.0), _decimals(z)) for z in known])
     sigmas = aligned([fixed(degrees(z.sigma_rad or 0.0), _decimals(z)) for z in known])
-    numbers = {z.joint: (v, s) for z, v, s in zip(known, values, sigmas, strict=True)}
+    micro = aligned([significant(1e6 * (z.sigma_rad or 0.0), 2) for z in known])
+    numbers = {z.joint: row for z, *row in zip(known, values, sigmas, micro, strict=True)}
     rows: list[tuple[str, ...]] = []
     for z in zeros:
         if z.joint not in numbers:
             rows.append((f"J{z.joint}", f"not determined: {_reason(z, evidence)}"))
             continue
         limit = "measurement" if limited_by_measurement(z) else "drawing tolerance of the links"
-        rows.append((f"J{z.joint}", *numbers[z.joint], angle(z.sigma_rad or 0.0), limit))
-    return join(table(("Joint", "Zero (°)", "± sigma (°)", "sigma", "limited by"), rows, numeric=(1, 2, 3)))
+        rows.append((f"J{z.joint}", *numbers[z.joint], limit))
+    return table(("Joint", "zero (°)", "± sigma (°)", "± sigma (µrad)", "limited by"), rows, numeric=(1, 2, 3))
 
 
 def _decimals(zero: JointZero) -> int:

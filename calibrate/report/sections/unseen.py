@@ -50,7 +50,16 @@ def _limits(evidence: Evidence) -> Iterator[str]:
         yield "One fixture place only: errors that are the same over the whole workspace stay hidden."
     if rig.tolerance is None:
         yield "Link lengths and angles were taken as drawn, since the rig file states no tolerance."
-    yield "The size of the whole arm: spots give no scale beyond that of the faces, unless a distance between places is measured."
+    held = {
+        p.name.partition(".")[2].partition("_")[0] for p in result.parameters if p.name.startswith("psd") and not p.free
+    }
+    if "gain" in held:
+        yield (
+            "Scale: the detectors' scale is taken as exact, and with it the size of the arm. A measured distance between two "
+            "places would check it."
+        )
+    if held - {"gain"}:
+        yield "The fixture itself: how PSD 2 sits to PSD 1 is taken from the drawing as exact."
     temperatures = [np.ptp(values) for _, values in _temperatures(evidence.recording)]
     if not temperatures or max(temperatures) < 1.0:
         yield "Warming: temperatures were not recorded or changed by less than 1 °C, so these zeros hold at this temperature."

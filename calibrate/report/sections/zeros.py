@@ -5,11 +5,11 @@ from math import degrees
 
 import numpy as np
 
-from calibrate.identifiability import WEAK, Identifiability
+from calibrate.identifiability import WEAK, Combination, Identifiability
 from calibrate.parameters import Parameter
 from calibrate.report.elements import Html, bullets, figure, folded, join, panels, section, table, tag
 from calibrate.report.evidence import Evidence
-from calibrate.report.quantities import aligned, angle, decimals_of, fixed, significant
+from calibrate.report.quantities import DASH, aligned, angle, decimals_of, fixed, significant
 from calibrate.report.rank_figures import spectrum
 from calibrate.report.reasons import plain_reason
 from calibrate.zeros.result import Estimate, JointZero
@@ -34,7 +34,7 @@ def zeros(evidence: Evidence) -> Html:
                 "Singular values of the weighted Jacobian. Each says how many times better than a plausible guess one "
                 "combination of parameters is known. The drop below the dashed line is the rank gap.",
             ),
-            join(tag("h3", "Unseen combinations"), rank_words(seen)),
+            tag("div", tag("h3", "Unseen combinations"), rank_words(seen)),
         ),
         tag("h3", "Zeros"),
         table_of_zeros(result.zeros, seen),
@@ -57,9 +57,15 @@ def rank_words(seen: Identifiability) -> Html:
         said.append(tag("p", gap))
     if not seen.combinations:
         return join(*said, tag("p", "Every parameter can be told from every other."))
-    kinds = {True: "by geometry, whatever the poses", False: "by these poses; others might tell them apart"}
-    words = [join(tag("code", c.words), f": cannot be told apart {kinds[c.structural]}.") for c in seen.combinations]
-    return join(*said, bullets(words))
+    return join(*said, bullets(join(tag("code", c.words), f": {_kind(c)}.") for c in seen.combinations))
+
+
+def _kind(combination: Combination) -> str:
+    if len(combination.members) == 1:
+        return "the measurement does not depend on it"
+    if combination.structural:
+        return "cannot be told apart by geometry, whatever the poses"
+    return "hardly told apart by these poses; others might"
 
 
 def table_of_zeros(listed: Sequence[JointZero], seen: Identifiability) -> Html:
@@ -73,11 +79,12 @@ def table_of_zeros(listed: Sequence[JointZero], seen: Identifiability) -> Html:
         aligned([fixed(scale(z.sigma_rad or 0.0), decimals_of(scale(z.sigma_rad or 0.0))) for z in known])
         for scale in (degrees, _mrad)
     ]
+    alone = aligned([_alone(z) for z in known])
     numbers = {
-        z.joint: (columns[0][i], sigmas[0][i], columns[1][i], sigmas[1][i], _alone(z)) for i, z in enumerate(known)
+        z.joint: (columns[0][i], sigmas[0][i], columns[1][i], sigmas[1][i], alone[i]) for i, z in enumerate(known)
     }
     rows = [(f"J{z.joint}", *numbers.get(z.joint, (f"not determined: {_why(z, seen)}",))) for z in listed]
-    head = ("Joint", "zero (°)", "± sigma (°)", "zero (mrad)", "± sigma (mrad)", "of the measurement alone")
+    head = ("Joint", "zero (°)", "± sigma (°)", "zero (mrad)", "± sigma (mrad)", "of measurement alone (µrad)")
     return table(head, rows, numeric=(1, 2, 3, 4, 5))
 
 
@@ -86,7 +93,7 @@ def _mrad(value_rad: float) -> float:
 
 
 def _alone(zero: JointZero) -> str:
-    return "not stated" if zero.measurement_sigma_rad is None else angle(zero.measurement_sigma_rad)
+    return DASH if zero.measurement_sigma_rad is None else significant(1e6 * zero.measurement_sigma_rad, 2)
 
 
 def _why(zero: JointZero, seen: Identifiability) -> str:

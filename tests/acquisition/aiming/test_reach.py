@@ -30,8 +30,11 @@ def test_a_beam_out_of_reach_is_refused_by_name(rig) -> None:
     target = BeamTarget(1, (0.0, 0.0, 0.0, 0.0), 0.2, 0.0)
     with pytest.raises(UnreachableError, match="no joint position within limits"):
         reach(
-            learner.arm, flange_for(learner.arm, learner.optics, T, target), np.array(rig.motion.home_rad),
-            np.random.default_rng(1), starts=3,
+            learner.arm,
+            flange_for(learner.arm, learner.optics, T, target),
+            np.array(rig.motion.home_rad),
+            np.random.default_rng(1),
+            starts=3,
         )
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from benchmarks.centring import run_search
 
 from acquisition.aiming.search import Found, Search
+from benchmarks.centring import run_search
 
 
 def test_finds_both_faces_from_no_light(rig, plain_rig) -> None:

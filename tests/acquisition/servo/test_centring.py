@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from benchmarks.centring import random_start
 
 from acquisition.bench import Look, Spot
 from acquisition.servo.centring import Limits, centre
@@ -13,6 +12,7 @@ from acquisition.servo.measured import Measured
 from acquisition.servo.registered import Registered
 from acquisition.servo.status import Status
 from acquisition.servo.strategy import Proposal
+from benchmarks.centring import random_start
 
 
 class Plane:
@@ -116,7 +116,9 @@ STRATEGIES: dict[str, Callable] = {"registered": Registered, "measured": Measure
 
 @pytest.mark.parametrize("name", STRATEGIES)
 @pytest.mark.parametrize("case", [0, 1])
-def test_reaches_5_um_with_the_fixture_pose_wrong_by_up_to_80_deg_and_50_mm(rig, plain_rig, name: str, case: int) -> None:
+def test_reaches_5_um_with_the_fixture_pose_wrong_by_up_to_80_deg_and_50_mm(
+    rig, plain_rig, name: str, case: int
+) -> None:
     start = random_start(rig, plain_rig, case, np.random.default_rng(700 + case))
     strategy = STRATEGIES[name](start.learner.arm, start.learner.optics, start.T_guess, start.first)
     run = centre(start.bench, start.learner.arm, strategy, start.q_rad, np.zeros(4))

@@ -1,0 +1,68 @@
+"""What encoders say of their own health: emergencies, heartbeats, a restart that nobody ordered."""
+
+from collections.abc import Sequence
+
+from drivers.cia406 import objects
+from drivers.cia406.codec import Emergency, emergency, heartbeat_state
+from drivers.cia406.objects import NmtState
+from drivers.errors import DeviceLost, DeviceRefused
+
+EMERGENCIES_KEPT = 256
+
+
+class NodeWatch:
+    """Takes every frame that is not a position. `codes` holds each node's last emergency code, 0 for none."""
+
+    def __init__(self, name: str, nodes: Sequence[int]) -> None:
+        self.emergencies: tuple[Emergency, ...] = ()  # the newest EMERGENCIES_KEPT, in the order they came
+        self.codes = tuple(0 for _ in nodes)
+        self.bad_frames = 0
+        self._name = name
+        self._nodes = tuple(nodes)
+        self._heard_s: dict[int, float] = {}  # last heartbeat
+        self._operational = False
+
+    def set_operational(self, operational: bool) -> None:
+        """From now on a boot-up, or another state than operational, is a fault; or no longer."""
+        self._operational = operational
+        self._heard_s = {}
+
+    def forget_codes(self) -> None:
+        """Nodes were configured anew: what they reported before is history."""
+        self.codes = tuple(0 for _ in self._nodes)
+
+    def take(self, can_id: int, data: bytes, now_s: float) -> None:
+        """DeviceLost on a restart, DeviceRefused when a node was told to leave the operational state."""
+        function, node = can_id & ~0x7F, can_id & 0x7F
+        if node not in self._nodes:
+            return
+        if function == objects.EMERGENCY_ID:
+            self._take_emergency(node, data, now_s)
+        elif function == objects.HEARTBEAT_ID and self._operational:
+            self._take_heartbeat(node, data, now_s)
+
+    def heard_within(self, places: Sequence[int], limit_s: float, now_s: float) -> bool:
+        """True when the heartbeat of every node at these places came within `limit_s`."""
+        return all(now_s - self._heard_s.get(self._nodes[place], -limit_s) < limit_s for place in places)
+
+    def _take_emergency(self, node: int, data: bytes, now_s: float) -> None:
+        message = emergency(now_s, node, data)
+        if message is None:
+            self.bad_frames += 1
+            return
+        self.emergencies = (*self.emergencies, message)[-EMERGENCIES_KEPT:]
+        at = self._nodes.index(node)
+        self.codes = (*self.codes[:at], message.code, *self.codes[at + 1 :])
+
+    def _take_heartbeat(self, node: int, data: bytes, now_s: float) -> None:
+        state = heartbeat_state(data)
+        self._heard_s[node] = now_s
+        if state is NmtState.BOOT_UP:
+            raise DeviceLost(
+                f"{self._name}: encoder {node} has restarted by itself (boot-up while operational); "
+                "check its power supply and cable, then connect again"
+            )
+        if state not in (None, NmtState.OPERATIONAL):
+            raise DeviceRefused(
+                f"{self._name}: encoder {node} is {state.name}, not operational; did another CANopen master stop it?"
+            )
