@@ -14,7 +14,7 @@ from acquisition.aiming.pose import BeamTarget, between, flange_for
 from acquisition.aiming.reach import reach
 from acquisition.aiming.search import Found, Search
 from acquisition.bench import Bench
-from acquisition.errors import SpotLostError
+from acquisition.errors import SpotLostError, UnreachableError
 from acquisition.journal import Journal
 from acquisition.learner import Learner
 from acquisition.servo.centring import Limits, centre
@@ -72,7 +72,7 @@ class Navigator:
         back = self._nearest(target)
         try:
             return self._centre(target, self._land(target), limits or NEAR)
-        except Exception:
+        except (SpotLostError, UnreachableError):
             self.move(back.q_rad)
             raise
 

@@ -13,6 +13,7 @@ from acquisition.streams import Pump
 from acquisition.supervisor import Supervisor
 from drivers.clock import Clock
 from drivers.device import Block, Movable
+from drivers.errors import DeviceError
 
 Floats = NDArray[np.float64]
 
@@ -57,7 +58,11 @@ class WiredBench:
     def move(self, q_rad: Floats) -> None:
         self.supervisor.check()
         self._cmd_rad = q_rad.copy()
-        self.arm.move_joints(q_rad, self.speeds.speed_rad_s, self.speeds.acceleration_rad_s2)
+        try:
+            self.arm.move_joints(q_rad, self.speeds.speed_rad_s, self.speeds.acceleration_rad_s2)
+        except DeviceError:
+            self.supervisor.check()  # the arm was stopped because another device failed: that is the news
+            raise
         self.supervisor.check()
 
     def stop(self) -> None:
@@ -94,14 +99,14 @@ class WiredBench:
         if self._start_s is None:
             self._start_s = float(window.device_s[0])
         psd1, psd2 = self.view.mean(window)
-        robot = self._during(self.pumps.robot, window)
-        joint_degC = robot[-1].values["joint_temperature_degC"][-1]
+        robot = self._since(self.pumps.robot, window)
+        joint_degC = robot["joint_temperature_degC"][-1]
         temperatures = {f"joint{i + 1}": float(t) for i, t in enumerate(joint_degC)}
         return Look(
             host_s=float(window.host_s[-1]),
             t_s=float(window.device_s.mean()) - self._start_s,
-            q_rad=_mean(robot, "actual_q_rad"),
-            qd_rad_s=_mean(robot, "actual_qd_rad_s"),
+            q_rad=robot["actual_q_rad"].mean(axis=0),
+            qd_rad_s=robot["actual_qd_rad_s"].mean(axis=0),
             cmd_rad=self._cmd_rad.copy(),
             encoder_rad=self._encoders(window),
             psd1=psd1,
@@ -114,19 +119,19 @@ class WiredBench:
         """Mean of the link-side encoders (joint,), NaN for one that did not answer."""
         if self.pumps.encoders is None:
             return None
-        each = np.concatenate([b.values["position_rad"] for b in self._during(self.pumps.encoders, window)])
+        each = self._since(self.pumps.encoders, window)["position_rad"]
         answered = np.isfinite(each)
         count = answered.sum(axis=0)
         return np.where(count > 0, np.where(answered, each, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
 
-    def _during(self, pump: Pump, window: PsdWindow) -> list[Block]:
-        """Blocks that arrived since the window began, at least one: the arm stands, so the next serves as well."""
+    def _since(self, pump: Pump, window: PsdWindow) -> dict[str, Floats]:
+        """Every channel of the samples that arrived since the window began, at least one: the arm stands, so one that
+        comes a little after the window serves as well.
+        """
         begin_s = float(window.host_s[0])
-        return pump.recent(begin_s) or pump.wait(begin_s, SILENCE_S)
-
-
-def _mean(blocks: list[Block], name: str) -> Floats:
-    return np.concatenate([block.values[name] for block in blocks]).mean(axis=0)
+        blocks = pump.recent(begin_s) or pump.wait(begin_s, SILENCE_S)
+        keep = np.concatenate([block.host_s for block in blocks]) >= begin_s
+        return {name: np.concatenate([block.values[name] for block in blocks])[keep] for name in blocks[0].values}
 
 
 def psd_window(blocks: list[Block]) -> PsdWindow:

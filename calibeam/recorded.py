@@ -59,7 +59,10 @@ def record_session(
 def _ended_early(
     bench: Bench, writer: RecordingWriter, clock: Clock, session: Session, why: BaseException
 ) -> PartialResult:
-    """Stop the arm, close the recording; a second Ctrl-C may not get in between."""
+    """Stop the arm, put what there is on the disk; a second Ctrl-C may not get in between.
+
+    The readers still run: whoever opened the recording closes it after them.
+    """
     reason = "stopped by Ctrl-C" if isinstance(why, KeyboardInterrupt) else str(why)
     also: list[str] = []
     with uninterrupted():
@@ -69,7 +72,7 @@ def _ended_early(
             also.append(f"the arm could not be told to stop ({error}); see that it stands")
         try:
             writer.event(Event(clock.now_s(), "ended early", {"why": reason}))
-            writer.close(complete=False)
+            writer.flush()
         except RecordingError as error:
             also.append(str(error))
     kept = f"{session.taken} samples are kept in {writer.path}"

@@ -2,11 +2,12 @@
 
 import itertools
 from collections.abc import Callable, Generator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
 from acquisition.psd_view import PsdView
+from acquisition.recording.errors import RecordingError
 from acquisition.recording.rig_schema import EncodersDevice, PsdDevice, Rig, RobotDevice
 from acquisition.recording.stream import Channel, Event
 from acquisition.recording.writer import RecordingWriter
@@ -141,7 +142,8 @@ def _pumped(
 
     def failed(failure: Exception) -> None:
         supervisor.failed(failure)
-        writer.event(Event(clock.now_s(), "device failed", {"device": device.name, "why": str(failure)}))
+        with suppress(RecordingError):  # it may be the recording itself that failed
+            writer.event(Event(clock.now_s(), "device failed", {"device": device.name, "why": str(failure)}))
 
     pump = Pump(device, clock, keep, failed)
     pump.start()

@@ -12,7 +12,7 @@ from simulators.encoders.dictionary import NodeDictionary
 from simulators.encoders.emergency import Emergencies
 from simulators.encoders.encoder import AbsoluteEncoder
 from simulators.encoders.frame import CanFrame
-from simulators.encoders.pdo import TransmitPdo
+from simulators.encoders.pdo import TIMER_SLACK_S, TransmitPdo
 from simulators.encoders.sdo_server import SdoServer
 
 NMT_ID = 0x000
@@ -133,7 +133,7 @@ class EncoderNode:
             return []
         if self._next_heartbeat_s is None:
             self._next_heartbeat_s = now_s + period_s
-        if now_s < self._next_heartbeat_s:
+        if now_s < self._next_heartbeat_s - TIMER_SLACK_S:
             return []
         self._next_heartbeat_s = max(self._next_heartbeat_s + period_s, now_s)
         return [self._life(self.state)]

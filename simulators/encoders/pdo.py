@@ -16,6 +16,7 @@ SYNCHRONOUS = range(1, 241)
 EVENT_TYPES = (254, 255)
 MAX_ENTRIES = 4
 PDO_BITS = 64
+TIMER_SLACK_S = 1e-6  # sums of seconds in floating point are not exact; far below the timers' millisecond
 
 
 class TransmitPdo:
@@ -55,7 +56,7 @@ class TransmitPdo:
         period_s = self._dictionary.number(self._communication, 5) * 1e-3
         if self._type not in EVENT_TYPES or not self._valid or period_s == 0.0:
             return None
-        if self._next_event_s is None or self._next_event_s > now_s:
+        if self._next_event_s is None or self._next_event_s > now_s + TIMER_SLACK_S:
             self._next_event_s = now_s + period_s if self._next_event_s is None else self._next_event_s
             return None
         self._next_event_s = max(self._next_event_s + period_s, now_s)

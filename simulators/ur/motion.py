@@ -207,11 +207,10 @@ class ArmController:
         self.history_rad.append(self.joints.q_rad)
         if self._motion is None:
             return
-        scale = self.speed_scaling if isinstance(self._motion, PathMove) else 1.0
-        then = self._next(self._motion, scale * TICK_S)
+        then = self._next(self._motion)
         if then is None:
             return
-        self.setpoint = SetPoint(then.q_rad, scale * then.qd_rad_s, scale * scale * then.qdd_rad_s2)
+        self.setpoint = then
         self._world.command(then.q_rad)
         if self._motion.finished:
             self._motion = None
@@ -221,17 +220,26 @@ class ArmController:
     def after_step(self, t_s: float) -> None:
         """Nothing to do: sensors are read when somebody asks."""
 
-    def _next(self, motion: Generator, dt_s: float) -> SetPoint | None:
-        if dt_s <= 0.0:  # speed slider at zero: the arm waits on its path
-            return None
+    def _next(self, motion: Generator) -> SetPoint | None:
+        """None when the arm stays where it is."""
         try:
-            then = motion.step(self.setpoint, dt_s)
+            if isinstance(motion, PathMove):
+                return self._next_on_path(motion, self.speed_scaling)
+            then = motion.step(self.setpoint, TICK_S)
             if not isinstance(motion, JointStop):
                 self._check_step(then)
             return then
         except PathBlocked as blocked:
             self.protective_stop(str(blocked))
-            return None if self._motion is None else self._motion.step(self.setpoint, dt_s)
+            return None if self._motion is None else self._motion.step(self.setpoint, TICK_S)
+
+    def _next_on_path(self, motion: PathMove, scaling: float) -> SetPoint | None:
+        """A path runs in its own time, which the speed slider stretches; at zero the arm waits on it."""
+        if scaling <= 0.0:
+            return None
+        then = motion.step(self.setpoint, scaling * TICK_S)
+        self._check_step(then)
+        return SetPoint(then.q_rad, scaling * then.qd_rad_s, scaling * scaling * then.qdd_rad_s2)
 
     def _check_step(self, then: SetPoint) -> None:
         """PathBlocked where a joint is too fast, or could no longer brake inside its range."""

@@ -46,8 +46,8 @@ class JointServo:
         if np.abs(error_rad).max() < NEAR_RAD:
             return standing(self._target_rad)
         a = self._acceleration_limit_rad_s2
-        # the last term: from this distance the joint can just brake in time
-        most = np.minimum(self._speed_limit_rad_s, np.sqrt(2.0 * a * np.abs(error_rad)))
+        # from this distance the joint brakes in time with half of what it can; the rest makes up for whole cycles
+        most = np.minimum(self._speed_limit_rad_s, np.sqrt(a * np.abs(error_rad)))
         wanted = np.clip(error_rad * min(self._rate_per_s, 0.5 / dt_s), -most, most)
         qd_rad_s = now.qd_rad_s + np.clip(wanted - now.qd_rad_s, -a * dt_s, a * dt_s)
         return follow(now, now.q_rad + qd_rad_s * dt_s, dt_s)

@@ -22,10 +22,10 @@ class Trapezoid:
 
     def at(self, t_s: float) -> tuple[float, float, float]:
         """Way, speed and acceleration at a time; still before the start and after the end."""
+        if t_s >= self.duration_s:  # asked first: the shortest ways take no time at all
+            return self.distance, 0.0, 0.0
         if t_s <= 0.0:
             return 0.0, 0.0, 0.0
-        if t_s >= self.duration_s:
-            return self.distance, 0.0, 0.0
         a, ramp = self.acceleration, self.ramp_s
         if t_s < ramp:
             return 0.5 * a * t_s * t_s, a * t_s, a

@@ -11,7 +11,9 @@ from simulators.host.loop import Host
 from simulators.psd_daq.emulator import build
 from simulators.wire import Bench
 
-CURRENTS_A = np.array([90e-6, 110e-6, 100e-6, 100e-6, 0.0, 0.0, 1e-9, 0.0])  # psd1 lit 1 mm beside its centre, psd2 dark
+CURRENTS_A = np.array(
+    [90e-6, 110e-6, 100e-6, 100e-6, 0.0, 0.0, 1e-9, 0.0]
+)  # psd1 lit 1 mm beside its centre, psd2 dark
 
 
 class StillWorld:

@@ -1,4 +1,4 @@
-"""A controller over a world that follows every set-point at once, and one in a process of its own over the real world."""
+"""A controller over a world that follows every set-point at once, and one in its own process over the real world."""
 
 import json
 import socket

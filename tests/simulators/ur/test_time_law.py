@@ -7,7 +7,7 @@ from simulators.ur.time_law import trapezoid
 positive = st.floats(1e-3, 1e2)
 
 
-@given(distance=st.floats(0.0, 1e2), speed=positive, acceleration=positive)
+@given(distance=st.just(0.0) | st.floats(1e-9, 1e2), speed=positive, acceleration=positive)
 def test_it_ends_where_it_should_and_keeps_both_limits(distance: float, speed: float, acceleration: float) -> None:
     law = trapezoid(distance, speed, acceleration)
     assert law.at(law.duration_s)[0] == distance
@@ -18,6 +18,12 @@ def test_it_ends_where_it_should_and_keeps_both_limits(distance: float, speed: f
         assert abs(change) <= acceleration
         mirrored = law.at((1.0 - share) * law.duration_s)[0]
         assert way + mirrored == pytest.approx(distance, abs=1e-9 * (1.0 + distance))
+
+
+@pytest.mark.parametrize("distance", [5e-324, 1e-300])
+def test_a_way_too_short_to_take_any_time_still_ends_where_it_should(distance: float) -> None:
+    law = trapezoid(distance, 1.0, 2.0)
+    assert law.at(law.duration_s) == (distance, 0.0, 0.0)
 
 
 def test_a_long_way_takes_distance_over_speed_plus_one_ramp() -> None:

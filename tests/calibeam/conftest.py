@@ -1,0 +1,24 @@
+"""The shipped rig, and emulators as a process of their own for tests that need real wires."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from acquisition.recording.rig import load_rig
+from acquisition.recording.rig_schema import Rig
+from calibeam.emulation import Emulation
+
+RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
+
+
+@pytest.fixture(scope="session")
+def rig() -> Rig:
+    return load_rig(RIG)
+
+
+@pytest.fixture
+def emulation() -> Iterator[Emulation]:
+    """Emulators of the shipped rig at eight times real time."""
+    with Emulation(RIG, seed=5, time_scale=8.0) as running:
+        yield running

@@ -1,0 +1,168 @@
+"""Sessions over real wires: what the recording holds, and every way in which a session can end early."""
+
+import os
+import signal
+import threading
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+from rich.console import Console
+
+from acquisition.plan import PlanOptions
+from acquisition.recording.read import read
+from acquisition.recording.recording import Recording
+from acquisition.recording.rig import rig_text
+from acquisition.recording.rig_schema import Rig
+from acquisition.recording.writer import RecordingWriter
+from acquisition.session import Summary
+from calibeam.emulation import Emulation
+from calibeam.outcome import PartialResult
+from calibeam.recorded import record_session
+from calibeam.site import addresses_of, connected
+from drivers.clock import SystemClock
+from drivers.ur.reader import UrReader
+
+RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
+
+SMALL = PlanOptions(centred=2, off_centre=2, repeats=1)  # about 8 s at the tests' pace
+
+
+class Takes:
+    """Runs a session over the wires of an emulation; `trouble` is called after so many samples."""
+
+    def __init__(self, rig: Rig, emulation: Emulation, path: Path) -> None:
+        self.rig, self.emulation, self.path = rig, emulation, path
+        self.trouble: tuple[int, Callable[[], None]] | None = None
+
+    def run(self) -> Summary:
+        clock = SystemClock()
+        emulated = addresses_of(self.rig, self.emulation.address, self.emulation.time_scale or 1.0)
+        with (
+            RecordingWriter(self.path, rig_text=rig_text(RIG), software="test", clock=clock) as writer,
+            connected(self.rig, emulated, writer, clock, self.emulation.place_fixture) as bench,
+        ):
+            if self.trouble is not None:
+                self._arrange(writer, *self.trouble)
+            return record_session(bench, self.rig, writer, SMALL, clock, Console(quiet=True))
+
+    def recording(self) -> Recording:
+        return read(self.path)
+
+    def _arrange(self, writer: RecordingWriter, after: int, act: Callable[[], None]) -> None:
+        plain, count = writer.sample, [0]
+
+        def counted(row) -> None:
+            plain(row)
+            count[0] += 1
+            if count[0] == after:
+                act()
+
+        writer.sample = counted
+
+
+@pytest.fixture
+def takes(rig: Rig, emulation: Emulation, tmp_path: Path) -> Takes:
+    one_place = msgspec.structs.replace(rig, placement_list=rig.placement_list[:1])
+    return Takes(one_place, emulation, tmp_path / "recording.mcap")
+
+
+def arm_speed_rad_s(emulation: Emulation) -> float:
+    reader = UrReader(str(emulation.address["robot"]["host"]))
+    reader.connect()
+    try:
+        return float(np.max(np.abs(reader.read(2.0).values["actual_qd_rad_s"][-1])))
+    finally:
+        reader.close()
+
+
+def test_a_whole_session_is_in_the_recording(takes: Takes) -> None:
+    summary = takes.run()
+    recording = takes.recording()
+    assert recording.complete
+    assert len(recording.samples) == len(summary.samples) == 12
+    assert set(recording.streams) == {"psd", "spots", "robot", "encoders"}
+    assert recording.streams["psd"].gaps == ()
+    assert recording.streams["robot"].gaps == ()
+    q_rad, link_rad = recording.samples.joints(), recording.samples.encoders()
+    # Link-side encoders stand off by a constant each: zero, mounting and repeatability; they count 6 urad.
+    assert np.max(np.abs((link_rad - q_rad) - np.median(link_rad - q_rad, axis=0))) < 3e-5
+    kinds = {event.kind for event in recording.events}
+    assert {"placement", "centring", "end"} <= kinds
+
+
+def test_a_protective_stop_ends_the_session_and_keeps_the_samples(takes: Takes) -> None:
+    takes.trouble = (5, lambda: takes.emulation.ask("robot.protective_stop"))
+    with pytest.raises(PartialResult, match=r"PROTECTIVE_STOP; clear the cause.*samples are kept in"):
+        takes.run()
+    assert not takes.recording().complete
+    assert len(takes.recording().samples) >= 5
+
+
+def test_a_silent_psd_box_stops_the_arm_and_is_named(takes: Takes) -> None:
+    takes.trouble = (5, lambda: takes.emulation.ask("psd.silence", on=True))
+    with pytest.raises(PartialResult, match="psd: no sample"):
+        takes.run()
+    assert arm_speed_rad_s(takes.emulation) < 1e-3
+    assert any(event.kind == "device failed" for event in takes.recording().events)
+
+
+def test_a_silent_encoder_is_named(takes: Takes) -> None:
+    takes.trouble = (5, lambda: takes.emulation.ask("encoders.silence", node=3))
+    with pytest.raises(PartialResult, match="3"):
+        takes.run()
+    assert len(takes.recording().samples) >= 5
+
+
+def test_a_controller_that_goes_quiet_ends_the_session(takes: Takes) -> None:
+    takes.trouble = (5, lambda: takes.emulation.ask("robot.silence", on=True))
+    with pytest.raises(PartialResult, match="robot"):
+        takes.run()
+    assert len(takes.recording().samples) >= 5
+
+
+def test_a_light_that_is_gone_for_good_ends_the_session(takes: Takes) -> None:
+    takes.emulation.place_fixture = lambda placement: takes.emulation.ask("fixture.place", id=0)
+    with pytest.raises(PartialResult, match="check that the laser is on"):
+        takes.run()
+    assert len(takes.recording().events) > 0
+
+
+def test_ctrl_c_in_mid_session_leaves_a_readable_recording_and_a_standing_arm(takes: Takes) -> None:
+    takes.trouble = (5, lambda: os.kill(os.getpid(), signal.SIGINT))
+    with pytest.raises(PartialResult, match="stopped by Ctrl-C"):
+        takes.run()
+    assert arm_speed_rad_s(takes.emulation) < 1e-3
+    assert not takes.recording().complete
+    assert len(takes.recording().samples) == 5
+
+
+def test_a_full_disk_stops_the_arm_and_keeps_what_was_written(takes: Takes, full_after: Callable) -> None:
+    with full_after(2_000_000), pytest.raises(PartialResult, match="disk"):
+        takes.run()
+    assert arm_speed_rad_s(takes.emulation) < 1e-3
+    assert takes.recording().streams["psd"].host_s.size > 1000
+
+
+@pytest.fixture
+def full_after() -> Callable[[int], AbstractContextManager]:
+    """A limit on the size of files of this process: what a full disk looks like to it."""
+    import resource
+    from contextlib import contextmanager
+
+    @contextmanager
+    def limited(size_bytes: int):
+        assert threading.current_thread() is threading.main_thread()
+        before = resource.getrlimit(resource.RLIMIT_FSIZE)
+        ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size_bytes, before[1]))
+        try:
+            yield
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
+            signal.signal(signal.SIGXFSZ, ignored)
+
+    return limited

@@ -1,0 +1,240 @@
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivers.errors import DeviceLost, DeviceRefused, DeviceStale
+from drivers.ur.control import UrControl
+from drivers.ur.reader import UrReader
+from simulators.ur.kinematics import NominalArm
+from simulators.ur.poses import pose_of
+
+HOME = np.array([0.0, -1.5, 1.5, -1.5, -1.5, 0.0])
+FAR = HOME + np.array([2.5, 0.0, 0.0, 0.0, 0.0, 0.0])
+RIG_PATH = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
+SLOW_RAD_S = 0.2  # FAR takes three wall seconds at four times real time
+
+
+@pytest.fixture
+def control(emulated):
+    control = UrControl(emulated.host)
+    control.connect()
+    control.move_joints(HOME, 2.0, 10.0)
+    yield control
+    control.close()
+
+
+@pytest.fixture
+def watch(emulated):
+    """A recorder beside the control: it sees what the arm really does."""
+    reader = UrReader(emulated.host)
+    reader.connect()
+    yield Watch(reader)
+    reader.close()
+
+
+class Watch:
+    def __init__(self, reader: UrReader) -> None:
+        self._reader = reader
+
+    def until(self, happened: Callable[[np.ndarray, np.ndarray], bool]) -> np.ndarray:
+        """Reads until (q, qd) of some sample satisfy it; the joints then. Five emulated seconds at most."""
+        seen = 0
+        while seen < 2500:
+            block = self._reader.read(1.0)
+            seen += len(block.sequence)
+            for q, qd in zip(block.values["actual_q_rad"], block.values["actual_qd_rad_s"], strict=True):
+                if happened(q, qd):
+                    return q
+        raise AssertionError("it did not happen within 5 emulated seconds")
+
+    def until_moving(self) -> None:
+        self.until(lambda q, qd: abs(qd[0]) > 0.5 * SLOW_RAD_S)
+
+    def until_standing(self) -> np.ndarray:
+        return self.until(lambda q, qd: np.abs(qd).max() < 1e-4)
+
+
+def joints_now(emulated) -> tuple[np.ndarray, np.ndarray]:
+    """Position and speed as a recorder sees them that connects now."""
+    reader = UrReader(emulated.host)
+    reader.connect()
+    block = reader.read(1.0)
+    reader.close()
+    return block.values["actual_q_rad"][0], block.values["actual_qd_rad_s"][0]
+
+
+def during(action: Callable[[], object]) -> threading.Thread:
+    thread = threading.Thread(target=action)
+    thread.start()
+    return thread
+
+
+def test_a_move_blocks_until_the_arm_has_arrived(emulated, control) -> None:
+    control.move_joints(HOME + 0.1, 2.0, 10.0)
+    q_rad, qd_rad_s = joints_now(emulated)
+    assert q_rad == pytest.approx(HOME + 0.1, abs=2e-5)
+    assert np.abs(qd_rad_s).max() < 1e-3
+
+
+def test_a_small_move_costs_little_more_than_its_motion(control) -> None:
+    took_s = []
+    for step in range(9):
+        start_s = time.monotonic()
+        control.move_joints(HOME + 0.01745 * (step % 2), 1.0, 3.0)
+        took_s.append(time.monotonic() - start_s)
+    motion_s = (2.0 * (0.01745 / 3.0) ** 0.5 + 0.05) / 4.0  # trapezoid and settling, at four times real time
+    assert np.median(took_s) < motion_s + 0.02
+
+
+def test_a_line_moves_the_tool(emulated, control) -> None:
+    arm = NominalArm.from_rig(tomllib.loads(RIG_PATH.read_text()))
+    end = (*arm.forward(HOME.tolist())[0][:9], -0.45, -0.15, 0.55)
+    control.move_linear(pose_of(end), 0.5, 2.0)
+    q_rad, qd_rad_s = joints_now(emulated)
+    assert arm.forward(q_rad.tolist())[0] == pytest.approx(end, abs=2e-5)
+    assert np.abs(qd_rad_s).max() < 1e-3
+
+
+def test_servo_set_points_are_followed_until_servo_stop(control, watch) -> None:
+    for step in range(100):
+        control.servo_joints(HOME + 0.0005 * step)
+    watch.until(lambda q, qd: bool(np.abs(q - HOME - 0.0005 * 99).max() < 1e-3))
+    control.servo_stop()
+    watch.until_standing()
+
+
+def test_stop_from_another_thread_ends_a_move_at_once(control, watch) -> None:
+    def stop() -> None:
+        watch.until_moving()
+        control.stop()
+
+    thread = during(stop)
+    with pytest.raises(DeviceRefused, match=r"ended by stop\(\)"):
+        control.move_joints(FAR, SLOW_RAD_S, 3.0)
+    thread.join()
+    assert watch.until_standing()[0] < 2.0
+    control.move_joints(HOME, 2.0, 10.0)  # the same connection goes on
+
+
+def test_stop_of_a_hung_child_goes_through_the_dashboard(control, watch) -> None:
+    assert control._child is not None
+    pid = control._child.pid
+
+    def hang_and_stop() -> None:
+        watch.until_moving()
+        os.kill(pid, signal.SIGSTOP)
+        control.stop()
+
+    thread = during(hang_and_stop)
+    with pytest.raises(DeviceRefused, match="connect again"):
+        control.move_joints(FAR, SLOW_RAD_S, 3.0)
+    thread.join()
+    assert watch.until_standing()[0] < 2.0
+    control.connect()
+    control.move_joints(HOME, 2.0, 10.0)
+
+
+def test_stop_works_without_a_connection(emulated) -> None:
+    UrControl(emulated.host).stop()
+
+
+def test_stop_with_nobody_there_says_so() -> None:
+    with pytest.raises(DeviceLost, match="emergency stop"):
+        UrControl("127.250.1.1").stop()
+
+
+def test_a_protective_stop_in_mid_move_is_named_with_its_remedy(emulated, control, watch) -> None:
+    def push() -> None:
+        watch.until_moving()
+        emulated.do("robot.protective_stop")
+
+    thread = during(push)
+    with pytest.raises(DeviceRefused, match="PROTECTIVE_STOP; clear the cause, unlock on the pendant"):
+        control.move_joints(FAR, SLOW_RAD_S, 3.0)
+    thread.join()
+    with pytest.raises(DeviceRefused, match="PROTECTIVE_STOP"):
+        control.connect()
+    emulated.do("robot.unlock")
+    control.connect()
+    control.move_joints(HOME, 2.0, 10.0)
+
+
+def test_a_killed_child_is_lost_and_the_arm_stops(control, watch) -> None:
+    assert control._child is not None
+    pid = control._child.pid
+
+    def kill() -> None:
+        watch.until_moving()
+        os.kill(pid, signal.SIGKILL)
+
+    thread = during(kill)
+    with pytest.raises(DeviceLost, match="signal SIGKILL"):
+        control.move_joints(FAR, SLOW_RAD_S, 3.0)
+    thread.join()
+    assert watch.until_standing()[0] < 2.0
+    with pytest.raises(DeviceLost, match="not connected"):
+        control.move_joints(HOME, 2.0, 10.0)
+
+
+def test_a_controller_that_drops_its_clients_is_lost(emulated, control, watch) -> None:
+    def drop() -> None:
+        watch.until_moving()
+        emulated.do("robot.disconnect")
+
+    thread = during(drop)
+    with pytest.raises(DeviceLost):
+        control.move_joints(FAR, SLOW_RAD_S, 3.0)
+    thread.join()
+    control.connect()
+    control.move_joints(HOME, 2.0, 10.0)
+
+
+def test_a_silent_controller_does_not_hang_a_move(emulated, control) -> None:
+    emulated.do("robot.silence", on=True)
+    start_s = time.monotonic()
+    with pytest.raises((DeviceStale, DeviceLost)):
+        control.move_joints(FAR, SLOW_RAD_S, 3.0)
+    assert time.monotonic() - start_s < 6.0
+
+
+def test_a_dead_parent_stops_the_arm(emulated, watch) -> None:
+    code = (
+        "import sys; from drivers.ur.control import UrControl; c = UrControl(sys.argv[1]); c.connect();"
+        f"c.move_joints({HOME.tolist()}, 2.0, 10.0); c.move_joints({FAR.tolist()}, {SLOW_RAD_S}, 3.0)"
+    )
+    with subprocess.Popen([sys.executable, "-c", code, emulated.host]) as parent:
+        watch.until(lambda q, qd: bool(q[0] > 0.02 and qd[0] > 0.5 * SLOW_RAD_S))
+        parent.kill()
+    assert watch.until_standing()[0] < 2.0
+
+
+def test_local_control_is_refused_before_anything_moves(emulated) -> None:
+    emulated.do("robot.remote_control", on=False)
+    with pytest.raises(DeviceRefused, match="remote control"):
+        UrControl(emulated.host).connect()
+
+
+def test_numbers_that_the_controller_does_not_take(control) -> None:
+    with pytest.raises(ValueError, match="six finite numbers"):
+        control.move_joints([0.0] * 5, 1.0, 1.0)
+    with pytest.raises(ValueError, match="positive"):
+        control.move_joints(HOME, 0.0, 1.0)
+    with pytest.raises(DeviceRefused, match="not within"):
+        control.move_joints(HOME, 10.0, 1.0)  # ur_rtde's own range
+    control.move_joints(HOME, 1.0, 1.0)
+
+
+def test_close_is_quick_and_safe_more_than_once(control) -> None:
+    start_s = time.monotonic()
+    control.close()
+    control.close()
+    assert time.monotonic() - start_s < 1.5
