@@ -6,7 +6,11 @@ class AcquisitionError(Exception):
 
 
 class SpotLostError(AcquisitionError):
-    """No light could be found again."""
+    """A pose could not be lit, or lost its light; the arm is back where there was some."""
+
+
+class NoLightError(AcquisitionError):
+    """No light could be found at all, or found again: the session cannot go on."""
 
 
 class UnreachableError(AcquisitionError):

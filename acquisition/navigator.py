@@ -14,7 +14,7 @@ from acquisition.aiming.pose import BeamTarget, between, flange_for
 from acquisition.aiming.reach import reach
 from acquisition.aiming.search import Found, Search
 from acquisition.bench import Bench
-from acquisition.errors import SpotLostError, UnreachableError
+from acquisition.errors import NoLightError, SpotLostError, UnreachableError
 from acquisition.journal import Journal
 from acquisition.learner import Learner
 from acquisition.servo.centring import Limits, centre
@@ -55,26 +55,34 @@ class Navigator:
         self._note(q_rad)
 
     def find(self, placement: int, first: int, roll_rad: float) -> None:
-        """Begin a block: aim by what is believed, search if that misses, come near the centres. SpotLostError."""
+        """Begin a block: aim by what is believed, search if that misses, come near the centres. NoLightError."""
         self._placement = placement
         T = self._learner.T_base_fixture(placement)
         target = BeamTarget(first, (0.0, 0.0, 0.0, 0.0), FINDING_STAND_OFF_M, roll_rad)
         self.move(self._reach(T, target, self.q_rad))
-        if not all(self._bench.look(GLANCE_S).lit(first)):
-            self._search(first, T)
-        self._lit = []
-        self._centre(target, T, NEAR)
+        self._stand_in_light(target, T)
 
     def visit(self, target: BeamTarget, limits: Limits | None) -> Centring:
-        """Land on the target and bring the spots there: within `limits`, or only near it. SpotLostError,
-        UnreachableError; the arm is then back at a lit pose.
+        """Land on the target and bring the spots there: within `limits`, or only near it.
+
+        SpotLostError, UnreachableError: the arm is back at a lit pose. NoLightError: even that is dark now, and the
+        search found nothing.
         """
         back = self._nearest(target)
         try:
             return self._centre(target, self._land(target), limits or NEAR)
         except (SpotLostError, UnreachableError):
             self.move(back.q_rad)
+            if not all(self._bench.look(GLANCE_S).lit(target.first)):  # the fixture was moved, or the laser is off
+                self._stand_in_light(back.target, back.T_base_fixture)
             raise
+
+    def _stand_in_light(self, target: BeamTarget, T: Floats) -> None:
+        """Search around where the arm stands if it is dark there, come near the centres, and forget older lit poses."""
+        if not all(self._bench.look(GLANCE_S).lit(target.first)):
+            self._search(target.first, T)
+        self._lit = []
+        self._centre(target, T, NEAR)
 
     def relearned(self) -> None:
         """The believed rig was refitted: what was right at single poses before is now worse than the fit."""
@@ -113,7 +121,7 @@ class Navigator:
         self._note(result.q_rad)
         self._journal.event("search", {"found": result.found.name, "motions": result.motions})
         if result.found is not Found.BOTH:
-            raise SpotLostError(
+            raise NoLightError(
                 f"place {self._placement}, PSD {first} first: {result.found.value} ({result.motions} positions tried); "
                 "check that the laser is on and that the fixture stands where the rig file says, to a few centimetres "
                 "and degrees"

@@ -4,7 +4,6 @@ One thread uses it at a time, except `close`. `read` sends the SYNCs; while nobo
 """
 
 from collections.abc import Sequence
-from contextlib import suppress
 
 import can
 import canopen
@@ -14,7 +13,15 @@ from drivers.cia406.angle import SPEED_LIMIT_RAD_S, ContinuousAngle
 from drivers.cia406.codec import Emergency, extract
 from drivers.cia406.configuration import EncoderIdentity, EncoderObjects, check_profile, configure
 from drivers.cia406.cycle import Row, SyncCycle
-from drivers.cia406.network import SEND_LIMIT_S, BoundedNetwork, OpenBus, listening, lost_as_device_lost, opened
+from drivers.cia406.network import (
+    SEND_LIMIT_S,
+    BoundedNetwork,
+    OpenBus,
+    listening,
+    lost_as_device_lost,
+    opened,
+    shut_down,
+)
 from drivers.cia406.rows import WatchedRow, to_block
 from drivers.cia406.watch import NodeWatch
 from drivers.clock import Clock, SystemClock
@@ -124,8 +131,7 @@ class Cia406Encoders:
             pass  # nobody is left to be told
         finally:
             self._stop_taking()
-            with suppress(can.CanError, OSError):  # an adapter that has gone cannot be told; its port closes anyway
-                bus.shutdown()
+            shut_down(bus)
 
     # --- setting up
 

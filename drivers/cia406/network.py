@@ -5,14 +5,14 @@ DeviceLost, with the cause kept.
 """
 
 from collections.abc import Callable, Generator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import can
 import canopen
 from serial import SerialException
 
-from drivers.errors import DeviceLost
+from drivers.errors import DeviceError, DeviceLost
 
 SEND_LIMIT_S = 0.5  # an adapter that takes no frame for so long has stopped
 LISTEN_S = 0.02  # how soon the listening thread of the set-up ends when told
@@ -61,8 +61,24 @@ def lost_as_device_lost(name: str, doing: str) -> Generator[None]:
     """Converts what python-can raises when its adapter has gone."""
     try:
         yield
+    except DeviceError:  # ours already, though DeviceLost and DeviceStale are OSErrors too
+        raise
     except GONE as cause:
         raise DeviceLost(f"{name}: CAN adapter gone while {doing} ({cause}); check its cable and power") from cause
+
+
+def shut_down(bus: can.BusABC) -> None:
+    """Releases the bus also when its adapter has gone.
+
+    python-can's slcan first tells the adapter, and leaves the port open when that fails: then we close it.
+    """
+    try:
+        bus.shutdown()
+    except GONE:
+        port: Any = getattr(bus, "serialPortOrig", None)
+        if port is not None:
+            with suppress(OSError):
+                port.close()
 
 
 class _Listener(can.Listener):

@@ -21,11 +21,16 @@ class NodeWatch:
         self._nodes = tuple(nodes)
         self._heard_s: dict[int, float] = {}  # last heartbeat
         self._operational = False
+        self._started: set[int] = set()  # nodes that have said that they are operational
 
     def set_operational(self, operational: bool) -> None:
-        """From now on a boot-up, or another state than operational, is a fault; or no longer."""
+        """From now on a boot-up, or another state than operational, is a fault; or no longer.
+
+        Not the other states before a node has said "operational": a heartbeat may cross the start command on its way.
+        """
         self._operational = operational
         self._heard_s = {}
+        self._started = set()
 
     def forget_codes(self) -> None:
         """Nodes were configured anew: what they reported before is history."""
@@ -62,7 +67,9 @@ class NodeWatch:
                 f"{self._name}: encoder {node} has restarted by itself (boot-up while operational); "
                 "check its power supply and cable, then connect again"
             )
-        if state not in (None, NmtState.OPERATIONAL):
+        if state is NmtState.OPERATIONAL:
+            self._started.add(node)
+        elif state is not None and node in self._started:
             raise DeviceRefused(
                 f"{self._name}: encoder {node} is {state.name}, not operational; did another CANopen master stop it?"
             )

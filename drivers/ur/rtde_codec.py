@@ -201,10 +201,6 @@ def encode_start() -> bytes:
     return _frame(Kind.START)
 
 
-def encode_pause() -> bytes:
-    return _frame(Kind.PAUSE)
-
-
 def _frame(kind: Kind, payload: bytes = b"") -> bytes:
     return HEADER.pack(HEADER.size + len(payload), kind) + payload
 

@@ -1,13 +1,13 @@
 """A whole session on the in-process bench: what it takes, and how it meets trouble."""
 
+import dataclasses
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from acquisition.errors import SpotLostError
+from acquisition.errors import NoLightError
 from acquisition.plan import PlanOptions, blocks
 from acquisition.sample import Sample
 from acquisition.session import Session, Summary
@@ -113,8 +113,42 @@ def test_no_fixture_is_light_lost_for_good(rig, bench_of) -> None:
             self.world.place_fixture(0)
 
     bench = bench_of(1)
-    with pytest.raises(SpotLostError, match="check that the laser is on"):
+    with pytest.raises(NoLightError, match="check that the laser is on"):
         run(rig, Empty(bench.world, bench.half_size_m))
+
+
+def test_a_fixture_taken_away_in_mid_session_is_light_lost_for_good(rig, bench_of) -> None:
+    bench = bench_of(2)
+
+    class Thief(Kept):
+        def sample(self, sample: Sample) -> None:
+            super().sample(sample)
+            if len(self.samples) == 7:
+                bench.world.place_fixture(0)
+
+    kept = Thief()
+    session = Session(bench, FittedLearner(rig), kept, SMALL, np.array(rig.motion.home_rad))
+    with pytest.raises(NoLightError, match="check that the laser is on"):
+        session.run(tuple(rig.placements))
+    assert len(kept.samples) == 7
+
+
+def test_a_fixture_bumped_in_mid_session_is_found_again(rig, bench_of) -> None:
+    bench = bench_of(2)
+    bumped = 9
+    bench.world._places[bumped] = tuple(
+        dataclasses.replace(face, centre_m=(face.centre_m[0] + 0.015, *face.centre_m[1:]))
+        for face in bench.world._places[1]
+    )
+
+    class Bump(Kept):
+        def sample(self, sample: Sample) -> None:
+            super().sample(sample)
+            if len(self.samples) == 7:
+                bench.world.place_fixture(bumped)
+
+    session = Session(bench, FittedLearner(rig), Bump(), SMALL, np.array(rig.motion.home_rad))
+    assert len(session.run((1,)).samples) > 12
 
 
 def test_a_protective_stop_in_mid_session_keeps_what_was_taken(rig, bench_of) -> None:
@@ -142,4 +176,4 @@ def test_the_plan_takes_the_four_poses_of_the_source_at_every_place() -> None:
 def test_the_plan_is_the_same_from_the_same_seed_only() -> None:
     one, two = (tuple(blocks((1,), 0.01, SMALL)) for _ in range(2))
     assert one == two
-    assert one != tuple(blocks((1,), 0.01, replace(SMALL, seed=2)))
+    assert one != tuple(blocks((1,), 0.01, dataclasses.replace(SMALL, seed=2)))

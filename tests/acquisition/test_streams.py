@@ -84,7 +84,7 @@ def test_a_failing_device_is_told_at_once_and_raised_to_who_waits(running) -> No
 
 def test_a_wait_without_samples_ends_as_stale(running) -> None:
     _, pump, _, _, _ = running
-    with pytest.raises(DeviceStale, match="no sample for 0.01 s"):
+    with pytest.raises(DeviceStale, match=r"no sample for 0\.01 s"):
         pump.wait(0.0, timeout_s=0.01)
 
 

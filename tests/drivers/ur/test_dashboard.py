@@ -23,6 +23,23 @@ def test_a_protective_stop_is_seen_and_unlocked(emulated) -> None:
     assert dashboard.state().ready
 
 
+def test_the_way_back_from_an_emergency_stop(emulated) -> None:
+    dashboard = UrDashboard(emulated.host)
+    emulated.do("robot.emergency_stop", on=True)
+    assert dashboard.state().safety_status == "ROBOT_EMERGENCY_STOP"
+    with pytest.raises(DeviceRefused, match='"power on" is refused'):
+        dashboard.power_on()
+    emulated.do("robot.emergency_stop", on=False)
+    dashboard.power_on()
+    dashboard.brake_release()
+    seen = {dashboard.state().robot_mode}
+    end_s = time.monotonic() + 5.0
+    while not dashboard.state().ready and time.monotonic() < end_s:
+        seen.add(dashboard.state().robot_mode)
+    assert dashboard.state().ready
+    assert "IDLE" in seen
+
+
 def test_an_unlock_that_comes_too_early_is_refused_in_the_controllers_words(emulated) -> None:
     emulated.do("robot.unlock_delay", seconds=1000.0)
     emulated.do("robot.protective_stop")
