@@ -19,7 +19,8 @@ MAX_STEPS = 60
 STEP_RAD = 0.5
 DAMPING = 1e-6
 CLOSE = 1e-8  # m and rad
-TABLE_M = 0.02  # no joint centre beyond the elbow may come lower than this above the base plane
+TABLE_M = 0.02  # neither the elbow nor a joint beyond it may come lower than this above the base plane
+ELBOW = 2  # frame behind the second link
 
 
 def reach(
@@ -41,9 +42,9 @@ def reach(
 
 
 def clear_of_table(arm: BelievedArm, q_rad: Floats) -> bool:
-    """Whether the joint centres beyond the elbow and the laser stay above the base plane."""
+    """Whether elbow, wrist and laser stay above the base plane."""
     origin_m, _ = arm.beam(q_rad)
-    return bool(np.min(arm.frames(q_rad)[3:, 2, 3]) > TABLE_M and origin_m[2] > TABLE_M)
+    return bool(np.min(arm.frames(q_rad)[ELBOW:, 2, 3]) > TABLE_M and origin_m[2] > TABLE_M)
 
 
 def _starts(near_rad: Floats, rng: np.random.Generator, starts: int) -> Iterator[Floats]:

@@ -44,3 +44,15 @@ def test_half_way_between_two_beams() -> None:
     middle = between(near, far, 0.5)
     assert middle.spots_m == pytest.approx((0.001, 0.002, 0.003, 0.004))
     assert (middle.stand_off_m, middle.roll_rad) == pytest.approx((0.2, 0.0))
+
+
+@pytest.mark.parametrize("placement", [1, 2, 3])
+def test_neither_elbow_nor_wrist_goes_below_the_table(rig, placement: int) -> None:
+    learner, rng = FittedLearner(rig), np.random.default_rng(5)
+    T = learner.T_base_fixture(placement)
+    for roll_rad in np.linspace(-2.6, 2.6, 5):
+        target = BeamTarget(1, (0.0, 0.0, 0.0, 0.0), 0.2, float(roll_rad))
+        flange = flange_for(learner.arm, learner.optics, T, target)
+        q_rad = reach(learner.arm, flange, np.array(rig.motion.home_rad), rng)
+        heights_m = learner.arm.frames(q_rad)[2:, 2, 3]
+        assert heights_m.min() > 0.0
