@@ -78,11 +78,20 @@ class Navigator:
             raise
 
     def _stand_in_light(self, target: BeamTarget, T: Floats) -> None:
-        """Search around where the arm stands if it is dark there, come near the centres, and forget older lit poses."""
+        """Search around where the arm stands if it is dark there, come near the centres, and forget older lit poses.
+
+        NoLightError when nothing is found, or when it is lost at once: then no lit pose is left to go back to.
+        """
         if not all(self._bench.look(GLANCE_S).lit(target.first)):
             self._search(target.first, T)
         self._lit = []
-        self._centre(target, T, NEAR)
+        try:
+            self._centre(target, T, NEAR)
+        except SpotLostError as lost:
+            raise NoLightError(
+                f"place {self._placement}, PSD {target.first} first: light was found, but {lost}; "
+                "check that the fixture stands still and that nothing crosses the beam"
+            ) from lost
 
     def relearned(self) -> None:
         """The believed rig was refitted: what was right at single poses before is now worse than the fit."""

@@ -23,6 +23,30 @@ class SettleRule:
     limit_s: float = 1.0  # of device time; then the sample is taken and marked as not settled
 
 
+@dataclass(frozen=True)
+class Stretch:
+    """The device time to average over."""
+
+    from_s: float
+    to_s: float
+    settled: bool
+
+
+def stretch_to_average(device_s: Floats, spots_m: Floats, dwell_s: float, rule: SettleRule) -> Stretch | None:
+    """`dwell_s` of the samples so far, from where they have settled; the last ones when they do not; None: wait on.
+
+    At least one window: a dwell shorter than that may hold a single sample of a slow box, which has no sigma.
+    """
+    dwell_s = max(dwell_s, rule.window_s)
+    last_s = float(device_s[-1])
+    start_s = settled_from(device_s, spots_m, rule)
+    if start_s is not None:
+        return Stretch(start_s, start_s + dwell_s, settled=True) if last_s - start_s >= dwell_s else None
+    if last_s - float(device_s[0]) > rule.limit_s + dwell_s:
+        return Stretch(last_s - dwell_s, last_s, settled=False)
+    return None
+
+
 def settled_from(device_s: Floats, spots_m: Floats, rule: SettleRule) -> float | None:
     """Start (device time, s) of the first pair of windows that agree; None while there is none.
 

@@ -2,6 +2,9 @@
 
 import threading
 from collections.abc import Callable
+from contextlib import suppress
+
+from drivers.errors import DeviceError
 
 
 class Supervisor:
@@ -13,11 +16,16 @@ class Supervisor:
         self.failure: Exception | None = None
 
     def failed(self, failure: Exception) -> None:
-        """A device, or the recording, cannot go on: stop the arm now; later failures are followers of the first."""
+        """A device, or the recording, cannot go on: stop the arm now; later failures are followers of the first.
+
+        Called from reader threads, so it never raises: an arm that does not take the stop is told of by the session,
+        which stops it again.
+        """
         with self._lock:
             first, self.failure = self.failure is None, self.failure or failure
         if first:
-            self._stop_arm()
+            with suppress(DeviceError):
+                self._stop_arm()
 
     def check(self) -> None:
         """Raise the first failure, if there was one."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from acquisition.bench import Look
 from acquisition.psd_view import PsdView, PsdWindow
-from acquisition.settling import SettleRule, settled_from
+from acquisition.settling import SettleRule, stretch_to_average
 from acquisition.streams import Pump
 from acquisition.supervisor import Supervisor
 from drivers.clock import Clock
@@ -52,8 +52,8 @@ class WiredBench:
     clock: Clock
     place: Callable[[int], None]
     rule: SettleRule = field(default_factory=SettleRule)
-    _cmd_rad: Floats = field(default_factory=lambda: np.empty(0))
-    _start_s: float | None = None
+    _cmd_rad: Floats = field(default_factory=lambda: np.empty(0), init=False)
+    _start_s: float | None = field(default=None, init=False)
 
     def move(self, q_rad: Floats) -> None:
         self.supervisor.check()
@@ -84,12 +84,9 @@ class WiredBench:
             if not blocks:
                 continue
             window = psd_window(blocks).between(begin_s, np.inf)
-            start_s = settled_from(window.device_s, self.view.each(window), self.rule)
-            last_s = float(window.device_s[-1])
-            if start_s is not None and last_s - start_s >= dwell_s:
-                return self._summed(window.between(start_s, start_s + dwell_s), settled=True)
-            if start_s is None and last_s - begin_s > self.rule.limit_s + dwell_s:
-                return self._summed(window.between(last_s - dwell_s, last_s), settled=False)
+            stretch = stretch_to_average(window.device_s, self.view.each(window), dwell_s, self.rule)
+            if stretch is not None:
+                return self._summed(window.between(stretch.from_s, stretch.to_s), settled=stretch.settled)
 
     def _psd_time(self) -> float:
         latest = self.pumps.psd.latest()

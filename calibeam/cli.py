@@ -3,11 +3,14 @@
 0 good, 1 failed, 2 wrong usage, 3 partial (what was recorded is kept, but the job did not end as asked).
 """
 
+import signal
 import sys
 from importlib.metadata import version
+from types import FrameType
 
 from cyclopts import App, CycloptsError
 from rich.console import Console
+from rich.markup import escape
 
 from acquisition.errors import AcquisitionError
 from acquisition.recording.errors import RecordingError, RigFileError, SamplesError
@@ -15,6 +18,7 @@ from calibeam.commands.demo import demo
 from calibeam.commands.emulate import emulate
 from calibeam.commands.export import export_command, import_command
 from calibeam.commands.identify import identify_command
+from calibeam.commands.predict import predict_command
 from calibeam.commands.report import report_command
 from calibeam.commands.session import session
 from calibeam.emulation import EmulationError
@@ -46,6 +50,7 @@ app.command(demo)
 app.command(session)
 app.command(emulate)
 app.command(identify_command, name="identify")
+app.command(predict_command, name="predict")
 app.command(report_command, name="report")
 app.command(export_command, name="export")
 app.command(import_command, name="import")
@@ -53,7 +58,13 @@ app.command(import_command, name="import")
 
 def main() -> None:
     """Run the command line; ends the process with one of the four exit codes."""
+    for number in (signal.SIGTERM, signal.SIGHUP):  # a closed terminal must leave the arm standing, too
+        signal.signal(number, _interrupt)
     sys.exit(run(sys.argv[1:]))
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
 
 
 def run(arguments: list[str]) -> int:
@@ -64,12 +75,17 @@ def run(arguments: list[str]) -> int:
     except CycloptsError:
         return 2  # cyclopts has printed what was wrong
     except PartialResult as partial:
-        errors.print(f"[bold]stopped:[/bold] {partial}", markup=True)
+        errors.print(f"[bold]stopped:[/bold] {escape(str(partial))}")
         return 3
     except KeyboardInterrupt:
         errors.print("stopped by Ctrl-C")
         return 1
     except TOLD as error:
         errors.print("error:", str(error), markup=False)
+        return 1
+    except OSError as error:  # a folder that cannot be made or written; devices' own are DeviceErrors above
+        errors.print(
+            "error:", f"{error.filename or 'file'}: {error.strerror or error}; choose another --out", markup=False
+        )
         return 1
     return 0

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from acquisition.bench import Look
 from acquisition.psd_view import NO_LIGHT, PsdView, PsdWindow
 from acquisition.recording.rig_schema import Rig
-from acquisition.settling import SettleRule, settled_from
+from acquisition.settling import SettleRule, stretch_to_average
 from drivers.psd_daq.messages import FaceIdentity
 from drivers.psd_faces import FaceKind
 from simulators.wire import TICK_S
@@ -38,7 +38,7 @@ class DirectBench:
     rate_hz: float = 1000.0
     rule: SettleRule = field(default_factory=SettleRule)
     moves: int = 0
-    _cmd_rad: Floats = field(default_factory=lambda: np.empty(0))
+    _cmd_rad: Floats = field(default_factory=lambda: np.empty(0), init=False)
 
     def __post_init__(self) -> None:
         self.world.psd_rate(self.rate_hz)
@@ -70,17 +70,13 @@ class DirectBench:
         self.moves += 1
 
     def look(self, dwell_s: float) -> Look:
-        begin_s = self.world.time_s
         samples: list[tuple[Floats, Floats]] = []
         while True:
             samples.append(self._sample(max(dwell_s, 2.0 * self.rule.window_s)))
             window = self._window(samples)
-            last_s = float(window.device_s[-1])
-            start_s = settled_from(window.device_s, self._view.each(window), self.rule)
-            if start_s is not None and last_s - start_s >= dwell_s:
-                return self._summed(window.between(start_s, start_s + dwell_s), settled=True)
-            if start_s is None and last_s - begin_s > self.rule.limit_s + dwell_s:
-                return self._summed(window.between(last_s - dwell_s, last_s), settled=False)
+            stretch = stretch_to_average(window.device_s, self._view.each(window), dwell_s, self.rule)
+            if stretch is not None:
+                return self._summed(window.between(stretch.from_s, stretch.to_s), settled=stretch.settled)
 
     def place_fixture(self, placement: int) -> None:
         self.world.place_fixture(placement)

@@ -19,6 +19,20 @@ class EmulationError(Exception):
     """The emulators did not start, ended, or refused; the message holds what they said."""
 
 
+def ask_emulators(host: str, port: int, verb: str, arguments: Mapping[str, Any]) -> Any:
+    """One verb of the emulators' side channel; its result. EmulationError when it refuses or does not answer."""
+    try:
+        with socket.create_connection((host, port), timeout=ANSWER_S) as line:
+            line.sendall(json.dumps({"do": verb, "with": arguments}).encode() + b"\n")
+            with line.makefile("r") as answers:
+                answer = json.loads(answers.readline())
+    except (OSError, ValueError) as error:
+        raise EmulationError(f"the emulators do not answer on {host}:{port}: {error}") from error
+    if not answer["ok"]:
+        raise EmulationError(f"the emulators refused {verb}: {answer['error']}")
+    return answer["result"]
+
+
 @dataclass
 class Emulation:
     """Runs `calibeam emulate` until closed. It ends by itself when this process dies, whatever the way."""
@@ -47,13 +61,21 @@ class Emulation:
             text=True,
             start_new_session=True,
         )
-        self.address = self._announcement(self._process)
+        try:
+            self.address = self._announcement(self._process)
+        except BaseException:
+            self.close()
+            raise
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        process = self._process
+        self.close()
+
+    def close(self) -> None:
+        """End the emulators; safe in every state."""
+        process, self._process = self._process, None
         if process is None:
             return
         process.terminate()
@@ -69,17 +91,9 @@ class Emulation:
 
     def ask(self, verb: str, **arguments: Any) -> Any:
         """One verb of the side channel; its result. EmulationError when it refuses or does not answer."""
-        where = (str(self.address["control"]["host"]), int(self.address["control"]["port"]))
-        try:
-            with socket.create_connection(where, timeout=ANSWER_S) as line:
-                line.sendall(json.dumps({"do": verb, "with": arguments}).encode() + b"\n")
-                with line.makefile("r") as answers:
-                    answer = json.loads(answers.readline())
-        except (OSError, ValueError) as error:
-            raise EmulationError(f"the emulators do not answer on {where[0]}:{where[1]}: {error}") from error
-        if not answer["ok"]:
-            raise EmulationError(f"the emulators refused {verb}: {answer['error']}")
-        return answer["result"]
+        return ask_emulators(
+            str(self.address["control"]["host"]), int(self.address["control"]["port"]), verb, arguments
+        )
 
     def _announcement(self, process: subprocess.Popen[str]) -> Mapping[str, Any]:
         out = process.stdout

@@ -43,7 +43,7 @@ def identify_recording(recording: Recording) -> Identified:
 
 def write_identified(identified: Identified, recording: Recording, path: Path) -> None:
     """model.json of the full model."""
-    identity = RigIdentity(recording.rig.name, rig_sha256(recording.rig_text))
+    identity = RigIdentity(recording.rig.name, rig_sha256(recording.rig_text), recording.rig_text)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_model(path, model_of(identified.zeros, identity, recording.rig.arm.model.value))
 

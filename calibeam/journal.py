@@ -10,7 +10,7 @@ from drivers.clock import Clock
 
 
 class RecordingJournal:
-    """Implements acquisition.session.Journal."""
+    """Implements acquisition.journal.Journal."""
 
     def __init__(self, writer: RecordingWriter, clock: Clock) -> None:
         self._writer, self._clock = writer, clock

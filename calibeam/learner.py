@@ -46,7 +46,7 @@ class Beliefs:
 
 
 class FittedLearner:
-    """Implements acquisition.session.Learner on the models of `calibrate`."""
+    """Implements acquisition.learner.Learner on the models of `calibrate`."""
 
     def __init__(self, rig: Rig, beliefs: Beliefs | None = None) -> None:
         self._rig, self._beliefs = rig, beliefs or Beliefs()

@@ -1,8 +1,8 @@
 """A session that is recorded: runs the plan, and whatever happens the arm is stopped and the file is whole."""
 
 import signal
-from collections.abc import Generator
-from contextlib import contextmanager
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
@@ -14,6 +14,7 @@ from acquisition.bench import Bench
 from acquisition.errors import AcquisitionError
 from acquisition.plan import PlanOptions
 from acquisition.recording.errors import RecordingError
+from acquisition.recording.read import read
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.stream import Event
 from acquisition.recording.writer import RecordingWriter
@@ -22,22 +23,45 @@ from acquisition.session import Session, Summary
 from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibeam.outcome import PartialResult
+from calibeam.software import SOFTWARE
 from drivers.clock import Clock
 from drivers.errors import DeviceError
 
 Interrupted = (DeviceError, AcquisitionError, RecordingError, KeyboardInterrupt)
 
 
+@contextmanager
+def new_recording(path: Path, rig_text: str, clock: Clock, notes: Mapping[str, str]) -> Generator[RecordingWriter]:
+    """A recording that is closed and readable at the end, whatever happens.
+
+    Nothing is left of it when a device could not be had and no sample was taken: the next try may use the same name.
+    """
+    writer = RecordingWriter(path, rig_text=rig_text, software=SOFTWARE, clock=clock, notes=notes)
+    try:
+        yield writer
+    except BaseException as why:
+        with uninterrupted(), suppress(RecordingError):  # what ended the session is the news, not what follows from it
+            writer.close(complete=False)
+            if isinstance(why, DeviceError) and len(read(path).samples) == 0:
+                path.unlink()
+        raise
+    with uninterrupted():
+        writer.close()
+
+
 def record_session(
-    bench: Bench, rig: Rig, writer: RecordingWriter, options: PlanOptions, clock: Clock, console: Console
+    bench: Bench, rig: Rig, writer: RecordingWriter, options: PlanOptions, clock: Clock, bar: Progress
 ) -> Summary:
-    """Take every place of the rig. PartialResult when it ended early: the arm stands, what was taken is kept."""
+    """Take every place of the rig, told by `bar`. PartialResult when it ended early: the arm stands, samples are kept.
+
+    Whoever asks a person for something meanwhile stops the bar first, and starts it again.
+    """
     home_rad = np.zeros(rig.n_joints) if rig.motion.home_rad is None else np.array(rig.motion.home_rad)
-    with _progress(console) as progress:
-        task = progress.add_task("collecting", total=None)
+    with bar:
+        task = bar.add_task("collecting", total=None)
 
         def tell(done: int, total: int, text: str) -> None:
-            progress.update(task, completed=done, total=total, description=text)
+            bar.update(task, completed=done, total=total, description=text)
 
         session = Session(
             bench,
@@ -63,7 +87,7 @@ def _ended_early(
 
     The readers still run: whoever opened the recording closes it after them.
     """
-    reason = "stopped by Ctrl-C" if isinstance(why, KeyboardInterrupt) else str(why)
+    reason = "Ctrl-C" if isinstance(why, KeyboardInterrupt) else str(why)
     also: list[str] = []
     with uninterrupted():
         try:
@@ -76,6 +100,8 @@ def _ended_early(
         except RecordingError as error:
             also.append(str(error))
     kept = f"{session.taken} samples are kept in {writer.path}"
+    if session.taken:
+        kept += f"; `calibeam identify {writer.path}` says what they tell"
     return PartialResult("; ".join([reason, *dict.fromkeys(also), kept]))
 
 
@@ -93,7 +119,8 @@ def uninterrupted() -> Generator[None, None, None]:
         signal.signal(signal.SIGINT, before)
 
 
-def _progress(console: Console) -> Progress:
+def progress_bar(console: Console) -> Progress:
+    """Samples taken and planned, what is being done, time gone and left."""
     return Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -104,10 +131,3 @@ def _progress(console: Console) -> Progress:
         console=console,
         transient=False,
     )
-
-
-def fresh(folder: Path, names: tuple[str, ...]) -> None:
-    """Make the folder, and take away results of an earlier run by the same names."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for name in names:
-        (folder / name).unlink(missing_ok=True)

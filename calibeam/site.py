@@ -19,7 +19,7 @@ from drivers.cia406.device import Cia406Encoders
 from drivers.cia406.network import bus_opener
 from drivers.clock import Clock
 from drivers.device import Block, Device
-from drivers.errors import DeviceRefused
+from drivers.errors import DeviceError, DeviceRefused
 from drivers.psd_daq.device import BAUD, PsdDaq
 from drivers.transports.serial_port import SerialAddress, open_serial
 from drivers.ur.control import UrControl
@@ -43,14 +43,14 @@ class Addresses:
     hurry: float = 1.0
 
 
-def addresses_of(rig: Rig, emulated: Mapping[str, Any] | None = None, time_scale: float = 1.0) -> Addresses:
+def addresses_of(rig: Rig, emulated: Mapping[str, Any] | None = None, hurry: float = 1.0) -> Addresses:
     """The rig's [devices], or the same devices where emulators announced them. DeviceRefused when one is missing."""
     psd, robot, encoders = rig.devices.psd, rig.devices.robot, rig.devices.encoders
     if psd is None or robot is None:
         missing = "psd" if psd is None else "robot"
         raise DeviceRefused(f"rig {rig.name}: no [devices.{missing}]; a session needs the PSD box and the controller")
     if emulated is None:
-        return Addresses(psd, robot, encoders)
+        return Addresses(psd, robot, encoders, hurry)
     psd = PsdDevice(psd.driver, port=emulated["psd"]["port"], rate_hz=psd.rate_hz)
     robot = RobotDevice(robot.driver, emulated["robot"]["host"], robot.rate_hz)
     if encoders is not None:
@@ -58,7 +58,7 @@ def addresses_of(rig: Rig, emulated: Mapping[str, Any] | None = None, time_scale
         encoders = EncodersDevice(
             encoders.driver, can["interface"], can["channel"], encoders.nodes, can["bitrate"], encoders.sync_hz
         )
-    return Addresses(psd, robot, encoders, time_scale)
+    return Addresses(psd, robot, encoders, hurry)
 
 
 @contextmanager
@@ -78,7 +78,11 @@ def connected(
             encoders=_encoders(addresses, writer, clock, supervisor, cleaning),
         )
         cleaning.callback(_released, control)
-        control.connect()
+        try:
+            control.connect()
+        except DeviceError:
+            supervisor.check()  # another device failed meanwhile, and its stop ended this too: that is the news
+            raise
         speeds = Speeds(rig.motion.speed_rad_s, rig.motion.acceleration_rad_s2)
         yield WiredBench(control, pumps, _view_of(psd), speeds, supervisor, clock, place)
 
@@ -90,7 +94,8 @@ def _released(control: UrControl) -> None:
 
 def _psd(device: PsdDevice, clock: Clock) -> PsdDaq:
     address = SerialAddress(port=device.port, serial_number=device.serial_number)
-    return PsdDaq(lambda: open_serial(address, BAUD), rate_hz=device.rate_hz, clock=clock)
+    with _refused("devices.psd"):
+        return PsdDaq(lambda: open_serial(address, BAUD), rate_hz=device.rate_hz, clock=clock)
 
 
 def _encoders(
@@ -100,8 +105,18 @@ def _encoders(
     if device is None:
         return None
     open_bus = bus_opener(device.interface, device.channel, device.bitrate)
-    encoders = Cia406Encoders(open_bus, device.nodes, device.sync_hz, clock=clock)
+    with _refused("devices.encoders"):
+        encoders = Cia406Encoders(open_bus, device.nodes, device.sync_hz, clock=clock)
     return cleaning.enter_context(_pumped(encoders, writer, clock, supervisor))
+
+
+@contextmanager
+def _refused(section: str) -> Generator[None]:
+    """What a driver says of values that it does not take, as an error of the rig's section."""
+    try:
+        yield
+    except ValueError as error:
+        raise DeviceRefused(f"[{section}] of the rig file: {error}") from error
 
 
 def _spots_beside(psd: PsdDaq, writer: RecordingWriter) -> Callable[[Block], None]:
@@ -110,8 +125,8 @@ def _spots_beside(psd: PsdDaq, writer: RecordingWriter) -> Callable[[Block], Non
     count = itertools.count()
 
     def keep(block: Block) -> None:
-        psd1, psd2 = _view_of(psd).mean(psd_window([block]))
-        values: dict[str, float] = dict(zip(SPOTS, (psd1.x_m, psd1.y_m, psd2.x_m, psd2.y_m), strict=True))
+        spots_m = _view_of(psd).each(psd_window([block])).mean(axis=0)  # a block may hold a single sample: no sigma
+        values: dict[str, float] = dict(zip(SPOTS, spots_m.tolist(), strict=True))
         stream.append(block.host_s[-1], block.device_s[-1], next(count), values)
 
     return keep
@@ -132,9 +147,6 @@ def _pumped(
     beside: Callable[[Block], None] = lambda block: None,
 ) -> Generator[Pump]:
     """The device connected, its blocks going into the recording until left, and to `beside`."""
-    device.connect()
-    channels = tuple(Channel(c.name, c.unit, c.shape, c.full_scale, c.resolution) for c in device.describe())
-    stream = writer.stream(device.name, channels, VIEWED.get(device.name))
 
     def keep(block: Block) -> None:
         stream.append(block.host_s, block.device_s, block.sequence, block.values)
@@ -146,8 +158,11 @@ def _pumped(
             writer.event(Event(clock.now_s(), "device failed", {"device": device.name, "why": str(failure)}))
 
     pump = Pump(device, clock, keep, failed)
-    pump.start()
     try:
+        device.connect()
+        channels = tuple(Channel(c.name, c.unit, c.shape, c.full_scale, c.resolution) for c in device.describe())
+        stream = writer.stream(device.name, channels, VIEWED.get(device.name))
+        pump.start()
         yield pump
     finally:
         with uninterrupted():

@@ -24,7 +24,6 @@ class Found(Enum):
     BOTH = "both faces have light"
     FIRST_ONLY = "the first face has light, the second was not found"
     NOTHING = "no light within the search radius"
-    OUT_OF_RANGE = "the search left the joint range"
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ def faults(rig: Rig) -> Iterator[Fault]:
     yield from _laser_faults(rig)
     yield from _placement_faults(rig)
     yield from _twice(("bar",), tuple(bar.id for bar in rig.bar_list))
+    yield from _tolerance_faults(rig)
     yield from _device_faults(rig)
     yield from _motion_faults(rig)
 
@@ -92,6 +93,18 @@ def _twice(section: KeyPath, ids: tuple[int, ...]) -> Iterator[Fault]:
     for index, number in enumerate(ids):
         if number in ids[:index]:
             yield (*section, index, "id"), f"id = {number} is used twice in [[{section[0]}]]; give every one its own"
+
+
+def _tolerance_faults(rig: Rig) -> Iterator[Fault]:
+    if (tolerance := rig.tolerance) is None:
+        return
+    for what, section in (("psd2", "fixture"), ("device", "device")):
+        sizes = {key: getattr(tolerance, key) for key in (f"{what}_m", f"{what}_rad")}
+        missing = [key for key, value in sizes.items() if value is None]
+        if len(missing) == 1:
+            yield ("tolerance",), f"[tolerance] says only half of how well {what} is known: add '{missing[0]}'"
+        elif not missing and getattr(rig, section) is None:
+            yield ("tolerance", f"{what}_m"), f"{what}_m is there, but there is no [{section}] that it is the sigma of"
 
 
 def _device_faults(rig: Rig) -> Iterator[Fault]:

@@ -110,10 +110,15 @@ class Noise(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Tolerance(Struct, frozen=True, forbid_unknown_fields=True):
-    """One sigma of the drawing: priors of the fit."""
+    """One sigma of the drawing: priors of the fit. What may be None is, without it, taken as `docs/formats.md` says."""
 
     length_m: Positive
     angle_rad: Positive
+    gain: Positive | None = None  # of both detectors' scales, about 1
+    psd2_m: Positive | None = None  # of PSD 2 in PSD 1, with psd2_rad
+    psd2_rad: Positive | None = None
+    device_m: Positive | None = None  # of [device] in the base, with device_rad
+    device_rad: Positive | None = None
 
 
 class PsdDriver(enum.Enum):

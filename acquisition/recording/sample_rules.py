@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.columns import (
     COMPLETE_PER_JOINT,
+    ORIENTATION,
     POSITION,
     SPOTS,
     Kind,
@@ -82,6 +83,8 @@ def _header_faults(names: tuple[str, ...], n_joints: int) -> Iterator[Fault]:
     for stem, unit in COMPLETE_PER_JOINT:
         yield from _incomplete(names, per_joint(stem, unit, n_joints))
     yield from _incomplete(names, POSITION)
+    if any(name in names for name in ORIENTATION):
+        yield from _incomplete(names, (*ORIENTATION, *POSITION))
     yield from _incomplete(names, SPOTS)
     if any(name in names for name in SPOTS):
         yield from _incomplete(names, (*SPOTS, "placement", "first_psd"))
@@ -133,6 +136,7 @@ def _table_faults(table: Table, rig: Rig) -> Iterator[Fault]:
     for name in required(rig.n_joints):
         yield from _first(np.isnan(table[name]), name, "the value is missing (empty or NaN); it is needed in every row")
     yield from _together(table, POSITION)
+    yield from _together(table, ORIENTATION)
     yield from _together(table, SPOTS)
     for needed in ("placement", "first_psd"):
         if SPOTS[0] in table and needed in table:

@@ -55,23 +55,26 @@ class Loop:
             if not self._in_range(self._q_rad + proposal.step_rad):
                 return self._end(Status.JOINT_LIMIT, look)
             taken = self._take(proposal)
-            if taken is None:
-                return self._end(Status.SPOT_LOST, look)
+            if not _both_lit(taken):
+                return self._end(Status.SPOT_LOST, taken)
             look = taken if not proposal.stay else look
 
-    def _take(self, proposal: Proposal) -> Look | None:
-        """Move; while the light is lost, come back by half, the spiral of the search being the caller's."""
+    def _take(self, proposal: Proposal) -> Look:
+        """Move; while the light is lost, come back by half. The look is dark when that did not find it again: the
+        spiral of the search is the caller's.
+        """
         step = proposal.step_rad
-        for attempt in range(self._limits.halvings):
-            q_rad = self._q_rad + step
-            look = self._see(q_rad, proposal.purpose if attempt == 0 else "go back")
+        look = self._see(self._q_rad + step, proposal.purpose)
+        for _ in range(self._limits.halvings):
             if _both_lit(look):
-                self._strategy.learn(q_rad, look.spots_m())
-                if not proposal.stay:
-                    self._q_rad = q_rad
-                return look
+                break
             step = step / 2.0
-        return None
+            look = self._see(self._q_rad + step, "go back")
+        if _both_lit(look):
+            self._strategy.learn(self._q_rad + step, look.spots_m())
+            if not proposal.stay:
+                self._q_rad = self._q_rad + step
+        return look
 
     def _see(self, q_rad: Floats, purpose: str) -> Look:
         if purpose != "start":

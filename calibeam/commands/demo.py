@@ -1,25 +1,23 @@
 """`calibeam demo`: the whole job on emulated devices, and then the truth that was concealed from it."""
 
-from importlib.metadata import version
 from pathlib import Path
 
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.read import read
+from acquisition.recording.errors import RecordingError
 from acquisition.recording.rig import load_rig, rig_text
-from acquisition.recording.writer import RecordingWriter
+from calibeam.conclude import conclude
 from calibeam.emulation import Emulation
-from calibeam.identification import identify_recording, write_identified
-from calibeam.recorded import fresh, record_session
+from calibeam.recorded import new_recording, progress_bar, record_session
 from calibeam.reveal import reveal
 from calibeam.site import addresses_of, connected
-from calibeam.terminal import print_identified, print_revealed
-from calibrate.report.zero_report import write_report
+from calibeam.terminal import print_revealed
 from drivers.clock import SystemClock
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
-RESULTS = ("recording.mcap", "model.json", "report.html", "truth.json")
+RECORDING, TRUTH = "recording.mcap", "truth.json"
+RESULTS = (RECORDING, "model.json", "report.html", TRUTH)
 
 
 def demo(*, out: Path = Path("out/demo"), rig: Path = RIG, seed: int = 1, time_scale: float = 8.0) -> None:
@@ -40,28 +38,29 @@ def demo(*, out: Path = Path("out/demo"), rig: Path = RIG, seed: int = 1, time_s
 
     """
     console, clock = Console(), SystemClock()
-    fresh(out, RESULTS)
     loaded, text = load_rig(rig), rig_text(rig)
+    _clear(out)
     console.print(f"starting the emulators of {rig.name} ({time_scale:g} x real time)")
+    notes = {"emulation_seed": str(seed), "time_scale": f"{time_scale:g}"}
     with (
-        Emulation(rig, seed=seed, time_scale=time_scale, truth=out / "truth.json") as emulation,
-        RecordingWriter(
-            out / "recording.mcap",
-            rig_text=text,
-            software=f"calibeam {version('calibeam')}",
-            clock=clock,
-            notes={"emulation_seed": str(seed), "time_scale": f"{time_scale:g}"},
-        ) as writer,
+        Emulation(rig, seed=seed, time_scale=time_scale, truth=out / TRUTH) as emulation,
+        new_recording(out / RECORDING, text, clock, notes) as writer,
         connected(
             loaded, addresses_of(loaded, emulation.address, time_scale), writer, clock, emulation.place_fixture
         ) as bench,
     ):
-        summary = record_session(bench, loaded, writer, PlanOptions(), clock, console)
-    console.print(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {out / 'recording.mcap'}")
-    recording = read(out / "recording.mcap")
-    identified = identify_recording(recording)
-    write_identified(identified, recording, out / "model.json")
-    print_identified(console, identified)
-    write_report(out / "report.html", recording, identified.zeros, point_constraint=identified.four_poses)
-    print_revealed(console, reveal(identified.zeros, out / "truth.json"))
-    console.print(f"report: {out / 'report.html'}")
+        summary = record_session(bench, loaded, writer, PlanOptions(), clock, progress_bar(console))
+    console.print(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {out / RECORDING}")
+    identified = conclude(out / RECORDING, console)
+    print_revealed(console, reveal(identified.zeros, out / TRUTH))
+
+
+def _clear(out: Path) -> None:
+    """Make the folder, and take away the results of an earlier demo; RecordingError where they are no demo's."""
+    if (out / RECORDING).exists() and not (out / TRUTH).exists():
+        raise RecordingError(
+            f"{out / RECORDING}: not of a demo (no {TRUTH} beside it); choose another folder with --out"
+        )
+    out.mkdir(parents=True, exist_ok=True)
+    for name in RESULTS:
+        (out / name).unlink(missing_ok=True)

@@ -59,3 +59,6 @@ def _print_table(where: dict[str, dict[str, Any]]) -> None:
     for device, address in where.items():
         print(f"{device:8s}", "  ".join(f"{key} {value}" for key, value in address.items()), flush=True)
     print("ready; Ctrl-C ends the emulators", flush=True)
+    if "control" in where:
+        control = f"{where['control']['host']}:{where['control']['port']}"
+        print(f"a session on them: calibeam session RIG.toml --control {control} --out session-1", flush=True)

@@ -1,11 +1,11 @@
 """`calibeam export` and `calibeam import`: session folders in and out of recordings."""
 
-from importlib.metadata import version
 from pathlib import Path
 
 from acquisition.recording.folder import export
 from acquisition.recording.import_folder import import_folder
 from acquisition.recording.read import read
+from calibeam.software import SOFTWARE
 
 
 def export_command(recording: Path, *, out: Path) -> None:
@@ -39,5 +39,5 @@ def import_command(folder: Path, *, out: Path) -> None:
         The recording to make.
 
     """
-    import_folder(folder, out, software=f"calibeam {version('calibeam')}")
+    import_folder(folder, out, software=SOFTWARE)
     print(f"{out}: {len(read(out).samples)} samples")

@@ -1,16 +1,20 @@
-"""`calibeam identify`: joint zeros of a recording or session folder."""
+"""`calibeam identify`: the arm of a recording or session folder, by whatever instruments it holds."""
 
 from pathlib import Path
 
 from rich.console import Console
 
 from acquisition.recording.read import read
+from calibeam.any_session import identify_session, only_spots, write_session_model
 from calibeam.identification import identify_recording, write_identified
+from calibeam.session_table import print_identification
 from calibeam.terminal import print_identified
 
 
 def identify_command(recording: Path, *, out: Path = Path("model.json")) -> None:
-    """Identify joint zeros: rank and what cannot be determined first, then numbers with their sigma.
+    """Identify the arm: blunders of the file, rank and what cannot be determined first, then numbers with their sigma.
+
+    Spots of the dual PSD alone give joint zeros; positions, wire, cones, bars, full poses (several at once) the arm.
 
     Example: calibeam identify out/demo/recording.mcap --out model.json
 
@@ -22,9 +26,13 @@ def identify_command(recording: Path, *, out: Path = Path("model.json")) -> None
         Where to write the model.
 
     """
-    source = read(recording)
-    identified = identify_recording(source)
-    write_identified(identified, source, out)
-    console = Console()
-    print_identified(console, identified)
-    console.print(f"model: {out}")
+    source, console = read(recording), Console()
+    if only_spots(source.samples):
+        identified = identify_recording(source)
+        write_identified(identified, source, out)
+        print_identified(console, identified)
+    else:
+        result = identify_session(source)
+        write_session_model(result, source, out)
+        print_identification(console, result)
+    console.print(f"model: {out}", markup=False)

@@ -1,24 +1,26 @@
 """`calibeam session`: the whole job on site, or on emulators that were started beside it."""
 
-from importlib.metadata import version
+from collections.abc import Callable
 from pathlib import Path
 
 from rich.console import Console
+from rich.progress import Progress
 from rich.prompt import Prompt
 
+from acquisition.errors import AcquisitionError
 from acquisition.plan import PlanOptions
-from acquisition.recording.read import read
 from acquisition.recording.rig import load_rig, rig_text
-from acquisition.recording.writer import RecordingWriter
-from calibeam.identification import identify_recording, write_identified
-from calibeam.recorded import record_session
+from acquisition.recording.rig_schema import Rig
+from calibeam.conclude import conclude
+from calibeam.emulation import ask_emulators
+from calibeam.recorded import new_recording, progress_bar, record_session
 from calibeam.site import addresses_of, connected
-from calibeam.terminal import print_identified
-from calibrate.report.zero_report import write_report
 from drivers.clock import SystemClock
 
 
-def session(rig: Path, *, out: Path = Path("session"), seed: int = 1) -> None:
+def session(
+    rig: Path, *, out: Path = Path("session"), seed: int = 1, control: str | None = None, time_scale: float = 1.0
+) -> None:
     """Connect, aim, centre, collect, record, identify, report. The arm moves: clear the cell first.
 
     Example: calibeam session rigs/ur5e-dual-psd.toml --out session-1
@@ -31,32 +33,54 @@ def session(rig: Path, *, out: Path = Path("session"), seed: int = 1) -> None:
         Folder for recording.mcap, model.json and report.html; nothing in it is overwritten.
     seed
         Of the pose plan.
+    control
+        Side channel of emulators, HOST:PORT as `calibeam emulate` prints it: the emulated fixture is moved through it,
+        instead of asking a person.
+    time_scale
+        Of the emulators, if it is not 1.
 
     """
     console, clock = Console(), SystemClock()
     loaded, text = load_rig(rig), rig_text(rig)
+    addresses, recording = addresses_of(loaded, hurry=time_scale), out / "recording.mcap"
     out.mkdir(parents=True, exist_ok=True)
+    bar = progress_bar(console)
+    place = _asking(loaded, bar) if control is None else _through(*_host_and_port(control))
+    with (
+        new_recording(recording, text, clock, {"plan_seed": str(seed)}) as writer,
+        connected(loaded, addresses, writer, clock, place) as bench,
+    ):
+        summary = record_session(bench, loaded, writer, PlanOptions(seed=seed), clock, bar)
+    console.print(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {recording}")
+    conclude(recording, console)
+
+
+def _asking(rig: Rig, bar: Progress) -> Callable[[int], None]:
+    """Has a person place the fixture; the bar, which would write over the question, waits."""
 
     def ask_for(placement: int) -> None:
-        place = loaded.placements[placement].psd1_in_base
-        where = ", ".join(f"{value:.3f}" for value in place.origin_m)
-        Prompt.ask(f"put the fixture at place {placement} (PSD 1 near {where} m in the base), then press Enter")
+        where = ", ".join(f"{value:.3f}" for value in rig.placements[placement].psd1_in_base.origin_m)
+        bar.stop()
+        try:
+            Prompt.ask(f"put the fixture at place {placement} (PSD 1 near {where} m in the base), then press Enter")
+        except EOFError as end:
+            raise AcquisitionError(
+                f"place {placement}: nobody can be asked to put the fixture there, standard input is closed; "
+                "run the session in a terminal"
+            ) from end
+        finally:
+            bar.start()
 
-    with (
-        RecordingWriter(
-            out / "recording.mcap",
-            rig_text=text,
-            software=f"calibeam {version('calibeam')}",
-            clock=clock,
-            notes={"plan_seed": str(seed)},
-        ) as writer,
-        connected(loaded, addresses_of(loaded), writer, clock, ask_for) as bench,
-    ):
-        summary = record_session(bench, loaded, writer, PlanOptions(seed=seed), clock, console)
-    console.print(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {out / 'recording.mcap'}")
-    recording = read(out / "recording.mcap")
-    identified = identify_recording(recording)
-    write_identified(identified, recording, out / "model.json")
-    write_report(out / "report.html", recording, identified.zeros, point_constraint=identified.four_poses)
-    print_identified(console, identified)
-    console.print(f"report: {out / 'report.html'}")
+    return ask_for
+
+
+def _through(host: str, port: int) -> Callable[[int], None]:
+    """Has the emulated fixture stand at the place."""
+    return lambda placement: ask_emulators(host, port, "fixture.place", {"id": placement})
+
+
+def _host_and_port(text: str) -> tuple[str, int]:
+    host, _, port = text.rpartition(":")
+    if not host or not port.isdigit():
+        raise AcquisitionError(f"--control {text}: give HOST:PORT as `calibeam emulate` prints it, 127.0.0.1:40001")
+    return host, int(port)

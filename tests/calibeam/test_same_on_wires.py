@@ -18,7 +18,7 @@ from calibeam.direct import direct_bench
 from calibeam.emulation import Emulation
 from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
-from calibeam.recorded import record_session
+from calibeam.recorded import progress_bar, record_session
 from calibeam.site import addresses_of, connected
 from drivers.clock import SystemClock
 from simulators.world.world import World
@@ -38,7 +38,7 @@ def on_wires(time_scale: float, folder: Path) -> Sequence[Sample]:
             rig, addresses_of(rig, emulation.address, time_scale), writer, clock, emulation.place_fixture
         ) as bench,
     ):
-        return record_session(bench, one_place, writer, TINY, clock, Console(quiet=True)).samples
+        return record_session(bench, one_place, writer, TINY, clock, progress_bar(Console(quiet=True))).samples
 
 
 def in_process(folder: Path) -> Sequence[Sample]:
