@@ -3,6 +3,7 @@ PYTHON ?= $(firstword $(foreach p,python3.11 python3.12 python3.13 python3,$(she
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+BENCH := .venv-bench
 
 .PHONY: setup demo test lint bench pins clean
 
@@ -13,6 +14,7 @@ $(READY): requirements/all.txt pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/all.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	$(BIN)/python -m calibrate.kernels
 	@touch $@
 
 demo: $(READY)
@@ -27,13 +29,24 @@ lint: $(READY)
 	$(BIN)/lint-imports
 	$(BIN)/pyright
 
-bench: $(READY)
-	$(BIN)/python -m benchmarks
+# In an environment of its own, which also holds the libraries that are compared with. One thread, quiet waiting.
+bench: $(BENCH)/.ready
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 OMP_WAIT_POLICY=PASSIVE $(BENCH)/bin/python -m benchmarks $(NAMES)
+
+$(BENCH)/.ready: requirements/all.txt requirements/bench.txt pyproject.toml
+	@test -n "$(PYTHON)" || { echo "calibeam needs Python 3.11 or newer (Debian: apt-get install python3 python3-venv)"; exit 1; }
+	$(PYTHON) -m venv $(BENCH)
+	$(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/all.txt -r requirements/bench.txt
+	$(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	$(BENCH)/bin/python -m calibrate.kernels
+	@touch $@
 
 # Renew the pins after changing pyproject.toml (needs pip-tools). Hashes only: no address enters the file.
 pins:
 	pip-compile --quiet --generate-hashes --strip-extras --extra dev --allow-unsafe \
 	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host -o requirements/all.txt pyproject.toml
+	pip-compile --quiet --generate-hashes --strip-extras --allow-unsafe \
+	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host -o requirements/bench.txt requirements/bench.in
 
 clean:
-	rm -rf $(VENV) out .pytest_cache .ruff_cache
+	rm -rf $(VENV) $(BENCH) out .pytest_cache .ruff_cache

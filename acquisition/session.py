@@ -60,7 +60,7 @@ class Session:
         return len(self._samples)
 
     def run(self, placements: tuple[int, ...]) -> Summary:
-        """Take every block of the plan. DeviceError, NoLightError, UnreachableError and the recording's errors end it."""
+        """Take every block of the plan. DeviceError, NoLightError, UnreachableError, RecordingError end it."""
         plan = tuple(blocks(placements, self._learner.optics.half_size_m, self._options))
         total = sum(len(block.visits) + 2 * self._options.repeats for block in plan)
         self._navigator.move(self._navigator.q_rad)

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from benchmarks import centring, zeros
+from benchmarks import centring, coverage, speed, zeros
 
 RIG = Path(__file__).parents[1] / "rigs" / "ur5e-dual-psd.toml"
 
@@ -27,7 +27,22 @@ def run_zeros() -> None:
     print(zeros.summary_line(results))
 
 
-BENCHMARKS: dict[str, Callable[[], None]] = {"centring": run_centring, "zeros": run_zeros}
+def run_coverage() -> None:
+    print("95 % intervals over 1,000 sessions of concealed truths, tracker and dual PSD in turn")
+    print("\n".join(coverage.lines(coverage.run(RIG))))
+
+
+def run_speed() -> None:
+    for row in speed.lines(RIG):
+        print(row, flush=True)
+
+
+BENCHMARKS: dict[str, Callable[[], None]] = {
+    "centring": run_centring,
+    "zeros": run_zeros,
+    "coverage": run_coverage,
+    "speed": run_speed,
+}
 
 
 def main(names: list[str]) -> int:

@@ -3,7 +3,6 @@
 import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ from calibeam.identification import identify_recording
 from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibeam.reveal import Revealed, reveal
+from calibeam.software import SOFTWARE
 from drivers.clock import SystemClock
 from simulators.world.truth import write_truth
 
@@ -43,8 +43,7 @@ def run(rig: Rig, plain_rig: Mapping[str, Any], rig_text: str, seeds: range) -> 
 def _one(rig: Rig, plain_rig: Mapping[str, Any], rig_text: str, seed: int, folder: Path) -> SeedResult:
     bench, clock = direct_bench(rig, plain_rig, seed=seed), SystemClock()
     write_truth(bench.world.truth, folder / "truth.json")
-    software = f"calibeam {version('calibeam')}"
-    with RecordingWriter(folder / "r.mcap", rig_text=rig_text, software=software, clock=clock) as writer:
+    with RecordingWriter(folder / "r.mcap", rig_text=rig_text, software=SOFTWARE, clock=clock) as writer:
         journal = RecordingJournal(writer, clock)
         home_rad = np.array(rig.motion.home_rad)
         session = Session(bench, FittedLearner(rig), journal, PlanOptions(seed=seed), home_rad)

@@ -29,6 +29,6 @@ def _concluded(recording_path: Path, console: Console) -> Identified:
     identified = identify_recording(recording)
     write_identified(identified, recording, folder / "model.json")
     print_identified(console, identified)
-    write_report(folder / "report.html", recording, identified.zeros, point_constraint=identified.four_poses)
+    write_report(folder / "report.html", identified.used, identified.zeros, point_constraint=identified.four_poses)
     console.print(f"report: {folder / 'report.html'}", markup=False)
     return identified

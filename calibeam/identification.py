@@ -1,8 +1,9 @@
 """From a recording to joint zeros, by the full dual-PSD model and by the source's four-pose point constraint."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,7 +11,10 @@ from acquisition.recording.recording import Recording
 from acquisition.recording.rig import rig_sha256
 from acquisition.recording.rig_schema import Rig
 from calibrate.arms.catalogue import arm_of
-from calibrate.dual_psd_rig import believed_noise, drawing_doubt, dual_psd_chain, laser_of
+from calibrate.blunders.finding import Blunder
+from calibrate.dual_psd_rig import believed_noise, drawing_doubt, dual_psd_chain, fixture_of, laser_of
+from calibrate.identification.record import left_out
+from calibrate.identification.spots import without_blunders
 from calibrate.model_file import RigIdentity, model_of, write_model
 from calibrate.observations import Observations
 from calibrate.read_samples import observations
@@ -31,21 +35,33 @@ class Identified:
 
     zeros: ZeroResult
     four_poses: PointConstraintResult | None
+    used: Recording  # without the rows of the blunders
+    blunders: tuple[Blunder, ...] = ()
+
+
+def check_identifiable(rig: Rig) -> None:
+    """DataError when a recording made with this rig could not be identified: said before an hour of measuring."""
+    fixture_of(rig)
+    laser_of(rig)
+    drawing_doubt(rig)
 
 
 def identify_recording(recording: Recording) -> Identified:
-    """Joint zeros of a dual-PSD recording. DataError when it holds nothing to fit."""
-    data, rig = observations(recording.samples), recording.rig
+    """Joint zeros of a dual-PSD recording. DataError when it holds nothing to fit, or is a blunder as a whole."""
+    rig = recording.rig
+    samples, blunders = without_blunders(rig, recording.samples)
+    data = observations(samples)
     chain = dual_psd_chain(rig, data.placement, data.first_psd)
     zeros = identify(chain, data, believed_noise(rig), rng=np.random.default_rng(SPLIT_SEED))
-    return Identified(zeros, _four_poses(rig, data))
+    return Identified(zeros, _four_poses(rig, data), replace(recording, samples=samples), blunders)
 
 
 def write_identified(identified: Identified, recording: Recording, path: Path) -> None:
     """model.json of the full model."""
     identity = RigIdentity(recording.rig.name, rig_sha256(recording.rig_text), recording.rig_text)
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_model(path, model_of(identified.zeros, identity, recording.rig.arm.model.value))
+    model = model_of(identified.zeros, identity, recording.rig.arm.model.value)
+    write_model(path, msgspec.structs.replace(model, blunders=tuple(left_out(b) for b in identified.blunders)))
 
 
 def _four_poses(rig: Rig, data: Observations) -> PointConstraintResult | None:

@@ -20,6 +20,7 @@ from acquisition.recording.stream import Event
 from acquisition.recording.writer import RecordingWriter
 from acquisition.servo.centring import Limits
 from acquisition.session import Session, Summary
+from calibeam.emulation import EmulationError
 from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibeam.outcome import PartialResult
@@ -27,7 +28,8 @@ from calibeam.software import SOFTWARE
 from drivers.clock import Clock
 from drivers.errors import DeviceError
 
-Interrupted = (DeviceError, AcquisitionError, RecordingError, KeyboardInterrupt)
+Interrupted = (DeviceError, AcquisitionError, RecordingError, EmulationError, KeyboardInterrupt)
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # all of them end a session as Ctrl-C does, see calibeam.cli
 
 
 @contextmanager
@@ -56,7 +58,7 @@ def record_session(
 
     Whoever asks a person for something meanwhile stops the bar first, and starts it again.
     """
-    home_rad = np.zeros(rig.n_joints) if rig.motion.home_rad is None else np.array(rig.motion.home_rad)
+    home_rad = np.array(rig.motion.home_rad)  # there is one: check_session
     with bar:
         task = bar.add_task("collecting", total=None)
 
@@ -107,16 +109,17 @@ def _ended_early(
 
 @contextmanager
 def uninterrupted() -> Generator[None, None, None]:
-    """Ctrl-C waits outside: cleaning up is short, and half of it is worse than a second's patience."""
+    """Ctrl-C and the end of the terminal wait outside: half of a clean-up is worse than a second's patience."""
 
     def ignore(number: int, frame: FrameType | None) -> None:
         return
 
-    before = signal.signal(signal.SIGINT, ignore)
+    before = {number: signal.signal(number, ignore) for number in ENDING}
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def progress_bar(console: Console) -> Progress:

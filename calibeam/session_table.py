@@ -6,10 +6,7 @@ from rich.table import Table
 
 from calibrate.identification.result import Identification
 from calibrate.uncertainty.chi_square import Alarm
-from calibrate.words import plainly
 from calibrate.zeros.result import Estimate
-
-SPOKEN = 3  # members of an unseen combination; model.json names all
 
 
 def print_identification(console: Console, result: Identification) -> None:
@@ -20,9 +17,8 @@ def print_identification(console: Console, result: Identification) -> None:
     names = ", ".join(f"{i.name} ({i.observations})" for i in result.instruments)
     console.print(f"{names}: {result.n_samples} samples, rank {seen.rank} of {seen.n_free} unknowns", highlight=False)
     for combination in seen.combinations:
-        first = plainly(combination.members[:SPOKEN])
-        text = f"not seen at all: {first}" if len(combination.members) == 1 else f"only together: {first}"
-        console.print(f"  {text}", highlight=False, markup=False)
+        about = "" if len(combination.members) > 1 else f"{combination.words}: "
+        console.print(f"  {about}{combination.says}", highlight=False, markup=False)
     _print_estimates(console, result.estimates)
     _print_figures(console, result)
     console.print(f"{result.status.name}: {result.status.value}", highlight=False)

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from acquisition.psd_view import PsdView
-from acquisition.recording.errors import RecordingError
+from acquisition.recording.errors import RecordingError, RigFileError
 from acquisition.recording.rig_schema import EncodersDevice, PsdDevice, Rig, RobotDevice
 from acquisition.recording.stream import Channel, Event
 from acquisition.recording.writer import RecordingWriter
 from acquisition.streams import Pump
 from acquisition.supervisor import Supervisor
 from acquisition.wired import Pumps, Speeds, WiredBench, psd_window
+from calibeam.identification import check_identifiable
 from calibeam.recorded import uninterrupted
 from drivers.cia406.device import Cia406Encoders
 from drivers.cia406.network import bus_opener
@@ -25,6 +26,7 @@ from drivers.transports.serial_port import SerialAddress, open_serial
 from drivers.ur.control import UrControl
 from drivers.ur.reader import UrReader
 
+UR_JOINTS = 6
 SPOTS = ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")
 VIEWED = {
     "psd": ("flags", "temperature_degC"),
@@ -41,6 +43,17 @@ class Addresses:
     robot: RobotDevice
     encoders: EncodersDevice | None
     hurry: float = 1.0
+
+
+def check_session(rig: Rig) -> None:
+    """What a session needs of a rig beyond what every rig file has. DataError, RigFileError; no device is touched."""
+    check_identifiable(rig)
+    if rig.motion.home_rad is None:
+        raise RigFileError(
+            f"rig {rig.name}: [motion] has no home_rad; give joint readings that are clear of everything"
+        )
+    if rig.n_joints != UR_JOINTS:
+        raise RigFileError(f"rig {rig.name}: {rig.n_joints} joints, but driver ur-rtde moves arms of {UR_JOINTS}")
 
 
 def addresses_of(rig: Rig, emulated: Mapping[str, Any] | None = None, hurry: float = 1.0) -> Addresses:

@@ -12,7 +12,9 @@ from calibrate.zeros.result import JointZero, ZeroResult
 
 
 def print_identified(console: Console, identified: Identified) -> None:
-    """Both methods, the full model last: its numbers are the ones to use."""
+    """What was wrong with the file, then both methods, the full model last: its numbers are the ones to use."""
+    for blunder in identified.blunders:
+        console.print(f"left out: {blunder.says}", highlight=False, markup=False)
     if identified.four_poses is not None:
         _print_four_poses(console, identified.four_poses)
     _print_full(console, identified.zeros)

@@ -20,8 +20,12 @@ class Chain:
     model: KinematicModel
     sensor: Sensor
 
-    @cached_property
+    @property
     def parameters(self) -> tuple[Parameter, ...]:
+        return self._parameters
+
+    @cached_property
+    def _parameters(self) -> tuple[Parameter, ...]:
         return self.model.parameters + self.sensor.parameters
 
     def expect(self, theta: Floats, q_rad: Floats) -> Floats:

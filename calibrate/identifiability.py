@@ -6,13 +6,15 @@ Source: Schroer, Theory of kinematic modelling, 1993 (column scaling, rank by si
 parameter outside the range of J' has no estimate is Rao, Linear Statistical Inference, 2nd ed. 1973, ch. 4a.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.parameters import Parameter, plausible_sizes, priors
+from calibrate.words import in_words, plainly
+
+__all__ = ["WEAK", "Combination", "Identifiability", "analyse", "in_words"]
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -20,6 +22,7 @@ Bools = NDArray[np.bool_]
 WEAK = 0.5  # sigma of twice the plausible size: the data say nothing; pure priors give exactly 1, so not 1
 STRUCTURAL = 1e-9  # of the largest singular value: not weak data but geometry; rounding leaves about 1e-12
 TRACE = 1e-5  # share of an unseen direction below which a parameter is not part of it
+NEGLIGIBLE = 0.1  # of a sigma: what an unseen combination, off by its plausible size, may shift a parameter by
 SPOKEN = 0.02  # share of its largest member below which a member is not worth saying
 
 
@@ -31,6 +34,7 @@ class Combination:
     members: tuple[str, ...]  # strongest first
     representative: str  # the one to hold
     structural: bool  # geometry forbids it; False: these poses are too few or too alike
+    plain: str = ""  # the same for who calibrates: "d2 + d3", "joint 1 zero with base yaw"
 
     @property
     def says(self) -> str:
@@ -51,6 +55,7 @@ class Identifiability:
     condition: float  # largest over smallest of the seen ones
     combinations: tuple[Combination, ...]
     sigma: Floats  # (free,) predicted, inf where not determined
+    unseen: Floats  # (free, k) directions that the data do not see, each of plausible size, in the parameters' units
 
     @property
     def n_free(self) -> int:
@@ -70,24 +75,27 @@ def analyse(jacobian: Floats, parameters: tuple[Parameter, ...]) -> Identifiabil
     names = tuple(parameters[i].name for i in free)
     scale, prior = plausible_sizes(parameters)[free], priors(parameters)[free]
     rows = np.concatenate([jacobian[:, free] * scale, np.diag(np.where(np.isfinite(prior), scale / prior, 0.0))])
-    _, s, Vt = np.linalg.svd(rows, full_matrices=False)
+    _, s, Vt = np.linalg.svd(np.linalg.qr(rows, mode="r"))  # the triangle has the same values and directions
     seen = s > max(WEAK, STRUCTURAL * s[0])
     unseen = Vt[~seen].T  # (free, k)
-    invisible = np.linalg.norm(unseen, axis=1) > TRACE if unseen.shape[1] else np.zeros(len(free), dtype=bool)
-    sigma = scale * np.sqrt(np.sum((Vt[seen].T / s[seen]) ** 2, axis=1))
-    sigma[invisible] = np.inf
+    shift, doubt = np.linalg.norm(unseen, axis=1), np.linalg.norm(Vt[seen].T / s[seen], axis=1)
+    invisible = (shift > TRACE) & (shift > NEGLIGIBLE * doubt)
+    sigma = np.where(invisible, np.inf, scale * doubt)
     n_structural = int(np.sum(s < STRUCTURAL * s[0]))
     return Identifiability(
         names,
         int(seen.sum()),
         s,
         float(s[0] / s[seen][-1]) if seen.any() else float("inf"),
-        _combinations(unseen[:, ::-1], names, n_structural),
+        _combinations(unseen[:, ::-1], names, n_structural, invisible),
         sigma,
+        scale[:, None] * unseen,
     )
 
 
-def _combinations(unseen: Floats, names: tuple[str, ...], n_structural: int) -> tuple[Combination, ...]:
+def _combinations(
+    unseen: Floats, names: tuple[str, ...], n_structural: int, invisible: Bools
+) -> tuple[Combination, ...]:
     """Simplest basis of the unseen directions (weakest first): each has a representative that no other contains.
 
     Joint zeros are taken as representatives first, because they are what is asked for. What geometry forbids is
@@ -99,7 +107,8 @@ def _combinations(unseen: Floats, names: tuple[str, ...], n_structural: int) -> 
     for k in range(len(basis)):
         first, end = (0, n_structural) if k < n_structural else (n_structural, len(basis))
         rest = np.abs(basis[k:end])
-        among_zeros = np.where(zeros, rest, 0.0)
+        worth_saying = rest > SPOKEN * rest.max(axis=1, keepdims=True)  # holding less would not hold the combination
+        among_zeros = np.where(zeros & worth_saying, rest, 0.0)
         candidates = among_zeros if among_zeros.max() > TRACE else rest
         row, column = divmod(int(np.argmax(candidates)), rest.shape[1])
         basis[[k, k + row]] = basis[[k + row, k]]
@@ -108,32 +117,13 @@ def _combinations(unseen: Floats, names: tuple[str, ...], n_structural: int) -> 
         others[k] = False
         basis[others] -= np.outer(basis[others, column], basis[k])
         pivots.append(column)
-    return tuple(_combination(v, names, pivots[k], k < n_structural) for k, v in enumerate(basis))
+    return tuple(_combination(v * invisible, names, pivots[k], k < n_structural) for k, v in enumerate(basis))
 
 
 def _combination(direction: Floats, names: tuple[str, ...], pivot: int, structural: bool) -> Combination:
     size = np.abs(direction) / np.abs(direction).max()
     order = [int(i) for i in np.argsort(-size, kind="stable") if size[i] > TRACE]
-    spoken = [names[pivot]] + [names[i] for i in sorted(order) if size[i] > SPOKEN and i != pivot]
-    return Combination(in_words(spoken), tuple(names[i] for i in order), names[pivot], structural)
-
-
-def in_words(names: Sequence[str]) -> str:
-    """Names joined for a person; what several placements, or the laser mount, have in common is said once.
-
-    >>> in_words(["joint1.zero", "placement1.x", "placement1.yaw", "placement2.x", "placement2.yaw"])
-    'joint1.zero + placement x, yaw'
-    """
-    groups: dict[str, list[str]] = {}
-    for name in names:
-        owner, _, what = name.partition(".")
-        if owner.startswith("placement"):
-            owner = "placement"
-        elif owner == "laser":
-            owner = "laser mount"
-        else:
-            owner, what = name, ""
-        listed = groups.setdefault(owner, [])
-        if what and what not in listed:
-            listed.append(what)
-    return " + ".join(f"{owner} {', '.join(what)}" if what else owner for owner, what in groups.items())
+    others = [i for i in order if i != pivot]
+    loud = SPOKEN * (size[others[0]] if others and size[others[0]] < SPOKEN else 1.0)  # a pair is never said as one
+    spoken = [names[pivot]] + [names[i] for i in sorted(others) if size[i] > loud]
+    return Combination(in_words(spoken), tuple(names[i] for i in order), names[pivot], structural, plainly(spoken))

@@ -3,7 +3,8 @@
     schema          1
     kind            "calibeam-model"
     software        "calibeam 0.1.0"
-    rig             {"name", "sha256"}: which rig file the corrections belong to (sha256 of its text)
+    rig             {"name", "sha256", "text"}: the rig file that the corrections belong to: sha256 of its text, and the
+                    text itself, so that the model predicts without another file (null: written before that)
     arm_model       "dh": what the parameter names mean (arms/)
     status, says    named outcome of the fit and its sentence
     poses           settled samples used
@@ -16,19 +17,29 @@
                     among many that predict the same; alone they mean nothing
     covariance      {"names", "rows"}: posterior of the free parameters, in the units above
     noise, repeats, held_out, rms_before_m, rms_after_m: as calibrate/zeros/result.py explains; null where there is none
+    instruments     names of the instruments that were fitted: "dual-psd", "position", "wire", "seat", "bar", "pose"
+    about           {name: numbers}: what was found in closed form before the fit and is corrected by `parameters`:
+                    "device": [x, y, z, rx, ry, rz] in the base, "tool": [x, y, z] in the flange, "seat<k>": [x, y, z].
+                    What is not named here is as in the rig
+    blunders        [{"kind", "rows", "column", "says"}]: faults of the file; these rows (from 1) were left out
 
 Angles are rad, lengths m. A joint's true angle is its reading plus `joint<i>.zero`.
 """
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from calibrate.errors import DataError
-from calibrate.zeros.result import HeldOut, NoiseFound, Repeats, ZeroResult
+from calibrate.parameters import Parameter
+from calibrate.zeros.result import ZeroResult
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 Fields = dict[str, float | int | str | bool | None]
 SCHEMA = 1
@@ -39,6 +50,7 @@ class RigIdentity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     name: str
     sha256: str
+    text: str | None = None
 
 
 class Unseen(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -66,6 +78,15 @@ class Covariance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     rows: tuple[tuple[float, ...], ...]
 
 
+class LeftOut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A blunder of the file: its rows, from 1, took no part."""
+
+    kind: str
+    rows: tuple[int, ...]
+    column: str
+    says: str
+
+
 class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Content of model.json; the module's text explains each field."""
 
@@ -90,6 +111,9 @@ class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     held_out: Fields | None
     rms_before_m: float
     rms_after_m: float
+    instruments: tuple[str, ...] = ("dual-psd",)
+    about: dict[str, tuple[float, ...]] = msgspec.field(default_factory=dict[str, tuple[float, ...]])
+    blunders: tuple[LeftOut, ...] = ()
 
 
 def model_of(result: ZeroResult, rig: RigIdentity, arm_model: str) -> ModelFile:
@@ -111,10 +135,10 @@ def model_of(result: ZeroResult, rig: RigIdentity, arm_model: str) -> ModelFile:
         unseen=tuple(Unseen(c.words, c.members, c.structural) for c in seen.combinations),
         parameters=tuple(ModelParameter(e.name, e.unit, e.value, e.sigma, e.why) for e in result.estimates),
         chain={p.name: float(v) for p, v in zip(result.parameters, result.theta, strict=True)},
-        covariance=_covariance(result),
-        noise=_fields(result.noise),
-        repeats=None if result.repeats is None else _fields(result.repeats),
-        held_out=None if result.held_out is None else _fields(result.held_out),
+        covariance=covariance_record(result.parameters, result.covariance),
+        noise=fields_of(result.noise),
+        repeats=None if result.repeats is None else fields_of(result.repeats),
+        held_out=None if result.held_out is None else fields_of(result.held_out),
         rms_before_m=result.rms_before_m,
         rms_after_m=result.rms_after_m,
     )
@@ -161,14 +185,15 @@ class _Version(msgspec.Struct, frozen=True):
     kind: str
 
 
-def _covariance(result: ZeroResult) -> Covariance | None:
-    free = np.flatnonzero(np.diag(result.covariance) > 0.0)
-    if not np.all(np.isfinite(result.covariance)):
+def covariance_record(parameters: tuple[Parameter, ...], covariance: NDArray[np.float64]) -> Covariance | None:
+    """The free part of a posterior (param, param); None where it does not exist."""
+    if not np.all(np.isfinite(covariance)):
         return None
-    rows = result.covariance[np.ix_(free, free)]
-    return Covariance(tuple(result.parameters[i].name for i in free), tuple(map(tuple, rows.tolist())))
+    free = np.flatnonzero(np.diag(covariance) > 0.0)
+    rows = covariance[np.ix_(free, free)]
+    return Covariance(tuple(parameters[i].name for i in free), tuple(map(tuple, rows.tolist())))
 
 
-def _fields(record: NoiseFound | Repeats | HeldOut) -> Fields:
+def fields_of(record: "DataclassInstance") -> Fields:
     """Fields of a result record; what is not a finite number becomes null, since JSON has no other word for it."""
     return {k: None if isinstance(v, float) and not np.isfinite(v) else v for k, v in asdict(record).items()}

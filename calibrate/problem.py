@@ -5,8 +5,9 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cholesky_banded, solve_banded
 
-from calibrate.chain import Chain
+from calibrate.observation_model import ObservationModel
 from calibrate.parameters import Parameter
 
 Floats = NDArray[np.float64]
@@ -31,17 +32,25 @@ class LeastSquares(Protocol):
 class Problem:
     """Chain against data. `parameters` may hold or bound what the chain leaves free."""
 
-    chain: Chain
+    chain: ObservationModel
     parameters: tuple[Parameter, ...]
-    q_rad: Floats  # (pose, joint)
+    q_rad: Floats  # (pose, joint); of pair observations both poses side by side, (pair, 2 joint)
     observed: Floats  # (pose, k)
     whitener: Floats  # (pose, k, k) W with W cov W' = 1
+    correlation: Floats | None = None  # (row,) where k is 1: of each row's noise with the next row's; the last is 0
+
+    @property
+    def rows(self) -> int:
+        """Poses, or pairs of poses: what `select` chooses from."""
+        return len(self.q_rad)
 
     def residual(self, theta: Floats) -> Floats:
-        return np.einsum("nij,nj->ni", self.whitener, self.misfit(theta)).ravel()
+        rows = np.einsum("nij,nj->ni", self.whitener, self.misfit(theta)).ravel()
+        return rows if self.correlation is None else decorrelated(rows, self.correlation)
 
     def jacobian(self, theta: Floats) -> Floats:
-        return (self.whitener @ self.chain.jacobian(theta, self.q_rad)).reshape(-1, len(self.parameters))
+        rows = (self.whitener @ self.chain.jacobian(theta, self.q_rad)).reshape(-1, len(self.parameters))
+        return rows if self.correlation is None else decorrelated(rows, self.correlation)
 
     def misfit(self, theta: Floats) -> Floats:
         """(pose, k) expected minus observed, in the sensor's unit."""
@@ -56,11 +65,22 @@ class Problem:
 
     def select(self, rows: NDArray[np.intp]) -> "Problem":
         """The same problem over some of the poses."""
+        kept = None
+        if self.correlation is not None:  # what was next to each other still is, or is taken as independent
+            kept = self.correlation[rows] * np.append(np.diff(rows) == 1, False)
         return Problem(
-            self.chain.select(rows), self.parameters, self.q_rad[rows], self.observed[rows], self.whitener[rows]
+            self.chain.select(rows), self.parameters, self.q_rad[rows], self.observed[rows], self.whitener[rows], kept
         )
 
 
 def whitener_of(covariance: Floats) -> Floats:
     """(..., k, k) inverse of the lower Cholesky factor of a covariance."""
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)), dtype=np.float64)
+
+
+def decorrelated(rows: Floats, correlation: Floats) -> Floats:
+    """Rows (row, ...) of unit noise, each correlated with its neighbour (row,), made independent: inverse Cholesky."""
+    if len(rows) < 2:
+        return rows
+    factor = cholesky_banded(np.stack([np.ones(len(rows)), correlation]), lower=True)
+    return np.asarray(solve_banded((1, 0), factor, rows), dtype=np.float64)

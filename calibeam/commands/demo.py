@@ -11,7 +11,7 @@ from calibeam.conclude import conclude
 from calibeam.emulation import Emulation
 from calibeam.recorded import new_recording, progress_bar, record_session
 from calibeam.reveal import reveal
-from calibeam.site import addresses_of, connected
+from calibeam.site import addresses_of, check_session, connected
 from calibeam.terminal import print_revealed
 from drivers.clock import SystemClock
 
@@ -39,6 +39,7 @@ def demo(*, out: Path = Path("out/demo"), rig: Path = RIG, seed: int = 1, time_s
     """
     console, clock = Console(), SystemClock()
     loaded, text = load_rig(rig), rig_text(rig)
+    check_session(loaded)
     _clear(out)
     console.print(f"starting the emulators of {rig.name} ({time_scale:g} x real time)")
     notes = {"emulation_seed": str(seed), "time_scale": f"{time_scale:g}"}

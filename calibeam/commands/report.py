@@ -22,5 +22,5 @@ def report_command(recording: Path, *, out: Path = Path("report.html")) -> None:
     """
     source = read(recording)
     identified = identify_recording(source)
-    write_report(out, source, identified.zeros, point_constraint=identified.four_poses)
+    write_report(out, identified.used, identified.zeros, point_constraint=identified.four_poses)
     print(f"report: {out}")

@@ -14,7 +14,7 @@ from acquisition.recording.rig_schema import Rig
 from calibeam.conclude import conclude
 from calibeam.emulation import ask_emulators
 from calibeam.recorded import new_recording, progress_bar, record_session
-from calibeam.site import addresses_of, connected
+from calibeam.site import addresses_of, check_session, connected
 from drivers.clock import SystemClock
 
 
@@ -42,6 +42,7 @@ def session(
     """
     console, clock = Console(), SystemClock()
     loaded, text = load_rig(rig), rig_text(rig)
+    check_session(loaded)
     addresses, recording = addresses_of(loaded, hurry=time_scale), out / "recording.mcap"
     out.mkdir(parents=True, exist_ok=True)
     bar = progress_bar(console)

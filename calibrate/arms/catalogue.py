@@ -2,28 +2,49 @@
 
 from collections.abc import Callable, Mapping
 
-from acquisition.recording.rig_schema import Arm, ArmModel, Rig, Tolerance
+import numpy as np
+
+from acquisition.recording.rig_schema import Arm, ArmModel, Rig
+from calibrate.arms.belief import HELD_AS_DRAWN, LinkBelief
 from calibrate.arms.dh import DhArm, DhLink
-from calibrate.arms.model import KinematicModel
-from calibrate.errors import DataError
+from calibrate.arms.local_poe import LocalPoeArm
+from calibrate.arms.mdh import MdhArm
+from calibrate.arms.serial import SerialArm
 from calibrate.rigid import transform
 
 
-def _dh(arm: Arm, tolerance: Tolerance | None) -> KinematicModel:
-    links = tuple(DhLink(j.theta_offset_rad or 0.0, j.d_m or 0.0, j.a_m or 0.0, j.alpha_rad or 0.0) for j in arm.joints)
-    T_last_flange = transform(arm.flange.origin_m, arm.flange.rotation_rad)
-    if tolerance is None:  # nobody says how far the drawing may be off: it is taken as exact, and the report says so
-        return DhArm(links, 0.0, 0.0, T_last_flange)
-    return DhArm(links, tolerance.length_m, tolerance.angle_rad, T_last_flange)
+def dh_rows(arm: Arm) -> tuple[DhLink, ...]:
+    """The rows of a D-H table of either kind, as drawn."""
+    return tuple(DhLink(j.theta_offset_rad or 0.0, j.d_m or 0.0, j.a_m or 0.0, j.alpha_rad or 0.0) for j in arm.joints)
 
 
-ARMS: Mapping[ArmModel, Callable[[Arm, Tolerance | None], KinematicModel]] = {ArmModel.DH: _dh}
+def _dh(arm: Arm, belief: LinkBelief) -> SerialArm:
+    return DhArm(dh_rows(arm), belief, transform(arm.flange.origin_m, arm.flange.rotation_rad))
 
 
-def arm_of(rig: Rig) -> KinematicModel:
-    """The rig's arm as believed. DataError for a model that cannot be fitted yet."""
-    build = ARMS.get(rig.arm.model)
-    if build is None:
-        known = ", ".join(m.value for m in ARMS)
-        raise DataError(f"rig {rig.name}: arm.model '{rig.arm.model.value}' cannot be identified; known: {known}")
-    return build(rig.arm, rig.tolerance)
+def _mdh(arm: Arm, belief: LinkBelief) -> SerialArm:
+    return MdhArm(dh_rows(arm), belief, transform(arm.flange.origin_m, arm.flange.rotation_rad))
+
+
+def _local_poe(arm: Arm, belief: LinkBelief) -> SerialArm:
+    parts = [transform(j.origin_m or (0.0, 0.0, 0.0), j.rotation_rad or (0.0, 0.0, 0.0)) for j in arm.joints]
+    return LocalPoeArm(np.array([*parts, transform(arm.flange.origin_m, arm.flange.rotation_rad)]), belief)
+
+
+ARMS: Mapping[ArmModel, Callable[[Arm, LinkBelief], SerialArm]] = {
+    ArmModel.DH: _dh,
+    ArmModel.MDH: _mdh,
+    ArmModel.LOCAL_POE: _local_poe,
+}
+
+
+def arm_of(rig: Rig, belief: LinkBelief | None = None) -> SerialArm:
+    """The rig's arm, its links as `belief` says, else as the [tolerance] says, else held as drawn."""
+    return ARMS[rig.arm.model](rig.arm, drawn_belief(rig) if belief is None else belief)
+
+
+def drawn_belief(rig: Rig) -> LinkBelief:
+    """What the rig's [tolerance] says; nobody says how far the drawing may be off: it is taken as exact."""
+    if rig.tolerance is None:
+        return HELD_AS_DRAWN
+    return LinkBelief(rig.tolerance.length_m, rig.tolerance.angle_rad)

@@ -42,6 +42,10 @@ def _paint_spectrum(figure: Figure, s: Floats, rank: int, with_drawing: bool) ->
             axes.plot(number[rows], shown[rows], "o", ms=5, mfc=face, mec=tone.value, mew=1.4, label=text)
     axes.axhline(WEAK, color=Tone.INK.value, lw=1.1, linestyle=(0, (4, 3)))
     axes.annotate("worse than a guess", (1.0, WEAK), (2, -11), textcoords="offset points", fontsize=9)
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(round(np.log10(value)))))
+    axes.yaxis.set_major_formatter(FuncFormatter(_power))
     axes.set(xlabel="combination of parameters", title="Plausible size over sigma, of each combination")
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 0.08))
+
+
+def _power(value: float, _: int | None) -> str:
+    return power_of_ten(round(np.log10(value)))

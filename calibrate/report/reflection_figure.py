@@ -1,5 +1,7 @@
 """The fixture close up, with both faces on edge: how the beam goes from face to face, in either order."""
 
+import itertools
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -77,7 +79,7 @@ def _beam(axes: Axes, path_mm: Floats, first_psd: int, style: dict[str, float]) 
     axes.plot(*path_mm.T, color=tone.value, linestyle=dashes if leads else "solid", zorder=4 if leads else 2, **style)  # pyright: ignore[reportArgumentType]
     if not leads:
         return
-    for a, b in zip(path_mm[:-1], path_mm[1:], strict=True):
+    for a, b in itertools.pairwise(path_mm):
         axes.annotate(
             "", 0.62 * b + 0.38 * a, 0.5 * (a + b), arrowprops={"arrowstyle": "-|>", "color": tone.value, "lw": 1.2}
         )

@@ -112,7 +112,7 @@ def _base(axes: Axes, view: Floats, level_m: float) -> None:
     turn = np.linspace(0.0, 2.0 * math.pi, 49)
     ring = STAND_M * np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=1)
     for height in {level_m, 0.0}:
-        _line(axes, (ring + [0.0, 0.0, height]) @ view, Tone.SOFT, 1.0)
+        _line(axes, (ring + np.array([0.0, 0.0, height])) @ view, Tone.SOFT, 1.0)
     for side in (view[:, 0], -view[:, 0]):
         edge = STAND_M * side
         _line(axes, np.stack([edge, _on_floor(edge, level_m)]) @ view, Tone.SOFT, 1.0)
@@ -120,7 +120,15 @@ def _base(axes: Axes, view: Floats, level_m: float) -> None:
         tip = axis @ view
         if np.linalg.norm(tip) > 0.02:  # else seen from its end
             _line(axes, np.array([[0.0, 0.0], tip]), Tone.SOFT, 1.2)
-            axes.text(*(1.25 * tip), name, ha="center", va="center", fontsize=9, color=Tone.SOFT.value)
+            axes.text(
+                1.25 * float(tip[0]),
+                1.25 * float(tip[1]),
+                name,
+                ha="center",
+                va="center",
+                fontsize=9,
+                color=Tone.SOFT.value,
+            )
 
 
 def _arm(axes: Axes, arm: StandingArm, view: Floats, tone: Tone, *, leading: bool) -> None:

@@ -1,5 +1,6 @@
 """The rig in space, from the fit: arms at chosen poses, faces where they stood, the beam from laser to second face."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,7 +95,7 @@ def _standing(rig: FittedRig, data: Observations, pose: int) -> StandingArm:
 def _bones(frames: Floats, laser_m: Floats) -> Floats:
     """From each origin along the joint axis, then along the common normal to the next; at the end to the laser."""
     corners = [frames[0, :3, 3]]
-    for before, after in zip(frames[:-1], frames[1:], strict=True):
+    for before, after in itertools.pairwise(frames):
         along = before[:3, 2] * (before[:3, 2] @ (after[:3, 3] - before[:3, 3]))
         corners += [before[:3, 3] + along, after[:3, 3]]
     return np.stack([*corners, laser_m])

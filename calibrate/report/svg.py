@@ -2,7 +2,7 @@
 
 import io
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from typing import Literal
 
@@ -50,11 +50,12 @@ POINT_PX = 1.25  # largest magnification on a wide page
 
 
 @contextmanager
-def house_style() -> Iterator[None]:
+def house_style() -> Generator[None]:
     """Figures made and written inside look alike, whatever the user's own matplotlib settings are."""
     with mpl.rc_context():
         mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)
+        for key, value in STYLE.items():
+            mpl.rcParams[key] = value  # pyright: ignore[reportArgumentType] - keys are checked by matplotlib itself
         yield
 
 
@@ -77,9 +78,18 @@ def log_axis(axes: Axes, which: Literal["x", "y"], values: Sequence[float], says
     else:
         axes.set(yscale="log", ylim=(low, high))
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 100.0 * low else (1.0,)))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: says(value)))
+    axis.set_major_formatter(FuncFormatter(_labelling(says)))
     axis.set_minor_locator(NullLocator())
     axis.set_minor_formatter(NullFormatter())
+
+
+def _labelling(says: Callable[[float], str]) -> Callable[[float, int | None], str]:
+    """What matplotlib asks for: it passes the tick's number, too."""
+
+    def label(value: float, _: int | None) -> str:
+        return says(value)
+
+    return label
 
 
 def inlined(svg: str, name: str, says: str) -> Html:

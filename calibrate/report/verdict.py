@@ -36,7 +36,7 @@ def verdict(evidence: Evidence) -> Verdict:
     """From the result and the recording; the thresholds are those at the top of this file."""
     result = evidence.result
     found = [z for z in result.zeros if z.value_rad is not None]
-    if not found or result.status in (Status.NOT_FINITE, Status.OUT_OF_STEPS):
+    if not found or result.status in (Status.NOT_FINITE, Status.OUT_OF_STEPS, Status.STALLED):
         return Verdict(Trust.NONE, "No joint zero was determined.", (result.status.value, *_doubts(evidence)))
     doubts = tuple(_doubts(evidence))
     explained = (
@@ -75,13 +75,15 @@ def _doubts_about_fit(result: ZeroResult) -> Iterator[str]:
         yield "The size of the noise did not settle; sigmas are a guess."
     if repeats is not None and repeats.lack_of_fit_p < UNLIKELY:
         yield (
-            f"Repeated poses scatter less than the model misses them (lack of fit F = {significant(repeats.lack_of_fit)}, "
+            "Repeated poses scatter less than the model misses them "
+            f"(lack of fit F = {significant(repeats.lack_of_fit)}, "
             f"p = {significant(repeats.lack_of_fit_p, 2)}): physics is missing from the model."
         )
     if unseen is not None and unseen.chi_after > WORSE_UNSEEN:
         yield f"Poses that the fit has not seen are missed by {significant(unseen.chi_after)} times the noise."
     if noise.joint_rad > NOISIER * noise.joint_believed_rad:
-        yield f"The joints scatter {significant(noise.joint_rad / noise.joint_believed_rad)} times as much as the rig file says."
+        times = significant(noise.joint_rad / noise.joint_believed_rad)
+        yield f"The joints scatter {times} times as much as the rig file says."
     if noise.psd_m > NOISIER * noise.psd_believed_m:
         yield f"The detectors scatter {significant(noise.psd_m / noise.psd_believed_m)} times as much as stated."
     if unseen is None:

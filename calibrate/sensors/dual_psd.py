@@ -10,6 +10,7 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from calibrate.errors import DataError
 from calibrate.parameters import Parameter
@@ -127,13 +128,17 @@ class DualPsd:
         out[:, range(4), range(4, 8)] = hit.spots_m.reshape(-1, 4)
         if self.pair_prior is not None:
             out[:, :, 8:14] = gain * self._by_pair(phi, twist)
-        for k, place in enumerate(self.places):
-            rows = np.flatnonzero(self.placement == place)
-            if len(rows):  # the fixture moving by a twist is the beam moving by its opposite
-                first = N_FIXED + 6 * k
-                fixture_twists = pose_offset_twists(self.fixture.T_base_psd1[place], phi[first : first + 6])
-                out[rows, :, first : first + 6] = -gain * (twist[rows] @ fixture_twists)
+        at_place = np.searchsorted(np.array(self.places), self.placement)
+        fixture_twists = np.stack([self._place_twists(phi, k) for k in range(len(self.places))])
+        columns = N_FIXED + 6 * at_place[:, None, None] + np.arange(6)  # a pose sees its own place only
+        by_place = -gain * (twist @ fixture_twists[at_place])  # the beam moves by the opposite of the fixture's twist
+        np.put_along_axis(out, np.broadcast_to(columns, by_place.shape), by_place, axis=2)
         return out
+
+    def _place_twists(self, phi: Floats, index: int) -> Floats:
+        """(6, 6) base twists of the fixture at the index-th place by its six parameters."""
+        first = N_FIXED + 6 * index
+        return pose_offset_twists(self.fixture.T_base_psd1[self.places[index]], phi[first : first + 6])
 
     def T_base_psd1(self, phi: Floats, place: int) -> Floats:
         """(4, 4) where the fixture stands according to phi."""
@@ -150,10 +155,17 @@ class DualPsd:
         return 2 * np.searchsorted(np.array(self.places), self.placement) + self.first_psd - 1
 
     def _unfolded(self, phi: Floats) -> Floats:
-        pair = self.T_psd1_psd2(phi)
-        return np.stack(
-            [optics.unfolded_faces(self.T_base_psd1(phi, k), pair, first) for k in self.places for first in (1, 2)]
-        )
+        pair, places = self.T_psd1_psd2(phi), self._T_base_places(phi)
+        orders = [optics.unfolded_faces(places, pair, first) for first in (1, 2)]
+        return np.stack(orders, axis=1).reshape(-1, 2, 4, 4)
+
+    def _T_base_places(self, phi: Floats) -> Floats:
+        """(place, 4, 4) where the fixture stands at all places; `T_base_psd1` of each, at once."""
+        deviation = phi[N_FIXED:].reshape(-1, 6)
+        offset = np.broadcast_to(np.eye(4), (len(deviation), 4, 4)).copy()
+        offset[:, :3, :3] = Rotation.from_rotvec(deviation[:, 3:]).as_matrix()
+        offset[:, :3, 3] = deviation[:, :3]
+        return np.stack([self.fixture.T_base_psd1[k] for k in self.places]) @ offset
 
     def _by_mount(self, hit: Strike, T_base_flange: Floats) -> Floats:
         across = T_base_flange[:, :3, :3] @ np.stack([self.mount.u, self.mount.v], axis=-1)  # (pose, 3, 2)

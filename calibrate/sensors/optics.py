@@ -39,12 +39,15 @@ class Strike:
 
 
 def unfolded_faces(T_base_psd1: Floats, T_psd1_psd2: Floats, first_psd: int) -> Floats:
-    """(2, 4, 4) maps from the base to face 1 and face 2 as the beam sees them when it strikes `first_psd` first."""
+    """(..., 2, 4, 4) maps from the base to face 1 and face 2 as the beam sees them when it strikes `first_psd` first.
+
+    For one fixture pose (4, 4), or many (..., 4, 4).
+    """
     T_psd1_base, T_psd2_psd1 = inverse(T_base_psd1), inverse(T_psd1_psd2)
     if first_psd == 1:
-        return np.stack([T_psd1_base, T_psd2_psd1 @ MIRROR_Z @ T_psd1_base])
+        return np.stack([T_psd1_base, T_psd2_psd1 @ MIRROR_Z @ T_psd1_base], axis=-3)
     T_psd2_base = T_psd2_psd1 @ T_psd1_base
-    return np.stack([T_psd1_psd2 @ MIRROR_Z @ T_psd2_base, T_psd2_base])
+    return np.stack([T_psd1_psd2 @ MIRROR_Z @ T_psd2_base, T_psd2_base], axis=-3)
 
 
 def strike(beam: Beam, faces: Floats) -> Strike:
@@ -53,8 +56,8 @@ def strike(beam: Beam, faces: Floats) -> Strike:
     A beam parallel to a plane gives infinite values without a warning: the caller sees it in `facing` being 0.
     """
     linear = faces[..., :3, :3]
-    p = np.einsum("nfij,nj->nfi", linear, beam.origin_m) + faces[..., :3, 3]
-    d = np.einsum("nfij,nj->nfi", linear, beam.direction)
+    p = (linear @ beam.origin_m[:, None, :, None])[..., 0] + faces[..., :3, 3]
+    d = (linear @ beam.direction[:, None, :, None])[..., 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         travel = -p[..., 2] / d[..., 2]
         lean = d[..., :2] / d[..., 2:]  # spot shift per rise of the beam's origin off the face

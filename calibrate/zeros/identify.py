@@ -11,8 +11,7 @@ from importlib.metadata import version
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
-from scipy.stats import norm
-from scipy.stats import t as student_t
+from scipy.special import ndtr, stdtrit
 
 from calibrate import noise as noise_model
 from calibrate.chain import Chain
@@ -153,7 +152,7 @@ def _widening(weighted: Weighted) -> Floats:
     jacobian = problem.chain.jacobian(theta, problem.q_rad)[:, :, free]
     dof = noise_model.variance_doubt(problem.misfit(theta), jacobian, weighted.parts, information, weighted.factors)
     out = np.ones(len(theta))
-    out[free] = student_t.ppf(norm.cdf(3.0), np.maximum(dof, LEAST_DOF)) / 3.0
+    out[free] = stdtrit(np.maximum(dof, LEAST_DOF), ndtr(3.0)) / 3.0
     return out
 
 
@@ -162,18 +161,19 @@ def _estimates(weighted: Weighted) -> tuple[Estimate, ...]:
     usable = np.all(np.isfinite(fit.covariance))
     sigma = _widening(weighted) * np.sqrt(np.diag(fit.covariance)) if usable else np.full(len(fit.theta), np.nan)
     return tuple(
-        _estimate(p, float(fit.theta[i]), float(sigma[i]), fit, seen.reason(p.name))
+        estimate_of(p, float(fit.theta[i]), float(sigma[i]), fit, seen.reason(p.name))
         for i, p in enumerate(weighted.problem.chain.parameters)
     )
 
 
-def _estimate(p: Parameter, value: float, sigma: float, fit: Fit, unseen: str | None) -> Estimate:
+def estimate_of(p: Parameter, value: float, sigma: float, fit: Fit, unseen: str | None) -> Estimate:
+    """The value with its sigma, or why there is none; `unseen`: what the identifiability says of the parameter."""
     why = unseen
     if not p.free:
         why = "held at its nominal value"
     elif p.name in fit.at_bound:
         why = f"at its bound ({value:g} {p.unit}): no result"
-    elif fit.status in (Status.NOT_FINITE, Status.OUT_OF_STEPS) or not np.isfinite(sigma):
+    elif fit.status in (Status.NOT_FINITE, Status.OUT_OF_STEPS, Status.STALLED) or not np.isfinite(sigma):
         why = fit.status.value
     elif why is None and sigma > p.plausible * (1.0 + 1e-6) and not np.isfinite(p.prior):
         why = f"data too weak: sigma {sigma:.2g} {p.unit} is worse than a guess ({p.plausible:g} {p.unit})"

@@ -5,7 +5,7 @@ Source: Draper, Smith, Applied Regression Analysis, 3rd ed. 1998, ch. 2.1 (pure 
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import f as fisher_f
+from scipy.special import fdtrc
 
 from calibrate.zeros.result import Repeats
 
@@ -34,4 +34,4 @@ def repeat_scatter(
         return None
     rest = max(dof - free, 1)
     ratio = max(chi2 - scatter, 0.0) / rest / (scatter / free) if scatter > 0.0 else float("inf")
-    return Repeats(groups, free, scatter / free, ratio, float(fisher_f.sf(ratio, rest, free)))
+    return Repeats(groups, free, scatter / free, ratio, float(fdtrc(rest, free, ratio)))

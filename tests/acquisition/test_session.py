@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from acquisition.bench import Look
 from acquisition.errors import NoLightError
+from acquisition.navigator import GLANCE_S
 from acquisition.plan import PlanOptions, blocks
 from acquisition.sample import Sample
 from acquisition.session import Session, Summary
@@ -131,6 +133,19 @@ def test_a_fixture_taken_away_in_mid_session_is_light_lost_for_good(rig, bench_o
     with pytest.raises(NoLightError, match="check that the laser is on"):
         session.run(tuple(rig.placements))
     assert len(kept.samples) == 7
+
+
+def test_a_light_that_is_found_and_lost_at_once_ends_the_session_by_name(rig, bench_of) -> None:
+    class OnlyGlances(DirectBench):
+        """Light for the short looks of the search, none for the longer ones of the servo."""
+
+        def look(self, dwell_s: float) -> Look:
+            self.world.place_fixture(1 if dwell_s == GLANCE_S else 0)
+            return super().look(dwell_s)
+
+    bench = bench_of(2)
+    with pytest.raises(NoLightError, match="light was found, but the light was lost"):
+        run(rig, OnlyGlances(bench.world, bench.half_size_m))
 
 
 def test_a_fixture_bumped_in_mid_session_is_found_again(rig, bench_of) -> None:

@@ -117,6 +117,16 @@ def test_a_sink_that_cannot_write_stops_the_stream() -> None:
     pump.stop()
 
 
+def test_an_arm_that_does_not_take_the_stop_leaves_the_first_failure_the_news() -> None:
+    def gone() -> None:
+        raise DeviceLost("robot: the dashboard does not answer")
+
+    supervisor = Supervisor(gone)
+    supervisor.failed(DeviceStale("first"))
+    with pytest.raises(DeviceStale, match="first"):
+        supervisor.check()
+
+
 def test_the_supervisor_stops_the_arm_once_and_keeps_the_first_failure() -> None:
     stops = []
     supervisor = Supervisor(lambda: stops.append(1))

@@ -4,9 +4,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
+from acquisition.recording.read import read
 from calibeam.cli import run
+from calibeam.conclude import conclude
 from calibeam.emulation import Emulation
+from calibeam.outcome import PartialResult
+from calibeam.recorded import new_recording
+from drivers.clock import SystemClock
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
 
@@ -59,6 +65,76 @@ def test_a_wrong_unit_is_refused(rig_with, session_of) -> None:
     code, said = session_of(rig_with(("d_m = 0.1625", 'd_m = "9.3 deg"')))
     assert code == 1
     assert "d_m" in said
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "named"),
+    [
+        ("rate_hz = 1000.0", "rate_hz = 1500.5", "rate_hz 1500.5"),
+        ("half_size_m = 0.010", "half_size_m = -1.0", "half_size_m"),
+        ("home_rad =", "# home_rad =", "home_rad"),
+        ("[tolerance]\nlength_m = 3e-4\nangle_rad = 5e-4\n", "", "[tolerance]"),
+    ],
+)
+def test_values_that_no_session_can_use_are_refused_before_a_device_is_touched(
+    rig_with, session_of, old: str, new: str, named: str
+) -> None:
+    code, said = session_of(rig_with((old, new)))
+    assert code == 1
+    assert named in said
+
+
+def test_a_session_that_could_not_begin_leaves_the_name_of_its_recording_free(rig_with, session_of, tmp_path) -> None:
+    session_of(rig_with(("out/emulated/psd", "no/such/port")))
+    assert not (tmp_path / "out" / "recording.mcap").exists()
+
+
+def test_a_folder_that_cannot_be_made_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").touch()
+    assert run(["session", str(RIG), "--out", str(tmp_path / "file")]) == 1
+    assert str(tmp_path / "file") in " ".join(capsys.readouterr().err.split())
+
+
+def test_the_demo_does_not_take_away_the_recording_of_a_session(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "recording.mcap").write_bytes(b"an hour of work")
+    assert run(["demo", "--out", str(tmp_path)]) == 1
+    assert "choose another" in capsys.readouterr().err
+    assert (tmp_path / "recording.mcap").read_bytes() == b"an hour of work"
+
+
+@pytest.fixture
+def unfinished(tmp_path: Path) -> Path:
+    """A recording that is closed and holds no sample yet."""
+    path = tmp_path / "recording.mcap"
+    with new_recording(path, RIG.read_text(), SystemClock(), {}):
+        pass
+    return path
+
+
+def test_a_recording_that_cannot_be_identified_is_a_partial_result(unfinished: Path) -> None:
+    with pytest.raises(PartialResult, match=r"the recording is whole: .*recording\.mcap"):
+        conclude(unfinished, Console(quiet=True))
+
+
+def test_ctrl_c_while_identifying_says_that_the_recording_is_whole(
+    unfinished: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(recording: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("calibeam.conclude.identify_recording", interrupted)
+    with pytest.raises(PartialResult, match=r"^Ctrl-C; the recording is whole"):
+        conclude(unfinished, Console(quiet=True))
+    assert read(unfinished).complete
+
+
+def test_ctrl_c_while_connecting_leaves_a_readable_recording(tmp_path: Path) -> None:
+    path = tmp_path / "recording.mcap"
+    with pytest.raises(KeyboardInterrupt), new_recording(path, RIG.read_text(), SystemClock(), {}):
+        raise KeyboardInterrupt
+    assert not read(path).complete
 
 
 def test_a_missing_port_is_named(rig_with, session_of) -> None:

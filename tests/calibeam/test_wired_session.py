@@ -140,6 +140,13 @@ def test_ctrl_c_in_mid_session_leaves_a_readable_recording_and_a_standing_arm(ta
     assert len(takes.recording().samples) == 5
 
 
+def test_a_box_at_its_slowest_rate_serves_a_session(takes: Takes) -> None:
+    """At 100 Hz every frame holds one sample, and a glance few."""
+    psd = msgspec.structs.replace(takes.rig.devices.psd, rate_hz=100.0)
+    takes.rig = msgspec.structs.replace(takes.rig, devices=msgspec.structs.replace(takes.rig.devices, psd=psd))
+    assert len(takes.run().samples) == 12
+
+
 def test_a_full_disk_stops_the_arm_and_keeps_what_was_written(takes: Takes, full_after: Callable) -> None:
     with full_after(2_000_000), pytest.raises(PartialResult, match="disk"):
         takes.run()

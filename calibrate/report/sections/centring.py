@@ -21,7 +21,7 @@ def centring(evidence: Evidence) -> Html:
     traces = traces_of(evidence.recording.events)
     if not traces.runs:
         return section("centring", TITLE, "The recording holds no centring run.", *_unreadable(traces))
-    lead = "The servo loop moves the arm until all four spot coordinates are within the tolerance of where they are wanted."
+    lead = "The servo loop moves the arm until all four spot coordinates are within the tolerance of their target."
     groups = traces.by_tolerance()
     drawings = [_pictures(runs, wanted, evidence.places) for wanted, runs in list(groups.items())[:PICTURED]]
     return section(

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from math import degrees, hypot
 
 from calibrate.report.elements import Html, figure, panels, section, table, tag
-from calibrate.report.quantities import angle, decimals_of, fixed, length, significant
+from calibrate.report.quantities import decimals_of, fixed, length, significant
 from calibrate.report.rank_figures import spectrum
 from calibrate.report.reasons import plain_reason
 from calibrate.report.sections.zeros import rank_words
@@ -13,8 +13,8 @@ from calibrate.zeros.result import JointZero
 
 TITLE = "Four-pose point constraint"
 LEAD = (
-    "The method of Deng, Ding, Zhang (Food & Machinery 2019(3)): the laser lines of centred poses meet in one point of the "
-    "fixture; only joint zeros are unknown."
+    "The method of Deng, Ding, Zhang (Food & Machinery 2019(3)), for comparison: the laser lines of centred poses meet "
+    "in one point of the fixture; only joint zeros are unknown."
 )
 
 
@@ -27,8 +27,9 @@ def point(result: PointConstraintResult | None, full: Sequence[JointZero], why_n
     drawing = figure(spectrum(seen.singular_values, seen.rank, "point-spectrum", with_drawing=False), caption)
     words = tag("div", tag("h3", f"Rank {seen.rank} of {seen.n_free} zeros"), rank_words(seen))
     met = (
-        f"The lines miss their common point by {length(result.rms_before_m)} before and {length(result.rms_after_m)} after, "
-        f"rms. Fit: {result.status.value}."
+        f"The lines miss their common point by {length(result.rms_before_m)} rms before the fit. That almost nothing "
+        f"is left after it ({length(result.rms_after_m)}) proves nothing: four poses hardly have more equations than "
+        f"unknowns. Fit: {result.status.value}."
     )
     return section("point", TITLE, LEAD, panels(drawing, words), tag("p", met), _beside(result, full))
 
@@ -46,11 +47,11 @@ def _beside(result: PointConstraintResult, full: Sequence[JointZero]) -> Html:
             (
                 f"J{zero.joint}",
                 fixed(degrees(zero.value_rad), digits),
-                angle(zero.sigma_rad),
+                fixed(degrees(zero.sigma_rad), digits),
                 *_difference(zero, others.get(zero.joint)),
             )
         )
-    head = ("Joint", "zero (°)", "sigma", "full model (°)", "difference", "in sigma of both")
+    head = ("Joint", "zero (°)", "± sigma (°)", "full model (°)", "difference (°)", "in sigma of both")
     return table(head, rows, numeric=(1, 2, 3, 4, 5))
 
 
@@ -61,4 +62,8 @@ def _difference(zero: JointZero, other: JointZero | None) -> tuple[str, ...]:
     apart = value - other.value_rad
     both = hypot(sigma, other.sigma_rad)
     in_sigma = significant(abs(apart) / both, 2) if both > 0.0 else ""
-    return (fixed(degrees(other.value_rad), decimals_of(degrees(other.sigma_rad))), angle(apart), in_sigma)
+    return (
+        fixed(degrees(other.value_rad), decimals_of(degrees(other.sigma_rad))),
+        fixed(degrees(apart), decimals_of(degrees(both))),
+        in_sigma,
+    )

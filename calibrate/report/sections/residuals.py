@@ -19,7 +19,10 @@ TITLE = "Residuals and noise"
 def residuals(evidence: Evidence) -> Html:
     """Before and after, by place, against noise; repeats and unseen poses."""
     result, expected = evidence.result, evidence.expected
-    lead = "Expected minus observed spot. Before: arm as drawn, fixture and laser where they fit best. After: everything fitted."
+    lead = (
+        "Expected minus observed spot. Before: arm as drawn, fixture and laser where they fit best. "
+        "After: everything fitted."
+    )
     if expected is None:
         return section("residuals", TITLE, lead, tag("p", f"There is no finite fit to judge: {result.status.value}."))
     return section(
@@ -43,12 +46,12 @@ def _courses(evidence: Evidence, expected: Expected) -> Html:
     return panels(
         figure(
             before,
-            f"Before the fit, {length(result.rms_before_m)} rms: on its own scale, without the noise, which would be a hairline here.",
+            f"Before the fit, {length(result.rms_before_m)} rms: on its own scale; the noise would be a hairline here.",
         ),
         figure(
             after,
-            f"After the fit, {length(result.rms_after_m)} rms. The grey band is two sigma of the noise, pose by pose; 95 % "
-            "of the points should lie in it, without a pattern. Circles: PSD 1 struck first; triangles: PSD 2.",
+            f"After the fit, {length(result.rms_after_m)} rms. The grey band is two sigma of the noise, pose by pose; "
+            "95 % of the points should lie in it, without a pattern. Circles: PSD 1 struck first; triangles: PSD 2.",
         ),
     )
 
@@ -112,7 +115,7 @@ def _ratio(found: float, believed: float) -> str:
 
 def _proofs(result: ZeroResult, expected: Expected) -> Html:
     n, repeats, unseen = result.noise, result.repeats, result.held_out
-    rows = [
+    rows: list[tuple[str, ...]] = [
         (
             "Noise floor",
             length(expected.floor_m),
@@ -121,7 +124,7 @@ def _proofs(result: ZeroResult, expected: Expected) -> Html:
         (
             "chi²/dof, believed noise",
             fixed(n.chi2_per_dof_believed, 3),
-            "far from 1: noise or model is not as believed",
+            "near 1 where noise and model are as believed",
         ),
         ("chi²/dof, noise found", fixed(n.chi2_per_dof, 3), "near 1 by construction"),
     ]

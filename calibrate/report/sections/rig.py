@@ -30,19 +30,19 @@ def _drawings(evidence: Evidence) -> list[Html]:
         panels(
             figure(
                 oblique(drawn),
-                f"The arm at its best centred pose at place {first}, its joints numbered; at the other places in colour. "
+                f"The arm at its best centred pose at place {first}, its joints numbered; other places in colour. "
                 "The laser beam is drawn through to the second face. Tiles of the floor are 0.2 m.",
             ),
             figure(
                 from_above(drawn),
-                "The same from above. The circles only mark where the fixture stands; the bars in them are its two faces.",
+                "The same from above. Circles only mark where the fixture stands; the bars in them are its two faces.",
             ),
         ),
         panels(
             figure(
                 reflection(fitted, evidence.data, first),
-                f"The fixture at place {first}, both faces seen on edge. The beam strikes one face, which reflects it onto "
-                "the other; the arrows are the best centred pose of each order, the thin lines the other poses.",
+                f"The fixture at place {first}, both faces seen on edge. The beam strikes one face, which reflects it "
+                "onto the other; the arrows are the best centred pose of each order, the thin lines the other poses.",
             ),
             _poses(evidence),
         ),

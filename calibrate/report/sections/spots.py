@@ -16,7 +16,9 @@ def spots(evidence: Evidence) -> Html:
     if fixture is None:
         return section("spots", TITLE, "The rig has no fixture.")
     half_m, data = fixture.half_size_m, evidence.data
-    lead = "Every settled sample. Circles: the face was struck directly; triangles: by the light that the other face reflects."
+    lead = (
+        "Every settled sample. Circles: the face was struck directly; triangles: by light that the other face reflects."
+    )
     figures = [
         figure(face(data, psd, half_m, evidence.places), _reach(data.spots_m[:, 2 * psd - 2 : 2 * psd], half_m))
         for psd in (1, 2)

@@ -6,8 +6,8 @@ from math import degrees, radians
 from calibrate.report.elements import Html, bullets, figure, panels, table, tag
 from calibrate.report.evidence import Evidence
 from calibrate.report.quantities import aligned, angle, decimals_of, fixed, length, significant
-from calibrate.report.summary_figures import doubts, explained
 from calibrate.report.reasons import plain_reason
+from calibrate.report.summary_figures import doubts, explained
 from calibrate.report.verdict import limited_by_measurement, verdict
 from calibrate.zeros.result import JointZero
 
@@ -52,7 +52,7 @@ def _limits(evidence: Evidence) -> list[Html]:
     loose = [z for z in zeros if z.value_rad is not None and not limited_by_measurement(z)]
     if loose:
         worst = max(z.sigma_rad or 0.0 for z in loose)
-        text = f"{_names(loose)}: known to {angle(worst)} only, which is the tolerance of the drawing, not the measurement."
+        text = f"{_names(loose)}: known to {angle(worst)} only, the tolerance of the drawing, not of the measurement."
         said.append(tag("p", text))
     open_ = [z for z in zeros if z.value_rad is None]
     said += [tag("p", f"J{z.joint}: not determined; {_reason(z, evidence)}.") for z in open_]
@@ -97,8 +97,8 @@ def _explained(evidence: Evidence) -> list[Html]:
     sizes = [("before the fit", result.rms_before_m), ("after the fit", result.rms_after_m)]
     sizes += [] if unseen is None else [("unseen poses", unseen.rms_after_m)]
     caption = (
-        "How far the spots are from where the model expects them. The dashed line is the noise floor: no model of the arm "
-        "can get below it on poses that it has not seen."
+        "How far the spots are from where the model expects them. The dashed line is the noise floor: no model of the "
+        "arm can get below it on poses that it has not seen."
     )
     return [figure(explained(sizes, expected.floor_m), caption)]
 

@@ -8,7 +8,7 @@ from acquisition.recording.check import check
 from acquisition.recording.recording import Recording
 from calibrate.report.elements import Html, bullets, section, table, tag
 from calibrate.report.evidence import Evidence
-from calibrate.report.quantities import angle, fixed, length, significant
+from calibrate.report.quantities import fixed, significant
 from calibrate.report.reasons import plain_reason
 from calibrate.report.verdict import limited_by_measurement
 
@@ -45,7 +45,7 @@ def _limits(evidence: Evidence) -> Iterator[str]:
             reason = plain_reason(f"joint{z.joint}.zero", result.identifiability, z.why)
             yield f"Zero of joint {z.joint}: {reason}."
         elif not limited_by_measurement(z):
-            yield f"Zero of joint {z.joint}: more poses will not better it; a tighter drawing or another instrument would."
+            yield f"Zero of joint {z.joint}: more poses will not better it; a tighter drawing would."
     if len(evidence.places) < 2:
         yield "One fixture place only: errors that are the same over the whole workspace stay hidden."
     if rig.tolerance is None:
@@ -55,14 +55,14 @@ def _limits(evidence: Evidence) -> Iterator[str]:
     }
     if "gain" in held:
         yield (
-            "Scale: the detectors' scale is taken as exact, and with it the size of the arm. A measured distance between two "
-            "places would check it."
+            "Scale: the detectors' scale is taken as exact, and with it the size of the arm. A measured distance "
+            "between two places would check it."
         )
     if held - {"gain"}:
         yield "The fixture itself: how PSD 2 sits to PSD 1 is taken from the drawing as exact."
     temperatures = [np.ptp(values) for _, values in _temperatures(evidence.recording)]
     if not temperatures or max(temperatures) < 1.0:
-        yield "Warming: temperatures were not recorded or changed by less than 1 °C, so these zeros hold at this temperature."
+        yield "Warming: temperatures were not recorded or changed by less than 1 °C; they hold at this one only."
     if "repeat" not in evidence.recording.samples:
         yield "Missing physics: no pose was repeated, so noise and model error cannot be told apart."
 
@@ -113,7 +113,11 @@ def _streams(recording: Recording) -> list[Html]:
         channels = ", ".join(c.name for c in stream.channels)
         rows.append((stream.name, str(len(stream.host_s)), rate, str(len(stream.gaps)), str(lost), channels))
     head = ("Stream", "samples", "per second", "gaps", "lost", "channels")
-    return [table(head, rows, numeric=(1, 2, 3, 4), caption="Raw streams")]
+    note = (
+        "Per second of the recording computer's clock: emulated devices may run faster than real time. A lost sample "
+        "of the encoders is a SYNC that this computer sent too late; the settled samples average over those that came."
+    )
+    return [table(head, rows, numeric=(1, 2, 3, 4), caption="Raw streams"), tag("p", note)]
 
 
 def _findings(recording: Recording) -> Html:

@@ -53,7 +53,8 @@ def rank_words(seen: Identifiability) -> Html:
         )
     ]
     if 0 < rank < len(s):
-        gap = f"The smallest seen is {significant(float(s[rank - 1]))}, the largest unseen {significant(float(s[rank]), 2)}; the limit is {WEAK:g}."
+        seen_last, unseen_first = significant(float(s[rank - 1])), significant(float(s[rank]), 2)
+        gap = f"The smallest seen is {seen_last}, the largest unseen {unseen_first}; the limit is {WEAK:g}."
         said.append(tag("p", gap))
     if not seen.combinations:
         return join(*said, tag("p", "Every parameter can be told from every other."))
@@ -104,12 +105,13 @@ def _reading(evidence: Evidence) -> str:
     tolerance = evidence.recording.rig.tolerance
     if tolerance is None:
         return (
-            "The rig file states no tolerance of the links, so they were taken as exact. If they are not, the zeros are "
-            "off by more than sigma says; add [tolerance] to the rig file."
+            "The rig file states no tolerance of the links, so they were taken as exact. If they are not, the zeros "
+            "are off by more than sigma says; add [tolerance] to the rig file."
         )
     return (
-        f"Sigma holds what the links may be off the drawing ({tolerance.length_m * 1e3:g} mm, {angle(tolerance.angle_rad)}) "
-        "as far as the data do not tell. The last column is what would remain if the links were exactly as now fitted."
+        f"Sigma holds what the links may be off the drawing ({tolerance.length_m * 1e3:g} mm, "
+        f"{angle(tolerance.angle_rad)}) as far as the data do not tell. The last column is what would remain "
+        "if the links were exactly as now fitted."
     )
 
 

@@ -1,5 +1,6 @@
 """Centring: the laws of the loop, and every strategy from a wrong guess of the fixture pose."""
 
+import dataclasses
 from collections.abc import Callable
 
 import numpy as np
@@ -76,6 +77,19 @@ def test_a_step_that_loses_the_light_is_halved_until_it_is_back() -> None:
     purposes = [step.purpose for step in run.trace]
     assert purposes[:4] == ["start", "correct", "go back", "go back"]
     assert np.isfinite(strategy.learned).all()  # a dark reading teaches nothing
+
+
+def test_a_light_that_does_not_come_back_is_said_and_the_last_look_is_dark() -> None:
+    class Blown(Plane):
+        def look(self, dwell_s: float) -> Look:
+            look = super().look(dwell_s)
+            dark = Spot(np.nan, np.nan, 0.0, np.nan, np.nan, lit=False)
+            return dataclasses.replace(look, psd1=dark) if self.moves else look
+
+    start = 0.05 * ONE
+    run = centre(Blown(start), Wide(), Stubborn(0.01 * ONE), start, np.zeros(4))
+    assert run.status is Status.SPOT_LOST
+    assert not run.look.psd1.lit
 
 
 def test_the_largest_joint_step_is_the_limit() -> None:

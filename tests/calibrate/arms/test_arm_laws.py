@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording.rig_schema import Arm, ArmModel, Joint, Pose, Rig, Tolerance
+from calibrate.arms.belief import FREE, HELD_AS_DRAWN, LinkBelief
 from calibrate.arms.catalogue import ARMS, arm_of
-from calibrate.errors import DataError
 
 STEP = 1e-6
 UR5E = [(0.1625, 0, np.pi / 2), (0, -0.425, 0), (0, -0.3922, 0), (0.1333, 0, np.pi / 2), (0.0997, 0, -np.pi / 2)]
@@ -18,8 +18,20 @@ def joint(d, a, alpha, offset=0.0):
 
 
 def rig_of(model, flange=Pose()):  # noqa: B008 - frozen record
-    joints = (*(joint(*row) for row in UR5E), joint(0.0996, 0, 0.2, 0.7))
+    rows = [(*row, 0.0) for row in UR5E] + [(0.0996, 0, 0.2, 0.7)]
+    if model is ArmModel.MDH:  # twist and length stand one row later
+        before = [(0.0, 0.0), *((a, alpha) for _, a, alpha, _ in rows)]
+        rows = [(d, *link, offset) for (d, _, _, offset), link in zip(rows, before, strict=False)]
+    joints = poe_joints(rows) if model is ArmModel.LOCAL_POE else tuple(joint(*row) for row in rows)
     return Rig(1, "law", Arm(model, joints, flange=flange), tolerance=Tolerance(3e-4, 5e-4))
+
+
+def poe_joints(rows):
+    """Fixed parts with nothing on an axis: shifts and turns by the rows' numbers, in all three directions."""
+    return tuple(
+        Joint(-3.0, 3.0, origin_m=(a, 0.1 * i, d), rotation_rad=(alpha, offset, -0.3))
+        for i, (d, a, alpha, offset) in enumerate(rows)
+    )
 
 
 def twist_between(T_from, T_to):
@@ -78,7 +90,41 @@ def test_without_tolerance_the_links_are_held_and_zeros_stay_free():
     assert {p.name for p in arm.parameters if p.free} == {f"joint{i}.zero" for i in range(1, 7)}
 
 
-def test_an_arm_model_without_a_fit_is_refused_by_name():
-    unknown = next(m for m in ArmModel if m not in ARMS)
-    with pytest.raises(DataError, match=f"'{unknown.value}' cannot be identified; known: dh"):
-        arm_of(rig_of(unknown))
+@pytest.mark.parametrize("model", list(ARMS))
+def test_a_free_belief_frees_the_links_without_opinion_and_held_frees_the_zeros_only(model):
+    free, held = arm_of(rig_of(model), FREE), arm_of(rig_of(model), HELD_AS_DRAWN)
+    assert {p.name for p in held.parameters if p.free} == {f"joint{i}.zero" for i in range(1, 7)}
+    assert all(p.prior == np.inf for p in free.parameters)
+    assert sum(p.free for p in free.parameters) > 25
+
+
+@pytest.mark.parametrize("model", list(ARMS))
+def test_what_is_held_in_a_free_arm_is_another_name_of_a_zero(model):
+    arm = arm_of(rig_of(model), FREE)
+    q = np.random.default_rng(5).uniform(-3, 3, (9, 6))
+    twists = arm.twists(np.zeros(len(arm.parameters)), q).reshape(54, -1)
+    free = [k for k, p in enumerate(arm.parameters) if p.free]
+    assert len(free) < len(arm.parameters)
+    assert np.linalg.matrix_rank(twists[:, free]) == np.linalg.matrix_rank(twists)
+
+
+def test_local_poe_sees_four_numbers_an_axis_and_six_of_the_flange():
+    """Schroeer's count for turning joints and a measured pose: 4 R + 6."""
+    arm = arm_of(rig_of(ArmModel.LOCAL_POE), FREE)
+    q = np.random.default_rng(5).uniform(-3, 3, (9, 6))
+    assert len(arm.parameters) == 6 * 7 + 6
+    assert np.linalg.matrix_rank(arm.twists(np.zeros(48), q).reshape(54, -1)) == 30
+
+
+@pytest.mark.parametrize("model", list(ARMS))
+def test_a_drawing_tolerance_is_the_prior_of_lengths_and_angles_but_not_of_zeros(model):
+    arm = arm_of(rig_of(model), LinkBelief(1e-4, 2e-4))
+    by_unit = {"m": 1e-4, "rad": 2e-4}
+    for p in arm.parameters:
+        if p.free:
+            assert p.prior == (np.inf if p.name.endswith("zero") else by_unit[p.unit]), p.name
+
+
+def test_a_negative_tolerance_is_refused():
+    with pytest.raises(ValueError, match="a sigma is not negative"):
+        LinkBelief(-1e-4, 1e-4)

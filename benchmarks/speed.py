@@ -1,0 +1,250 @@
+"""Speed on one core, in one run beside Pinocchio, scipy and plain numpy: CPU-time medians, ratios, aims.
+
+Every rival is first checked to give the same numbers. Aims are of issue 3, for one core of the kind of machine that is
+described in docs/decisions/0005; a busy machine shows larger figures, so look at the ratios too.
+"""
+
+import subprocess
+import sys
+import time
+import tracemalloc
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from unittest.mock import patch
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from acquisition.recording.rig import load_rig
+from acquisition.recording.rig_schema import Placement, Pose, Rig
+from benchmarks import rival_pinocchio
+from benchmarks.drawn_sessions import T_BASE_DEVICE, TARGET_M, Bench, frame
+from calibrate.arms.catalogue import arm_of
+from calibrate.arms.serial import SerialArm
+from calibrate.chain import Chain
+from calibrate.dual_psd_rig import believed_noise, dual_psd_chain
+from calibrate.fit import NEAR_START, solve
+from calibrate.kernels import ready, serial
+from calibrate.kernels.__main__ import main as compile_loops
+from calibrate.kernels.position_fit import identify_positions
+from calibrate.observations import Observations
+from calibrate.parameters import hold, plausible_sizes
+from calibrate.problem import Problem
+from calibrate.rigid import cross_matrix
+from calibrate.sensors.device import Device
+from calibrate.sensors.position import Position
+from calibrate.sensors.target import Target
+from calibrate.zeros.identify import fit_weighted, identify
+
+Floats = NDArray[np.float64]
+
+SIGMA_M = 20e-6
+JOINT_SIGMA_RAD = 3e-6
+UNITS = {"ns a pose": 1e9, "ms": 1e3, "s": 1.0}
+IMPORTS = "calibrate, calibrate.arms.catalogue, calibrate.zeros.identify, calibrate.kernels.position_fit"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table; times in `unit`."""
+
+    what: str
+    unit: str
+    ours: float
+    aim: float | None
+    others: Mapping[str, float] = field(default_factory=dict)
+
+    def text(self) -> str:
+        rivals = ", ".join(f"{name} {_short(t)} ({t / self.ours:.1f}x)" for name, t in self.others.items()) or "-"
+        verdict = "" if self.aim is None else "reached" if self.ours <= self.aim else "NOT reached"
+        aim = "-" if self.aim is None else f"<= {_short(self.aim)}"
+        return f"{self.what:58s} {_short(self.ours):>8s} {self.unit:10s} {aim:>9s} {verdict:12s} {rivals}"
+
+
+def lines(rig_file: Path) -> Iterator[str]:
+    """The table, line by line as it is measured."""
+    compile_loops()
+    ready.available.cache_clear()
+    rig = load_rig(rig_file)
+    arm = arm_of(rig)
+    yield f"{'what':58s} {'ours':>8s} {'':10s} {'aim':>9s} {'':12s} others (times ours)"
+    for rows in (_poses(arm), _tracker(rig_file, arm), _growth(rig_file, arm), _dual_psd(rig_file, rig), _starting()):
+        for row in rows:
+            yield row.text()
+
+
+def _short(value: float) -> str:
+    return f"{value:.3g}" if value < 1000.0 else f"{value:.0f}"
+
+
+def cpu_s(work: Callable[[], object], samples: int = 31, warm_up: int = 3) -> float:
+    """Median CPU time of one call."""
+    for _ in range(warm_up):
+        work()
+    times: list[float] = []
+    for _ in range(samples):
+        begun = time.process_time()
+        work()
+        times.append(time.process_time() - begun)
+    return float(np.median(times))
+
+
+def _poses(arm: SerialArm) -> Iterator[Row]:
+    rng = np.random.default_rng(0)
+    theta = rng.normal(0, 1e-3, len(arm.parameters))
+    everything = serial.ArmConstants.of(arm, theta)
+    four_a_link = everything.of_columns(np.flatnonzero(np.arange(len(theta)) % 5 != 4))
+    few = rng.uniform(-2.5, 2.5, (1_000, arm.n_joints))
+    flange_rivals, jacobian_rivals = _pose_rivals(arm, theta, everything, four_a_link, few)
+    for poses, flange_aim, jacobian_aim in ((1_000, 25.0, 80.0), (100_000, None, None)):
+        q = rng.uniform(-2.5, 2.5, (poses, arm.n_joints))
+        each = 1e9 / poses
+        ours = each * cpu_s(lambda q=q: serial.flange(everything, q))
+        yield Row(f"forward kinematics, {poses} poses", "ns a pose", ours, flange_aim, flange_rivals)
+        ours = each * cpu_s(lambda q=q: serial.point_and_jacobian(four_a_link, TARGET_M, q))
+        yield Row(f"point, Jacobian by 24 parameters, {poses} poses", "ns a pose", ours, jacobian_aim, jacobian_rivals)
+
+
+def _pose_rivals(
+    arm: SerialArm, theta: Floats, everything: serial.ArmConstants, four_a_link: serial.ArmConstants, q_rad: Floats
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Times (ns a pose) of the others for flange and Jacobian at these poses, after a look that all say the same."""
+    rival, each = rival_pinocchio.Rival(everything), 1e9 / len(q_rad)
+    np.testing.assert_allclose(serial.flange(everything, q_rad), rival.flanges(q_rad), atol=1e-12)
+    point, jacobian = serial.point_and_jacobian(four_a_link, TARGET_M, q_rad)
+    np.testing.assert_allclose(point, rival.points(TARGET_M, q_rad), atol=1e-12)
+    np.testing.assert_allclose(jacobian, _numpy_jacobian(arm, theta, q_rad)[:, :, np.arange(30) % 5 != 4], atol=1e-12)
+    flanges = {
+        "numpy": each * cpu_s(lambda: arm.frames(theta, q_rad)[:, -1]),
+        "Pinocchio": each * cpu_s(lambda: rival.flanges(q_rad), 5),
+    }
+    jacobians = {
+        "numpy, 30 parameters": each * cpu_s(lambda: _numpy_jacobian(arm, theta, q_rad), 9),
+        "Pinocchio, its 6x36 regressor": each * cpu_s(lambda: rival.regressors(TARGET_M, q_rad), 5),
+    }
+    return flanges, jacobians
+
+
+def _numpy_jacobian(arm: SerialArm, theta: Floats, q_rad: Floats) -> Floats:
+    with patch.object(ready, "worth", return_value=False):
+        T, twists = arm.flange(theta, q_rad), arm.twists(theta, q_rad)
+    point = T[:, :3, :3] @ TARGET_M + T[:, :3, 3]
+    return twists[:, :3] - cross_matrix(point) @ twists[:, 3:]
+
+
+def tracker_problem(rig_file: Path, arm: SerialArm, poses: int) -> Problem:
+    """30 unknowns without any belief: 21 of links 2 to 6, tool 3, device 6; 20 um an axis."""
+    session = Bench(rig_file).tracker(np.random.default_rng(1), poses)
+    chain = Chain(arm, Position(Target(TARGET_M), Device(frame(*T_BASE_DEVICE))))
+    loose = tuple(replace(p, prior=np.inf, free=True) for p in chain.parameters)
+    held = {p.name for p in loose if p.name.startswith(("joint1.", "link1."))}
+    held |= {p.name for p in loose if p.name.endswith(".tilt") and p.name != "link2.tilt"}
+    weights = np.tile(np.eye(3) / SIGMA_M, (poses, 1, 1))
+    return Problem(chain, hold(loose, held), session.q_rad, session.observed, weights)
+
+
+def _tracker(rig_file: Path, arm: SerialArm) -> Iterator[Row]:
+    problem = tracker_problem(rig_file, arm, 1_000)
+    ours = identify_positions(problem)
+    reduced = problem.with_parameters(ours.fit.parameters)
+    rivals = {f"scipy {m}, rank known": (lambda m=m: _by_scipy(reduced, m)) for m in ("lm", "dogbox", "trf")}
+    with patch.object(ready, "worth", return_value=False):
+        others = {"calibrate.fit, numpy, rank known": cpu_s(lambda: solve(reduced, damping=NEAR_START), 5, 1)}
+        for name, rival in rivals.items():
+            np.testing.assert_allclose(rival(), ours.fit.chi2, rtol=1e-6)
+            others[name] = cpu_s(rival, 5, 0)
+    what = f"identification, 1000 tracker poses, 30 unknowns (rank {ours.seen.rank if ours.seen else 0})"
+    in_ms = {name: 1e3 * t for name, t in others.items()}
+    yield Row(what, "ms", 1e3 * cpu_s(lambda: identify_positions(problem), 51), 2.0, in_ms)
+
+
+def _by_scipy(problem: Problem, method: str) -> float:
+    """Chi-square at scipy's end, from the same rows in the same scaled columns."""
+    free = np.flatnonzero([p.free for p in problem.parameters])
+    scale, theta = plausible_sizes(problem.parameters)[free], np.zeros(len(problem.parameters))
+
+    def at(x: Floats) -> Floats:
+        out = theta.copy()
+        out[free] = x * scale
+        return out
+
+    found = least_squares(
+        lambda x: problem.residual(at(x)),
+        np.zeros(len(free)),
+        lambda x: problem.jacobian(at(x))[:, free] * scale,
+        method=method,
+    )
+    return 2.0 * float(found.cost)
+
+
+def _growth(rig_file: Path, arm: SerialArm) -> Iterator[Row]:
+    whole = tracker_problem(rig_file, arm, 1_000_000)
+    for poses in (10_000, 100_000, 1_000_000):
+        problem = whole.select(np.arange(poses))
+        tracemalloc.start()
+        identify_positions(problem)
+        held_mb = tracemalloc.get_traced_memory()[1] / 1e6
+        tracemalloc.stop()
+        each = 1e9 * cpu_s(lambda problem=problem: identify_positions(problem), 3, 0) / poses
+        yield Row(f"identification, {poses} tracker poses, {held_mb:.0f} MB held", "ns a pose", each, None)
+
+
+def six_places(rig_file: Path, rig: Rig) -> tuple[Rig, Observations]:
+    """300 samples, 150 poses twice, over six places: the rig's three, and each of them moved by some centimetres."""
+    rng, bench = np.random.default_rng(2), Bench(rig_file, tuple(rig.placements))
+    bench.places |= {k + 3: frame(rng.normal(0, 0.03, 3), [0, 0, 0]) @ T for k, T in bench.places.items()}
+    one = bench.dual_psd(rng, 150)
+    extra = tuple(
+        Placement(id=k, psd1_in_base=Pose(tuple(T[:3, 3].tolist()), rig.placements[k - 3].psd1_in_base.rotation_rad))
+        for k, T in bench.places.items()
+        if k > 3
+    )
+    spots = np.concatenate([one.observed, one.observed + rng.normal(0, 2e-6, one.observed.shape)])
+    q, first, place = (np.concatenate([a, a]) for a in (one.q_rad, one.first_psd, one.placement))
+    q = q + rng.normal(0, JOINT_SIGMA_RAD, q.shape)
+    return msgspec.structs.replace(rig, placement_list=rig.placement_list + extra), Observations(q, first, place, spots)
+
+
+def _dual_psd(rig_file: Path, rig: Rig) -> Iterator[Row]:
+    rig, data = six_places(rig_file, rig)
+    chain, believed = dual_psd_chain(rig, data.placement, data.first_psd), believed_noise(rig)
+    kinds: dict[str, tuple[float | None, Callable[[], object]]] = {
+        "fit, rank and noise, 300 dual-PSD samples, 6 places": (20.0, lambda: fit_weighted(chain, data, believed)),
+        "the same with what was before and held-out proof": (
+            None,
+            lambda: identify(chain, data, believed, rng=np.random.default_rng(0)),
+        ),
+    }
+    for what, (aim, work) in kinds.items():
+        with patch.object(ready, "worth", return_value=False):
+            numpy_arms = {"with numpy arms": 1e3 * cpu_s(work, 7, 1)}
+        yield Row(what, "ms", 1e3 * cpu_s(work, 7, 1), aim, numpy_arms)
+
+
+def _starting() -> Iterator[Row]:
+    """In fresh interpreters; CPU time too, which is what a person waits for on a machine with nothing else to do."""
+    code = f"import time; t = time.process_time(); import {IMPORTS}; print(time.process_time() - t)"
+    yield Row(
+        "import of calibrate with arms and identification",
+        "s",
+        _fresh(code),
+        0.5,
+        {"numpy alone": _fresh("import time; t = time.process_time(); import numpy; print(time.process_time() - t)")},
+    )
+    code = (
+        "import time, numpy as np; from calibrate.kernels import serial; "
+        "arm = serial.ArmConstants(np.tile(np.eye(4), (7, 1, 1)), np.zeros(6), np.zeros(1, int), np.zeros((1, 6))); "
+        "t = time.process_time(); serial.flange(arm, np.zeros((1000, 6))); "
+        "serial.point_and_jacobian(arm, np.zeros(3), np.zeros((1000, 6))); print(time.process_time() - t)"
+    )
+    yield Row("first call of the compiled loops, from the cache", "s", _fresh(code), 1.0)
+
+
+def _fresh(code: str, times: int = 5) -> float:
+    runs = (
+        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True) for _ in range(times)
+    )
+    return float(np.median([float(run.stdout) for run in runs]))

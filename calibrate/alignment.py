@@ -1,0 +1,132 @@
+"""Start values in closed form: frames by Kabsch's rotation, a tool point by linear equations, a drum by trilateration.
+
+No iteration from a guess: any place of the device is found. Sources: Kabsch, Acta Cryst. A32, 1976; Horn, J. Opt. Soc.
+Am. A 4(4), 1987 (scipy's Rotation.align_vectors); trilateration by differences of squared lengths is linear algebra.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from calibrate.errors import DataError
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+FLAT = 1e-6  # of the largest extent of a set of points: below it lies on a line (or in a plane), rounding aside
+ROUNDS = 10  # of leaving out shots far off; two or three are enough where most of the shots are good
+FAR = 5.0  # medians of the residual: one good shot of 1e4 lies farther off (Maxwell law), so few good ones are lost
+CLEARLY = 0.5  # of the other rms: a flat set of points with noise prefers one hand by a hair only
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """A rigid motion from points seen in b to the same points in a, and what speaks against it."""
+
+    T_a_b: Floats  # (4, 4)
+    rms_m: float  # of the distances, of the points used
+    mirrored_rms_m: float  # the same if one axis of b were reversed; far below `rms_m`: b is left-handed
+    determinant: float  # +1 or -1: the best orthogonal map is a rotation or a mirror; 0: points in a plane cannot tell
+    used: Bools  # (point,) False: so far off that it was left out of the start
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether b looks left-handed."""
+        return self.determinant < 0.0 and self.mirrored_rms_m < CLEARLY * self.rms_m
+
+
+def align(points_a_m: Floats, points_b_m: Floats) -> Alignment:
+    """The motion with the least sum of squares, shots far off left out. Both (point, 3).
+
+    DataError for fewer than 3 points, or points on a line, which leave a turn about it open.
+    """
+    used = np.ones(len(points_a_m), dtype=bool)
+    for _ in range(ROUNDS):
+        T_a_b = _kabsch(points_a_m[used], points_b_m[used])
+        off_m = np.linalg.norm(points_b_m @ T_a_b[:3, :3].T + T_a_b[:3, 3] - points_a_m, axis=1)
+        near = off_m <= FAR * np.median(off_m) + np.finfo(float).eps * np.abs(points_a_m).max()
+        if np.array_equal(near, used):
+            break
+        used = near
+    return _judged(points_a_m[used], points_b_m[used], used)
+
+
+def align_with_tool(T_base_flange: Floats, points_device_m: Floats) -> tuple[Alignment, Floats]:
+    """Device frame in the base and target in the flange (3,), neither known, from flange poses (pose, 4, 4).
+
+    R t + p = A y + o is linear in t, A, o; A is then brought to a rotation and t, o are found again. Where all flange
+    orientations are alike, t and o cannot be told apart and the smallest t is taken. DataError for fewer than 5 poses.
+    """
+    n = len(points_device_m)
+    if n < 5:
+        raise DataError(f"tool point and device frame: {n} positions, 15 unknowns need at least 5; give tool.point_m")
+    R, p = T_base_flange[:, :3, :3], T_base_flange[:, :3, 3]
+    unit = np.broadcast_to(np.eye(3), (n, 3, 3))
+    affine = np.einsum("ij,nk->nijk", np.eye(3), points_device_m).reshape(n, 3, 9)
+    rows = np.concatenate([-R, affine, unit], axis=2).reshape(-1, 15)
+    found = np.linalg.lstsq(rows, p.ravel(), rcond=1e-9)[0]
+    U, _, Vt = np.linalg.svd(found[3:12].reshape(3, 3))
+    turn = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+    rows = np.concatenate([-R, unit], axis=2).reshape(-1, 6)
+    both = np.linalg.lstsq(rows, (p - points_device_m @ turn.T).ravel(), rcond=1e-9)[0]
+    tool_m = np.asarray(both[:3], dtype=np.float64)
+    return align(R @ tool_m + p, points_device_m), tool_m
+
+
+def pivot(T_base_flange: Floats, seat: NDArray[np.int64]) -> tuple[Floats, dict[int, Floats]]:
+    """Probe tip in the flange (3,) and seats in the base from flange poses (pose, 4, 4): R t + p = s, linear in t, s.
+
+    DataError where the orientations are too alike to tell tip and seats apart.
+    """
+    seats = sorted(set(seat.tolist()))
+    n = len(seat)
+    at = np.zeros((n, 3, len(seats), 3))
+    for axis in range(3):
+        at[range(n), axis, np.searchsorted(seats, seat), axis] = -1.0
+    rows = np.concatenate([T_base_flange[:, :3, :3], at.reshape(n, 3, -1)], axis=2).reshape(3 * n, -1)
+    solution, _, rank, _ = np.linalg.lstsq(rows, -T_base_flange[:, :3, 3].ravel(), rcond=1e-6)
+    found = np.asarray(solution, dtype=np.float64)
+    if rank < rows.shape[1]:
+        raise DataError("seats: the probe leans the same way in all rows; its tip is not told: give tool.point_m")
+    return found[:3], {k: found[3 + 3 * i : 6 + 3 * i] for i, k in enumerate(seats)}
+
+
+def trilaterate(points_m: Floats, lengths_m: Floats) -> Floats:
+    """(3,) the point at these distances (point,) from points (point, 3): |p - o|^2 = l^2 less its mean is linear in o.
+
+    DataError for fewer than 4 points, or points in a plane, which leave two answers.
+    """
+    p = points_m - points_m.mean(axis=0)
+    extent = np.linalg.svd(p, compute_uv=False) if len(p) else np.zeros(3)
+    if len(p) < 4 or extent[2] < FLAT * extent[0]:
+        raise DataError(f"wire: {len(p)} targets in one plane; the drum may be on either side: give [device] or spread")
+    square = np.sum(p**2, axis=1) - lengths_m**2
+    origin = np.linalg.lstsq(2.0 * p, square - square.mean(), rcond=None)[0]
+    return np.asarray(origin + points_m.mean(axis=0), dtype=np.float64)
+
+
+def _kabsch(a: Floats, b: Floats) -> Floats:
+    centred = b - b.mean(axis=0) if len(b) else b
+    extent = np.linalg.svd(centred, compute_uv=False) if len(b) >= 3 else np.zeros(3)
+    if len(b) < 3 or extent[1] < FLAT * max(extent[0], 1e-300):
+        raise DataError(f"device frame: {len(b)} positions on one line or fewer than 3; measure all over the workspace")
+    T = np.eye(4)
+    T[:3, :3] = Rotation.align_vectors(a - a.mean(axis=0), centred)[0].as_matrix()
+    T[:3, 3] = a.mean(axis=0) - T[:3, :3] @ b.mean(axis=0)
+    return T
+
+
+def _judged(a: Floats, b: Floats, used: Bools) -> Alignment:
+    T_a_b = _kabsch(a, b)
+    mirror = np.diag([1.0, 1.0, -1.0])
+    T_mirrored = _kabsch(a, b @ mirror)
+    U, s, Vt = np.linalg.svd((a - a.mean(axis=0)).T @ (b - b.mean(axis=0)))
+    determinant = float(np.sign(np.linalg.det(U @ Vt))) if s[2] > FLAT**2 * s[0] else 0.0
+    return Alignment(T_a_b, _rms(T_a_b, a, b), _rms(T_mirrored, a, b @ mirror), determinant, used)
+
+
+def _rms(T_a_b: Floats, a: Floats, b: Floats) -> float:
+    off = b @ T_a_b[:3, :3].T + T_a_b[:3, 3] - a
+    return float(np.sqrt(np.mean(np.sum(off**2, axis=1))))

@@ -1,0 +1,110 @@
+"""What all serial arms of turning joints have in common: fixed parts and turns about z in alternation.
+
+T_base_flange = F_0 Rz(a_1) F_1 Rz(a_2) ... Rz(a_n) F_n,  a_i = q_i + offset_i.
+Every parameter moves one frame B_i = F_0 Rz(a_1) ... F_i, and moves it by a twist that is constant in that frame;
+the base sees it through the adjoint of B_i. Source: Murray, Li, Sastry, A Mathematical Introduction to Robotic
+Manipulation, 1994, ch. 3.4 (body and spatial manipulator Jacobian).
+"""
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from calibrate.kernels import ready
+from calibrate.kernels import serial as loops
+from calibrate.parameters import Parameter
+from calibrate.rigid import cross, turn_twist
+
+Floats = NDArray[np.float64]
+
+
+class SerialArm(ABC):
+    """KinematicModel of a chain; a kind of arm says what its parameters do to fixed parts and joint offsets."""
+
+    def __init__(self, n_joints: int, parameters: tuple[Parameter, ...], moves_frame: tuple[int, ...]) -> None:
+        """`moves_frame`: for each parameter the i of the frame B_i in which its twist is constant."""
+        self.n_joints = n_joints
+        self.parameters = parameters
+        self.moves_frame = moves_frame
+        self._columns_of = [np.flatnonzero(np.array(moves_frame) == i) for i in range(n_joints + 1)]
+
+    @abstractmethod
+    def fixed_parts(self, theta: Floats) -> Floats:
+        """(joint + 1, 4, 4) F_0 ... F_n."""
+
+    @abstractmethod
+    def angle_offset_rad(self, theta: Floats) -> Floats:
+        """(joint,) what is added to a joint reading."""
+
+    @abstractmethod
+    def body_twists(self, theta: Floats) -> Floats:
+        """(param, 6) twist [v; w] by each parameter, written in the frame it moves."""
+
+    def frames(self, theta: Floats, q_rad: Floats) -> Floats:
+        """(pose, joint + 1, 4, 4) B_0 ... B_n: joint i turns about z of B_(i-1), B_n is the flange."""
+        angle = q_rad + self.angle_offset_rad(theta)
+        c, s = np.cos(angle), np.sin(angle)
+        fixed = self.fixed_parts(theta)
+        B = np.empty((len(q_rad), self.n_joints + 1, 4, 4))
+        B[:, 0] = fixed[0]
+        for i in range(self.n_joints):
+            turned = B[:, i].copy()
+            ci, si = c[:, i, None], s[:, i, None]
+            turned[:, :, 0] = ci * B[:, i, :, 0] + si * B[:, i, :, 1]
+            turned[:, :, 1] = ci * B[:, i, :, 1] - si * B[:, i, :, 0]
+            B[:, i + 1] = turned @ fixed[i + 1]
+        return B
+
+    def flange(self, theta: Floats, q_rad: Floats) -> Floats:
+        if ready.worth(len(q_rad)):
+            return loops.flange(loops.ArmConstants.of(self, theta), q_rad)
+        return self.frames(theta, q_rad)[:, -1].copy()
+
+    def joint_twists(self, theta: Floats, q_rad: Floats) -> Floats:
+        before = self.frames(theta, q_rad)[:, :-1]
+        return np.swapaxes(turn_twist(before[..., :3, 2], before[..., :3, 3]), 1, 2)
+
+    def twists(self, theta: Floats, q_rad: Floats) -> Floats:
+        if ready.worth(len(q_rad)):
+            return loops.twists(loops.ArmConstants.of(self, theta), q_rad)
+        B = self.frames(theta, q_rad)
+        body = self.body_twists(theta).reshape(-1, 2, 3)
+        out = np.empty((len(q_rad), len(self.parameters), 6))
+        for i, columns in enumerate(self._columns_of):
+            to_base = np.swapaxes(B[:, i, :3, :3], 1, 2)
+            seen = (body[columns].reshape(-1, 3) @ to_base).reshape(len(q_rad), -1, 6)
+            seen[..., :3] += cross(B[:, i, None, :3, 3], seen[..., 3:])
+            out[:, columns] = seen
+        return np.swapaxes(out, 1, 2)
+
+
+def rotation_x(angle_rad: ArrayLike) -> Floats:
+    """(..., 4, 4) turn about x."""
+    return _turn(angle_rad, 1, 2)
+
+
+def rotation_y(angle_rad: ArrayLike) -> Floats:
+    """(..., 4, 4) turn about y."""
+    return _turn(angle_rad, 2, 0)
+
+
+def rotation_z(angle_rad: ArrayLike) -> Floats:
+    """(..., 4, 4) turn about z."""
+    return _turn(angle_rad, 0, 1)
+
+
+def shift(x_m: ArrayLike, z_m: ArrayLike) -> Floats:
+    """(..., 4, 4) shift along x and z."""
+    out = np.broadcast_to(np.eye(4), (*np.shape(x_m), 4, 4)).copy()
+    out[..., 0, 3], out[..., 2, 3] = x_m, z_m
+    return out
+
+
+def _turn(angle_rad: ArrayLike, first: int, second: int) -> Floats:
+    """Turn that carries axis `first` towards axis `second`."""
+    out = np.broadcast_to(np.eye(4), (*np.shape(angle_rad), 4, 4)).copy()
+    c, s = np.cos(angle_rad), np.sin(angle_rad)
+    out[..., first, first], out[..., first, second] = c, -s
+    out[..., second, first], out[..., second, second] = s, c
+    return out

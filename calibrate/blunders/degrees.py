@@ -1,0 +1,40 @@
+"""Joint angles in degrees: far outside the joint limits in many rows, or explained only when read as degrees."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.blunders.finding import Blunder, BlunderKind
+from calibrate.blunders.hypothesis import Hypothesis
+
+Floats = NDArray[np.float64]
+
+BEYOND = 2.0  # times the farthest joint limit: no arm reads that in radians
+SHARE = 0.1  # of the rows: a single typed digit is not a unit
+REMEDY = "write radians (degrees times pi/180)"
+
+
+def beyond_limits(q_rad: Floats, limits_rad: Floats) -> Blunder | None:
+    """Columns whose angles (pose, joint) cannot be radians between limits (joint, 2); None if all can."""
+    if len(q_rad) == 0:
+        return None
+    reach = BEYOND * np.max(np.abs(limits_rad), axis=1)
+    beyond = np.flatnonzero(np.mean(np.abs(q_rad) > reach, axis=0) > SHARE)
+    if len(beyond) == 0:
+        return None
+    j = int(beyond[np.argmax(np.max(np.abs(q_rad[:, beyond]), axis=0))])
+    worst, limit = float(np.max(np.abs(q_rad[:, j]))), float(np.max(np.abs(limits_rad[j])))
+    columns = ", ".join(f"q{k + 1}_rad" for k in beyond)
+    what = f"angles up to {worst:g} beside a limit of {limit:g} rad (q{j + 1}_rad): these are degrees"
+    return Blunder(BlunderKind.DEGREES, (), f"column {columns}", what, REMEDY)
+
+
+def hypotheses(n_joints: int) -> Iterator[Hypothesis]:
+    """All columns in degrees, or one of them: a small motion in degrees can lie within the limits."""
+    factor = np.pi / 180.0
+    what = "the positions are explained only when the angles are read as degrees"
+    yield Hypothesis(BlunderKind.DEGREES, f"columns q1_rad ... q{n_joints}_rad", what, REMEDY, lambda q: q * factor)
+    for j in range(n_joints):
+        scale = np.where(np.arange(n_joints) == j, factor, 1.0)
+        yield Hypothesis(BlunderKind.DEGREES, f"column q{j + 1}_rad", what, REMEDY, lambda q, s=scale: q * s)

@@ -1,0 +1,23 @@
+"""One way in which a whole file may have been written by another convention."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.blunders.finding import BlunderKind
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """What the joint angles would have to be, and whether the device's axes would be left-handed."""
+
+    kind: BlunderKind
+    column: str
+    what: str
+    remedy: str
+    angles: Callable[[Floats], Floats]  # (pose, joint) as written -> as meant, rad
+    mirrored: bool = False

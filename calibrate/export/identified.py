@@ -1,0 +1,62 @@
+"""The arm that is exported: the rig as corrected, ready for every form."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.recording.rig_schema import Rig
+from calibrate.arms.catalogue import arm_of
+from calibrate.arms.convert import corrected_parts
+from calibrate.errors import DataError
+
+Floats = NDArray[np.float64]
+
+SIGN = (
+    "joint values are the readings of the controller or the encoders; identified zeros are already inside the numbers"
+    " below, nothing is to be added or subtracted"
+)
+
+
+@dataclass(frozen=True)
+class IdentifiedArm:
+    """T_base_flange(q) = F_0 Rz(q_1) F_1 ... Rz(q_n) F_n with q the joint readings."""
+
+    rig: Rig
+    corrections: Mapping[str, float]  # of the arm only
+    parts: Floats  # (joint + 1, 4, 4) F_0 ... F_n
+    tool_m: tuple[float, float, float] | None  # target point in the flange frame, where the rig names one
+
+
+def identified_arm(rig: Rig, corrections: Mapping[str, float]) -> IdentifiedArm:
+    """Takes what belongs to arm and tool point; DataError for a joint or link that this arm does not have."""
+    known = {p.name for p in arm_of(rig).parameters}
+    for name in corrections:
+        if name.startswith(("joint", "link")) and name not in known:
+            raise DataError(
+                f"rig {rig.name}: no parameter {name} in an arm of model '{rig.arm.model.value}' with {rig.n_joints}"
+                " joints; give the model.json that was identified with this rig"
+            )
+    own = {k: v for k, v in corrections.items() if k in known}
+    return IdentifiedArm(rig, own, corrected_parts(rig.arm, own), _tool_m(rig, corrections))
+
+
+def _tool_m(rig: Rig, corrections: Mapping[str, float]) -> tuple[float, float, float] | None:
+    if rig.tool.point_m is None:
+        return None
+    x, y, z = (v + corrections.get(f"tool.{a}", 0.0) for a, v in zip("xyz", rig.tool.point_m, strict=True))
+    return x, y, z
+
+
+def roll_pitch_yaw(rotation: Floats) -> tuple[float, float, float]:
+    """Angles of R = Rz(yaw) Ry(pitch) Rx(roll), the fixed-axis angles of URDF (Craig 2005, eq. 2.64).
+
+    Roll is read after yaw and pitch are taken away, so that the three together stay exact where roll and yaw alone are
+    undefined (pitch of a quarter turn), which is the rule and not the exception in an arm CMM.
+    """
+    yaw = float(np.arctan2(rotation[1, 0], rotation[0, 0]))
+    c, s = np.cos(yaw), np.sin(yaw)
+    along, across = c * rotation[0] + s * rotation[1], c * rotation[1] - s * rotation[0]  # rows of Rz(-yaw) R
+    pitch = float(np.arctan2(-rotation[2, 0], along[0]))
+    return float(np.arctan2(-across[2], across[1])), pitch, yaw

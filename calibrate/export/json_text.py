@@ -1,0 +1,36 @@
+"""JSON of an identified arm: the fixed parts as matrices, and the D-H table of the same arm."""
+
+import msgspec
+
+from acquisition.recording.rig_schema import ArmModel
+from calibrate.arms.convert import convert, pose_of
+from calibrate.export.dh_csv import FRAME, TABLE, dh_numbers
+from calibrate.export.identified import SIGN, IdentifiedArm
+
+
+def json_text(arm: IdentifiedArm) -> str:
+    """The file's text; `convention` explains the other keys."""
+    new = convert(arm.rig.arm, ArmModel.DH, arm.corrections)
+    base, flange = pose_of(new.T_base_new), new.arm.flange
+    content = {
+        "schema": 1,
+        "kind": "calibeam-arm",
+        "name": arm.rig.name,
+        "convention": {
+            "units": "m, rad",
+            "sign": SIGN,
+            "parts": "T_base_flange = F_0 Rz(q_1) F_1 ... Rz(q_n) F_n; 4x4 row by row",
+            "dh": "T_base_flange = base T_1 ... T_n flange; T_i = Rz(q_i + theta_offset) Tz(d) Tx(a) Rx(alpha)"
+            " Ry(tilt); rx, ry, rz is a rotation vector",
+            "tool_point_m": "in the flange frame",
+        },
+        "joints": [{"lower_rad": j.lower_rad, "upper_rad": j.upper_rad} for j in arm.rig.arm.joints],
+        "parts": arm.parts.tolist(),
+        "dh": {
+            "base": dict(zip(FRAME, (*base.origin_m, *base.rotation_rad), strict=True)),
+            "rows": [dict(zip(TABLE, row, strict=True)) for row in dh_numbers(new)],
+            "flange": dict(zip(FRAME, (*flange.origin_m, *flange.rotation_rad), strict=True)),
+        },
+        "tool_point_m": arm.tool_m,
+    }
+    return msgspec.json.format(msgspec.json.encode(content), indent=1).decode() + "\n"

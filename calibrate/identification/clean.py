@@ -1,0 +1,83 @@
+"""Bad rows are found against a fit that they cannot pull, named, and left out before anything is averaged."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.blunders.bad_rows import bad_rows
+from calibrate.blunders.finding import Blunder, BlunderKind
+from calibrate.blunders.other_session import rows_of_another_session
+from calibrate.blunders.shots import outlying
+from calibrate.errors import DataError
+from calibrate.identification.rounds import distances, wary_fit
+from calibrate.identification.session import columns_of, shots_of
+from calibrate.weighting import Measured, Weighting
+
+Floats = NDArray[np.float64]
+
+FEWEST_ROWS = 12  # of an instrument: below, nobody can say which row is the odd one
+PASSES = 3  # bad rows can hide behind worse ones
+MOST_BAD = 0.4  # of the rows: beyond, the question is which of two sessions is the right one
+
+
+def clean(weighting: Weighting, start: Floats) -> tuple[Weighting, tuple[Blunder, ...]]:
+    """The rows that can be averaged, and what was wrong with the others.
+
+    DataError where so many rows are bad that the rest is no basis.
+    """
+    rows = np.unique(np.concatenate([m.sample_rows.ravel() for m in weighting.measured]))
+    blunders: list[Blunder] = []
+    kept = weighting
+    for _ in range(PASSES):
+        found = _found(kept, wary_fit(kept, start))
+        if not found:
+            break
+        blunders += found
+        refuse_most(tuple(blunders), len(rows))
+        kept = weighting.take(np.setdiff1d(rows, rows_of(blunders)))
+    return kept, tuple(blunders)
+
+
+def rows_of(blunders: Sequence[Blunder]) -> NDArray[np.intp]:
+    """Every row that any of them names, sorted."""
+    return np.array(sorted({row for b in blunders for row in b.rows}), dtype=np.intp)
+
+
+def refuse_most(blunders: tuple[Blunder, ...], rows: int) -> None:
+    """DataError where so many of the rows are named that nobody can say which ones are the good ones."""
+    bad = len(rows_of(blunders))
+    if bad > MOST_BAD * rows:
+        raise DataError(
+            f"{bad} of {rows} rows do not go with the rest (first: {blunders[0].says}); "
+            "check that joints and observations are of the same rows and session"
+        )
+
+
+def _found(weighting: Weighting, theta: Floats) -> list[Blunder]:
+    problem = weighting.problem(theta)
+    out: list[Blunder] = []
+    every = zip(weighting.measured, distances(problem, theta), strict=False)  # known lengths come last and are no rows
+    for index, (measured, distance) in enumerate(every):
+        if measured.problem.rows < FEWEST_ROWS:
+            continue
+        own = problem.of_block(index, theta)
+        shots = shots_of(measured, own)
+        if shots is None:
+            out += _bad_pairs(measured, distance, np.linalg.norm(measured.problem.misfit(own), axis=1))
+            continue
+        blocks = rows_of_another_session(shots) if measured.name == "position" else ()
+        inside = {row for b in blocks for row in b.rows}
+        out += [*blocks, *(b for b in bad_rows(shots) if b.rows[0] not in inside)]
+    return out
+
+
+def _bad_pairs(measured: Measured, distance: Floats, away_m: Floats) -> list[Blunder]:
+    """Pairs of rows, of which nobody can say which one is wrong; (row,) whitened and plain misfit."""
+    out: list[Blunder] = []
+    for i in np.flatnonzero(outlying(distance, measured.problem.observed.shape[1])):
+        rows = tuple(sorted(int(r) for r in measured.sample_rows[i]))
+        what = f"{measured.name} {1e3 * away_m[i]:.3g} mm away from what all other rows say"
+        remedy = "take both again, or remove them"
+        out.append(Blunder(BlunderKind.BAD_SHOT, rows, ", ".join(columns_of(measured)), what, remedy))
+    return out

@@ -1,0 +1,31 @@
+"""How far an unseen combination can pull on each parameter: which of its members have a number all the same.
+
+What the data do not see is known no better than to its plausible size. A parameter that has a share of 1e-4 in it moves
+by 1e-4 of its own plausible size when the combination moves by all of that: it is determined, and what little it is
+pulled goes into its sigma.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.identifiability import STRUCTURAL, WEAK
+from calibrate.parameters import Parameter, plausible_sizes, priors
+
+Floats = NDArray[np.float64]
+
+FAR = 3.0  # plausible sizes that the truth of an unseen combination may lie from where it was held
+
+
+def pull_of_unseen(jacobian: Floats, parameters: tuple[Parameter, ...]) -> Floats:
+    """(param,) in its unit, for the whitened Jacobian (row, param): one sigma of what unseen combinations add.
+
+    Rank and scaling are those of identifiability.analyse.
+    """
+    free = np.flatnonzero([p.free for p in parameters])
+    scale, prior = plausible_sizes(parameters)[free], priors(parameters)[free]
+    rows = np.concatenate([jacobian[:, free] * scale, np.diag(scale / prior)])
+    _, s, Vt = np.linalg.svd(np.linalg.qr(rows, mode="r"))
+    unseen = Vt[s <= max(WEAK, STRUCTURAL * s[0])]
+    out = np.zeros(len(parameters))
+    out[free] = FAR * scale * np.linalg.norm(unseen, axis=0)
+    return out

@@ -1,0 +1,80 @@
+"""An identification as model.json."""
+
+import numpy as np
+
+from calibrate.blunders.finding import Blunder
+from calibrate.identification.result import Identification
+from calibrate.model_file import (
+    SCHEMA,
+    Fields,
+    LeftOut,
+    ModelFile,
+    ModelParameter,
+    RigIdentity,
+    Unseen,
+    covariance_record,
+    fields_of,
+)
+
+
+def record_of(result: Identification, rig: RigIdentity, arm_model: str) -> ModelFile:
+    """The record to write. Of several instruments, `rms_...` are of the first, `held_out` carries all by name."""
+    seen, first = result.identifiability, result.instruments[0]
+    return ModelFile(
+        schema=SCHEMA,
+        kind="calibeam-model",
+        software=result.software,
+        rig=rig,
+        arm_model=arm_model,
+        status=result.status.name,
+        says=result.status.value,
+        poses=result.n_samples,
+        rank=seen.rank,
+        free=seen.n_free,
+        condition=seen.condition if np.isfinite(seen.condition) else None,
+        singular_values=tuple(seen.singular_values.tolist()),
+        unseen=tuple(Unseen(c.words, c.members, c.structural) for c in seen.combinations),
+        parameters=tuple(ModelParameter(e.name, e.unit, e.value, e.sigma, e.why) for e in result.estimates),
+        chain={p.name: float(v) for p, v in zip(result.parameters, result.theta, strict=True)},
+        covariance=covariance_record(result.parameters, result.covariance),
+        noise=_noise(result),
+        repeats=None if result.repeats is None else _plain(fields_of(result.repeats)),
+        held_out=_held_out(result),
+        rms_before_m=first.rms_before,
+        rms_after_m=first.rms_after,
+        instruments=tuple(i.name for i in result.instruments),
+        about=result.about,
+        blunders=tuple(left_out(b) for b in result.blunders),
+    )
+
+
+def _noise(result: Identification) -> Fields:
+    """Flat: `<source>_believed`, `<source>`, `<source>_sigma`, and chi-square against the noise as stated."""
+    out: Fields = {}
+    for noise in result.noise:
+        out |= {f"{noise.source}_believed": noise.believed, noise.source: noise.found}
+        out[f"{noise.source}_sigma"] = noise.sigma
+    stated = result.stated_noise
+    p = stated.p_above if np.isfinite(stated.p_above) else None
+    return out | {"chi2_stated": stated.chi2, "dof": stated.dof, "p_stated": p, "alarm": stated.alarm.name}
+
+
+def _held_out(result: Identification) -> Fields | None:
+    """Flat: the split once, then `<instrument>_rms_before`, `_rms_after`, `_observations`."""
+    if not result.held_out:
+        return None
+    out: Fields = {"split": result.held_out[0].split, "chi_after": result.held_out[0].chi_after}
+    for one in result.held_out:
+        out |= {f"{one.name}_observations": one.observations, f"{one.name}_rms_before": one.rms_before}
+        out[f"{one.name}_rms_after"] = one.rms_after
+    return out
+
+
+def _plain(fields: Fields) -> Fields:
+    """Enum members by their name."""
+    return {k: getattr(v, "name", v) for k, v in fields.items()}
+
+
+def left_out(blunder: Blunder) -> LeftOut:
+    """With rows counted from 1, as a person counts."""
+    return LeftOut(blunder.kind.name, tuple(row + 1 for row in blunder.rows), blunder.column, blunder.says)

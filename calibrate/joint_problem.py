@@ -1,0 +1,143 @@
+"""Several instruments in one fit: blocks of whitened rows side by side, parameters of one name are one unknown."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.errors import DataError
+from calibrate.parameters import Parameter, index_of
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+
+class Block(Protocol):
+    """One instrument's rows: a LeastSquares of its own that can be cut. Each row has the same number of residuals."""
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]: ...
+
+    @property
+    def rows(self) -> int:
+        """Observation rows: poses, pairs or known lengths."""
+        ...
+
+    def residual(self, theta: Floats) -> Floats:
+        """(rows * k,) whitened, expected minus observed, row by row."""
+        ...
+
+    def jacobian(self, theta: Floats) -> Floats:
+        """(rows * k, param) derivative of `residual` by every parameter of the block, free or not."""
+        ...
+
+    def select(self, rows: Indices) -> Self:
+        """The same block over some of its rows."""
+        ...
+
+
+@dataclass(frozen=True)
+class JointProblem:
+    """LeastSquares over the union of the blocks' parameters, in the order of their first appearance.
+
+    DataError where two blocks disagree on what a shared parameter is: unit, start, prior, bounds or plausible size. A
+    parameter is free when any block that has it leaves it free (a placement may be idle in one block and not in
+    another). `chosen`, from `with_parameters`, overrides the union: the same names in the same order.
+    """
+
+    blocks: tuple[Block, ...]
+    chosen: tuple[Parameter, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if not self.blocks:
+            raise DataError("joint problem: no blocks at all; give at least one instrument's observations")
+        merged = tuple(p.name for p in self._merged)
+        if self.chosen is not None and tuple(p.name for p in self.chosen) != merged:
+            raise DataError(f"joint problem: chosen parameters are not those of the blocks in order: {merged}")
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return self._merged if self.chosen is None else self.chosen
+
+    @property
+    def rows(self) -> int:
+        """Observation rows of all blocks, counted through in the order of the blocks."""
+        return sum(block.rows for block in self.blocks)
+
+    def residual(self, theta: Floats) -> Floats:
+        parts = [block.residual(theta[columns]) for block, columns in zip(self.blocks, self._columns, strict=True)]
+        return np.concatenate(parts)
+
+    def jacobian(self, theta: Floats) -> Floats:
+        parts = [block.jacobian(theta[columns]) for block, columns in zip(self.blocks, self._columns, strict=True)]
+        out = np.zeros((sum(len(part) for part in parts), len(self.parameters)))
+        first = 0
+        for part, columns in zip(parts, self._columns, strict=True):
+            out[first : first + len(part), columns] = part
+            first += len(part)
+        return out
+
+    def with_parameters(self, parameters: tuple[Parameter, ...]) -> "JointProblem":
+        """The same blocks with these held, bounded or believed otherwise."""
+        return replace(self, chosen=parameters)
+
+    def with_blocks(self, blocks: tuple[Block, ...]) -> "JointProblem":
+        """Other weights, the same unknowns."""
+        return JointProblem(blocks, self.parameters)
+
+    def select(self, rows: Indices) -> "JointProblem":
+        """Some of the rows, counted through all blocks; unknowns stay, also those that no row left speaks of."""
+        cut: list[Block] = []
+        for block, first in zip(self.blocks, self.first_rows, strict=True):
+            own = rows[(rows >= first) & (rows < first + block.rows)] - first
+            cut.append(block.select(own))
+        return self.with_blocks(tuple(cut))
+
+    def of_block(self, block: int, theta: Floats) -> Floats:
+        """The values of one block's own parameters."""
+        return theta[self._columns[block]]
+
+    def spread(self, block: int, columns: Floats) -> Floats:
+        """(..., param) derivatives (..., own) by one block's own parameters, put where those stand among all."""
+        out = np.zeros((*columns.shape[:-1], len(self.parameters)))
+        out[..., self._columns[block]] = columns
+        return out
+
+    def by_row(self, theta: Floats) -> Floats:
+        """(rows,) sum of the squared whitened residuals of each row: chi-square of k where nothing is wrong."""
+        parts = [
+            np.sum(block.residual(theta[columns]).reshape(block.rows, -1) ** 2, axis=1) if block.rows else np.zeros(0)
+            for block, columns in zip(self.blocks, self._columns, strict=True)
+        ]
+        return np.concatenate(parts)
+
+    @cached_property
+    def first_rows(self) -> tuple[int, ...]:
+        """Of each block, its first row among those of all."""
+        return tuple(np.concatenate([[0], np.cumsum([block.rows for block in self.blocks])[:-1]]).astype(int).tolist())
+
+    @cached_property
+    def _merged(self) -> tuple[Parameter, ...]:
+        found: dict[str, Parameter] = {}
+        for block in self.blocks:
+            for p in block.parameters:
+                found[p.name] = _agreed(found[p.name], p) if p.name in found else p
+        return tuple(found.values())
+
+    @cached_property
+    def _columns(self) -> tuple[Indices, ...]:
+        index = index_of(self._merged)
+        return tuple(np.array([index[p.name] for p in block.parameters], dtype=np.intp) for block in self.blocks)
+
+
+def _agreed(one: Parameter, other: Parameter) -> Parameter:
+    for what in ("unit", "start", "prior", "lower", "upper", "plausible"):
+        a, b = getattr(one, what), getattr(other, what)
+        if a != b:
+            raise DataError(
+                f"joint problem: parameter {one.name} has {what} {a} in one block and {b} in another; "
+                "build all blocks from the same rig"
+            )
+    return one if one.free else replace(one, free=other.free)

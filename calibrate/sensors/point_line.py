@@ -1,0 +1,117 @@
+"""Instrument: a laser line through one unknown point, such as the one where both orders of a centred fixture meet.
+
+Observed at a pose: how far the point lies beside the beam (m), along both axes across the drawn beam, which is zero.
+Source of the constraint: Deng, Ding, Zhang, Food & Machinery 2019(3); here the point is an unknown, and the offsets
+are taken where the beam passes it, so that each pose gives two equations of its own.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.errors import DataError
+from calibrate.parameters import Parameter
+from calibrate.rigid import cross
+from calibrate.sensors.laser import LaserMount
+from calibrate.zeros.lines import Lines, nearest_point
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+POINT_PLAUSIBLE_M = 0.05  # about the point nearest to the nominal lines
+
+
+@dataclass(frozen=True)
+class PointLine:
+    """The beam of pose j passes point `point[j]`. Parameters: laser mount 4, then 3 of each point: shifts, base."""
+
+    mount: LaserMount
+    start_m: Mapping[int, Floats]  # point -> (3,) in the base
+    point: Ints  # (pose,)
+
+    unit = "m"
+
+    def __post_init__(self) -> None:
+        unknown = set(self.point.tolist()) - set(self.start_m)
+        if unknown:
+            raise DataError(f"point {min(unknown)} has no start; give one for every point of the data")
+
+    @cached_property
+    def points(self) -> tuple[int, ...]:
+        """Points in the order of their parameters."""
+        return tuple(sorted(self.start_m))
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return self._parameters
+
+    @cached_property
+    def _parameters(self) -> tuple[Parameter, ...]:
+        used = set(self.point.tolist())
+        found = (Parameter(f"point{k}.{a}", "m", POINT_PLAUSIBLE_M, free=k in used) for k in self.points for a in "xyz")
+        return self.mount.parameters + tuple(found)
+
+    def select(self, rows: NDArray[np.intp]) -> Self:
+        return replace(self, point=self.point[rows])
+
+    def expect(self, phi: Floats, T_base_flange: Floats) -> Floats:
+        beside, travel_m = self._beside(phi, T_base_flange)
+        return beside - phi[:2] - travel_m[:, None] * phi[2:4]
+
+    def by_twist(self, phi: Floats, T_base_flange: Floats) -> Floats:
+        """The flange moving by a twist is the point moving by its opposite."""
+        seen = self._across(phi) @ np.swapaxes(T_base_flange[:, :3, :3], 1, 2)  # (pose, 2, 3)
+        point = self._points_m(phi)[self._index]
+        out = np.empty((len(T_base_flange), 2, 6))
+        out[..., :3] = -seen
+        out[..., 3:] = cross(seen, point[:, None])  # -a . (w x p) = (a x p) . w
+        return out
+
+    def by_parameter(self, phi: Floats, T_base_flange: Floats) -> Floats:
+        n = len(T_base_flange)
+        _, travel_m = self._beside(phi, T_base_flange)
+        out = np.zeros((n, 2, 4 + 3 * len(self.points)))
+        out[:, range(2), range(2)] = -1.0
+        out[:, range(2), range(2, 4)] = -travel_m[:, None]
+        seen = self._across(phi) @ np.swapaxes(T_base_flange[:, :3, :3], 1, 2)
+        for axis in range(3):
+            out[range(n), :, 4 + 3 * self._index + axis] = seen[:, :, axis]
+        return out
+
+    def _across(self, phi: Floats) -> Floats:
+        """(2, 3) derivative of the observation by the point, both in the flange frame."""
+        m = self.mount
+        return np.stack([m.u - phi[2] * m.direction, m.v - phi[3] * m.direction])
+
+    def _beside(self, phi: Floats, T_base_flange: Floats) -> tuple[Floats, Floats]:
+        """(pose, 2) offsets from, and (pose,) travel along the beam as drawn."""
+        m = self.mount
+        point = self._points_m(phi)[self._index]
+        R = T_base_flange[:, :3, :3]
+        in_flange = np.einsum("nji,nj->ni", R, point - T_base_flange[:, :3, 3]) - m.origin_m
+        return in_flange @ np.stack([m.u, m.v], axis=1), in_flange @ m.direction
+
+    def _points_m(self, phi: Floats) -> Floats:
+        return np.stack([self.start_m[k] for k in self.points]) + phi[4:].reshape(-1, 3)
+
+    @cached_property
+    def _index(self) -> NDArray[np.intp]:
+        return np.searchsorted(np.array(self.points), self.point)
+
+
+def meeting_points(mount: LaserMount, T_base_flange: Floats, point: Ints) -> dict[int, Floats]:
+    """Start of every point: nearest to the nominal lines that pass it. DataError where these are parallel or one."""
+    beam = mount.beam(np.zeros(4), T_base_flange)
+    out: dict[int, Floats] = {}
+    for k in sorted(set(point.tolist())):
+        rows = np.flatnonzero(point == k)
+        direction = beam.direction[rows]
+        if len(rows) < 2 or np.linalg.norm(cross(direction[:1], direction), axis=1).max() < 1e-3:
+            raise DataError(f"point {k}: {len(rows)} lines, all parallel; take poses that cross there at an angle")
+        none = np.zeros((len(rows), 3, 0))
+        out[k] = nearest_point(Lines(beam.origin_m[rows], direction, none, none))[0]
+    return out

@@ -1,0 +1,63 @@
+"""Linear algebra that the solvers share: damped and minimum-norm steps, and the covariance."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, solve_triangular
+
+Floats = NDArray[np.float64]
+
+SINGULAR = 1e-11  # of the largest: below, columns are taken as dependent; rounding of whitened rows leaves about 1e-13
+LEAST_RIDGE = 1e-15  # of the largest diagonal element: keeps an "undamped" step finite, changes no visible digit
+
+
+def damped_step(normal: Floats, gradient: Floats, damping: float) -> Floats:
+    """Step of the damped normal equations, -(N + damping max(diag N) 1)^-1 g, for (free, free) and (free,).
+
+    The ridge in scaled columns keeps combinations that the data cannot see where they are. ArithmeticError where N is
+    not finite.
+    """
+    if len(gradient) == 0:
+        return np.zeros(0)
+    ridge = max(damping, LEAST_RIDGE) * float(np.max(np.diag(normal)))
+    for _ in range(60):
+        try:
+            return -cho_solve(cho_factor(normal + ridge * np.eye(len(gradient)), lower=True), gradient)
+        except LinAlgError:  # rounding made it indefinite
+            ridge *= 10.0
+        except ValueError as error:
+            raise ArithmeticError(
+                f"normal equations of {len(gradient)} parameters are not finite; check weights"
+            ) from error
+    raise ArithmeticError(f"normal equations of {len(gradient)} parameters stay indefinite; check weights")
+
+
+def promised_gain(normal: Floats, gradient: Floats) -> float:
+    """Decrease of the sum of squares that an (almost) undamped step promises."""
+    return float(-gradient @ damped_step(normal, gradient, 0.0)) if len(gradient) else 0.0
+
+
+def gauss_newton_step(slope: Floats, residual: Floats) -> Floats:
+    """(free,) shortest h that minimises |J h + e|: what the data cannot see is left where it is.
+
+    By QR of [J e], then singular values of the small triangle (Golub, Van Loan, Matrix Computations, 4th ed., 5.5.5).
+    """
+    if slope.shape[1] == 0:
+        return np.zeros(0)
+    triangle = np.asarray(np.linalg.qr(np.column_stack([slope, residual]), mode="r"), dtype=np.float64)
+    n = slope.shape[1]
+    shortest = np.linalg.lstsq(triangle[:, :n], -triangle[:, n], rcond=SINGULAR)[0]
+    return np.asarray(shortest, dtype=np.float64)
+
+
+def covariance_of(J: Floats) -> Floats | None:
+    """(J'J)^-1 by QR, which does not square the condition; None when the columns are dependent."""
+    if J.shape[1] == 0:
+        return np.zeros((0, 0))
+    if J.shape[0] < J.shape[1]:
+        return None
+    R = np.linalg.qr(J, mode="r")
+    diagonal = np.abs(np.diag(R))
+    if not np.all(np.isfinite(R)) or diagonal.min() <= SINGULAR * diagonal.max():
+        return None
+    inverse = solve_triangular(R, np.eye(len(R)))
+    return inverse @ inverse.T

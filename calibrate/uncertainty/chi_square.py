@@ -1,0 +1,88 @@
+"""Does the scatter agree with the noise: chi-square against the stated noise, and misfit against that of repeats.
+
+Sources: Pearson's chi-square; Draper, Smith, Applied Regression Analysis, 3rd ed. 1998, ch. 2.1 (pure error, lack of
+fit). Prior rows count as rows, which holds where the truth is drawn from the priors.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2 as chi2_law
+from scipy.stats import f as fisher_law
+
+from calibrate.fit import Fit
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+ALARM_P = 1e-3  # a false alarm in a thousand good sets a side
+
+
+class Alarm(Enum):
+    """What a test says; the value is the sentence for a person."""
+
+    NONE = "scatter and noise agree"
+    ABOVE_STATED = "misfit is larger than the stated noise: the noise is understated or the model misses something"
+    BELOW_STATED = "misfit is smaller than the stated noise: the noise is overstated, and every sigma with it"
+    LACK_OF_FIT = "misfit stays the same where poses repeat: the model misses something that is not noise"
+    NO_REDUNDANCY = "as many unknowns as rows: nothing checks the noise"
+
+
+@dataclass(frozen=True)
+class StatedNoise:
+    """Chi-square of a fit under the noise that was stated."""
+
+    chi2: float
+    dof: int
+    p_above: float  # probability of more than chi2 if model and noise are right; nan without redundancy
+    alarm: Alarm
+
+    @property
+    def noise_factor(self) -> float:
+        """By what the stated sigmas would have to be multiplied for chi-square to be its mean."""
+        return float(np.sqrt(self.chi2 / self.dof)) if self.dof > 0 else float("nan")
+
+
+@dataclass(frozen=True)
+class RepeatNoise:
+    """Scatter within repeats of a pose, and how much larger the misfit of the poses is."""
+
+    groups: int
+    dof: int  # of the scatter
+    chi2_per_dof: float  # of the scatter under the stated noise
+    ratio: float  # F: misfit that repeats over scatter
+    p_above: float  # probability of more than the ratio from scatter alone
+    alarm: Alarm
+
+
+def against_stated(fit: Fit) -> StatedNoise:
+    """Chi-square of the whole fit; `ABOVE_STATED` or `BELOW_STATED` beyond one in a thousand."""
+    if fit.dof <= 0:
+        return StatedNoise(fit.chi2, fit.dof, float("nan"), Alarm.NO_REDUNDANCY)
+    above = float(chi2_law.sf(fit.chi2, fit.dof))
+    below = float(chi2_law.cdf(fit.chi2, fit.dof))
+    alarm = Alarm.ABOVE_STATED if above < ALARM_P else Alarm.BELOW_STATED if below < ALARM_P else Alarm.NONE
+    return StatedNoise(fit.chi2, fit.dof, above, alarm)
+
+
+def against_repeats(fit: Fit, residual: Floats, repeat: Ints) -> RepeatNoise | None:
+    """Lack of fit from whitened residuals (row, k) after the fit; `repeat` (row,) names the group, below 0 none.
+
+    None where no group has two rows. The misfit is taken after the model, so that poses that repeat only nearly do not
+    count as scatter.
+    """
+    found = [residual[repeat == g] for g in np.unique(repeat[repeat >= 0])]
+    groups = [rows - rows.mean(axis=0) for rows in found if len(rows) >= 2]
+    if not groups:
+        return None
+    scatter = float(sum(np.sum(rows**2) for rows in groups))
+    free = sum(residual.shape[1] * (len(rows) - 1) for rows in groups)
+    rest = fit.dof - free
+    if rest <= 0 or scatter <= 0.0:
+        return RepeatNoise(len(groups), free, scatter / free, float("nan"), float("nan"), Alarm.NO_REDUNDANCY)
+    ratio = max(fit.chi2 - scatter, 0.0) / rest / (scatter / free)
+    above = float(fisher_law.sf(ratio, rest, free))
+    alarm = Alarm.LACK_OF_FIT if above < ALARM_P else Alarm.NONE
+    return RepeatNoise(len(groups), free, scatter / free, ratio, above, alarm)

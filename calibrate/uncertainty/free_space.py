@@ -1,0 +1,101 @@
+"""How far off the target may be anywhere in the workspace, as the covariance of the fit predicts it.
+
+Each pose maps the doubt of the parameters to the target, J C J'. What only moves the whole workspace rigidly (where
+base or device stand) is no error of the arm: the best rigid motion is taken out of every column of J before, so that
+gauge freedoms do not count, whatever frame was held. Sources: law of propagation, JCGM 100:2008, ch. 5.1.2; gauges of
+a least-squares network: Triggs, McLauchlan, Hartley, Fitzgibbon, Bundle Adjustment, LNCS 1883, 2000, ch. 9.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from calibrate.arms.model import KinematicModel
+from calibrate.fit import Fit
+from calibrate.identifiability import Identifiability
+from calibrate.parameters import index_of
+from calibrate.rigid import cross_matrix
+
+Floats = NDArray[np.float64]
+
+FELT_M = 1e-7  # rms over the workspace, for an unseen combination of plausible size: below, it does not matter
+TOOL = ("tool.x", "tool.y", "tool.z")
+
+
+class FreeSpaceStatus(Enum):
+    """Whether there is a prediction."""
+
+    PREDICTED = "predicted from the covariance of the fit"
+    UNDETERMINED = "an unseen combination moves the target: no error can be stated"
+    NO_COVARIANCE = "the fit has no covariance"
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """Joint poses drawn evenly within limits, and the target whose place counts."""
+
+    lower_rad: Floats  # (joint,)
+    upper_rad: Floats
+    point_m: Floats  # (3,) target in the flange frame
+    poses: int = 500  # the mean settles to about 2 %
+
+
+@dataclass(frozen=True)
+class FreeSpaceError:
+    """One sigma of the target's position (three axes together) over the workspace; None where not determined."""
+
+    status: FreeSpaceStatus
+    mean_m: float | None
+    p95_m: float | None
+    max_m: float | None
+    undetermined: tuple[str, ...] = ()  # the combinations that move the target, in words
+
+
+def free_space_error(
+    model: KinematicModel, fit: Fit, seen: Identifiability, workspace: Workspace, rng: Generator
+) -> FreeSpaceError:
+    """Prediction for the arm `model` whose parameters (and those of the tool) are among those of `fit`, by name.
+
+    `seen` is the identifiability at `fit.theta` of all parameters, before anything was held.
+    """
+    if not np.all(np.isfinite(fit.covariance)):
+        return FreeSpaceError(FreeSpaceStatus.NO_COVARIANCE, None, None, None)
+    q_rad = rng.uniform(workspace.lower_rad, workspace.upper_rad, (workspace.poses, model.n_joints))
+    J = without_rigid_motion(*_target_by_parameter(model, fit, workspace.point_m, q_rad))
+    column = index_of(fit.parameters)
+    felt = np.sqrt(np.sum((J[..., [column[n] for n in seen.names]] @ seen.unseen) ** 2, axis=1).mean(axis=0))
+    if np.any(felt > FELT_M):
+        return FreeSpaceError(FreeSpaceStatus.UNDETERMINED, None, None, None, tuple(c.plain for c in seen.combinations))
+    sigma = np.sqrt(np.maximum(np.einsum("nip,pq,niq->n", J, fit.covariance, J, optimize=True), 0.0))
+    return FreeSpaceError(
+        FreeSpaceStatus.PREDICTED, float(sigma.mean()), float(np.percentile(sigma, 95.0)), float(sigma.max())
+    )
+
+
+def without_rigid_motion(points_m: Floats, by_parameter: Floats) -> Floats:
+    """(pose, 3, param) the same derivatives less the rigid motion of all points (pose, 3) that fits each best."""
+    n, _, params = by_parameter.shape
+    rigid = np.concatenate([np.tile(np.eye(3), (n, 1, 1)), -cross_matrix(points_m)], axis=2).reshape(3 * n, 6)
+    Q = np.linalg.qr(rigid)[0]
+    flat = by_parameter.reshape(3 * n, params)
+    return (flat - Q @ (Q.T @ flat)).reshape(n, 3, params)
+
+
+def _target_by_parameter(model: KinematicModel, fit: Fit, point_m: Floats, q_rad: Floats) -> tuple[Floats, Floats]:
+    """Target in the base (pose, 3) and its derivative by all parameters of the fit (pose, 3, param)."""
+    column = index_of(fit.parameters)
+    own = [column[p.name] for p in model.parameters]
+    theta = fit.theta[own]
+    T = model.flange(theta, q_rad)
+    tool = [column[name] for name in TOOL if name in column]
+    shift_m = fit.theta[tool] if tool else np.zeros(3)
+    points = T[:, :3, :3] @ (point_m + shift_m) + T[:, :3, 3]
+    twists = model.twists(theta, q_rad)
+    out = np.zeros((len(q_rad), 3, len(fit.parameters)))
+    out[:, :, own] = twists[:, :3] - cross_matrix(points) @ twists[:, 3:]  # v + w x p
+    if tool:
+        out[:, :, tool] = T[:, :3, :3]
+    return points, out

@@ -1,0 +1,121 @@
+"""Error on rows that the fit has not seen, for any problem that can be cut.
+
+Each fold is predicted by a refit on the other rows. What only the unseen rows know (where the fixture stood at a
+place that was left out) is fitted to them with all else held, and costs them as many degrees of freedom; so a place
+that was left out proves the arm, not the place. Source: cross-validation, Stone, J. R. Statist. Soc. B 36(2), 1974.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.fit import NEAR_START, Status, solve
+from calibrate.identifiability import analyse
+from calibrate.parameters import Parameter, start_values
+from calibrate.redundant import reduced
+from calibrate.uncertainty.cuttable import Cuttable
+from calibrate.uncertainty.splits import Split
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.intp]
+P = TypeVar("P", bound=Cuttable)
+
+USABLE = (Status.CONVERGED, Status.RANK_DEFICIENT)  # unseen combinations do not spoil a prediction of like rows
+
+
+class Proof(Enum):
+    """How the proof ended."""
+
+    DONE = "predicted from the other rows"
+    TOO_FEW = "too few rows: none left to fit, or fewer unseen values than unknowns of their own"
+    NOT_REFITTED = "the fit on the other rows did not converge"
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Pooled over the folds of a split; numbers are None where there is no proof."""
+
+    split: str
+    proof: Proof
+    rows: int  # predicted
+    chi: float | None  # rms of the whitened error: 1 = the noise, above it what the fit does not know
+    rms: float | None  # rms of `measure`, in its unit; None without one
+    refitted: tuple[str, ...]  # what only unseen rows know
+
+
+@dataclass(frozen=True)
+class _Fold:
+    squares: float
+    dof: int
+    measured: Floats
+    refitted: tuple[str, ...]
+
+
+def held_out(problem: P, split: Split, theta: Floats, measure: Callable[[P, Floats], Floats] | None = None) -> HeldOut:
+    """Proof by one split from the fit `theta` (param,) of all rows, a start only.
+
+    `measure(problem, theta)` gives errors (any shape) in the unit wanted for `rms`, such as `Problem.misfit`.
+    """
+    folds: list[_Fold] = []
+    for unseen in split.unseen:
+        used = np.setdiff1d(np.arange(problem.rows), unseen)
+        fold = _fold(problem, used, unseen, theta, measure) if len(used) else Proof.TOO_FEW
+        if isinstance(fold, Proof):
+            return HeldOut(split.says, fold, 0, None, None, ())
+        folds.append(fold)
+    dof = sum(fold.dof for fold in folds)
+    if dof <= 0:
+        return HeldOut(split.says, Proof.TOO_FEW, 0, None, None, ())
+    errors = np.concatenate([fold.measured for fold in folds])
+    return HeldOut(
+        split.says,
+        Proof.DONE,
+        sum(len(unseen) for unseen in split.unseen),
+        float(np.sqrt(sum(fold.squares for fold in folds) / dof)),
+        float(np.sqrt(np.mean(errors**2))) if len(errors) else None,
+        tuple(dict.fromkeys(name for fold in folds for name in fold.refitted)),
+    )
+
+
+def _fold(
+    problem: P, used: Rows, unseen: Rows, theta: Floats, measure: Callable[[P, Floats], Floats] | None
+) -> _Fold | Proof:
+    train, test = problem.select(used), problem.select(unseen)
+    idle = _idle(train.jacobian(theta), problem.parameters)
+    known = _refit(train, tuple(replace(p, free=p.free and i not in idle) for i, p in enumerate(problem.parameters)))
+    after = known(theta)
+    if after is None:
+        return Proof.NOT_REFITTED
+    own = [i for i in idle if np.any(test.jacobian(after)[:, i])]
+    if own:
+        fit = _refit(test, tuple(replace(p, free=i in own) for i, p in enumerate(problem.parameters)))(after)
+        if fit is None:
+            return Proof.NOT_REFITTED
+        after = fit
+    residual = test.residual(after)
+    measured = np.zeros(0) if measure is None else np.ravel(measure(test, after))
+    refitted = tuple(problem.parameters[i].name for i in own)
+    return _Fold(float(residual @ residual), len(residual) - len(own), measured, refitted)
+
+
+def _idle(jacobian: Floats, parameters: tuple[Parameter, ...]) -> tuple[int, ...]:
+    """Free parameters without any say in these rows."""
+    return tuple(i for i, p in enumerate(parameters) if p.free and not np.any(jacobian[:, i]))
+
+
+def _refit(problem: Cuttable, parameters: tuple[Parameter, ...]) -> Callable[[Floats], Floats | None]:
+    """Fit of what these rows can tell; a combination that they alone do not see goes back to its nominal value."""
+
+    def from_start(theta: Floats) -> Floats | None:
+        seen = analyse(problem.jacobian(theta), parameters)
+        kept = reduced(parameters, seen)
+        nominal = np.array([before.free and not after.free for before, after in zip(parameters, kept, strict=True)])
+        start = np.where(nominal, start_values(parameters), theta)
+        fit = solve(problem.with_parameters(kept), start=start, damping=NEAR_START)
+        return fit.theta if fit.status in USABLE else None
+
+    return from_start

@@ -1,0 +1,170 @@
+"""Instruments of one session with what is believed of their noise, and the joint problem under given noise.
+
+Noise of a row is joint repeatability mapped through the arm, G G' joint^2 with G the derivative by the readings, plus
+the instrument's own. Which pose a row belongs to is known to the instrument alone, so this holds for pairs of poses
+too. Neighbouring distances share a pose, which their weights respect. Rows of two instruments at one pose (a position
+and a wire) are taken as independent, and sizes of noise are found as if all rows were.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate import variance
+from calibrate.joint_problem import Block, JointProblem
+from calibrate.noise import parts_of
+from calibrate.parameters import Parameter, priors, start_values
+from calibrate.problem import Problem
+from calibrate.variance import FIXED, NoisyRows, VarianceFactors, as_believed, covariance_of
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+ENOUGH = 20_000  # rows of an instrument from which sizes of noise are found: 0.5 % of a sigma, whatever more there is
+JOINT = "joint"  # the source of noise that all instruments share
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One instrument's rows. `problem` need not be weighted yet."""
+
+    name: str  # "position", "dual-psd", ...
+    problem: Problem
+    own_sigma: Mapping[str, Floats]  # source -> (row, k) as believed, zero where the source does not reach
+    sample_rows: Indices  # (row, 1) or (row, 2): rows of the table of samples that each row was made of
+    own_correlation: Floats | None = None  # (row,) of pairs: of its own noise with the next row's, if they share a pose
+
+    def parts(self, theta: Floats, joint_rad: float) -> Floats:
+        """(1 + source, row, k, k) covariance by joints, then by each own source, at the believed sizes."""
+        by_joint = self.problem.chain.by_joint(theta, self.problem.q_rad)
+        each = [parts_of(by_joint, joint_rad, sigma) for sigma in self.own_sigma.values()]
+        return np.stack([each[0][0], *(part[1] for part in each)])
+
+    def select(self, rows: Indices) -> "Measured":
+        """Some of the rows."""
+        own = {source: sigma[rows] for source, sigma in self.own_sigma.items()}
+        chained = None if self.own_correlation is None else self.own_correlation[rows]
+        return replace(
+            self,
+            problem=self.problem.select(rows),
+            own_sigma=own,
+            sample_rows=self.sample_rows[rows],
+            own_correlation=chained,
+        )
+
+    def weighted(self, theta: Floats, joint_rad: float, sources: Sequence[int], factors: VarianceFactors) -> Problem:
+        """The problem with weights from the noise at `theta`; `sources` are those of joints, then of its own noise."""
+        parts = self.parts(theta, joint_rad)
+        covariance = covariance_of(parts, sources, factors.log_variance)
+        problem = self.problem.with_covariance(covariance)
+        if self.own_correlation is None:
+            return problem
+        own = (covariance - covariance_of(parts[:1], sources[:1], factors.log_variance))[:, 0, 0]
+        by_joint = self.problem.chain.by_joint(theta, self.problem.q_rad)[:, 0]
+        n = self.problem.chain.model.n_joints
+        scale = joint_rad**2 * np.exp(factors.log_variance[sources[0]])
+        by_joints = scale * np.einsum("ni,ni->n", by_joint[:-1, n:], by_joint[1:, :n])
+        shared = by_joints + self.own_correlation[:-1] * np.sqrt(own[:-1] * own[1:])
+        shared = np.where(self.sample_rows[:-1, 1] == self.sample_rows[1:, 0], shared, 0.0)
+        sigma = np.sqrt(covariance[:, 0, 0])
+        return replace(problem, correlation=np.append(shared / (sigma[:-1] * sigma[1:]), 0.0))
+
+
+@dataclass(frozen=True)
+class Weighting:
+    """What is measured, and lengths that are known to a stated sigma (blocks of one residual a row)."""
+
+    measured: tuple[Measured, ...]
+    joint_rad: float  # believed repeatability of one joint reading
+    known: tuple[Block, ...] = ()
+
+    @cached_property
+    def sources(self) -> tuple[str, ...]:
+        """Names of the sources of noise, in the order of VarianceFactors."""
+        own = (source for instrument in self.measured for source in instrument.own_sigma)
+        return tuple(dict.fromkeys((JOINT, *own)))
+
+    @cached_property
+    def unweighted(self) -> JointProblem:
+        """Which parameters there are, and which row belongs to what; its residuals have no meaning."""
+        return JointProblem((*(instrument.problem for instrument in self.measured), *self.known))
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return self.unweighted.parameters
+
+    @property
+    def believed(self) -> VarianceFactors:
+        """Every source as large as believed."""
+        return as_believed(len(self.sources))
+
+    def problem(self, theta: Floats, factors: VarianceFactors | None = None) -> JointProblem:
+        """The joint problem with weights from the noise at `theta` (param,), as believed without `factors`."""
+        size = self.believed if factors is None else factors
+        blocks = [
+            instrument.weighted(self.unweighted.of_block(i, theta), self.joint_rad, self._sources_of(i), size)
+            for i, instrument in enumerate(self.measured)
+        ]
+        return JointProblem((*blocks, *self.known))
+
+    def noise(self, parameters: tuple[Parameter, ...], theta: Floats) -> VarianceFactors:
+        """Sizes of all sources by REML at an estimate; `parameters` say what was free and believed in the fit.
+
+        LinAlgError where what is left free cannot be determined: hold it first (calibrate/identifiability.py).
+        """
+        information, deviation, rows = self._linearised(parameters, theta)
+        return variance.estimate(rows, len(self.sources), information, information * deviation)
+
+    def doubt(self, parameters: tuple[Parameter, ...], theta: Floats, factors: VarianceFactors) -> Floats:
+        """(free,) Satterthwaite degrees of freedom of the variances of the free parameters."""
+        information, _, rows = self._linearised(parameters, theta)
+        return variance.doubt(rows, information, factors)
+
+    def rows_of(self, samples: Indices) -> Indices:
+        """Rows of the joint problem that are made of these rows of the table of samples alone; known lengths not."""
+        out = [
+            first + np.flatnonzero(np.isin(instrument.sample_rows, samples).all(axis=1))
+            for instrument, first in zip(self.measured, self.unweighted.first_rows, strict=False)
+        ]
+        return np.concatenate(out)
+
+    def take(self, samples: Indices) -> "Weighting":
+        """The same instruments over these rows of the table of samples; parameters and known lengths stay."""
+        cut = tuple(m.select(np.flatnonzero(np.isin(m.sample_rows, samples).all(axis=1))) for m in self.measured)
+        return replace(self, measured=cut)
+
+    def _sources_of(self, i: int) -> tuple[int, ...]:
+        return tuple(self.sources.index(source) for source in (JOINT, *self.measured[i].own_sigma))
+
+    def _linearised(
+        self, parameters: tuple[Parameter, ...], theta: Floats
+    ) -> tuple[Floats, Floats, tuple[NoisyRows, ...]]:
+        """Prior information (free,), deviation from the prior (free,), and all rows."""
+        free = np.flatnonzero([p.free for p in parameters])
+        information = 1.0 / priors(parameters)[free] ** 2
+        deviation = (theta - start_values(parameters))[free]
+        jacobian = self.unweighted.with_parameters(parameters)
+        rows: list[NoisyRows] = []
+        for i, every in enumerate(self.measured):
+            instrument = _thinned(every)
+            problem, own = instrument.problem, jacobian.of_block(i, theta)
+            spread = jacobian.spread(i, problem.chain.jacobian(own, problem.q_rad))[..., free]
+            parts = instrument.parts(own, self.joint_rad)
+            rows.append(NoisyRows(problem.misfit(own), spread, parts, self._sources_of(i)))
+        for i, block in enumerate(self.known, start=len(self.measured)):
+            own = jacobian.of_block(i, theta)
+            spread = jacobian.spread(i, block.jacobian(own)[:, None])[..., free]
+            one = np.ones((1, block.rows, 1, 1))
+            rows.append(NoisyRows(block.residual(own)[:, None], spread, one, (FIXED,)))
+        return information, deviation, tuple(rows)
+
+
+def _thinned(instrument: Measured) -> Measured:
+    """Evenly spread rows, no more than ENOUGH."""
+    n = instrument.problem.rows
+    if n <= ENOUGH:
+        return instrument
+    return instrument.select(np.linspace(0, n - 1, ENOUGH).astype(np.intp))

@@ -1,0 +1,121 @@
+"""`identify` and `predict` on session folders: a model that predicts by itself, and blunders told to the person."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from calibeam.cli import run
+
+RIG = """schema = 1
+name = "three-joints"
+[arm]
+model = "dh"
+{joints}
+[tool]
+point_m = [0.03, 0.01, 0.05]
+[noise]
+position_m = 1e-5
+"""
+JOINT = """[[arm.joint]]
+a_m = {a}
+alpha_rad = {alpha}
+d_m = {d}
+lower_rad = -2.9
+upper_rad = 2.9
+"""
+TABLE = [(0.0, np.pi / 2, 0.3), (0.4, 0.0, 0.0), (0.1, np.pi / 2, 0.0), (0.0, -np.pi / 2, 0.35), (0.05, 0.0, 0.1)]
+POSITION = ("x_m", "y_m", "z_m")
+POINT = np.array([0.0302, 0.0101, 0.0498])
+
+
+def observed(q, rng):
+    """Positions of an arm 0.3 mm beside its drawing, in a tracker frame of its own."""
+    point = np.tile(POINT, (len(q), 1))
+    for j in reversed(range(len(TABLE))):
+        a, alpha, d = TABLE[j]
+        point = Rotation.from_rotvec([alpha, 0, 0]).apply(point) + np.array([a + 3e-4, 0.0, d])
+        point = Rotation.from_rotvec((q[:, j] + 1e-3 * j)[:, None] * [0, 0, 1]).apply(point)
+    seen = Rotation.from_rotvec([0.2, 0.1, 2.0]).apply(point) + np.array([1.0, 2.0, 0.5])
+    return seen + rng.normal(0.0, 1e-5, point.shape)
+
+
+def write_samples(path, q, positions=None):
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        seen = () if positions is None else POSITION
+        writer.writerow(["t_s", *(f"q{i + 1}_rad" for i in range(5)), *seen])
+        for i, row in enumerate(q.tolist()):
+            writer.writerow([i, *row, *([] if positions is None else positions[i].tolist())])
+
+
+@pytest.fixture
+def folder(tmp_path):
+    rng = np.random.default_rng(3)
+    joints = "".join(JOINT.format(a=a, alpha=alpha, d=d) for a, alpha, d in TABLE)
+    where = tmp_path / "session"
+    where.mkdir()
+    (where / "rig.toml").write_text(RIG.format(joints=joints))
+    q = rng.uniform(-2.0, 2.0, (120, 5))
+    write_samples(where / "samples.csv", q, observed(q, rng))
+    return where
+
+
+def rows(path):
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_session_folder_becomes_a_model_that_predicts_unseen_poses_by_itself(folder, tmp_path, capsys):
+    model, out = tmp_path / "deep" / "model.json", tmp_path / "predicted.csv"
+    assert run(["identify", str(folder), "--out", str(model)]) == 0
+    assert "held out (random 20% of the rows): position" in capsys.readouterr().out
+    (folder / "rig.toml").unlink()
+    rng = np.random.default_rng(9)
+    q = rng.uniform(-2.0, 2.0, (30, 5))
+    seen = observed(q, rng)
+    write_samples(tmp_path / "new.csv", q, seen)
+    assert run(["predict", str(model), str(tmp_path / "new.csv"), "--out", str(out)]) == 0
+    predicted = rows(out)
+    assert list(predicted[0]) == ["t_s", "x_m", "y_m", "z_m", "r_x_m", "r_y_m", "r_z_m"]
+    found = np.array([[float(row[c]) for c in POSITION] for row in predicted])
+    residual = np.array([[float(row[f"r_{c}"]) for c in POSITION] for row in predicted])
+    assert np.sqrt(np.mean((found - seen) ** 2)) < 2e-5
+    np.testing.assert_allclose(residual, found - seen, atol=1e-12)
+
+
+def test_samples_without_observations_are_predicted_too(folder, tmp_path):
+    model, out = tmp_path / "model.json", tmp_path / "predicted.csv"
+    assert run(["identify", str(folder), "--out", str(model)]) == 0
+    write_samples(tmp_path / "new.csv", np.zeros((4, 5)))
+    assert run(["predict", str(model), str(tmp_path / "new.csv"), "--out", str(out)]) == 0
+    assert [list(row) for row in rows(out)] == [["t_s", "x_m", "y_m", "z_m"]] * 4
+
+
+@pytest.mark.parametrize(("form", "suffix"), [("urdf", ".urdf"), ("dh-csv", ".dh.csv"), ("matlab", ".m")])
+def test_the_arm_is_exported_beside_the_model(folder, tmp_path, form, suffix):
+    assert run(["identify", str(folder), "--out", str(tmp_path / "model.json"), "--export", form]) == 0
+    assert "rad" in (tmp_path / f"model{suffix}").read_text()
+
+
+def test_a_bad_row_is_told_and_stands_in_the_model(folder, tmp_path, capsys):
+    table = (folder / "samples.csv").read_text().splitlines()
+    cells = table[8].split(",")
+    cells[7] = str(float(cells[7]) + 0.1)
+    table[8] = ",".join(cells)
+    (folder / "samples.csv").write_text("\n".join(table) + "\n")
+    assert run(["identify", str(folder), "--out", str(tmp_path / "model.json")]) == 0
+    assert "left out: row 8, y_m: reads" in capsys.readouterr().out.replace("\n", " ")
+    (blunder,) = json.loads((tmp_path / "model.json").read_text())["blunders"]
+    assert (blunder["kind"], blunder["rows"], blunder["column"]) == ("WRONG_VALUE", [8], "y_m")
+
+
+def test_a_file_in_degrees_fails_with_one_sentence(folder, tmp_path, capsys):
+    table = rows(folder / "samples.csv")
+    q = np.degrees([[float(row[f"q{i}_rad"]) for i in range(1, 6)] for row in table])
+    write_samples(folder / "samples.csv", q, np.array([[float(row[c]) for c in POSITION] for row in table]))
+    assert run(["identify", str(folder), "--out", str(tmp_path / "model.json")]) == 1
+    assert "these are degrees; write radians" in capsys.readouterr().err
+    assert not (tmp_path / "model.json").exists()

@@ -1,0 +1,92 @@
+"""Bad rows are found and named by row, column and cause; honest rows never."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from calibrate.blunders.bad_rows import bad_rows
+from calibrate.blunders.finding import BlunderKind
+from calibrate.blunders.other_session import rows_of_another_session, sessions_apart
+
+from .conftest import NOISE, POINT, flange
+
+
+def test_honest_rows_are_left_alone(scene):
+    assert bad_rows(scene.shots()) == ()
+    assert rows_of_another_session(scene.shots()) == ()
+
+
+def test_heavy_tails_are_not_blunders(scene):
+    rng = np.random.default_rng(2)
+    scene.position_m += NOISE * rng.standard_t(4, scene.position_m.shape)
+    assert bad_rows(scene.shots()) == ()
+
+
+@pytest.mark.parametrize("column", range(3))
+def test_a_typed_digit_in_a_reading_names_row_column_and_what_it_should_be(scene, column):
+    meant = scene.position_m[30, column]
+    scene.position_m[30, column] += 0.02
+    (found,) = bad_rows(scene.shots())
+    assert (found.kind, found.rows) == (BlunderKind.WRONG_VALUE, (30,))
+    assert found.column == ("x_m", "y_m", "z_m")[column]
+    assert found.says.startswith(f"row 31, {found.column}: reads")
+    assert float(found.what.split("about ")[1].split()[0]) == pytest.approx(meant, abs=1e-4)
+
+
+@pytest.mark.parametrize("joint", range(1, 7))
+@pytest.mark.parametrize("off", [0.05, -1.0])
+def test_a_typed_digit_in_an_angle_names_the_joint(scene, joint, off):
+    scene.q_rad[64, joint - 1] += off
+    (found,) = bad_rows(scene.shots())
+    assert (found.kind, found.rows, found.column) == (BlunderKind.WRONG_VALUE, (64,), f"q{joint}_rad")
+
+
+def test_an_angle_whole_turns_off_is_given_back_within_one_turn(scene):
+    meant = scene.q_rad[64, 2]
+    scene.q_rad[64, 2] = 15.0
+    (found,) = bad_rows(scene.shots())
+    assert found.column == "q3_rad"
+    assert float(found.what.split("about ")[1].split()[0]) == pytest.approx(meant, abs=1e-3)
+
+
+def test_a_bad_shot_is_said_with_its_distance(scene):
+    scene.position_m[12] += [0.004, -0.007, 0.005]
+    (found,) = bad_rows(scene.shots())
+    assert (found.kind, found.rows) == (BlunderKind.BAD_SHOT, (12,))
+    assert float(found.what.split(" mm")[0]) == pytest.approx(np.sqrt(90.0), abs=0.1)
+
+
+def test_several_bad_rows_are_each_named(scene):
+    scene.position_m[[3, 50, 99], [0, 1, 2]] += 0.5
+    assert [b.rows for b in bad_rows(scene.shots())] == [(3,), (50,), (99,)]
+
+
+@pytest.mark.parametrize(("turn", "shift"), [([0, 0, 0], [0.002, 0, 0.001]), ([0.1, 0.2, -0.1], [0.3, 0.1, -0.2])])
+def test_a_block_of_another_session_is_named_by_its_frame(scene, turn, shift):
+    rows = slice(70, 95)
+    scene.position_m[rows] = Rotation.from_rotvec(turn).apply(scene.position_m[rows]) + shift
+    (found,) = rows_of_another_session(scene.shots())
+    assert found.kind is BlunderKind.OTHER_SESSION
+    assert found.rows == tuple(range(70, 95))
+    assert found.says.startswith("rows 71-95, x_m, y_m, z_m: positions in another device frame")
+
+
+@pytest.mark.parametrize("rows", [slice(0, 45), slice(60, 100)])
+def test_another_session_is_seen_before_any_fit_by_the_arm_as_drawn(scene, rows):
+    elsewhere = Rotation.from_rotvec([0.4, 0.1, -1.0]).apply(scene.position_m[rows])
+    scene.position_m[rows] = elsewhere + np.array([0.5, 0.0, 0.1])
+    every = np.arange(10, 130)
+    (found,) = sessions_apart(flange(scene.q_rad), scene.position_m, POINT, every)
+    assert found.kind is BlunderKind.OTHER_SESSION
+    assert found.rows == tuple(every[rows].tolist())
+
+
+def test_one_session_is_not_taken_apart(scene):
+    assert sessions_apart(flange(scene.q_rad), scene.position_m, None, np.arange(120)) == ()
+
+
+def test_bad_rows_in_a_line_are_not_a_session_of_their_own(scene):
+    rng = np.random.default_rng(8)
+    scene.position_m[40:50] += rng.normal(0.0, 0.05, (10, 3))
+    assert rows_of_another_session(scene.shots()) == ()
+    assert len(bad_rows(scene.shots())) == 10

@@ -1,0 +1,59 @@
+"""A dual-PSD session: honest rows stay, a wrong cell and a copy are named and left out."""
+
+import numpy as np
+import pytest
+
+from acquisition.recording.rig import load_rig
+from acquisition.recording.samples import Samples
+from calibrate.blunders.finding import BlunderKind
+from calibrate.errors import DataError
+from calibrate.identification.spots import without_blunders
+
+from .conftest import changed, table
+
+SPOTS = ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")
+
+
+@pytest.fixture(scope="module")
+def rig(request):
+    return load_rig(request.config.rootpath / "rigs" / "ur5e-dual-psd.toml")
+
+
+@pytest.fixture
+def samples(sessions):
+    s = sessions(41, n=60, repeats=6)
+    spots = dict(zip(SPOTS, s.spots_m.T, strict=True))
+    return table(s.q_rad, placement=s.placement.astype(float), first_psd=s.first_psd.astype(float), **spots)
+
+
+def test_honest_spots_are_all_kept(rig, samples):
+    kept, blunders = without_blunders(rig, samples)
+    assert blunders == ()
+    assert kept is samples
+
+
+@pytest.mark.parametrize(("column", "off"), [("psd2_x_m", 1e-3), ("psd1_y_m", -4e-4), ("q3_rad", 0.05)])
+def test_a_typed_digit_is_named_by_row_and_column(rig, samples, column, off):
+    values = samples.column(column).copy()
+    values[17] += off
+    kept, (found,) = without_blunders(rig, changed(samples, **{column: values}))
+    assert (found.kind, found.rows) == (BlunderKind.WRONG_VALUE, (17,))
+    assert found.column == column
+    assert len(kept) == len(samples) - 1
+
+
+def test_a_copied_row_is_left_out_and_later_rows_keep_their_numbers(rig, samples):
+    doubled = Samples({k: np.insert(v, 5, v[2]) for k, v in samples.columns.items()}, 6)
+    x = doubled.column("psd1_x_m").copy()
+    x[40] += 2e-3
+    _, blunders = without_blunders(rig, changed(doubled, psd1_x_m=x))
+    assert {(b.kind, b.rows) for b in blunders} == {
+        (BlunderKind.DUPLICATED_ROWS, (5,)),
+        (BlunderKind.WRONG_VALUE, (40,)),
+    }
+
+
+def test_degrees_are_refused_by_name(rig, samples):
+    degrees = {f"q{i}_rad": np.degrees(samples.column(f"q{i}_rad")) for i in range(1, 7)}
+    with pytest.raises(DataError, match="these are degrees"):
+        without_blunders(rig, changed(samples, **degrees))

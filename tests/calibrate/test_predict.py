@@ -1,0 +1,113 @@
+"""A model alone predicts what every instrument would read, under the columns' own names, a row for a row."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from acquisition.recording.rig import load_rig, rig_sha256, rig_text
+from acquisition.recording.samples import Samples
+from calibrate.dual_psd_rig import believed_noise, dual_psd_chain
+from calibrate.errors import DataError
+from calibrate.model_file import RigIdentity, model_of
+from calibrate.observations import Observations
+from calibrate.predict import Predictor, predict
+from calibrate.zeros.identify import identify
+
+Q = np.array([[0.1, -1.2, 1.3, -0.8, 0.4, 0.2], [0.5, -1.0, 1.1, -0.3, 0.9, -0.6], [-0.7, -1.4, 0.9, 0.2, 0.3, 1.0]])
+TURN = (0.3, -0.4, 2.2)
+
+
+@pytest.fixture(scope="module")
+def rig_path(request):
+    return request.config.rootpath / "rigs" / "ur5e-dual-psd.toml"
+
+
+@pytest.fixture(scope="module")
+def rig(rig_path):
+    return load_rig(rig_path)
+
+
+def pose(origin, rotation):
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = Rotation.from_rotvec(rotation).as_matrix(), origin
+    return T
+
+
+def table(q=Q, **columns):
+    readings = {f"q{i + 1}_rad": q[:, i] for i in range(6)}
+    return Samples({"t_s": np.arange(len(q), dtype=float), **readings, **columns}, 6)
+
+
+@pytest.fixture
+def predictor(rig):
+    about = {"tool": (0.02, -0.01, 0.08), "device": (1.8, -0.6, 0.4, *TURN)}
+    return Predictor(rig, {"tool.x": 1e-3, "device.z": 0.05}, about, ("position",))
+
+
+@pytest.fixture
+def tips(ur5e_exact):
+    return np.array([(ur5e_exact().flange(q) @ [0.021, -0.01, 0.08, 1.0])[:3] for q in Q])
+
+
+def test_positions_are_those_in_the_frame_of_the_device(predictor, tips):
+    place = pose((1.8, -0.6, 0.4), TURN) @ pose((0, 0, 0.05), (0, 0, 0))
+    seen = (tips - place[:3, 3]) @ place[:3, :3]
+    out = predict(predictor, table())
+    assert list(out) == ["t_s", "x_m", "y_m", "z_m"]
+    np.testing.assert_allclose(np.stack([out[c] for c in ("x_m", "y_m", "z_m")], axis=1), seen, atol=1e-12)
+
+
+def test_residuals_stand_where_the_row_has_an_observation(predictor):
+    given = predict(predictor, table())
+    x = given["x_m"] - 1e-3
+    x[1] = np.nan
+    beside = np.where(np.isnan(x), np.nan, 0.0)
+    out = predict(predictor, table(x_m=x, y_m=beside, z_m=beside))
+    np.testing.assert_allclose(out["r_x_m"], [1e-3, np.nan, 1e-3], atol=1e-12)
+    assert np.all(np.isfinite(out["x_m"]))
+
+
+def test_a_wire_is_the_distance_from_the_origin_of_the_device(predictor, tips):
+    place = pose((1.8, -0.6, 0.4), TURN) @ pose((0, 0, 0.05), (0, 0, 0))
+    out = predict(predictor, table(wire_m=np.full(3, np.nan)))
+    np.testing.assert_allclose(out["wire_m"], np.linalg.norm(tips - place[:3, 3], axis=1), atol=1e-12)
+
+
+def test_seat_and_bar_rows_get_the_tip_in_the_base_and_others_none(predictor, tips):
+    out = predict(predictor, table(seat=np.array([1.0, np.nan, np.nan]), bar=np.array([np.nan, np.nan, 1.0])))
+    found = np.stack([out[c] for c in ("tip_x_m", "tip_y_m", "tip_z_m")], axis=1)
+    np.testing.assert_allclose(found[[0, 2]], tips[[0, 2]], atol=1e-12)
+    assert np.all(np.isnan(found[1]))
+    assert "x_m" not in out
+
+
+def test_spots_come_from_the_model_file_alone(sessions, rig, rig_path):
+    session = sessions(41, n=60, repeats=6)
+    data = Observations(session.q_rad, session.first_psd, session.placement, session.spots_m, None, session.repeat)
+    chain = dual_psd_chain(rig, session.placement, session.first_psd)
+    result = identify(chain, data, believed_noise(rig), rng=np.random.default_rng(0), held_out_share=0.0)
+    text = rig_text(rig_path)
+    predictor = Predictor.of(model_of(result, RigIdentity(rig.name, rig_sha256(text), text), "dh"))
+    placement = session.placement.astype(float)
+    placement[3] = np.nan
+    names = ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")
+    spots = dict(zip(names, session.spots_m.T, strict=True))
+    samples = table(session.q_rad, placement=placement, first_psd=session.first_psd.astype(float), **spots)
+    out = predict(predictor, samples)
+    residual = np.stack([out[f"r_{c}"] for c in names], axis=1)
+    assert np.all(np.isnan(residual[3]))
+    assert np.sqrt(np.nanmean(residual**2)) < 5e-6
+
+
+def test_a_model_without_its_rig_is_refused(sessions, rig):
+    session = sessions(41, n=60, repeats=6)
+    data = Observations(session.q_rad, session.first_psd, session.placement, session.spots_m, None, session.repeat)
+    chain = dual_psd_chain(rig, session.placement, session.first_psd)
+    result = identify(chain, data, believed_noise(rig), rng=np.random.default_rng(0), held_out_share=0.0)
+    with pytest.raises(DataError, match="the rig's text is not in the file"):
+        Predictor.of(model_of(result, RigIdentity(rig.name, "0" * 64), "dh"))
+
+
+def test_a_device_that_nobody_knows_is_refused(rig):
+    with pytest.raises(DataError, match=r"no \[device\]"):
+        predict(Predictor(rig, {}, {}, ("position",)), table())

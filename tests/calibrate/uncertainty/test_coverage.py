@@ -1,0 +1,21 @@
+"""Sixty sessions: as many 95 % intervals hold the truth as chance allows."""
+
+from scipy.stats import binom
+
+from benchmarks import coverage
+
+
+def test_intervals_keep_their_word(request):
+    tally = coverage.run(request.config.rootpath / "rigs" / "ur5e-dual-psd.toml", sessions=60, seed=7)
+    assert tally.failed == 0
+    assert {key[0] for key in tally.stated} == {"tracker", "dual PSD"}
+    stated, held = sum(tally.stated.values()), sum(tally.held.values())
+    # members of a session share its noise: a sixth of the intervals count as independent, about four a session
+    low, high = binom.ppf([0.001, 0.999], stated // 6, coverage.LEVEL) / (stated // 6)
+    assert low <= held / stated <= high
+
+
+def test_what_is_not_determined_is_not_counted(request):
+    tally = coverage.run(request.config.rootpath / "rigs" / "ur5e-dual-psd.toml", sessions=2, seed=8)
+    assert tally.stated["dual PSD", "joint zero"] == 4  # joint 1 turns with the fixture, joint 6 with the laser
+    assert tally.stated["tracker", "device yaw"] == 0  # joint 1 turns with the device

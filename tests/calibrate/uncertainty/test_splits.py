@@ -1,0 +1,28 @@
+"""Splits: what is left out, and that nothing is left out twice."""
+
+import numpy as np
+
+from calibrate.uncertainty.splits import at_random, by_place, last_block, usual
+
+
+def test_a_random_fifth_is_another_one_with_another_seed():
+    (one,), (other,) = (at_random(50, np.random.default_rng(seed)).unseen for seed in (0, 1))
+    assert len(set(one.tolist())) == len(one) == 10
+    assert set(one.tolist()) != set(other.tolist())
+
+
+def test_every_row_is_unseen_once_when_places_go_in_turn():
+    folds = by_place(np.array([3, 1, 3, 2, 1])).unseen
+    assert [fold.tolist() for fold in folds] == [[1, 4], [3], [0, 2]]
+
+
+def test_the_last_block_goes_by_time_and_not_by_row():
+    (fold,) = last_block(np.array([5.0, 0.0, 9.0, 1.0, 2.0]), share=0.4).unseen
+    assert fold.tolist() == [0, 2]
+
+
+def test_one_place_is_no_split_by_place():
+    rng = np.random.default_rng(0)
+    assert len(usual(10, rng)) == 1
+    assert len(usual(10, rng, place=np.ones(10, dtype=int), t_s=np.arange(10.0))) == 2
+    assert len(usual(10, rng, place=np.arange(10) % 2, t_s=np.arange(10.0))) == 3
