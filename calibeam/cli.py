@@ -45,6 +45,7 @@ app = App(
     name="calibeam",
     version=version("calibeam"),
     help="Record, calibrate and diagnose robot arms with a laser and two position-sensitive detectors.",
+    suppress_keyboard_interrupt=False,  # it would end with 130 and no word
 )
 app.command(demo)
 app.command(session)

@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 
-from calibrate.report.elements import Html, join, tag
+from calibrate.report.elements import Html, tag
 from calibrate.report.quantities import TIED
 from calibrate.report.tones import tone_of
 
 
 def patch(number: int, name: str) -> Html:
     """The colour of the n-th placement, from 0, in front of a name."""
-    return join(tag("span", "", cls="key", style=f"background: {tone_of(number).css}"), name)
+    return tag("span", tag("span", "", cls="key", style=f"background: {tone_of(number).css}"), name, cls="place")
 
 
 def place_name(place: int) -> str:
@@ -19,4 +19,4 @@ def place_name(place: int) -> str:
 
 def colour_key(places: Sequence[int]) -> Html:
     """All placements with their colours."""
-    return tag("p", *(tag("span", patch(i, place_name(place))) for i, place in enumerate(places)), cls="keys")
+    return tag("p", *(patch(i, place_name(place)) for i, place in enumerate(places)), cls="keys")

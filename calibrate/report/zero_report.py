@@ -54,7 +54,7 @@ def report_html(
     """The page as text; arguments as in `write_report`."""
     known = evidence(recording, result, angles)
     chapters = (
-        (summary.summary(known)),
+        summary.summary(known),
         rig.rig(known),
         spots.spots(known),
         centring.centring(known),

@@ -130,6 +130,17 @@ def test_ctrl_c_while_identifying_says_that_the_recording_is_whole(
     assert read(unfinished).complete
 
 
+def test_ctrl_c_before_anything_is_recorded_fails_with_one_sentence(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(path: Path) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("calibeam.commands.session.load_rig", interrupted)
+    assert run(["session", str(RIG)]) == 1
+    assert "stopped by Ctrl-C" in capsys.readouterr().err
+
+
 def test_ctrl_c_while_connecting_leaves_a_readable_recording(tmp_path: Path) -> None:
     path = tmp_path / "recording.mcap"
     with pytest.raises(KeyboardInterrupt), new_recording(path, RIG.read_text(), SystemClock(), {}):

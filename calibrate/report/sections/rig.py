@@ -15,7 +15,10 @@ TITLE = "The rig"
 
 def rig(evidence: Evidence) -> Html:
     """Drawings with beam and reflection, and how many poses each place has."""
-    lead = "Drawn from the recording and the fit: true proportions, real poses, beams that end on the observed spots."
+    source = (
+        "the recording and the fit" if evidence.corrections else "the recording and the rig file, for want of a fit"
+    )
+    lead = f"Drawn from {source}: true proportions, real poses, beams that end on the observed spots."
     return section("rig", TITLE, lead, *_drawings(evidence))
 
 
@@ -59,5 +62,5 @@ def _poses(evidence: Evidence) -> Html:
         )
         for i, place in enumerate(evidence.places)
     ]
-    head = ("Fixture place", "PSD 1 struck first", "PSD 2 struck first", "poses")
-    return table(head, rows, numeric=(1, 2, 3), caption="Poses with both spots, and the colours of the places")
+    head = ("Place", "PSD 1 first", "PSD 2 first", "poses")
+    return table(head, rows, numeric=(1, 2, 3), caption="Poses by place, and by the face that is struck first")

@@ -62,7 +62,7 @@ def _limits(evidence: Evidence) -> Iterator[str]:
         yield "The fixture itself: how PSD 2 sits to PSD 1 is taken from the drawing as exact."
     temperatures = [np.ptp(values) for _, values in _temperatures(evidence.recording)]
     if not temperatures or max(temperatures) < 1.0:
-        yield "Warming: temperatures were not recorded or changed by less than 1 °C; they hold at this one only."
+        yield "Warming: temperatures were not recorded or changed by less than 1 °C; the zeros hold at that one."
     if "repeat" not in evidence.recording.samples:
         yield "Missing physics: no pose was repeated, so noise and model error cannot be told apart."
 
