@@ -35,6 +35,7 @@ class Sample:
         row |= {f"approach{i + 1}": int(sign) for i, sign in enumerate(self.approach)}
         row |= {"repeat": self.repeat}
         row |= _numbered("qd", "_rad_s", look.qd_rad_s)
+        row |= {"settled": int(look.settled), "centred": int(self.centred)}
         return row | {f"temp_{where}_degC": value for where, value in look.temperatures_degC.items()}
 
 

@@ -17,9 +17,7 @@ from drivers.errors import DeviceError
 
 Floats = NDArray[np.float64]
 
-# After the controller says that the motion has ended, samples still on their way were taken before: at 3 Mbaud a frame
-# of ten samples arrives 11 ms after its first one.
-IN_FLIGHT_S = 0.015
+LATENESS_S = 2.0  # of host time looked back on, to learn how early a PSD sample can arrive at all
 SILENCE_S = 0.5  # host time without a sample after which a wait gives up
 
 
@@ -51,6 +49,7 @@ class WiredBench:
     supervisor: Supervisor
     clock: Clock
     place: Callable[[int], None]
+    hurry: float = 1.0  # device seconds in one second of this program's clock
     rule: SettleRule = field(default_factory=SettleRule)
     _cmd_rad: Floats = field(default_factory=lambda: np.empty(0), init=False)
     _start_s: float | None = field(default=None, init=False)
@@ -74,7 +73,7 @@ class WiredBench:
     def look(self, dwell_s: float) -> Look:
         self.supervisor.check()
         seen_s = self.clock.now_s()
-        begin_s = self._psd_time() + IN_FLIGHT_S
+        begin_s = self._psd_time(seen_s)
         blocks: list[Block] = []
         while True:
             arrived = self.pumps.psd.wait(seen_s, SILENCE_S)
@@ -88,9 +87,15 @@ class WiredBench:
             if stretch is not None:
                 return self._summed(window.between(stretch.from_s, stretch.to_s), settled=stretch.settled)
 
-    def _psd_time(self) -> float:
-        latest = self.pumps.psd.latest()
-        return float((latest or self.pumps.psd.wait(-np.inf, SILENCE_S)[-1]).device_s[-1])
+    def _psd_time(self, host_s: float) -> float:
+        """What the PSD box's clock showed, or later, at `host_s`: earlier samples may be of before the motion ended.
+
+        The promptest sample of the last seconds ties both clocks; every other one came later than it could have, by
+        the line, this machine's load, or an emulator that fell behind. So the guess is late rather than early.
+        """
+        blocks = self.pumps.psd.recent(host_s - LATENESS_S) or self.pumps.psd.wait(-np.inf, SILENCE_S)
+        prompt_s = min(float(block.host_s[-1]) - float(block.device_s[-1]) / self.hurry for block in blocks)
+        return (host_s - prompt_s) * self.hurry
 
     def _summed(self, window: PsdWindow, *, settled: bool) -> Look:
         if self._start_s is None:

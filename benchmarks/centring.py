@@ -52,13 +52,21 @@ class Start:
     first: int
 
 
-def run(rig: Rig, plain_rig: Mapping[str, Any], cases: int = 100, seed: int = 20_000) -> dict[str, list[Centring]]:
-    """Runs of every strategy from the same `cases` starts."""
+def run(
+    rig: Rig,
+    plain_rig: Mapping[str, Any],
+    cases: int = 100,
+    seed: int = 20_000,
+    strategies: tuple[str, ...] = tuple(name for name, _ in STRATEGIES),
+) -> dict[str, list[Centring]]:
+    """Runs of the named strategies, all if not said, from the same `cases` starts."""
     rng = np.random.default_rng(seed)
-    runs: dict[str, list[Centring]] = {name: [] for name, _ in STRATEGIES}
+    runs: dict[str, list[Centring]] = {name: [] for name in strategies}
     for case in range(cases):
         start = random_start(rig, plain_rig, case, rng)
         for name, make in STRATEGIES:
+            if name not in strategies:
+                continue
             start.bench.move(start.q_rad)
             strategy = make(start.learner.arm, start.learner.optics, start.T_guess, start.first)
             runs[name].append(centre(start.bench, start.learner.arm, strategy, start.q_rad, np.zeros(4), LIMITS))

@@ -16,7 +16,7 @@ class RecordingJournal:
         self._writer, self._clock = writer, clock
 
     def sample(self, sample: Sample) -> None:
-        self._writer.sample(sample.row())
+        self._writer.sample(sample.row(), sample.look.host_s)
 
     def event(self, kind: str, detail: Mapping[str, Any]) -> None:
         self._writer.event(Event(self._clock.now_s(), kind, detail))

@@ -97,7 +97,7 @@ def connected(
             supervisor.check()  # another device failed meanwhile, and its stop ended this too: that is the news
             raise
         speeds = Speeds(rig.motion.speed_rad_s, rig.motion.acceleration_rad_s2)
-        yield WiredBench(control, pumps, _view_of(psd), speeds, supervisor, clock, place)
+        yield WiredBench(control, pumps, _view_of(psd), speeds, supervisor, clock, place, addresses.hurry)
 
 
 def _released(control: UrControl) -> None:

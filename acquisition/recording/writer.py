@@ -129,8 +129,10 @@ class RecordingWriter:
             )
             return self._streams[name]
 
-    def sample(self, row: Mapping[str, Cell]) -> None:
+    def sample(self, row: Mapping[str, Cell], host_s: float | None = None) -> None:
         """One settled sample: column -> value, None (or NaN) where missing; names of the session-folder format.
+
+        `host_s` is when it was taken, for viewers; without it `t_s` is counted from `host_s0`.
 
         SamplesError for a row that could not be read back; RecordingError when the recording failed or is closed.
         """
@@ -138,7 +140,7 @@ class RecordingWriter:
             place = f"{self.path} sample {self._n_samples + 1}"
             columns = {name: [_plain(cell)] for name, cell in row.items()}
             checked = next(checked_samples(columns, self.rig, lambda _: place).rows())
-            time_ns = log_ns(self.host_s0 + float(checked["t_s"] or 0.0))
+            time_ns = log_ns(self.host_s0 + float(checked["t_s"] or 0.0) if host_s is None else host_s)
             self._spool.put(partial(self._samples_encoder.write, row=checked, log_ns=time_ns), 16 * len(row))
             self._n_samples += 1
 

@@ -57,13 +57,16 @@ def _trace(detail: Mapping[str, Any]) -> Trace | None:
         spots = np.array(
             [[math.nan if v is None else float(v) for v in look] for look in detail["spots_m"]], dtype=np.float64
         ).reshape(-1, 4)
-        target = np.array(detail["target_m"], dtype=np.float64)
+        target = np.array(detail["target_m"], dtype=np.float64).reshape(4)
+        tolerance_m = float(detail["tolerance_m"])
+        if not (np.all(np.isfinite(target)) and 0.0 < tolerance_m < math.inf):
+            return None
         return Trace(
             int(detail["placement"]),
             int(detail["first_psd"]),
             str(detail["strategy"]),
             str(detail["status"]),
-            float(detail["tolerance_m"]),
+            tolerance_m,
             np.abs(spots - target).max(axis=1) if len(spots) else np.empty(0),
             sum(purpose == "probe" for purpose in detail["purpose"]),
         )

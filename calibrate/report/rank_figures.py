@@ -26,7 +26,7 @@ def _paint_spectrum(figure: Figure, s: Floats, rank: int, with_drawing: bool) ->
     axes = figure.add_subplot()
     axes.set_yscale("log")
     number = np.arange(1, len(s) + 1)
-    shown = np.maximum(s, 1e-13 * s[0])
+    shown = np.maximum(s, np.finfo(float).eps * s[0])  # below is rounding, and zero has no place on a log axis
     drawing = np.zeros(len(s), dtype=bool) if not with_drawing else s < DRAWING
     drawing[rank:] = False
     data = ~drawing

@@ -55,8 +55,8 @@ class Takes:
     def _arrange(self, writer: RecordingWriter, after: int, act: Callable[[], None]) -> None:
         plain, count = writer.sample, [0]
 
-        def counted(row) -> None:
-            plain(row)
+        def counted(*sample) -> None:
+            plain(*sample)
             count[0] += 1
             if count[0] == after:
                 act()

@@ -1,7 +1,7 @@
 """The first page: what was found, how well, and what stayed open."""
 
 from collections.abc import Sequence
-from math import degrees, radians
+from math import degrees, isfinite, radians
 
 from calibrate.report.elements import Html, bullets, figure, panels, table, tag
 from calibrate.report.evidence import Evidence
@@ -52,7 +52,8 @@ def _limits(evidence: Evidence) -> list[Html]:
     loose = [z for z in zeros if z.value_rad is not None and not limited_by_measurement(z)]
     if loose:
         worst = max(z.sigma_rad or 0.0 for z in loose)
-        text = f"{_names(loose)}: known to {angle(worst)} only, limited by the drawing's tolerance, not by the measurement."
+        limit = "limited by the drawing's tolerance, not by the measurement"
+        text = f"{_names(loose)}: known to {angle(worst)} only, {limit}."
         said.append(tag("p", text))
     open_ = [z for z in zeros if z.value_rad is None]
     said += [tag("p", f"J{z.joint}: not determined; {_reason(z, evidence)}.") for z in open_]
@@ -74,11 +75,10 @@ def _tile(name: str, value: str, says: str) -> Html:
 def _tiles(evidence: Evidence) -> Html:
     result, expected, unseen = evidence.result, evidence.expected, evidence.result.held_out
     found = [z for z in result.zeros if z.value_rad is not None]
-    better = result.rms_before_m / result.rms_after_m if result.rms_after_m > 0.0 else None
     tiles = [
         _tile("Zeros determined", f"{len(found)} of {len(result.zeros)}", _names(found) or "none"),
         _tile("Spots off before", length(result.rms_before_m), "rms, arm as drawn at the best places"),
-        _tile("Spots off after", length(result.rms_after_m), _gain(better)),
+        _tile("Spots off after", length(result.rms_after_m), _gain(result.rms_before_m, result.rms_after_m)),
     ]
     if expected is not None:
         tiles.append(_tile("Noise floor", length(expected.floor_m), "rms of joints and detectors, as found"))
@@ -89,8 +89,10 @@ def _tiles(evidence: Evidence) -> Html:
     return tag("div", *tiles, cls="tiles")
 
 
-def _gain(times: float | None) -> str:
-    return "no finite fit" if times is None else f"rms, {significant(times)} times better"
+def _gain(before_m: float, after_m: float) -> str:
+    if not isfinite(after_m):
+        return "no finite fit"
+    return f"rms, {significant(before_m / after_m)} times better" if after_m > 0.0 else "rms"
 
 
 def _explained(evidence: Evidence) -> list[Html]:

@@ -14,6 +14,7 @@ from acquisition.servo.registered import Registered
 from acquisition.servo.status import Status
 from acquisition.servo.strategy import Proposal
 from benchmarks.centring import random_start
+from benchmarks.centring import run as benchmark
 
 
 class Plane:
@@ -146,3 +147,11 @@ def test_law_8_with_a_guess_wrong_by_25_deg_converges_with_ripple(rig, plain_rig
     strategy = FixedGuess(start.learner.arm, start.learner.optics, start.T_guess, first, gain=0.6)
     run = centre(start.bench, start.learner.arm, strategy, start.q_rad, np.zeros(4), Limits(max_steps=60))
     assert run.status is Status.CENTRED
+
+
+def test_centring_from_anywhere_keeps_its_promise(rig, plain_rig) -> None:
+    """The benchmark in small: 16 random starts, fixture pose wrong by up to 80 deg and 50 mm, both orders."""
+    runs = benchmark(rig, plain_rig, cases=16, seed=77, strategies=("registered (sessions use it)",))
+    steps = [run.steps for run in runs["registered (sessions use it)"] if run.status is Status.CENTRED]
+    assert len(steps) >= 15
+    assert np.median(steps) <= 6
