@@ -29,6 +29,12 @@ def _concluded(recording_path: Path, console: Console) -> Identified:
     identified = identify_recording(recording)
     write_identified(identified, recording, folder / "model.json")
     print_identified(console, identified)
-    write_report(folder / "report.html", identified.used, identified.zeros, point_constraint=identified.four_poses)
+    write_report(
+        folder / "report.html",
+        identified.used,
+        identified.zeros,
+        point_constraint=identified.four_poses,
+        left_out=[blunder.says for blunder in identified.blunders],
+    )
     console.print(f"report: {folder / 'report.html'}", markup=False)
     return identified

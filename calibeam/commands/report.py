@@ -22,5 +22,11 @@ def report_command(recording: Path, *, out: Path = Path("report.html")) -> None:
     """
     source = read(recording)
     identified = identify_recording(source)
-    write_report(out, identified.used, identified.zeros, point_constraint=identified.four_poses)
+    write_report(
+        out,
+        identified.used,
+        identified.zeros,
+        point_constraint=identified.four_poses,
+        left_out=[blunder.says for blunder in identified.blunders],
+    )
     print(f"report: {out}")

@@ -1,5 +1,6 @@
 """Writes the report of a dual-PSD session: one HTML file that needs nothing else, on a screen, a phone or on paper."""
 
+from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 
@@ -24,9 +25,11 @@ def write_report(
     point_constraint: PointConstraintResult | None = None,
     why_no_point_constraint: str = "it was not asked for",
     angles: Angles = "reported",
+    left_out: Sequence[str] = (),
 ) -> Path:
     """One HTML file at `path`, over what may be there; returns it.
 
+    `left_out` are sentences, each naming rows that were recorded but not fitted.
     `result` must come from `recording` with these `angles`. DataError if it does not, or the file cannot be written.
     """
     page = report_html(
@@ -35,6 +38,7 @@ def write_report(
         point_constraint=point_constraint,
         why_no_point_constraint=why_no_point_constraint,
         angles=angles,
+        left_out=left_out,
     )
     try:
         Path(path).write_text(page, encoding="utf-8")
@@ -50,6 +54,7 @@ def report_html(
     point_constraint: PointConstraintResult | None = None,
     why_no_point_constraint: str = "it was not asked for",
     angles: Angles = "reported",
+    left_out: Sequence[str] = (),
 ) -> str:
     """The page as text; arguments as in `write_report`."""
     known = evidence(recording, result, angles)
@@ -61,7 +66,7 @@ def report_html(
         residuals.residuals(known),
         zeros.zeros(known),
         point.point(point_constraint, result.zeros, why_no_point_constraint),
-        unseen.unseen(known),
+        unseen.unseen(known, left_out),
         provenance.provenance(known),
     )
     return _page(known, chapters)

@@ -1,6 +1,6 @@
 """The chapter on what these data cannot tell, and on the data themselves."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -22,7 +22,7 @@ EXTRAS = (
 )
 
 
-def unseen(evidence: Evidence) -> Html:
+def unseen(evidence: Evidence, left_out: Sequence[str] = ()) -> Html:
     """Limits of the answer, then coverage and health of the recording."""
     recording = evidence.recording
     lead = "Limits that no computation can lift, and the state of the recording behind the numbers."
@@ -31,11 +31,16 @@ def unseen(evidence: Evidence) -> Html:
         TITLE,
         lead,
         bullets(_limits(evidence)),
+        *_not_fitted(left_out),
         _coverage(evidence),
         _recorded(recording),
         *_streams(recording),
         _findings(recording),
     )
+
+
+def _not_fitted(left_out: Sequence[str]) -> list[Html]:
+    return [tag("h3", "Recorded, but left out of the fit"), bullets(left_out)] if left_out else []
 
 
 def _limits(evidence: Evidence) -> Iterator[str]:

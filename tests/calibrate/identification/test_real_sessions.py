@@ -36,7 +36,9 @@ def test_20_unseen_poses_of_a_ur5_are_predicted_to_a_tenth_of_a_millimetre(real)
     ("name", "before_m", "after_m"),
     [("ur10-leica-a", 0.8e-3, 0.449e-3), ("ur10-leica-b", 1.0e-3, 0.421e-3), ("ur10-leica-d", 0.7e-3, 0.397e-3)],
 )
-def test_a_ur10_before_a_tracker_of_unknown_place_is_as_good_as_published(real, name, before_m, after_m):
+def test_a_ur10_before_a_tracker_of_unknown_place_is_within_3_percent_of_the_published_error(
+    real, name, before_m, after_m
+):
     recording = real(name)
     assert recording.rig.device is None
     result = run(recording, share=0.2)

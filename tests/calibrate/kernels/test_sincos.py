@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-compiled = pytest.importorskip("calibrate.kernels.compiled")
+from calibrate.kernels import compiled
 
 
 def both(angle):

@@ -85,6 +85,13 @@ def test_all_chapters_are_there(page: str) -> None:
     assert page.count("<svg") >= 9
 
 
+def test_rows_left_out_of_the_fit_are_named(page: str, recorded, identified) -> None:
+    assert "left out of the fit" not in text_of(page)
+    told = text_of(report_html(recorded, identified.zeros, left_out=["row 7, psd1_x_m: 5 mm < off; check it"]))
+    assert "left out of the fit" in told
+    assert "row 7, psd1_x_m: 5 mm &lt; off; check it" in told
+
+
 def test_chromium_shows_it_without_a_word_on_the_console(recorded, identified, tmp_path: Path) -> None:
     browser = shutil.which("chromium")
     if browser is None:
