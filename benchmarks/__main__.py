@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from benchmarks import centring, coverage, speed, zeros
+from benchmarks import blunders, centring, coverage, speed, zeros
 
 RIG = Path(__file__).parents[1] / "rigs" / "ur5e-dual-psd.toml"
 
@@ -32,6 +32,12 @@ def run_coverage() -> None:
     print("\n".join(coverage.lines(coverage.run(RIG))))
 
 
+def run_blunders() -> None:
+    print("blunders put into sessions at random rows and joints, and healthy sessions of every instrument")
+    for row in blunders.lines(RIG, RIG.parents[2] / "shared" / "data"):
+        print(row, flush=True)
+
+
 def run_speed() -> None:
     for row in speed.lines(RIG):
         print(row, flush=True)
@@ -41,6 +47,7 @@ BENCHMARKS: dict[str, Callable[[], None]] = {
     "centring": run_centring,
     "zeros": run_zeros,
     "coverage": run_coverage,
+    "blunders": run_blunders,
     "speed": run_speed,
 }
 

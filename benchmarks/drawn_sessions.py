@@ -50,7 +50,7 @@ class Bench:
 
     def tracker(self, rng: np.random.Generator, poses: int = 40) -> Session:
         """Positions of a target at poses drawn over most of the joint range."""
-        truth, links = self._drawn_links(rng)
+        truth, links = self.drawn_links(rng)
         angles = rng.uniform(-2.5, 2.5, (poses, len(links)))
         tool, device = rng.normal(0, 1e-3, 3), _drawn_frame(rng)
         truth |= {f"tool.{a}": v for a, v in zip("xyz", tool, strict=True)} | _named("device", device)
@@ -63,7 +63,7 @@ class Bench:
 
     def dual_psd(self, rng: np.random.Generator, poses: int = 50) -> Session:
         """Spots at poses of the pool; laser mount and places a little off."""
-        truth, links = self._drawn_links(rng)
+        truth, links = self.drawn_links(rng)
         chosen = rng.permutation(len(self.pool[0]))[:poses]
         angles, place, first = (values[chosen] for values in self.pool)
         origin = self.laser_origin + rng.normal(0, 5e-4, 3)
@@ -83,7 +83,7 @@ class Bench:
         spots += rng.normal(0, SPOT_SIGMA_M, spots.shape)
         return Session(angles - _zeros(truth), spots, place, first, truth)
 
-    def _drawn_links(self, rng: np.random.Generator) -> tuple[dict[str, float], Floats]:
+    def drawn_links(self, rng: np.random.Generator) -> tuple[dict[str, float], Floats]:
         sizes = [self.tolerance["length_m"]] * 2 + [self.tolerance["angle_rad"]] * 2
         off = rng.normal(0, sizes, (len(self.links), 4))
         off[np.abs(np.cos(self.links[:, 3])) < PARALLEL_COSINE, 3] = 0.0

@@ -1,5 +1,6 @@
 """From any recording or session folder to a model of the arm, whatever instruments it holds."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ from acquisition.recording.columns import POSITION, SPOTS
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import rig_sha256
 from acquisition.recording.samples import Samples
-from calibeam.identification import SPLIT_SEED
+from calibrate.fit_plan import DEFAULT, FitPlan, read_plan
 from calibrate.identification.identify import identify
 from calibrate.identification.record import record_of
 from calibrate.identification.result import Identification
@@ -24,15 +25,36 @@ def only_spots(samples: Samples) -> bool:
     )
 
 
-def identify_session(recording: Recording) -> Identification:
+@dataclass(frozen=True)
+class Planned:
+    """A fit plan and its text, which travels with the model."""
+
+    plan: FitPlan = DEFAULT
+    text: str | None = None
+
+    @classmethod
+    def read(cls, path: Path | None) -> "Planned":
+        """The plan of a file, the defaults without one. DataError for what is wrong in it."""
+        return cls() if path is None else cls(*read_plan(path))
+
+
+def identify_session(
+    recording: Recording, planned: Planned | None = None, bootstrap_rounds: int | None = None
+) -> Identification:
     """The arm by all instruments of the recording. DataError when it holds nothing to fit, or is a blunder as such."""
-    return identify(recording.rig, recording.samples, rng=np.random.default_rng(SPLIT_SEED))
+    plan = DEFAULT if planned is None else planned.plan
+    rng = np.random.default_rng(plan.seed)
+    return identify(recording.rig, recording.samples, rng=rng, plan=plan, bootstrap_rounds=bootstrap_rounds)
 
 
-def write_session_model(result: Identification, recording: Recording, path: Path) -> ModelFile:
+def write_session_model(
+    result: Identification, recording: Recording, path: Path, planned: Planned | None = None
+) -> ModelFile:
     """model.json, with the rig in it."""
-    text = recording.rig_text
-    model = record_of(result, RigIdentity(recording.rig.name, rig_sha256(text), text), recording.rig.arm.model.value)
+    text, rig = recording.rig_text, recording.rig
+    told = Planned() if planned is None else planned
+    arm_model = (told.plan.model or rig.arm.model).value
+    model = record_of(result, RigIdentity(rig.name, rig_sha256(text), text), arm_model, told.text)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_model(path, model)
     return model

@@ -21,6 +21,7 @@ from calibeam.commands.identify import identify_command
 from calibeam.commands.predict import predict_command
 from calibeam.commands.report import report_command
 from calibeam.commands.session import session
+from calibeam.commands.tool_axes import tool_axes_command
 from calibeam.emulation import EmulationError
 from calibeam.outcome import PartialResult
 from calibrate.errors import DataError
@@ -53,6 +54,7 @@ app.command(emulate)
 app.command(identify_command, name="identify")
 app.command(predict_command, name="predict")
 app.command(report_command, name="report")
+app.command(tool_axes_command, name="tool-axes")
 app.command(export_command, name="export")
 app.command(import_command, name="import")
 

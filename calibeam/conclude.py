@@ -7,9 +7,9 @@ from rich.console import Console
 from acquisition.recording.read import read
 from calibeam.identification import Identified, identify_recording, write_identified
 from calibeam.outcome import PartialResult
+from calibeam.reporting import write_zero_report
 from calibeam.terminal import print_identified
 from calibrate.errors import DataError
-from calibrate.report.zero_report import write_report
 
 
 def conclude(recording_path: Path, console: Console) -> Identified:
@@ -29,12 +29,6 @@ def _concluded(recording_path: Path, console: Console) -> Identified:
     identified = identify_recording(recording)
     write_identified(identified, recording, folder / "model.json")
     print_identified(console, identified)
-    write_report(
-        folder / "report.html",
-        identified.used,
-        identified.zeros,
-        point_constraint=identified.four_poses,
-        left_out=[blunder.says for blunder in identified.blunders],
-    )
+    write_zero_report(identified, folder / "report.html")
     console.print(f"report: {folder / 'report.html'}", markup=False)
     return identified

@@ -13,8 +13,12 @@ from acquisition.recording.rig_schema import Rig
 from calibrate.arms.catalogue import arm_of
 from calibrate.blunders.finding import Blunder
 from calibrate.dual_psd_rig import believed_noise, drawing_doubt, dual_psd_chain, fixture_of, laser_of
+from calibrate.fit import Status
+from calibrate.identification.evidence import Asked
+from calibrate.identification.evidence_record import evidence_fields
 from calibrate.identification.record import left_out
-from calibrate.identification.spots import without_blunders
+from calibrate.identification.result import Identification
+from calibrate.identification.spots import proved, without_blunders
 from calibrate.model_file import RigIdentity, model_of, write_model
 from calibrate.observations import Observations
 from calibrate.read_samples import observations
@@ -37,6 +41,7 @@ class Identified:
     four_poses: PointConstraintResult | None
     used: Recording  # without the rows of the blunders
     blunders: tuple[Blunder, ...] = ()
+    proved: Identification | None = None  # the same fit, for its proofs; None where there is no answer to prove
 
 
 def check_identifiable(rig: Rig) -> None:
@@ -53,7 +58,10 @@ def identify_recording(recording: Recording) -> Identified:
     data = observations(samples)
     chain = dual_psd_chain(rig, data.placement, data.first_psd)
     zeros = identify(chain, data, believed_noise(rig), rng=np.random.default_rng(SPLIT_SEED))
-    return Identified(zeros, _four_poses(rig, data), replace(recording, samples=samples), blunders)
+    proofs = None
+    if zeros.status is not Status.NOT_FINITE:
+        proofs = proved(rig, samples, zeros, asked=Asked(), rng=np.random.default_rng(SPLIT_SEED))
+    return Identified(zeros, _four_poses(rig, data), replace(recording, samples=samples), blunders, proofs)
 
 
 def write_identified(identified: Identified, recording: Recording, path: Path) -> None:
@@ -61,7 +69,11 @@ def write_identified(identified: Identified, recording: Recording, path: Path) -
     identity = RigIdentity(recording.rig.name, rig_sha256(recording.rig_text), recording.rig_text)
     path.parent.mkdir(parents=True, exist_ok=True)
     model = model_of(identified.zeros, identity, recording.rig.arm.model.value)
-    write_model(path, msgspec.structs.replace(model, blunders=tuple(left_out(b) for b in identified.blunders)))
+    model = msgspec.structs.replace(model, blunders=tuple(left_out(b) for b in identified.blunders))
+    if identified.proved is not None:
+        proofs = evidence_fields(identified.proved.evidence)
+        model = msgspec.structs.replace(model, alarms=identified.proved.alarms, **proofs)
+    write_model(path, model)
 
 
 def _four_poses(rig: Rig, data: Observations) -> PointConstraintResult | None:

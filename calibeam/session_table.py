@@ -1,60 +1,99 @@
-"""An identified arm as a person reads it in a terminal: blunders, rank, then numbers, each with its doubt."""
+"""An identified arm as a person reads it in a terminal: blunders, alarms, rank, numbers with their doubt, verdict."""
+
+from collections.abc import Callable
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from calibeam.evidence_lines import lines_of
+from calibeam.verdict_line import print_verdict
+from calibrate.identification.evidence_record import parameter_records
+from calibrate.identification.fit_report import ONLY_BELIEVED
 from calibrate.identification.result import Identification
-from calibrate.uncertainty.chi_square import Alarm
-from calibrate.zeros.result import Estimate
+from calibrate.model_file import ModelParameter
+from calibrate.report.verdict import Verdict
+
+UNITS = {"m": ("um", 1e6), "rad": ("urad", 1e6)}
 
 
-def print_identification(console: Console, result: Identification) -> None:
-    """What was wrong with the file comes first, since all that follows is without these rows."""
+def print_identification(console: Console, result: Identification, judged: Verdict) -> None:
+    """What was wrong with the file comes first, since all that follows is without these rows; last the verdict."""
     for blunder in result.blunders:
         console.print(f"left out: {blunder.says}", highlight=False, markup=False)
+    for alarm in result.alarms:
+        console.print(f"ALARM: {alarm}", style="bold red", highlight=False, markup=False)
     seen = result.identifiability
     names = ", ".join(f"{i.name} ({i.observations})" for i in result.instruments)
-    console.print(f"{names}: {result.n_samples} samples, rank {seen.rank} of {seen.n_free} unknowns", highlight=False)
+    console.print(
+        f"{names}: {result.n_samples} samples, rank {seen.rank} of {seen.n_free} unknowns, "
+        f"condition {seen.condition:.3g}",
+        highlight=False,
+    )
     for combination in seen.combinations:
         about = "" if len(combination.members) > 1 else f"{combination.words}: "
         console.print(f"  {about}{combination.says}", highlight=False, markup=False)
-    _print_estimates(console, result.estimates)
-    _print_figures(console, result)
-    console.print(f"{result.status.name}: {result.status.value}", highlight=False)
+    believed = [e.name for e in result.estimates if e.why is not None and e.why.startswith(ONLY_BELIEVED)]
+    if believed:
+        console.print(f"  only the drawing speaks of: {', '.join(believed)}", highlight=False, markup=False)
+    _print_parameters(console, parameter_records(result.estimates, seen, result.evidence.bootstrap))
+    for line in (*_figures(result), *lines_of(result.evidence)):
+        console.print(line, highlight=False, markup=False)
+    print_verdict(console, judged)
 
 
-def _print_estimates(console: Console, estimates: tuple[Estimate, ...]) -> None:
-    known = [(e.name, e.unit, e.value, e.sigma) for e in estimates if e.value is not None and e.sigma is not None]
+def _print_parameters(console: Console, parameters: tuple[ModelParameter, ...]) -> None:
+    known = [p for p in parameters if p.value is not None]
     if not known:
         console.print("no single parameter can be told alone; together they predict (model.json: chain)")
         return
+    _print_table(console, ("correction", "sigma", "predicted", "95 %"), known, _by_covariance)
+    drawn = [p for p in known if p.bootstrap_sigma is not None]
+    if drawn:
+        _print_table(console, ("bootstrap sigma", "bootstrap 95 %"), drawn, _by_bootstrap)
+
+
+def _print_table(
+    console: Console,
+    headings: tuple[str, ...],
+    parameters: list[ModelParameter],
+    cells: Callable[[ModelParameter, float], list[str]],
+) -> None:
     table = Table()
-    for heading in ("parameter", "correction", "sigma", "unit"):
+    for heading in ("parameter", *headings, "unit"):
         table.add_column(heading, justify="right")
-    for name, unit, value, sigma in known:
-        small = {"m": "um", "rad": "urad"}.get(unit)
-        factor = 1e6 if small else 1.0
-        table.add_row(name, f"{factor * value:+.2f}", f"{factor * sigma:.2f}", small or unit)
+    for p in parameters:
+        unit, factor = UNITS.get(p.unit, (p.unit, 1.0))
+        table.add_row(p.name, *cells(p, factor), unit)
     console.print(table)
 
 
-def _print_figures(console: Console, result: Identification) -> None:
-    for one in result.instruments:
-        console.print(
-            f"{one.name}: {1e3 * one.rms_before:.4g} mm rms with the arm as drawn, {1e3 * one.rms_after:.4g} mm after",
-            highlight=False,
-        )
-    for unseen in result.held_out:
-        console.print(
-            f"held out ({unseen.split}): {unseen.name}, {unseen.observations} rows, {1e3 * unseen.rms_before:.4g} mm "
-            f"rms before, {1e3 * unseen.rms_after:.4g} mm after",
-            highlight=False,
-        )
+def _by_covariance(p: ModelParameter, factor: float) -> list[str]:
+    promised = _cell(p.predicted_sigma, factor)
+    return [_cell(p.value, factor, "+"), _cell(p.sigma, factor), promised, _interval(p.low, p.high, factor)]
+
+
+def _by_bootstrap(p: ModelParameter, factor: float) -> list[str]:
+    return [_cell(p.bootstrap_sigma, factor), _interval(p.bootstrap_low, p.bootstrap_high, factor)]
+
+
+def _interval(low: float | None, high: float | None, factor: float) -> str:
+    return f"{_cell(low, factor, '+')} {_cell(high, factor, '+')}"
+
+
+def _cell(value: float | None, factor: float, sign: str = "") -> str:
+    return "-" if value is None else f"{factor * value:{sign}.4g}"
+
+
+def _figures(result: Identification) -> list[str]:
+    out = [
+        f"{one.name}: {1e3 * one.rms_before:.4g} mm rms with the arm as drawn, {1e3 * one.rms_after:.4g} mm after"
+        for one in result.instruments
+    ]
     for noise in result.noise:
         found, believed = 1e6 * noise.found, 1e6 * noise.believed
-        console.print(f"noise of {noise.source}: {found:.3g}e-6 found, {believed:.3g}e-6 believed", highlight=False)
+        out.append(f"noise of {noise.source}: {found:.3g}e-6 found, {believed:.3g}e-6 believed")
     stated = result.stated_noise
-    if stated.alarm is not Alarm.NONE:
-        factor = "" if np.isnan(stated.noise_factor) else f" ({stated.noise_factor:.3g} times)"
-        console.print(f"chi-square: {stated.alarm.value}{factor}", highlight=False)
+    if np.isfinite(stated.p_above):
+        out.append(f"chi-square under the noise as stated: {stated.chi2:.4g} at {stated.dof} degrees of freedom")
+    return out

@@ -4,20 +4,27 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from calibeam.evidence_lines import told_lines
 from calibeam.identification import Identified
 from calibeam.reveal import Revealed
+from calibeam.verdict_line import print_verdict
 from calibrate.identifiability import Identifiability
+from calibrate.report.evidence import evidence
+from calibrate.report.verdict import verdict
 from calibrate.zeros.point_constraint import PointConstraintResult
 from calibrate.zeros.result import JointZero, ZeroResult
 
 
 def print_identified(console: Console, identified: Identified) -> None:
-    """What was wrong with the file, then both methods, the full model last: its numbers are the ones to use."""
+    """What was wrong with the file, the full model, the source's method beside it, and last how far to trust it."""
     for blunder in identified.blunders:
         console.print(f"left out: {blunder.says}", highlight=False, markup=False)
+    _print_full(console, identified.zeros)
+    for line in [] if identified.proved is None else told_lines(identified.proved):
+        console.print(line, highlight=False, markup=False)
     if identified.four_poses is not None:
         _print_four_poses(console, identified.four_poses)
-    _print_full(console, identified.zeros)
+    print_verdict(console, verdict(evidence(identified.used, identified.zeros, "reported")))
 
 
 def print_revealed(console: Console, revealed: tuple[Revealed, ...]) -> None:
@@ -42,10 +49,9 @@ def print_revealed(console: Console, revealed: tuple[Revealed, ...]) -> None:
 
 
 def _print_four_poses(console: Console, result: PointConstraintResult) -> None:
-    console.print("\n[bold]four-pose point constraint[/bold] (Deng, Ding, Zhang 2019)")
+    console.print("\n[bold]for comparison (source method)[/bold]: four-pose point constraint, Deng, Ding, Zhang 2019")
     _print_rank(console, result.identifiability)
     _print_zeros(console, result.zeros)
-    console.print(f"{result.status.name}: {result.status.value}")
 
 
 def _print_full(console: Console, result: ZeroResult) -> None:
@@ -64,7 +70,6 @@ def _print_full(console: Console, result: ZeroResult) -> None:
             f"held out ({held.split}): {held.poses} poses, {1e6 * held.rms_before_m:.1f} um before, "
             f"{1e6 * held.rms_after_m:.2f} um after"
         )
-    console.print(f"{result.status.name}: {result.status.value}")
 
 
 def _print_rank(console: Console, seen: Identifiability) -> None:

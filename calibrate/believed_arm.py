@@ -1,6 +1,7 @@
 """The believed arm with its laser, one pose at a time and cheap: what servo and pose plan ask thousands of times.
 
-Same formulas as the fit (arms/dh), with everything that does not depend on the joints worked out once.
+Same chain as the fit (arms/serial), of any arm model, with everything that does not depend on the joints worked out
+once.
 """
 
 import math
@@ -11,9 +12,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.rig_schema import Rig
 from calibrate.arms.catalogue import arm_of
-from calibrate.arms.dh import DhArm
 from calibrate.dual_psd_rig import laser_of
-from calibrate.errors import DataError
 from calibrate.parameters import values_by_name
 
 Floats = NDArray[np.float64]
@@ -23,10 +22,8 @@ class BelievedArm:
     """Immutable; `corrections` are fitted values by parameter name, of which it takes those of arm and laser."""
 
     def __init__(self, rig: Rig, corrections: Mapping[str, float] | None = None) -> None:
-        """DataError for a rig without laser or with an arm model that has no single-pose form."""
+        """DataError for a rig without laser."""
         arm, laser = arm_of(rig), laser_of(rig)
-        if not isinstance(arm, DhArm):
-            raise DataError(f"rig {rig.name}: arm.model '{rig.arm.model.value}' has no single-pose model")
         parameters = arm.parameters + laser.parameters
         known = {p.name for p in parameters}
         theta = values_by_name(parameters, {k: v for k, v in (corrections or {}).items() if k in known})
@@ -34,13 +31,14 @@ class BelievedArm:
         self.n_joints = arm.n_joints
         self.lower_rad = np.array([j.lower_rad for j in rig.arm.joints])
         self.upper_rad = np.array([j.upper_rad for j in rig.arm.joints])
-        self._tails = arm.link_tail(theta[:n])
+        fixed = arm.fixed_parts(theta[:n])
+        self._base, self._tails = fixed[0], fixed[1:]
         self._offset_rad = arm.angle_offset_rad(theta[:n])
         self._laser_origin_m, direction = laser.in_flange(theta[n:])
         self._laser_direction = direction / np.linalg.norm(direction)
 
     def frames(self, q_rad: Floats) -> Floats:
-        """T_base_frame (joint + 1, 4, 4) of the base and behind every link; the last is the flange."""
+        """T_base_frame (joint + 1, 4, 4): joint i + 1 turns about z of frame i; the last is the flange."""
         angle = np.asarray(q_rad, dtype=float) + self._offset_rad
         links = self._tails.copy()  # Rz(angle) times each tail: only its first two rows mix
         for i, a in enumerate(angle.tolist()):
@@ -48,7 +46,7 @@ class BelievedArm:
             x, y = self._tails[i, 0], self._tails[i, 1]
             links[i, 0], links[i, 1] = c * x - s * y, s * x + c * y
         out = np.empty((self.n_joints + 1, 4, 4))
-        out[0] = np.eye(4)
+        out[0] = self._base
         for i in range(self.n_joints):
             np.matmul(out[i], links[i], out=out[i + 1])
         return out

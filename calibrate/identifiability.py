@@ -23,6 +23,7 @@ WEAK = 0.5  # sigma of twice the plausible size: the data say nothing; pure prio
 STRUCTURAL = 1e-9  # of the largest singular value: not weak data but geometry; rounding leaves about 1e-12
 TRACE = 1e-5  # share of an unseen direction below which a parameter is not part of it
 NEGLIGIBLE = 0.1  # of a sigma: what an unseen combination, off by its plausible size, may shift a parameter by
+EQUAL = 1e-6  # of a length: two that differ by less are equally long
 SPOKEN = 0.02  # share of its largest member below which a member is not worth saying
 
 
@@ -30,11 +31,20 @@ SPOKEN = 0.02  # share of its largest member below which a member is not worth s
 class Combination:
     """Parameters that can be changed together without the data noticing."""
 
-    words: str  # "joint1.zero + placement x, y, yaw"
+    spoken: tuple[str, ...]  # the representative, then the members worth saying
     members: tuple[str, ...]  # strongest first
     representative: str  # the one to hold
     structural: bool  # geometry forbids it; False: these poses are too few or too alike
-    plain: str = ""  # the same for who calibrates: "d2 + d3", "joint 1 zero with base yaw"
+
+    @property
+    def words(self) -> str:
+        """As in "joint1.zero + placement x, y, yaw"."""
+        return in_words(self.spoken)
+
+    @property
+    def plain(self) -> str:
+        """The same for who calibrates: "d2 + d3", "joint 1 zero with base yaw"."""
+        return plainly(self.spoken)
 
     @property
     def says(self) -> str:
@@ -74,14 +84,14 @@ def analyse(jacobian: Floats, parameters: tuple[Parameter, ...]) -> Identifiabil
     free = np.flatnonzero([p.free for p in parameters])
     names = tuple(parameters[i].name for i in free)
     scale, prior = plausible_sizes(parameters)[free], priors(parameters)[free]
-    rows = np.concatenate([jacobian[:, free] * scale, np.diag(np.where(np.isfinite(prior), scale / prior, 0.0))])
-    _, s, Vt = np.linalg.svd(np.linalg.qr(rows, mode="r"))  # the triangle has the same values and directions
-    seen = s > max(WEAK, STRUCTURAL * s[0])
+    s, Vt = directions(jacobian[:, free] * scale, scale / prior)
+    structural = STRUCTURAL * float(s.max(initial=0.0))  # no free parameter at all has no values
+    seen = s > max(WEAK, structural)
     unseen = Vt[~seen].T  # (free, k)
     shift, doubt = np.linalg.norm(unseen, axis=1), np.linalg.norm(Vt[seen].T / s[seen], axis=1)
     invisible = (shift > TRACE) & (shift > NEGLIGIBLE * doubt)
     sigma = np.where(invisible, np.inf, scale * doubt)
-    n_structural = int(np.sum(s < STRUCTURAL * s[0]))
+    n_structural = int(np.sum(s < structural))
     return Identifiability(
         names,
         int(seen.sum()),
@@ -93,37 +103,66 @@ def analyse(jacobian: Floats, parameters: tuple[Parameter, ...]) -> Identifiabil
     )
 
 
+def directions(jacobian: Floats, belief: Floats) -> tuple[Floats, Floats]:
+    """Singular values (free,), falling, and their directions (free, free), row by row, of data and priors.
+
+    For the scaled whitened Jacobian (row, free) and the plausible sizes over the prior sigmas (free,).
+    """
+    n = len(belief)
+    believed = np.flatnonzero(belief)
+    beliefs = np.zeros((max(len(believed), n - len(jacobian)), n))  # at least as many rows as columns
+    beliefs[range(len(believed)), believed] = belief[believed]
+    rows = np.concatenate([jacobian, beliefs])
+    _, s, Vt = np.linalg.svd(np.linalg.qr(rows, mode="r"))  # the triangle has the same values and directions
+    return s, Vt
+
+
 def _combinations(
     unseen: Floats, names: tuple[str, ...], n_structural: int, invisible: Bools
 ) -> tuple[Combination, ...]:
     """Simplest basis of the unseen directions (weakest first): each has a representative that no other contains.
 
     Joint zeros are taken as representatives first, because they are what is asked for. What geometry forbids is
-    separated first and kept free of what is only weak.
+    separated first and kept free of what is only weak. Which orthonormal basis `unseen` is makes no difference.
     """
-    basis = unseen.T.copy()
+    structural, weak = unseen.T[:n_structural], unseen.T[n_structural:]
     zeros = np.array([name.endswith(".zero") for name in names])
-    pivots: list[int] = []
-    for k in range(len(basis)):
-        first, end = (0, n_structural) if k < n_structural else (n_structural, len(basis))
-        rest = np.abs(basis[k:end])
-        worth_saying = rest > SPOKEN * rest.max(axis=1, keepdims=True)  # holding less would not hold the combination
-        among_zeros = np.where(zeros & worth_saying, rest, 0.0)
-        candidates = among_zeros if among_zeros.max() > TRACE else rest
-        row, column = divmod(int(np.argmax(candidates)), rest.shape[1])
-        basis[[k, k + row]] = basis[[k + row, k]]
-        basis[k] /= basis[k, column]
-        others = np.arange(len(basis)) >= first
-        others[k] = False
-        basis[others] -= np.outer(basis[others, column], basis[k])
-        pivots.append(column)
-    return tuple(_combination(v * invisible, names, pivots[k], k < n_structural) for k, v in enumerate(basis))
+    first = _representatives(structural, zeros)
+    structural = np.linalg.solve(structural[:, first], structural)
+    weak = weak - weak[:, first] @ structural
+    then = _representatives(weak, zeros)
+    basis = np.concatenate([structural, np.linalg.solve(weak[:, then], weak)])
+    size, pivots = np.abs(basis) * invisible, first + then
+    share = (size / size.max(axis=1, keepdims=True, initial=0.0)).tolist()
+    return tuple(_combination(share[k], names, pivots[k], k < n_structural) for k in range(len(share)))
 
 
-def _combination(direction: Floats, names: tuple[str, ...], pivot: int, structural: bool) -> Combination:
-    size = np.abs(direction) / np.abs(direction).max()
-    order = [int(i) for i in np.argsort(-size, kind="stable") if size[i] > TRACE]
+def _representatives(basis: Floats, zeros: Bools) -> list[int]:
+    """Columns of a basis (k, free), as many as rows and independent: each the longest of what those before leave.
+
+    Of equally long ones the first, however they are rounded. Source: Businger, Golub, Numer. Math. 7, 1965 (column
+    pivoting), by projection.
+    """
+    rest, square = basis, np.sum(basis**2, axis=0)
+    out: list[int] = []
+    for _ in range(len(basis)):
+        loud = zeros & (square > SPOKEN**2 * square.max())  # less would not hold it
+        candidates = np.where(loud, square, 0.0)
+        longest = candidates.max()
+        if longest <= TRACE**2:
+            candidates, longest = square, square.max()
+        column = int(np.argmax(candidates >= (1.0 - EQUAL) * longest))
+        along = rest[:, column] / np.sqrt(square[column])
+        share = along @ rest
+        rest, square = rest - along[:, None] * share, square - share**2
+        out.append(column)
+    return out
+
+
+def _combination(share: list[float], names: tuple[str, ...], pivot: int, structural: bool) -> Combination:
+    """`share` (free,) of what the largest member moves by."""
+    order = sorted((i for i, size in enumerate(share) if size > TRACE), key=lambda i: -round(share[i], 6))
     others = [i for i in order if i != pivot]
-    loud = SPOKEN * (size[others[0]] if others and size[others[0]] < SPOKEN else 1.0)  # a pair is never said as one
-    spoken = [names[pivot]] + [names[i] for i in sorted(others) if size[i] > loud]
-    return Combination(in_words(spoken), tuple(names[i] for i in order), names[pivot], structural, plainly(spoken))
+    loud = SPOKEN * (share[others[0]] if others and share[others[0]] < SPOKEN else 1.0)  # a pair is never said as one
+    spoken = (names[pivot], *(names[i] for i in sorted(others) if share[i] > loud))
+    return Combination(spoken, tuple(names[i] for i in order), names[pivot], structural)

@@ -115,7 +115,8 @@ def _point_line(table: SampleTable) -> tuple[Measured, ...]:
     mount = laser_of(table.rig)
     sensor = PointLine(mount, meeting_points(mount, table.T_base_flange[rows], place), place)
     own = {"line": np.full((len(rows), 2), LINE_BELIEVED_M)}
-    return (table.measured("point", Chain(table.arm, sensor), rows, np.zeros((len(rows), 2)), own),)
+    chain = Chain(table.arm, sensor)
+    return (table.measured("point", chain, rows, np.zeros((len(rows), 2)), own, condition=True),)
 
 
 def _position(table: SampleTable) -> tuple[Measured, ...]:
@@ -163,7 +164,9 @@ def _wire(table: SampleTable) -> tuple[Measured, ...]:
     length_m = table.samples.column("wire_m")[rows]
     if np.any(length_m <= 0.0):
         bad = int(np.argmax(length_m <= 0.0))
-        raise DataError(f"samples row {rows[bad]}: wire_m is {length_m[bad]}; a length is positive: empty the cell")
+        raise DataError(
+            f"samples row {rows[bad] + 1}, column 'wire_m': {length_m[bad]} m; a length is positive: empty the cell"
+        )
     own = {"wire": np.full((len(rows), 1), table.rig.noise.wire_m or WIRE_BELIEVED_M)}
     return (table.measured("wire", Chain(table.arm, Wire(table.target, table.device)), rows, length_m[:, None], own),)
 
@@ -175,7 +178,8 @@ def _seat(table: SampleTable) -> tuple[Measured, ...]:
     seat = table.samples.integers("seat", 0)[rows]
     sensor = Seat(table.target, mean_tips(table.tips_m[rows], seat), seat)
     own = {"seat": np.full((len(rows), 3), table.rig.noise.seat_m or SEAT_BELIEVED_M)}
-    return (table.measured("seat", Chain(table.arm, sensor), rows, np.zeros((len(rows), 3)), own),)
+    chain = Chain(table.arm, sensor)
+    return (table.measured("seat", chain, rows, np.zeros((len(rows), 3)), own, condition=True),)
 
 
 def _bar(table: SampleTable) -> tuple[Measured, ...]:

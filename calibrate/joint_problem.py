@@ -9,28 +9,18 @@ from numpy.typing import NDArray
 
 from calibrate.errors import DataError
 from calibrate.parameters import Parameter, index_of
+from calibrate.problem import LeastSquares, Problem
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 
-class Block(Protocol):
+class Block(LeastSquares, Protocol):
     """One instrument's rows: a LeastSquares of its own that can be cut. Each row has the same number of residuals."""
 
     @property
-    def parameters(self) -> tuple[Parameter, ...]: ...
-
-    @property
     def rows(self) -> int:
-        """Observation rows: poses, pairs or known lengths."""
-        ...
-
-    def residual(self, theta: Floats) -> Floats:
-        """(rows * k,) whitened, expected minus observed, row by row."""
-        ...
-
-    def jacobian(self, theta: Floats) -> Floats:
-        """(rows * k, param) derivative of `residual` by every parameter of the block, free or not."""
+        """Observation rows: poses, pairs or known lengths; residuals stand row by row."""
         ...
 
     def select(self, rows: Indices) -> Self:
@@ -66,6 +56,12 @@ class JointProblem:
         """Observation rows of all blocks, counted through in the order of the blocks."""
         return sum(block.rows for block in self.blocks)
 
+    @property
+    def row_widths(self) -> Indices:
+        """(row,) residual values of each; of a block that does not say, one: a known length."""
+        one = [getattr(block, "row_widths", np.ones(block.rows, dtype=np.intp)) for block in self.blocks]
+        return np.concatenate(one)
+
     def residual(self, theta: Floats) -> Floats:
         parts = [block.residual(theta[columns]) for block, columns in zip(self.blocks, self._columns, strict=True)]
         return np.concatenate(parts)
@@ -94,6 +90,12 @@ class JointProblem:
             own = rows[(rows >= first) & (rows < first + block.rows)] - first
             cut.append(block.select(own))
         return self.with_blocks(tuple(cut))
+
+    def fulfilled(self, theta: Floats) -> "JointProblem":
+        """Where rank is to be judged: conditions at joint readings that fulfil them (Problem.fulfilled)."""
+        values = (theta[columns] for columns in self._columns)
+        each = zip(self.blocks, values, strict=True)
+        return self.with_blocks(tuple(b.fulfilled(own) if isinstance(b, Problem) else b for b, own in each))
 
     def of_block(self, block: int, theta: Floats) -> Floats:
         """The values of one block's own parameters."""

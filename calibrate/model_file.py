@@ -1,27 +1,4 @@
-"""model.json: an identified model with its doubt, version 1.
-
-    schema          1
-    kind            "calibeam-model"
-    software        "calibeam 0.1.0"
-    rig             {"name", "sha256", "text"}: the rig file that the corrections belong to: sha256 of its text, and the
-                    text itself, so that the model predicts without another file (null: written before that)
-    arm_model       "dh": what the parameter names mean (arms/)
-    status, says    named outcome of the fit and its sentence
-    poses           settled samples used
-    rank, free      of the scaled whitened Jacobian with drawing priors, at the estimate
-    condition, singular_values
-    unseen          [{"words", "members", "structural"}]: what can only be told together
-    parameters      [{"name", "unit", "value", "sigma", "undetermined"}]: corrections to the nominal rig, SI;
-                    value and sigma are null where `undetermined` says why
-    chain           {name: value}: one complete set for predictions. Entries of undetermined parameters are one choice
-                    among many that predict the same; alone they mean nothing
-    covariance      {"names", "rows"}: posterior of the free parameters, in the units above
-    noise, repeats, held_out, rms_before_m, rms_after_m: as calibrate/zeros/result.py explains; null where there is none
-    instruments     names of the instruments that were fitted: "dual-psd", "position", "wire", "seat", "bar", "pose"
-    about           {name: numbers}: what was found in closed form before the fit and is corrected by `parameters`:
-                    "device": [x, y, z, rx, ry, rz] in the base, "tool": [x, y, z] in the flange, "seat<k>": [x, y, z].
-                    What is not named here is as in the rig
-    blunders        [{"kind", "rows", "column", "says"}]: faults of the file; these rows (from 1) were left out
+"""model.json: an identified model with its doubt, version 1. docs/formats.md explains every key.
 
 Angles are rad, lengths m. A joint's true angle is its reading plus `joint<i>.zero`.
 """
@@ -69,6 +46,12 @@ class ModelParameter(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     value: float | None
     sigma: float | None
     undetermined: str | None
+    low: float | None = None  # 95 % by the covariance, normal law
+    high: float | None = None
+    predicted_sigma: float | None = None  # what poses, noise and priors promise; null where they promise nothing
+    bootstrap_sigma: float | None = None
+    bootstrap_low: float | None = None  # 95 % of the refits
+    bootstrap_high: float | None = None
 
 
 class Covariance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -85,6 +68,54 @@ class LeftOut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     rows: tuple[int, ...]
     column: str
     says: str
+
+
+class UnseenRows(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Error of one instrument on rows that the fit has not seen, by one way to split."""
+
+    split: str
+    instrument: str
+    observations: int
+    rms_before: float
+    rms_after: float
+    chi_after: float
+
+
+class ObservabilityRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How well the poses show what the data alone can tell; `condition` null where they show nothing."""
+
+    o1: float
+    o2: float
+    o3: float
+    o4: float
+    o5: float
+    condition: float | None
+    parameters: int
+
+
+class FreeSpaceRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Predicted error of the target over the workspace; numbers null where `status` says why."""
+
+    status: str
+    says: str
+    rms_m: float | None
+    p95_m: float | None
+    max_m: float | None
+    pose_rms_m: float | None
+    pose_p95_m: float | None
+    pose_max_m: float | None
+    scatter: str
+    point_m: tuple[float, ...]
+    poses: int
+    undetermined: tuple[str, ...] = ()
+    guessed: tuple[str, ...] = ()
+
+
+class BootstrapRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How many refits to drawn rows stand behind the bootstrap numbers of `parameters`."""
+
+    rounds: int
+    failed: int
 
 
 class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -114,6 +145,13 @@ class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     instruments: tuple[str, ...] = ("dual-psd",)
     about: dict[str, tuple[float, ...]] = msgspec.field(default_factory=dict[str, tuple[float, ...]])
     blunders: tuple[LeftOut, ...] = ()
+    alarms: tuple[str, ...] = ()
+    proofs: tuple[UnseenRows, ...] = ()
+    unproven: tuple[str, ...] = ()
+    observability: ObservabilityRecord | None = None
+    free_space: FreeSpaceRecord | None = None
+    bootstrap: BootstrapRecord | None = None
+    plan: str | None = None
 
 
 def model_of(result: ZeroResult, rig: RigIdentity, arm_model: str) -> ModelFile:

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate import variance
-from calibrate.variance import NoisyRows, VarianceFactors, as_believed
+from calibrate.variance import VarianceFactors, as_believed
 
 Floats = NDArray[np.float64]
 
@@ -41,21 +40,3 @@ def parts_of(by_joint: Floats, joint_rad: float, own_sigma: Floats) -> Floats:
 def total(parts: Floats, factors: VarianceFactors) -> Floats:
     """(pose, k, k) covariance of the noise."""
     return np.einsum("k,knij->nij", np.exp(factors.log_variance), parts)
-
-
-def estimate(
-    misfit: Floats, jacobian: Floats, parts: Floats, prior_information: Floats, prior_gradient: Floats
-) -> VarianceFactors:
-    """REML for residuals (pose, k) linearised with `jacobian` (pose, k, param) of the free parameters.
-
-    `prior_information` (param,) is 1/sigma^2 (0: none), `prior_gradient` (param,) that times the deviation from it.
-    """
-    rows = NoisyRows(misfit, jacobian, parts, (0, 1))
-    return variance.estimate((rows,), 2, prior_information, prior_gradient)
-
-
-def variance_doubt(
-    misfit: Floats, jacobian: Floats, parts: Floats, prior_information: Floats, factors: VarianceFactors
-) -> Floats:
-    """(param,) Satterthwaite degrees of freedom of each posterior variance, given how well the noise is known."""
-    return variance.doubt((NoisyRows(misfit, jacobian, parts, (0, 1)),), prior_information, factors)

@@ -10,9 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording.columns import ORIENTATION, POSITION, SPOTS
 from acquisition.recording.rig import parse_rig
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig_schema import ArmModel, Rig
 from acquisition.recording.samples import Samples
 from calibrate.arms.catalogue import arm_of
+from calibrate.converted_rig import rig_in_model
 from calibrate.dual_psd_rig import dual_psd_chain
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
@@ -43,6 +44,7 @@ class Predictor:
         if model.rig.text is None:
             raise DataError(f"model of rig {model.rig.name}: the rig's text is not in the file; identify again")
         rig = parse_rig(model.rig.text, f"rig.toml in the model of {model.rig.name}")
+        rig = rig_in_model(rig, ArmModel(model.arm_model))
         return cls(rig, model.chain, model.about, model.instruments)
 
     def flange(self, q_rad: Floats) -> Floats:
@@ -122,7 +124,10 @@ def _position(predictor: Predictor, samples: Samples) -> Columns:
 
 def _rotation(predictor: Predictor, samples: Samples) -> Columns:
     turns = predictor.T_base_device[:3, :3].T @ predictor.flange(samples.joints())[:, :3, :3]
-    return _columns(ORIENTATION, Rotation.from_matrix(turns @ predictor.turn_of_target()).as_rotvec())
+    vectors = Rotation.from_matrix(turns @ predictor.turn_of_target()).as_rotvec()
+    if all(name in samples for name in ORIENTATION):
+        vectors = _nearer_form(vectors, np.stack([samples.column(name) for name in ORIENTATION], axis=1))
+    return _columns(ORIENTATION, vectors)
 
 
 def _wire(predictor: Predictor, samples: Samples) -> Columns:
@@ -144,6 +149,17 @@ def _tip(predictor: Predictor, samples: Samples) -> Columns:
     if named:
         tip[~np.logical_or.reduce(named)] = np.nan
     return _columns(TIP, tip)
+
+
+def _nearer_form(vectors: Floats, observed: Floats) -> Floats:
+    """(row, 3) the same rotations: of turns near half a turn the vector that is next to the observed one.
+
+    A turn by an angle about an axis is one by the angle less 2 pi about the same axis.
+    """
+    angle = np.linalg.norm(vectors, axis=1, keepdims=True)
+    turned_back = vectors * (1.0 - 2.0 * np.pi / np.maximum(angle, np.finfo(float).eps))
+    nearer = np.linalg.norm(turned_back - observed, axis=1) < np.linalg.norm(vectors - observed, axis=1)
+    return np.where(nearer[:, None], turned_back, vectors)
 
 
 def _columns(names: tuple[str, ...], values: Floats) -> Columns:

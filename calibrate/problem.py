@@ -12,6 +12,9 @@ from calibrate.parameters import Parameter
 
 Floats = NDArray[np.float64]
 
+NEWTON_STEPS = 4  # from millimetres, as drawn, to rounding: each squares what is left over the size of the arm
+SINGULAR = 0.05  # of the quickest direction: a stretched arm leaves what it cannot follow, and does not leap
+
 
 class LeastSquares(Protocol):
     """What a solver and the identifiability analysis see. Priors and bounds are in `parameters`, not in the rows."""
@@ -38,11 +41,17 @@ class Problem:
     observed: Floats  # (pose, k)
     whitener: Floats  # (pose, k, k) W with W cov W' = 1
     correlation: Floats | None = None  # (row,) where k is 1: of each row's noise with the next row's; the last is 0
+    condition: bool = False  # observed are not readings but what has to hold, such as tip less seat is zero
 
     @property
     def rows(self) -> int:
         """Poses, or pairs of poses: what `select` chooses from."""
         return len(self.q_rad)
+
+    @property
+    def row_widths(self) -> NDArray[np.intp]:
+        """(pose,) residual values of each: they are of one observation, for a robust loss."""
+        return np.full(self.rows, self.observed.shape[1], dtype=np.intp)
 
     def residual(self, theta: Floats) -> Floats:
         rows = np.einsum("nij,nj->ni", self.whitener, self.misfit(theta)).ravel()
@@ -68,9 +77,29 @@ class Problem:
         kept = None
         if self.correlation is not None:  # what was next to each other still is, or is taken as independent
             kept = self.correlation[rows] * np.append(np.diff(rows) == 1, False)
-        return Problem(
-            self.chain.select(rows), self.parameters, self.q_rad[rows], self.observed[rows], self.whitener[rows], kept
+        return replace(
+            self,
+            chain=self.chain.select(rows),
+            q_rad=self.q_rad[rows],
+            observed=self.observed[rows],
+            whitener=self.whitener[rows],
+            correlation=kept,
         )
+
+    def fulfilled(self, theta: Floats) -> "Problem":
+        """Rank is to be judged here: a condition at the nearest joint readings that fulfil it; readings as they are.
+
+        What moves everything alike (a turn about axis 1 with all seats) turns what is left of a condition as well, and
+        the derivative by it would look like information; where nothing is left there is none.
+        """
+        if not self.condition:
+            return self
+        q_rad = self.q_rad
+        for _ in range(NEWTON_STEPS):
+            left = self.chain.expect(theta, q_rad) - self.observed
+            back = np.linalg.pinv(self.chain.by_joint(theta, q_rad), rcond=SINGULAR)
+            q_rad = q_rad - np.einsum("nji,ni->nj", back, left)
+        return replace(self, q_rad=q_rad)
 
 
 def whitener_of(covariance: Floats) -> Floats:

@@ -47,7 +47,7 @@ def observations(samples: Samples, angles: Angles = "reported") -> Observations:
 def _refuse_missing(values: Floats, rows: NDArray[np.intp], what: str) -> None:
     bad = rows[~np.all(np.isfinite(values[rows]), axis=1)]
     if len(bad):
-        raise DataError(f"samples row {bad[0]}: spots but no {what}; complete the row or remove its spots")
+        raise DataError(f"samples row {bad[0] + 1}: spots but no {what}; complete the row or remove its spots")
 
 
 def _sigma(samples: Samples, rows: NDArray[np.intp]) -> Floats | None:

@@ -70,16 +70,16 @@ def slide_twist(direction: Floats) -> Floats:
 
 
 def left_jacobian(rotation_rad: Floats) -> Floats:
-    """(3, 3) J with Exp(r + dr) = Exp(J dr) Exp(r) to first order.
+    """(..., 3, 3) J with Exp(r + dr) = Exp(J dr) Exp(r) to first order, for rotation vectors (..., 3).
 
     Source: Sola, Deray, Atchuthan, A micro Lie theory, arXiv 1812.01537, eq. (145).
     """
-    angle = float(np.linalg.norm(rotation_rad))
+    angle = np.sqrt(np.sum(rotation_rad**2, axis=-1))[..., None, None]
+    small = angle < 1e-4  # series; the first dropped term is angle^3 / 24 < 1e-13
+    safe = np.where(small, 1.0, angle)
+    first = np.where(small, 0.5, (1.0 - np.cos(safe)) / safe**2)
+    second = np.where(small, 1.0 / 6.0, (safe - np.sin(safe)) / safe**3)
     cross_r = cross_matrix(rotation_rad)
-    if angle < 1e-4:  # series; the first dropped term is angle^3 / 24 < 1e-13
-        return np.eye(3) + cross_r / 2.0 + cross_r @ cross_r / 6.0
-    first = (1.0 - np.cos(angle)) / angle**2
-    second = (angle - np.sin(angle)) / angle**3
     return np.eye(3) + first * cross_r + second * cross_r @ cross_r
 
 
@@ -89,11 +89,14 @@ def pose_offset(deviation: Floats) -> Floats:
 
 
 def pose_offset_twists(T_base_nominal: Floats, deviation: Floats) -> Floats:
-    """(6, 6) base twist of the frame T_base_nominal @ pose_offset(deviation) by each of its six deviations."""
-    R = T_base_nominal[:3, :3]
-    origin_m = T_base_nominal[:3, 3] + R @ deviation[:3]
-    out = np.zeros((6, 6))
-    out[:3, :3] = R
-    out[3:, 3:] = R @ left_jacobian(deviation[3:])
-    out[:3, 3:] = cross_matrix(origin_m) @ out[3:, 3:]
+    """(..., 6, 6) base twist of the frame T_base_nominal @ pose_offset(deviation) by each of its six deviations.
+
+    For one frame (4, 4) and deviation (6,), or many.
+    """
+    R = T_base_nominal[..., :3, :3]
+    origin_m = T_base_nominal[..., :3, 3] + (R @ deviation[..., :3, None])[..., 0]
+    out = np.zeros((*deviation.shape, 6))
+    out[..., :3, :3] = R
+    out[..., 3:, 3:] = R @ left_jacobian(deviation[..., 3:])
+    out[..., :3, 3:] = cross_matrix(origin_m) @ out[..., 3:, 3:]
     return out

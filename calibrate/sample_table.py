@@ -74,7 +74,9 @@ class SampleTable:
         rows = np.flatnonzero(np.all(np.isfinite(self.stacked(names)), axis=1))
         bad = rows[~np.all(np.isfinite(self.q_rad[rows]), axis=1)]
         if len(bad):
-            raise DataError(f"samples row {bad[0]}: {names[0]} but no joint angles; complete the row or empty the cell")
+            raise DataError(
+                f"samples row {bad[0] + 1}: {names[0]} but no joint angles; complete the row or empty the cell"
+            )
         return rows
 
     def stacked(self, names: tuple[str, ...]) -> Floats:
@@ -132,11 +134,22 @@ class SampleTable:
         return Device(T_base_device)
 
     def measured(
-        self, name: str, chain: ObservationModel, rows: Indices, observed: Floats, own: Mapping[str, Floats]
+        self,
+        name: str,
+        chain: ObservationModel,
+        rows: Indices,
+        observed: Floats,
+        own: Mapping[str, Floats],
+        *,
+        condition: bool = False,
     ) -> Measured:
-        """`rows` (row,) of single poses or (row, 2) of pairs; unit weights until the noise is known."""
+        """`rows` (row,) of single poses or (row, 2) of pairs; unit weights until the noise is known.
+
+        `condition`: as in Problem.
+        """
         which = rows.reshape(len(rows), -1)
         k = observed.shape[1]
         q = self.q_rad[which].reshape(len(rows), -1)
         weight = np.broadcast_to(np.eye(k), (len(rows), k, k))
-        return Measured(name, Problem(chain, chain.parameters, q, observed, weight), own, which)
+        problem = Problem(chain, chain.parameters, q, observed, weight, condition=condition)
+        return Measured(name, problem, own, which)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.identifiability import Identifiability, analyse
+from calibrate.kernels.position_fit import short_jacobian
 from calibrate.parameters import Parameter
 from calibrate.problem import LeastSquares
 
@@ -24,15 +25,23 @@ def analyse_along(problem: LeastSquares, theta: Floats, parameters: tuple[Parame
 
     Values that are held stay as they are; the rest of the answer is that of `analyse` at theta.
     """
-    here = analyse(problem.jacobian(theta), parameters)
+    here = analyse(short_jacobian(problem, theta, parameters), parameters)
+    for there in points_along(here, theta, parameters):
+        here = _with_members(here, analyse(short_jacobian(problem, there, parameters), parameters))
+    return here
+
+
+def points_along(here: Identifiability, theta: Floats, parameters: tuple[Parameter, ...]) -> tuple[Floats, ...]:
+    """Values (param,) some way from theta along each combination that geometry forbids, both ways."""
     free = np.flatnonzero([p.free for p in parameters])
     structural = sum(c.structural for c in here.combinations)
+    out: list[Floats] = []
     for direction in here.unseen.T[here.unseen.shape[1] - structural :]:
         for way in (-HALF_WAY, HALF_WAY):
             there = theta.copy()
             there[free] += way * direction
-            here = _with_members(here, analyse(problem.jacobian(there), parameters))
-    return here
+            out.append(there)
+    return tuple(out)
 
 
 def _with_members(here: Identifiability, there: Identifiability) -> Identifiability:

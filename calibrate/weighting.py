@@ -80,6 +80,7 @@ class Weighting:
     measured: tuple[Measured, ...]
     joint_rad: float  # believed repeatability of one joint reading
     known: tuple[Block, ...] = ()
+    chosen: tuple[Parameter, ...] | None = None  # `parameters` held or believed otherwise, in the same order
 
     @cached_property
     def sources(self) -> tuple[str, ...]:
@@ -90,7 +91,7 @@ class Weighting:
     @cached_property
     def unweighted(self) -> JointProblem:
         """Which parameters there are, and which row belongs to what; its residuals have no meaning."""
-        return JointProblem((*(instrument.problem for instrument in self.measured), *self.known))
+        return JointProblem((*(instrument.problem for instrument in self.measured), *self.known), self.chosen)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -108,15 +109,19 @@ class Weighting:
             instrument.weighted(self.unweighted.of_block(i, theta), self.joint_rad, self._sources_of(i), size)
             for i, instrument in enumerate(self.measured)
         ]
-        return JointProblem((*blocks, *self.known))
+        return JointProblem((*blocks, *self.known), self.chosen)
 
-    def noise(self, parameters: tuple[Parameter, ...], theta: Floats) -> VarianceFactors:
+    def noise(
+        self, parameters: tuple[Parameter, ...], theta: Floats, start: VarianceFactors | None = None
+    ) -> VarianceFactors:
         """Sizes of all sources by REML at an estimate; `parameters` say what was free and believed in the fit.
+
+        `start`: what was found before, which saves steps.
 
         LinAlgError where what is left free cannot be determined: hold it first (calibrate/identifiability.py).
         """
         information, deviation, rows = self._linearised(parameters, theta)
-        return variance.estimate(rows, len(self.sources), information, information * deviation)
+        return variance.estimate(rows, len(self.sources), information, information * deviation, start)
 
     def doubt(self, parameters: tuple[Parameter, ...], theta: Floats, factors: VarianceFactors) -> Floats:
         """(free,) Satterthwaite degrees of freedom of the variances of the free parameters."""

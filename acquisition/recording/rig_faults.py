@@ -1,4 +1,7 @@
-"""Turns what the type check says about a rig file into one line for a person: file, line, key, value, remedy."""
+"""Turns what the type check says about a rig file into one line for a person: file, line, key, value, remedy.
+
+`root` is the record of the whole file: that of the rig, or of another file that is read in the same way.
+"""
 
 import difflib
 import enum
@@ -19,16 +22,16 @@ _UNKNOWN = re.compile(r"unknown field `(.*)`")
 _MISSING = re.compile(r"missing required field `(.*)`")
 
 
-def explain(error: msgspec.ValidationError, document: Mapping[str, Any]) -> tuple[KeyPath, str]:
+def explain(error: msgspec.ValidationError, document: Mapping[str, Any], root: Any = Rig) -> tuple[KeyPath, str]:
     """The key at fault and a sentence about it, from the message of msgspec (0.22: "what - at `$.path[0].to`")."""
     match = _PLACE.fullmatch(str(error))
     says, place = (match["says"], match["path"] or "") if match else (str(error), "")
     path: KeyPath = tuple(name or int(index) for name, index in _STEP.findall(place))
     if unknown := _UNKNOWN.search(says):
-        return (*path, unknown[1]), unknown_key(unknown[1], path, known_keys(path))
+        return (*path, unknown[1]), unknown_key(unknown[1], path, known_keys(path, root))
     if missing := _MISSING.search(says):
         return path, f"{section(path)} needs the key '{missing[1]}'; add it"
-    return path, _wrong_value(path, says, document)
+    return path, _wrong_value(path, says, document, root)
 
 
 def unknown_key(key: str, path: KeyPath, known: Sequence[str]) -> str:
@@ -40,11 +43,11 @@ def unknown_key(key: str, path: KeyPath, known: Sequence[str]) -> str:
     return f"{says}; did you mean '{near[0]}'?" if near else f"{says}; known are {', '.join(known)}"
 
 
-def known_keys(path: KeyPath) -> tuple[str, ...]:
-    """The keys that the rig file may have at this place."""
+def known_keys(path: KeyPath, root: Any = Rig) -> tuple[str, ...]:
+    """The keys that the file may have at this place."""
     if path == ("emulation",):
         return EMULATION_KEYS
-    found = _type_at(path)
+    found = _type_at(path, root)
     return tuple(field.encode_name for field in fields(found)) if _is_struct(found) else ()
 
 
@@ -56,8 +59,8 @@ def section(path: KeyPath) -> str:
     return f"[[{dotted}]]" if isinstance(path[-1], int) else f"[{dotted}]"
 
 
-def _type_at(path: KeyPath) -> Any:
-    found: Any = Rig
+def _type_at(path: KeyPath, root: Any) -> Any:
+    found: Any = root
     for name in path:
         if isinstance(name, str):
             field = next((field for field in fields(found) if field.encode_name == name), None)
@@ -80,7 +83,7 @@ def _is_struct(found: Any) -> bool:
     return isinstance(found, type) and issubclass(found, msgspec.Struct)
 
 
-def _wrong_value(path: KeyPath, says: str, document: Mapping[str, Any]) -> str:
+def _wrong_value(path: KeyPath, says: str, document: Mapping[str, Any], root: Any) -> str:
     value: Any = document
     for step in path:
         value = value[step]
@@ -88,15 +91,14 @@ def _wrong_value(path: KeyPath, says: str, document: Mapping[str, Any]) -> str:
     key = names[-1] if names else "the file"
     shown = f"{key} = {value!r}" if not isinstance(value, Mapping) else f"'{key}'"
     where = section(path[: path.index(key)] if key in path else ())
-    return f"{shown} in {where}: {_plain(says)}{_remedy(key, path, value)}"
+    return f"{shown} in {where}: {_plain(says)}{_remedy(key, _type_at(path, root), value)}"
 
 
 def _plain(says: str) -> str:
     return says.replace("`", "").replace("Expected", "expected").replace("Invalid enum value", "unknown value")
 
 
-def _remedy(key: str, path: KeyPath, value: Any) -> str:
-    found = _type_at(path)
+def _remedy(key: str, found: Any, value: Any) -> str:
     if isinstance(found, type) and issubclass(found, enum.Enum):
         choices = [str(member.value) for member in found]
         near = difflib.get_close_matches(str(value), choices, n=1)

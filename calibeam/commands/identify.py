@@ -1,16 +1,22 @@
 """`calibeam identify`: the arm of a recording or session folder, by whatever instruments it holds."""
 
 from pathlib import Path
+from typing import Annotated
 
+from cyclopts import Parameter, validators
 from rich.console import Console
 
 from acquisition.recording.read import read
-from calibeam.any_session import identify_session, only_spots, write_session_model
+from calibeam.any_session import Planned, identify_session, only_spots, write_session_model
+from calibeam.ending import naming, refuse_nothing, tell_unfinished
 from calibeam.identification import identify_recording, write_identified
 from calibeam.session_table import print_identification
 from calibeam.terminal import print_identified
 from calibrate.export.export import ExportForm, export_model
+from calibrate.identification.planned import rig_as_planned
 from calibrate.model_file import corrections, read_model
+from calibrate.report.session_evidence import session_evidence
+from calibrate.report.session_verdict import session_verdict
 
 SUFFIX = {
     ExportForm.URDF: ".urdf",
@@ -22,10 +28,18 @@ SUFFIX = {
 }
 
 
-def identify_command(recording: Path, *, out: Path = Path("model.json"), export: tuple[ExportForm, ...] = ()) -> None:
+def identify_command(
+    recording: Path,
+    *,
+    plan: Path | None = None,
+    bootstrap: Annotated[int, Parameter(validator=validators.Number(gte=0))] | None = None,
+    out: Path = Path("model.json"),
+    export: tuple[ExportForm, ...] = (),
+) -> None:
     """Identify the arm: blunders of the file, rank and what cannot be determined first, then numbers with their sigma.
 
     Spots of the dual PSD alone give joint zeros; positions, wire, cones, bars, full poses (several at once) the arm.
+    With a plan, or with --bootstrap, spots alone are fitted in the same way as all others.
 
     Example: calibeam identify out/demo/recording.mcap --out model.json
 
@@ -33,6 +47,10 @@ def identify_command(recording: Path, *, out: Path = Path("model.json"), export:
     ----------
     recording
         A recording, or a session folder with rig.toml and samples.csv.
+    plan
+        A fit plan (fit.toml): what is free, held or believed, which instruments, loss, solver, proofs.
+    bootstrap
+        Also refit so many times to drawn rows: intervals that trust no law of noise.
     out
         Where to write the model.
     export
@@ -40,17 +58,30 @@ def identify_command(recording: Path, *, out: Path = Path("model.json"), export:
         matlab.
 
     """
+    planned = Planned.read(plan)
+    with naming(recording):
+        _identify(recording, planned, bootstrap, out, export)
+
+
+def _identify(
+    recording: Path, planned: Planned, bootstrap: int | None, out: Path, export: tuple[ExportForm, ...]
+) -> None:
     source, console = read(recording), Console()
-    if only_spots(source.samples):
+    if only_spots(source.samples) and planned.text is None and not bootstrap:
         identified = identify_recording(source)
+        status = identified.zeros.status
+        refuse_nothing(status, identified.zeros.estimates)
         write_identified(identified, source, out)
         print_identified(console, identified)
     else:
-        result = identify_session(source)
-        write_session_model(result, source, out)
-        print_identification(console, result)
+        result = identify_session(source, planned, bootstrap)
+        status = result.status
+        refuse_nothing(status, result.estimates)
+        model = write_session_model(result, source, out, planned)
+        print_identification(console, result, session_verdict(session_evidence(source, model)))
     console.print(f"model: {out}", markup=False)
     for form in export:
         beside = out.with_name(out.stem + SUFFIX[form])
-        export_model(beside, source.rig, corrections(read_model(out)), form)
+        export_model(beside, rig_as_planned(source.rig, planned.plan), corrections(read_model(out)), form)
         console.print(f"{form.value}: {beside}", markup=False)
+    tell_unfinished(status, out)

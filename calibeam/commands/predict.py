@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from acquisition.recording.samples_csv import read_csv
+from acquisition.recording.samples_parquet import read_parquet
 from calibeam.predicted_csv import write_predicted
 from calibrate.model_file import read_model
 from calibrate.predict import Predictor, predict
@@ -18,12 +19,13 @@ def predict_command(model: Path, samples: Path, *, out: Path = Path("predicted.c
     model
         The model.json of an identification; it holds the rig.
     samples
-        A samples.csv with t_s and joint angles; it need not hold observations.
+        A samples.csv or samples.parquet with t_s and joint angles; it need not hold observations.
     out
         The CSV file to write.
 
     """
     predictor = Predictor.of(read_model(model))
-    columns = predict(predictor, read_csv(samples, predictor.rig))
+    read = read_parquet if samples.suffix == ".parquet" else read_csv
+    columns = predict(predictor, read(samples, predictor.rig))
     write_predicted(out, columns)
     print(f"predicted: {out}")

@@ -3,12 +3,15 @@
 from pathlib import Path
 
 from acquisition.recording.read import read
-from calibeam.identification import identify_recording
-from calibrate.report.zero_report import write_report
+from calibeam.reporting import write_any_report
+from calibrate.model_file import read_model
 
 
-def report_command(recording: Path, *, out: Path = Path("report.html")) -> None:
-    """Write one self-contained HTML file: rig, spots, centring, residuals, zeros with sigma, what the data cannot see.
+def report_command(recording: Path, *, model: Path | None = None, out: Path = Path("report.html")) -> None:
+    """Write one self-contained HTML file: how good the arm is now, errors before and after, numbers with their doubt.
+
+    Of the dual PSD alone: rig, spots, centring, residuals, joint zeros. Of any other session: errors by instrument,
+    proof on unseen rows, what was identified and what was refused and why.
 
     Example: calibeam report out/demo/recording.mcap --out report.html
 
@@ -16,17 +19,12 @@ def report_command(recording: Path, *, out: Path = Path("report.html")) -> None:
     ----------
     recording
         A recording, or a session folder.
+    model
+        The model.json of this recording; without it the recording is identified anew.
     out
         The HTML file to write.
 
     """
-    source = read(recording)
-    identified = identify_recording(source)
-    write_report(
-        out,
-        identified.used,
-        identified.zeros,
-        point_constraint=identified.four_poses,
-        left_out=[blunder.says for blunder in identified.blunders],
-    )
+    known = None if model is None else read_model(model)
+    write_any_report(read(recording), known, out)
     print(f"report: {out}")

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.arms.belief import LinkBelief, link_angle, link_length, zero_parameter
-from calibrate.arms.serial import SerialArm, rotation_x, rotation_y, shift
+from calibrate.arms.serial import SerialArm
 from calibrate.parameters import Parameter
 from calibrate.rigid import adjoint, inverse
 
@@ -41,13 +41,19 @@ class DhArm(SerialArm):
         n = len(links)
         self._nominal = nominal_rows(links)
         self._T_last_flange = np.eye(4) if T_last_flange is None else T_last_flange
+        self._twist_flange_last = adjoint(inverse(self._T_last_flange))
         parameters = tuple(p for i, k in enumerate(links, start=1) for p in _link_parameters(i, k, belief))
         super().__init__(n, parameters, tuple(frame for i in range(n) for frame in (i, i, i + 1, i + 1, i + 1)))
 
     def link_tail(self, theta: Floats) -> Floats:
-        """(joint, 4, 4) constant part of each link: Tz Tx Rx Ry, the last one with the flange."""
+        """(joint, 4, 4) constant part of each link: Tz Tx Rx Ry multiplied out, the last one with the flange."""
         _, d, a, alpha, tilt = (self._nominal + theta.reshape(-1, PER_LINK)).T
-        out = shift(a, d) @ rotation_x(alpha) @ rotation_y(tilt)
+        ca, sa, cb, sb = np.cos(alpha), np.sin(alpha), np.cos(tilt), np.sin(tilt)
+        out = np.zeros((self.n_joints, 4, 4))
+        out[:, 0, 0], out[:, 0, 2], out[:, 0, 3] = cb, sb, a
+        out[:, 1, 0], out[:, 1, 1], out[:, 1, 2] = sa * sb, ca, -sa * cb
+        out[:, 2, 0], out[:, 2, 1], out[:, 2, 2], out[:, 2, 3] = -ca * sb, sa, ca * cb, d
+        out[:, 3, 3] = 1.0
         out[-1] = out[-1] @ self._T_last_flange
         return out
 
@@ -66,7 +72,7 @@ class DhArm(SerialArm):
         out[:, 2, 0], out[:, 2, 2] = np.cos(tilt), np.sin(tilt)  # x in front of the tilt, seen from behind it
         out[:, 3, 3:] = out[:, 2, :3]
         out[:, 4, 4] = 1.0
-        out[-1, 2:] = out[-1, 2:] @ adjoint(inverse(self._T_last_flange)).T
+        out[-1, 2:] = out[-1, 2:] @ self._twist_flange_last.T
         return out.reshape(-1, 6)
 
 

@@ -73,7 +73,7 @@ class SerialArm(ABC):
         out = np.empty((len(q_rad), len(self.parameters), 6))
         for i, columns in enumerate(self._columns_of):
             to_base = np.swapaxes(B[:, i, :3, :3], 1, 2)
-            seen = (body[columns].reshape(-1, 3) @ to_base).reshape(len(q_rad), -1, 6)
+            seen = (body[columns].reshape(-1, 3) @ to_base).reshape(len(q_rad), len(columns), 6)
             seen[..., :3] += cross(B[:, i, None, :3, 3], seen[..., 3:])
             out[:, columns] = seen
         return np.swapaxes(out, 1, 2)

@@ -9,6 +9,7 @@ from calibrate.blunders.finding import Blunder, BlunderKind
 from calibrate.blunders.shots import Shots, outlying, robust_scale
 
 Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 EXPLAINED = 4.0  # robust sigmas that may be left of a row once the guilty cell is changed
 CLEARER = 3.0  # times less must be left than with the next best cell, else no cell is named
@@ -28,13 +29,15 @@ class _Suspect:
     left: float
 
 
-def bad_rows(shots: Shots) -> tuple[Blunder, ...]:
-    """One blunder a row. Nothing where the rows are too few to say what is usual."""
+def bad_rows(shots: Shots, among: Indices | None = None) -> tuple[Blunder, ...]:
+    """One blunder a row, of those `among` the observations. Nothing where they are too few to say what is usual."""
     misfit = shots.misfit()
     k = misfit.shape[1]
     distance = np.linalg.norm(misfit, axis=1)
     scale = robust_scale(distance, k)
-    return tuple(_named(shots, int(i), misfit[i], scale) for i in np.flatnonzero(outlying(distance, k)))
+    found = np.flatnonzero(outlying(distance, k))
+    found = found if among is None else np.intersect1d(found, among)
+    return tuple(_named(shots, int(i), misfit[i], scale) for i in found)
 
 
 def _named(shots: Shots, i: int, misfit: Floats, scale: float) -> Blunder:

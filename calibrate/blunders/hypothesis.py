@@ -1,4 +1,4 @@
-"""One way in which a whole file may have been written by another convention."""
+"""One way in which the joint angles of a whole file may have been written by another convention."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,11 +13,10 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """What the joint angles would have to be, and whether the device's axes would be left-handed."""
+    """What the joint angles would have to be."""
 
     kind: BlunderKind
     column: str
     what: str
     remedy: str
     angles: Callable[[Floats], Floats]  # (pose, joint) as written -> as meant, rad
-    mirrored: bool = False

@@ -45,7 +45,12 @@ def rough_fit(T_base_flange: Floats, position_m: Floats, point_m: Floats, *, mir
 def frame_between(a_m: Floats, b_m: Floats, weight: Floats, *, mirrored: bool = False) -> tuple[Floats, Floats]:
     """(linear (3, 3), shift (3,)) with linear @ a + shift nearest to b, both (point, 3), weights (point,)."""
     middle_a, middle_b = np.average(a_m, axis=0, weights=weight), np.average(b_m, axis=0, weights=weight)
-    U, _, Vt = np.linalg.svd(((b_m - middle_b) * weight[:, None]).T @ (a_m - middle_a))
-    sign = np.linalg.det(U) * np.linalg.det(Vt) * (-1.0 if mirrored else 1.0)
-    linear = U @ np.diag([1.0, 1.0, np.sign(sign)]) @ Vt
+    linear = turn_between(a_m - middle_a, b_m - middle_b, weight, mirrored=mirrored)
     return linear, middle_b - linear @ middle_a
+
+
+def turn_between(a: Floats, b: Floats, weight: Floats, *, mirrored: bool = False) -> Floats:
+    """(3, 3) linear with linear @ a nearest to b, both (vector, 3), weights (vector,)."""
+    U, _, Vt = np.linalg.svd((b * weight[:, None]).T @ a)
+    sign = np.linalg.det(U) * np.linalg.det(Vt) * (-1.0 if mirrored else 1.0)
+    return np.asarray(U @ np.diag([1.0, 1.0, np.sign(sign)]) @ Vt, dtype=np.float64)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -34,7 +34,7 @@ class Shots:
 
 def robust_scale(distance: Floats, k: int) -> float:
     """One sigma of a coordinate from the median of distances (obs,) over k coordinates (Hampel's MAD, for chi)."""
-    return max(float(np.median(distance)) / float(np.sqrt(chi2.ppf(0.5, k))), LEAST_SCALE)
+    return max(float(np.median(distance)) / float(np.sqrt(chdtri(k, 0.5))), LEAST_SCALE)
 
 
 def outlying(distance: Floats, k: int) -> Bools:

@@ -5,18 +5,22 @@ from importlib.metadata import version
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
-from scipy.stats import norm
-from scipy.stats import t as student_t
+from scipy.special import ndtr, stdtrit
 
+from acquisition.recording.rig_schema import Rig
+from acquisition.recording.samples import Samples
 from calibrate.blunders.finding import Blunder
-from calibrate.fit import NEAR_START, Fit, Status, solve
-from calibrate.identification.held_out import lengths, proof
-from calibrate.identification.pull import pull_of_unseen
+from calibrate.fit import FAR_START, Fit, Status
+from calibrate.identifiability import Identifiability
+from calibrate.identification.evidence import Asked, evidence_of, rows_used
+from calibrate.identification.held_out import lengths
+from calibrate.identification.pull import pull_along
 from calibrate.identification.result import Identification, InstrumentFound, Noise
 from calibrate.identification.rounds import Fitted
 from calibrate.identification.session import NEGLIGIBLE_RAD, about_of
-from calibrate.parameters import hold, plausible_sizes, start_values
+from calibrate.parameters import Parameter, hold, plausible_sizes, start_values
 from calibrate.uncertainty.chi_square import RepeatNoise, against_repeats, against_stated
+from calibrate.unseen_along import analyse_along
 from calibrate.weighting import JOINT
 from calibrate.zeros.identify import LEAST_DOF, estimate_of
 from calibrate.zeros.result import Estimate
@@ -24,35 +28,39 @@ from calibrate.zeros.result import Estimate
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+ONLY_BELIEVED = "only its prior speaks of it"
 HELD = "held so that a combination has an answer; see the combinations"
+ONLY_PRIOR = 2.0 / np.sqrt(5.0)  # of a prior sigma: the data alone know it to twice that, see identifiability.WEAK
 TOLD = 0.05  # of the plausible size: a member of an unseen combination that can move no further is a number
 
 
 def result_of(
-    fitted: Fitted, blunders: tuple[Blunder, ...], repeat: Ints | None, *, rng: Generator, held_out_share: float
+    fitted: Fitted, blunders: tuple[Blunder, ...], rig: Rig, samples: Samples, *, asked: Asked, rng: Generator
 ) -> Identification:
-    """Everything that travels with the values; `repeat` (row of the samples,) names groups of repeated poses."""
+    """Everything that travels with the values; `samples` are the whole file, of which the fit took some rows."""
     fit, before = fitted.fit, fit_places_only(fitted)
+    seen = fitted.seen
+    if fit.status is not Status.NOT_FINITE:
+        seen = analyse_along(fitted.problem, fit.theta, fitted.problem.parameters)
     status = fit.status
-    if status is Status.CONVERGED and fitted.seen.combinations:
+    if status is Status.CONVERGED and seen.combinations:
         status = Status.RANK_DEFICIENT
-    proven = held_out_share > 0.0 and status is not Status.NOT_FINITE
-    rows = [m.sample_rows.ravel() for m in fitted.weighting.measured]
+    noise = _noise(fitted)
     return Identification(
         status,
         blunders,
-        _estimates(fitted),
-        fitted.seen,
-        tuple(_found(fitted, i, before.theta) for i in range(len(rows))),
-        _noise(fitted),
+        _estimates(fitted, seen),
+        seen,
+        tuple(_found(fitted, i, before.theta) for i in range(len(fitted.weighting.measured))),
+        noise,
         against_stated(_as_stated(fitted)),
-        _repeats(fitted, repeat),
-        proof(fitted, before.parameters, before.theta, held_out_share, rng) if proven else (),
+        _repeats(fitted, samples.integers("repeat", -1) if "repeat" in samples else None),
+        evidence_of(fitted, seen, before, noise, rig, samples, asked, rng),
         fitted.problem.parameters,
         fit.theta,
         fit.covariance,
         about_of(fitted.weighting),
-        len(np.unique(np.concatenate(rows))),
+        len(rows_used(fitted)),
         fitted.steps,
         f"calibeam {version('calibeam')}",
     )
@@ -63,27 +71,37 @@ def fit_places_only(fitted: Fitted) -> Fit:
     arm = {p.name for m in fitted.weighting.measured for p in m.problem.chain.model.parameters}
     parameters = hold(fitted.fit.parameters, arm)
     start = np.where([p.name in arm for p in parameters], start_values(parameters), fitted.fit.theta)
-    return solve(fitted.problem.with_parameters(parameters), start=start)
+    return fitted.by.fit(fitted.problem.with_parameters(parameters), start, FAR_START)
 
 
 def _as_stated(fitted: Fitted) -> Fit:
     """The fit under the noise as believed, for its chi-square."""
     problem = fitted.weighting.problem(fitted.fit.theta).with_parameters(fitted.fit.parameters)
-    return solve(problem, start=fitted.fit.theta, damping=NEAR_START)
+    return fitted.by.fit(problem, fitted.fit.theta)
 
 
-def _estimates(fitted: Fitted) -> tuple[Estimate, ...]:
-    fit, seen = fitted.fit, fitted.seen
+def _estimates(fitted: Fitted, seen: Identifiability) -> tuple[Estimate, ...]:
+    fit = fitted.fit
     usable = np.all(np.isfinite(fit.covariance))
     sigma = _widening(fitted) * np.sqrt(np.diag(fit.covariance)) if usable else np.full(len(fit.theta), np.nan)
-    pulled = pull_of_unseen(fitted.problem.jacobian(fit.theta), fitted.problem.parameters)
+    pulled = np.zeros(len(fit.theta))
+    if fit.status is not Status.NOT_FINITE:
+        pulled = pull_along(fitted.problem, fit.theta, fitted.problem.parameters, fitted.seen)
     free = np.array([p.free for p in fit.parameters])
     told = free & (pulled < TOLD * plausible_sizes(fit.parameters))
     total = np.hypot(sigma, pulled)
     return tuple(
-        estimate_of(p, float(fit.theta[i]), float(total[i]), fit, None if told[i] else seen.reason(p.name) or HELD)
+        estimate_of(p, float(fit.theta[i]), float(total[i]), fit, _why_untold(p, fit, i, seen, told=bool(told[i])))
         for i, p in enumerate(fitted.problem.parameters)
     )
+
+
+def _why_untold(p: Parameter, fit: Fit, i: int, seen: Identifiability, *, told: bool) -> str | None:
+    if not told:
+        return seen.reason(p.name) or HELD
+    if np.isfinite(p.prior) and np.sqrt(fit.covariance[i, i]) > ONLY_PRIOR * p.prior:
+        return f"{ONLY_BELIEVED}: {p.prior:.3g} {p.unit} as believed, to which the data add nothing"
+    return None
 
 
 def _widening(fitted: Fitted) -> Floats:
@@ -91,7 +109,7 @@ def _widening(fitted: Fitted) -> Floats:
     parameters = fitted.fit.parameters
     dof = fitted.weighting.doubt(parameters, fitted.fit.theta, fitted.factors)
     out = np.ones(len(parameters))
-    out[[p.free for p in parameters]] = student_t.ppf(norm.cdf(3.0), np.maximum(dof, LEAST_DOF)) / 3.0
+    out[[p.free for p in parameters]] = stdtrit(np.maximum(dof, LEAST_DOF), ndtr(3.0)) / 3.0
     return out
 
 

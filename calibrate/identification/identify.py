@@ -16,19 +16,27 @@ from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.arms.catalogue import arm_of
 from calibrate.blunders.conventions import wrong_convention
-from calibrate.blunders.degrees import beyond_limits
+from calibrate.blunders.degrees import as_radians, beyond_limits
 from calibrate.blunders.duplicates import duplicated_rows
 from calibrate.blunders.finding import Blunder
+from calibrate.blunders.left_alone import left_alone
+from calibrate.blunders.limits import rows_beyond_limits
 from calibrate.blunders.other_session import sessions_apart
+from calibrate.blunders.witnesses import witnesses_of
 from calibrate.errors import DataError
+from calibrate.estimator import Estimator
+from calibrate.fit_plan import DEFAULT, FitPlan
 from calibrate.identification.clean import clean, refuse_most, rows_of
+from calibrate.identification.evidence import Asked
 from calibrate.identification.fit_report import result_of
+from calibrate.identification.held_out import Splitting
+from calibrate.identification.planned import rig_as_planned, samples_as_planned
 from calibrate.identification.result import Identification
 from calibrate.identification.rounds import settled_fit
 from calibrate.identification.session import instruments_for_fit, standing_at
 from calibrate.instruments import Instruments
 from calibrate.parameters import start_values
-from calibrate.redundant import Redundant
+from calibrate.weighting import Weighting
 
 Floats = NDArray[np.float64]
 
@@ -38,32 +46,67 @@ def identify(
     samples: Samples,
     *,
     rng: Generator,
-    held_out_share: float = 0.2,
-    redundant: Redundant = Redundant.REMOVED,
+    held_out_share: float | None = None,
+    bootstrap_rounds: int | None = None,
+    plan: FitPlan = DEFAULT,
 ) -> Identification:
-    """Everything about the arm that these samples tell, by all instruments whose columns they have.
+    """Everything about the arm that these samples tell, by all instruments whose columns they have, as the plan says.
 
-    `held_out_share` of the rows, drawn by `rng`, are predicted from the others (0: no held-out proof). DataError where
-    there is nothing to fit, or where the whole file is wrong.
+    `held_out_share` of the rows, drawn by `rng`, are predicted from the others (0: no held-out proof), and
+    `bootstrap_rounds` fits are made to drawn rows; None: as the plan says. DataError where there is nothing to fit,
+    where the whole file is wrong, or where the plan asks for what rig or samples do not have.
     """
+    rig, samples = rig_as_planned(rig, plan), samples_as_planned(samples, plan)
+    weighting, start, blunders = without_blunders(rig, samples, plan)
+    by = Estimator(plan.method, plan.robust_loss)
+    fitted = settled_fit(weighting, start, plan.of_redundant, by)
+    share = plan.share if held_out_share is None else held_out_share
+    rounds = plan.bootstrap if bootstrap_rounds is None else bootstrap_rounds
+    asked = Asked(Splitting(share, plan.splits), rounds)
+    return result_of(fitted, blunders, rig, samples, asked=asked, rng=rng)
+
+
+def without_blunders(
+    rig: Rig, samples: Samples, plan: FitPlan = DEFAULT
+) -> tuple[Weighting, Floats, tuple[Blunder, ...]]:
+    """What can be averaged, a start for it, and what was wrong with the rows left out. DataError as of `identify`."""
     refuse_wrong_file(rig, samples)
-    early = (*duplicated_rows(samples), *_sessions_apart(rig, samples))
-    instruments = _instruments_without(rig, samples, early)
+    early = _with_left_alone(samples, (*impossible_rows(rig, samples), *_sessions_apart(rig, samples)))
+    instruments = _instruments_without(rig, samples, early, plan)
     weighting, late = clean(instruments.weighting, instruments.start)
-    fitted = settled_fit(weighting, instruments.start, redundant)
-    repeat = samples.integers("repeat", -1) if "repeat" in samples else None
-    return result_of(fitted, early + late, repeat, rng=rng, held_out_share=held_out_share)
+    every = _with_left_alone(samples, early + late)
+    if len(every) > len(early) + len(late):
+        weighting = weighting.take(np.setdiff1d(np.arange(len(samples)), rows_of(every)))
+    return weighting, instruments.start, every
 
 
 def refuse_wrong_file(rig: Rig, samples: Samples) -> None:
-    """DataError that says which convention the file is written by, where it is not that of the rig."""
-    limits = np.array([[j.lower_rad, j.upper_rad] for j in rig.arm.joints])
-    blunder = beyond_limits(samples.joints(), limits)
-    if blunder is None and POSITION[0] in samples:
-        rows, positions = _positions(samples)
-        blunder = wrong_convention(_drawn_flange(rig), samples.joints()[rows], positions, _point(rig))
-    if blunder is not None:
-        raise DataError(blunder.says)
+    """DataError that says which conventions the file is written by, where they are not those of the rig."""
+    if blunders := wrong_file(rig, samples):
+        raise DataError("; besides, ".join(blunder.says for blunder in blunders))
+
+
+def wrong_file(rig: Rig, samples: Samples) -> tuple[Blunder, ...]:
+    """Conventions of the whole file that are not those of the rig."""
+    q_rad, limits_rad = samples.joints(), _limits_rad(rig)
+    in_degrees = beyond_limits(q_rad, limits_rad)
+    if in_degrees is not None:
+        q_rad = as_radians(q_rad, limits_rad)
+    found = wrong_convention(_drawn_flange(rig), witnesses_of(rig, samples, q_rad))
+    return tuple(blunder for blunder in (in_degrees, found) if blunder is not None)
+
+
+def impossible_rows(rig: Rig, samples: Samples) -> tuple[Blunder, ...]:
+    """Rows that no instrument has to judge: copies, angles that the arm cannot have, and what says nothing without."""
+    return _with_left_alone(samples, duplicated_rows(samples) + rows_beyond_limits(samples, _limits_rad(rig)))
+
+
+def _with_left_alone(samples: Samples, blunders: tuple[Blunder, ...]) -> tuple[Blunder, ...]:
+    return blunders + left_alone(samples, blunders)
+
+
+def _limits_rad(rig: Rig) -> Floats:
+    return np.array([[j.lower_rad, j.upper_rad] for j in rig.arm.joints])
 
 
 def _sessions_apart(rig: Rig, samples: Samples) -> tuple[Blunder, ...]:
@@ -73,13 +116,13 @@ def _sessions_apart(rig: Rig, samples: Samples) -> tuple[Blunder, ...]:
     return sessions_apart(_drawn_flange(rig)(samples.joints()[rows]), positions, _point(rig), rows)
 
 
-def _instruments_without(rig: Rig, samples: Samples, blunders: tuple[Blunder, ...]) -> Instruments:
+def _instruments_without(rig: Rig, samples: Samples, blunders: tuple[Blunder, ...], plan: FitPlan) -> Instruments:
     """The instruments without the rows of these blunders; their rows count in the samples as given."""
     if not blunders:
-        return instruments_for_fit(rig, samples)
+        return instruments_for_fit(rig, samples, plan)
     refuse_most(blunders, len(samples))
     kept = np.setdiff1d(np.arange(len(samples)), rows_of(blunders))
-    found = instruments_for_fit(rig, samples.take(kept))
+    found = instruments_for_fit(rig, samples.take(kept), plan)
     return replace(found, weighting=standing_at(found.weighting, kept))
 
 

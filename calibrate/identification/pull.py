@@ -2,14 +2,17 @@
 
 What the data do not see is known no better than to its plausible size. A parameter that has a share of 1e-4 in it moves
 by 1e-4 of its own plausible size when the combination moves by all of that: it is determined, and what little it is
-pulled goes into its sigma.
+pulled goes into its sigma. Where a combination bends (calibrate/unseen_along.py) the largest pull on its way counts.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.identifiability import STRUCTURAL, WEAK
+from calibrate.identifiability import STRUCTURAL, WEAK, Identifiability
+from calibrate.kernels.position_fit import short_jacobian
 from calibrate.parameters import Parameter, plausible_sizes, priors
+from calibrate.problem import LeastSquares
+from calibrate.unseen_along import points_along
 
 Floats = NDArray[np.float64]
 
@@ -29,3 +32,11 @@ def pull_of_unseen(jacobian: Floats, parameters: tuple[Parameter, ...]) -> Float
     out = np.zeros(len(parameters))
     out[free] = FAR * scale * np.linalg.norm(unseen, axis=0)
     return out
+
+
+def pull_along(
+    problem: LeastSquares, theta: Floats, parameters: tuple[Parameter, ...], seen: Identifiability
+) -> Floats:
+    """(param,) the same, the largest at `theta` and on the way along what is `seen` as unseen there."""
+    points = (theta, *points_along(seen, theta, parameters))
+    return np.max([pull_of_unseen(short_jacobian(problem, point, parameters), parameters) for point in points], axis=0)

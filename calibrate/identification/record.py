@@ -3,13 +3,13 @@
 import numpy as np
 
 from calibrate.blunders.finding import Blunder
+from calibrate.identification.evidence_record import evidence_fields, parameter_records
 from calibrate.identification.result import Identification
 from calibrate.model_file import (
     SCHEMA,
     Fields,
     LeftOut,
     ModelFile,
-    ModelParameter,
     RigIdentity,
     Unseen,
     covariance_record,
@@ -17,8 +17,8 @@ from calibrate.model_file import (
 )
 
 
-def record_of(result: Identification, rig: RigIdentity, arm_model: str) -> ModelFile:
-    """The record to write. Of several instruments, `rms_...` are of the first, `held_out` carries all by name."""
+def record_of(result: Identification, rig: RigIdentity, arm_model: str, plan: str | None = None) -> ModelFile:
+    """The record to write. Of several instruments, `rms_...` are of the first; `plan` is the text of the fit plan."""
     seen, first = result.identifiability, result.instruments[0]
     return ModelFile(
         schema=SCHEMA,
@@ -34,7 +34,7 @@ def record_of(result: Identification, rig: RigIdentity, arm_model: str) -> Model
         condition=seen.condition if np.isfinite(seen.condition) else None,
         singular_values=tuple(seen.singular_values.tolist()),
         unseen=tuple(Unseen(c.words, c.members, c.structural) for c in seen.combinations),
-        parameters=tuple(ModelParameter(e.name, e.unit, e.value, e.sigma, e.why) for e in result.estimates),
+        parameters=parameter_records(result.estimates, seen, result.evidence.bootstrap),
         chain={p.name: float(v) for p, v in zip(result.parameters, result.theta, strict=True)},
         covariance=covariance_record(result.parameters, result.covariance),
         noise=_noise(result),
@@ -45,6 +45,9 @@ def record_of(result: Identification, rig: RigIdentity, arm_model: str) -> Model
         instruments=tuple(i.name for i in result.instruments),
         about=result.about,
         blunders=tuple(left_out(b) for b in result.blunders),
+        alarms=result.alarms,
+        plan=plan,
+        **evidence_fields(result.evidence),
     )
 
 
@@ -60,11 +63,12 @@ def _noise(result: Identification) -> Fields:
 
 
 def _held_out(result: Identification) -> Fields | None:
-    """Flat: the split once, then `<instrument>_rms_before`, `_rms_after`, `_observations`."""
+    """Flat, of the first split: its words once, then `<instrument>_rms_before`, `_rms_after`, `_observations`."""
     if not result.held_out:
         return None
-    out: Fields = {"split": result.held_out[0].split, "chi_after": result.held_out[0].chi_after}
-    for one in result.held_out:
+    first = result.held_out[0]
+    out: Fields = {"split": first.split, "chi_after": first.chi_after}
+    for one in (unseen for unseen in result.held_out if unseen.split == first.split):
         out |= {f"{one.name}_observations": one.observations, f"{one.name}_rms_before": one.rms_before}
         out[f"{one.name}_rms_after"] = one.rms_after
     return out

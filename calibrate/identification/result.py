@@ -8,8 +8,11 @@ from numpy.typing import NDArray
 from calibrate.blunders.finding import Blunder
 from calibrate.fit import Status
 from calibrate.identifiability import Identifiability
+from calibrate.observability import Observability
 from calibrate.parameters import Parameter
-from calibrate.uncertainty.chi_square import RepeatNoise, StatedNoise
+from calibrate.uncertainty.bootstrap import Bootstrap
+from calibrate.uncertainty.chi_square import Alarm, RepeatNoise, StatedNoise
+from calibrate.uncertainty.free_space import FreeSpaceError, Scatter
 from calibrate.zeros.result import Estimate
 
 Floats = NDArray[np.float64]
@@ -50,6 +53,36 @@ class Unseen:
 
 
 @dataclass(frozen=True)
+class Proven:
+    """Errors of every instrument under every split, and why a split proves nothing."""
+
+    held_out: tuple[Unseen, ...] = ()
+    unproven: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class FreeSpace:
+    """Error of the target anywhere: poses drawn evenly between the joint limits."""
+
+    geometry: FreeSpaceError  # the doubt of the parameters alone: what the next calibration could take away
+    pose: FreeSpaceError  # with the scatter of a single pose: what a user meets
+    scatter: Scatter
+    scatter_says: str  # what the scatter is made of
+    poses: int
+    point_m: tuple[float, ...]  # (3,) the target in the flange frame
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What is proved or predicted of a fit; None where the fit came to no end, or where it was not asked for."""
+
+    proven: Proven
+    observability: Observability | None
+    free_space: FreeSpace | None
+    bootstrap: Bootstrap | None
+
+
+@dataclass(frozen=True)
 class Identification:
     """Outcome of the identification of an arm by any instruments."""
 
@@ -61,7 +94,7 @@ class Identification:
     noise: tuple[Noise, ...]
     stated_noise: StatedNoise  # chi-square under the noise as believed
     repeats: RepeatNoise | None  # of the first instrument that repeated poses
-    held_out: tuple[Unseen, ...]  # one an instrument; empty with too few observations
+    evidence: Evidence
     parameters: tuple[Parameter, ...]
     theta: Floats  # (param,) predicts; alone, an entry that is not determined means nothing
     covariance: Floats  # (param, param) posterior; rows of held parameters are zero
@@ -69,3 +102,25 @@ class Identification:
     n_samples: int  # rows that took part
     steps: int
     software: str
+
+    @property
+    def held_out(self) -> tuple[Unseen, ...]:
+        """One an instrument and split; empty with too few observations."""
+        return self.evidence.proven.held_out
+
+    @property
+    def alarms(self) -> tuple[str, ...]:
+        """Sentences about noise and model that a person must read before the numbers; none where all agrees."""
+        return alarms_of(self.stated_noise, self.repeats)
+
+
+def alarms_of(stated: StatedNoise, repeats: RepeatNoise | None) -> tuple[str, ...]:
+    """What chi-square says against the noise as stated, and the misfit against the scatter of repeats."""
+    out: list[str] = []
+    if stated.alarm in (Alarm.ABOVE_STATED, Alarm.BELOW_STATED):
+        out.append(f"{stated.alarm.value} (scatter {stated.noise_factor:.3g} times the stated noise)")
+    elif stated.alarm is Alarm.NO_REDUNDANCY:
+        out.append(stated.alarm.value)
+    if repeats is not None and repeats.alarm is Alarm.LACK_OF_FIT:
+        out.append(f"{repeats.alarm.value} (F = {repeats.ratio:.3g} over {repeats.groups} repeated poses)")
+    return tuple(out)

@@ -5,9 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.fit import FAR_START, NEAR_START, Fit, Status, solve
+from calibrate.estimator import LEAST_SQUARES, Estimator
+from calibrate.fit import FAR_START, NEAR_START, Fit, Status
 from calibrate.identifiability import Identifiability, analyse
 from calibrate.joint_problem import Block, JointProblem
+from calibrate.kernels.position_fit import short_jacobian
 from calibrate.parameters import plausible_sizes
 from calibrate.problem import Problem
 from calibrate.redundant import Redundant, reduced
@@ -36,19 +38,22 @@ class Fitted:
     seen: Identifiability
     factors: VarianceFactors  # noise found over believed, of weighting.sources
     steps: int
+    by: Estimator = LEAST_SQUARES
 
 
-def settled_fit(weighting: Weighting, start: Floats, redundant: Redundant = Redundant.REMOVED) -> Fitted:
+def settled_fit(
+    weighting: Weighting, start: Floats, redundant: Redundant = Redundant.REMOVED, by: Estimator = LEAST_SQUARES
+) -> Fitted:
     """Rounds from `start` (param,) until weights and rank stand."""
-    fitted = _round(weighting, weighting.believed, start, FAR_START, redundant)
+    fitted = _round(weighting, weighting.believed, start, FAR_START, redundant, by)
     steps = fitted.fit.steps
     for _ in range(ROUNDS - 1):
         if fitted.fit.status is Status.NOT_FINITE:
             break
         rank, theta = fitted.seen.rank, fitted.fit.theta
-        factors = weighting.noise(fitted.fit.parameters, theta)
+        factors = weighting.noise(fitted.fit.parameters, theta, fitted.factors)
         change = float(np.max(np.abs(factors.log_variance - fitted.factors.log_variance)))
-        fitted = _round(weighting, factors, theta, NEAR_START, redundant)
+        fitted = _round(weighting, factors, theta, NEAR_START, redundant, by)
         steps += fitted.fit.steps
         if change < SETTLED and fitted.seen.rank == rank:
             break
@@ -76,19 +81,26 @@ def distances(problem: JointProblem, theta: Floats) -> list[Floats]:
 
 
 def _round(
-    weighting: Weighting, factors: VarianceFactors, start: Floats, damping: float, redundant: Redundant
+    weighting: Weighting,
+    factors: VarianceFactors,
+    start: Floats,
+    damping: float,
+    redundant: Redundant,
+    by: Estimator = LEAST_SQUARES,
 ) -> Fitted:
     problem = weighting.problem(start, factors)
-    fit, seen = _solved(problem, start, damping, redundant)
-    return Fitted(weighting, problem, fit, seen, factors, fit.steps)
+    fit, seen = _solved(problem, start, damping, redundant, by)
+    return Fitted(weighting, problem, fit, seen, factors, fit.steps, by)
 
 
-def _solved(problem: JointProblem, start: Floats, damping: float, redundant: Redundant) -> tuple[Fit, Identifiability]:
+def _solved(
+    problem: JointProblem, start: Floats, damping: float, redundant: Redundant, by: Estimator = LEAST_SQUARES
+) -> tuple[Fit, Identifiability]:
     """Least squares of what can be determined at the start, and the rank at the end."""
-    seen = analyse(problem.jacobian(start), problem.parameters)
-    fit = solve(problem.with_parameters(reduced(problem.parameters, seen, redundant)), start=start, damping=damping)
+    seen = analyse(short_jacobian(problem.fulfilled(start), start, problem.parameters), problem.parameters)
+    fit = by.fit(problem.with_parameters(reduced(problem.parameters, seen, redundant)), start, damping)
     if fit.status is not Status.NOT_FINITE:
-        seen = analyse(problem.jacobian(fit.theta), problem.parameters)
+        seen = analyse(short_jacobian(problem.fulfilled(fit.theta), fit.theta, problem.parameters), problem.parameters)
     return fit, seen
 
 

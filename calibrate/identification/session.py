@@ -6,14 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.columns import POSITION, SPOTS
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.arms.belief import FREE
 from calibrate.arms.catalogue import arm_of
 from calibrate.blunders.shots import Shots
 from calibrate.chain import Chain
+from calibrate.fit_plan import DEFAULT, FitPlan, InstrumentName
+from calibrate.identification.planned import COLUMNS, as_planned, chosen_instruments, samples_as_planned
 from calibrate.instruments import Instruments, instruments_of
+from calibrate.sample_table import Positions, Spots
 from calibrate.sensors.full_pose import FullPose
 from calibrate.sensors.position import Position
 from calibrate.sensors.seat import Seat
@@ -29,23 +31,21 @@ About = dict[str, tuple[float, ...]]
 OUTSIDE = ("position", "full-pose", "wire")
 NEGLIGIBLE_RAD = 1e-9  # joint noise, where it is left to the instruments' own: far below any reading
 
-COLUMNS = {
-    "dual-psd": SPOTS,
-    "position": POSITION,
-    "full-pose": POSITION,
-    "distance": POSITION,
-    "wire": ("wire_m",),
-    "seat": ("seat",),
-    "bar": ("bar", "bar_end"),
-}
 
+def instruments_for_fit(rig: Rig, samples: Samples, plan: FitPlan = DEFAULT) -> Instruments:
+    """The instruments of the samples, as planned; links are believed to the drawing tolerance, or free without one.
 
-def instruments_for_fit(rig: Rig, samples: Samples) -> Instruments:
-    """All instruments of the samples; links are believed to the drawing tolerance, or free where the rig states none.
-
-    DataError where no row holds an observation, or where columns and rig contradict each other.
+    DataError where no row holds an observation, or where columns, rig and plan contradict each other.
     """
-    found = instruments_of(samples, rig, arm=arm_of(rig, None if rig.tolerance is not None else FREE))
+    as_distance, as_lines = (i in plan.instruments for i in (InstrumentName.DISTANCE, InstrumentName.POINT))
+    found = instruments_of(
+        samples_as_planned(samples, plan),
+        rig,
+        arm=arm_of(rig, None if rig.tolerance is not None else FREE),
+        positions=Positions.DISTANCE if as_distance else Positions.FRAME,
+        spots=Spots.POINT if as_lines else Spots.REFLECTION,
+    )
+    found = as_planned(chosen_instruments(found, plan), plan)
     if all(m.name in OUTSIDE for m in found.weighting.measured):
         return replace(found, weighting=replace(found.weighting, joint_rad=NEGLIGIBLE_RAD))
     return found

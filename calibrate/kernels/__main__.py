@@ -9,17 +9,22 @@ from calibrate.kernels.ready import available, state_ready
 
 def compile_all() -> None:
     """Call every compiled loop on one pose of an arm of one joint; numba keeps what it compiled."""
-    from calibrate.kernels import compiled
+    from calibrate.kernels import compiled, dual_psd_loops
 
     fixed, offset, q = np.tile(np.eye(4), (2, 1, 1)), np.zeros(1), np.zeros((1, 1))
     frames, twists, point = np.zeros(1, dtype=np.intp), np.zeros((1, 6)), np.zeros(3)
     compiled.flange(fixed, offset, q, np.empty((1, 16)))
     compiled.point_jacobian(fixed, offset, frames, twists, point, q, np.empty((3, 1)), np.empty((3, 1)))
     compiled.twists(fixed, offset, frames, twists, q, np.empty((1, 6, 1)))
-    device, moved, seen, weight = np.eye(4), np.zeros((6, 6)), np.zeros((1, 3)), np.eye(3)[None].copy()
+    device, deviation, seen, weight = np.eye(4), np.zeros(6), np.zeros((1, 3)), np.eye(3)[None].copy()
     for add_up, shape in ((True, (12, 12)), (False, (33, 1))):
         out = np.zeros(shape)
-        compiled.position_rows(fixed, offset, frames, twists, point, device, moved, q, seen, weight, out, add_up)
+        compiled.position_rows(fixed, offset, frames, twists, point, device, deviation, q, seen, weight, out, add_up)
+    arm, beam = (fixed, np.ones((1, 1)), np.zeros((1, 1)), frames, twists), (point, point, np.zeros((0, 3)), np.ones(4))
+    faces, group = np.tile(np.eye(4), (2, 2, 1, 1)), np.zeros(1, dtype=np.int64)
+    motions = np.empty((0, 2, 0, 6)), np.empty((0, 0), dtype=np.intp), False
+    spots, whitener, out = np.zeros((1, 4)), np.eye(4)[None].copy(), np.zeros((2, 4, 1))
+    dual_psd_loops.rows(*arm, *beam, faces, *motions, group, whitener, spots, out)
 
 
 def main() -> int:

@@ -315,9 +315,43 @@ def _weigh(W, device, first, count, M, columns, flat):
 
 
 @njit(**FAST)
-def position_rows(fixed, offset, frames, twists, tool, device, device_twists, q, observed, W, out, add_up):
+def moved_frame(T, deviation, moved, twists):
+    """`moved` (4, 4) = T with a deviation (6,) applied on its right, and its base twists (6 deviation, 6) by each.
+
+    The formulas of calibrate/rigid.py, pose_offset and pose_offset_twists: Exp(r) = 1 + a K + b K^2 and its left
+    Jacobian 1 + b K + c K^2, K the cross matrix of r.
+    """
+    r, square = deviation[3:], deviation[3] ** 2 + deviation[4] ** 2 + deviation[5] ** 2
+    a, b, c = 1.0 - square / 6.0, 0.5 - square / 24.0, (1.0 - square / 20.0) / 6.0  # next terms below 1e-17
+    if square >= 1e-8:
+        angle = math.sqrt(square)
+        a, b, c = math.sin(angle) / angle, (1.0 - math.cos(angle)) / square, (1.0 - math.sin(angle) / angle) / square
+    K = np.array([[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]])
+    twists[:] = 0.0
+    moved[3, :3], moved[3, 3] = 0.0, 1.0
+    for i in range(3):
+        moved[i, 3] = T[i, 3]
+        for m in range(3):
+            moved[i, 3] += T[i, m] * deviation[m]
+    for i in range(3):
+        for j in range(3):
+            turn, jacobian = 0.0, 0.0
+            for m in range(3):
+                one, squared = (1.0 if m == j else 0.0), r[m] * r[j] - (square if m == j else 0.0)
+                turn += T[i, m] * (one + a * K[m, j] + b * squared)
+                jacobian += T[i, m] * (one + b * K[m, j] + c * squared)
+            moved[i, j], twists[j, i], twists[3 + j, 3 + i] = turn, T[i, j], jacobian
+    x, y, z = moved[0, 3], moved[1, 3], moved[2, 3]
+    for j in range(3, 6):  # a turn about an axis through the origin of the frame: v = o x w
+        u, v, w = twists[j, 3], twists[j, 4], twists[j, 5]
+        twists[j, 0], twists[j, 1], twists[j, 2] = y * w - z * v, z * u - x * w, x * v - y * u
+
+
+@njit(**FAST)
+def position_rows(fixed, offset, frames, twists, tool, T_base_device, deviation, q, observed, W, out, add_up):
     """Whitened [J r] with columns arm, tool, device, residual; or its normal matrix.
 
+    The device stands at T_base_device with a `deviation` (6,).
     `add_up`: `out` (wide, wide), a multiple of TILE, gets the lower triangle of [J r]'[J r] added, the rows staying in
     the cache; otherwise `out` (3 columns, pose) gets the rows.
     """
@@ -326,6 +360,8 @@ def position_rows(fixed, offset, frames, twists, tool, device, device_twists, q,
     B, P, seen = np.empty(at + 2 * n * BLOCK), np.empty(3 * BLOCK), np.empty(3 * BLOCK)
     J, M, side = np.zeros((3 * TILE * tiles, BLOCK)), np.empty(9 * BLOCK), 3 * BLOCK * TILE
     flat = J.reshape(-1)
+    device, device_twists = np.empty((4, 4)), np.empty((6, 6))
+    moved_frame(T_base_device, deviation, device, device_twists)
     _place(B[:FRAME], fixed[0])
     for first in range(0, poses, BLOCK):
         count = min(BLOCK, poses - first)

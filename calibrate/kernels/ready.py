@@ -1,4 +1,4 @@
-"""Whether the compiled loops are at hand: numba's cache was filled for this source, this numba, Python and processor.
+"""Whether the compiled loops are at hand: numba's cache was filled for these sources, this numba, Python and processor.
 
 Compiling takes seconds, and no first call shall wait for it. So it is done once, by `python -m calibrate.kernels`
 (which `make` does at set-up); until then the numpy models serve, which give the same numbers. docs/decisions/0005.
@@ -9,7 +9,7 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
-SOURCE = Path(__file__).with_name("compiled.py")
+SOURCES = tuple(Path(__file__).with_name(name) for name in ("compiled.py", "dual_psd_loops.py"))
 
 WORTH_POSES = 256  # below, a single fit is over before numba is imported (0.3 to 0.4 s, once a process)
 
@@ -27,7 +27,7 @@ def available() -> bool:
 
 
 def state_ready() -> None:
-    """Leave the mark that `available` looks for; OSError where the folder of the source cannot be written."""
+    """Leave the mark that `available` looks for; OSError where the folder of the sources cannot be written."""
     marker = _marker()
     marker.parent.mkdir(exist_ok=True)
     marker.write_text(_processor())
@@ -35,10 +35,11 @@ def state_ready() -> None:
 
 
 def _marker() -> Path:
-    """Beside numba's own cache files, and named by what makes them stale: the source's date and size, and versions."""
-    stat = SOURCE.stat()
+    """Beside numba's own cache files, and named by what makes them stale: each source's date and size, and versions."""
+    stats = [source.stat() for source in SOURCES]
+    sources = "-".join(f"{stat.st_mtime_ns}-{stat.st_size}" for stat in stats)
     python = f"{sys.implementation.cache_tag}-numba{version('numba')}"
-    return SOURCE.parent / "__pycache__" / f"compiled-{stat.st_mtime_ns}-{stat.st_size}-{python}.ready"
+    return SOURCES[0].parent / "__pycache__" / f"compiled-{sources}-{python}.ready"
 
 
 def _processor() -> str:

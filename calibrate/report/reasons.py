@@ -1,24 +1,63 @@
 """Why something was not determined, in the words of who stands beside the robot."""
 
-from calibrate.identifiability import Combination, Identifiability, in_words
+from collections.abc import Sequence
+from typing import Protocol
+
+from calibrate.identifiability import Identifiability, in_words
 
 OWNERS = {
+    "device": "where the measuring device stands",
+    "tool": "where the target sits on the flange",
+    "seat": "where the cones are",
     "placement": "where the fixture stands",
     "laser mount": "how the laser sits on the flange",
     "psd1": "the gains of PSD 1",
     "psd2": "how PSD 2 sits to PSD 1",
 }
+NUMBERED = {"seat": "where cone", "placement": "where fixture place"}  # one of them alone
+
+
+class Together(Protocol):
+    """Parameters that can only be told together: a combination of the analysis, or of a model.json."""
+
+    @property
+    def words(self) -> str: ...
+
+    @property
+    def members(self) -> tuple[str, ...]: ...
+
+    @property
+    def structural(self) -> bool: ...
 
 
 def plain_reason(name: str, seen: Identifiability, fallback: str | None) -> str:
     """Sentence for a parameter that was not determined; `fallback` where rank is not the reason."""
-    for combination in seen.combinations:
+    return reason_among(name, seen.combinations, fallback)
+
+
+def reason_among(name: str, combinations: Sequence[Together], fallback: str | None) -> str:
+    """The same from the combinations alone."""
+    for combination in combinations:
         if name in combination.members:
             return _says(name, combination)
     return fallback or "not determined"
 
 
-def _says(name: str, combination: Combination) -> str:
+def kind_of(combination: Together) -> str:
+    """Why nothing tells its members apart."""
+    if len(combination.members) == 1:
+        return "the measurement does not depend on it"
+    if combination.structural:
+        return "cannot be told apart by geometry, whatever the poses"
+    return "hardly told apart by these poses; others might"
+
+
+def in_plain_words(words: str) -> str:
+    """'link2.offset + device z' -> 'the offset of link 2 and where the measuring device stands (z)'."""
+    return " and ".join(_plain(part) for part in words.split(" + "))
+
+
+def _says(name: str, combination: Together) -> str:
     if len(combination.members) == 1:
         return "the measurement does not depend on it"
     others = combination.words.split(" + ")
@@ -29,13 +68,14 @@ def _says(name: str, combination: Combination) -> str:
 
 
 def _plain(words: str) -> str:
-    """'placement x, y, yaw' -> 'where the fixture stands (x, y, yaw)'; 'joint6.zero' -> 'the zero of joint 6'."""
-    for owner, said in OWNERS.items():
-        if words.startswith(owner):
-            axes = words.removeprefix(owner).strip(" .")
-            return f"{said} ({axes})" if axes else said
+    """'placement x, y' -> 'where the fixture stands (x, y)'; 'seat2.z' -> 'where cone 2 is (z)'."""
     owner, _, what = words.partition(".")
-    for kind in ("joint", "link"):
-        if owner.startswith(kind) and what:
-            return f"the {what} of {kind} {owner.removeprefix(kind)}"
-    return words
+    kind = owner.rstrip("0123456789")
+    number = owner.removeprefix(kind)
+    if kind in NUMBERED and number:
+        return f"{NUMBERED[kind]} {number} is ({what})"
+    for start, said in OWNERS.items():
+        if words.startswith(start):
+            axes = words.removeprefix(start).strip(" .")
+            return f"{said} ({axes})" if axes else said
+    return f"the {what} of {kind} {number}" if kind in ("joint", "link") and what else words

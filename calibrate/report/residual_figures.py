@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from scipy.stats import beta, norm
+from scipy.special import betaincinv, ndtri
 
 from calibrate.observations import Observations
 from calibrate.report.elements import Html
@@ -16,6 +16,7 @@ Floats = NDArray[np.float64]
 
 COORDINATES = ("PSD 1 x", "PSD 1 y", "PSD 2 x", "PSD 2 y")
 MARKERS = {1: "o", 2: "^"}  # by the face that is struck first
+MOST_POINTS = 800  # of the ordered residuals: beyond, the page grows and the eye sees no more
 CORRIDOR = 0.95  # pointwise, of the order statistics
 
 
@@ -57,33 +58,41 @@ def _paint(
     all_axes[-1].set_xlabel("pose")
 
 
-def quantiles(whitened: Floats) -> Html:
+def quantiles(whitened: Floats, name: str = "residual-quantiles") -> Html:
     """Whitened residuals in order against those of a normal law, with the corridor in which 95 % of each should lie.
 
     Source: order statistics of n uniform numbers follow Beta(i, n + 1 - i) (David, Nagaraja, Order Statistics, 2003).
     """
     says = "ordered residuals in units of their noise against the quantiles of a normal law"
-    return drawn(
-        "residual-quantiles", says, 4.6, 3.9, lambda figure: _paint_quantiles(figure, np.sort(whitened.ravel()))
-    )
+    return drawn(name, says, 4.6, 3.9, lambda figure: _paint_quantiles(figure, np.sort(whitened.ravel())))
 
 
 def _paint_quantiles(figure: Figure, ordered: Floats) -> None:
     axes = figure.add_subplot()
     n = len(ordered)
-    rank = np.arange(1, n + 1)
-    expected = norm.ppf((rank - 0.5) / n)
-    low, high = (norm.ppf(beta.ppf(p, rank, n + 1 - rank)) for p in ((1 - CORRIDOR) / 2, (1 + CORRIDOR) / 2))
+    rank = _ranks_to_show(n)
+    ordered = ordered[rank - 1]
+    expected = ndtri((rank - 0.5) / n)
+    low, high = (ndtri(betaincinv(rank, n + 1 - rank, p)) for p in ((1 - CORRIDOR) / 2, (1 + CORRIDOR) / 2))
     axes.fill_between(expected, low, high, color=Tone.FAINT.value, lw=0)
     axes.plot(expected, expected, color=Tone.SOFT.value, lw=0.9)
     axes.plot(expected, ordered, "o", ms=2.8, color=Tone.PLACE_1.value, mew=0)
     axes.set(xlabel="expected of pure noise (sigma)", ylabel="found (sigma)", title="Ordered residuals")
 
 
-def histogram(whitened: Floats) -> Html:
+def _ranks_to_show(n: int) -> NDArray[np.intp]:
+    """From 1: all, or as many as a page can hold, with every one of both tails."""
+    if n <= MOST_POINTS:
+        return np.arange(1, n + 1)
+    tail = MOST_POINTS // 4
+    middle = np.linspace(tail, n - tail, MOST_POINTS // 2).astype(np.intp)
+    return np.unique(np.concatenate([np.arange(1, tail + 1), middle, np.arange(n - tail + 1, n + 1)]))
+
+
+def histogram(whitened: Floats, name: str = "residual-histogram") -> Html:
     """The same residuals as a histogram beside the normal law."""
     says = "histogram of the residuals in units of their noise beside the normal law"
-    return drawn("residual-histogram", says, 4.6, 3.9, lambda figure: _paint_histogram(figure, whitened.ravel()))
+    return drawn(name, says, 4.6, 3.9, lambda figure: _paint_histogram(figure, whitened.ravel()))
 
 
 def _paint_histogram(figure: Figure, values: Floats) -> None:
@@ -92,5 +101,5 @@ def _paint_histogram(figure: Figure, values: Floats) -> None:
     width = reach / 12.0 if reach <= 6.0 else reach / 24.0
     axes.hist(values, bins=np.arange(-reach, reach + width, width).tolist(), color=Tone.PLACE_1.value, alpha=0.55)
     x = np.linspace(-reach, reach, 160)
-    axes.plot(x, norm.pdf(x) * len(values) * width, color=Tone.INK.value, lw=1.4)
+    axes.plot(x, np.exp(-0.5 * x**2) / np.sqrt(2.0 * np.pi) * len(values) * width, color=Tone.INK.value, lw=1.4)
     axes.set(xlabel="residual (sigma)", ylabel="coordinates", title="Residuals beside pure noise (line)")

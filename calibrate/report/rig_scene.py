@@ -38,7 +38,7 @@ class FittedRig:
 
 
 def fitted_rig(evidence: Evidence) -> FittedRig:
-    """DataError for an arm that has no single-pose model."""
+    """DataError for a rig without laser or fixture."""
     rig, corrections = evidence.recording.rig, evidence.corrections
     fixture = fixture_of(rig)
     pair = pose_offset(np.array([corrections.get(f"psd2.{axis}", 0.0) for axis in AXES]))
@@ -51,7 +51,7 @@ class StandingArm:
 
     placement: int
     first_psd: int
-    bones_m: Floats  # (corner, 3) from base to laser, along the axes and common normals of the D-H table
+    bones_m: Floats  # (corner, 3) from base to laser, along the axes and what leads across to the next
     axes_m: Floats  # (joint, 3) a point of each joint's axis: the origin in front of it
     beam_m: Floats  # (3, 3) laser, spot on the first face, spot on the second
 
@@ -93,8 +93,8 @@ def _standing(rig: FittedRig, data: Observations, pose: int) -> StandingArm:
 
 
 def _bones(frames: Floats, laser_m: Floats) -> Floats:
-    """From each origin along the joint axis, then along the common normal to the next; at the end to the laser."""
-    corners = [frames[0, :3, 3]]
+    """From the base to axis 1, from each frame along its axis and across to the next; at the end to the laser."""
+    corners = [np.zeros(3), frames[0, :3, 3]]
     for before, after in itertools.pairwise(frames):
         along = before[:3, 2] * (before[:3, 2] @ (after[:3, 3] - before[:3, 3]))
         corners += [before[:3, 3] + along, after[:3, 3]]

@@ -25,11 +25,12 @@ class Trust(Enum):
 
 @dataclass(frozen=True)
 class Verdict:
-    """One sentence, and every reason for care."""
+    """One sentence, every reason for care, and what to do."""
 
     trust: Trust
     sentence: str
     reasons: tuple[str, ...]
+    advice: tuple[str, ...] = ()  # what to do about them
 
 
 def verdict(evidence: Evidence) -> Verdict:

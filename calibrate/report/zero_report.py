@@ -1,20 +1,26 @@
 """Writes the report of a dual-PSD session: one HTML file that needs nothing else, on a screen, a phone or on paper."""
 
 from collections.abc import Sequence
-from importlib.resources import files
 from pathlib import Path
 
 from acquisition.recording.recording import Recording
-from calibrate.errors import DataError
 from calibrate.read_samples import Angles
-from calibrate.report.elements import Html, join, tag
-from calibrate.report.evidence import Evidence, evidence
+from calibrate.report.evidence import evidence
+from calibrate.report.page import page, write_page
 from calibrate.report.sections import centring, point, provenance, residuals, rig, spots, summary, unseen, zeros
 from calibrate.zeros.point_constraint import PointConstraintResult
 from calibrate.zeros.result import ZeroResult
 
-# The browser itself refuses anything from outside: https://www.w3.org/TR/CSP3/
-POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+CONTENTS = {
+    "rig": rig.TITLE,
+    "spots": spots.TITLE,
+    "centring": centring.TITLE,
+    "residuals": residuals.TITLE,
+    "zeros": zeros.TITLE,
+    "point": point.TITLE,
+    "unseen": unseen.TITLE,
+    "provenance": provenance.TITLE,
+}
 
 
 def write_report(
@@ -32,7 +38,7 @@ def write_report(
     `left_out` are sentences, each naming rows that were recorded but not fitted.
     `result` must come from `recording` with these `angles`. DataError if it does not, or the file cannot be written.
     """
-    page = report_html(
+    text = report_html(
         recording,
         result,
         point_constraint=point_constraint,
@@ -40,11 +46,7 @@ def write_report(
         angles=angles,
         left_out=left_out,
     )
-    try:
-        Path(path).write_text(page, encoding="utf-8")
-    except OSError as error:
-        raise DataError(f"{path}: the report cannot be written ({error.strerror}); give another place") from error
-    return Path(path)
+    return write_page(path, text)
 
 
 def report_html(
@@ -67,35 +69,6 @@ def report_html(
         zeros.zeros(known),
         point.point(point_constraint, result.zeros, why_no_point_constraint),
         unseen.unseen(known, left_out),
-        provenance.provenance(known),
+        provenance.provenance(recording, result.n_poses, "with both spots", f"{result.software}, {result.steps} steps"),
     )
-    return _page(known, chapters)
-
-
-def _page(known: Evidence, chapters: tuple[Html, ...]) -> str:
-    style = Html(files("calibrate.report").joinpath("report.css").read_text(encoding="utf-8"))
-    head = tag(
-        "head",
-        tag("meta", charset="utf-8"),
-        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag("meta", http_equiv="Content-Security-Policy", content=POLICY),
-        tag("title", f"Joint zeros of {known.recording.rig.name}"),
-        tag("style", style),
-    )
-    footer = tag("footer", f"Written by {known.result.software}. This file needs no network and no other file.")
-    body = tag("body", tag("main", summary.masthead(known), _contents(), *chapters, footer))
-    return join(Html("<!doctype html>\n"), tag("html", head, body, lang="en"), Html("\n"))
-
-
-def _contents() -> Html:
-    titles = {
-        "rig": rig.TITLE,
-        "spots": spots.TITLE,
-        "centring": centring.TITLE,
-        "residuals": residuals.TITLE,
-        "zeros": zeros.TITLE,
-        "point": point.TITLE,
-        "unseen": unseen.TITLE,
-        "provenance": provenance.TITLE,
-    }
-    return tag("nav", *(tag("a", title, href=f"#{anchor}") for anchor, title in titles.items()), aria_label="Contents")
+    return page(f"Joint zeros of {recording.rig.name}", summary.masthead(known), CONTENTS, chapters, result.software)

@@ -14,19 +14,21 @@ SHORTEST_M = 1e-3  # shorter distances hardly depend on the arm, and one of zero
 def bar_pairs(rows: Indices, bar: NDArray[np.int64], end: NDArray[np.str_]) -> Indices:
     """(pair, 2) rows of end a and end b from the rows that have a bar, in the order of the session.
 
-    Consecutive rows form one length. DataError naming the row that has no partner.
+    Consecutive rows form one length. DataError naming the row, from 1, that has no partner.
     """
     if len(rows) % 2:
         raise DataError(
-            f"samples row {rows[-1]}: end {end[-1]} of bar {bar[-1]} without the other end; take or drop it"
+            f"samples row {rows[-1] + 1}, column 'bar_end': end {end[-1]} of bar {bar[-1]} without the other end; "
+            "take or drop it"
         )
     pairs: list[tuple[int, int]] = []
     for i in range(0, len(rows), 2):
         ends = {str(end[i]): int(rows[i]), str(end[i + 1]): int(rows[i + 1])}
         if bar[i] != bar[i + 1] or set(ends) != {"a", "b"}:
             raise DataError(
-                f"samples row {rows[i + 1]}: end {end[i + 1]} of bar {bar[i + 1]} follows end {end[i]} of bar {bar[i]} "
-                f"(row {rows[i]}); consecutive rows a, b of one bar form a length: correct or drop the odd one"
+                f"samples row {rows[i + 1] + 1}, column 'bar_end': end {end[i + 1]} of bar {bar[i + 1]} follows end "
+                f"{end[i]} of bar {bar[i]} (row {rows[i] + 1}); consecutive rows a, b of one bar form a length: "
+                "correct or drop the odd one"
             )
         pairs.append((ends["a"], ends["b"]))
     return np.array(pairs, dtype=np.intp).reshape(-1, 2)

@@ -29,7 +29,8 @@ PAIR_PLAUSIBLE_RAD = 0.02
 GAIN_PLAUSIBLE = 0.05
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")  # shifts, then rotation vector, in the frame's own axes
 GAINS = ("psd1.gain_x", "psd1.gain_y", "psd2.gain_x", "psd2.gain_y")
-N_FIXED = laser.N_PARAMETERS + len(GAINS) + len(AXES)  # columns before the placements
+PAIR_FIRST = laser.N_PARAMETERS + len(GAINS)  # column of PSD 2 in PSD 1
+N_FIXED = PAIR_FIRST + len(AXES)  # columns before the placements
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,13 @@ class DualPsd:
 
     def strike(self, phi: Floats, T_base_flange: Floats) -> Strike:
         """Geometry of light at every pose, before the gains."""
-        return optics.strike(self.mount.beam(phi[:4], T_base_flange), self._unfolded(phi)[self._group])
+        return optics.strike(self.mount.beam(phi[:4], T_base_flange), self.unfolded(phi)[self.group])
+
+    def leans(self, phi: Floats, T_base_flange: Floats) -> Floats:
+        """(pose, 2, 2) x, y that the arriving beam travels along face 1, 2 per depth: tangent of its incidence."""
+        linear = self.unfolded(phi)[self.group][..., :3, :3]
+        along = (linear @ self.mount.beam(phi[:4], T_base_flange).direction[:, None, :, None])[..., 0]
+        return along[..., :2] / np.abs(along[..., 2:])
 
     def lit(self, phi: Floats, T_base_flange: Floats) -> NDArray[np.bool_]:
         """(pose, 2) True where light falls on the face of PSD 1, PSD 2."""
@@ -127,18 +134,27 @@ class DualPsd:
         out[:, :, 0:4] = gain * self._by_mount(hit, T_base_flange)
         out[:, range(4), range(4, 8)] = hit.spots_m.reshape(-1, 4)
         if self.pair_prior is not None:
-            out[:, :, 8:14] = gain * self._by_pair(phi, twist)
-        at_place = np.searchsorted(np.array(self.places), self.placement)
-        fixture_twists = np.stack([self._place_twists(phi, k) for k in range(len(self.places))])
-        columns = N_FIXED + 6 * at_place[:, None, None] + np.arange(6)  # a pose sees its own place only
-        by_place = -gain * (twist @ fixture_twists[at_place])  # the beam moves by the opposite of the fixture's twist
+            by_pair = twist.reshape(-1, 2, 2, 6) @ self.pair_motions(phi)[self.group]
+            out[:, :, 8:14] = gain * by_pair.reshape(-1, 4, 6)
+        columns = N_FIXED + 6 * self.at_place[:, None, None] + np.arange(6)  # a pose sees its own place only
+        by_place = -gain * (twist @ self.place_twists(phi)[self.at_place])  # the beam moves by the opposite
         np.put_along_axis(out, np.broadcast_to(columns, by_place.shape), by_place, axis=2)
         return out
 
-    def _place_twists(self, phi: Floats, index: int) -> Floats:
-        """(6, 6) base twists of the fixture at the index-th place by its six parameters."""
-        first = N_FIXED + 6 * index
-        return pose_offset_twists(self.fixture.T_base_psd1[self.places[index]], phi[first : first + 6])
+    def place_twists(self, phi: Floats) -> Floats:
+        """(place, 6, 6) base twists of the fixture at each place by the six parameters of that place."""
+        return pose_offset_twists(self._drawn[1:], phi[N_FIXED:].reshape(-1, 6))
+
+    def pair_motions(self, phi: Floats) -> Floats:
+        """(2 place, face, 6, 6) base twists by which the incoming beam seems to move, by six parameters of PSD 2.
+
+        As each face sees it; rows are those of `group`.
+        """
+        pair, *places = self._placed(phi)
+        pair_twists = pose_offset_twists(self.fixture.T_psd1_psd2, phi[8:14])
+        seen = np.stack([_beam_motions(pair, first) @ pair_twists for first in (1, 2)])  # (order, face, 6, 6)
+        to_base = np.stack([adjoint(T) for T in places])
+        return (to_base[:, None, None] @ seen).reshape(-1, 2, 6, 6)
 
     def T_base_psd1(self, phi: Floats, place: int) -> Floats:
         """(4, 4) where the fixture stands according to phi."""
@@ -150,41 +166,39 @@ class DualPsd:
         return self.fixture.T_psd1_psd2 @ pose_offset(phi[8:14])
 
     @cached_property
-    def _group(self) -> Ints:
-        """(pose,) row of `_unfolded`: placement and order together."""
-        return 2 * np.searchsorted(np.array(self.places), self.placement) + self.first_psd - 1
+    def at_place(self) -> Ints:
+        """(pose,) index of the placement among `places`."""
+        return np.searchsorted(np.array(self.places), self.placement)
 
-    def _unfolded(self, phi: Floats) -> Floats:
-        pair, places = self.T_psd1_psd2(phi), self._T_base_places(phi)
-        orders = [optics.unfolded_faces(places, pair, first) for first in (1, 2)]
+    @cached_property
+    def group(self) -> Ints:
+        """(pose,) row of `unfolded`: placement and order together."""
+        return 2 * self.at_place + self.first_psd - 1
+
+    def unfolded(self, phi: Floats) -> Floats:
+        """(2 place, face, 4, 4) maps from the base to the faces as the unreflected beam sees them."""
+        placed = self._placed(phi)
+        orders = [optics.unfolded_faces(placed[1:], placed[0], first) for first in (1, 2)]
         return np.stack(orders, axis=1).reshape(-1, 2, 4, 4)
 
-    def _T_base_places(self, phi: Floats) -> Floats:
-        """(place, 4, 4) where the fixture stands at all places; `T_base_psd1` of each, at once."""
-        deviation = phi[N_FIXED:].reshape(-1, 6)
+    @cached_property
+    def _drawn(self) -> Floats:
+        """(1 + place, 4, 4) PSD 2 in PSD 1, then where the fixture is believed to have stood."""
+        return np.stack([self.fixture.T_psd1_psd2, *(self.fixture.T_base_psd1[k] for k in self.places)])
+
+    def _placed(self, phi: Floats) -> Floats:
+        """(1 + place, 4, 4) the same according to phi: `T_psd1_psd2`, then `T_base_psd1` of each place, at once."""
+        deviation = phi[PAIR_FIRST:].reshape(-1, 6)
         offset = np.broadcast_to(np.eye(4), (len(deviation), 4, 4)).copy()
         offset[:, :3, :3] = Rotation.from_rotvec(deviation[:, 3:]).as_matrix()
         offset[:, :3, 3] = deviation[:, :3]
-        return np.stack([self.fixture.T_base_psd1[k] for k in self.places]) @ offset
+        return self._drawn @ offset
 
     def _by_mount(self, hit: Strike, T_base_flange: Floats) -> Floats:
         across = T_base_flange[:, :3, :3] @ np.stack([self.mount.u, self.mount.v], axis=-1)  # (pose, 3, 2)
         shift = hit.slope @ across[:, None]  # (pose, face, xy, uv)
         tilt = hit.travel_m[..., None, None] * shift
         return np.concatenate([shift, tilt], axis=-1).reshape(-1, 4, 4)
-
-    def _by_pair(self, phi: Floats, twist: Floats) -> Floats:
-        """(pose, 4, 6) from the derivative `twist` (pose, 4, 6) by base twists of the incoming beam."""
-        pair_twists = pose_offset_twists(self.fixture.T_psd1_psd2, phi[8:14])
-        out = np.zeros_like(twist)
-        for group in np.unique(self._group):
-            place, first_psd = self.places[group // 2], group % 2 + 1
-            seen = _beam_motions(self.T_psd1_psd2(phi), int(first_psd)) @ pair_twists  # (face, 6, 6)
-            in_base = adjoint(self.T_base_psd1(phi, place)) @ seen
-            rows = np.flatnonzero(self._group == group)
-            out[rows, :2] = twist[rows, :2] @ in_base[0]
-            out[rows, 2:] = twist[rows, 2:] @ in_base[1]
-        return out
 
 
 def _beam_motions(T_psd1_psd2: Floats, first_psd: int) -> Floats:

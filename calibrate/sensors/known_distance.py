@@ -48,7 +48,7 @@ class KnownDistances:
             for row, place in enumerate(places.tolist()):
                 k = self.sensor.places.index(place)
                 out[row, k, :3] += sign * along[row] @ self.sensor.fixture.T_base_psd1[place][:3, :3]
-        return out.reshape(self.rows, -1) / self.sigma_m[:, None]
+        return out.reshape(self.rows, 6 * len(self.sensor.places)) / self.sigma_m[:, None]
 
     def select(self, rows: NDArray[np.intp]) -> "KnownDistances":
         return replace(self, between=self.between[rows], length_m=self.length_m[rows], sigma_m=self.sigma_m[rows])

@@ -17,6 +17,7 @@ from calibrate.errors import DataError
 from calibrate.parameters import Parameter
 from calibrate.rigid import cross
 from calibrate.sensors.laser import LaserMount
+from calibrate.sensors.shared_points import SharedPoints
 from calibrate.zeros.lines import Lines, nearest_point
 
 Floats = NDArray[np.float64]
@@ -36,14 +37,7 @@ class PointLine:
     unit = "m"
 
     def __post_init__(self) -> None:
-        unknown = set(self.point.tolist()) - set(self.start_m)
-        if unknown:
-            raise DataError(f"point {min(unknown)} has no start; give one for every point of the data")
-
-    @cached_property
-    def points(self) -> tuple[int, ...]:
-        """Points in the order of their parameters."""
-        return tuple(sorted(self.start_m))
+        _ = self._points  # says what is wrong with them
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -51,9 +45,11 @@ class PointLine:
 
     @cached_property
     def _parameters(self) -> tuple[Parameter, ...]:
-        used = set(self.point.tolist())
-        found = (Parameter(f"point{k}.{a}", "m", POINT_PLAUSIBLE_M, free=k in used) for k in self.points for a in "xyz")
-        return self.mount.parameters + tuple(found)
+        return self.mount.parameters + self._points.parameters
+
+    @cached_property
+    def _points(self) -> SharedPoints:
+        return SharedPoints("point", self.start_m, self.point, POINT_PLAUSIBLE_M)
 
     def select(self, rows: NDArray[np.intp]) -> Self:
         return replace(self, point=self.point[rows])
@@ -65,22 +61,19 @@ class PointLine:
     def by_twist(self, phi: Floats, T_base_flange: Floats) -> Floats:
         """The flange moving by a twist is the point moving by its opposite."""
         seen = self._across(phi) @ np.swapaxes(T_base_flange[:, :3, :3], 1, 2)  # (pose, 2, 3)
-        point = self._points_m(phi)[self._index]
+        point = self._points.at_poses_m(phi[4:])
         out = np.empty((len(T_base_flange), 2, 6))
         out[..., :3] = -seen
         out[..., 3:] = cross(seen, point[:, None])  # -a . (w x p) = (a x p) . w
         return out
 
     def by_parameter(self, phi: Floats, T_base_flange: Floats) -> Floats:
-        n = len(T_base_flange)
         _, travel_m = self._beside(phi, T_base_flange)
-        out = np.zeros((n, 2, 4 + 3 * len(self.points)))
-        out[:, range(2), range(2)] = -1.0
-        out[:, range(2), range(2, 4)] = -travel_m[:, None]
+        by_mount = np.zeros((len(T_base_flange), 2, 4))
+        by_mount[:, range(2), range(2)] = -1.0
+        by_mount[:, range(2), range(2, 4)] = -travel_m[:, None]
         seen = self._across(phi) @ np.swapaxes(T_base_flange[:, :3, :3], 1, 2)
-        for axis in range(3):
-            out[range(n), :, 4 + 3 * self._index + axis] = seen[:, :, axis]
-        return out
+        return np.concatenate([by_mount, self._points.by_shift(seen)], axis=-1)
 
     def _across(self, phi: Floats) -> Floats:
         """(2, 3) derivative of the observation by the point, both in the flange frame."""
@@ -90,17 +83,10 @@ class PointLine:
     def _beside(self, phi: Floats, T_base_flange: Floats) -> tuple[Floats, Floats]:
         """(pose, 2) offsets from, and (pose,) travel along the beam as drawn."""
         m = self.mount
-        point = self._points_m(phi)[self._index]
+        point = self._points.at_poses_m(phi[4:])
         R = T_base_flange[:, :3, :3]
         in_flange = np.einsum("nji,nj->ni", R, point - T_base_flange[:, :3, 3]) - m.origin_m
         return in_flange @ np.stack([m.u, m.v], axis=1), in_flange @ m.direction
-
-    def _points_m(self, phi: Floats) -> Floats:
-        return np.stack([self.start_m[k] for k in self.points]) + phi[4:].reshape(-1, 3)
-
-    @cached_property
-    def _index(self) -> NDArray[np.intp]:
-        return np.searchsorted(np.array(self.points), self.point)
 
 
 def meeting_points(mount: LaserMount, T_base_flange: Floats, point: Ints) -> dict[int, Floats]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from calibrate.errors import DataError
 from calibrate.parameters import Parameter
+from calibrate.sensors.shared_points import SharedPoints
 from calibrate.sensors.target import Target, point_by_twist
 
 Floats = NDArray[np.float64]
@@ -33,14 +34,7 @@ class Seat:
     unit = "m"
 
     def __post_init__(self) -> None:
-        unknown = set(self.seat.tolist()) - set(self.start_m)
-        if unknown:
-            raise DataError(f"seat {min(unknown)} has no start point; give one for every seat of the data")
-
-    @cached_property
-    def seats(self) -> tuple[int, ...]:
-        """Seats in the order of their parameters."""
-        return tuple(sorted(self.start_m))
+        _ = self._points  # says what is wrong with them
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -48,33 +42,24 @@ class Seat:
 
     @cached_property
     def _parameters(self) -> tuple[Parameter, ...]:
-        used = set(self.seat.tolist())
-        points = (Parameter(f"seat{k}.{a}", "m", PLAUSIBLE_M, free=k in used) for k in self.seats for a in "xyz")
-        return self.target.parameters + tuple(points)
+        return self.target.parameters + self._points.parameters
+
+    @cached_property
+    def _points(self) -> SharedPoints:
+        return SharedPoints("seat", self.start_m, self.seat, PLAUSIBLE_M)
 
     def select(self, rows: NDArray[np.intp]) -> Self:
         return replace(self, seat=self.seat[rows])
 
     def expect(self, phi: Floats, T_base_flange: Floats) -> Floats:
-        return self.target.in_base(phi[:3], T_base_flange) - self.points_m(phi)[self._index]
+        return self.target.in_base(phi[:3], T_base_flange) - self._points.at_poses_m(phi[3:])
 
     def by_twist(self, phi: Floats, T_base_flange: Floats) -> Floats:
         return point_by_twist(self.target.in_base(phi[:3], T_base_flange))
 
     def by_parameter(self, phi: Floats, T_base_flange: Floats) -> Floats:
-        n = len(self.seat)
-        by_seat = np.zeros((n, 3, len(self.seats), 3))
-        for axis in range(3):
-            by_seat[range(n), axis, self._index, axis] = -1.0
-        return np.concatenate([T_base_flange[:, :3, :3], by_seat.reshape(n, 3, -1)], axis=-1)
-
-    def points_m(self, phi: Floats) -> Floats:
-        """(seat, 3) the seats in the base."""
-        return np.stack([self.start_m[k] for k in self.seats]) + phi[3:].reshape(-1, 3)
-
-    @cached_property
-    def _index(self) -> NDArray[np.intp]:
-        return np.searchsorted(np.array(self.seats), self.seat)
+        by_seat = self._points.by_shift(np.broadcast_to(-np.eye(3), (len(self.seat), 3, 3)))
+        return np.concatenate([T_base_flange[:, :3, :3], by_seat], axis=-1)
 
 
 def mean_tips(tips_m: Floats, seat: Ints) -> dict[int, Floats]:

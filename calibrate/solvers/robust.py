@@ -2,7 +2,8 @@
 
 Each round solves a weighted least-squares problem that touches the loss from above, so the cost never rises (Lange,
 Hunter, Yang, J. Comput. Graph. Statist. 9(1), 2000). Covariance: Huber, Robust Statistics, 1981, eq. (7.6.3) with his
-correction K, for rows whose scale is stated; prior rows stay squares, with their own variance of one.
+correction K, for rows whose scale is stated; prior rows stay squares, with their own variance of one. All values of an
+observation share one weight, by its length (grouping.py).
 """
 
 from collections.abc import Callable
@@ -11,6 +12,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.problem import LeastSquares
+from calibrate.solvers.grouping import Groups
 from calibrate.solvers.levenberg import least_gain
 from calibrate.solvers.linear import covariance_of, promised_gain
 from calibrate.solvers.loss import Loss
@@ -33,7 +36,7 @@ def reweighted(rows: Rows, theta: Floats, loss: Loss, run: Run, tolerance: float
     steps = 0
     ended = Ended(theta, rows.residual(theta), None, Stop.NOT_FINITE, 0)
     for _ in range(MAX_ROUNDS):
-        weighted = rows.weighted(loss.weight(rows.problem.residual(theta)))
+        weighted = rows.weighted(row_weights(rows.problem, rows.problem.residual(theta), loss))
         ended = run(weighted, theta)
         steps += ended.steps
         if ended.slope is None or ended.stop is Stop.STEPS:
@@ -46,7 +49,7 @@ def reweighted(rows: Rows, theta: Floats, loss: Loss, run: Run, tolerance: float
 
 def _settled(rows: Rows, theta: Floats, loss: Loss, tolerance: float) -> bool:
     """Under the weights of its own residuals, a full step from here promises less than the tolerance."""
-    weighted = rows.weighted(loss.weight(rows.problem.residual(theta)))
+    weighted = rows.weighted(row_weights(rows.problem, rows.problem.residual(theta), loss))
     residual, slope = weighted.residual(theta), weighted.jacobian(theta)
     gradient = slope.T @ residual
     active = ~rows.pressed(theta, gradient)
@@ -54,17 +57,36 @@ def _settled(rows: Rows, theta: Floats, loss: Loss, tolerance: float) -> bool:
     return promised < least_gain(tolerance, residual)
 
 
+def row_weights(problem: LeastSquares, residual: Floats, loss: Loss) -> Floats:
+    """(row,) weights of the values of a whitened residual (row,)."""
+    groups = Groups.of(problem, len(residual))
+    return groups.spread(loss.weight(groups.norms(residual), groups.widths))
+
+
+def total_cost(problem: LeastSquares, residual: Floats, loss: Loss) -> float:
+    """Sum of the loss over all observations of a whitened residual (row,)."""
+    groups = Groups.of(problem, len(residual))
+    return float(np.sum(loss.cost(groups.norms(residual), groups.widths)))
+
+
 def robust_covariance(rows: Rows, theta: Floats, loss: Loss) -> Floats | None:
-    """(free, free) in scaled columns: A^-1 B A^-1; None where it does not exist."""
+    """(free, free) in scaled columns: A^-1 B A^-1; None where it does not exist.
+
+    An observation bends by its curvature in one direction and by its weight in the k - 1 across; the directions of
+    noise being all alike, a value bends by the mean of these.
+    """
     z = rows.problem.residual(theta)
+    groups = Groups.of(rows.problem, len(z))
+    length, k = groups.norms(z), groups.widths
     slope = rows.jacobian(theta)
     data, beliefs = slope[: len(z)], slope[len(z) :]
-    bend = loss.curvature(z)
+    weight = loss.weight(length, k)
+    bend = groups.spread((loss.curvature(length, k) + (k - 1) * weight) / np.maximum(k, 1))
     level = float(np.mean(bend))
     if len(z) <= slope.shape[1] or level <= 0.0:
         return None
     correction = 1.0 + slope.shape[1] / len(z) * float(np.var(bend)) / level**2
-    spread = correction**2 * float(np.sum((loss.weight(z) * z) ** 2)) / (len(z) - slope.shape[1])
+    spread = correction**2 * float(np.sum((weight * length) ** 2)) / (len(z) - slope.shape[1])
     inverse = covariance_of(np.concatenate([np.sqrt(level) * data, beliefs]))
     if inverse is None:
         return None

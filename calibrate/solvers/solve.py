@@ -12,7 +12,7 @@ from calibrate.solvers.levenberg import FAR_START, LevenbergRules, levenberg
 from calibrate.solvers.linear import covariance_of, promised_gain
 from calibrate.solvers.loss import Loss, LossKind
 from calibrate.solvers.result import Fit, Status, Stop
-from calibrate.solvers.robust import Run, reweighted, robust_covariance
+from calibrate.solvers.robust import Run, reweighted, robust_covariance, row_weights, total_cost
 from calibrate.solvers.rows import Ended, Rows
 
 Floats = NDArray[np.float64]
@@ -79,8 +79,8 @@ def _fit(rows: Rows, ended: Ended, loss: Loss, tolerance: float) -> Fit:
         ended.steps,
         at_bound if ended.slope is not None else (),
         ended.stop,
-        float(np.sum(loss.cost(data)) + beliefs @ beliefs) if robust else chi2,
-        loss.weight(data) if robust else None,
+        float(total_cost(rows.problem, data, loss) + beliefs @ beliefs) if robust else chi2,
+        row_weights(rows.problem, data, loss) if robust else None,
     )
 
 

@@ -23,14 +23,32 @@ class Segment:
         """(joint,) mean readings over the segment."""
         return q_rad[self.rows].mean(axis=0)
 
+    def span_rad(self, q_rad: Floats) -> float:
+        """How far the joint turns."""
+        return float(np.ptp(q_rad[self.rows, self.joint - 1]))
+
 
 def single_axis_segments(q_rad: Floats) -> tuple[Segment, ...]:
     """The longest runs of rows (row, joint) in which one joint alone moves, in order; neighbours may share a row."""
+    return tuple(run for run in _runs(q_rad) if _usable(run, q_rad))
+
+
+def too_short(q_rad: Floats) -> tuple[Segment, ...]:
+    """Runs in which one joint alone moves, but over too few rows or too short an arc for a circle."""
+    return tuple(run for run in _runs(q_rad) if not _usable(run, q_rad))
+
+
+def _usable(run: Segment, q_rad: Floats) -> bool:
+    return len(run.rows) >= FEWEST and run.span_rad(q_rad) >= SHORTEST_RAD
+
+
+def _runs(q_rad: Floats) -> tuple[Segment, ...]:
+    """Every run of at least three rows in which one joint moves, the longest at each place."""
     found: list[Segment] = []
     first = 0
     while first < len(q_rad) - 1:
         best = max((_run(q_rad, first, joint) for joint in range(q_rad.shape[1])), key=lambda run: len(run.rows))
-        if len(best.rows) >= FEWEST and np.ptp(q_rad[best.rows, best.joint - 1]) >= SHORTEST_RAD:
+        if len(best.rows) > 2 and best.span_rad(q_rad) > STILL_RAD:
             found.append(best)
             first = int(best.rows[-1])
         else:

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.arms.model import KinematicModel
-from calibrate.errors import DataError
 from calibrate.fit import Status, solve
 from calibrate.identifiability import Identifiability, analyse
 from calibrate.parameters import hold
@@ -19,23 +18,16 @@ from calibrate.rigid import inverse
 from calibrate.sensors.pair import PairChain
 from calibrate.sensors.target import UNKNOWN_PLAUSIBLE_M, Target
 from calibrate.sensors.tip_distance import TipDistance
-from calibrate.tool_axes.circle import Circle, fit_circle
+from calibrate.tool_axes.circle import fit_circle
 from calibrate.tool_axes.flange_frame import FlangeFrame, flange_frame
-from calibrate.tool_axes.segments import STILL_RAD, Segment, single_axis_segments
+from calibrate.tool_axes.segments import Segment, single_axis_segments
+from calibrate.tool_axes.wrist import AxisFound, wrist
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 STRIDES = (1, 2, 3, 5, 8, 13)  # partners of each row: near and far ones, without the square of all pairs
 SHORTEST_SHARE = 0.05  # of the longest distance: shorter pairs have no direction worth having
-
-
-@dataclass(frozen=True)
-class AxisFound:
-    """One joint's axis in the device's frame."""
-
-    segment: Segment
-    circle: Circle
 
 
 @dataclass(frozen=True)
@@ -53,35 +45,23 @@ class ToolCalibration:
     distance_rms_m: float
 
 
-def calibrate_tool(arm: KinematicModel, q_rad: Floats, position_m: Floats) -> ToolCalibration:
-    """From readings (row, joint) and positions (row, 3) in any frame. DataError without the rotations it needs."""
+def calibrate_tool(
+    arm: KinematicModel, q_rad: Floats, position_m: Floats, file_rows: Indices | None = None
+) -> ToolCalibration:
+    """From readings (row, joint) and positions (row, 3) in any frame.
+
+    `file_rows` (row,), from 0, says where these rows stand in the file, for errors. DataError without the rotations
+    it needs.
+    """
+    where = np.arange(len(q_rad)) if file_rows is None else file_rows
     axes = tuple(
         AxisFound(s, fit_circle(position_m[s.rows], q_rad[s.rows, s.joint - 1])) for s in single_axis_segments(q_rad)
     )
-    before, last = _wrist(axes, q_rad, arm.n_joints)
+    before, last = wrist(axes, q_rad, lambda row: int(where[row]) + 1)
     flange = flange_frame(arm, before.circle, last.circle, last.segment.held(q_rad))
     by_axes_m = _seen_from_flange(arm, flange, last.segment, q_rad, position_m)
     rows = np.unique(np.concatenate([axis.segment.rows for axis in axes]))
     return _by_distances(arm, q_rad[rows], position_m[rows], by_axes_m, flange, axes)
-
-
-def _wrist(axes: tuple[AxisFound, ...], q_rad: Floats, n: int) -> tuple[AxisFound, AxisFound]:
-    """Rotations of the last two joints, taken with the joints before them at the same readings."""
-    for last in (a for a in axes if a.segment.joint == n):
-        for before in (a for a in axes if a.segment.joint == n - 1):
-            apart = np.abs(last.segment.held(q_rad) - before.segment.held(q_rad))[: n - 2]
-            if np.all(apart <= STILL_RAD):
-                for axis in (before, last):
-                    if axis.circle.status is not Status.CONVERGED:
-                        raise DataError(
-                            f"circle of joint {axis.segment.joint}: {axis.circle.status.value}; turn farther"
-                        )
-                return before, last
-    turned = ", ".join(str(a.segment.joint) for a in axes) or "none"
-    raise DataError(
-        f"tool by single axes: rotations of joint {n - 1} alone and {n} alone are needed, joints 1 to {n - 2} at "
-        f"the same readings; found single rotations of joint {turned}"
-    )
 
 
 def _seen_from_flange(

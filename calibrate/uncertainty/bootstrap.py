@@ -11,7 +11,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from calibrate.fit import NEAR_START, Fit, Status, solve
+from calibrate.estimator import LEAST_SQUARES, Estimator
+from calibrate.fit import Fit, Status
 from calibrate.uncertainty.cuttable import Cuttable
 
 Floats = NDArray[np.float64]
@@ -39,19 +40,29 @@ class Bootstrap:
 
 
 def bootstrap(
-    problem: Cuttable, fit: Fit, rng: Generator, *, rounds: int = 200, group: Ints | None = None
+    problem: Cuttable,
+    fit: Fit,
+    rng: Generator,
+    *,
+    rounds: int = 200,
+    group: Ints | None = None,
+    by: Estimator = LEAST_SQUARES,
 ) -> Bootstrap:
-    """Refits of `problem` (the one that gave `fit`) on drawn rows; rows of one `group` (row,) are drawn together."""
+    """Refits of `problem` (the one that gave `fit`, `by` the same) on drawn rows.
+
+    Rows of one `group` (row,) are drawn together; rows of a group below 0 are stated, not sampled, and always there.
+    """
     labels = np.arange(problem.rows) if group is None else group
-    members = [np.flatnonzero(labels == g) for g in np.unique(labels)]
+    members = [np.flatnonzero(labels == g) for g in np.unique(labels[labels >= 0])]
+    stated = np.flatnonzero(labels < 0)
     found: list[Floats] = []
     for _ in range(rounds):
-        rows = np.concatenate([members[i] for i in rng.integers(len(members), size=len(members))])
+        rows = np.concatenate([*(members[i] for i in rng.integers(len(members), size=len(members))), stated])
         believed = tuple(
             replace(p, start=p.start + rng.normal(0.0, p.prior)) if p.free and np.isfinite(p.prior) else p
             for p in problem.parameters
         )
-        again = solve(problem.select(rows).with_parameters(believed), start=fit.theta, damping=NEAR_START)
+        again = by.fit(problem.select(rows).with_parameters(believed), fit.theta)
         if again.status is Status.CONVERGED:
             found.append(again.theta)
     return Bootstrap(np.array(found).reshape(-1, len(fit.theta)), rounds - len(found))

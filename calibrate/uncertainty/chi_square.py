@@ -9,8 +9,7 @@ from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2 as chi2_law
-from scipy.stats import f as fisher_law
+from scipy.special import chdtr, chdtrc, fdtrc
 
 from calibrate.fit import Fit
 
@@ -61,8 +60,8 @@ def against_stated(fit: Fit) -> StatedNoise:
     """Chi-square of the whole fit; `ABOVE_STATED` or `BELOW_STATED` beyond one in a thousand."""
     if fit.dof <= 0:
         return StatedNoise(fit.chi2, fit.dof, float("nan"), Alarm.NO_REDUNDANCY)
-    above = float(chi2_law.sf(fit.chi2, fit.dof))
-    below = float(chi2_law.cdf(fit.chi2, fit.dof))
+    above = float(chdtrc(fit.dof, fit.chi2))
+    below = float(chdtr(fit.dof, fit.chi2))
     alarm = Alarm.ABOVE_STATED if above < ALARM_P else Alarm.BELOW_STATED if below < ALARM_P else Alarm.NONE
     return StatedNoise(fit.chi2, fit.dof, above, alarm)
 
@@ -83,6 +82,6 @@ def against_repeats(fit: Fit, residual: Floats, repeat: Ints) -> RepeatNoise | N
     if rest <= 0 or scatter <= 0.0:
         return RepeatNoise(len(groups), free, scatter / free, float("nan"), float("nan"), Alarm.NO_REDUNDANCY)
     ratio = max(fit.chi2 - scatter, 0.0) / rest / (scatter / free)
-    above = float(fisher_law.sf(ratio, rest, free))
+    above = float(fdtrc(rest, free, ratio))
     alarm = Alarm.LACK_OF_FIT if above < ALARM_P else Alarm.NONE
     return RepeatNoise(len(groups), free, scatter / free, ratio, above, alarm)

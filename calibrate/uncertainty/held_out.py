@@ -13,7 +13,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.fit import NEAR_START, Status, solve
+from calibrate.estimator import LEAST_SQUARES, Estimator
+from calibrate.fit import Status
 from calibrate.identifiability import analyse
 from calibrate.parameters import Parameter, start_values
 from calibrate.redundant import reduced
@@ -45,6 +46,7 @@ class HeldOut:
     chi: float | None  # rms of the whitened error: 1 = the noise, above it what the fit does not know
     rms: float | None  # rms of `measure`, in its unit; None without one
     refitted: tuple[str, ...]  # what only unseen rows know
+    errors: tuple[Floats, ...] = ()  # of each fold, what `measure` gave
 
 
 @dataclass(frozen=True)
@@ -55,15 +57,21 @@ class _Fold:
     refitted: tuple[str, ...]
 
 
-def held_out(problem: P, split: Split, theta: Floats, measure: Callable[[P, Floats], Floats] | None = None) -> HeldOut:
-    """Proof by one split from the fit `theta` (param,) of all rows, a start only.
+def held_out(
+    problem: P,
+    split: Split,
+    theta: Floats,
+    measure: Callable[[P, Floats], Floats] | None = None,
+    by: Estimator = LEAST_SQUARES,
+) -> HeldOut:
+    """Proof by one split from the fit `theta` (param,) of all rows, a start only; refits are made `by` that of the fit.
 
     `measure(problem, theta)` gives errors (any shape) in the unit wanted for `rms`, such as `Problem.misfit`.
     """
     folds: list[_Fold] = []
     for unseen in split.unseen:
         used = np.setdiff1d(np.arange(problem.rows), unseen)
-        fold = _fold(problem, used, unseen, theta, measure) if len(used) else Proof.TOO_FEW
+        fold = _fold(problem, used, unseen, theta, measure, by) if len(used) else Proof.TOO_FEW
         if isinstance(fold, Proof):
             return HeldOut(split.says, fold, 0, None, None, ())
         folds.append(fold)
@@ -78,21 +86,28 @@ def held_out(problem: P, split: Split, theta: Floats, measure: Callable[[P, Floa
         float(np.sqrt(sum(fold.squares for fold in folds) / dof)),
         float(np.sqrt(np.mean(errors**2))) if len(errors) else None,
         tuple(dict.fromkeys(name for fold in folds for name in fold.refitted)),
+        tuple(fold.measured for fold in folds),
     )
 
 
 def _fold(
-    problem: P, used: Rows, unseen: Rows, theta: Floats, measure: Callable[[P, Floats], Floats] | None
+    problem: P,
+    used: Rows,
+    unseen: Rows,
+    theta: Floats,
+    measure: Callable[[P, Floats], Floats] | None,
+    by: Estimator,
 ) -> _Fold | Proof:
     train, test = problem.select(used), problem.select(unseen)
     idle = _idle(train.jacobian(theta), problem.parameters)
-    known = _refit(train, tuple(replace(p, free=p.free and i not in idle) for i, p in enumerate(problem.parameters)))
+    kept = tuple(replace(p, free=p.free and i not in idle) for i, p in enumerate(problem.parameters))
+    known = _refit(train, kept, by)
     after = known(theta)
     if after is None:
         return Proof.NOT_REFITTED
     own = [i for i in idle if np.any(test.jacobian(after)[:, i])]
     if own:
-        fit = _refit(test, tuple(replace(p, free=i in own) for i, p in enumerate(problem.parameters)))(after)
+        fit = _refit(test, tuple(replace(p, free=i in own) for i, p in enumerate(problem.parameters)), by)(after)
         if fit is None:
             return Proof.NOT_REFITTED
         after = fit
@@ -107,7 +122,7 @@ def _idle(jacobian: Floats, parameters: tuple[Parameter, ...]) -> tuple[int, ...
     return tuple(i for i, p in enumerate(parameters) if p.free and not np.any(jacobian[:, i]))
 
 
-def _refit(problem: Cuttable, parameters: tuple[Parameter, ...]) -> Callable[[Floats], Floats | None]:
+def _refit(problem: Cuttable, parameters: tuple[Parameter, ...], by: Estimator) -> Callable[[Floats], Floats | None]:
     """Fit of what these rows can tell; a combination that they alone do not see goes back to its nominal value."""
 
     def from_start(theta: Floats) -> Floats | None:
@@ -115,7 +130,7 @@ def _refit(problem: Cuttable, parameters: tuple[Parameter, ...]) -> Callable[[Fl
         kept = reduced(parameters, seen)
         nominal = np.array([before.free and not after.free for before, after in zip(parameters, kept, strict=True)])
         start = np.where(nominal, start_values(parameters), theta)
-        fit = solve(problem.with_parameters(kept), start=start, damping=NEAR_START)
+        fit = by.fit(problem.with_parameters(kept), start)
         return fit.theta if fit.status in USABLE else None
 
     return from_start

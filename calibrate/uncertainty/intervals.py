@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from calibrate.fit import Fit, Status
 from calibrate.identifiability import Identifiability
@@ -28,7 +28,7 @@ def intervals(fit: Fit, seen: Identifiability, level: float = 0.95) -> tuple[Int
 
     `seen`: at the fit, before anything was held; best from `analyse_along`, which misses no bent combination.
     """
-    reach = float(norm.ppf(0.5 + level / 2.0))
+    reach = float(ndtri(0.5 + level / 2.0))
     out: list[Interval] = []
     for i, p in enumerate(fit.parameters):
         variance = float(fit.covariance[i, i])

@@ -1,12 +1,21 @@
 """Which rows a proof leaves out: at random, a place at a time, or the end of the session."""
 
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
 Rows = NDArray[np.intp]
+
+
+class SplitKind(Enum):
+    """By the word of a fit plan."""
+
+    RANDOM = "random"
+    PLACE = "place"
+    LAST = "last"
 
 
 @dataclass(frozen=True)
@@ -24,8 +33,11 @@ def at_random(rows: int, rng: Generator, share: float = 0.2) -> Split:
 
 
 def by_place(place: NDArray[np.int64]) -> Split:
-    """A fold for each placement, seat or place of the device, `place` (row,): what stands elsewhere is predicted."""
-    places = np.unique(place)
+    """A fold for each placement, seat or place of the device, `place` (row,): what stands elsewhere is predicted.
+
+    Rows of a place below 0 have none and are never left out.
+    """
+    places = np.unique(place[place >= 0])
     return Split(f"each of {len(places)} places in turn", tuple(np.flatnonzero(place == p) for p in places))
 
 
@@ -37,12 +49,18 @@ def last_block(t_s: NDArray[np.float64], share: float = 0.2) -> Split:
 
 
 def usual(
-    rows: int, rng: Generator, *, place: NDArray[np.int64] | None = None, t_s: NDArray[np.float64] | None = None
+    rows: int,
+    rng: Generator,
+    *,
+    place: NDArray[np.int64] | None = None,
+    t_s: NDArray[np.float64] | None = None,
+    share: float = 0.2,
+    kinds: tuple[SplitKind, ...] = tuple(SplitKind),
 ) -> tuple[Split, ...]:
     """What every result is proved by: a random fifth, each place if there are several, and the last fifth in time."""
-    splits = [at_random(rows, rng)]
-    if place is not None and len(np.unique(place)) > 1:
+    splits = [at_random(rows, rng, share)] if SplitKind.RANDOM in kinds else []
+    if SplitKind.PLACE in kinds and place is not None and len(np.unique(place[place >= 0])) > 1:
         splits.append(by_place(place))
-    if t_s is not None:
-        splits.append(last_block(t_s))
+    if SplitKind.LAST in kinds and t_s is not None and len(np.unique(t_s)) > 1:
+        splits.append(last_block(t_s, share))
     return tuple(splits)

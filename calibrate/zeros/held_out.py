@@ -4,9 +4,10 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from calibrate.fit import NEAR_START, Status, solve
+from calibrate.fit import Status
 from calibrate.parameters import Parameter, start_values
 from calibrate.problem import Problem
+from calibrate.zeros.ranked_fit import FAR, NEAR, fitted
 from calibrate.zeros.result import HeldOut
 
 Floats = NDArray[np.float64]
@@ -28,9 +29,9 @@ def held_out_error(
     order = rng.permutation(n)
     unseen, used = np.sort(order[: max(1, round(share * n))]), np.sort(order[max(1, round(share * n)) :])
     train, test = problem.select(used), problem.select(unseen)
-    after = solve(train, start=theta, damping=NEAR_START)
+    after = fitted(train, theta, NEAR)
     as_drawn = np.where([p.free for p in nominal], theta, start_values(nominal))
-    before = solve(train.with_parameters(nominal), start=as_drawn)
+    before = fitted(train.with_parameters(nominal), as_drawn, FAR)
     if after.status is not Status.CONVERGED or before.status is Status.NOT_FINITE:
         return None
     return HeldOut(

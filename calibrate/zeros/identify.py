@@ -14,15 +14,17 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, stdtrit
 
 from calibrate import noise as noise_model
+from calibrate import variance
 from calibrate.chain import Chain
 from calibrate.errors import DataError
-from calibrate.fit import NEAR_START, Fit, Status, solve
-from calibrate.identifiability import Identifiability, analyse
+from calibrate.fit import Fit, Status
+from calibrate.identifiability import Identifiability
 from calibrate.noise import NoiseModel, VarianceFactors
 from calibrate.observations import Observations
 from calibrate.parameters import Parameter, hold, priors, start_values
 from calibrate.problem import Problem, whitener_of
 from calibrate.zeros.held_out import held_out_error
+from calibrate.zeros.ranked_fit import COARSE, FAR, NEAR, by_joint, fitted, noisy_rows, ranked_fit
 from calibrate.zeros.repeats import repeat_scatter
 from calibrate.zeros.result import Estimate, HeldOut, JointZero, NoiseFound, ZeroResult
 
@@ -99,15 +101,14 @@ def fit_weighted(chain: Chain, data: Observations, believed: BelievedNoise, *, s
 
 def _round(problem: Problem, model: NoiseModel, theta: Floats, factors: VarianceFactors) -> Weighted:
     """Weights, rank, fit, and then the noise that its residuals show."""
-    parts = model.parts(problem.chain.by_joint(theta, problem.q_rad))
-    problem = problem.with_covariance(noise_model.total(parts, factors))
-    seen = analyse(problem.jacobian(theta), problem.chain.parameters)
-    held = hold(problem.chain.parameters, (c.representative for c in seen.combinations))
-    problem = problem.with_parameters(held)
-    fit = solve(problem, start=theta, damping=NEAR_START)
+    parts = model.parts(by_joint(problem, theta))
+    problem = problem.with_parameters(problem.chain.parameters).with_covariance(noise_model.total(parts, factors))
+    ranked = ranked_fit(problem, theta, NEAR)
+    fit, seen = ranked.fit, ranked.seen
+    problem = problem.with_parameters(fit.parameters)
     if fit.status is Status.NOT_FINITE:
         return Weighted(problem, fit, factors, parts, seen, fit.steps, True)
-    renewed = _noise(problem, fit.theta, parts)
+    renewed = _noise(problem, fit.theta, parts, factors)
     change = float(np.max(np.abs(renewed.log_variance - factors.log_variance)))
     return Weighted(problem, fit, renewed, parts, seen, fit.steps, change < SETTLED)
 
@@ -115,11 +116,9 @@ def _round(problem: Problem, model: NoiseModel, theta: Floats, factors: Variance
 def _coarse(problem: Problem, model: NoiseModel) -> tuple[Floats, int]:
     """Places, mount and zeros with the links as drawn: the large errors, without the small ones to hide in."""
     nominal = start_values(problem.parameters)
-    parts = model.parts(problem.chain.by_joint(nominal, problem.q_rad))
-    rough = problem.with_covariance(parts.sum(axis=0))
-    parameters = hold(problem.parameters, (p.name for p in problem.parameters if p.free and np.isfinite(p.prior)))
-    seen = analyse(rough.jacobian(nominal), parameters)
-    fit = solve(rough.with_parameters(hold(parameters, (c.representative for c in seen.combinations))))
+    parts = model.parts(by_joint(problem, nominal))
+    drawn = hold(problem.parameters, (p.name for p in problem.parameters if p.free and np.isfinite(p.prior)))
+    fit = ranked_fit(problem.with_parameters(drawn).with_covariance(parts.sum(axis=0)), nominal, COARSE).fit
     return (nominal if fit.status is Status.NOT_FINITE else fit.theta), fit.steps
 
 
@@ -129,14 +128,15 @@ def _fit_places_only(weighted: Weighted) -> Fit:
     arm = [p.name for p in problem.chain.model.parameters]
     nominal = start_values(problem.parameters)
     nominal[len(arm) :] = weighted.fit.theta[len(arm) :]
-    return solve(problem.with_parameters(hold(problem.parameters, arm)), start=nominal)
+    return fitted(problem.with_parameters(hold(problem.parameters, arm)), nominal, FAR)
 
 
-def _noise(problem: Problem, theta: Floats, parts: Floats) -> VarianceFactors:
+def _noise(problem: Problem, theta: Floats, parts: Floats, known: VarianceFactors) -> VarianceFactors:
+    """Sizes of both sources; the search starts from those `known`."""
     free, information = _free(problem.parameters)
     deviation = (theta - start_values(problem.parameters))[free]
-    jacobian = problem.chain.jacobian(theta, problem.q_rad)[:, :, free]
-    return noise_model.estimate(problem.misfit(theta), jacobian, parts, information, information * deviation)
+    rows = noisy_rows(problem, theta, parts)
+    return variance.estimate((rows,), 2, information, information * deviation, known)
 
 
 def _free(parameters: tuple[Parameter, ...]) -> tuple[NDArray[np.intp], Floats]:
@@ -149,8 +149,7 @@ def _widening(weighted: Weighted) -> Floats:
     """(param,) factor on sigma that keeps the odds of 3 sigma when the noise is known from few data."""
     problem, theta = weighted.problem, weighted.fit.theta
     free, information = _free(problem.parameters)
-    jacobian = problem.chain.jacobian(theta, problem.q_rad)[:, :, free]
-    dof = noise_model.variance_doubt(problem.misfit(theta), jacobian, weighted.parts, information, weighted.factors)
+    dof = variance.doubt((noisy_rows(problem, theta, weighted.parts),), information, weighted.factors)
     out = np.ones(len(theta))
     out[free] = stdtrit(np.maximum(dof, LEAST_DOF), ndtr(3.0)) / 3.0
     return out
@@ -223,6 +222,7 @@ def _noise_found(weighted: Weighted, believed: BelievedNoise) -> NoiseFound:
         (float(np.sum(residual**2)) + prior_chi2) / dof,
         fit.chi2_per_dof,
         factors.converged,
+        *factors.at_zero,
     )
 
 

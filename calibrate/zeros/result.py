@@ -47,6 +47,8 @@ class NoiseFound:
     chi2_per_dof_believed: float  # under the believed noise; far from 1: noise or model is not as believed
     chi2_per_dof: float  # under the noise found; near 1 by construction
     converged: bool
+    joint_at_zero: bool = False  # so small that it cannot be told from none: the number is no size, only small
+    psd_at_zero: bool = False
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,18 @@
 
 import csv
 import json
+from functools import partial
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from acquisition.recording.read import read
 from calibeam.cli import run
+from calibrate.fit import solve
+from calibrate.model_file import read_model
+from calibrate.report.session_evidence import session_evidence
+from calibrate.report.session_verdict import session_verdict
 
 RIG = """schema = 1
 name = "three-joints"
@@ -119,3 +125,98 @@ def test_a_file_in_degrees_fails_with_one_sentence(folder, tmp_path, capsys):
     assert run(["identify", str(folder), "--out", str(tmp_path / "model.json")]) == 1
     assert "these are degrees; write radians" in capsys.readouterr().err
     assert not (tmp_path / "model.json").exists()
+
+
+def test_a_plan_in_another_arm_model_predicts_by_its_model_file_alone(folder, tmp_path, capsys):
+    plan, model, out = tmp_path / "fit.toml", tmp_path / "model.json", tmp_path / "predicted.csv"
+    plan.write_text('schema = 1\nmodel = "local-poe"\nloss = "huber"\nsplits = ["last"]\n')
+    assert run(["identify", str(folder), "--plan", str(plan), "--bootstrap", "8", "--out", str(model)]) == 0
+    printed = capsys.readouterr().out
+    assert "held out (last 20% of the session): position" in printed
+    assert "random" not in printed
+    assert "bootstrap: 8 refits" in printed
+    content = json.loads(model.read_text())
+    assert (content["arm_model"], content["plan"]) == ("local-poe", plan.read_text())
+    assert content["bootstrap"] == {"rounds": 8, "failed": 0}
+    assert {p["split"] for p in content["proofs"]} == {"last 20% of the session"}
+    assert content["free_space"]["rms_m"] < content["free_space"]["pose_rms_m"]
+    told = [p for p in content["parameters"] if p["value"] is not None]
+    assert all(p["low"] < p["value"] < p["high"] and p["bootstrap_sigma"] > 0.0 for p in told)
+    q = np.random.default_rng(9).uniform(-2.0, 2.0, (30, 5))
+    seen = observed(q, np.random.default_rng(8))
+    write_samples(tmp_path / "new.csv", q, seen)
+    assert run(["predict", str(model), str(tmp_path / "new.csv"), "--out", str(out)]) == 0
+    residual = np.array([[float(row[f"r_{c}"]) for c in POSITION] for row in rows(out)])
+    assert np.sqrt(np.mean(residual**2)) < 2e-5
+
+
+def test_a_fault_in_the_plan_is_one_sentence(folder, tmp_path, capsys):
+    plan = tmp_path / "fit.toml"
+    plan.write_text('schema = 1\nlose = "huber"\n')
+    assert run(["identify", str(folder), "--plan", str(plan), "--out", str(tmp_path / "model.json")]) == 1
+    error = " ".join(capsys.readouterr().err.split())
+    assert "fit.toml line 2: unknown key 'lose' in the file; did you mean 'loss'?" in error
+
+
+def test_noise_that_was_stated_too_small_is_an_alarm_on_screen_and_in_the_model(folder, tmp_path, capsys):
+    rig = folder / "rig.toml"
+    rig.write_text(rig.read_text().replace("position_m = 1e-5", "position_m = 1e-6"))
+    assert run(["identify", str(folder), "--out", str(tmp_path / "model.json")]) == 0
+    assert "ALARM: misfit is larger than the stated noise" in capsys.readouterr().out
+    (alarm,) = json.loads((tmp_path / "model.json").read_text())["alarms"]
+    assert "times the stated noise" in alarm
+
+
+@pytest.mark.parametrize(
+    ("line", "old", "new", "says"),
+    [
+        (0, "q2_rad", "q1_rad", "column 'q1_rad' stands twice"),
+        (0, "q5_rad", "q6_rad", "column 'q5_rad': the column is missing"),
+        (3, ",", ",x", "row 3 (line 4), column 'q1_rad': 'x"),
+        (3, ",", ",nan,", "row 3 (line 4): 10 cells under 9 columns"),
+    ],
+)
+def test_what_the_format_promises_to_refuse_names_file_row_and_column(folder, tmp_path, capsys, line, old, new, says):
+    table = (folder / "samples.csv").read_text().splitlines()
+    table[line] = table[line].replace(old, new, 1)
+    (folder / "samples.csv").write_text("\n".join(table) + "\n")
+    assert run(["identify", str(folder), "--out", str(tmp_path / "model.json")]) == 1
+    told = capsys.readouterr().err
+    assert f"{folder / 'samples.csv'}" in told
+    assert says in told
+
+
+def test_where_nothing_is_determined_the_command_fails_and_writes_no_model(folder, tmp_path, capsys):
+    table = (folder / "samples.csv").read_text().splitlines()
+    (folder / "samples.csv").write_text("\n".join(table[:4]) + "\n")
+    assert run(["identify", str(folder), "--out", str(tmp_path / "model.json")]) == 1
+    assert f"{folder}: nothing can be identified: none of" in capsys.readouterr().err
+    assert not (tmp_path / "model.json").exists()
+
+
+def test_the_last_word_is_the_report_s_verdict_and_no_alarming_status(folder, tmp_path, capsys):
+    model = tmp_path / "model.json"
+    assert run(["identify", str(folder), "--out", str(model)]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    judged = session_verdict(session_evidence(read(folder), read_model(model)))
+    last = " ".join(" ".join([judged.sentence, *judged.reasons]).split())
+    assert told.rpartition(" model:")[0].endswith(last)
+    assert "RANK_DEFICIENT" not in told
+
+
+@pytest.mark.parametrize("instrument", ["position", "distance"])
+def test_every_way_to_read_positions_ends_with_a_verdict(folder, tmp_path, capsys, instrument):
+    plan = tmp_path / "fit.toml"
+    plan.write_text(f'schema = 1\ninstruments = ["{instrument}"]\n')
+    assert run(["identify", str(folder), "--plan", str(plan), "--out", str(tmp_path / "model.json")]) == 0
+    assert f"misses {instrument}s that the fit has not seen by" in " ".join(capsys.readouterr().out.split())
+
+
+def test_a_fit_that_came_to_no_end_is_partial_and_its_model_is_kept(folder, tmp_path, capsys, monkeypatch):
+    model = tmp_path / "model.json"
+    monkeypatch.setattr("calibrate.estimator.solve", partial(solve, max_steps=0))
+    assert run(["identify", str(folder), "--out", str(model)]) == 3
+    told = capsys.readouterr()
+    assert "No usable model: step limit reached" in " ".join(told.out.split())
+    assert f"what was found so far is in {model}" in " ".join(told.err.split())
+    assert read_model(model).status == "OUT_OF_STEPS"

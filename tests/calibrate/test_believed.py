@@ -1,9 +1,12 @@
 """The believed rig at one pose agrees with the chain that is fitted, and with a followed ray."""
 
+import msgspec
 import numpy as np
 import pytest
 
 from acquisition.recording.rig import load_rig
+from acquisition.recording.rig_schema import ArmModel
+from calibrate.arms.convert import convert
 from calibrate.believed import BelievedRig
 from calibrate.believed_fixture import Light
 from calibrate.dual_psd_rig import dual_psd_chain
@@ -16,10 +19,11 @@ def rig(request):
     return load_rig(request.config.rootpath / "rigs" / "ur5e-dual-psd.toml")
 
 
-@pytest.fixture
-def corrected(rig, sessions):
-    """A session, its chain with some corrections, and the believed rig with the same."""
+@pytest.fixture(params=list(ArmModel), ids=lambda model: model.value)
+def corrected(request, rig, sessions):
+    """A session, its chain of every arm model with some corrections, and the believed rig with the same."""
     session = sessions(31, n=20)
+    rig = msgspec.structs.replace(rig, arm=convert(rig.arm, request.param).arm)
     chain = dual_psd_chain(rig, session.placement, session.first_psd)
     theta = start_values(chain.parameters) + np.random.default_rng(0).normal(0, 2e-3, len(chain.parameters))
     values = dict(zip([p.name for p in chain.parameters], theta, strict=True))

@@ -1,7 +1,5 @@
 """The solver: known minima, priors, bounds, and a named status for every way to end."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -9,55 +7,12 @@ from scipy.optimize import least_squares
 from calibrate.fit import NEAR_START, Status, solve
 from calibrate.parameters import Parameter
 
-
-@dataclass(frozen=True)
-class Curve:
-    """Any residual with its derivative."""
-
-    parameters: tuple[Parameter, ...]
-    function: object
-    slope: object
-
-    def residual(self, theta):
-        return np.asarray(self.function(theta), dtype=float)
-
-    def jacobian(self, theta):
-        return np.asarray(self.slope(theta), dtype=float)
-
-
-def unknowns(*starts, **more):
-    return tuple(Parameter(f"p{i}", "1", 1.0, start=s, **more) for i, s in enumerate(starts))
-
-
-def rosenbrock(**more):
-    return Curve(
-        unknowns(-1.2, 1.0, **more),
-        lambda t: [10.0 * (t[1] - t[0] ** 2), 1.0 - t[0]],
-        lambda t: [[-20.0 * t[0], 10.0], [-1.0, 0.0]],
-    )
-
-
-def powell_singular():
-    return Curve(
-        unknowns(3.0, -1.0, 0.0, 1.0),
-        lambda t: [
-            t[0] + 10 * t[1],
-            5**0.5 * (t[2] - t[3]),
-            (t[1] - 2 * t[2]) ** 2,
-            10**0.5 * (t[0] - t[3]) ** 2,
-        ],
-        lambda t: [
-            [1, 10, 0, 0],
-            [0, 0, 5**0.5, -(5**0.5)],
-            [0, 2 * (t[1] - 2 * t[2]), -4 * (t[1] - 2 * t[2]), 0],
-            [2 * 10**0.5 * (t[0] - t[3]), 0, 0, -2 * 10**0.5 * (t[0] - t[3])],
-        ],
-    )
+from .known_minima import Known, powell_singular, rosenbrock, unknowns
 
 
 def line(x, y, sigma, **more):
     design = np.column_stack([np.ones_like(x), x]) / sigma
-    return Curve(unknowns(0.0, 0.0, **more), lambda t: design @ t - y / sigma, lambda t: design)
+    return Known(unknowns(0.0, 0.0, **more), lambda t: design @ t - y / sigma, lambda t: design)
 
 
 def test_the_curved_valley_is_followed_to_its_end():
@@ -81,7 +36,7 @@ def test_covariance_of_a_line_is_the_textbook_one():
 
 
 def test_a_prior_pulls_by_its_weight():
-    curve = Curve(
+    curve = Known(
         (Parameter("p0", "1", 1.0, start=1.0, prior=0.5),), lambda t: (t - 3.0) / 1.0, lambda t: np.ones((1, 1))
     )
     fit = solve(curve)
@@ -102,14 +57,14 @@ def test_bounds_hold_and_the_others_go_to_their_best_as_scipy_says():
 
 def test_held_parameters_stay_and_have_no_variance():
     curve = rosenbrock()
-    held = Curve((curve.parameters[0], Parameter("p1", "1", 1.0, start=1.0, free=False)), curve.function, curve.slope)
+    held = Known((curve.parameters[0], Parameter("p1", "1", 1.0, start=1.0, free=False)), curve.function, curve.slope)
     fit = solve(held)
     assert fit.theta[1] == 1.0
     assert fit.covariance[1, 1] == 0.0
 
 
 def test_dependent_columns_end_as_rank_deficient_without_covariance():
-    curve = Curve(unknowns(0.0, 0.0), lambda t: [t[0] + t[1] - 1.0] * 3, lambda t: np.ones((3, 2)))
+    curve = Known(unknowns(0.0, 0.0), lambda t: [t[0] + t[1] - 1.0] * 3, lambda t: np.ones((3, 2)))
     fit = solve(curve)
     assert fit.status is Status.RANK_DEFICIENT
     assert np.isnan(fit.covariance).all()
@@ -120,7 +75,7 @@ def test_too_few_steps_are_said():
 
 
 def test_a_residual_that_is_not_finite_is_said():
-    curve = Curve(unknowns(0.0), lambda t: [np.inf], lambda t: np.ones((1, 1)))
+    curve = Known(unknowns(0.0), lambda t: [np.inf], lambda t: np.ones((1, 1)))
     assert solve(curve).status is Status.NOT_FINITE
 
 

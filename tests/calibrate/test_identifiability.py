@@ -50,6 +50,20 @@ def test_two_separate_losses_are_told_apart():
     }
 
 
+def test_who_represents_a_combination_does_not_depend_on_how_the_rows_are_turned():
+    """Three offsets seen in their sum alone, and a zero with a yaw: equal members, and an unseen space of three."""
+    rng = np.random.default_rng(4)
+    J = np.concatenate([rng.normal(0, 100, (8, 1)) * [1, 1, 1, 0, 0, 0], rng.normal(0, 100, (8, 3)) @ np.eye(3, 6, 3)])
+    J[:, 4] = J[:, 3]
+    parameters = names("link2.offset", "link3.offset", "link4.offset", "placement1.yaw", "joint1.zero", "joint2.zero")
+    found = set()
+    for _ in range(20):
+        turned = np.linalg.qr(rng.normal(size=(16, 16)))[0] @ J
+        found.add(tuple((c.representative, c.members) for c in analyse(turned, parameters).combinations))
+    assert len(found) == 1
+    assert {who for who, _ in found.pop()} == {"joint1.zero", "link2.offset", "link3.offset"}
+
+
 def test_a_prior_makes_a_combination_known_to_the_size_of_the_prior():
     J = np.full((3, 2), 1e4)
     parameters = (*names("joint4.zero"), Parameter("link4.tilt", "rad", 5e-4, prior=5e-4))

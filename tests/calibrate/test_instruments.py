@@ -269,7 +269,7 @@ def test_what_contradicts_itself_is_refused(rig, truth):
     q = random_readings(12)
     with pytest.raises(DataError, match="no row holds an observation"):
         instruments_of(table(q), rig)
-    with pytest.raises(DataError, match="row 3: wire_m is 0"):
+    with pytest.raises(DataError, match="row 4, column 'wire_m': 0"):
         instruments_of(table(q, wire_m=np.where(np.arange(12) == 3, 0.0, 1.0)), rig)
     nameless = msgspec.structs.replace(rig, tool=msgspec.structs.replace(rig.tool, point_m=None))
     with pytest.raises(DataError, match=r"need tool\.point_m"):

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from calibrate import noise
+from calibrate import variance
 from calibrate.noise import NoiseModel
+from calibrate.variance import NoisyRows
 
 
 def draw(rng, n, joint_rad, psd_m, columns=10):
@@ -20,7 +21,7 @@ def draw(rng, n, joint_rad, psd_m, columns=10):
 def test_both_components_are_found_from_a_wrong_belief(joint_rad, psd_m):
     misfit, J, by_joint = draw(np.random.default_rng(7), 300, joint_rad, psd_m)
     parts = NoiseModel(3e-6, np.full((300, 4), 2e-6)).parts(by_joint)
-    found = noise.estimate(misfit, J, parts, np.zeros(10), np.zeros(10))
+    found = variance.estimate((NoisyRows(misfit, J, parts, (0, 1)),), 2, np.zeros(10), np.zeros(10))
     assert found.converged
     truth = np.array([joint_rad / 3e-6, psd_m / 2e-6])
     assert np.all(np.abs(found.factor - truth) < 4.0 * found.factor_sigma)
@@ -33,7 +34,8 @@ def test_restricted_likelihood_is_not_biased_by_many_parameters():
     for seed in range(60):
         misfit, J, by_joint = draw(np.random.default_rng(seed), 20, 3e-6, 2e-6, columns=40)
         parts = NoiseModel(3e-6, np.full((20, 4), 2e-6)).parts(by_joint)
-        factors.append(noise.estimate(misfit, J, parts, np.zeros(40), np.zeros(40)).log_variance)
+        rows = NoisyRows(misfit, J, parts, (0, 1))
+        factors.append(variance.estimate((rows,), 2, np.zeros(40), np.zeros(40)).log_variance)
     total_power = np.mean(np.sum(np.exp(factors), axis=1)) / 2.0
     assert total_power == pytest.approx(1.0, abs=0.12)  # plain maximum likelihood would give one half
 
@@ -47,5 +49,5 @@ def test_few_residuals_leave_the_noise_in_doubt_and_widen_sigma():
 def _degrees_of_freedom(n):
     misfit, J, by_joint = draw(np.random.default_rng(8), n, 3e-6, 2e-6)
     parts = NoiseModel(3e-6, np.full((n, 4), 2e-6)).parts(by_joint)
-    found = noise.estimate(misfit, J, parts, np.zeros(10), np.zeros(10))
-    return float(np.median(noise.variance_doubt(misfit, J, parts, np.zeros(10), found)))
+    found = variance.estimate((NoisyRows(misfit, J, parts, (0, 1)),), 2, np.zeros(10), np.zeros(10))
+    return float(np.median(variance.doubt((NoisyRows(misfit, J, parts, (0, 1)),), np.zeros(10), found)))

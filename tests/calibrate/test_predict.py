@@ -67,6 +67,22 @@ def test_residuals_stand_where_the_row_has_an_observation(predictor):
     assert np.all(np.isfinite(out["x_m"]))
 
 
+def test_an_orientation_near_half_a_turn_is_written_as_the_observed_one(predictor, ur5e_exact):
+    flange = Rotation.from_matrix([ur5e_exact().flange(q)[:3, :3] for q in Q])
+    seen = Rotation.from_rotvec(TURN).inv() * flange
+    axis = np.array([0.6, 0.0, 0.8])
+    mounted = seen[0].inv() * Rotation.from_rotvec((np.pi - 1e-4) * axis)  # what the first row then reads
+    about = {**predictor.about, "tool": (0.02, -0.01, 0.08, *mounted.as_rotvec())}
+    beyond = (seen * mounted).as_rotvec()
+    beyond[0] = -(np.pi - 1e-4) * axis
+    position = dict.fromkeys(("x_m", "y_m", "z_m"), np.zeros(3))
+    columns = dict(zip(("rx_rad", "ry_rad", "rz_rad"), beyond.T, strict=True))
+    out = predict(Predictor(predictor.rig, {}, about, ("full-pose",)), table(**position, **columns))
+    residual = np.stack([out[f"r_{c}"] for c in columns], axis=1)
+    np.testing.assert_allclose(residual[0], -2e-4 * axis, atol=1e-12)
+    np.testing.assert_allclose(residual[1:], 0.0, atol=1e-12)
+
+
 def test_a_wire_is_the_distance_from_the_origin_of_the_device(predictor, tips):
     place = pose((1.8, -0.6, 0.4), TURN) @ pose((0, 0, 0.05), (0, 0, 0))
     out = predict(predictor, table(wire_m=np.full(3, np.nan)))

@@ -54,7 +54,7 @@ def test_the_second_encoders_can_be_fitted_instead():
         (samples(psd1_x_m=None), "no dual-PSD recording"),
         (samples(psd1_x_m=[NAN] * 3), "none of 3 rows"),
         (samples(placement=None), "no column placement"),
-        (samples(first_psd=[1.0, NAN, 2.0]), "row 1: spots but no first_psd"),
+        (samples(first_psd=[1.0, NAN, 2.0]), "row 2: spots but no first_psd"),
     ],
 )
 def test_what_is_missing_is_named(table, says):

@@ -14,6 +14,7 @@ from calibrate.zeros.result import ZeroResult
 Floats = NDArray[np.float64]
 
 TITLE = "Residuals and noise"
+NONE = "too small to be told from none"
 
 
 def residuals(evidence: Evidence) -> Html:
@@ -95,14 +96,14 @@ def _noise(result: ZeroResult) -> Html:
         (
             "joints",
             angle(n.joint_believed_rad),
-            doubted_angle(n.joint_rad, n.joint_sigma_rad),
-            _ratio(n.joint_rad, n.joint_believed_rad),
+            NONE if n.joint_at_zero else doubted_angle(n.joint_rad, n.joint_sigma_rad),
+            "" if n.joint_at_zero else _ratio(n.joint_rad, n.joint_believed_rad),
         ),
         (
             "detectors (median of the averaged spots)",
             length(n.psd_believed_m),
-            doubted_length(n.psd_m, n.psd_sigma_m),
-            _ratio(n.psd_m, n.psd_believed_m),
+            NONE if n.psd_at_zero else doubted_length(n.psd_m, n.psd_sigma_m),
+            "" if n.psd_at_zero else _ratio(n.psd_m, n.psd_believed_m),
         ),
     ]
     head = ("Noise, one sigma", "believed", "found in the residuals", "found / believed")

@@ -8,6 +8,7 @@ from calibrate.report.evidence import Evidence
 from calibrate.report.quantities import aligned, angle, decimals_of, fixed, length, significant
 from calibrate.report.reasons import plain_reason
 from calibrate.report.summary_figures import doubts, explained
+from calibrate.report.tiles import tile
 from calibrate.report.verdict import limited_by_measurement, verdict
 from calibrate.zeros.result import JointZero
 
@@ -68,23 +69,19 @@ def _reason(zero: JointZero, evidence: Evidence) -> str:
     return plain_reason(f"joint{zero.joint}.zero", evidence.result.identifiability, zero.why)
 
 
-def _tile(name: str, value: str, says: str) -> Html:
-    return tag("div", tag("span", name, cls="name"), tag("b", value), tag("span", says), cls="tile")
-
-
 def _tiles(evidence: Evidence) -> Html:
     result, expected, unseen = evidence.result, evidence.expected, evidence.result.held_out
     found = [z for z in result.zeros if z.value_rad is not None]
     tiles = [
-        _tile("Zeros determined", f"{len(found)} of {len(result.zeros)}", _names(found) or "none"),
-        _tile("Spots off before", length(result.rms_before_m), "rms, arm as drawn at the best places"),
-        _tile("Spots off after", length(result.rms_after_m), _gain(result.rms_before_m, result.rms_after_m)),
+        tile("Zeros determined", f"{len(found)} of {len(result.zeros)}", _names(found) or "none"),
+        tile("Spots off before", length(result.rms_before_m), "rms, arm as drawn at the best places"),
+        tile("Spots off after", length(result.rms_after_m), _gain(result.rms_before_m, result.rms_after_m)),
     ]
     if expected is not None:
-        tiles.append(_tile("Noise floor", length(expected.floor_m), "rms of joints and detectors, as found"))
+        tiles.append(tile("Noise floor", length(expected.floor_m), "rms of joints and detectors, as found"))
     if unseen is not None:
         tiles.append(
-            _tile("Unseen poses", length(unseen.rms_after_m), f"rms on {unseen.poses} poses kept out of the fit")
+            tile("Unseen poses", length(unseen.rms_after_m), f"rms on {unseen.poses} poses kept out of the fit")
         )
     return tag("div", *tiles, cls="tiles")
 

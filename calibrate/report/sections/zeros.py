@@ -5,13 +5,13 @@ from math import degrees
 
 import numpy as np
 
-from calibrate.identifiability import WEAK, Combination, Identifiability
+from calibrate.identifiability import WEAK, Identifiability
 from calibrate.parameters import Parameter
 from calibrate.report.elements import Html, bullets, figure, folded, join, panels, section, table, tag
 from calibrate.report.evidence import Evidence
 from calibrate.report.quantities import DASH, aligned, angle, decimals_of, fixed, significant
 from calibrate.report.rank_figures import spectrum
-from calibrate.report.reasons import plain_reason
+from calibrate.report.reasons import kind_of, plain_reason
 from calibrate.zeros.result import Estimate, JointZero
 
 TITLE = "Joint zeros and rank"
@@ -58,15 +58,7 @@ def rank_words(seen: Identifiability) -> Html:
         said.append(tag("p", gap))
     if not seen.combinations:
         return join(*said, tag("p", "Every parameter can be told from every other."))
-    return join(*said, bullets(join(tag("code", c.words), f": {_kind(c)}.") for c in seen.combinations))
-
-
-def _kind(combination: Combination) -> str:
-    if len(combination.members) == 1:
-        return "the measurement does not depend on it"
-    if combination.structural:
-        return "cannot be told apart by geometry, whatever the poses"
-    return "hardly told apart by these poses; others might"
+    return join(*said, bullets(join(tag("code", c.words), f": {kind_of(c)}.") for c in seen.combinations))
 
 
 def table_of_zeros(listed: Sequence[JointZero], seen: Identifiability) -> Html:

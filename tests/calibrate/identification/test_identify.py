@@ -48,9 +48,12 @@ def test_links_without_tolerance_are_free_and_the_noise_is_found(rig, session):
     result = run(msgspec.structs.replace(rig, tolerance=None), samples)
     (noise,) = result.noise
     assert (noise.source, noise.found) == ("position", pytest.approx(TRACKER_M, rel=0.15))
-    (unseen,) = result.held_out
-    assert unseen.rms_before > 5e-4
-    assert unseen.rms_after < 2.2 * TRACKER_M
+    random, last = result.held_out
+    assert (random.split, last.split) == ("random 20% of the rows", "last 20% of the session")
+    for unseen in (random, last):
+        assert unseen.observations == 50
+        assert unseen.rms_before > 5e-4
+        assert unseen.rms_after < 2.2 * TRACKER_M
 
 
 def test_what_is_said_with_a_sigma_is_true(rig, session):
@@ -64,6 +67,16 @@ def test_what_is_said_with_a_sigma_is_true(rig, session):
     for name in ("joint1.zero", "device.yaw", "link1.offset", "device.z", "link2.offset"):
         assert name not in told
     assert result.status is Status.RANK_DEFICIENT
+
+
+def test_a_drawing_is_not_given_back_as_a_finding(rig, session):
+    rig, _ = tracked(rig, session)
+    q = session.readings(150)
+    q[:, 4:] = 0.4  # two joints that never move show nothing of what is behind them
+    result = run(rig, table(q, **session.positions(q, TRACKER_M)), held_out_share=0.0)
+    why = {e.name: e.why for e in result.estimates}
+    assert why["link6.twist"].startswith("only its prior speaks of it")
+    assert why["link2.length"] is None
 
 
 def test_an_understated_noise_is_an_alarm(rig, session):

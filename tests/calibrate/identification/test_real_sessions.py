@@ -6,8 +6,14 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording.samples_csv import read_csv
 from calibrate.blunders.finding import BlunderKind
+from calibrate.fit import solve
 from calibrate.identification.identify import identify
+from calibrate.identification.rounds import settled_fit
+from calibrate.identification.session import instruments_for_fit
+from calibrate.parameters import hold, plausible_sizes
 from calibrate.predict import Predictor, predict
+from calibrate.uncertainty.held_out import held_out
+from calibrate.uncertainty.splits import at_random
 
 from .conftest import changed
 
@@ -31,21 +37,86 @@ def test_20_unseen_poses_of_a_ur5_are_predicted_to_a_tenth_of_a_millimetre(real)
     assert result.blunders == ()
 
 
-# Published beside the data: 0.449, 0.421, 0.397 mm, each of one random split; 20 splits scatter by 3 to 5 %.
-@pytest.mark.parametrize(
-    ("name", "before_m", "after_m"),
-    [("ur10-leica-a", 0.8e-3, 0.449e-3), ("ur10-leica-b", 1.0e-3, 0.421e-3), ("ur10-leica-d", 0.7e-3, 0.397e-3)],
-)
-def test_a_ur10_before_a_tracker_of_unknown_place_is_within_3_percent_of_the_published_error(
-    real, name, before_m, after_m
-):
+def unseen_rms_m(recording, splits=20):
+    """(split,) rms length of the error on a fifth of the rows, each time another fifth, predicted from the others."""
+    instruments = instruments_for_fit(recording.rig, recording.samples)
+    fitted = settled_fit(instruments.weighting, instruments.start)
+    problem = fitted.problem.blocks[0].with_parameters(fitted.fit.parameters)
+
+    def length(part, theta):
+        return np.linalg.norm(part.misfit(theta), axis=1)
+
+    each = (at_random(problem.rows, np.random.default_rng(seed)) for seed in range(splits))
+    return np.array([held_out(problem, split, fitted.fit.theta, length).rms for split in each])
+
+
+def best_of_all_arms_m(recording):
+    """rms over all rows of the arm (all of five errors a link, tracker, target) that fits these very rows best."""
+    problem = instruments_for_fit(recording.rig, recording.samples).weighting.measured[0].problem
+    sizes = plausible_sizes(problem.parameters)
+    theta = np.zeros(len(sizes))
+    for _ in range(8):
+        rows = (problem.chain.jacobian(theta, problem.q_rad) * sizes).reshape(-1, len(sizes))
+        theta -= sizes * np.linalg.lstsq(rows, problem.misfit(theta).ravel(), rcond=1e-10)[0]
+    return float(np.sqrt(np.mean(np.sum(problem.misfit(theta) ** 2, axis=1))))
+
+
+# Beside the data stand 0.449, 0.421 and 0.397 mm, each of one split that is not told. The mean over 20 splits, which
+# scatter by 2 to 4 %, is below that for a and 0.6 % above for d. For b it is 6 % above, and no kinematic model can do
+# better: the best arm fitted to the unseen rows as well leaves 0.441 mm (docs/decisions/0007).
+FIGURES_M = {"ur10-leica-a": 0.449e-3, "ur10-leica-b": 0.421e-3, "ur10-leica-d": 0.397e-3}
+DRAWN_M = {"ur10-leica-a": 0.8e-3, "ur10-leica-b": 1.0e-3, "ur10-leica-d": 0.7e-3}
+
+
+@pytest.mark.parametrize("name", FIGURES_M)
+def test_a_ur10_before_a_tracker_of_unknown_place_is_predicted_as_well_as_by_the_best_of_all_arms(real, name):
+    """Unknowns cost (1 + p/n) on unseen rows: 1.3 % for the 24 of the 632 rows of d, less for the others."""
     recording = real(name)
     assert recording.rig.device is None
-    result = run(recording, share=0.2)
-    (unseen,) = result.held_out
-    assert unseen.rms_before > before_m
-    assert unseen.rms_after < 1.03 * after_m
+    assert unseen_rms_m(recording).mean() <= 1.015 * best_of_all_arms_m(recording)
+
+
+@pytest.mark.parametrize("name", ["ur10-leica-a"])
+def test_the_mean_over_20_splits_is_at_or_below_the_published_error(real, name):
+    assert unseen_rms_m(real(name)).mean() <= FIGURES_M[name]
+
+
+def test_the_mean_over_20_splits_of_d_is_above_the_published_error_by_less_than_the_mean_is_doubtful(real):
+    rms = unseen_rms_m(real("ur10-leica-d"))
+    assert rms.mean() <= FIGURES_M["ur10-leica-d"] + rms.std() / np.sqrt(len(rms))
+
+
+def test_the_published_error_of_b_is_of_a_lucky_split_which_no_arm_reaches_on_all_rows(real):
+    recording, figure = real("ur10-leica-b"), FIGURES_M["ur10-leica-b"]
+    rms = unseen_rms_m(recording, 60)
+    assert best_of_all_arms_m(recording) > 1.04 * figure
+    assert rms.min() <= figure < rms.mean() <= 1.06 * figure
+
+
+@pytest.mark.parametrize("name", FIGURES_M)
+def test_the_identification_tells_the_unseen_error_and_finds_no_blunder_in_a_good_session(real, name):
+    result = run(real(name), share=0.2)
+    unseen = result.held_out[0]
+    assert "random" in unseen.split
+    assert unseen.rms_before > DRAWN_M[name]
+    assert unseen.rms_after < 1.12 * FIGURES_M[name]  # three times the scatter of one split
     assert result.blunders == ()
+
+
+def test_axis_4_of_the_ur5_is_11_6_mrad_out_of_parallel_to_axis_3_in_every_part_of_the_session(real):
+    """So far, that a real arm is doubted first: nothing else in the model takes its place (docs/decisions/0007)."""
+    recording = real("ur5-tracker")
+    q4, q5 = recording.samples.column("q4_rad"), recording.samples.column("q5_rad")
+    parts = [q4 < np.median(q4), q4 >= np.median(q4), q5 < np.median(q5), q5 >= np.median(q5)]
+    for part in parts:
+        result = run(recording, recording.samples.take(np.flatnonzero(part)))
+        twist = next(e for e in result.estimates if e.name == "link3.twist")
+        assert twist.value == pytest.approx(11.6e-3, abs=3e-4)
+    instruments = instruments_for_fit(recording.rig, recording.samples)
+    problem = settled_fit(instruments.weighting, instruments.start).problem
+    parallel = solve(problem.with_parameters(hold(problem.parameters, ["link3.twist"])), start=instruments.start)
+    misfit = problem.blocks[0].misfit(parallel.theta)
+    assert np.sqrt(np.mean(np.sum(misfit**2, axis=1))) > 0.4e-3
 
 
 def test_blunders_made_in_the_ur5_session_are_found_and_no_others(real):

@@ -6,8 +6,14 @@ import pytest
 from acquisition.recording.rig import load_rig
 from acquisition.recording.samples import Samples
 from calibrate.blunders.finding import BlunderKind
+from calibrate.dual_psd_rig import believed_noise, dual_psd_chain
 from calibrate.errors import DataError
-from calibrate.identification.spots import without_blunders
+from calibrate.fit_plan import FitPlan
+from calibrate.identification.evidence import Asked
+from calibrate.identification.identify import identify
+from calibrate.identification.spots import proved, without_blunders
+from calibrate.read_samples import observations
+from calibrate.zeros.identify import identify as identify_zeros
 
 from .conftest import changed, table
 
@@ -57,3 +63,32 @@ def test_degrees_are_refused_by_name(rig, samples):
     degrees = {f"q{i}_rad": np.degrees(samples.column(f"q{i}_rad")) for i in range(1, 7)}
     with pytest.raises(DataError, match="these are degrees"):
         without_blunders(rig, changed(samples, **degrees))
+
+
+def test_zeros_are_proved_as_every_other_fit_is(rig, samples):
+    data = observations(samples)
+    zeros = identify_zeros(
+        dual_psd_chain(rig, data.placement, data.first_psd), data, believed_noise(rig), rng=np.random.default_rng(0)
+    )
+    found = proved(rig, samples, zeros, asked=Asked(), rng=np.random.default_rng(0))
+    np.testing.assert_allclose(
+        [e.value for e in found.estimates if e.name == "joint3.zero"], zeros.zeros[2].value_rad, atol=1e-7
+    )
+    assert [u.split for u in found.held_out] == [
+        "random 20% of the rows",
+        "each of 3 places in turn",
+        "last 20% of the session",
+    ]
+    assert all(u.rms_after < 1.2e-5 < 1e-3 < u.rms_before for u in found.held_out)
+    assert found.evidence.observability.n_free > 30
+    assert found.alarms == ()
+
+
+def test_a_plan_holds_and_believes_in_a_session_of_spots_alone(rig, samples):
+    plan = FitPlan(schema=1, hold=("link*",), priors={"placement*": 2e-2})
+    result = identify(rig, samples, rng=np.random.default_rng(0), plan=plan, held_out_share=0.0)
+    by = {p.name: p for p in result.parameters}
+    assert not any(p.free for name, p in by.items() if name.startswith("link"))
+    assert {p.prior for name, p in by.items() if name.startswith("placement")} == {2e-2}
+    # The links of the truth are not those of the drawing: held, they leave more than the stated noise.
+    assert any("larger than the stated noise" in alarm for alarm in result.alarms)

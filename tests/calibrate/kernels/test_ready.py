@@ -13,7 +13,8 @@ def source(tmp_path, monkeypatch):
     """A source elsewhere, never compiled."""
     path = tmp_path / "compiled.py"
     path.write_text("x = 1\n")
-    monkeypatch.setattr(ready, "SOURCE", path)
+    (tmp_path / "other.py").write_text("y = 1\n")
+    monkeypatch.setattr(ready, "SOURCES", (tmp_path / "other.py", path))
     ready.available.cache_clear()
     yield path
     ready.available.cache_clear()

@@ -1,23 +1,30 @@
-"""One short in-process session, recorded and identified once: what a report is made of."""
+"""What reports are made of: a short dual-PSD session in process, and sessions of other instruments by formulas."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from acquisition.plan import PlanOptions
 from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
-from acquisition.recording.rig import load_rig, plain_rig, rig_text
+from acquisition.recording.rig import load_rig, parse_rig, plain_rig, rig_sha256, rig_text
+from acquisition.recording.samples import Samples
 from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
 from calibeam.direct import direct_bench
 from calibeam.identification import Identified, identify_recording
 from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
+from calibrate.identification.identify import identify
+from calibrate.identification.record import record_of
+from calibrate.model_file import ModelFile, RigIdentity
 from drivers.clock import SystemClock
 
 RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
+POSITION, ORIENTATION = ("x_m", "y_m", "z_m"), ("rx_rad", "ry_rad", "rz_rad")
+NOISE_M, NOISE_RAD = 20e-6, 1e-4
 
 
 @pytest.fixture(scope="session")
@@ -35,3 +42,51 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recording:
 @pytest.fixture(scope="session")
 def identified(recorded: Recording) -> Identified:
     return identify_recording(recorded)
+
+
+class ArmSession:
+    """A UR5e a little beside its drawing, and what its instruments read of it; plain 4 x 4 products."""
+
+    tool_m = np.array([0.021, -0.012, 0.083])
+    turn, shift_m = Rotation.from_rotvec([0.3, -0.4, 2.2]), np.array([1.8, -0.6, 0.4])  # of the device, in the base
+    mounted = Rotation.from_rotvec([0.2, 0.1, -0.3])  # a 6-D target on the flange
+
+    def __init__(self, truth, n: int) -> None:
+        self.rng = np.random.default_rng(6)
+        self.q_rad = self.rng.uniform(-1.8, 1.8, (n, 6))
+        self.flanges = np.array([truth.flange(q + truth.zeros) for q in self.q_rad])
+        self.tips_m = (self.flanges @ np.array([*self.tool_m, 1.0]))[:, :3]
+
+    def positions(self) -> dict[str, np.ndarray]:
+        seen = self.turn.inv().apply(self.tips_m - self.shift_m)
+        return dict(zip(POSITION, (seen + self.rng.normal(0.0, NOISE_M, seen.shape)).T, strict=True))
+
+    def turns(self) -> dict[str, np.ndarray]:
+        turned = self.turn.inv() * Rotation.from_matrix(self.flanges[:, :3, :3]) * self.mounted
+        noise = Rotation.from_rotvec(self.rng.normal(0.0, NOISE_RAD, (len(self.q_rad), 3)))
+        return dict(zip(ORIENTATION, (noise * turned).as_rotvec().T, strict=True))
+
+    def wire(self) -> dict[str, np.ndarray]:
+        length_m = np.linalg.norm(self.tips_m - self.shift_m, axis=1)
+        return {"wire_m": length_m + self.rng.normal(0.0, NOISE_M, len(length_m))}
+
+    def recording(self, columns: dict[str, np.ndarray], name: str = "any-arm") -> Recording:
+        text = rig_text(RIG).replace('name = "ur5e-dual-psd"', f'name = "{name}"')
+        text = text.replace("laser_origin_m", "point_m = [0.02, -0.01, 0.08]\nlaser_origin_m", 1)
+        text = text.replace("[noise]", "[noise]\nposition_m = 20e-6\nwire_m = 20e-6", 1)
+        readings = {f"q{i + 1}_rad": self.q_rad[:, i] for i in range(6)}
+        samples = Samples({"t_s": np.arange(len(self.q_rad), dtype=float), **readings, **columns}, 6)
+        return Recording(Path("session"), text, parse_rig(text, "rig"), samples, complete=True)
+
+    def model(self, recording: Recording) -> ModelFile:
+        rig = recording.rig
+        found = identify(rig, recording.samples, rng=np.random.default_rng(1))
+        identity = RigIdentity(rig.name, rig_sha256(recording.rig_text), recording.rig_text)
+        return record_of(found, identity, rig.arm.model.value)
+
+
+@pytest.fixture(scope="session")
+def arm_session(ur5e_truth):
+    """ArmSession of so many poses; a new one each time, so that its columns may be changed."""
+    truth = ur5e_truth(np.random.default_rng(5), zero_max=5e-3)
+    return lambda n=80: ArmSession(truth, n)

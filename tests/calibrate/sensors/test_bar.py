@@ -16,11 +16,11 @@ def test_consecutive_ends_form_lengths_whichever_comes_first():
 
 
 def test_an_end_without_its_partner_is_named():
-    with pytest.raises(DataError, match="row 3: end a of bar 1 follows end a of bar 1"):
+    with pytest.raises(DataError, match="row 4, column 'bar_end': end a of bar 1 follows end a of bar 1"):
         bar_pairs(ROWS, np.array([1, 1, 2, 2]), np.array(["a", "a", "b", "a"]))
-    with pytest.raises(DataError, match="row 5: end b of bar 2 follows end a of bar 1"):
+    with pytest.raises(DataError, match="row 6, column 'bar_end': end b of bar 2 follows end a of bar 1"):
         bar_pairs(ROWS[1:3], np.array([1, 2]), np.array(["a", "b"]))
-    with pytest.raises(DataError, match="row 5: end b of bar 2 without the other end"):
+    with pytest.raises(DataError, match="row 6, column 'bar_end': end b of bar 2 without the other end"):
         bar_pairs(ROWS[:3], np.array([1, 1, 2]), np.array(["a", "b", "b"]))
 
 

@@ -1,6 +1,6 @@
 """All solvers on all problems: known minima, arms, bounds, lost rank; and scipy as an independent witness."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from calibrate.chain import Chain
 from calibrate.dual_psd_rig import dual_psd_chain
 from calibrate.fit import DogLegRules, Method, Status, solve
 from calibrate.identifiability import analyse
-from calibrate.parameters import Parameter, plausible_sizes, start_values
+from calibrate.parameters import plausible_sizes, start_values
 from calibrate.problem import Problem
 from calibrate.redundant import reduced
 from calibrate.rigid import transform
@@ -20,38 +20,10 @@ from calibrate.sensors.device import Device
 from calibrate.sensors.position import Position
 from calibrate.sensors.target import Target
 
+from ..known_minima import Known, powell_singular, rosenbrock, unknowns
+
 POSITION_SIGMA_M = 20e-6
 TIGHT = DogLegRules(e2=1e-12, kmax=500)  # beyond what any measurement needs, to compare with scipy
-
-
-@dataclass(frozen=True)
-class Known:
-    """A test function with its derivative, written out."""
-
-    parameters: tuple[Parameter, ...]
-    function: object
-    slope: object
-
-    def residual(self, theta):
-        return np.asarray(self.function(theta), dtype=float)
-
-    def jacobian(self, theta):
-        return np.asarray(self.slope(theta), dtype=float)
-
-    def with_parameters(self, parameters):
-        return replace(self, parameters=parameters)
-
-
-def unknowns(*starts, **more):
-    return tuple(Parameter(f"p{i}", "1", 1.0, start=s, **more) for i, s in enumerate(starts))
-
-
-def rosenbrock(**more):
-    return Known(
-        unknowns(-1.2, 1.0, **more),
-        lambda t: [10.0 * (t[1] - t[0] ** 2), 1.0 - t[0]],
-        lambda t: [[-20.0 * t[0], 10.0], [-1.0, 0.0]],
-    )
 
 
 def beale():
@@ -88,25 +60,6 @@ def box():
         lambda t: np.column_stack(
             [-x * np.exp(-t[0] * x), x * np.exp(-t[1] * x), np.exp(-10.0 * x) - np.exp(-x)],
         ),
-    )
-
-
-def powell_singular():
-    """The same, problem 13: minimum 0 at the origin, where the Jacobian has rank 2."""
-    return Known(
-        unknowns(3.0, -1.0, 0.0, 1.0),
-        lambda t: [
-            t[0] + 10 * t[1],
-            5**0.5 * (t[2] - t[3]),
-            (t[1] - 2 * t[2]) ** 2,
-            10**0.5 * (t[0] - t[3]) ** 2,
-        ],
-        lambda t: [
-            [1, 10, 0, 0],
-            [0, 0, 5**0.5, -(5**0.5)],
-            [0, 2 * (t[1] - 2 * t[2]), -4 * (t[1] - 2 * t[2]), 0],
-            [2 * 10**0.5 * (t[0] - t[3]), 0, 0, -2 * 10**0.5 * (t[0] - t[3])],
-        ],
     )
 
 

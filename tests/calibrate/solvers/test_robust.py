@@ -110,3 +110,64 @@ def test_a_prior_pulls_a_robust_fit_as_it_pulls_a_plain_one():
 def test_a_width_that_is_not_positive_is_refused():
     with pytest.raises(ValueError, match="STUDENT_T loss: width 0"):
         Loss.student_t(0.0)
+
+
+@dataclass(frozen=True)
+class Points:
+    """A point (3,) seen many times with unit noise: three values an observation, or each value for itself."""
+
+    seen: np.ndarray  # (obs, 3)
+
+    parameters = tuple(Parameter(a, "m", 1.0) for a in "xyz")
+
+    def residual(self, theta):
+        return (theta - self.seen).ravel()
+
+    def jacobian(self, theta):
+        return np.tile(np.eye(3), (len(self.seen), 1))
+
+
+class WholePoints(Points):
+    @property
+    def row_widths(self):
+        return np.full(len(self.seen), 3)
+
+
+@pytest.mark.parametrize("loss", ROBUST, ids=str)
+def test_a_bad_shot_is_distrusted_in_all_its_coordinates(loss):
+    rng = np.random.default_rng(6)
+    seen = rng.normal(0.0, 1.0, (80, 3))
+    seen[7, 0] += 100.0
+    weights = solve(WholePoints(seen), loss=loss).weights.reshape(80, 3)
+    np.testing.assert_array_equal(weights, weights[:, :1] * np.ones(3))
+    assert weights[7, 2] < 0.06
+    assert solve(Points(seen), loss=loss).weights.reshape(80, 3)[7, 2] > 0.5
+
+
+@pytest.mark.parametrize("loss", ROBUST, ids=str)
+def test_the_answer_does_not_depend_on_the_axes_of_an_observation(loss):
+    rng = np.random.default_rng(7)
+    seen = rng.standard_t(2, (60, 3)) + np.arange(3)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    straight = solve(WholePoints(seen), loss=loss, tolerance=1e-14).theta
+    turned = solve(WholePoints(seen @ turn.T), loss=loss, tolerance=1e-14).theta
+    np.testing.assert_allclose(turn @ straight, turned, atol=1e-7)
+
+
+@pytest.mark.parametrize("loss", [Loss.HUBER, Loss.CAUCHY, Loss.STUDENT_T], ids=str)
+def test_sigma_of_whole_observations_is_the_scatter_of_the_answers(loss):
+    rng, z = np.random.default_rng(8), []
+    for _ in range(300):
+        size = np.where(rng.uniform(size=(40, 1)) < 0.1, 5.0, 1.0)
+        fit = solve(WholePoints(size * rng.normal(size=(40, 3))), loss=loss)
+        z.append(fit.theta / np.sqrt(np.diag(fit.covariance)))
+    assert np.sqrt(np.mean(np.square(z))) == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("loss", [Loss.HUBER, Loss.CAUCHY], ids=str)
+def test_as_many_good_observations_bend_whatever_their_width(loss):
+    rng = np.random.default_rng(9)
+    k = np.array([1, 3, 6])
+    lengths = [np.linalg.norm(rng.normal(size=(200_000, n)), axis=1) for n in k]
+    beyond = [float(np.mean(z > bend)) for z, bend in zip(lengths, loss.bend(k), strict=True)]
+    np.testing.assert_allclose(beyond, beyond[0], atol=4.0 * np.sqrt(beyond[0] / 200_000))

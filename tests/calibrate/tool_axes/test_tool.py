@@ -89,7 +89,25 @@ def test_with_noise_the_errors_are_as_large_as_stated(arm, positions):
 
 def test_the_wrist_s_last_joint_alone_is_not_enough(arm, positions):
     q = turns(4, 6)
-    with pytest.raises(
-        DataError, match=r"rotations of joint 5 alone and 6 alone .* found single rotations of joint 4, 6"
-    ):
+    with pytest.raises(DataError, match="joint 5 alone and 6 alone are needed") as told:
         calibrate_tool(arm, q, positions(q))
+    assert str(told.value).endswith("found single rotations of joint 4 (rows 1-16), 6 (rows 17-31)")
+
+
+def test_an_arc_that_is_too_short_is_told_with_its_rows(arm, positions):
+    q = np.concatenate([turns(6), turns(5, span=0.1)])
+    with pytest.raises(DataError, match=r"joint 5 alone turns only 11\.5 deg .*; 20 deg and 5 rows are needed"):
+        calibrate_tool(arm, q, positions(q))
+
+
+def test_a_joint_that_was_moved_between_both_rotations_is_named(arm, positions):
+    q = turns(5, 6)
+    q[16:, 1] += 0.1
+    with pytest.raises(DataError, match=r"joint 2 stands 5\.7 deg apart between rows 1-16 and rows 17-31"):
+        calibrate_tool(arm, q, positions(q))
+
+
+def test_errors_count_rows_as_the_file_does(arm, positions):
+    q = turns(4, 6)
+    with pytest.raises(DataError, match=r"found single rotations of joint 4 \(rows 11-26\)"):
+        calibrate_tool(arm, q, positions(q), np.arange(10, 10 + len(q)))

@@ -33,3 +33,14 @@ def test_rows_of_a_group_go_together_and_lost_rank_is_counted(fitted):
     drawn = bootstrap(one.problem, one.fit, np.random.default_rng(0), rounds=5, group=np.arange(40) // 39)
     assert drawn.failed + len(drawn.theta) == 5
     assert drawn.failed > 0  # a draw of the one odd pose alone cannot place the device
+
+
+def test_rows_that_are_stated_and_not_sampled_are_in_every_draw(fitted):
+    one = fitted(71, poses=40)
+    group = np.where(np.arange(40) == 39, 0, -1)  # one pose to draw, all others stated: every draw is the session
+    drawn = bootstrap(one.problem, one.fit, np.random.default_rng(0), rounds=3, group=group)
+    free = [i for i, p in enumerate(one.problem.parameters) if p.free and np.isinf(p.prior)]
+    spread = np.ptp(drawn.theta[:, free], axis=0)
+    honest = np.ptp(bootstrap(one.problem, one.fit, np.random.default_rng(0), rounds=3).theta[:, free], axis=0)
+    assert drawn.failed == 0
+    assert np.median(spread / honest) < 0.5

@@ -8,7 +8,13 @@ import pytest
 from benchmarks.drawn_sessions import TARGET_M
 from calibrate.fit import solve
 from calibrate.identifiability import analyse
-from calibrate.uncertainty.free_space import FreeSpaceStatus, Workspace, free_space_error, without_rigid_motion
+from calibrate.uncertainty.free_space import (
+    FreeSpaceStatus,
+    Scatter,
+    Workspace,
+    free_space_error,
+    without_rigid_motion,
+)
 
 ROOM = Workspace(np.full(6, -2.5), np.full(6, 2.5), TARGET_M, 400)
 
@@ -78,3 +84,28 @@ def test_a_rigid_motion_of_everything_is_no_error():
     left = without_rigid_motion(points, bent)
     np.testing.assert_allclose(left[..., 0], 0.0, atol=1e-12)
     assert np.abs(left[..., 1]).max() > 0.1
+
+
+def test_scatter_of_a_pose_adds_in_squares(fitted):
+    one = fitted(60, poses=60)
+
+    def rms_m(scatter):
+        found = free_space_error(one.model, one.fit, one.seen, ROOM, np.random.default_rng(0), scatter)
+        return found.rms_m
+
+    alone, of_target, of_joints = rms_m(Scatter()), rms_m(Scatter(target_m=2e-5)), rms_m(Scatter(joint_rad=1e-5))
+    assert of_target == pytest.approx(np.hypot(alone, np.sqrt(3.0) * 2e-5), rel=1e-9)
+    assert 5e-6 < np.sqrt(of_joints**2 - alone**2) < 3e-5  # 10 urad at an arm of 0.9 m, six joints
+
+
+def test_what_the_poses_hardly_show_counts_with_its_plausible_size(fitted):
+    one = fitted(60, poses=60)
+    weak = replace(one.seen.combinations[0], structural=False)
+    length = one.seen.names.index("link2.length")
+    unseen = np.zeros((len(one.seen.names), 1))
+    unseen[length] = 1e-3
+    seen = replace(one.seen, combinations=(weak,), unseen=unseen)
+    sure, guess = (free_space_error(one.model, one.fit, s, ROOM, np.random.default_rng(0)) for s in (one.seen, seen))
+    assert guess.status is FreeSpaceStatus.PREDICTED
+    assert guess.guessed == (weak.plain,)
+    assert 1e-4 < np.sqrt(guess.rms_m**2 - sure.rms_m**2) < 1e-3

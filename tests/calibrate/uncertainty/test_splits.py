@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from calibrate.uncertainty.splits import at_random, by_place, last_block, usual
+from calibrate.uncertainty.splits import SplitKind, at_random, by_place, last_block, usual
 
 
 def test_a_random_fifth_is_another_one_with_another_seed():
@@ -14,6 +14,17 @@ def test_a_random_fifth_is_another_one_with_another_seed():
 def test_every_row_is_unseen_once_when_places_go_in_turn():
     folds = by_place(np.array([3, 1, 3, 2, 1])).unseen
     assert [fold.tolist() for fold in folds] == [[1, 4], [3], [0, 2]]
+
+
+def test_rows_without_a_place_are_never_left_out():
+    assert [fold.tolist() for fold in by_place(np.array([-1, 4, -1, 0])).unseen] == [[3], [1]]
+
+
+def test_only_the_kinds_that_are_asked_for_are_made():
+    t_s, rng = np.arange(10.0), np.random.default_rng(0)
+    (one,) = usual(10, rng, t_s=t_s, share=0.3, kinds=(SplitKind.LAST, SplitKind.PLACE))
+    assert (one.says, len(one.unseen[0])) == ("last 30% of the session", 3)
+    assert usual(10, rng, t_s=np.zeros(10), kinds=(SplitKind.LAST,)) == ()
 
 
 def test_the_last_block_goes_by_time_and_not_by_row():

@@ -87,6 +87,15 @@ def test_noise_is_found_and_chi_square_agrees(results):
         assert 0.7 < noise.chi2_per_dof < 1.3
 
 
+def test_joints_without_noise_are_said_to_have_none_that_can_be_told(rig, sessions):
+    session = sessions(8, joint_noise=0.0)
+    result = run(rig, session, held_out_share=0.0)
+    assert result.noise.converged
+    assert (result.noise.joint_at_zero, result.noise.psd_at_zero) == (True, False)
+    assert abs(result.noise.psd_m - 2e-6) < 4.0 * result.noise.psd_sigma_m
+    assert all(abs(z) < 4.5 for z in deviations(result, session.truth))
+
+
 def test_wrong_belief_about_noise_changes_little(rig, sessions):
     right = run(rig, sessions(0), held_out_share=0.0)
     wrong = run(rig, sessions(0), held_out_share=0.0, noise=BelievedNoise(2e-5, 5e-7))

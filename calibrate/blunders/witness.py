@@ -1,0 +1,70 @@
+"""What an instrument has to say on whether the arm as drawn can have moved as the file says: its strain, in metres.
+
+A witness fits, robustly and in milliseconds, whatever nobody states exactly (the device's frame, the target, the cones)
+and tells what distance remains. Files by another convention are found by comparing strains, never by a threshold.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.blunders.finding import BlunderKind
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+ENOUGH_POSES = 150  # more do not change which hypothesis wins
+TRUST = 0.1  # of what is drawn: a target may be 10 mm off where the readings are explained to 1 mm
+
+
+@dataclass(frozen=True)
+class Strain:
+    """Median distance between arm and readings, and by how much drawn things had to move for it; both in m."""
+
+    typical_m: float
+    moved_m: float
+
+    def __add__(self, other: "Strain") -> "Strain":
+        """Of two instruments together."""
+        return Strain(self.typical_m + other.typical_m, self.moved_m + other.moved_m)
+
+    @property
+    def compared_m(self) -> float:
+        """What the better of two explanations has less of."""
+        return self.typical_m + TRUST * self.moved_m
+
+
+class Witness(Protocol):
+    """One instrument's readings beside the joint angles of the same rows."""
+
+    @property
+    def q_rad(self) -> Floats:
+        """(pose, joint) as written, of the poses that `strain` wants."""
+        ...
+
+    def strain(self, T_base_flange: Floats) -> Strain:
+        """For flange poses (pose, 4, 4) of the arm as drawn."""
+        ...
+
+    def otherwise(self) -> "Iterator[Otherwise]":
+        """The same readings as they would be if the file wrote them by another known convention."""
+        ...
+
+
+@dataclass(frozen=True)
+class Otherwise:
+    """Another convention of an instrument's columns, and its readings then."""
+
+    kind: BlunderKind
+    column: str
+    what: str
+    remedy: str
+    witness: Witness
+
+
+def thinned(rows: Rows) -> Rows:
+    """No more than ENOUGH_POSES of these rows, evenly spread."""
+    return np.unique(rows[np.linspace(0, len(rows) - 1, ENOUGH_POSES).astype(np.intp)]) if len(rows) else rows

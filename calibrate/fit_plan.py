@@ -1,0 +1,158 @@
+"""The fit plan: what a user wants of an identification, as a TOML file with one clear error for what is wrong in it.
+
+Keys are those of docs/formats.md. Patterns are shell patterns over parameter names: "link*.length", "joint6.zero".
+"""
+
+import enum
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+from msgspec import Meta, Struct
+
+from acquisition.recording.rig_faults import explain
+from acquisition.recording.rig_lines import KeyPath, key_lines, line_of
+from acquisition.recording.rig_schema import ArmModel
+from calibrate.errors import DataError
+from calibrate.fit import Loss, Method
+from calibrate.redundant import Redundant
+from calibrate.uncertainty.splits import SplitKind
+
+Pattern = Annotated[str, Meta(min_length=1)]
+Positive = Annotated[float, Meta(gt=0.0)]
+Count = Annotated[int, Meta(ge=0)]
+
+
+class LossName(enum.Enum):
+    """What a residual costs; all but the first forgive far rows."""
+
+    LEAST_SQUARES = "least-squares"
+    HUBER = "huber"
+    CAUCHY = "cauchy"
+    STUDENT_T = "student-t"
+
+
+class SolverName(enum.Enum):
+    """The algorithm."""
+
+    LEVENBERG = "levenberg-marquardt"
+    DOGLEG = "dog-leg"
+
+
+class RedundantName(enum.Enum):
+    """What is done with combinations that the data do not see."""
+
+    REMOVED = "removed"
+    PRIORS = "priors"
+
+
+class InstrumentName(enum.Enum):
+    """Instruments by the columns of the samples; `distance` and `point` are other ways to use positions and spots."""
+
+    DUAL_PSD = "dual-psd"
+    POINT = "point"  # centred spots only, as lines through one point of each placement
+    POSITION = "position"
+    FULL_POSE = "full-pose"
+    DISTANCE = "distance"  # positions as distances between consecutive poses, without the device's frame
+    WIRE = "wire"
+    SEAT = "seat"
+    BAR = "bar"
+
+
+class FitPlan(Struct, frozen=True, forbid_unknown_fields=True):
+    """A whole plan; every key but `schema` may be absent and then leaves things as they are without a plan."""
+
+    schema: Literal[1]
+    model: ArmModel | None = None  # the rig's arm is written anew in this model
+    instruments: tuple[InstrumentName, ...] = ()  # none: all that the samples allow
+    free: tuple[Pattern, ...] = ()  # without an opinion of the drawing
+    priors: Mapping[str, Positive] = {}  # pattern -> one sigma about the drawing, m or rad; a later one wins
+    hold: tuple[Pattern, ...] = ()  # as drawn; wins over `free` and `priors`
+    loss: LossName = LossName.LEAST_SQUARES
+    solver: SolverName = SolverName.LEVENBERG
+    redundant: RedundantName = RedundantName.REMOVED
+    splits: tuple[SplitKind, ...] = tuple(SplitKind)
+    share: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.2  # of the rows, held out; 0: no proof
+    seed: Count = 1  # of everything that is drawn: the same plan and samples give the same model
+    bootstrap: Count = 0  # rounds
+
+    @property
+    def robust_loss(self) -> Loss:
+        return LOSSES[self.loss]
+
+    @property
+    def method(self) -> Method:
+        return METHODS[self.solver]
+
+    @property
+    def of_redundant(self) -> Redundant:
+        return REDUNDANT[self.redundant]
+
+
+LOSSES = {
+    LossName.LEAST_SQUARES: Loss.SQUARE,
+    LossName.HUBER: Loss.HUBER,
+    LossName.CAUCHY: Loss.CAUCHY,
+    LossName.STUDENT_T: Loss.STUDENT_T,
+}
+METHODS = {SolverName.LEVENBERG: Method.LEVENBERG, SolverName.DOGLEG: Method.DOGLEG}
+REDUNDANT = {RedundantName.REMOVED: Redundant.REMOVED, RedundantName.PRIORS: Redundant.HELD_BY_PRIORS}
+
+DEFAULT = FitPlan(schema=1)
+
+
+def read_plan(path: Path) -> tuple[FitPlan, str]:
+    """The plan of a file, and its text. DataError naming file, line, key, value and remedy."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise DataError(f"{path}: cannot read the fit plan ({error.strerror}); check the path") from error
+    except UnicodeDecodeError as error:
+        raise DataError(f"{path}: the fit plan is not UTF-8 (byte {error.start}); save it as UTF-8") from error
+    return parse_plan(text, str(path)), text
+
+
+def parse_plan(text: str, name: str) -> FitPlan:
+    """The plan of a text; `name` stands for the file in errors."""
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise DataError(f"{name}: not TOML: {error}; correct the line") from error
+    lines = key_lines(text)
+    try:
+        plan = msgspec.convert(document, type=FitPlan)
+    except msgspec.ValidationError as error:
+        faults = [*_prior_faults(document.get("priors")), explain(error, document, FitPlan)]
+        raise _fault(name, lines, *faults[0]) from error
+    for path, says in _contradictions(plan):
+        raise _fault(name, lines, path, says)
+    return plan
+
+
+def _prior_faults(priors: Any) -> Iterator[tuple[KeyPath, str]]:
+    """The type check does not say which entry of a table is wrong."""
+    for key, value in priors.items() if isinstance(priors, dict) else ():
+        if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0.0:
+            yield (
+                ("priors", key),
+                f"'{key}' = {value!r} in [priors]: one sigma is a positive number in m or rad; correct it",
+            )
+
+
+def _contradictions(plan: FitPlan) -> Iterator[tuple[KeyPath, str]]:
+    pairs = (
+        (InstrumentName.POSITION, InstrumentName.DISTANCE),
+        (InstrumentName.FULL_POSE, InstrumentName.DISTANCE),
+        (InstrumentName.DUAL_PSD, InstrumentName.POINT),
+    )
+    for one, other in pairs:
+        if {one, other} <= set(plan.instruments):
+            yield ("instruments",), f"'{one.value}' and '{other.value}' are the same readings; choose one of them"
+    if plan.share == 0.0 and plan.splits != tuple(SplitKind):
+        yield ("share",), "share = 0 holds nothing out, so that `splits` has no meaning; leave one of them out"
+
+
+def _fault(name: str, lines: Mapping[KeyPath, int], path: KeyPath, says: str) -> DataError:
+    return DataError(f"{name} line {line_of(lines, path)}: {says}")

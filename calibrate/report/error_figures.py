@@ -1,0 +1,110 @@
+"""Error of every reading before and after the fit: how large, when, and along which joint."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from calibrate.report.elements import Html
+from calibrate.report.patterns import Pattern
+from calibrate.report.quantities import fixed
+from calibrate.report.session_evidence import Readings
+from calibrate.report.svg import drawn, log_axis
+from calibrate.report.tones import PLACES, Tone
+
+Floats = NDArray[np.float64]
+
+MOST_POINTS = 1200  # of a scatter: beyond, the page grows and the eye sees no more
+BINS = 28
+COLUMNS = 4
+AXES = {3: ("x", "y", "z"), 4: ("PSD 1 x", "PSD 1 y", "PSD 2 x", "PSD 2 y"), 1: ("length",)}
+
+
+def errors(readings: Readings) -> Html:
+    """Histogram of the length of the misfit before and after, on a logarithmic axis."""
+    says = f"histogram of the errors of {readings.title} before and after the fit"
+    return drawn(f"errors-{readings.name}", says, 4.8, 3.3, lambda figure: _paint_errors(figure, readings))
+
+
+def _paint_errors(figure: Figure, readings: Readings) -> None:
+    axes = figure.add_subplot()
+    sets = (("arm as drawn", readings.error_before, Tone.PLACE_2), ("identified", readings.error_after, Tone.PLACE_1))
+    sizes = np.concatenate([values[values > 0.0] for _, values, _ in sets])
+    if len(sizes) == 0:
+        axes.set_axis_off()
+        return
+    edges = np.geomspace(max(sizes.min(), 1e-4 * np.median(sizes)), sizes.max() * 1.001, BINS)
+    for label, values, tone in sets:
+        rms = readings.says(float(np.sqrt(np.mean(values**2))))
+        axes.hist(values, bins=edges.tolist(), color=tone.value, alpha=0.6, label=f"{label}: {rms} rms")
+    axes.set(ylabel="readings", title=f"{readings.title}: error")
+    log_axis(axes, "x", [float(edges[0]), float(edges[-1])], lambda value: readings.says(value, 1))
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.14), ncols=2, borderaxespad=0.0)
+
+
+def by_sample(readings: Readings) -> Html:
+    """Length of the misfit against the number of the sample."""
+    says = f"errors of {readings.title} against the number of the sample, before and after the fit"
+    return drawn(f"by-sample-{readings.name}", says, 4.8, 3.3, lambda figure: _paint_by_sample(figure, readings))
+
+
+def _paint_by_sample(figure: Figure, readings: Readings) -> None:
+    axes = figure.add_subplot()
+    shown = thinned(len(readings.rows))
+    number = readings.rows[shown, 0] + 1
+    before, after = readings.error_before[shown], readings.error_after[shown]
+    for values, tone, label in ((before, Tone.PLACE_2, "arm as drawn"), (after, Tone.PLACE_1, "identified")):
+        some = values > 0.0
+        axes.plot(number[some], values[some], "o", ms=2.2, mew=0, color=tone.value, alpha=0.65, label=label)
+    sizes = np.concatenate([before, after])
+    sizes = sizes[sizes > 0.0]
+    if len(sizes):
+        log_axis(
+            axes, "y", [float(np.quantile(sizes, 0.002)), float(sizes.max())], lambda value: readings.says(value, 1)
+        )
+    axes.set(xlabel="sample", title="Error in the order of the session")
+
+
+def thinned(n: int) -> NDArray[np.intp]:
+    """Evenly spread observations, no more than a page can show."""
+    return np.arange(n) if n <= MOST_POINTS else np.linspace(0, n - 1, MOST_POINTS).astype(np.intp)
+
+
+def along(readings: Readings, found: Sequence[Pattern]) -> Html:
+    """Means of groups of readings along each factor with two sigma, all on one scale."""
+    says = f"mean residual of {readings.title} along every joint angle and along the session"
+    rows = -(-len(found) // COLUMNS)
+    return drawn(
+        f"along-{readings.name}", says, 9.9, 0.5 + 2.1 * rows, lambda figure: _paint_along(figure, readings, found)
+    )
+
+
+def _paint_along(figure: Figure, readings: Readings, found: Sequence[Pattern]) -> None:
+    rows = -(-len(found) // COLUMNS)
+    reach = max(float(np.max(np.abs(p.mean) + 2.0 * p.sigma)) for p in found)
+    scale, unit = _unit(reach, readings.unit)
+    grid = figure.subplots(rows, COLUMNS, sharey=True, squeeze=False).ravel()
+    names = AXES.get(found[0].mean.shape[1], tuple(str(i + 1) for i in range(found[0].mean.shape[1])))
+    for axes, p in zip(grid, found, strict=False):
+        middle = np.degrees(p.middle) if p.factor.startswith("J") else p.middle
+        axes.axhline(0.0, color=Tone.SOFT.value, lw=0.8)
+        for k, name in enumerate(names):
+            tone = PLACES[k % len(PLACES)].value
+            axes.fill_between(
+                middle, *(scale * (p.mean[:, k] + s * p.sigma[:, k]) for s in (-2.0, 2.0)), color=tone, alpha=0.18, lw=0
+            )
+            axes.plot(middle, scale * p.mean[:, k], "-", color=tone, lw=1.3, label=name)
+        where = f"{p.factor} (°)" if p.factor.startswith("J") else p.factor
+        axes.set(title=f"{where}: F = {fixed(p.f, 1)}{', clear' if p.clear else ''}")
+    for axes in grid[len(found) :]:
+        axes.set_axis_off()
+    for axes in grid[::COLUMNS]:
+        axes.set_ylabel(f"mean residual ({unit})")
+    if len(names) > 1:
+        grid[0].legend(loc="best", ncols=len(names), handlelength=1.0, columnspacing=0.8, fontsize=8)
+
+
+def _unit(reach: float, unit: str) -> tuple[float, str]:
+    sizes = {"m": ((1e3, "mm"), (1e6, "µm")), "rad": ((1e3, "mrad"), (1e6, "µrad"))}[unit]
+    return sizes[0] if reach * sizes[0][0] >= 0.3 else sizes[1]

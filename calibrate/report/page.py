@@ -1,0 +1,38 @@
+"""One HTML file that needs nothing else, on a screen, a phone or on paper: the shell that every report shares."""
+
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path
+
+from calibrate.errors import DataError
+from calibrate.report.elements import Html, join, tag
+
+# The browser itself refuses anything from outside: https://www.w3.org/TR/CSP3/
+POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+
+
+def page(title: str, masthead: Html, contents: Mapping[str, str], chapters: Sequence[Html], software: str) -> Html:
+    """The whole document; `contents` are headings by the anchor of their chapter."""
+    style = Html(files("calibrate.report").joinpath("report.css").read_text(encoding="utf-8"))
+    head = tag(
+        "head",
+        tag("meta", charset="utf-8"),
+        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        tag("meta", http_equiv="Content-Security-Policy", content=POLICY),
+        tag("title", title),
+        tag("style", style),
+    )
+    links = (tag("a", heading, href=f"#{anchor}") for anchor, heading in contents.items())
+    nav = tag("nav", *links, aria_label="Contents")
+    footer = tag("footer", f"Written by {software}. This file needs no network and no other file.")
+    body = tag("body", tag("main", masthead, nav, *chapters, footer))
+    return join(Html("<!doctype html>\n"), tag("html", head, body, lang="en"), Html("\n"))
+
+
+def write_page(path: Path | str, text: str) -> Path:
+    """Over what may be there; returns the path. DataError where it cannot be written."""
+    try:
+        Path(path).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise DataError(f"{path}: the report cannot be written ({error.strerror}); give another place") from error
+    return Path(path)

@@ -1,0 +1,86 @@
+"""Health and coverage of a recording as tables: joint angles, what was recorded beside them, raw streams, findings."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.recording.check import check
+from acquisition.recording.recording import Recording
+from acquisition.recording.rig_schema import Rig
+from calibrate.report.elements import Html, table, tag
+from calibrate.report.quantities import fixed, significant
+
+Floats = NDArray[np.float64]
+
+EXTRAS = (
+    ("cmd1_rad", "commanded joint angles", "whether the controller reached what it was told"),
+    ("enc1_rad", "second encoders on the joints", "transmission errors between motor and link"),
+    ("repeat", "repeated poses", "noise apart from missing physics"),
+    ("approach1", "direction of approach", "backlash"),
+)
+
+
+def coverage(rig: Rig, q_rad: Floats) -> Html:
+    """How much of each joint's range the poses (pose, joint) use."""
+    rows = [
+        (
+            f"J{i}",
+            *(fixed(float(np.degrees(v)), 1) for v in (q.min(), q.max(), np.ptp(q))),
+            f"{np.ptp(q) / (j.upper_rad - j.lower_rad):.0%}",
+        )
+        for i, (j, q) in enumerate(zip(rig.arm.joints, q_rad.T, strict=True), start=1)
+    ]
+    head = ("Joint", "from (°)", "to (°)", "span (°)", "of its range")
+    return table(head, rows, numeric=(1, 2, 3, 4), caption="Joint angles in the fitted poses")
+
+
+def recorded(recording: Recording, extras: Sequence[tuple[str, str, str]]) -> Html:
+    """Which of these columns there are: name, what it is, what it shows; and the temperatures."""
+    samples = recording.samples
+    rows: list[tuple[str, ...]] = [
+        (what, "yes" if column in samples else "no", f"shows {shows}" if column in samples else f"cannot show {shows}")
+        for column, what, shows in extras
+    ]
+    for name, values in temperatures(recording):
+        where = name.removeprefix("temp_").removesuffix("_degC")
+        rows.append(
+            (f"temperature {where}", "yes", f"{fixed(float(values.min()), 2)} to {fixed(float(values.max()), 2)} °C")
+        )
+    return table(("Quantity", "recorded", "what it tells"), rows, caption="Beside angles and spots")
+
+
+def temperatures(recording: Recording) -> list[tuple[str, Floats]]:
+    """Columns of temperatures that hold a value, and these values."""
+    samples = recording.samples
+    names = [n for n in samples.names if n.startswith("temp_") and n.endswith("_degC")]
+    read = [(n, samples.column(n)[np.isfinite(samples.column(n))]) for n in names]
+    return [(n, values) for n, values in read if len(values)]
+
+
+def streams(recording: Recording) -> list[Html]:
+    """Rates and gaps of the raw streams."""
+    if not recording.streams:
+        return [tag("p", "No raw streams are in the recording, only settled samples.")]
+    rows: list[tuple[str, ...]] = []
+    for stream in recording.streams.values():
+        span_s = float(np.ptp(stream.host_s)) if len(stream.host_s) > 1 else 0.0
+        rate = significant((len(stream.host_s) - 1) / span_s) if span_s > 0.0 else ""
+        lost = sum(max(gap.missing, 0) for gap in stream.gaps)
+        channels = ", ".join(c.name for c in stream.channels)
+        rows.append((stream.name, str(len(stream.host_s)), rate, str(len(stream.gaps)), str(lost), channels))
+    head = ("Stream", "samples", "per second", "gaps", "lost", "channels")
+    note = (
+        "Per second of the recording computer's clock: emulated devices may run faster than real time. A lost sample "
+        "of the encoders is a SYNC that this computer sent too late; the settled samples average over those that came."
+    )
+    return [table(head, rows, numeric=(1, 2, 3, 4), caption="Raw streams"), tag("p", note)]
+
+
+def findings(recording: Recording) -> Html:
+    """What the check of the recording says."""
+    found = check(recording)
+    if not found:
+        return tag("p", "The check of the recording found nothing wrong.")
+    rows = [(finding.problem.value, finding.where, finding.says) for finding in found]
+    return table(("Problem", "where", "what"), rows, caption="Found by the check of the recording")

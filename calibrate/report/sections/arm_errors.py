@@ -1,0 +1,97 @@
+"""The chapter on errors before and after, instrument by instrument, and on patterns in what remains."""
+
+import numpy as np
+
+from calibrate.report.elements import Html, figure, folded, panels, section, table, tag
+from calibrate.report.error_figures import MOST_POINTS, along, by_sample, errors
+from calibrate.report.patterns import GROUPS, Pattern
+from calibrate.report.quantities import fixed, significant
+from calibrate.report.residual_figures import histogram, quantiles
+from calibrate.report.session_evidence import Readings, SessionEvidence
+from calibrate.report.session_verdict import patterns_of
+
+TITLE = "Errors before and after"
+
+
+def errors_chapter(evidence: SessionEvidence) -> Html:
+    """All instruments in one table, then each by itself."""
+    lead = (
+        "Expected minus observed. As drawn: frames, target and cones where they fit best, the arm nominal. "
+        "Identified: everything fitted. An error is the length of the difference, 3-D for a position."
+    )
+    rows = [row for readings in evidence.readings for row in _figures(readings)]
+    head = ("Reading", "state", "count", "rms", "mean", "95 %", "largest")
+    each = (part for i in range(len(evidence.readings)) for part in _instrument(evidence, i))
+    return section("errors", TITLE, lead, table(head, rows, numeric=(2, 3, 4, 5, 6)), *each)
+
+
+def _figures(readings: Readings) -> list[tuple[str, ...]]:
+    out: list[tuple[str, ...]] = []
+    for state, values in (("as drawn", readings.error_before), ("identified", readings.error_after)):
+        numbers = (np.sqrt(np.mean(values**2)), values.mean(), np.percentile(values, 95.0), values.max())
+        name = readings.title if state == "as drawn" else ""
+        out.append((name, state, str(len(values)), *(readings.says(float(n)) for n in numbers)))
+    return out
+
+
+def _instrument(evidence: SessionEvidence, index: int) -> list[Html]:
+    readings = evidence.readings[index]
+    found = patterns_of(evidence, index)
+    out = [tag("h3", readings.title)]
+    if index > 0:  # those of the first are on the first page
+        out.append(_before_and_after(readings))
+    out.append(_noise_like(readings))
+    if found:
+        out += [tag("div", figure(along(readings, found), _caption(found)), cls="wide"), _pattern_table(found)]
+    else:
+        out.append(tag("p", "Too few readings to look for patterns along the joints."))
+    return out
+
+
+def _before_and_after(readings: Readings) -> Html:
+    some = f" {MOST_POINTS} of them are drawn." if len(readings.rows) > MOST_POINTS else ""
+    return panels(
+        figure(errors(readings), "Every reading, before and after, on a logarithmic axis."),
+        figure(by_sample(readings), f"The same in the order of the file.{some}"),
+    )
+
+
+def _noise_like(readings: Readings) -> Html:
+    whitened = readings.whitened
+    beyond = int(np.sum(np.abs(whitened) > 3.0))
+    return panels(
+        figure(
+            quantiles(whitened, f"quantiles-{readings.name}"),
+            "In units of the noise found. On the line within the grey corridor: pure noise. An S shape: more far "
+            "values than noise has.",
+        ),
+        figure(
+            histogram(whitened, f"histogram-{readings.name}"),
+            f"{beyond} of {whitened.size} coordinates lie beyond three sigma; noise alone would put "
+            f"{significant(0.0027 * whitened.size, 2)} there.",
+        ),
+    )
+
+
+def _caption(found: tuple[Pattern, ...]) -> str:
+    return (
+        f"What the identified arm leaves, averaged over {len(found[0].middle)} groups of readings along each factor, "
+        "with two sigma of each average. Pure noise stays about zero everywhere; a wave along a joint is physics that "
+        "the model lacks."
+    )
+
+
+def _pattern_table(found: tuple[Pattern, ...]) -> Html:
+    rows = [
+        (
+            p.factor,
+            fixed(p.f, 2),
+            significant(p.p, 2) if p.p > 0.0 else "0",
+            f"{p.share:.0%}",
+            "a pattern: not chance" if p.clear else "no pattern that chance would not give",
+        )
+        for p in found
+    ]
+    caption = f"Does what remains depend on it (one-way analysis of variance, up to {GROUPS} groups)"
+    head = ("Factor", "F", "p", "share of what remains", "reads as")
+    return folded("The same in numbers", table(head, rows, numeric=(1, 2, 3), caption=caption))

@@ -1,0 +1,133 @@
+"""The chapter with every parameter: a number with its sigma, or the reason why there is none; rank before both."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from calibrate.identifiability import WEAK
+from calibrate.model_file import ModelFile, ModelParameter
+from calibrate.observability import WELL_CONDITIONED
+from calibrate.parameters import Parameter
+from calibrate.report.elements import Html, bullets, figure, folded, panels, section, table, tag
+from calibrate.report.quantities import DASH, aligned, decimals_of, fixed, significant
+from calibrate.report.rank_figures import spectrum
+from calibrate.report.reasons import in_plain_words, kind_of, reason_among
+from calibrate.report.session_evidence import SessionEvidence
+
+TITLE = "What was identified, and what was not"
+LEARNED = 0.9  # sigma over drawing tolerance: above, these data taught nothing about the parameter
+
+
+def parameters_chapter(evidence: SessionEvidence) -> Html:
+    """Rank and unseen combinations, then numbers, then refusals."""
+    model = evidence.model
+    lead = f"Rank {model.rank} of {model.free}: what the data can see comes before any number. Fit: {model.says}."
+    known = [p for p in model.parameters if p.value is not None]
+    refused = [p for p in model.parameters if p.value is None]
+    content = [_rank(evidence), tag("h3", "Identified"), _numbers(evidence, known)]
+    if refused:
+        content += [tag("h3", "Refused"), tag("p", _about_refusals(), cls="lead"), _refusals(evidence, refused)]
+    return section("parameters", TITLE, lead, *content)
+
+
+def _rank(evidence: SessionEvidence) -> Html:
+    model = evidence.model
+    s = np.array(model.singular_values)
+    words = tag("div", tag("h3", "Unseen combinations"), *_combinations(evidence))
+    if len(s) == 0:
+        return words
+    drawing = any(np.isfinite(p.prior) for p in evidence.parameters)
+    caption = (
+        "Singular values of the weighted Jacobian in plausible sizes: how many times better than a guess one "
+        f"combination of parameters is known. Below {WEAK:g} nothing is known."
+    )
+    return panels(figure(spectrum(s, model.rank, "spectrum", with_drawing=drawing), caption), words)
+
+
+def _combinations(evidence: SessionEvidence) -> Iterator[Html]:
+    model = evidence.model
+    yield tag("p", f"{model.rank} of {model.free} combinations are seen.")
+    yield from _observability(model)
+    if not model.unseen:
+        yield tag("p", "Every parameter can be told from every other.")
+        return
+    kinds = dict.fromkeys(kind_of(u) for u in model.unseen)
+    for kind in kinds:
+        yield tag("p", f"{kind[0].upper()}{kind[1:]}:")
+        yield bullets(in_plain_words(u.words) for u in model.unseen if kind_of(u) == kind)
+
+
+def _observability(model: ModelFile) -> Iterator[Html]:
+    seen = model.observability
+    if seen is None:
+        if model.condition is not None:
+            yield tag("p", f"Condition of what is seen: {significant(model.condition)}.")
+        return
+    values = (seen.o1, seen.o2, seen.o3, seen.o4, seen.o5, seen.condition)
+    row = tuple(DASH if value is None else significant(value) for value in values)
+    caption = f"Observability of the {seen.parameters} parameters that the data tell"
+    head = (*(f"O{k}" for k in range(1, 6)), "condition")
+    yield table(head, [row], numeric=range(6), caption=caption)
+    if seen.condition is not None and seen.condition > WELL_CONDITIONED:
+        says = f"A condition above {WELL_CONDITIONED:g} means that other poses would show some parameters far better."
+        yield tag("p", says, cls="lead")
+
+
+def _numbers(evidence: SessionEvidence, known: list[ModelParameter]) -> Html:
+    if not known:
+        return tag("p", "No single parameter can be told alone; together they predict (model.json: chain).")
+    believed = {p.name: p for p in evidence.parameters}
+    drawn = any(p.bootstrap_sigma is not None for p in known)
+    head = (
+        "Parameter",
+        "what it is",
+        "correction",
+        "± sigma",
+        *(("by refits",) if drawn else ()),
+        "unit",
+        "known from",
+    )
+    numbers = [_number(p) for p in known]
+    values, sigmas = (aligned(list(column)) for column in zip(*(n[:2] for n in numbers), strict=True))
+    rows = [
+        (tag("code", p.name), in_plain_words(p.name), value, sigma, *_by_refits(p, drawn), unit, _source(p, believed))
+        for p, value, sigma, (_, _, unit) in zip(known, values, sigmas, numbers, strict=True)
+    ]
+    return table(head, rows, numeric=(2, 3, 4) if drawn else (2, 3))
+
+
+def _number(found: ModelParameter) -> tuple[str, str, str]:
+    """Correction, sigma and their unit."""
+    scale, unit = {"m": (1e3, "mm"), "rad": (1e3, "mrad")}.get(found.unit, (1.0, found.unit))
+    value, sigma = scale * (found.value or 0.0), scale * (found.sigma or 0.0)
+    digits = decimals_of(sigma)
+    return fixed(value, digits), fixed(sigma, digits), unit
+
+
+def _by_refits(found: ModelParameter, drawn: bool) -> tuple[str, ...]:
+    if not drawn:
+        return ()
+    scale = {"m": 1e3, "rad": 1e3}.get(found.unit, 1.0)
+    return (DASH,) if found.bootstrap_sigma is None else (significant(scale * found.bootstrap_sigma, 2),)
+
+
+def _source(found: ModelParameter, believed: dict[str, Parameter]) -> str:
+    own = believed.get(found.name)
+    drawing = own is not None and (found.sigma or 0.0) > LEARNED * own.prior
+    return "drawing" if drawing else "data"
+
+
+def _about_refusals() -> str:
+    return (
+        "A number for one of these alone would be one choice among many that fit the data equally well. The model "
+        "still predicts: it holds one of each combination where it was, which changes no prediction."
+    )
+
+
+def _refusals(evidence: SessionEvidence, refused: list[ModelParameter]) -> Html:
+    rows = [
+        (tag("code", p.name), in_plain_words(p.name), reason_among(p.name, evidence.model.unseen, p.undetermined))
+        for p in refused
+    ]
+    listed = table(("Parameter", "what it is", "why there is no number"), rows)
+    return listed if len(rows) <= 12 else folded(f"All {len(rows)}, each with its reason", listed)

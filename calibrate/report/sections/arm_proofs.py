@@ -1,0 +1,93 @@
+"""The chapter on doubt: unseen rows, chi-square, noise, repeats."""
+
+from collections.abc import Iterator
+
+from acquisition.recording.rig_schema import Rig
+from calibrate.model_file import ModelFile, UnseenRows
+from calibrate.report.elements import Html, section, table, tag
+from calibrate.report.free_space_table import free_space
+from calibrate.report.model_tests import proofs, repeated, scatter
+from calibrate.report.quantities import DASH, angle, doubted_angle, doubted_length, fixed, length, significant
+from calibrate.report.session_evidence import SAID, SessionEvidence
+from calibrate.uncertainty.chi_square import Alarm
+
+TITLE = "Proof and doubt"
+ANGULAR = ("joint", "orientation")
+STATED = {"joint": "joint_rad", "psd": "psd_m", "position": "position_m", "wire": "wire_m", "seat": "seat_m"}
+
+
+def proofs_chapter(evidence: SessionEvidence) -> Html:
+    """What speaks for and against the numbers."""
+    lead = "An error on rows that the fit has not seen is what to expect at work; a sigma is as good as the noise."
+    return section(
+        "proofs",
+        TITLE,
+        lead,
+        *_unseen(evidence.model),
+        *free_space(evidence.model),
+        _noise(evidence.model, evidence.recording.rig),
+        table(("Test", "value", "reads as"), _tests(evidence.model), numeric=(1,), caption="Noise against misfit"),
+        *_drawn_rows(evidence.model),
+    )
+
+
+def _unseen(model: ModelFile) -> list[Html]:
+    found = proofs(model)
+    unproven = [tag("p", f"No proof by {why}.") for why in model.unproven]
+    if not found:
+        return [tag("p", "No rows were kept out of the fit: too few, or it was not asked for."), *unproven]
+    head = ("Left out", "reading", "count", "as drawn, rms", "identified, rms", "over the noise")
+    caption = "Rows that the fit has not seen, predicted from the others"
+    return [table(head, (_proof(p) for p in found), numeric=(2, 3, 4, 5), caption=caption), *unproven]
+
+
+def _proof(proof: UnseenRows) -> tuple[str, ...]:
+    name = SAID.get(proof.instrument, proof.instrument)
+    return (
+        proof.split,
+        name,
+        str(proof.observations),
+        length(proof.rms_before),
+        length(proof.rms_after),
+        fixed(proof.chi_after, 2),
+    )
+
+
+def _drawn_rows(model: ModelFile) -> list[Html]:
+    if model.bootstrap is None:
+        return []
+    failed = f"; {model.bootstrap.failed} of them did not end" if model.bootstrap.failed else ""
+    rounds = f"{model.bootstrap.rounds} refits to rows drawn at random{failed}"
+    return [tag("p", f"Sigmas were also found by {rounds}: see the parameters.")]
+
+
+def _noise(model: ModelFile, rig: Rig) -> Html:
+    rows: list[tuple[str, ...]] = []
+    for name in [n.removesuffix("_believed") for n in model.noise if n.endswith("_believed")]:
+        believed, found, sigma = (model.noise.get(f"{name}{tail}") for tail in ("_believed", "", "_sigma"))
+        if not (isinstance(believed, float) and isinstance(found, float) and isinstance(sigma, float)):
+            continue
+        says, doubted = (angle, doubted_angle) if name in ANGULAR else (length, doubted_length)
+        stated = getattr(rig.noise, STATED.get(name, ""), None) is not None
+        source = "rig file" if stated else "assumed: the rig file states none"
+        rows.append((name, says(believed), source, doubted(found, sigma), fixed(found / believed, 2)))
+    head = ("Noise of", "believed", "by", "found in the residuals", "found / believed")
+    return table(head, rows, numeric=(1, 3, 4), caption="Noise, one sigma of one coordinate")
+
+
+def _tests(model: ModelFile) -> Iterator[tuple[str, ...]]:
+    found, repeats = scatter(model), repeated(model)
+    if found is not None:
+        ratio = fixed(found.chi2 / found.dof, 2) if found.dof > 0 else DASH
+        said = f"alarm: {found.alarm.value}" if found.alarm is not Alarm.NONE else found.alarm.value
+        yield "chi²/dof, noise as believed", ratio, f"{found.dof} degrees of freedom; {said}"
+    if repeats is None:
+        yield "Repeats", "none: no pose was repeated, so missing physics cannot be told from noise"
+        return
+    yield (
+        "Repeats, chi²/dof",
+        fixed(repeats.chi2_per_dof, 2),
+        f"{repeats.groups} groups, {repeats.dof} degrees of freedom; owes nothing to the arm model",
+    )
+    if repeats.ratio is not None and repeats.p is not None:
+        yield "Lack of fit, F", fixed(repeats.ratio, 2), f"p = {significant(repeats.p, 2)}: {repeats.alarm.value}"

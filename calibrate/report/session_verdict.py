@@ -1,0 +1,164 @@
+"""The first sentence of a session's report: how good the arm is now, whether to trust it, and what to do next."""
+
+from collections.abc import Iterator
+from math import isfinite
+
+import numpy as np
+
+from calibrate.fit import Status
+from calibrate.model_file import Fields, UnseenRows
+from calibrate.report.model_tests import Repeated, Scatter, proofs, repeated, scatter
+from calibrate.report.patterns import Pattern, patterns
+from calibrate.report.quantities import significant
+from calibrate.report.session_evidence import SessionEvidence
+from calibrate.report.verdict import NOISIER, WORSE_UNSEEN, Trust, Verdict
+from calibrate.uncertainty.chi_square import Alarm
+
+MANY_LEFT_OUT = 0.05  # of the rows: beyond, it is worth asking what went wrong while measuring
+NO_BETTER = 0.95  # of the error as drawn on unseen rows: above, the identification has gained nothing
+WORTH_SAYING = 0.1  # of what remains: a pattern of less changes no decision
+FAILED = (Status.NOT_FINITE.name, Status.OUT_OF_STEPS.name, Status.STALLED.name)
+
+NOUNS = {
+    "dual-psd": "spots",
+    "position": "positions",
+    "full-pose": "positions",
+    "distance": "distances",
+    "wire": "wire lengths",
+    "seat": "cones",
+    "bar": "bar lengths",
+}
+
+Doubt = tuple[str, str]  # what speaks against trust, and what to do about it
+
+
+def session_verdict(evidence: SessionEvidence) -> Verdict:
+    """From model and recording; the thresholds are those at the top of this file and of verdict.py."""
+    model = evidence.model
+    doubts = list(_doubts(evidence))
+    reasons = tuple(says for says, _ in doubts)
+    advice = tuple(dict.fromkeys((*(do for _, do in doubts if do), *_harmless(scatter(model)))))
+    if model.status in FAILED:
+        again = "Measure again, with more and more different poses."
+        return Verdict(Trust.NONE, f"No usable model: {model.says}.", reasons, (again, *advice))
+    first = next(iter(proofs(model)), None)
+    if first is not None and first.rms_after > NO_BETTER * first.rms_before:
+        keep = "Keep the drawing; find out what is wrong with arm, instrument or poses, and measure again."
+        return Verdict(Trust.NONE, f"{_how_good(evidence, first)} Do not use this model.", reasons, (keep, *advice))
+    if not doubts:
+        ready = "Export the arm (calibeam identify --export) or use model.json as it is."
+        return Verdict(
+            Trust.GOOD, f"{_how_good(evidence, first)} Trust it: what remains is noise.", (), (ready, *advice)
+        )
+    return Verdict(Trust.CARE, f"{_how_good(evidence, first)} Use it, with care.", reasons, advice)
+
+
+def worst_pattern(evidence: SessionEvidence) -> Pattern | None:
+    """The clear pattern that holds most of what the first instrument leaves."""
+    clear = [p for p in patterns_of(evidence, 0) if p.clear]
+    return max(clear, key=lambda p: p.share, default=None)
+
+
+def patterns_of(evidence: SessionEvidence, index: int) -> tuple[Pattern, ...]:
+    """Of one of the readings; an observation of two poses counts at its first."""
+    readings = evidence.readings[index]
+    rows = readings.rows[:, 0]
+    return patterns(evidence.recording.samples.joints()[rows], rows.astype(np.float64), readings.after)
+
+
+def _how_good(evidence: SessionEvidence, proof: UnseenRows | None) -> str:
+    readings = evidence.readings[0]
+    noun = NOUNS.get(readings.instrument, readings.instrument)
+    if proof is None:
+        after, before = (float(np.sqrt(np.mean(e**2))) for e in (readings.error_after, readings.error_before))
+        return (
+            f"The identified arm misses the {noun} it was fitted to by {readings.says(after)} rms; "
+            f"as drawn it misses them by {readings.says(before)}."
+        )
+    return (
+        f"The identified arm misses {noun} that the fit has not seen by {readings.says(proof.rms_after)} rms; "
+        f"as drawn it misses them by {readings.says(proof.rms_before)}."
+    )
+
+
+def _doubts(evidence: SessionEvidence) -> Iterator[Doubt]:
+    model, recording = evidence.model, evidence.recording
+    if model.status == Status.AT_BOUND.name:
+        yield f"{Status.AT_BOUND.value}.", "Look up which parameter it is below, and check the rig file's drawing."
+    yield from _doubts_of_scatter(scatter(model), repeated(model))
+    yield from _noisy_sources(model.noise)
+    worst = worst_pattern(evidence)
+    if worst is not None and worst.share > WORTH_SAYING:
+        along = "changes in the session" if worst.factor.startswith("order") else f"follows {worst.factor}"
+        yield (
+            f"What remains {along} ({worst.share:.0%} of it, F = {significant(worst.f)}): the model lacks something.",
+            "Look for the missing physics where the figures along the joints, below, show it.",
+        )
+    yield from _doubts_of_proofs(proofs(model))
+    share = evidence.left_out / max(len(recording.samples), 1)
+    if share > MANY_LEFT_OUT:
+        yield (
+            f"{evidence.left_out} of {len(recording.samples)} rows were left out as faulty.",
+            "Find out what went wrong with the rows that were left out; they are listed below.",
+        )
+    if not recording.complete:
+        yield "The recording was cut short; what is in it is good, but the plan was not finished.", "Finish the plan."
+    for damage in recording.damage:
+        yield f"The file is damaged: {damage}.", "Keep the file as it is, and record again if you can."
+
+
+def _doubts_of_scatter(found: Scatter | None, repeats: Repeated | None) -> Iterator[Doubt]:
+    if found is None:
+        return
+    if found.alarm is Alarm.ABOVE_STATED:
+        yield (
+            f"What remains is {significant(found.factor)} times the noise that was believed: the instruments are worse "
+            "than that, or the arm does something that the model lacks.",
+            "Measure some poses several times (column repeat): only that tells noise from missing physics."
+            if repeats is None
+            else "",
+        )
+    if found.alarm is Alarm.NO_REDUNDANCY:
+        yield f"{Alarm.NO_REDUNDANCY.value}.", "Measure more poses."
+    if repeats is not None and repeats.alarm is Alarm.LACK_OF_FIT and repeats.ratio is not None:
+        yield (
+            f"Repeated poses scatter less than the model misses them (F = {significant(repeats.ratio)}): "
+            "physics is missing from the model.",
+            "Look for the missing physics where the figures along the joints, below, show it.",
+        )
+
+
+def _harmless(found: Scatter | None) -> Iterator[str]:
+    """An alarm that makes no number worse: sigmas are of the scatter found."""
+    if found is not None and found.alarm is Alarm.BELOW_STATED:
+        yield (
+            f"What remains is only {significant(found.factor)} times the noise that was believed: put the noise that "
+            "was found into [noise] of the rig file."
+        )
+
+
+def _noisy_sources(noise: Fields) -> Iterator[Doubt]:
+    """Which of several sources is worse than believed."""
+    names = [n.removesuffix("_believed") for n in noise if n.endswith("_believed")]
+    for name in names if len(names) > 1 else ():
+        found, believed = noise.get(name), noise.get(f"{name}_believed")
+        if isinstance(found, float) and isinstance(believed, float) and found > NOISIER * believed > 0.0:
+            times = significant(found / believed)
+            yield f"The noise of {name} is {times} times what was believed.", f"Check the instrument: {name}."
+
+
+def _doubts_of_proofs(found: tuple[UnseenRows, ...]) -> Iterator[Doubt]:
+    if not found:
+        yield (
+            "There is no proof on unseen rows: too few rows, or it was not asked for.",
+            "Measure at least 15 poses, better 50, so that some can be kept for the proof.",
+        )
+    told = set[str]()
+    for proof in found:
+        if proof.split in told or not isfinite(proof.chi_after) or proof.chi_after <= WORSE_UNSEEN:
+            continue
+        told.add(proof.split)
+        yield (
+            f"Unseen rows ({proof.split}) are missed by {significant(proof.chi_after)} times the noise.",
+            "Check that nothing moved during the session, and measure where the arm will work.",
+        )

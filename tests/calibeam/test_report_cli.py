@@ -1,0 +1,111 @@
+"""`report`: a page for a recording of any instruments, else one sentence with the right exit code."""
+
+import csv
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from calibeam.cli import run
+
+RIG = """schema = 1
+name = "five-joints"
+[arm]
+model = "dh"
+{joints}
+[tool]
+point_m = [0.03, 0.01, 0.05]
+[noise]
+position_m = 1e-5
+"""
+JOINT = """[[arm.joint]]
+a_m = {a}
+alpha_rad = {alpha}
+d_m = {d}
+lower_rad = -2.9
+upper_rad = 2.9
+"""
+TABLE = [(0.0, np.pi / 2, 0.3), (0.4, 0.0, 0.0), (0.1, np.pi / 2, 0.0), (0.0, -np.pi / 2, 0.35), (0.05, 0.0, 0.1)]
+
+
+def seen(q, rng):
+    """Positions in a tracker's own frame of an arm 0.3 mm beside its drawing."""
+    point = np.tile([0.03, 0.01, 0.05], (len(q), 1))
+    for j in reversed(range(len(TABLE))):
+        a, alpha, d = TABLE[j]
+        point = Rotation.from_rotvec([alpha, 0, 0]).apply(point) + np.array([a + 3e-4, 0.0, d])
+        point = Rotation.from_rotvec((q[:, j] + 1e-3 * j)[:, None] * [0, 0, 1]).apply(point)
+    point = Rotation.from_rotvec([0.2, 0.1, 2.0]).apply(point) + np.array([1.0, 2.0, 0.5])
+    return point + rng.normal(0.0, 1e-5, point.shape)
+
+
+def write_folder(where, seed, n=90):
+    where.mkdir()
+    rng = np.random.default_rng(seed)
+    joints = "".join(JOINT.format(a=a, alpha=alpha, d=d) for a, alpha, d in TABLE)
+    (where / "rig.toml").write_text(RIG.format(joints=joints))
+    q = rng.uniform(-2.0, 2.0, (n, 5))
+    table = np.column_stack([np.arange(n), q, seen(q, rng)])
+    with (where / "samples.csv").open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["t_s", *(f"q{i + 1}_rad" for i in range(5)), "x_m", "y_m", "z_m"])
+        writer.writerows(table.tolist())
+    return where
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return write_folder(tmp_path / "session", 3)
+
+
+def test_a_session_of_positions_gets_its_report(folder, tmp_path, capsys):
+    out = tmp_path / "deep" / "report.html"
+    assert run(["report", str(folder), "--out", str(out)]) == 0
+    assert f"report: {out}" in capsys.readouterr().out
+    assert "misses positions that the fit has not seen by" in out.read_text()
+
+
+def test_the_report_of_a_model_is_that_of_its_own_numbers(folder, tmp_path):
+    model, out = tmp_path / "model.json", tmp_path / "report.html"
+    assert run(["identify", str(folder), "--out", str(model)]) == 0
+    assert run(["report", str(folder), "--model", str(model), "--out", str(out)]) == 0
+    anew = tmp_path / "anew.html"
+    assert run(["report", str(folder), "--out", str(anew)]) == 0
+    assert out.read_text() == anew.read_text()
+
+
+def test_a_model_by_a_plan_is_read_by_its_plan(folder, tmp_path):
+    plan, model, out = tmp_path / "fit.toml", tmp_path / "model.json", tmp_path / "report.html"
+    plan.write_text('schema = 1\nmodel = "mdh"\nhold = ["link5.*"]\n')
+    assert run(["identify", str(folder), "--plan", str(plan), "--out", str(model)]) == 0
+    assert run(["report", str(folder), "--model", str(model), "--out", str(out)]) == 0
+    assert "misses positions" in out.read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        (["missing.mcap"], 1, "missing.mcap"),
+        (["text.mcap"], 1, "text.mcap"),
+        (["session", "--model", "missing.json"], 1, "missing.json: cannot be read"),
+        (["session", "--model", "text.mcap"], 1, "text.mcap: not a model.json"),
+        (["session", "--modle", "model.json"], 2, "modle"),
+        ([], 2, "recording"),
+    ],
+)
+def test_what_cannot_be_reported_is_said_with_its_exit_code(
+    folder, tmp_path, capsys, monkeypatch, arguments, code, told
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "text.mcap").write_text("nothing of the kind")
+    assert run(["report", *arguments]) == code
+    said = capsys.readouterr()
+    assert told in (said.err + said.out).lower()
+    assert not (tmp_path / "report.html").exists()
+
+
+def test_the_model_of_another_session_is_refused(folder, tmp_path, capsys):
+    other, model = write_folder(tmp_path / "other", 4), tmp_path / "model.json"
+    assert run(["identify", str(other), "--out", str(model)]) == 0
+    assert run(["report", str(folder), "--model", str(model), "--out", str(tmp_path / "report.html")]) == 1
+    assert "give the model of this recording" in capsys.readouterr().err

@@ -1,0 +1,119 @@
+"""A plan changes what is fitted and how, and nothing else; what it cannot have is refused by name."""
+
+import msgspec
+import numpy as np
+import pytest
+
+from acquisition.recording.rig_schema import ArmModel
+from calibrate.errors import DataError
+from calibrate.fit_plan import FitPlan, InstrumentName, LossName, RedundantName, SolverName
+from calibrate.identification.identify import identify
+from calibrate.identification.planned import rig_as_planned
+from calibrate.predict import Predictor, predict
+
+from .conftest import table
+
+NOISE_M = 1e-5
+AXES = ("x_m", "y_m", "z_m")
+
+
+@pytest.fixture
+def tracked(rig, session):
+    rig = msgspec.structs.replace(rig, noise=msgspec.structs.replace(rig.noise, position_m=NOISE_M))
+    q = session.readings(150)
+    return rig, table(q, **session.positions(q, NOISE_M))
+
+
+@pytest.fixture
+def fresh(session):
+    q = session.readings(80)
+    return table(q, **session.positions(q, 0.0))
+
+
+def run(tracked, share=0.0, **keys):
+    plan = FitPlan(schema=1, **keys)
+    return identify(*tracked, rng=np.random.default_rng(0), plan=plan, held_out_share=share)
+
+
+def error_m(tracked, result, fresh, **keys):
+    rig = rig_as_planned(tracked[0], FitPlan(schema=1, **keys))
+    values = {p.name: float(v) for p, v in zip(result.parameters, result.theta, strict=True)}
+    predicted = predict(Predictor(rig, values, result.about, ("position",)), fresh)
+    return np.sqrt(np.mean([predicted[f"r_{c}"] ** 2 for c in AXES]))
+
+
+def told(result):
+    return {e.name: e for e in result.estimates if e.value is not None}
+
+
+def test_what_is_held_freed_and_believed_is_so_in_the_fit(tracked):
+    priors = {"link*.length": 5e-4, "link2.length": 1e-4}
+    result = run(tracked, hold=("link6.*", "link2.offset"), free=("link3.*",), priors=priors)
+    now = {p.name: p for p in result.parameters}
+    assert not any(now[f"link6.{k}"].free for k in ("offset", "length", "twist"))
+    assert (now["link3.length"].prior, now["link2.length"].prior) == (5e-4, 1e-4)
+    assert np.isinf(now["link3.twist"].prior)
+    assert np.isfinite(now["link4.twist"].prior)
+    reasons = {e.name: e.why for e in result.estimates}
+    assert reasons["link6.length"] == reasons["link2.offset"] == "held at its nominal value"
+
+
+def test_the_arm_may_be_fitted_in_another_model(tracked, fresh):
+    drawn = run(tracked)
+    for model in (ArmModel.MDH, ArmModel.LOCAL_POE):
+        other = run(tracked, model=model)
+        assert {p.name for p in other.parameters} != {p.name for p in drawn.parameters}
+        assert error_m(tracked, other, fresh, model=model) < 0.6 * NOISE_M
+
+
+def test_dog_leg_gives_the_same_answer_and_a_loss_one_within_the_doubt(tracked):
+    plain = told(run(tracked))
+    dogleg = told(run(tracked, solver=SolverName.DOGLEG))
+    huber = told(run(tracked, loss=LossName.HUBER))
+    for name, e in plain.items():
+        assert abs(dogleg[name].value - e.value) < 1e-3 * e.sigma
+        assert abs(huber[name].value - e.value) < 1.5 * e.sigma
+    assert max(abs(huber[n].value - e.value) / e.sigma for n, e in plain.items()) > 0.01
+
+
+@pytest.mark.parametrize("loss", [LossName.CAUCHY, LossName.STUDENT_T])
+def test_a_loss_that_forgives_predicts_as_well(tracked, fresh, loss):
+    assert error_m(tracked, run(tracked, loss=loss), fresh) < 0.8 * NOISE_M
+
+
+def test_redundant_parameters_held_by_priors_have_no_number_either(tracked, fresh):
+    removed, pulled = run(tracked), run(tracked, redundant=RedundantName.PRIORS)
+    assert error_m(tracked, pulled, fresh) < 0.6 * NOISE_M
+    for result in (removed, pulled):
+        assert not {"joint1.zero", "device.yaw", "joint6.zero"} & set(told(result))
+    shared = set(told(removed)) & set(told(pulled))
+    assert len(shared) > 8
+    for name in shared:
+        assert abs(told(removed)[name].value - told(pulled)[name].value) < told(removed)[name].sigma
+
+
+def test_share_and_splits_are_those_of_the_plan(tracked):
+    result = identify(*tracked, rng=np.random.default_rng(0), plan=FitPlan(schema=1, share=0.4))
+    assert [u.observations for u in result.held_out] == [60, 60]
+
+
+def test_spots_as_lines_are_an_instrument_too(rig, sessions):
+    lit = sessions(62, n=40, spread=0.0, places=(1,))
+    names = ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")
+    spots = dict(zip(names, lit.spots_m.T, strict=True))
+    samples = table(lit.q_rad, placement=lit.placement.astype(float), first_psd=lit.first_psd.astype(float), **spots)
+    result = run((rig, samples), instruments=(InstrumentName.POINT,))
+    assert [i.name for i in result.instruments] == ["point"]
+
+
+@pytest.mark.parametrize(
+    ("keys", "says"),
+    [
+        ({"hold": ("link2.lenght",)}, "matches 'link2.lenght'; did you mean 'link2.length'"),
+        ({"priors": {"placement9.x": 1e-3}}, "no parameter of this session matches 'placement9.x'"),
+        ({"instruments": (InstrumentName.POSITION, InstrumentName.WIRE)}, "instrument 'wire': the samples hold no row"),
+    ],
+)
+def test_what_rig_or_samples_do_not_have_is_refused_by_name(tracked, keys, says):
+    with pytest.raises(DataError, match=says):
+        run(tracked, **keys)

@@ -1,0 +1,160 @@
+"""The report of any session: whole, self-contained, every parameter a number with sigma or a reason, never both."""
+
+import re
+from html.parser import HTMLParser
+
+import msgspec
+import numpy as np
+import pytest
+
+from calibrate.errors import DataError
+from calibrate.model_file import ModelFile
+from calibrate.report.session_evidence import session_evidence
+from calibrate.report.session_report import session_report_html, write_session_report
+
+NEWER = ("alarms", "proofs", "unproven", "observability", "free_space", "bootstrap", "plan")
+
+
+@pytest.fixture(scope="module")
+def wire_and_positions(arm_session):
+    """Two instruments, each at half of the poses, and a name that would be code."""
+    session = arm_session()
+    half = np.arange(len(session.q_rad)) % 2 == 0
+    columns = {name: np.where(half, column, np.nan) for name, column in session.positions().items()}
+    columns |= {name: np.where(half, np.nan, column) for name, column in session.wire().items()}
+    recording = session.recording(columns, "<script>alert(1)</script>")
+    return recording, session.model(recording)
+
+
+@pytest.fixture(scope="module")
+def poses(arm_session):
+    session = arm_session()
+    recording = session.recording(session.positions() | session.turns())
+    return recording, session.model(recording)
+
+
+@pytest.fixture(scope="module")
+def page(wire_and_positions) -> str:
+    return session_report_html(*wire_and_positions)
+
+
+def text_of(page: str) -> str:
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", re.sub(r"<(style|svg).*?</\1>", " ", page, flags=re.DOTALL)))
+
+
+class Balance(HTMLParser):
+    """Fails on a tag that is closed but not open."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs) -> None:
+        if tag not in {"meta", "br"}:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs) -> None: ...
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def test_the_page_is_whole_and_fetches_nothing(page):
+    balance = Balance()
+    balance.feed(page)
+    assert balance.open == []
+    assert re.findall(r"""(?:src|href)\s*=\s*["']([^"'#][^"']*)["']""", page) == []
+    assert "<script" not in page
+    assert "&lt;script&gt;alert(1)&lt;/script&gt;" in page
+    assert ">nan" not in page
+    ids = re.findall(r'\bid="([^"]+)"', page)
+    assert len(ids) == len(set(ids))
+
+
+def test_every_parameter_is_a_number_with_sigma_or_a_reason(page, wire_and_positions):
+    rows = re.findall(r"<tr>(.*?)</tr>", page, flags=re.DOTALL)
+    for parameter in wire_and_positions[1].parameters:
+        (own,) = [row for row in rows if f"<code>{parameter.name}</code>" in row]
+        numbers = re.findall(r'<td class="n">[−\d.]+', own)
+        assert len(numbers) == (0 if parameter.value is None else 2), own
+
+
+def test_every_instrument_has_its_errors_before_and_after(page, wire_and_positions):
+    evidence = session_evidence(*wire_and_positions)
+    assert [r.title for r in evidence.readings] == ["Measured positions", "Wire lengths"]
+    text = text_of(page)
+    for readings in evidence.readings:
+        assert len(readings.rows) == 40
+        assert f"{readings.title} as drawn 40" in text
+    first = evidence.readings[0]
+    model = wire_and_positions[1]
+    assert np.sqrt(np.mean(first.error_after**2)) == pytest.approx(model.rms_after_m, rel=1e-9)
+    assert np.sqrt(np.mean(first.error_before**2)) == pytest.approx(model.rms_before_m, rel=1e-3)
+
+
+def test_residuals_are_whitened_by_the_noise_that_was_found(poses):
+    for readings in session_evidence(*poses).readings:
+        assert 0.8 < np.sqrt(np.mean(readings.whitened**2)) < 1.1
+
+
+def test_a_pose_is_told_as_position_in_metres_and_orientation_in_radians(poses):
+    position, orientation = session_evidence(*poses).readings
+    assert (position.unit, orientation.unit) == ("m", "rad")
+    assert np.sqrt(np.mean(position.error_after**2)) == pytest.approx(np.sqrt(3) * 20e-6, rel=0.25)
+    assert np.sqrt(np.mean(orientation.error_after**2)) == pytest.approx(np.sqrt(3) * 1e-4, rel=0.25)
+    text = text_of(session_report_html(*poses))
+    assert "Measured poses, orientation" in text
+    assert "µrad" in text
+
+
+def test_proofs_by_every_split_observability_and_free_space_are_told(page, wire_and_positions):
+    model, text = wire_and_positions[1], text_of(page)
+    assert model.proofs
+    for proof in model.proofs:
+        assert proof.split in text
+    assert "Observability of the" in text
+    assert "Predicted error of the target" in text
+
+
+def test_a_model_from_before_these_fields_has_a_report_too(wire_and_positions):
+    recording, model = wire_and_positions
+    defaults = {f.name: f.default for f in msgspec.structs.fields(ModelFile)}
+    old = msgspec.structs.replace(model, **{name: defaults[name] for name in NEWER})
+    text = text_of(session_report_html(recording, old))
+    assert "random 20% of the rows" in text
+    assert "Observability" not in text
+    assert "Predicted error of the target" not in text
+
+
+def test_a_row_left_out_is_named_with_its_fault(arm_session):
+    session = arm_session()
+    columns = session.positions()
+    columns["y_m"][6] += 0.1
+    recording = session.recording(columns)
+    text = text_of(session_report_html(recording, session.model(recording)))
+    assert "row 7, y_m: reads" in text
+    assert "of 80; 1 left out as faulty" in text
+
+
+def test_the_model_of_another_recording_is_refused(arm_session, wire_and_positions):
+    session = arm_session()
+    other = session.recording(session.positions())
+    with pytest.raises(DataError, match="it was fitted to position, wire, here are position"):
+        session_report_html(other, wire_and_positions[1])
+    shorter = arm_session(60)
+    with pytest.raises(DataError, match="it is of 80 samples, here are 60"):
+        session_report_html(shorter.recording(shorter.positions()), session.model(other))
+
+
+def test_the_model_of_other_values_is_refused(arm_session):
+    session = arm_session()
+    recording = session.recording(session.positions())
+    columns = session.positions()
+    columns["x_m"][::2] += 1e-3
+    with pytest.raises(DataError, match="give the model of this recording"):
+        session_report_html(session.recording(columns), session.model(recording))
+
+
+def test_a_place_that_cannot_be_written_is_named(wire_and_positions, tmp_path):
+    with pytest.raises(DataError, match="cannot be written"):
+        write_session_report(tmp_path / "missing" / "report.html", *wire_and_positions)

@@ -1,0 +1,90 @@
+"""The first sentence: trust where all is well, care with reason and advice, no trust where nothing is gained."""
+
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from calibrate.report.session_evidence import session_evidence
+from calibrate.report.session_verdict import session_verdict
+from calibrate.report.verdict import Trust
+
+
+@pytest.fixture(scope="module")
+def healthy(arm_session):
+    session = arm_session(120)
+    recording = session.recording(session.positions())
+    return session_evidence(recording, session.model(recording))
+
+
+def changed(evidence, **fields):
+    return replace(evidence, model=msgspec.structs.replace(evidence.model, **fields))
+
+
+def test_a_healthy_session_is_trusted_and_said_in_one_sentence(healthy):
+    judged = session_verdict(healthy)
+    assert (judged.trust, judged.reasons) == (Trust.GOOD, ())
+    proof = healthy.model.proofs[0]
+    assert f"{1e6 * proof.rms_after:.1f}" in judged.sentence
+    assert "Trust it" in judged.sentence
+    assert judged.advice
+
+
+def test_physics_that_the_model_lacks_is_seen_along_its_joint(arm_session):
+    session = arm_session(150)
+    columns = session.positions()
+    columns["z_m"] = columns["z_m"] + 2e-4 * np.sin(6.0 * session.q_rad[:, 1])
+    recording = session.recording(columns)
+    judged = session_verdict(session_evidence(recording, session.model(recording)))
+    said = " ".join(judged.reasons)
+    assert judged.trust is Trust.CARE
+    assert "follows J2" in said
+    assert "times the noise that was believed" in said
+    assert any("missing physics" in do for do in judged.advice)
+
+
+def test_noise_below_the_stated_is_advice_and_no_doubt(healthy):
+    noise = healthy.model.noise | {"chi2_stated": 80.0, "dof": 300, "alarm": "BELOW_STATED"}
+    judged = session_verdict(changed(healthy, noise=noise))
+    assert judged.trust is Trust.GOOD
+    assert any("0.516 times" in do for do in judged.advice)
+
+
+def test_unseen_rows_far_beyond_the_noise_call_for_care(healthy):
+    far = tuple(msgspec.structs.replace(p, chi_after=4.0) for p in healthy.model.proofs)
+    judged = session_verdict(changed(healthy, proofs=far))
+    assert judged.trust is Trust.CARE
+    assert "4.00 times the noise" in judged.reasons[0]
+
+
+def test_an_arm_no_better_than_its_drawing_is_not_to_be_used(healthy):
+    same = tuple(msgspec.structs.replace(p, rms_after=p.rms_before) for p in healthy.model.proofs)
+    judged = session_verdict(changed(healthy, proofs=same))
+    assert judged.trust is Trust.NONE
+    assert "Do not use this model" in judged.sentence
+
+
+def test_a_fit_that_did_not_end_is_no_model(healthy):
+    judged = session_verdict(changed(healthy, status="STALLED", says="it stood still"))
+    assert judged.trust is Trust.NONE
+    assert judged.sentence == "No usable model: it stood still."
+
+
+def test_without_a_proof_the_sentence_says_what_it_was_fitted_to(healthy):
+    judged = session_verdict(changed(healthy, proofs=(), held_out=None))
+    assert judged.trust is Trust.CARE
+    assert "it was fitted to" in judged.sentence
+    assert "no proof on unseen rows" in judged.reasons[0]
+
+
+def test_the_one_noisy_source_of_several_is_named(healthy):
+    noise = healthy.model.noise | {"wire_believed": 1e-5, "wire": 1e-4, "wire_sigma": 1e-5}
+    judged = session_verdict(changed(healthy, noise=noise))
+    assert "The noise of wire is 10.0 times what was believed." in judged.reasons
+
+
+def test_a_recording_that_was_cut_short_calls_for_care(healthy):
+    judged = session_verdict(replace(healthy, recording=replace(healthy.recording, complete=False)))
+    assert judged.trust is Trust.CARE
+    assert "cut short" in judged.reasons[0]
