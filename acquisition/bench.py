@@ -36,6 +36,7 @@ class Look:
     psd2: Spot
     temperatures_degC: dict[str, float]
     settled: bool
+    window_s: tuple[float, float] | None = None  # first and last PSD sample in it, by the box's clock
 
     def spots_m(self) -> Floats:
         """psd1 x, y, psd2 x, y (4,), NaN where dark."""

@@ -62,6 +62,16 @@ class Navigator:
         self.move(self._reach(T, target, self.q_rad))
         self._stand_in_light(target, T)
 
+    def find_near(self, placement: int, first: int, spots_m: tuple[float, float, float, float]) -> Floats:
+        """Search the light around where the arm stands, bring it near these spots; joint readings (joint,) there.
+
+        NoLightError where there is none.
+        """
+        self._placement = placement
+        target = BeamTarget(first, spots_m, FINDING_STAND_OFF_M, 0.0)
+        self._stand_in_light(target, self._learner.T_base_fixture(placement))
+        return self.q_rad
+
     def visit(self, target: BeamTarget, limits: Limits | None) -> Centring:
         """Land on the target and bring the spots there: within `limits`, or only near it.
 

@@ -112,13 +112,15 @@ class Session:
 
     def _record(self, visit: Visit, *, centred: bool) -> Sample | None:
         look = self._bench.look(self._options.dwell_s)
-        if not _usable(look):
+        if not usable(look):
             self._journal.event("skipped", {"placement": visit.placement, "why": "no light, or saturated, when read"})
             return None
         approach = self._navigator.approach.copy()
         sample = Sample(look, visit.placement, visit.target.first, approach, visit.repeat, centred)
         self._samples.append(sample)
         self._journal.sample(sample)
+        if look.window_s is not None:  # so that the streams tell what happened about the sample
+            self._journal.event("sample", {"psd_from_s": look.window_s[0], "psd_to_s": look.window_s[1]})
         return sample
 
     def _learn(self) -> None:
@@ -127,5 +129,6 @@ class Session:
         self._navigator.relearned()
 
 
-def _usable(look: Look) -> bool:
+def usable(look: Look) -> bool:
+    """Whether both faces have light, and none too much."""
     return all(face.lit and not face.saturated for face in (look.psd1, look.psd2))

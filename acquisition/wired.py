@@ -115,6 +115,7 @@ class WiredBench:
             psd2=psd2,
             temperatures_degC={"psd": float(window.temperature_degC.mean()), **temperatures},
             settled=settled,
+            window_s=(float(window.device_s[0]), float(window.device_s[-1])),
         )
 
     def _encoders(self, window: PsdWindow) -> Floats | None:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from benchmarks import blunders, centring, coverage, speed, zeros
+from benchmarks import blunders, centring, coverage, false_alarms, real_diagnosis, speed, streams, zeros
 
 RIG = Path(__file__).parents[1] / "rigs" / "ur5e-dual-psd.toml"
 
@@ -38,8 +38,25 @@ def run_blunders() -> None:
         print(row, flush=True)
 
 
+def run_streams() -> None:
+    for row in streams.lines(RIG):
+        print(row, flush=True)
+
+
 def run_speed() -> None:
     for row in speed.lines(RIG):
+        print(row, flush=True)
+
+
+def run_real() -> None:
+    print("diagnosis of the real recordings")
+    for row in real_diagnosis.lines(RIG.parents[2] / "shared" / "data"):
+        print(row, flush=True)
+
+
+def run_false_alarms() -> None:
+    print("sessions with nothing hidden, five kinds in turn, as many of each noise: share in which something is found")
+    for row in false_alarms.lines():
         print(row, flush=True)
 
 
@@ -49,6 +66,9 @@ BENCHMARKS: dict[str, Callable[[], None]] = {
     "coverage": run_coverage,
     "blunders": run_blunders,
     "speed": run_speed,
+    "false_alarms": run_false_alarms,
+    "streams": run_streams,
+    "real": run_real,
 }
 
 

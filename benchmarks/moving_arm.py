@@ -39,7 +39,7 @@ def motion(rng: Generator, moves: int = 20, joints: int = 6, speed: float = 0.6,
     pieces.append(np.tile(at, (round(stand_s / STEP_S), 1)))
     stands.append((now_s, now_s + stand_s))
     command = np.concatenate(pieces)
-    return Motion(STEP_S * np.arange(len(command)), command, np.array(stands))
+    return Motion(STEP_S * np.arange(len(command), dtype=np.float64), command, np.array(stands))
 
 
 def trapezoid(share: Floats) -> Floats:
@@ -55,10 +55,13 @@ def followed(command: Floats, frequency_hz: float, damping: float, lag_s: float 
     """Each joint as a servo of second order without feed-forward of its speed, behind a first-order filter."""
     w = 2.0 * np.pi * frequency_hz
     servo = StateSpace([[0.0, 1.0], [-(w**2), -2.0 * damping * w]], [[0.0], [w**2]], [[1.0, 0.0]], [[0.0]])
-    out = np.stack([_through(servo, channel) for channel in command.T], axis=1)
+    at = command[0]
+    out = np.stack([start + _through(servo, channel - start) for start, channel in zip(at, command.T, strict=True)], 1)
     if lag_s > 0.0:
         slow = StateSpace([[-1.0 / lag_s]], [[1.0 / lag_s]], [[1.0]], [[0.0]])
-        out = np.stack([_through(slow, channel) for channel in out.T], axis=1)
+        out = np.stack(
+            [start + _through(slow, channel - start) for start, channel in zip(out[0], out.T, strict=True)], 1
+        )
     return out
 
 
@@ -75,5 +78,6 @@ def sampled(time_s: Floats, values: Floats, at_s: Floats) -> Floats:
 
 
 def _through(system: StateSpace, u: Floats) -> Floats:
-    _, y, _ = lsim(system, u - u[0], STEP_S * np.arange(len(u)))
-    return np.asarray(y) + (u[0] if system.A[0, 0] or system.B[1:].sum() > 0.0 else 0.0)
+    """From rest."""
+    _, y, _ = lsim(system, u, STEP_S * np.arange(len(u)))
+    return np.asarray(y)

@@ -14,24 +14,31 @@ from rich.markup import escape
 
 from acquisition.errors import AcquisitionError
 from acquisition.recording.errors import RecordingError, RigFileError, SamplesError
+from calibeam.commands.compare import compare_command
 from calibeam.commands.demo import demo
+from calibeam.commands.diagnose import diagnose_command
 from calibeam.commands.emulate import emulate
 from calibeam.commands.export import export_command, import_command
 from calibeam.commands.identify import identify_command
 from calibeam.commands.predict import predict_command
+from calibeam.commands.prove import prove_command
 from calibeam.commands.report import report_command
 from calibeam.commands.session import session
 from calibeam.commands.tool_axes import tool_axes_command
 from calibeam.emulation import EmulationError
 from calibeam.outcome import PartialResult
+from calibeam.prove.seal import BrokenSealError
 from calibrate.errors import DataError
 from drivers.errors import DeviceError
+from simulators.conceal.wanted import ConcealError
 from simulators.host.errors import HostError
 from simulators.world.errors import WorldError
 
 # What is told in one sentence instead of a traceback: everything that is about the user's world, not about our code.
 TOLD = (
     AcquisitionError,
+    BrokenSealError,
+    ConcealError,
     DataError,
     DeviceError,
     EmulationError,
@@ -52,7 +59,10 @@ app.command(demo)
 app.command(session)
 app.command(emulate)
 app.command(identify_command, name="identify")
+app.command(diagnose_command, name="diagnose")
+app.command(compare_command, name="compare")
 app.command(predict_command, name="predict")
+app.command(prove_command, name="prove")
 app.command(report_command, name="report")
 app.command(tool_axes_command, name="tool-axes")
 app.command(export_command, name="export")

@@ -1,26 +1,33 @@
-"""What follows a recording: identify, write model.json and report.html beside it, print. Needs no device any more."""
+"""What follows a recording: identify, diagnose, write model.json, diagnosis.json, report.html beside it, print.
+
+Needs no device any more.
+"""
 
 from pathlib import Path
 
 from rich.console import Console
 
 from acquisition.recording.read import read
+from acquisition.recording.recording import Recording
+from calibeam.diagnosis import diagnosed_to
+from calibeam.diagnosis_lines import print_diagnosis
 from calibeam.identification import Identified, identify_recording, write_identified
 from calibeam.outcome import PartialResult
 from calibeam.reporting import write_zero_report
 from calibeam.terminal import print_identified
+from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.errors import DataError
 
 
 def conclude(recording_path: Path, console: Console) -> Identified:
-    """Model and report into the folder of the recording. PartialResult when that cannot be done, or is interrupted."""
+    """Model, diagnosis, report into the recording's folder. PartialResult when that cannot be done."""
     try:
         return _concluded(recording_path, console)
     except (KeyboardInterrupt, DataError, OSError) as why:
         reason = "Ctrl-C" if isinstance(why, KeyboardInterrupt) else str(why)
         raise PartialResult(
             f"{reason}; the recording is whole: {recording_path}; "
-            f"`calibeam identify` and `calibeam report` go on from there"
+            f"`calibeam identify`, `diagnose` and `report` go on from there"
         ) from why
 
 
@@ -29,6 +36,19 @@ def _concluded(recording_path: Path, console: Console) -> Identified:
     identified = identify_recording(recording)
     write_identified(identified, recording, folder / "model.json")
     print_identified(console, identified)
-    write_zero_report(identified, folder / "report.html")
+    diagnosis = _diagnosed(recording, folder / "diagnosis.json", console)
+    write_zero_report(identified, folder / "report.html", diagnosis)
     console.print(f"report: {folder / 'report.html'}", markup=False)
     return identified
+
+
+def _diagnosed(recording: Recording, path: Path, console: Console) -> DiagnosisFile | None:
+    """None, and said, where there is too little to diagnose: what was identified stands all the same."""
+    try:
+        file = diagnosed_to(recording, None, path)
+    except DataError as why:
+        console.print(f"no diagnosis: {why}", highlight=False, markup=False)
+        return None
+    print_diagnosis(console, file)
+    console.print(f"diagnosis: {path}", markup=False)
+    return file

@@ -48,7 +48,6 @@ def check_identifiable(rig: Rig) -> None:
     """DataError when a recording made with this rig could not be identified: said before an hour of measuring."""
     fixture_of(rig)
     laser_of(rig)
-    drawing_doubt(rig)
 
 
 def identify_recording(recording: Recording) -> Identified:

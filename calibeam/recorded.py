@@ -3,6 +3,7 @@
 import signal
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from types import FrameType
 
@@ -13,7 +14,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from acquisition.bench import Bench
 from acquisition.errors import AcquisitionError
 from acquisition.plan import PlanOptions
+from acquisition.planned_session import PlannedSession
 from acquisition.recording.errors import RecordingError
+from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.read import read
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.stream import Event
@@ -52,9 +55,17 @@ def new_recording(path: Path, rig_text: str, clock: Clock, notes: Mapping[str, s
 
 
 def record_session(
-    bench: Bench, rig: Rig, writer: RecordingWriter, options: PlanOptions, clock: Clock, bar: Progress
+    bench: Bench,
+    rig: Rig,
+    writer: RecordingWriter,
+    options: PlanOptions,
+    clock: Clock,
+    bar: Progress,
+    plan: PosePlan | None = None,
 ) -> Summary:
-    """Take every place of the rig, told by `bar`. PartialResult when it ended early: the arm stands, samples are kept.
+    """Take every place of the rig, or the poses of a plan, told by `bar`.
+
+    PartialResult when it ended early: the arm stands, samples are kept.
 
     Whoever asks a person for something meanwhile stops the bar first, and starts it again.
     """
@@ -65,17 +76,17 @@ def record_session(
         def tell(done: int, total: int, text: str) -> None:
             bar.update(task, completed=done, total=total, description=text)
 
-        session = Session(
-            bench,
-            FittedLearner(rig),
-            RecordingJournal(writer, clock),
-            options,
-            home_rad,
-            limits=Limits(step_rad=rig.motion.step_limit_rad),
-            progress=tell,
-        )
+        learner, journal = FittedLearner(rig), RecordingJournal(writer, clock)
+        limits = Limits(step_rad=rig.motion.step_limit_rad)
+        session: Session | PlannedSession
+        if plan is None:
+            session = Session(bench, learner, journal, options, home_rad, limits=limits, progress=tell)
+            run = partial(session.run, tuple(rig.placements))
+        else:
+            session = PlannedSession(bench, learner, journal, options, home_rad, progress=tell)
+            run = partial(session.run, plan)
         try:
-            summary = session.run(tuple(rig.placements))
+            summary = run()
         except Interrupted as why:
             raise _ended_early(bench, writer, clock, session, why) from why
     writer.event(Event(clock.now_s(), "end", {"samples": len(summary.samples), "skipped": summary.skipped}))
@@ -83,7 +94,7 @@ def record_session(
 
 
 def _ended_early(
-    bench: Bench, writer: RecordingWriter, clock: Clock, session: Session, why: BaseException
+    bench: Bench, writer: RecordingWriter, clock: Clock, session: Session | PlannedSession, why: BaseException
 ) -> PartialResult:
     """Stop the arm, put what there is on the disk; a second Ctrl-C may not get in between.
 

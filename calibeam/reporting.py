@@ -6,7 +6,9 @@ from acquisition.recording.recording import Recording
 from acquisition.recording.rig import rig_sha256
 from calibeam.any_session import identify_session, only_spots
 from calibeam.identification import Identified, identify_recording
+from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.errors import DataError
+from calibrate.identification.evidence_record import evidence_fields
 from calibrate.identification.record import record_of
 from calibrate.model_file import ModelFile, RigIdentity
 from calibrate.report.session_report import write_session_report
@@ -16,8 +18,10 @@ ZEROS_ONLY = "joint_believed_rad"  # a noise that only the method for spots alon
 SAME = 1e-3  # of the rms: what two machines may differ by
 
 
-def write_any_report(recording: Recording, model: ModelFile | None, path: Path) -> None:
-    """The report at `path`; without a model the recording is identified anew, without a plan.
+def write_any_report(
+    recording: Recording, model: ModelFile | None, path: Path, diagnosis: DiagnosisFile | None = None
+) -> None:
+    """The report at `path`; without a model the recording is identified anew, without a plan. A diagnosis adds pages.
 
     DataError where the recording holds nothing to fit, the model is not of it, or the file cannot be written.
     """
@@ -26,19 +30,21 @@ def write_any_report(recording: Recording, model: ModelFile | None, path: Path) 
         identified = identify_recording(recording)
         if model is not None:
             _refuse_other(model, identified, recording)
-        write_zero_report(identified, path)
+        write_zero_report(identified, path, diagnosis)
     else:
-        write_session_report(path, recording, _identified(recording) if model is None else model)
+        write_session_report(path, recording, _identified(recording) if model is None else model, diagnosis)
 
 
-def write_zero_report(identified: Identified, path: Path) -> None:
-    """The report of joint zeros."""
+def write_zero_report(identified: Identified, path: Path, diagnosis: DiagnosisFile | None = None) -> None:
+    """The report of joint zeros, with the pages of a diagnosis where there is one."""
     write_report(
         path,
         identified.used,
         identified.zeros,
         point_constraint=identified.four_poses,
         left_out=[blunder.says for blunder in identified.blunders],
+        proved=None if identified.proved is None else evidence_fields(identified.proved.evidence),
+        diagnosis=diagnosis,
     )
 
 

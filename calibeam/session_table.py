@@ -9,10 +9,10 @@ from rich.table import Table
 from calibeam.evidence_lines import lines_of
 from calibeam.verdict_line import print_verdict
 from calibrate.identification.evidence_record import parameter_records
-from calibrate.identification.fit_report import ONLY_BELIEVED
 from calibrate.identification.result import Identification
 from calibrate.model_file import ModelParameter
 from calibrate.report.verdict import Verdict
+from calibrate.zeros.result import ONLY_BELIEVED
 
 UNITS = {"m": ("um", 1e6), "rad": ("urad", 1e6)}
 

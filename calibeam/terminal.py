@@ -4,10 +4,12 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from acquisition.recording.rig_schema import Rig
 from calibeam.evidence_lines import told_lines
 from calibeam.identification import Identified
 from calibeam.reveal import Revealed
 from calibeam.verdict_line import print_verdict
+from calibrate.default_belief import said_of
 from calibrate.identifiability import Identifiability
 from calibrate.report.evidence import evidence
 from calibrate.report.verdict import verdict
@@ -17,6 +19,7 @@ from calibrate.zeros.result import JointZero, ZeroResult
 
 def print_identified(console: Console, identified: Identified) -> None:
     """What was wrong with the file, the full model, the source's method beside it, and last how far to trust it."""
+    print_unasked(console, identified.used.rig)
     for blunder in identified.blunders:
         console.print(f"left out: {blunder.says}", highlight=False, markup=False)
     _print_full(console, identified.zeros)
@@ -25,6 +28,12 @@ def print_identified(console: Console, identified: Identified) -> None:
     if identified.four_poses is not None:
         _print_four_poses(console, identified.four_poses)
     print_verdict(console, verdict(evidence(identified.used, identified.zeros, "reported")))
+
+
+def print_unasked(console: Console, rig: Rig) -> None:
+    """What a fit to spots believes of a rig that states no tolerance."""
+    if (said := said_of(rig)) is not None:
+        console.print(said, highlight=False, markup=False)
 
 
 def print_revealed(console: Console, revealed: tuple[Revealed, ...]) -> None:

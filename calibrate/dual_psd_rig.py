@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from acquisition.recording.rig_schema import Rig
 from calibrate.arms.catalogue import arm_of
 from calibrate.chain import Chain
+from calibrate.default_belief import links_of, pair_of
 from calibrate.errors import DataError
 from calibrate.rigid import transform
 from calibrate.sensors.dual_psd import DualPsd, Fixture
@@ -36,15 +37,23 @@ def laser_of(rig: Rig) -> LaserMount:
 
 
 def dual_psd_chain(rig: Rig, placement: NDArray[np.int64], first_psd: NDArray[np.int64]) -> Chain:
-    """The rig's arm with its dual PSD, for poses with these placements and orders (pose,), (pose,)."""
-    return Chain(arm_of(rig), DualPsd(laser_of(rig), fixture_of(rig), placement, first_psd))
+    """The rig's arm with its dual PSD, for poses with these placements and orders (pose,), (pose,).
+
+    Links and detectors as [tolerance] believes them, without one as default_belief.py.
+    """
+    return Chain(arm_of(rig, links_of(rig)), dual_psd_of(rig, placement, first_psd))
+
+
+def dual_psd_of(rig: Rig, placement: NDArray[np.int64], first_psd: NDArray[np.int64]) -> DualPsd:
+    """The instrument alone; gains and PSD 2 in PSD 1 free under the [tolerance] that doubts them."""
+    gain = None if rig.tolerance is None else rig.tolerance.gain
+    return DualPsd(laser_of(rig), fixture_of(rig), placement, first_psd, gain, pair_of(rig))
 
 
 def drawing_doubt(rig: Rig, line_m: float = 5e-6) -> DrawingDoubt:
-    """What the point constraint takes on trust; 5 um is how well the servo centres. DataError without [tolerance]."""
-    if rig.tolerance is None:
-        raise DataError(f"rig {rig.name}: no [tolerance]; without it the point constraint cannot state a sigma")
-    return DrawingDoubt(line_m, rig.tolerance.length_m, rig.tolerance.angle_rad)
+    """What the point constraint takes on trust; 5 um is how well the servo centres."""
+    links = links_of(rig)
+    return DrawingDoubt(line_m, links.length_sigma_m, links.angle_sigma_rad)
 
 
 def believed_noise(rig: Rig) -> BelievedNoise:

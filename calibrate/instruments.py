@@ -19,7 +19,7 @@ from calibrate.alignment import Alignment
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.model import KinematicModel
 from calibrate.chain import Chain
-from calibrate.dual_psd_rig import believed_noise, fixture_of, laser_of
+from calibrate.dual_psd_rig import believed_noise, dual_psd_of, laser_of
 from calibrate.errors import DataError
 from calibrate.joint_problem import Block
 from calibrate.parameters import start_values
@@ -92,12 +92,8 @@ def _dual_psd(table: SampleTable) -> tuple[Measured, ...]:
     rows = table.filled(*SPOTS)
     if len(rows) == 0 or table.spots is Spots.POINT:
         return ()
-    seen, tolerance = observations(table.samples, table.angles), table.rig.tolerance
-    pair = None
-    if tolerance is not None and tolerance.psd2_m is not None and tolerance.psd2_rad is not None:
-        pair = (tolerance.psd2_m, tolerance.psd2_rad)
-    gain = None if tolerance is None else tolerance.gain
-    sensor = DualPsd(laser_of(table.rig), fixture_of(table.rig), seen.placement, seen.first_psd, gain, pair)
+    seen = observations(table.samples, table.angles)
+    sensor = dual_psd_of(table.rig, seen.placement, seen.first_psd)
     sigma = np.full((len(rows), 4), believed_noise(table.rig).psd_m) if seen.sigma_m is None else seen.sigma_m
     return (table.measured("dual-psd", Chain(table.arm, sensor), rows, seen.spots_m, {"psd": sigma}),)
 

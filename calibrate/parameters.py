@@ -22,6 +22,7 @@ class Parameter:
     lower: float = -math.inf
     upper: float = math.inf
     free: bool = True
+    assumed: bool = False  # the prior is nobody's statement: it holds a fit, but a number has to come from data
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.plausible) and self.plausible > 0.0):
@@ -62,6 +63,11 @@ def hold(parameters: Iterable[Parameter], names: Iterable[str]) -> tuple[Paramet
     if unknown:
         raise KeyError(f"no parameter named {', '.join(sorted(unknown))}; known: {', '.join(p.name for p in out)}")
     return out
+
+
+def without_assumed(parameters: Iterable[Parameter]) -> tuple[Parameter, ...]:
+    """The same parameters without the priors that nobody stated: what is asked before a number is told."""
+    return tuple(replace(p, prior=math.inf) if p.assumed else p for p in parameters)
 
 
 def values_by_name(parameters: Iterable[Parameter], values: Mapping[str, float]) -> Floats:

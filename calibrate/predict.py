@@ -13,6 +13,7 @@ from acquisition.recording.rig import parse_rig
 from acquisition.recording.rig_schema import ArmModel, Rig
 from acquisition.recording.samples import Samples
 from calibrate.arms.catalogue import arm_of
+from calibrate.arms.model import KinematicModel
 from calibrate.converted_rig import rig_in_model
 from calibrate.dual_psd_rig import dual_psd_chain
 from calibrate.errors import DataError
@@ -58,11 +59,10 @@ class Predictor:
     @cached_property
     def T_base_device(self) -> Floats:
         """(4, 4) the measuring device. DataError where neither model nor rig knows a place."""
-        place = self.about.get("device")
-        if place is None and self.rig.device is None:
+        place = self.about.get("device", _drawn_device(self.rig))
+        if place is None:
             raise DataError(f"rig {self.rig.name}: no [device] and none in the model; fit positions or a wire first")
-        believed = transform(place[:3], place[3:]) if place is not None else _drawn_device(self.rig)
-        device = Device(believed)
+        device = Device(transform(place[:3], place[3:]))
         return device.T_base_device_at(self._of(device.parameters))
 
     def turn_of_target(self) -> Floats:
@@ -78,7 +78,7 @@ class Predictor:
         return chain.expect(self._of(chain.parameters), q_rad)
 
     @cached_property
-    def _arm(self):
+    def _arm(self) -> KinematicModel:
         return arm_of(self.rig)
 
     @cached_property
@@ -166,8 +166,9 @@ def _columns(names: tuple[str, ...], values: Floats) -> Columns:
     return dict(zip(names, values.T, strict=True))
 
 
-def _drawn_device(rig: Rig) -> Floats:
-    return np.eye(4) if rig.device is None else transform(rig.device.origin_m, rig.device.rotation_rad)
+def _drawn_device(rig: Rig) -> tuple[float, ...] | None:
+    """Origin and rotation vector in the base, as in `about`."""
+    return None if rig.device is None else (*rig.device.origin_m, *rig.device.rotation_rad)
 
 
 INSTRUMENTS = (

@@ -62,12 +62,16 @@ class _Shares:
     Y: Floats  # (row, param)
     B: Floats  # (part, row)
     sources: list[int]
+    whole: bool  # the shares of a row add up to 1: no source is as large as stated
 
-    def terms(self, e: Floats, Z: Floats) -> _Terms:
-        """From the residual of the best fit and Z (row, param)."""
+    def terms(self, e: Floats, Z: Floats, square: Floats | None) -> _Terms:
+        """From the residual of the best fit, Z (row, param), and Z'Z where it is known."""
         leverage = np.einsum("np,np->n", Z, Z)
-        spread = np.stack([part.T @ part for part in (root[:, None] * Z for root in np.sqrt(self.B))])
-        return _Terms(spread, self.B * e, self.B.sum(axis=1), (self.B * (1.0 - 2.0 * leverage)) @ self.B.T)
+        asked = self.B[:-1] if self.whole else self.B
+        spread = [part.T @ part for part in (root[:, None] * Z for root in np.sqrt(asked))]
+        if self.whole:
+            spread.append((Z.T @ Z if square is None else square) - sum(spread))
+        return _Terms(np.stack(spread), self.B * e, self.B.sum(axis=1), (self.B * (1.0 - 2.0 * leverage)) @ self.B.T)
 
 
 @dataclass(frozen=True)
@@ -79,7 +83,7 @@ class _BlockShares:
     B: Floats  # (part, row, k, k)
     sources: list[int]
 
-    def terms(self, e: Floats, Z: Floats) -> _Terms:
+    def terms(self, e: Floats, Z: Floats, _square: Floats | None) -> _Terms:
         """From the residual of the best fit and Z (row * k, param)."""
         parts, n, k = self.B.shape[:3]
         BZ = (self.B @ Z.reshape(n, k, -1)).reshape(parts, n * k, -1)
@@ -127,13 +131,14 @@ def score_at(
     L = _factor([w.Y for w in whitened], prior_information)
     shift = -cho_solve((L, True), sum(w.Y.T @ w.y for w in whitened) + prior_gradient, check_finite=False)
     spread, products, answers = np.zeros((n, p, p)), np.zeros((n, n)), np.zeros((n, n))
+    square = _of_one(L, prior_information) if len(whitened) == 1 else None
     squared, traces, pulls = np.zeros(n), np.zeros(n), np.zeros((n, p))
     for w in whitened:
         if not w.sources:  # as large as stated: nothing to find
             continue
         e = w.y + w.Y @ shift
         Z = _divided(w.Y, L)
-        of, terms = w.sources, w.terms(e, Z)
+        of, terms = w.sources, w.terms(e, Z, square)
         spread[of] += terms.spread
         squared[of] += terms.weighted @ e
         traces[of] += terms.traces
@@ -146,6 +151,12 @@ def score_at(
     return Score(gradient, expected, observed, spread, L)
 
 
+def _of_one(L: Floats, prior_information: Floats) -> Floats:
+    """(param, param) Z'Z of a single instrument, by L L' = Y'Y + priors."""
+    believed = _divided(np.diag(np.sqrt(prior_information)), L)
+    return np.eye(len(L)) - believed.T @ believed
+
+
 def _whitened(rows: NoisyRows | IndependentRows, log_variance: Floats) -> _Shares | _BlockShares:
     found = [i for i, source in enumerate(rows.sources) if source != FIXED]
     sources = [rows.sources[i] for i in found]
@@ -154,7 +165,8 @@ def _whitened(rows: NoisyRows | IndependentRows, log_variance: Floats) -> _Share
         scaled = factors[:, None] * rows.parts
         variance = scaled.sum(axis=0)
         root = 1.0 / np.sqrt(variance)
-        return _Shares(root * rows.misfit, root[:, None] * rows.jacobian, scaled[found] / variance, sources)
+        whole = len(found) == len(rows.sources)
+        return _Shares(root * rows.misfit, root[:, None] * rows.jacobian, scaled[found] / variance, sources, whole)
     scaled = factors[:, None, None, None] * rows.parts
     W = whitener_of(scaled.sum(axis=0))
     B = W @ scaled[found] @ np.swapaxes(W, 1, 2)

@@ -17,7 +17,7 @@ from drivers.clock import SystemClock
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
 RECORDING, TRUTH = "recording.mcap", "truth.json"
-RESULTS = (RECORDING, "model.json", "report.html", TRUTH)
+RESULTS = (RECORDING, "model.json", "diagnosis.json", "report.html", TRUTH)
 
 
 def demo(*, out: Path = Path("out/demo"), rig: Path = RIG, seed: int = 1, time_scale: float = 8.0) -> None:
@@ -28,7 +28,8 @@ def demo(*, out: Path = Path("out/demo"), rig: Path = RIG, seed: int = 1, time_s
     Parameters
     ----------
     out
-        Folder for recording.mcap, model.json, report.html, and truth.json, which is opened only after the fit.
+        Folder for recording.mcap, model.json, diagnosis.json, report.html, and truth.json, which is opened only after
+        the fit.
     rig
         The rig file.
     seed

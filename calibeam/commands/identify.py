@@ -11,9 +11,10 @@ from calibeam.any_session import Planned, identify_session, only_spots, write_se
 from calibeam.ending import naming, refuse_nothing, tell_unfinished
 from calibeam.identification import identify_recording, write_identified
 from calibeam.session_table import print_identification
-from calibeam.terminal import print_identified
+from calibeam.terminal import print_identified, print_unasked
 from calibrate.export.export import ExportForm, export_model
-from calibrate.identification.planned import rig_as_planned
+from calibrate.identification.planned import rig_as_planned, samples_as_planned
+from calibrate.identification.session import holds_spots
 from calibrate.model_file import corrections, read_model
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_verdict import session_verdict
@@ -78,6 +79,8 @@ def _identify(
         status = result.status
         refuse_nothing(status, result.estimates)
         model = write_session_model(result, source, out, planned)
+        if holds_spots(samples_as_planned(source.samples, planned.plan)):
+            print_unasked(console, source.rig)
         print_identification(console, result, session_verdict(session_evidence(source, model)))
     console.print(f"model: {out}", markup=False)
     for form in export:

@@ -9,6 +9,8 @@ from rich.prompt import Prompt
 
 from acquisition.errors import AcquisitionError
 from acquisition.plan import PlanOptions
+from acquisition.planned_session import check_planned
+from acquisition.recording.pose_plan import read_pose_plan
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.rig_schema import Rig
 from calibeam.conclude import conclude
@@ -19,9 +21,15 @@ from drivers.clock import SystemClock
 
 
 def session(
-    rig: Path, *, out: Path = Path("session"), seed: int = 1, control: str | None = None, time_scale: float = 1.0
+    rig: Path,
+    *,
+    out: Path = Path("session"),
+    plan: Path | None = None,
+    seed: int = 1,
+    control: str | None = None,
+    time_scale: float = 1.0,
 ) -> None:
-    """Connect, aim, centre, collect, record, identify, report. The arm moves: clear the cell first.
+    """Connect, aim, centre, collect, record, identify, diagnose, report. The arm moves: clear the cell first.
 
     Example: calibeam session rigs/ur5e-dual-psd.toml --out session-1
 
@@ -30,9 +38,11 @@ def session(
     rig
         The rig file; [devices] says how each device is reached.
     out
-        Folder for recording.mcap, model.json and report.html; nothing in it is overwritten.
+        Folder for recording.mcap, model.json, diagnosis.json and report.html; nothing in it is overwritten.
+    plan
+        A plan of joint poses, as `calibeam diagnose --plan-out` writes it: these are taken, and no others.
     seed
-        Of the pose plan.
+        Of the poses of a session without a plan.
     control
         Side channel of emulators, HOST:PORT as `calibeam emulate` prints it: the emulated fixture is moved through it,
         instead of asking a person.
@@ -43,6 +53,9 @@ def session(
     console, clock = Console(), SystemClock()
     loaded, text = load_rig(rig), rig_text(rig)
     check_session(loaded)
+    poses = None if plan is None else read_pose_plan(plan, loaded)
+    if poses is not None:
+        check_planned(poses)
     addresses, recording = addresses_of(loaded, hurry=time_scale), out / "recording.mcap"
     out.mkdir(parents=True, exist_ok=True)
     bar = progress_bar(console)
@@ -51,7 +64,7 @@ def session(
         new_recording(recording, text, clock, {"plan_seed": str(seed)}) as writer,
         connected(loaded, addresses, writer, clock, place) as bench,
     ):
-        summary = record_session(bench, loaded, writer, PlanOptions(seed=seed), clock, bar)
+        summary = record_session(bench, loaded, writer, PlanOptions(seed=seed), clock, bar, poses)
     console.print(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {recording}")
     conclude(recording, console)
 

@@ -17,6 +17,7 @@ class LinkBelief:
 
     length_sigma_m: float
     angle_sigma_rad: float
+    assumed: bool = False  # nobody's statement (Parameter.assumed)
 
     def __post_init__(self) -> None:
         if not (self.length_sigma_m >= 0.0 and self.angle_sigma_rad >= 0.0):
@@ -36,17 +37,17 @@ def zero_parameter(joint: int) -> Parameter:
 
 def link_length(name: str, belief: LinkBelief) -> Parameter:
     """A correction (m) to a drawn length."""
-    return _believed(name, "m", belief.length_sigma_m)
+    return _believed(name, "m", belief.length_sigma_m, belief.assumed)
 
 
 def link_angle(name: str, belief: LinkBelief, *, own: bool = True) -> Parameter:
     """A correction (rad) to a drawn angle; held where it is not a motion of its own but another one's second name."""
-    return _believed(name, "rad", belief.angle_sigma_rad if own else 0.0)
+    return _believed(name, "rad", belief.angle_sigma_rad if own else 0.0, belief.assumed)
 
 
-def _believed(name: str, unit: str, sigma: float) -> Parameter:
+def _believed(name: str, unit: str, sigma: float, assumed: bool) -> Parameter:
     if sigma == 0.0:
         return Parameter(name, unit, LINK_PLAUSIBLE, free=False)
     if math.isinf(sigma):
         return Parameter(name, unit, LINK_PLAUSIBLE)
-    return Parameter(name, unit, sigma, prior=sigma)
+    return Parameter(name, unit, sigma, prior=sigma, assumed=assumed)

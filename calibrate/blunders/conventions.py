@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.blunders import coupling, degrees, offsets, signs
-from calibrate.blunders.finding import Blunder, BlunderKind
+from calibrate.blunders.finding import Blunder
 from calibrate.blunders.hypothesis import Hypothesis
 from calibrate.blunders.witness import Otherwise, Strain, Witness
 
@@ -26,6 +26,7 @@ GAIN = 4.0  # by which the strain must fall
 RIVAL = 1.5  # times the winner's strain: as good an explanation
 NOTHING_M = 2e-5  # no instrument says less: perfect data must not tell conventions apart by their rounding
 GROSS = 0.05  # of the reach: more than joint zeros 2 deg off explain, so that something else is wrong, or two things
+CARRIED_M = 0.3  # from the flange, along each of its axes: a beam's usual travel, a long probe
 
 
 @dataclass(frozen=True)
@@ -118,9 +119,9 @@ def _of_readings(witnesses: tuple[Witness, ...]) -> Iterator[tuple[Otherwise, tu
 
 
 def _reach_m(T_base_flange: Floats) -> float:
-    """How far the flange usually is from the middle of where it goes."""
-    at = T_base_flange[:, :3, 3]
-    return float(np.median(np.linalg.norm(at - np.median(at, axis=0), axis=1)))
+    """How far what the flange carries usually is from the middle of where it goes: turning on the spot counts, too."""
+    carried = T_base_flange[:, None, :3, 3] + CARRIED_M * np.swapaxes(T_base_flange[:, :3, :3], 1, 2)
+    return float(np.median(np.linalg.norm(carried - np.median(carried, axis=0), axis=2)))
 
 
 def _compared(account: _Account) -> float:
@@ -149,12 +150,8 @@ def _named(best: _Account, tried: list[_Account], before: _Account) -> Blunder:
     first = best.said[0]
     besides = "".join(f"; and {other.column}: {other.what}" for other in best.said[1:])
     remedy = "; and ".join(one.remedy for one in best.said)
-    return Blunder(_kind(best), (), first.column, f"{first.what}{besides} {figures}{others}", remedy)
+    return Blunder(first.kind, (), first.column, f"{first.what}{besides} {figures}{others}", remedy)
 
 
 def _in_words(account: _Account) -> str:
     return " and ".join(f"{one.column}: {one.what}" for one in account.said)
-
-
-def _kind(account: _Account) -> BlunderKind:
-    return account.said[0].kind

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.blunders.least_distance import weights
+
 Floats = NDArray[np.float64]
 
 TURNS = 25  # of frame and target in turn; compared are factors, not digits
-FLOOR = 0.05  # of the median distance: closer rows all weigh the same
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ def rough_fit(T_base_flange: Floats, position_m: Floats, point_m: Floats, *, mir
         in_base = (position_m - shift) @ linear
         point_m = np.average(np.einsum("nji,nj->ni", R, in_base - t), axis=0, weights=weight)
         distance = np.linalg.norm(R @ point_m + t - in_base, axis=1)
-        weight = 1.0 / np.maximum(distance, FLOOR * float(np.median(distance)) + 1e-12)
+        weight = weights(distance)
     return RoughFit(linear, shift, point_m, distance, float(np.median(distance)))
 
 

@@ -52,7 +52,7 @@ class SpotsWitness:
         return Strain(float(np.median(distance)), float(np.median(moved)))
 
     def otherwise(self) -> Iterator[Otherwise]:
-        """Detectors exchanged in the order of the light, and millimetres. Signs: see spot_signs.py, after a fit."""
+        """Detectors exchanged in the order of the light, and millimetres. Mirrored axes: spot_signs.py."""
         yield Otherwise(
             BlunderKind.EXCHANGED_PSD,
             "column first_psd",

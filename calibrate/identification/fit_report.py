@@ -14,24 +14,22 @@ from calibrate.fit import FAR_START, Fit, Status
 from calibrate.identifiability import Identifiability
 from calibrate.identification.evidence import Asked, evidence_of, rows_used
 from calibrate.identification.held_out import lengths
-from calibrate.identification.pull import pull_along
+from calibrate.identification.pull import TOLD, pull_along
 from calibrate.identification.result import Identification, InstrumentFound, Noise
 from calibrate.identification.rounds import Fitted
 from calibrate.identification.session import NEGLIGIBLE_RAD, about_of
-from calibrate.parameters import Parameter, hold, plausible_sizes, start_values
+from calibrate.parameters import Parameter, hold, plausible_sizes, start_values, without_assumed
 from calibrate.uncertainty.chi_square import RepeatNoise, against_repeats, against_stated
 from calibrate.unseen_along import analyse_along
 from calibrate.weighting import JOINT
-from calibrate.zeros.identify import LEAST_DOF, estimate_of
-from calibrate.zeros.result import Estimate
+from calibrate.zeros.estimates import estimate_of, untold
+from calibrate.zeros.identify import LEAST_DOF
+from calibrate.zeros.result import HELD, ONLY_BELIEVED, Estimate
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-ONLY_BELIEVED = "only its prior speaks of it"
-HELD = "held so that a combination has an answer; see the combinations"
 ONLY_PRIOR = 2.0 / np.sqrt(5.0)  # of a prior sigma: the data alone know it to twice that, see identifiability.WEAK
-TOLD = 0.05  # of the plausible size: a member of an unseen combination that can move no further is a number
 
 
 def result_of(
@@ -41,7 +39,7 @@ def result_of(
     fit, before = fitted.fit, fit_places_only(fitted)
     seen = fitted.seen
     if fit.status is not Status.NOT_FINITE:
-        seen = analyse_along(fitted.problem, fit.theta, fitted.problem.parameters)
+        seen = analyse_along(fitted.problem, fit.theta, without_assumed(fitted.problem.parameters))
     status = fit.status
     if status is Status.CONVERGED and seen.combinations:
         status = Status.RANK_DEFICIENT
@@ -86,7 +84,7 @@ def _estimates(fitted: Fitted, seen: Identifiability) -> tuple[Estimate, ...]:
     sigma = _widening(fitted) * np.sqrt(np.diag(fit.covariance)) if usable else np.full(len(fit.theta), np.nan)
     pulled = np.zeros(len(fit.theta))
     if fit.status is not Status.NOT_FINITE:
-        pulled = pull_along(fitted.problem, fit.theta, fitted.problem.parameters, fitted.seen)
+        pulled = pull_along(fitted.problem, fit.theta, without_assumed(fitted.problem.parameters), seen)
     free = np.array([p.free for p in fit.parameters])
     told = free & (pulled < TOLD * plausible_sizes(fit.parameters))
     total = np.hypot(sigma, pulled)
@@ -98,7 +96,7 @@ def _estimates(fitted: Fitted, seen: Identifiability) -> tuple[Estimate, ...]:
 
 def _why_untold(p: Parameter, fit: Fit, i: int, seen: Identifiability, *, told: bool) -> str | None:
     if not told:
-        return seen.reason(p.name) or HELD
+        return untold(p, seen) or HELD
     if np.isfinite(p.prior) and np.sqrt(fit.covariance[i, i]) > ONLY_PRIOR * p.prior:
         return f"{ONLY_BELIEVED}: {p.prior:.3g} {p.unit} as believed, to which the data add nothing"
     return None

@@ -22,6 +22,7 @@ from calibrate.blunders.finding import Blunder
 from calibrate.blunders.left_alone import left_alone
 from calibrate.blunders.limits import rows_beyond_limits
 from calibrate.blunders.other_session import sessions_apart
+from calibrate.blunders.spot_signs import mirrored_axes
 from calibrate.blunders.witnesses import witnesses_of
 from calibrate.errors import DataError
 from calibrate.estimator import Estimator
@@ -93,6 +94,8 @@ def wrong_file(rig: Rig, samples: Samples) -> tuple[Blunder, ...]:
     if in_degrees is not None:
         q_rad = as_radians(q_rad, limits_rad)
     found = wrong_convention(_drawn_flange(rig), witnesses_of(rig, samples, q_rad))
+    if in_degrees is None and found is None:
+        found = mirrored_axes(rig, samples)
     return tuple(blunder for blunder in (in_degrees, found) if blunder is not None)
 
 

@@ -73,10 +73,10 @@ def as_planned(found: Instruments, plan: FitPlan) -> Instruments:
 def _believed(p: Parameter, plan: FitPlan) -> Parameter:
     if _matches(p.name, plan.free):
         plausible = max(p.plausible, LINK_PLAUSIBLE) if p.name.startswith("link") else p.plausible
-        p = replace(p, free=True, prior=np.inf, plausible=plausible)
+        p = replace(p, free=True, prior=np.inf, plausible=plausible, assumed=False)
     for pattern, sigma in plan.priors.items():
         if fnmatchcase(p.name, pattern):
-            p = replace(p, free=True, prior=sigma, plausible=max(p.plausible, sigma))
+            p = replace(p, free=True, prior=sigma, plausible=max(p.plausible, sigma), assumed=False)
     return replace(p, free=False) if _matches(p.name, plan.hold) else p
 
 

@@ -16,6 +16,7 @@ from calibrate.unseen_along import points_along
 
 Floats = NDArray[np.float64]
 
+TOLD = 0.05  # of the plausible size: a member of an unseen combination that can move no further is a number
 FAR = 3.0  # plausible sizes that the truth of an unseen combination may lie from where it was held
 
 

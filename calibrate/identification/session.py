@@ -6,12 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from acquisition.recording.columns import SPOTS
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.arms.belief import FREE
 from calibrate.arms.catalogue import arm_of
 from calibrate.blunders.shots import Shots
 from calibrate.chain import Chain
+from calibrate.default_belief import links_of
 from calibrate.fit_plan import DEFAULT, FitPlan, InstrumentName
 from calibrate.identification.planned import COLUMNS, as_planned, chosen_instruments, samples_as_planned
 from calibrate.instruments import Instruments, instruments_of
@@ -33,15 +35,18 @@ NEGLIGIBLE_RAD = 1e-9  # joint noise, where it is left to the instruments' own: 
 
 
 def instruments_for_fit(rig: Rig, samples: Samples, plan: FitPlan = DEFAULT) -> Instruments:
-    """The instruments of the samples, as planned; links are believed to the drawing tolerance, or free without one.
+    """The instruments of the samples, as planned; links are believed to the drawing tolerance.
+
+    Without one they are free, but where there are spots, which see little of an arm: as default_belief.py.
 
     DataError where no row holds an observation, or where columns, rig and plan contradict each other.
     """
     as_distance, as_lines = (i in plan.instruments for i in (InstrumentName.DISTANCE, InstrumentName.POINT))
+    planned = samples_as_planned(samples, plan)
     found = instruments_of(
-        samples_as_planned(samples, plan),
+        planned,
         rig,
-        arm=arm_of(rig, None if rig.tolerance is not None else FREE),
+        arm=arm_of(rig, links_of(rig) if rig.tolerance is not None or holds_spots(planned) else FREE),
         positions=Positions.DISTANCE if as_distance else Positions.FRAME,
         spots=Spots.POINT if as_lines else Spots.REFLECTION,
     )
@@ -49,6 +54,11 @@ def instruments_for_fit(rig: Rig, samples: Samples, plan: FitPlan = DEFAULT) -> 
     if all(m.name in OUTSIDE for m in found.weighting.measured):
         return replace(found, weighting=replace(found.weighting, joint_rad=NEGLIGIBLE_RAD))
     return found
+
+
+def holds_spots(samples: Samples) -> bool:
+    """Whether any row holds spots of the dual PSD."""
+    return SPOTS[0] in samples and bool(np.any(np.isfinite(samples.column(SPOTS[0]))))
 
 
 def standing_at(weighting: Weighting, rows: Indices) -> Weighting:

@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
+from calibrate.arms.catalogue import arm_of
 from calibrate.blunders.finding import Blunder
 from calibrate.blunders.shots import robust_scale
+from calibrate.default_belief import links_of
 from calibrate.dual_psd_rig import believed_noise, dual_psd_chain
 from calibrate.identification.clean import clean, refuse_most, rows_of
 from calibrate.identification.evidence import Asked
@@ -46,7 +48,7 @@ def without_blunders(rig: Rig, samples: Samples) -> tuple[Samples, tuple[Blunder
 
 def proved(rig: Rig, samples: Samples, zeros: ZeroResult, *, asked: Asked, rng: Generator) -> Identification:
     """The fit behind these zeros once more, by the way of all instruments, for what is proved of it."""
-    weighting = instruments_of(samples, rig).weighting
+    weighting = instruments_of(samples, rig, arm=arm_of(rig, links_of(rig))).weighting
     index = index_of(zeros.parameters)
     fitted = settled_fit(weighting, np.array([zeros.theta[index[p.name]] for p in weighting.parameters]))
     return result_of(fitted, (), rig, samples, asked=asked, rng=rng)
@@ -58,7 +60,7 @@ def _bad_spots(rig: Rig, samples: Samples, rows: NDArray[np.intp]) -> tuple[Blun
     fit = fit_weighted(dual_psd_chain(rig, data.placement, data.first_psd), data, believed_noise(rig)).fit
     if not np.all(np.isfinite(fit.theta)):
         return ()
-    found = instruments_of(samples, rig)
+    found = instruments_of(samples, rig, arm=arm_of(rig, links_of(rig)))
     index = index_of(fit.parameters)
     start = np.array([fit.theta[index[p.name]] for p in found.weighting.parameters])
     factors = found.weighting.noise(fit.parameters, start)

@@ -1,13 +1,12 @@
 """What to expect of the arm anywhere in its workspace, as the covariance predicts it."""
 
-from calibrate.model_file import FreeSpaceRecord, ModelFile
+from calibrate.model_file import FreeSpaceRecord
 from calibrate.report.elements import Html, bullets, table, tag
 from calibrate.report.quantities import DASH, length
 
 
-def free_space(model: ModelFile) -> list[Html]:
-    """A table; the reason where there is no prediction; nothing in a model from before there was one."""
-    found = model.free_space
+def free_space(found: FreeSpaceRecord | None) -> list[Html]:
+    """A table; the reason where there is no prediction; nothing of a model from before there was one."""
     if found is None:
         return []
     if found.rms_m is None:

@@ -3,7 +3,9 @@
 from pathlib import Path
 
 from acquisition.recording.recording import Recording
+from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.model_file import ModelFile
+from calibrate.report.diagnosis.page import inserted
 from calibrate.report.page import page, write_page
 from calibrate.report.sections import arm_data, arm_errors, arm_parameters, arm_proofs, arm_summary, provenance
 from calibrate.report.session_evidence import session_evidence
@@ -17,15 +19,17 @@ CONTENTS = {
 }
 
 
-def write_session_report(path: Path | str, recording: Recording, model: ModelFile) -> Path:
-    """One HTML file at `path`, over what may be there; returns it.
+def write_session_report(
+    path: Path | str, recording: Recording, model: ModelFile, diagnosis: DiagnosisFile | None = None
+) -> Path:
+    """One HTML file at `path`, over what may be there; returns it. `diagnosis` adds its pages.
 
     DataError where the model was not made from this recording, or the file cannot be written.
     """
-    return write_page(path, session_report_html(recording, model))
+    return write_page(path, session_report_html(recording, model, diagnosis))
 
 
-def session_report_html(recording: Recording, model: ModelFile) -> str:
+def session_report_html(recording: Recording, model: ModelFile, diagnosis: DiagnosisFile | None = None) -> str:
     """The page as text."""
     known = session_evidence(recording, model)
     chapters = (
@@ -36,4 +40,5 @@ def session_report_html(recording: Recording, model: ModelFile) -> str:
         arm_data.data_chapter(known),
         provenance.provenance(recording, model.poses, "took part in the fit", model.software),
     )
-    return page(f"The arm {recording.rig.name}", arm_summary.masthead(known), CONTENTS, chapters, model.software)
+    contents, chapters = inserted(CONTENTS, chapters, diagnosis, recording.rig)
+    return page(f"The arm {recording.rig.name}", arm_summary.masthead(known), contents, chapters, model.software)

@@ -92,7 +92,8 @@ def _doubts(evidence: SessionEvidence) -> Iterator[Doubt]:
         along = "changes in the session" if worst.factor.startswith("order") else f"follows {worst.factor}"
         yield (
             f"What remains {along} ({worst.share:.0%} of it, F = {significant(worst.f)}): the model lacks something.",
-            "Look for the missing physics where the figures along the joints, below, show it.",
+            "Look for the missing physics where the figures along the joints, below, show it; `calibeam diagnose` says "
+            "what it is.",
         )
     yield from _doubts_of_proofs(proofs(model))
     share = evidence.left_out / max(len(recording.samples), 1)
@@ -124,7 +125,8 @@ def _doubts_of_scatter(found: Scatter | None, repeats: Repeated | None) -> Itera
         yield (
             f"Repeated poses scatter less than the model misses them (F = {significant(repeats.ratio)}): "
             "physics is missing from the model.",
-            "Look for the missing physics where the figures along the joints, below, show it.",
+            "Look for the missing physics where the figures along the joints, below, show it; `calibeam diagnose` says "
+            "what it is.",
         )
 
 

@@ -4,10 +4,24 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from acquisition.recording.recording import Recording
+from calibrate.diagnose.schema import DiagnosisFile
+from calibrate.identification.evidence_record import EvidenceFields
 from calibrate.read_samples import Angles
+from calibrate.report.diagnosis.page import inserted
 from calibrate.report.evidence import evidence
 from calibrate.report.page import page, write_page
-from calibrate.report.sections import centring, point, provenance, residuals, rig, spots, summary, unseen, zeros
+from calibrate.report.sections import (
+    centring,
+    point,
+    proofs,
+    provenance,
+    residuals,
+    rig,
+    spots,
+    summary,
+    unseen,
+    zeros,
+)
 from calibrate.zeros.point_constraint import PointConstraintResult
 from calibrate.zeros.result import ZeroResult
 
@@ -18,6 +32,7 @@ CONTENTS = {
     "residuals": residuals.TITLE,
     "zeros": zeros.TITLE,
     "point": point.TITLE,
+    "proofs": proofs.TITLE,
     "unseen": unseen.TITLE,
     "provenance": provenance.TITLE,
 }
@@ -32,10 +47,13 @@ def write_report(
     why_no_point_constraint: str = "it was not asked for",
     angles: Angles = "reported",
     left_out: Sequence[str] = (),
+    proved: EvidenceFields | None = None,
+    diagnosis: DiagnosisFile | None = None,
 ) -> Path:
     """One HTML file at `path`, over what may be there; returns it.
 
-    `left_out` are sentences, each naming rows that were recorded but not fitted.
+    `left_out` are sentences, each naming rows that were recorded but not fitted; `proved` is None where nothing was;
+    `diagnosis` adds its pages.
     `result` must come from `recording` with these `angles`. DataError if it does not, or the file cannot be written.
     """
     text = report_html(
@@ -45,6 +63,8 @@ def write_report(
         why_no_point_constraint=why_no_point_constraint,
         angles=angles,
         left_out=left_out,
+        proved=proved,
+        diagnosis=diagnosis,
     )
     return write_page(path, text)
 
@@ -57,6 +77,8 @@ def report_html(
     why_no_point_constraint: str = "it was not asked for",
     angles: Angles = "reported",
     left_out: Sequence[str] = (),
+    proved: EvidenceFields | None = None,
+    diagnosis: DiagnosisFile | None = None,
 ) -> str:
     """The page as text; arguments as in `write_report`."""
     known = evidence(recording, result, angles)
@@ -68,7 +90,10 @@ def report_html(
         residuals.residuals(known),
         zeros.zeros(known),
         point.point(point_constraint, result.zeros, why_no_point_constraint),
+        *([] if proved is None else [proofs.proofs(proved)]),
         unseen.unseen(known, left_out),
         provenance.provenance(recording, result.n_poses, "with both spots", f"{result.software}, {result.steps} steps"),
     )
-    return page(f"Joint zeros of {recording.rig.name}", summary.masthead(known), CONTENTS, chapters, result.software)
+    contents = {anchor: title for anchor, title in CONTENTS.items() if anchor != "proofs" or proved is not None}
+    contents, chapters = inserted(contents, chapters, diagnosis, recording.rig)
+    return page(f"Joint zeros of {recording.rig.name}", summary.masthead(known), contents, chapters, result.software)

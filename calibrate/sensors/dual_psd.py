@@ -43,6 +43,15 @@ class Fixture:
 
 
 @dataclass(frozen=True)
+class PairBelief:
+    """One sigma of PSD 2 in PSD 1, about its own axes."""
+
+    length_sigma_m: float
+    angle_sigma_rad: float
+    assumed: bool = False  # nobody's statement (Parameter.assumed)
+
+
+@dataclass(frozen=True)
 class DualPsd:
     """Sensor over a data set in which pose j used `placement[j]` and struck `first_psd[j]` first.
 
@@ -54,7 +63,7 @@ class DualPsd:
     placement: Ints  # (pose,)
     first_psd: Ints  # (pose,) 1 or 2
     gain_prior: float | None = None  # one sigma of the four gains; None: exact, held
-    pair_prior: tuple[float, float] | None = None  # one sigma (m, rad) of PSD 2 in PSD 1; None: exact, held
+    pair_prior: PairBelief | None = None  # of PSD 2 in PSD 1; None: exact, held
 
     unit = "m"
 
@@ -79,16 +88,6 @@ class DualPsd:
     @cached_property
     def _parameters(self) -> tuple[Parameter, ...]:
         gains = tuple(_held_unless(name, "1", GAIN_PLAUSIBLE, self.gain_prior, start=1.0) for name in GAINS)
-        length, angle = self.pair_prior or (None, None)
-        pair = tuple(
-            _held_unless(
-                f"psd2.{a}",
-                "m" if i < 3 else "rad",
-                (PAIR_PLAUSIBLE_M, PAIR_PLAUSIBLE_RAD)[i // 3],
-                (length, angle)[i // 3],
-            )
-            for i, a in enumerate(AXES)
-        )
         used = set(self.placement.tolist())
         places = tuple(
             Parameter(
@@ -100,7 +99,7 @@ class DualPsd:
             for k in self.places
             for i, a in enumerate(AXES)
         )
-        return self.mount.parameters + gains + pair + places
+        return self.mount.parameters + gains + _pair_parameters(self.pair_prior) + places
 
     def select(self, rows: NDArray[np.intp]) -> Self:
         return replace(self, placement=self.placement[rows], first_psd=self.first_psd[rows])
@@ -212,6 +211,13 @@ def _beam_motions(T_psd1_psd2: Floats, first_psd: int) -> Floats:
         return np.stack([np.zeros((6, 6)), -adjoint(optics.MIRROR_Z)])
     mirror = T_psd1_psd2 @ optics.MIRROR_Z @ inverse(T_psd1_psd2)
     return np.stack([adjoint(mirror) - np.eye(6), -np.eye(6)])
+
+
+def _pair_parameters(belief: PairBelief | None) -> tuple[Parameter, ...]:
+    length, angle = (None, None) if belief is None else (belief.length_sigma_m, belief.angle_sigma_rad)
+    sizes = [("m", PAIR_PLAUSIBLE_M, length)] * 3 + [("rad", PAIR_PLAUSIBLE_RAD, angle)] * 3
+    pair = (_held_unless(f"psd2.{a}", *size) for a, size in zip(AXES, sizes, strict=True))
+    return tuple(replace(p, assumed=belief is not None and belief.assumed) for p in pair)
 
 
 def _held_unless(name: str, unit: str, plausible: float, prior: float | None, start: float = 0.0) -> Parameter:

@@ -1,8 +1,8 @@
 """Full dual-PSD identification of joint zeros.
 
-Joint zeros, placements and laser mount are free without any opinion; links are free under their drawing tolerance;
-rank comes first, and what cannot be determined is held and named. Weights are the noise of joints and detectors,
-re-estimated from the residuals. docs/decisions/0003 says why it is done so.
+Joint zeros, placements and laser mount are free without any opinion; links, and detectors where the rig doubts them,
+are free under the tolerance of the drawing; rank comes first, and what cannot be determined is held and named. Weights
+are the noise of joints and detectors, re-estimated from the residuals. docs/decisions/0003 says why it is done so.
 """
 
 from dataclasses import dataclass, replace
@@ -23,6 +23,7 @@ from calibrate.noise import NoiseModel, VarianceFactors
 from calibrate.observations import Observations
 from calibrate.parameters import Parameter, hold, priors, start_values
 from calibrate.problem import Problem, whitener_of
+from calibrate.zeros.estimates import estimates, seen_by_data
 from calibrate.zeros.held_out import held_out_error
 from calibrate.zeros.ranked_fit import COARSE, FAR, NEAR, by_joint, fitted, noisy_rows, ranked_fit
 from calibrate.zeros.repeats import repeat_scatter
@@ -155,37 +156,12 @@ def _widening(weighted: Weighted) -> Floats:
     return out
 
 
-def _estimates(weighted: Weighted) -> tuple[Estimate, ...]:
-    fit, seen = weighted.fit, weighted.seen
-    usable = np.all(np.isfinite(fit.covariance))
-    sigma = _widening(weighted) * np.sqrt(np.diag(fit.covariance)) if usable else np.full(len(fit.theta), np.nan)
-    return tuple(
-        estimate_of(p, float(fit.theta[i]), float(sigma[i]), fit, seen.reason(p.name))
-        for i, p in enumerate(weighted.problem.chain.parameters)
-    )
-
-
-def estimate_of(p: Parameter, value: float, sigma: float, fit: Fit, unseen: str | None) -> Estimate:
-    """The value with its sigma, or why there is none; `unseen`: what the identifiability says of the parameter."""
-    why = unseen
-    if not p.free:
-        why = "held at its nominal value"
-    elif p.name in fit.at_bound:
-        why = f"at its bound ({value:g} {p.unit}): no result"
-    elif fit.status in (Status.NOT_FINITE, Status.OUT_OF_STEPS, Status.STALLED) or not np.isfinite(sigma):
-        why = fit.status.value
-    elif why is None and sigma > p.plausible * (1.0 + 1e-6) and not np.isfinite(p.prior):
-        why = f"data too weak: sigma {sigma:.2g} {p.unit} is worse than a guess ({p.plausible:g} {p.unit})"
-    known = why is None
-    return Estimate(p.name, p.unit, value if known else None, sigma if known else None, why)
-
-
-def _zeros(weighted: Weighted, estimates: tuple[Estimate, ...]) -> tuple[JointZero, ...]:
+def _zeros(weighted: Weighted, told: tuple[Estimate, ...]) -> tuple[JointZero, ...]:
     fit = weighted.fit
     index = {p.name: i for i, p in enumerate(fit.parameters)}
     links = np.flatnonzero([p.free and np.isfinite(p.prior) for p in fit.parameters])
     found: list[JointZero] = []
-    for e in estimates:
+    for e in told:
         owner, _, what = e.name.partition(".")
         if what != "zero":
             continue
@@ -195,7 +171,7 @@ def _zeros(weighted: Weighted, estimates: tuple[Estimate, ...]) -> tuple[JointZe
 
 
 def _given_links(covariance: Floats, zero: int, links: NDArray[np.intp]) -> float:
-    """Sigma of a zero if the links were known exactly: conditional variance of a normal law."""
+    """Sigma of a zero if the drawing were known exactly: conditional variance of a normal law."""
     if len(links) == 0:
         return float(np.sqrt(covariance[zero, zero]))
     scale = np.sqrt(np.diag(covariance)[links])
@@ -230,16 +206,17 @@ def _result(
     weighted: Weighted, before: Fit, proof: HeldOut | None, data: Observations, believed: BelievedNoise
 ) -> ZeroResult:
     problem, fit = weighted.problem, weighted.fit
-    estimates = _estimates(weighted)
+    seen, pulled = seen_by_data(problem, fit, weighted.seen)
+    told = estimates(problem, fit, seen, pulled, _widening(weighted))
     status = fit.status
-    if status is Status.CONVERGED and weighted.seen.combinations:
+    if status is Status.CONVERGED and seen.combinations:
         status = Status.RANK_DEFICIENT
     misfit_before, misfit_after = problem.misfit(before.theta), problem.misfit(fit.theta)
     return ZeroResult(
         status,
-        _zeros(weighted, estimates),
-        estimates,
-        weighted.seen,
+        _zeros(weighted, told),
+        told,
+        seen,
         _noise_found(weighted, believed),
         repeat_scatter(problem.whitener, misfit_after, data.repeat, fit.chi2, fit.dof),
         proof,

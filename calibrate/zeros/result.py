@@ -12,6 +12,11 @@ from calibrate.parameters import Parameter
 Floats = NDArray[np.float64]
 
 
+ONLY_BELIEVED = "only its prior speaks of it"
+UNSTATED = "assumed for want of a [tolerance]"
+HELD = "held so that a combination has an answer; see the combinations"
+
+
 @dataclass(frozen=True)
 class Estimate:
     """One parameter: a value with its doubt, or the reason why there is none (then both numbers are None)."""
@@ -30,7 +35,7 @@ class JointZero:
     joint: int  # counted from 1
     value_rad: float | None
     sigma_rad: float | None
-    measurement_sigma_rad: float | None  # what would remain of sigma if the links were exactly as now believed
+    measurement_sigma_rad: float | None  # what would remain of sigma if links and bracket were exactly as now believed
     why: str | None  # why not determined
 
 

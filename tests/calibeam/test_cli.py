@@ -73,7 +73,6 @@ def test_a_wrong_unit_is_refused(rig_with, session_of) -> None:
         ("rate_hz = 1000.0", "rate_hz = 1500.5", "rate_hz 1500.5"),
         ("half_size_m = 0.010", "half_size_m = -1.0", "half_size_m"),
         ("home_rad =", "# home_rad =", "home_rad"),
-        ("[tolerance]\nlength_m = 3e-4\nangle_rad = 5e-4\n", "", "[tolerance]"),
     ],
 )
 def test_values_that_no_session_can_use_are_refused_before_a_device_is_touched(

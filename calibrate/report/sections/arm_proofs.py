@@ -3,12 +3,13 @@
 from collections.abc import Iterator
 
 from acquisition.recording.rig_schema import Rig
-from calibrate.model_file import ModelFile, UnseenRows
+from calibrate.model_file import ModelFile
 from calibrate.report.elements import Html, section, table, tag
 from calibrate.report.free_space_table import free_space
 from calibrate.report.model_tests import proofs, repeated, scatter
 from calibrate.report.quantities import DASH, angle, doubted_angle, doubted_length, fixed, length, significant
-from calibrate.report.session_evidence import SAID, SessionEvidence
+from calibrate.report.session_evidence import SessionEvidence
+from calibrate.report.unseen_table import unseen_rows
 from calibrate.uncertainty.chi_square import Alarm
 
 TITLE = "Proof and doubt"
@@ -23,33 +24,11 @@ def proofs_chapter(evidence: SessionEvidence) -> Html:
         "proofs",
         TITLE,
         lead,
-        *_unseen(evidence.model),
-        *free_space(evidence.model),
+        *unseen_rows(proofs(evidence.model), evidence.model.unproven),
+        *free_space(evidence.model.free_space),
         _noise(evidence.model, evidence.recording.rig),
         table(("Test", "value", "reads as"), _tests(evidence.model), numeric=(1,), caption="Noise against misfit"),
         *_drawn_rows(evidence.model),
-    )
-
-
-def _unseen(model: ModelFile) -> list[Html]:
-    found = proofs(model)
-    unproven = [tag("p", f"No proof by {why}.") for why in model.unproven]
-    if not found:
-        return [tag("p", "No rows were kept out of the fit: too few, or it was not asked for."), *unproven]
-    head = ("Left out", "reading", "count", "as drawn, rms", "identified, rms", "over the noise")
-    caption = "Rows that the fit has not seen, predicted from the others"
-    return [table(head, (_proof(p) for p in found), numeric=(2, 3, 4, 5), caption=caption), *unproven]
-
-
-def _proof(proof: UnseenRows) -> tuple[str, ...]:
-    name = SAID.get(proof.instrument, proof.instrument)
-    return (
-        proof.split,
-        name,
-        str(proof.observations),
-        length(proof.rms_before),
-        length(proof.rms_after),
-        fixed(proof.chi_after, 2),
     )
 
 

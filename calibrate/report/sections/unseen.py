@@ -46,7 +46,7 @@ def _limits(evidence: Evidence) -> Iterator[str]:
     if len(evidence.places) < 2:
         yield "One fixture place only: errors that are the same over the whole workspace stay hidden."
     if rig.tolerance is None:
-        yield "Link lengths and angles were taken as drawn, since the rig file states no tolerance."
+        yield "The rig file states no tolerance: links and bracket were believed as usual, not as known."
     held = {
         p.name.partition(".")[2].partition("_")[0] for p in result.parameters if p.name.startswith("psd") and not p.free
     }

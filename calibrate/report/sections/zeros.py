@@ -5,6 +5,7 @@ from math import degrees
 
 import numpy as np
 
+from calibrate.default_belief import links_of, said_of
 from calibrate.identifiability import WEAK, Identifiability
 from calibrate.parameters import Parameter
 from calibrate.report.elements import Html, bullets, figure, folded, join, panels, section, table, tag
@@ -94,16 +95,13 @@ def _why(zero: JointZero, seen: Identifiability) -> str:
 
 
 def _reading(evidence: Evidence) -> str:
-    tolerance = evidence.recording.rig.tolerance
-    if tolerance is None:
-        return (
-            "The rig file states no tolerance of the links, so they were taken as exact. If they are not, the zeros "
-            "are off by more than sigma says; add [tolerance] to the rig file."
-        )
+    rig = evidence.recording.rig
+    links, unasked = links_of(rig), said_of(rig)
     return (
-        f"Sigma holds what the links may be off the drawing ({tolerance.length_m * 1e3:g} mm, "
-        f"{angle(tolerance.angle_rad)}) as far as the data do not tell. The last column is what would remain "
-        "if the links were exactly as now fitted."
+        ("" if unasked is None else f"The rig file has {unasked}. ")
+        + f"Sigma holds what the links may be off the drawing ({links.length_sigma_m * 1e3:g} mm, "
+        f"{angle(links.angle_sigma_rad)}) as far as the data do not tell. The last column is what would remain "
+        "if links and bracket were exactly as now fitted."
     )
 
 

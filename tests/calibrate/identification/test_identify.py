@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from calibrate.blunders.finding import BlunderKind
 from calibrate.errors import DataError
 from calibrate.fit import Status
 from calibrate.identification.identify import identify
@@ -117,6 +118,18 @@ def test_cones_bring_all_tips_of_a_seat_together(rig, session):
     tips = np.stack([predicted[c] for c in ("tip_x_m", "tip_y_m", "tip_z_m")], axis=1)
     for k in (1.0, 2.0):
         assert np.linalg.norm(tips[seat == k].std(axis=0)) < 3e-5
+
+
+def test_a_cone_that_is_left_with_one_row_goes_too_and_both_rows_are_named(rig, session):
+    q, seat = seated(session, np.concatenate([CONES, [[0.3, 0.3, 0.4]]]), 40)
+    surplus = np.flatnonzero(seat == 3.0)[2:]
+    q, seat = np.remainder(np.delete(q, surplus, axis=0) + np.pi, 2.0 * np.pi) - np.pi, np.delete(seat, surplus)
+    q[-2, 3] = 9.0
+    result = run(rig, table(q, seat=seat), held_out_share=0.0)
+    found = [(b.kind, b.rows) for b in result.blunders]
+    assert found == [(BlunderKind.BEYOND_LIMITS, (len(q) - 2,)), (BlunderKind.LEFT_ALONE, (len(q) - 1,))]
+    assert not any(p.name.startswith("seat3") for p in result.parameters)
+    assert result.n_samples == len(q) - 2
 
 
 def test_a_bar_gives_the_scale_that_cones_do_not_have(rig, session):

@@ -15,9 +15,10 @@ from calibrate.kernels.dual_psd_rows import DualPsdRows
 from calibrate.kernels.normal_fit import fit_normal
 from calibrate.parameters import hold
 from calibrate.problem import Problem
+from calibrate.sensors.dual_psd import PairBelief
 from calibrate.solvers.levenberg import LevenbergRules
 
-PAIR = (5e-5, 1e-3)
+PAIR = PairBelief(5e-5, 1e-3)
 
 
 @pytest.fixture(scope="module")

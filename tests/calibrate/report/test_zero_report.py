@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from calibrate.identification.evidence_record import evidence_fields
 from calibrate.report.zero_report import report_html, write_report
 
 VOID = {"meta", "br", "hr", "img", "input", "link"}
@@ -37,6 +38,15 @@ class Balance(HTMLParser):
 
 def text_of(page: str) -> str:
     return re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", re.sub(r"<(style|svg).*?</\1>", " ", page, flags=re.DOTALL)))
+
+
+def test_proofs_of_the_same_fit_have_a_chapter_where_they_were_made(recorded, identified, page):
+    proved = evidence_fields(identified.proved.evidence)
+    told = text_of(report_html(recorded, identified.zeros, proved=proved))
+    assert all(proof.split in told for proof in proved["proofs"])
+    assert len(proved["proofs"]) >= 2
+    assert "drawn evenly between the joint limits" in told or proved["free_space"].says in told
+    assert 'href="#proofs"' not in page
 
 
 def test_every_element_is_closed(page: str) -> None:

@@ -1,0 +1,114 @@
+"""A session of explicit joint poses: go there, from the asked-for side, and read; where it is dark, find the light."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.aiming.reach import clear_of_table
+from acquisition.bench import Bench
+from acquisition.errors import AcquisitionError, NoLightError, SpotLostError, UnreachableError
+from acquisition.journal import Journal
+from acquisition.learner import Learner
+from acquisition.navigator import GLANCE_S, Navigator
+from acquisition.plan import PlanOptions
+from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
+from acquisition.sample import Sample
+from acquisition.session import Summary, usable
+
+Floats = NDArray[np.float64]
+Progress = Callable[[int, int, str], None]
+
+
+def check_planned(plan: PosePlan) -> None:
+    """AcquisitionError where a session before two detectors cannot take a block as it is asked for."""
+    for number, block in enumerate(plan.block, start=1):
+        if block.placement is None or block.first_psd is None:
+            raise AcquisitionError(
+                f"block {number} of the plan names no placement and first_psd: a session takes poses before the two "
+                "detectors; take these by hand, and record them as rows of samples.csv"
+            )
+        if block.payload_kg:
+            raise AcquisitionError(
+                f"block {number} of the plan wants a payload of {block.payload_kg:g} kg: a session changes none; "
+                "take these poses by hand, or leave the block out"
+            )
+
+
+class PlannedSession:
+    """Runs a plan on a bench; the only owner of what was taken. Stopping the arm after an error is the caller's."""
+
+    def __init__(
+        self,
+        bench: Bench,
+        learner: Learner,
+        journal: Journal,
+        options: PlanOptions,
+        home_rad: Floats,
+        *,
+        progress: Progress = lambda done, total, text: None,
+    ) -> None:
+        self._bench, self._learner, self._journal, self._options = bench, learner, journal, options
+        self._navigator = Navigator(bench, learner, journal, home_rad, options.seed)
+        self._progress = progress
+        self._samples: list[Sample] = []
+        self._skipped = 0
+
+    @property
+    def taken(self) -> int:
+        """Samples so far, also after the session was cut short."""
+        return len(self._samples)
+
+    def run(self, plan: PosePlan) -> Summary:
+        """Take every block. DeviceError, RecordingError end it; a pose that is dark or out of reach is skipped."""
+        check_planned(plan)
+        self._navigator.move(self._navigator.q_rad)
+        standing: int | None = None
+        for block in plan.block:
+            placement = block.placement or 0
+            if placement != standing:
+                self._bench.place_fixture(placement)
+                self._journal.event("placement", {"id": placement})
+                standing = placement
+            for pose in block.pose:
+                self._progress(len(self._samples), plan.poses, f"place {placement}, PSD {block.first_psd} first")
+                self._take(block, pose, placement)
+        self._progress(len(self._samples), plan.poses, "done")
+        return Summary(tuple(self._samples), (), self._skipped)
+
+    def _take(self, block: PlannedBlock, pose: PlannedPose, placement: int) -> None:
+        first = block.first_psd or 1
+        try:
+            self._go(pose, placement, first)
+        except (UnreachableError, SpotLostError, NoLightError) as why:
+            return self._skip(placement, str(why))
+        look = self._bench.look(self._options.dwell_s)
+        if not usable(look):
+            return self._skip(placement, "no light, or saturated, when read")
+        sample = Sample(look, placement, first, self._navigator.approach.copy(), None, centred=False)
+        self._samples.append(sample)
+        self._journal.sample(sample)
+        return None
+
+    def _go(self, pose: PlannedPose, placement: int, first: int) -> None:
+        """To the pose from its side; where it is dark there, to light near it and the spots that were expected."""
+        q_rad = np.array(pose.q_rad)
+        if not clear_of_table(self._learner.arm, q_rad):
+            raise UnreachableError(f"pose {np.round(q_rad, 3).tolist()}: elbow, wrist or laser would touch the table")
+        self._approach(q_rad, pose)
+        if not all(self._bench.look(GLANCE_S).lit(first)):
+            found_rad = self._navigator.find_near(placement, first, pose.spots_m or (0.0, 0.0, 0.0, 0.0))
+            self._approach(found_rad, pose)
+
+    def _approach(self, q_rad: Floats, pose: PlannedPose) -> None:
+        """Every joint that has a way comes this way, from inside its range."""
+        way = np.array(pose.approach or np.zeros(len(q_rad)))
+        before = q_rad - self._options.opposite_rad * way
+        arm = self._learner.arm
+        if np.any(way) and np.all((before >= arm.lower_rad) & (before <= arm.upper_rad)):
+            self._navigator.move(before)
+        self._navigator.move(q_rad)
+
+    def _skip(self, placement: int, why: str) -> None:
+        self._journal.event("skipped", {"placement": placement, "why": why})
+        self._skipped += 1

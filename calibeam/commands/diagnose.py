@@ -1,0 +1,62 @@
+"""`calibeam diagnose`: where a recording parts from its model, what physics was left out, and the proof."""
+
+from pathlib import Path
+
+import msgspec
+from rich.console import Console
+
+from acquisition.recording.read import read
+from calibeam.diagnosis import diagnose_recording, plan_next, refuse_wrong_file
+from calibeam.diagnosis_lines import print_diagnosis
+from calibeam.ending import naming
+from calibrate.diagnose.file import write_diagnosis
+from calibrate.model_file import read_model
+from calibrate.report.diagnosis.page import write_diagnosis_report
+
+
+def diagnose_command(
+    recording: Path,
+    *,
+    model: Path | None = None,
+    out: Path = Path("diagnosis.json"),
+    report: Path | None = None,
+    plan_out: Path | None = None,
+    json: bool = False,
+) -> None:
+    """Say where recording and model part, which physics is missing, how large it is, and prove it on unseen samples.
+
+    Faults of the file come first; a file that is wrong as a whole ends with code 1, and diagnosis.json says why.
+
+    Example: calibeam diagnose out/demo/recording.mcap --model out/demo/model.json --out diagnosis.json
+
+    Parameters
+    ----------
+    recording
+        A recording, or a session folder with rig.toml and samples.csv.
+    model
+        An identified model of the same rig: the comparison starts from it.
+    out
+        Where to write the diagnosis.
+    report
+        Where to write the pages for a person; beside the diagnosis, if not said otherwise.
+    plan_out
+        Where to write the poses that would best tell rivals apart: `calibeam session RIG --plan` takes them.
+    json
+        Print the diagnosis as it stands in the file, on one line, and nothing else.
+
+    """
+    known = None if model is None else read_model(model)
+    source, console = read(recording), Console()
+    with naming(recording):
+        found, file = diagnose_recording(source, known)
+        write_diagnosis(out, file)
+        if json:
+            print(msgspec.json.encode(file).decode())
+        else:
+            print_diagnosis(console, file)
+        refuse_wrong_file(found, out)
+        planned = "" if plan_out is None else plan_next(found, plan_out)
+    page = write_diagnosis_report(out.with_suffix(".html") if report is None else report, source, file)
+    if not json:
+        for line in filter(None, (planned, f"diagnosis: {out}", f"report: {page}")):
+            console.print(line, markup=False, highlight=False)

@@ -1,0 +1,95 @@
+"""`calibeam prove`: hide physics in emulated sessions, diagnose them blindly, open the seals, and count."""
+
+import sys
+from pathlib import Path
+
+import msgspec
+from rich.console import Console
+
+from calibeam.prove.lines import print_proof, print_real
+from calibeam.prove.prove import Plan, fresh, prove
+from calibeam.prove.real import prove_real
+from calibeam.prove.scenario import DEVELOPMENT, KINDS, Kind, Mix
+from calibrate.errors import DataError
+from simulators.conceal.wanted import FAMILIES, Family
+
+PUBLISHED_SEED = 20261121  # of the table in the README; nobody has looked at its cases while the diagnosis was made
+
+
+def prove_command(
+    *,
+    cases: int = 60,
+    seed: int = PUBLISHED_SEED,
+    out: Path = Path("out/proof"),
+    family: tuple[Family, ...] = FAMILIES,
+    kind: tuple[Kind, ...] = KINDS,
+    enr: tuple[float, float] | None = None,
+    mechanism: str | None = None,
+    jobs: int = 2,
+    without: tuple[str, ...] = (),
+    compare: int = 0,
+    real: Path | None = None,
+    publish: bool = False,
+    json: bool = False,
+) -> None:
+    """Hide physics in emulated sessions, diagnose them in processes that know nothing of it, open the seals, count.
+
+    Example: calibeam prove --cases 300 --out out/proof
+
+    Parameters
+    ----------
+    cases
+        How many sessions.
+    seed
+        Everything is drawn from it. Below 1000: development, no figure for the public.
+    out
+        Folder for recordings, seals, answers, proof.json and proof.html; has to be empty.
+    family
+        Instruments: all, if not said otherwise; may be repeated.
+    kind
+        Kinds of cases: all in their shares, if not said otherwise; may be repeated.
+    enr
+        Smallest and largest effect over noise.
+    mechanism
+        One mechanism by name, in cases with one effect (python -m simulators.conceal --list).
+    jobs
+        Processes at a time.
+    without
+        Physics to take out of the catalogue: then its cases have to be called unknown, at the right place.
+    compare
+        For how many cases an oracle, which is told the truth, and other methods are asked for comparison.
+    real
+        A folder with session folders of real recordings: these are diagnosed, and what is hidden of them inferred.
+    publish
+        Refuse what no published table may be made of.
+    json
+        Print nothing but the path of proof.json.
+
+    """
+    console = Console(stderr=json)
+    if real is not None:
+        _real(console, real, out, jobs)
+        return
+    if publish and seed < DEVELOPMENT:
+        raise DataError(f"seed {seed} is one of development (below {DEVELOPMENT}); publish with another --seed")
+    if publish and without:
+        raise DataError("--without makes the catalogue another one; its table is not the one to publish")
+    if cases < 1 or jobs < 1:
+        raise DataError(f"--cases {cases} --jobs {jobs}: both must be 1 or more")
+    plan = Plan(Mix(kind, family, enr, mechanism), seed, cases, jobs, without, compare)
+    proof = prove(out, plan, lambda word: _tell(console, word), " ".join(["calibeam", *sys.argv[1:]]))
+    print_proof(console, proof)
+    console.print(f"proof: {out / 'proof.json'}\npage: {out / 'proof.html'}", markup=False, highlight=False)
+    if json:
+        print(out / "proof.json")
+
+
+def _tell(console: Console, word: str) -> None:
+    console.print(word, markup=False, highlight=False)
+
+
+def _real(console: Console, data: Path, out: Path, jobs: int) -> None:
+    """Pages of all sets and real.json in `out`."""
+    sets = prove_real(data, fresh(out).out, jobs, lambda word: _tell(console, word))
+    (out / "real.json").write_bytes(msgspec.json.format(msgspec.json.encode(sets), indent=1) + b"\n")
+    print_real(console, sets)

@@ -1,0 +1,154 @@
+"""Two recordings of one motion, measured and simulated: aligned, compared link by link, their difference diagnosed."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from acquisition.recording.recording import Recording
+from acquisition.recording.samples import Samples
+from calibeam.comparison_record import ComparisonFile, LinkRecord, StreamRecord
+from calibeam.diagnosis import diagnose_recording
+from calibeam.software import SOFTWARE
+from calibrate.diagnose.compare.chain import Difference, differences
+from calibrate.diagnose.compare.matched import Matched, match
+from calibrate.diagnose.compare.observed import difference_samples
+from calibrate.diagnose.compare.parted import ROUNDING, Parted, judged
+from calibrate.diagnose.compare.streams import StreamPair, late_against_joints, stream_pairs
+from calibrate.diagnose.diagnosis import Verdict
+from calibrate.diagnose.schema import DiagnosisFile
+from calibrate.diagnose.streams.recorded import devices_of
+from calibrate.errors import DataError
+
+FEWEST = 20  # samples of a diagnosis; fewer hold no more than the geometry
+READING = ("spots", "position", "wire")
+CLEAR = 5.0  # sigmas of a time that is told
+PERSON = {"rad": ("urad", 1e6), "m": ("um", 1e6)}
+
+
+def compare(measured: Recording, simulated: Recording, *, diagnosed: bool = True) -> ComparisonFile:
+    """DataError where the two are not of one arm and one motion. `diagnosed`: seek physics in what differs."""
+    rows = match(measured.samples, simulated.samples)
+    pair = measured.samples.take(rows.measured), simulated.samples.take(rows.simulated)
+    links = differences(simulated.rig, pair)
+    told = judged(links, simulated.rig, pair)
+    streams = stream_pairs(devices_of(measured), devices_of(simulated))
+    notes: list[str] = []
+    diagnosis = _diagnosis(measured, simulated, pair, links, told, notes) if diagnosed else None
+    if diagnosis is not None and diagnosis.verdict == Verdict.MISMATCH.value:
+        told = tuple(_by_structure(one) for one in told)
+    first = next((link.link for link in told if link.parts), None)
+    return ComparisonFile(
+        1,
+        "calibeam-comparison",
+        SOFTWARE,
+        measured.path.name,
+        simulated.path.name,
+        len(rows.measured),
+        *_unmatched(measured.samples, simulated.samples, rows),
+        first,
+        _says(told, pair[0]),
+        tuple(_link(one, pair[0]) for one in told),
+        _streams(streams),
+        tuple(notes),
+        diagnosis,
+    )
+
+
+def _by_structure(one: Parted) -> Parted:
+    """A reading whose difference has a cause parts, however large its noise was believed to be."""
+    if one.link not in READING or one.parts:
+        return one
+    return replace(
+        one, parts=True, first_row=0, noise=None, noise_from="less than believed: the difference has a cause"
+    )
+
+
+def _unmatched(measured: Samples, simulated: Samples, rows: Matched) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    one = measured.column("t_s")[rows.only_measured]
+    two = simulated.column("t_s")[rows.only_simulated]
+    return tuple(one.tolist()), tuple(two.tolist())
+
+
+def _says(told: tuple[Parted, ...], measured: Samples) -> str:
+    first = next((link for link in told if link.parts), None)
+    if first is None:
+        return "measured and simulated agree in every link of the chain, within the noise that is known or believed"
+    unit, factor = PERSON[first.unit]
+    before = [link.link for link in told[: told.index(first)]]
+    agree = f"{', '.join(before)} agree; " if before else ""
+    at_s = measured.column("t_s")[first.first_row or 0]
+    noise = "" if first.noise is None else f", where noise makes {factor * first.noise:.3g} {unit} ({first.noise_from})"
+    return (
+        f"{agree}they part at the {first.link}, from t = {at_s:.3f} s on: "
+        f"{factor * first.rms_own:.3g} {unit} rms{noise}, "
+        f"at most {factor * first.largest_own:.3g} {unit} in {first.largest_channel}"
+    )
+
+
+def _link(one: Parted, measured: Samples) -> LinkRecord:
+    t_s = measured.column("t_s")
+    return LinkRecord(
+        one.link,
+        one.unit,
+        one.rows,
+        one.rms_raw,
+        one.rms_own,
+        one.largest_own,
+        one.largest_channel,
+        float(t_s[one.largest_row]),
+        one.noise,
+        one.noise_from,
+        one.p,
+        one.parts,
+        None if one.first_row is None else float(t_s[one.first_row]),
+        one.offset,
+        one.scatter,
+    )
+
+
+def _streams(pairs: tuple[StreamPair, ...]) -> tuple[StreamRecord, ...]:
+    late = late_against_joints(pairs)
+    return tuple(
+        StreamRecord(
+            one.stream,
+            one.unit,
+            one.clock.status.value,
+            one.clock.offset_s,
+            one.clock.offset_sigma_s,
+            one.clock.drift,
+            one.clock.drift_sigma,
+            one.clock.middle_s,
+            one.samples,
+            one.level,
+            one.rms,
+            one.noise,
+            one.largest,
+            one.largest_s,
+            one.parts,
+            *late.get(one.stream, (None, None)),
+        )
+        for one in pairs
+    )
+
+
+def _diagnosis(
+    measured: Recording,
+    simulated: Recording,
+    pair: tuple[Samples, Samples],
+    links: tuple[Difference, ...],
+    told: tuple[Parted, ...],
+    notes: list[str],
+) -> DiagnosisFile | None:
+    """Of readings that the simulation would give if it were the model, plus what the measured ones differ by."""
+    if not any(one.link in READING and one.largest_own > ROUNDING for one in told):
+        return None
+    if len(pair[0]) < FEWEST:
+        notes.append(f"{len(pair[0])} samples are too few to seek physics in; {FEWEST} are needed")
+        return None
+    rig, samples = simulated.rig, difference_samples(simulated.rig, pair, links)
+    source = replace(simulated, path=measured.path, rig=rig, samples=samples, streams={}, events=())
+    try:
+        return diagnose_recording(source)[1]
+    except (DataError, np.linalg.LinAlgError) as why:
+        notes.append(f"no physics was sought: {why}")
+        return None

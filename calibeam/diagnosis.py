@@ -1,0 +1,71 @@
+"""From a recording to diagnosis.json: where it parts from what the model predicts, and why."""
+
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.recording.pose_plan import write_pose_plan
+from acquisition.recording.recording import Recording
+from acquisition.recording.rig import rig_sha256
+from calibrate.diagnose.contests import separating
+from calibrate.diagnose.file import write_diagnosis
+from calibrate.diagnose.from_recording import Diagnosed, diagnose_samples
+from calibrate.diagnose.plan_of import plan_of
+from calibrate.diagnose.schema import DiagnosisFile
+from calibrate.diagnose.streams.from_recording import streams_of
+from calibrate.diagnose.streams.to_file import with_streams
+from calibrate.diagnose.to_file import file_of
+from calibrate.errors import DataError
+from calibrate.model_file import ModelFile, corrections
+
+SEED = 1  # of nulls, splits and bootstraps: the same recording always gives the same diagnosis
+
+
+def diagnose_recording(recording: Recording, model: ModelFile | None = None) -> tuple[Diagnosed, DiagnosisFile]:
+    """Both as records and as the file says it; `model` is where the comparison starts.
+
+    DataError where the recording holds too little, or the model is of another rig.
+    """
+    if model is not None and model.rig.sha256 != rig_sha256(recording.rig_text):
+        raise DataError(
+            f"the model is of rig '{model.rig.name}', whose file is another than that of {recording.path.name}; "
+            "give the model that was identified with this rig, or none"
+        )
+    start = None if model is None else corrections(model)
+    found = diagnose_samples(recording.rig, recording.samples, np.random.default_rng(SEED), start)
+    fitted = None if found.physics is None else found.physics.model
+    return found, with_streams(file_of(found, recording), streams_of(recording, fitted))
+
+
+def plan_next(found: Diagnosed, path: Path) -> str:
+    """The poses that separate the rivals of a diagnosis as a plan at `path`; a sentence about it, or why there is none.
+
+    OSError where it cannot be written.
+    """
+    if found.physics is None:
+        return "no plan: the file is to be put right first"
+    physics = found.physics
+    chosen = separating(physics.diagnosis, np.random.default_rng(SEED))
+    if chosen is None:
+        return "no plan: no finding has a rival that more poses could tell from it"
+    plan = plan_of(chosen, physics.model)
+    write_pose_plan(path, plan)
+    return (
+        f"{plan.poses} poses that tell the rivals apart: {path} (margin to expect: {chosen.before:.0f} BIC before, "
+        f"{chosen.after:.0f} with them)"
+    )
+
+
+def refuse_wrong_file(found: Diagnosed, path: Path) -> None:
+    """DataError where the whole file is wrong, after that has been written to `path`."""
+    if found.physics is None:
+        said = "; besides, ".join(blunder.says for blunder in found.blunders)
+        raise DataError(f"{said} (also in {path}); no physics is sought before that is put right")
+
+
+def diagnosed_to(recording: Recording, model: ModelFile | None, path: Path) -> DiagnosisFile:
+    """diagnosis.json at `path`. DataError as above; OSError where it cannot be written."""
+    found, file = diagnose_recording(recording, model)
+    write_diagnosis(path, file)
+    refuse_wrong_file(found, path)
+    return file

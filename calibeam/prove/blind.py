@@ -1,0 +1,77 @@
+"""The diagnosing process: `python -m calibeam.prove.blind [PHYSICS ...]`. It gets recordings, and nothing else.
+
+One line of JSON in for each case, one out when its answer is written. It refuses to import the simulators, so that
+nothing can be drawn anew; the truth is under a key that another process holds.
+"""
+
+import json
+import sys
+import time
+from collections.abc import Sequence
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+from types import ModuleType
+
+FORBIDDEN = "simulators"
+
+
+class NoSimulators:
+    """Import hook: a diagnosis that could draw the world anew would prove nothing."""
+
+    def find_spec(
+        self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """ImportError for the simulators, nothing for all else."""
+        if name.split(".")[0] == FORBIDDEN:
+            raise ImportError(f"{name}: the diagnosing process of a proof may not import {FORBIDDEN}")
+        return None
+
+
+def answer(recording: Path, asked: Path, out: Path) -> None:
+    """Writes diagnosis.json and, where both models say it, unseen.npz with the tool at the poses asked."""
+    import numpy as np
+
+    from acquisition.recording.read import read
+    from calibeam.diagnosis import diagnose_recording
+    from calibeam.prove.unseen_file import write_unseen
+    from calibeam.prove.unseen_poses import tool_at
+    from calibrate.diagnose.file import write_diagnosis
+
+    found, file = diagnose_recording(read(recording))
+    out.mkdir(parents=True, exist_ok=True)
+    write_diagnosis(out / "diagnosis.json", file)
+    if found.physics is None or not asked.is_file():
+        return
+    table = np.loadtxt(asked, delimiter=",", skiprows=1)
+    q_rad, approach = np.hsplit(table, 2)
+    write_unseen(
+        out / "unseen.npz",
+        tool_at(found.physics.geometry, q_rad, approach),
+        tool_at(found.physics.model, q_rad, approach),
+    )
+
+
+def forget(physics: Sequence[str]) -> None:
+    """Take effects out of the catalogue: a check that what is not known is called unknown, and not another name."""
+    from calibrate.effects import catalogue
+
+    catalogue.EFFECTS = tuple(e for e in catalogue.EFFECTS if e.physics not in physics)
+
+
+def main(without: Sequence[str]) -> None:
+    """Until standard input ends. A case that fails says why, and the next one is taken."""
+    sys.meta_path.insert(0, NoSimulators())
+    if without:
+        forget(without)
+    for line in sys.stdin:
+        order = json.loads(line)
+        began_s, error = time.process_time(), ""
+        try:
+            answer(Path(order["recording"]), Path(order["asked"]), Path(order["out"]))
+        except Exception as reason:
+            error = f"{type(reason).__name__}: {reason}"
+        print(json.dumps({"cpu_s": time.process_time() - began_s, "error": error}), flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,96 @@
+"""Hands recordings to diagnosing processes that know nothing else: a bare environment, no key, no path to a seal."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from queue import SimpleQueue
+
+from calibeam.prove.layout import Layout
+
+KEPT = ("PATH", "HOME", "PYTHONPATH", "LANG", "SYSTEMROOT")  # of the environment; nothing in them is about a case
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+
+
+@dataclass(frozen=True)
+class Answered:
+    """How a diagnosis went; its content is in the answer's folder."""
+
+    name: str
+    cpu_s: float
+    error: str  # empty where it went well
+
+
+def bare_environment(environment: Mapping[str, str]) -> dict[str, str]:
+    """What a diagnosing process gets of it: enough to start Python, nothing that leads to a seal."""
+    return {name: environment[name] for name in KEPT if name in environment} | ONE_THREAD
+
+
+class Blind:
+    """One diagnosing process. Owner of the child; `close` ends it."""
+
+    def __init__(self, without: Sequence[str] = ()) -> None:
+        self._child = subprocess.Popen(  # noqa: S603 - our own interpreter; the names are checked against the catalogue
+            [sys.executable, "-m", "calibeam.prove.blind", *without],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env=bare_environment(os.environ),
+        )
+
+    def answer(self, layout: Layout, name: str) -> Answered:
+        """Waits for one diagnosis."""
+        order = {
+            "recording": str(layout.recording(name)),
+            "asked": str(layout.asked(name)),
+            "out": str(layout.answer(name)),
+        }
+        stdin, stdout = self._child.stdin, self._child.stdout
+        if stdin is None or stdout is None:
+            raise RuntimeError("the diagnosing process has no pipes")
+        stdin.write(json.dumps(order) + "\n")
+        stdin.flush()
+        line = stdout.readline()
+        if not line:
+            return Answered(name, 0.0, f"the diagnosing process ended with code {self._child.wait()}")
+        said = json.loads(line)
+        return Answered(name, said["cpu_s"], said["error"])
+
+    @property
+    def alive(self) -> bool:
+        return self._child.poll() is None
+
+    def close(self) -> None:
+        """Ends the process as soon as it has nothing to do."""
+        if self._child.stdin is not None:
+            self._child.stdin.close()
+        if self._child.stdout is not None:
+            self._child.stdout.close()
+        self._child.wait()
+
+
+def diagnose_cases(layout: Layout, names: Sequence[str], jobs: int, without: Sequence[str] = ()) -> Iterator[Answered]:
+    """In order of names; one process for each job, each taking a case at a time; `without` some physics, by name."""
+    idle: SimpleQueue[Blind] = SimpleQueue()
+    for _ in range(jobs):
+        idle.put(Blind(without))
+
+    def one(name: str) -> Answered:
+        blind = idle.get()
+        try:
+            if not blind.alive:
+                blind.close()
+                blind = Blind(without)
+            return blind.answer(layout, name)
+        finally:
+            idle.put(blind)
+
+    try:
+        with ThreadPoolExecutor(jobs) as pool:
+            yield from pool.map(one, names)
+    finally:
+        while not idle.empty():
+            idle.get().close()

@@ -1,0 +1,41 @@
+"""Shares with their doubt. Wilson, J. Am. Stat. Assoc. 22, 1927: keeps its level for shares near 0 and 1, and few."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+Z = 1.959964  # 95 %
+
+
+@dataclass(frozen=True)
+class Share:
+    """k of n."""
+
+    k: int
+    n: int
+
+    @property
+    def value(self) -> float:
+        return self.k / self.n if self.n else math.nan
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 %; (0, 1) of nothing."""
+        if not self.n:
+            return (0.0, 1.0)
+        p, n = self.value, self.n
+        middle = (p + Z**2 / (2 * n)) / (1 + Z**2 / n)
+        half = Z * math.sqrt(p * (1 - p) / n + Z**2 / (4 * n**2)) / (1 + Z**2 / n)
+        return (max(0.0, middle - half), min(1.0, middle + half))
+
+    def __str__(self) -> str:
+        if not self.n:
+            return "-"
+        low, high = self.interval
+        return f"{100 * self.value:.0f} % ({100 * low:.0f}-{100 * high:.0f}, n {self.n})"
+
+
+def share(hits: Iterable[bool]) -> Share:
+    """How many are true."""
+    counted = list(hits)
+    return Share(sum(counted), len(counted))

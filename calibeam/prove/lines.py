@@ -1,0 +1,92 @@
+"""The table of a proof in the terminal."""
+
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.table import Table
+
+from calibeam.prove.hidden_angle import HiddenAngle
+from calibeam.prove.real import RealScore
+from calibeam.prove.record import CaseScore, ProofFile
+from calibeam.prove.tally import Figure, Line, at_once, by, by_effect, by_enr, figures, rivals
+
+
+def print_proof(console: Console, proof: ProofFile) -> None:
+    """All sums; each case stands in the file and on the page."""
+    cases = proof.cases
+    console.print(_lines("one hidden effect, by effect over noise", by_enr(cases)))
+    console.print(_lines("effect over noise >= 0.6, by instrument", by(cases, lambda c: c.family)))
+    console.print(_lines("several at once", [at_once(cases, "three"), at_once(cases, "eighteen")]))
+    console.print(_lines("effect over noise >= 0.6, by mechanism", by_effect(cases)))
+    console.print(_figures(cases))
+    others = rivals(cases)
+    if others:
+        console.print(_shares(others))
+    for case in cases:
+        if case.error:
+            console.print(f"{case.name}: {case.error}", markup=False, highlight=False)
+
+
+def _lines(title: str, lines: Sequence[Line]) -> Table:
+    table = Table(title=title, title_justify="left")
+    for heading in ("", "located", "named", "among rivals", "others said, a case"):
+        table.add_column(heading)
+    for line in lines:
+        if line.located.n:
+            table.add_row(
+                line.label, str(line.located), str(line.named), str(line.among_rivals), f"{line.spurious:.2f}"
+            )
+    return table
+
+
+def _figures(cases: Sequence[CaseScore]) -> Table:
+    table = Table(title="doubt and proof", title_justify="left")
+    for heading in ("", "measured", "wanted"):
+        table.add_column(heading)
+    for figure in figures(cases):
+        table.add_row(figure.label, figure.said, figure.wanted)
+    return table
+
+
+def _shares(others: Sequence[Figure]) -> Table:
+    table = Table(title="share of the oracle's held-out gain (1: all, 0: none)", title_justify="left")
+    for heading in ("", "median, p10"):
+        table.add_column(heading)
+    for figure in others:
+        table.add_row(figure.label, figure.said)
+    return table
+
+
+def print_real(console: Console, sets: Sequence[RealScore]) -> None:
+    """What is found in real recordings, what remains, and what is inferred of hidden columns."""
+    table = Table(title="real recordings", title_justify="left")
+    for heading in ("set", "samples", "verdict", "geometry, held out", "with physics", "found"):
+        table.add_column(heading)
+    for one in sets:
+        file = one.diagnosis
+        if file is None:
+            table.add_row(one.name, str(one.samples), f"failed: {one.error}")
+            continue
+        found = ", ".join(f"{f.physics} at {f.where}" for f in file.findings)
+        before, after = _um(file.rms_before_m), _um(file.rms_after_m)
+        table.add_row(one.name, str(one.samples), file.verdict, before, after, found)
+    console.print(table)
+    for one in sets:
+        for a in one.angles:
+            console.print(f"{one.name}: {_angle(a)}", highlight=False)
+        for c in one.columns:
+            said = f"{one.name}: {c.column} hidden: {c.physics} at {c.where} over time, correlation {c.correlation:.2f}"
+            console.print(said, highlight=False)
+
+
+def _um(value: float | None) -> str:
+    return "-" if value is None else f"{1e6 * value:.3g} um"
+
+
+def _angle(hidden: HiddenAngle) -> str:
+    if hidden.rms_rad is None or hidden.expected_rad is None:
+        return f"joint {hidden.joint} hidden: the target sits on its axis and says nothing of it"
+    return (
+        f"joint {hidden.joint} hidden at {hidden.poses} poses: inferred to {1e6 * hidden.rms_rad:.0f} urad rms, "
+        f"expected {1e6 * hidden.expected_rad:.0f}; {hidden.unfelt} more poses do not feel it"
+    )

@@ -1,0 +1,94 @@
+"""The concealed proof: conceal, publish the hashes, diagnose blindly, open the seals, score."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from calibeam.prove.comparing import compared_cases
+from calibeam.prove.concealing import Concealed, conceal_cases, publish
+from calibeam.prove.diagnosing import Answered, diagnose_cases
+from calibeam.prove.layout import Layout
+from calibeam.prove.page import write_proof_page
+from calibeam.prove.record import SCHEMA, ProofFile
+from calibeam.prove.scenario import DEVELOPMENT, Mix
+from calibeam.prove.scoring import score
+from calibeam.prove.seal import opened
+from calibeam.prove.truth import Truth, truth_of
+from calibeam.software import SOFTWARE
+from calibrate.effects.catalogue import EFFECTS
+from calibrate.errors import DataError
+
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is proved, and how much of it."""
+
+    mix: Mix
+    seed: int
+    cases: int
+    jobs: int
+    without: tuple[str, ...] = ()  # physics that is taken out of the catalogue, to see what is said then
+    compare: int = 0  # cases for which the oracle and other methods are asked, too
+
+
+def prove(out: Path, plan: Plan, tell: Tell, command: str) -> ProofFile:
+    """Everything, and proof.json in `out`. DataError where `out` holds something already."""
+    _refuse_unlisted(plan.without)
+    layout, began_s = fresh(out), time.monotonic()
+    concealed: list[Concealed] = []
+    for one in conceal_cases(layout, plan.mix, plan.seed, plan.cases, plan.jobs):
+        concealed.append(one)
+        tell(f"concealed {len(concealed)} of {plan.cases}")
+    published = publish(layout, concealed)
+    tell(f"SHA-256 of {layout.hashes.name}, which seals all {plan.cases} cases: {published}")
+    answered: list[Answered] = []
+    for answer in diagnose_cases(layout, [c.scenario.name for c in concealed], plan.jobs, plan.without):
+        answered.append(answer)
+        tell(f"diagnosed {len(answered)} of {plan.cases}")
+    truths = [_opened(layout, c, plan.without) for c in concealed]
+    scored = [score(layout, c, a, t) for c, a, t in zip(concealed, answered, truths, strict=True)]
+    scored = compared_cases(layout, scored, truths, plan.compare, plan.jobs, tell)
+    proof = ProofFile(
+        SCHEMA,
+        SOFTWARE,
+        plan.seed,
+        plan.seed < DEVELOPMENT,
+        command,
+        published,
+        time.monotonic() - began_s,
+        tuple(scored),
+        plan.without,
+    )
+    layout.proof.write_bytes(msgspec.json.format(msgspec.json.encode(proof), indent=1) + b"\n")
+    write_proof_page(layout.page, proof)
+    return proof
+
+
+def _refuse_unlisted(without: Sequence[str]) -> None:
+    known = sorted({e.physics for e in EFFECTS})
+    for name in without:
+        if name not in known:
+            raise DataError(f"--without {name}: no physics of the catalogue; there are {', '.join(known)}")
+
+
+def fresh(out: Path) -> Layout:
+    """An empty folder. DataError where it holds something."""
+    if out.exists() and any(out.iterdir()):
+        raise DataError(f"{out}: the folder is not empty; a proof starts from nothing, give another --out")
+    out.mkdir(parents=True, exist_ok=True)
+    return Layout(out)
+
+
+def _opened(layout: Layout, concealed: Concealed, without: Sequence[str]) -> Truth:
+    """From now on the truth lies in clear beside the answer."""
+    name = concealed.scenario.name
+    content = opened(layout.seal(name).read_bytes(), concealed.key, concealed.sha256)
+    path = layout.revealed(name)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content)
+    return truth_of(content, without)

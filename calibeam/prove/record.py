@@ -1,0 +1,120 @@
+"""proof.json: what was concealed, what was said, and how the two compare. docs/proof.md explains every key."""
+
+from typing import Literal
+
+import msgspec
+
+SCHEMA = 1
+UNKNOWN = "unknown"
+DIAGNOSIS = "diagnosis"  # among the methods that are compared
+CONFIDENT = 0.9  # a name with less is a suspicion, and said as one
+
+
+class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Every part of the file."""
+
+
+class SizeScore(Record, frozen=True):
+    """A stated size against the true one."""
+
+    name: str
+    true: float
+    said: float
+    sigma: float
+
+    @property
+    def inside(self) -> bool:
+        return abs(self.said - self.true) <= 1.959964 * self.sigma
+
+
+class DefectScore(Record, frozen=True):
+    """One concealed mechanism and what became of it."""
+
+    mechanism: str
+    physics: str
+    port: str
+    depends_on: tuple[str, ...]
+    enr: float
+    located: bool
+    equivalent: str  # why another word for the place is as good; mostly empty
+    named: bool  # place and physics, as first choice
+    driver: bool  # and what it depends on
+    among_rivals: bool  # named, or among what was said to be as good
+    unknown_there: bool  # said at its place: a cause without a name
+    sizes: tuple[SizeScore, ...] = ()
+
+
+class Said(Record, frozen=True):
+    """One finding, in short."""
+
+    where: str
+    depends_on: str
+    physics: str
+    confidence: float
+    says: str
+    placed: bool  # something was hidden there
+    right: bool  # this physics, there
+
+
+class BaselineScore(Record, frozen=True):
+    """Another method on the same unseen samples; 1: all that the oracle removes, 0: none."""
+
+    method: str
+    rms_m: float | None
+    gain: float | None
+    says: str  # what it answers to "where and why"
+
+
+class CaseScore(Record, frozen=True):
+    """One case of the proof."""
+
+    name: str
+    sha256: str
+    kind: str
+    family: str
+    places: int
+    samples: int
+    noise: str
+    seed: int
+    enr_wanted: float
+    attempts: int
+    withheld: tuple[str, ...]
+    verdict: str  # "failed" where the diagnosis did not end
+    defects: tuple[DefectScore, ...]
+    said: tuple[Said, ...]
+    unexplained: bool
+    asks_for: bool  # withheld: what is missing is named, or the cause is found without it
+    held_out_before_m: float | None
+    held_out_after_m: float | None
+    floor_m: float | None  # rms of the noise that was really added; None: not in this unit
+    free_space_before_m: float | None
+    free_space_after_m: float | None
+    cpu_s: float
+    error: str = ""
+    oracle_before_m: float | None = None  # geometry alone on the samples that the oracle is judged by
+    oracle_m: float | None = None  # with the true terms; None: not compared
+    baselines: tuple[BaselineScore, ...] = ()
+
+    @property
+    def alarmed(self) -> bool:
+        return bool(self.said)
+
+    @property
+    def misnamed(self) -> bool:
+        """A name of physics, believed, for what was not hidden there."""
+        return any(s.physics != UNKNOWN and s.confidence >= CONFIDENT and not s.right for s in self.said)
+
+
+class ProofFile(Record, frozen=True):
+    """Content of proof.json."""
+
+    schema: Literal[1]
+    software: str
+    seed: int
+    development: bool  # the seed is one that development may have seen: no figure for the public
+    command: str
+    published: str  # SHA-256 of the list of hashes, told before anything was diagnosed
+    wall_s: float
+    cases: tuple[CaseScore, ...]
+    without: tuple[str, ...] = ()  # physics that was taken out of the catalogue: those cases count as unlisted ones
+    kind: Literal["calibeam-proof"] = "calibeam-proof"

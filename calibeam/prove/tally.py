@@ -1,0 +1,152 @@
+"""Sums of a proof: shares by kind of case, by effect over noise, by instrument, by effect."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from calibeam.prove.interval import Share, share
+from calibeam.prove.record import DIAGNOSIS, CaseScore, DefectScore
+
+BINS = (0.0, 0.15, 0.3, 0.6, 1.0, 2.0, 5.0, np.inf)  # effect over noise
+PLAIN = 0.6  # effect over noise from which a cause has to be found and named
+SINGLE = ("one", "disturbed")
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line of a table about hidden causes."""
+
+    label: str
+    located: Share
+    named: Share
+    among_rivals: Share
+    spurious: float  # findings beyond one for each hidden cause, a case
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One number of the proof and what it should be."""
+
+    label: str
+    said: str
+    wanted: str
+
+
+def by_enr(cases: Sequence[CaseScore]) -> list[Line]:
+    """Cases with one effect that a catalogue may list."""
+    ones = [c for c in cases if c.kind in SINGLE]
+    return [
+        _line(f"{low:g} - {high:g}" if high < np.inf else f"> {low:g}", [c for c in ones if low <= _enr(c) < high])
+        for low, high in pairwise(BINS)
+    ]
+
+
+def by(cases: Sequence[CaseScore], what: Callable[[CaseScore], str]) -> list[Line]:
+    """Plain single effects, grouped by a word about the case."""
+    ones = [c for c in cases if c.kind in SINGLE and _enr(c) >= PLAIN]
+    return [_line(word, [c for c in ones if what(c) == word]) for word in sorted({what(c) for c in ones})]
+
+
+def by_effect(cases: Sequence[CaseScore]) -> list[Line]:
+    """Plain effects, single or several at once, by mechanism."""
+    kept = [c for c in cases if c.kind in (*SINGLE, "three", "eighteen")]
+    words = sorted({d.mechanism for c in kept for d in c.defects})
+    out: list[Line] = []
+    for word in words:
+        hits = [d for c in kept for d in c.defects if d.mechanism == word and d.enr >= PLAIN]
+        if hits:
+            out.append(_of(word, hits, 0.0))
+    return out
+
+
+def at_once(cases: Sequence[CaseScore], kind: str) -> Line:
+    """Several effects at once: each counts."""
+    return _line(kind, [c for c in cases if c.kind == kind])
+
+
+def figures(cases: Sequence[CaseScore]) -> list[Figure]:
+    """The rest of what was promised."""
+    null = [c for c in cases if c.kind == "none"]
+    outside = [c for c in cases if c.kind == "outside" and all(d.enr >= PLAIN for d in c.defects)]
+    withheld = [c for c in cases if c.kind == "withheld" and all(d.enr >= PLAIN for d in c.defects)]
+    faint = [c for c in cases if c.kind in SINGLE and 0.15 <= _enr(c) < 0.3 and c.said]
+    sizes = [s for c in cases for d in c.defects for s in d.sizes]
+    out = [
+        Figure(f"false alarms, {noise} noise", str(share(c.alarmed for c in null if c.noise == noise)), wanted)
+        for noise, wanted in (("white", "<= 6 %"), ("heavy", "<= 6 %"), ("wandering", "<= 8 %"))
+    ]
+    return [
+        *out,
+        Figure("faint (0.15 - 0.3): what is named is right", str(share(not c.misnamed for c in faint)), "all"),
+        Figure("outside: place right", str(share(c.defects[0].located for c in outside)), ">= 90 %"),
+        Figure("outside: said to be unknown", str(share(_said_unknown(c) for c in outside)), ">= 90 %"),
+        Figure("outside: misnamed with confidence", str(share(c.misnamed for c in outside)), "<= 5 %"),
+        Figure(
+            "withheld: says what is missing", str(share(c.asks_for and not c.misnamed for c in withheld)), ">= 95 %"
+        ),
+        Figure("withheld: said to be consistent", str(share(c.verdict == "consistent" for c in withheld)), "none"),
+        Figure("stated sizes within 1.96 sigma", str(share(s.inside for s in sizes)), "93 - 97 %"),
+        Figure("diagnoses that failed", str(share(c.verdict == "failed" for c in cases)), "none"),
+        *_ratios(cases),
+    ]
+
+
+def _ratios(cases: Sequence[CaseScore]) -> Iterable[Figure]:
+    floor = [c.held_out_after_m / c.floor_m for c in cases if c.held_out_after_m and c.floor_m and c.kind in SINGLE]
+    yield Figure("held-out / floor, median and p90", _percentiles(floor, 50, 90), "<= 1.05, 1.15")
+    gains = [g for c in cases if (g := oracle_share(c)) is not None]
+    yield Figure("held-out gain, share of the oracle's, median and p10", _percentiles(gains, 50, 10), ">= 0.97, 0.85")
+    free = [c for c in cases if c.free_space_before_m and c.free_space_after_m and c.kind in (*SINGLE, "three")]
+    found = [c for c in free if c.said]
+    ratio = [(c.free_space_after_m or 0.0) / (c.free_space_before_m or 1.0) for c in found]
+    yield Figure("free-space error, after / before, where something was found", _percentiles(ratio), "")
+    yield Figure("free-space error worse by more than a tenth", str(share(r > 1.1 for r in ratio)), "")
+    yield Figure("seconds a case (CPU), median and p90", _percentiles([c.cpu_s for c in cases]), "<= 5")
+
+
+def oracle_share(case: CaseScore) -> float | None:
+    """Share of the squared held-out error that knowing the truth removes and the diagnosis removed, too."""
+    return next((b.gain for b in case.baselines if b.method == DIAGNOSIS), None)
+
+
+def rivals(cases: Sequence[CaseScore]) -> list[Figure]:
+    """All methods on the same unseen samples of the same cases: share of the oracle's gain."""
+    compared = [c for c in cases if c.baselines]
+    names = dict.fromkeys(b.method for c in compared for b in c.baselines)
+    return [_gains(n, [b.gain for c in compared for b in c.baselines if b.method == n]) for n in names]
+
+
+def _gains(label: str, gains: Sequence[float | None]) -> Figure:
+    return Figure(label, _percentiles([g for g in gains if g is not None], 50, 10), "")
+
+
+def _said_unknown(case: CaseScore) -> bool:
+    return case.unexplained or all(d.unknown_there for d in case.defects)
+
+
+def _line(label: str, cases: Sequence[CaseScore]) -> Line:
+    spurious = [max(0, len(c.said) - sum(d.located for d in c.defects)) for c in cases]
+    return _of(label, [d for c in cases for d in c.defects], float(np.mean(spurious)) if spurious else 0.0)
+
+
+def _of(label: str, defects: Sequence[DefectScore], spurious: float) -> Line:
+    return Line(
+        label,
+        share(d.located for d in defects),
+        share(d.named for d in defects),
+        share(d.among_rivals for d in defects),
+        spurious,
+    )
+
+
+def _enr(case: CaseScore) -> float:
+    return case.defects[0].enr if case.defects else 0.0
+
+
+def _percentiles(values: Sequence[float], *which: float) -> str:
+    if not values:
+        return "-"
+    low, high = np.percentile(values, which or (50, 90))
+    return f"{low:.3g}, {high:.3g} (n {len(values)})"

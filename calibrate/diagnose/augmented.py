@@ -1,0 +1,257 @@
+"""Geometry and terms as one least-squares problem under given weights, for any solver of calibrate/solvers."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.diagnose.linearised import Accepted
+from calibrate.diagnose.ported import Look, flange_twists, joint_turns, look, perturbed_frames, through
+from calibrate.diagnose.session import Session
+from calibrate.effects.drivers import Drivers
+from calibrate.effects.ports import Perturbation, Place, Port
+from calibrate.joint_problem import JointProblem
+from calibrate.parameters import Parameter
+from calibrate.weighting import Measured
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+INNER_STEP = 1e-3  # of the range of an inner parameter, for its difference quotient
+LOOSE = 1e3  # times the size that would be plain to see: belief about a coefficient, so that none is ever singular
+
+
+@dataclass(frozen=True, eq=False)
+class Around:
+    """The session at one set of values."""
+
+    by: Perturbation
+    frames: Floats  # (sample, joint + 1, 4, 4)
+    looks: tuple[Look, ...]
+    expected: tuple[Floats, ...]  # (row, k) with reading terms
+
+
+@dataclass(frozen=True, eq=False)
+class Augmented:
+    """LeastSquares. Values are those of the geometry, then coefficients and smooth inner values of each term.
+
+    `drivers` stand still during a fit: they are refreshed between fits. Rows of each instrument are those of `rows`.
+    """
+
+    session: Session
+    terms: tuple[Accepted, ...]
+    drivers: Drivers | None  # needed where there are terms
+    rows: tuple[Ints, ...]  # of each instrument, the active ones
+    whiteners: tuple[Floats, ...]  # (active row, k, k) robust weights included
+    sizes: tuple[Floats, ...]  # of each term (coefficient,) that would be plain to see; inf where it does nothing
+    last: dict[bytes, Around] = field(default_factory=dict[bytes, Around])
+    slopes: dict[bytes, list[Floats]] = field(default_factory=dict[bytes, list[Floats]])
+
+    def under(self, whiteners: tuple[Floats, ...]) -> "Augmented":
+        """The same with other weights: what was computed last without weights is kept."""
+        return replace(self, whiteners=whiteners)
+
+    def refreshed(self, drivers: Drivers) -> "Augmented":
+        """The same with other drivers."""
+        return replace(self, drivers=drivers, last={}, slopes={})
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return self._parameters
+
+    @cached_property
+    def _parameters(self) -> tuple[Parameter, ...]:
+        out = list(self.session.parameters)
+        for i, accepted in enumerate(self.terms):
+            out += [
+                Parameter(f"term{i}.c{j}", "1", s, start=0.0, prior=LOOSE * s, free=bool(np.isfinite(s)))
+                if np.isfinite(s)
+                else Parameter(f"term{i}.c{j}", "1", 1.0, free=False)
+                for j, s in enumerate(self.sizes[i])
+            ]
+            for inner in accepted.term.inner:
+                if not inner.discrete:
+                    width = inner.upper - inner.lower
+                    out.append(
+                        Parameter(f"term{i}.{inner.name}", "1", 0.1 * width, lower=inner.lower, upper=inner.upper)
+                    )
+        return tuple(out)
+
+    @cached_property
+    def owner(self) -> Ints:
+        """(parameter,) index of the term that it belongs to, -1: geometry."""
+        out = [np.full(len(self.session.parameters), -1, dtype=np.intp)]
+        for i, accepted in enumerate(self.terms):
+            smooth = sum(not inner.discrete for inner in accepted.term.inner)
+            out.append(np.full(len(accepted.coefficients) + smooth, i, dtype=np.intp))
+        return np.concatenate(out)
+
+    @property
+    def start(self) -> Floats:
+        """(geometry unknown to this class: zeros,) then the values that the terms came with."""
+        parts = [np.zeros(len(self.session.parameters))]
+        for accepted in self.terms:
+            smooth = [not inner.discrete for inner in accepted.term.inner]
+            parts += [accepted.coefficients, accepted.inner[np.array(smooth, dtype=bool)]]
+        return np.concatenate(parts)
+
+    def split(self, values: Floats) -> tuple[Floats, tuple[Accepted, ...]]:
+        """Geometry (param,), and the terms with these values."""
+        n = len(self.session.parameters)
+        out: list[Accepted] = []
+        at = n
+        for accepted in self.terms:
+            m = len(accepted.coefficients)
+            coefficients, at = values[at : at + m], at + m
+            inner = accepted.inner.copy()
+            for j, spec in enumerate(accepted.term.inner):
+                if not spec.discrete:
+                    inner[j], at = values[at], at + 1
+            out.append(Accepted(accepted.term, coefficients, inner))
+        return values[:n], tuple(out)
+
+    def around(self, values: Floats) -> Around:
+        """Frames and readings at these values; kept, since residual and derivative are asked for in turn."""
+        key = values.tobytes()
+        if key not in self.last:
+            self.last.clear()
+            self.last[key] = self._around(values)
+        return self.last[key]
+
+    def residual(self, theta: Floats) -> Floats:
+        at, geometry = self.around(theta), theta[: len(self.session.parameters)]
+        parts = [
+            np.einsum("nij,nj->ni", W, at.expected[i][rows] - m.problem.observed[rows]).ravel()
+            for i, (m, rows, W) in enumerate(zip(self.session.measured, self.rows, self.whiteners, strict=True))
+        ]
+        joint, first = self.session.weighting.unweighted, len(self.session.measured)
+        parts += [
+            block.residual(joint.of_block(first + i, geometry)) for i, block in enumerate(self.session.weighting.known)
+        ]
+        return np.concatenate(parts)
+
+    def jacobian(self, theta: Floats) -> Floats:
+        parts = [
+            (W @ full[rows]).reshape(-1, full.shape[-1])
+            for full, rows, W in zip(self._slopes(theta), self.rows, self.whiteners, strict=True)
+        ]
+        joint, geometry = self.session.weighting.unweighted, theta[: len(self.session.parameters)]
+        extra = len(theta) - len(geometry)
+        for i, block in enumerate(self.session.weighting.known, start=len(self.session.measured)):
+            known = joint.spread(i, block.jacobian(joint.of_block(i, geometry)))
+            parts.append(np.concatenate([known, np.zeros((len(known), extra))], axis=1))
+        return np.concatenate(parts)
+
+    def _slopes(self, theta: Floats) -> list[Floats]:
+        """Of each instrument (row, k, value) without weights; kept, since weights change more often than values."""
+        key = theta.tobytes()
+        if key not in self.slopes:
+            self.slopes.clear()
+            at, (geometry, terms) = self.around(theta), self.split(theta)
+            moved = self.session.samples.joints() + at.by.joints_rad
+            arm = self.session.arm.twists(geometry[: len(self.session.arm.parameters)], moved)
+            joint = self.session.weighting.unweighted
+            added = [self._term_columns(accepted, at) for accepted in terms]
+            self.slopes[key] = [
+                np.concatenate([self._own_slope(joint, i, m, at, arm), *(columns[i] for columns in added)], axis=-1)
+                for i, m in enumerate(self.session.measured)
+            ]
+        return self.slopes[key]
+
+    @staticmethod
+    def _own_slope(joint: JointProblem, i: int, m: Measured, at: Around, arm: Floats) -> Floats:
+        return joint.spread(i, np.concatenate([through(at.looks[i], m, arm), at.looks[i].by_sensor], axis=-1))
+
+    def by_joint(self, at: Around, i: int) -> Floats:
+        """(row, k, readings) derivative of instrument i's readings by the joint readings of the row's poses."""
+        turns, m = joint_turns(at.frames), self.session.measured[i]
+        each = [by @ turns[rows] for by, rows in zip(at.looks[i].by_twists, m.sample_rows.T, strict=True)]
+        return np.concatenate(each, axis=-1)
+
+    def _around(self, values: Floats) -> Around:
+        geometry, terms = self.split(values)
+        q = self.session.samples.joints()
+        by = Perturbation.none(len(q), self.session.arm.n_joints)
+        for accepted in terms:
+            amount = accepted.term.amount(self._drivers, accepted.coefficients, accepted.inner)
+            by = by.plus(accepted.term.port, amount)
+        theta = geometry[: len(self.session.arm.parameters)]
+        frames = perturbed_frames(self.session.arm, theta, q, by)
+        joint = self.session.weighting.unweighted
+        looks = tuple(look(m, joint.of_block(i, geometry), frames) for i, m in enumerate(self.session.measured))
+        return Around(
+            by, frames, looks, tuple(map(self._read, self.session.measured, looks, [by.readings] * len(looks)))
+        )
+
+    @staticmethod
+    def _read(measured: Measured, seen: Look, readings: Mapping[str, Floats]) -> Floats:
+        if measured.name not in readings:
+            return seen.expected
+        return seen.expected + readings[measured.name][measured.sample_rows[:, -1]]
+
+    @property
+    def _drivers(self) -> Drivers:
+        if self.drivers is None:
+            raise ValueError("terms need drivers: give those of the last state")
+        return self.drivers
+
+    def _term_columns(self, accepted: Accepted, at: Around) -> list[Floats]:
+        """Of each instrument (row, k, coefficients and smooth inner values)."""
+        basis = accepted.term.basis(self._drivers, accepted.inner)
+        parts = [basis]
+        for j, spec in enumerate(accepted.term.inner):
+            if not spec.discrete:
+                parts.append(self._by_inner(accepted, j, INNER_STEP * (spec.upper - spec.lower))[..., None])
+        return self.columns(accepted.term.port, np.concatenate(parts, axis=-1), at)
+
+    def _by_inner(self, accepted: Accepted, j: int, step: float) -> Floats:
+        low, high = accepted.inner.copy(), accepted.inner.copy()
+        low[j], high[j] = low[j] - step / 2.0, high[j] + step / 2.0
+        amount = accepted.term.amount
+        return (
+            amount(self._drivers, accepted.coefficients, high) - amount(self._drivers, accepted.coefficients, low)
+        ) / step
+
+    def columns(self, port: Port, basis: Floats, at: Around) -> list[Floats]:
+        """Of each instrument (row, k, m) derivative of its readings by what a port adds (sample, width, m)."""
+        return columns_of(self.session, port, basis, at)
+
+
+def plain_sizes(
+    session: Session,
+    terms: Sequence[Accepted],
+    drivers: Drivers | None,
+    whiteners: Sequence[Floats],
+    rows: Sequence[Ints],
+) -> tuple[Floats, ...]:
+    """Of each term (coefficient,) size that would show as one sigma per observation; inf where it does nothing.
+
+    At the session's drawing: good enough for a size.
+    """
+    if not terms or drivers is None:
+        return ()
+    frames, joint = drivers.frames, session.weighting.unweighted
+    looks = tuple(look(m, joint.of_block(i, session.start), frames) for i, m in enumerate(session.measured))
+    at = Around(Perturbation.none(len(frames), session.arm.n_joints), frames, looks, ())
+    out: list[Floats] = []
+    for accepted in terms:
+        basis = accepted.term.basis(drivers, accepted.inner)
+        columns = columns_of(session, accepted.term.port, basis, at)
+        seen = [(W @ c[r]).reshape(-1, c.shape[-1]) for c, r, W in zip(columns, rows, whiteners, strict=True)]
+        felt = np.sqrt(np.mean(np.concatenate(seen) ** 2, axis=0))
+        with np.errstate(divide="ignore"):
+            out.append(np.where((felt > 0.0) & np.any(basis != 0.0, axis=(0, 1)), 1.0 / felt, np.inf))
+    return tuple(out)
+
+
+def columns_of(session: Session, port: Port, basis: Floats, at: Around) -> list[Floats]:
+    """Of each instrument (row, k, m) derivative of its readings by what a port adds (sample, width, m)."""
+    if port.place is not Place.READING:
+        twists = flange_twists(at.frames, port, basis)
+        return [through(seen, m, twists) for seen, m in zip(at.looks, session.measured, strict=True)]
+    return [
+        basis[m.sample_rows[:, -1]] if m.name == port.instrument else np.zeros((*seen.expected.shape, basis.shape[-1]))
+        for seen, m in zip(at.looks, session.measured, strict=True)
+    ]

@@ -1,0 +1,115 @@
+"""A state on the bench: what judging additions, removals and replacements needs, computed once and if asked for."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.diagnose.linearised import Accepted, State
+from calibrate.diagnose.score import Removed, Scores, orthonormal, removed, scores
+from calibrate.diagnose.visible import VISIBLE, Menu, Sight, beyond, menu_of, sight_of
+from calibrate.effects.term import Term
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """A state, seen by the search."""
+
+    state: State
+    given: Menu | None = None  # what is left of the menu where something was taken out of sight
+
+    @cached_property
+    def sight(self) -> Sight:
+        return sight_of(self.state.rows) if self.given is None else self.given.sight
+
+    @cached_property
+    def menu(self) -> Menu:
+        """Closed terms: those that name physics."""
+        if self.given is not None:
+            return self.given
+        return self.menu_of(tuple(term for term in self.state.candidates() if not term.open))
+
+    @cached_property
+    def open_menu(self) -> Menu:
+        """Open families of the catalogue: they compete, but name nothing."""
+        return self.menu_of(tuple(term for term in self.state.candidates() if term.open))
+
+    @cached_property
+    def scores(self) -> Scores:
+        return scores(self.menu)
+
+    @cached_property
+    def gone(self) -> tuple[Removed, ...]:
+        """Each accepted term taken out alone."""
+        return tuple(removed(self.state, self.sight, (i,)) for i in range(len(self.state.accepted)))
+
+    @cached_property
+    def rank(self) -> Ints:
+        """(term,) combinations of coefficients of each accepted term that the others leave visible."""
+        return np.array([self._rank(i) for i in range(len(self.state.accepted))], dtype=np.intp)
+
+    @cached_property
+    def share(self) -> Floats:
+        """(term,) of each accepted term's square behind geometry that the other terms cannot absorb."""
+        return np.array([self._share(i) for i in range(len(self.state.accepted))])
+
+    @cached_property
+    def bic(self) -> float:
+        """Of the whole model; terms only are paid for, geometry is the same in all."""
+        numbers = sum(len(a.inner) for a in self.state.accepted)
+        return self.state.minus_two_log_likelihood + (int(self.rank.sum()) + numbers) * float(np.log(self.sight.data))
+
+    @cached_property
+    def noise_rad(self) -> float:
+        """Turn of the joint that is felt most, which an average pose would show as one sigma."""
+        felt = [
+            float(np.linalg.norm(block.raw[0, 0] * block.size[0, 0]))
+            for block in self.menu.blocks
+            if block.size.size
+            and self.menu.terms[self.menu.entries[block.entries[0]].term].port.where.endswith(".angle")
+        ]
+        return float(np.sqrt(self.state.samples) / max(felt)) if felt and max(felt) > 0.0 else 0.0
+
+    def with_taken(self, proposed: Accepted) -> "Bench":
+        """As if a term had been fitted: the linear part of a refit."""
+        columns = self.state.columns(proposed.term, proposed.inner)
+        return Bench(self.state, beyond(self.menu, orthonormal(self.sight.complement(columns.T).T, VISIBLE)))
+
+    def menu_of(self, terms: tuple[Term, ...]) -> Menu:
+        return menu_of(self.state, terms, self.sight)
+
+    def contribution(self, accepted: Accepted) -> Floats:
+        """(row,) what a term adds to the expected rows."""
+        return self.state.columns(accepted.term, accepted.inner) @ accepted.coefficients
+
+    def _rank(self, i: int) -> int:
+        accepted = self.state.accepted[i]
+        columns = self.state.columns(accepted.term, accepted.inner)
+        size = np.linalg.norm(columns, axis=0)
+        left = self.gone[i].span.T @ (columns / np.where(size > 0.0, size, 1.0))
+        return int(np.sum(np.linalg.eigvalsh(left.T @ left) > VISIBLE))
+
+    def behind(self, accepted: Accepted) -> Floats:
+        """(row,) an accepted term's contribution that geometry cannot absorb."""
+        amount = self.contribution(accepted)
+        return amount - self._geometry @ (self._geometry.T @ amount)
+
+    @cached_property
+    def _geometry(self) -> Floats:
+        return sight_of_geometry(self, np.isin(self.state.rows.owner, range(len(self.state.accepted))))
+
+    def _share(self, i: int) -> float:
+        """Of the contribution itself: combinations that the data do not need do not count."""
+        behind = self.behind(self.state.accepted[i])
+        alone = self.gone[i].span.T @ self.contribution(self.state.accepted[i])
+        return float(alone @ alone / max(behind @ behind, 1e-300))
+
+
+def sight_of_geometry(bench: Bench, own: NDArray[np.bool_]) -> Floats:
+    """(row, rank) basis of geometry without any term."""
+    U, _ = np.linalg.qr(bench.state.rows.geometry[:, ~own])
+    return U

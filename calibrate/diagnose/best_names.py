@@ -1,0 +1,48 @@
+"""Each accepted term by the name that a full refit likes best; of names that the data cannot tell apart, that of
+the fewest drivers (numbers are paid for by BIC already).
+
+The search compares candidates by linear scores, which are off by some units of BIC where robust weights or inner values
+would settle elsewhere.
+"""
+
+from dataclasses import replace
+
+from calibrate.diagnose.bench import Bench
+from calibrate.diagnose.rivals import Rival, rivals_of
+from calibrate.diagnose.search import Search
+
+# Of BIC: no more than a bare mention. Source: Kass, Raftery, Bayes factors, J. Am. Stat. Assoc. 90(430), 1995, section
+# 3.2.
+TIED = 2.0
+ROUNDS = 6
+
+Rivals = tuple[tuple[Rival, ...], ...]
+
+
+def with_best_names(at: Search) -> tuple[Search, Rivals]:
+    """The search with names exchanged, and the rivals of each term in it."""
+    for _ in range(ROUNDS):
+        rivals = _rivals(at.bench)
+        changed = _exchanged(at, rivals)
+        if changed is None:
+            return at, rivals
+        at = changed
+    return at, _rivals(at.bench)
+
+
+def _rivals(bench: Bench) -> Rivals:
+    return tuple(() if a.term.open else rivals_of(bench, i) for i, a in enumerate(bench.state.accepted))
+
+
+def _exchanged(at: Search, rivals: Rivals) -> Search | None:
+    """With the first name exchanged that has a better one; None if there is none."""
+    for i, (own, mine) in enumerate(zip(at.state.accepted, rivals, strict=True)):
+        class_ = [(0.0, own), *((r.margin, r.accepted) for r in mine if r.refitted)]
+        least = min(margin for margin, _ in class_)
+        best = min((c for c in class_ if c[0] <= least + TIED), key=lambda c: (len(c[1].term.depends_on), c[0]))[1]
+        if best is own:
+            continue
+        bench = Bench(at.state.refitted([best if j == i else a for j, a in enumerate(at.state.accepted)]))
+        if bench.bic <= at.bench.bic + TIED:
+            return replace(at.at(bench), p=at.p | {best.term.key: at.p.get(own.term.key, 0.0)})
+    return None

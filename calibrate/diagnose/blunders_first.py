@@ -1,0 +1,155 @@
+"""Blunders before physics: what is wrong with the file, and which rows have no part in the diagnosis.
+
+Other than before an identification, what moved or drifted stays in: it is the very thing that is sought. Only where
+something stands farther off than any bump moves it (calibrate/effects/moved.py), rows are those of another session.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from acquisition.recording.columns import POSITION
+from acquisition.recording.rig_schema import Rig
+from acquisition.recording.samples import Samples
+from calibrate.arms.catalogue import arm_of
+from calibrate.blunders.bad_rows import bad_rows
+from calibrate.blunders.finding import Blunder, BlunderKind
+from calibrate.blunders.other_session import sessions_apart
+from calibrate.blunders.rough_fit import frame_between, rough_fit
+from calibrate.diagnose.session import Session, session_of
+from calibrate.diagnose.wild_rows import FEWEST_ROWS, alone, behind_gap, lasting
+from calibrate.effects.moved import LIMIT
+from calibrate.identification.clean import refuse_most, rows_of
+from calibrate.identification.identify import impossible_rows, wrong_file
+from calibrate.identification.rounds import distances, wary_fit
+from calibrate.identification.session import columns_of, shots_of
+from calibrate.parameters import start_values
+from calibrate.weighting import Measured
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+PASSES = 2  # a row can hide behind a worse one
+PLACES = ("placement", "seat")
+
+
+@dataclass(frozen=True)
+class Cleared:
+    """What may be diagnosed. `rows` (sample,) of the file; empty where the whole file is wrong."""
+
+    samples: Samples
+    rows: Ints
+    blunders: tuple[Blunder, ...]
+
+    @property
+    def whole_file(self) -> bool:
+        """Whether there is nothing to diagnose before the file is put right."""
+        return any(blunder.whole_file for blunder in self.blunders)
+
+
+def blunders_first(rig: Rig, samples: Samples) -> Cleared:
+    """DataError where the samples hold no observation, or where so many rows are bad that none can be trusted."""
+    if wrong := wrong_file(rig, samples):
+        return Cleared(samples, np.zeros(0, dtype=np.intp), wrong)
+    blunders = [*impossible_rows(rig, samples), *_joined(rig, samples)]
+    kept = _kept(samples, blunders)
+    for _ in range(PASSES):
+        found = [_counted(blunder, kept) for blunder in _wild(session_of(rig, samples.take(kept)))]
+        if not found:
+            break
+        blunders += found
+        kept = _kept(samples, blunders)
+    return Cleared(samples.take(kept), kept, tuple(blunders))
+
+
+def place_of(samples: Samples) -> Ints:
+    """(sample,) where fixture or probe stood; -1 where neither is recorded."""
+    for name in PLACES:
+        if name in samples:
+            return samples.integers(name, -1).astype(np.intp)
+    return np.full(len(samples), -1, dtype=np.intp)
+
+
+def _kept(samples: Samples, blunders: list[Blunder]) -> Ints:
+    refuse_most(tuple(blunders), len(samples)) if blunders else None
+    return np.setdiff1d(np.arange(len(samples)), rows_of(blunders))
+
+
+def _counted(blunder: Blunder, kept: Ints) -> Blunder:
+    """Rows of the file instead of rows of what was kept."""
+    return replace(blunder, rows=tuple(int(kept[row]) for row in blunder.rows))
+
+
+def _joined(rig: Rig, samples: Samples) -> list[Blunder]:
+    """Blocks of positions in a frame so far off that nothing was bumped: another session."""
+    if POSITION[0] not in samples:
+        return []
+    positions = np.stack([samples.column(c) for c in POSITION], axis=1)
+    rows = np.flatnonzero(np.isfinite(positions[:, 0]))
+    arm = arm_of(rig)
+    flange = arm.flange(start_values(arm.parameters), samples.joints()[rows])
+    point = None if rig.tool.point_m is None else np.array(rig.tool.point_m)
+    found = sessions_apart(flange, positions[rows], point, rows)
+    if not found:
+        return []
+    rough = rough_fit(flange, positions[rows], np.zeros(3) if point is None else point)
+    tips = flange[:, :3, :3] @ rough.point_m + flange[:, :3, 3]
+    expected = tips @ rough.linear.T + rough.shift_m
+    return [b for b in found if _elsewhere(expected, positions[rows], np.isin(rows, b.rows))]
+
+
+def _elsewhere(expected: Floats, observed: Floats, block: NDArray[np.bool_]) -> bool:
+    linear, shift_m = frame_between(expected[block], observed[block], np.ones(int(block.sum())))
+    middle = expected[block].mean(axis=0)
+    moved_m = float(np.linalg.norm(linear @ middle + shift_m - middle))
+    return max(moved_m, float(Rotation.from_matrix(linear).magnitude())) > LIMIT
+
+
+def _wild(session: Session) -> list[Blunder]:
+    """Single rows, and blocks farther off than a bump; rows count in the session's samples."""
+    theta = wary_fit(session.weighting, session.start)
+    problem = session.weighting.problem(theta)
+    place = place_of(session.samples)
+    out: list[Blunder] = []
+    every = zip(session.measured, distances(problem, theta), strict=False)  # known lengths come last and are no rows
+    for index, (measured, distance) in enumerate(every):
+        if measured.problem.rows < FEWEST_ROWS:
+            continue
+        k = measured.problem.observed.shape[1]
+        own = problem.of_block(index, theta)
+        here = place[measured.sample_rows[:, -1]]
+        single = alone(distance, k, here)
+        away_m = np.linalg.norm(measured.problem.misfit(own)[:, :3], axis=1)
+        shots = shots_of(measured, own)
+        if shots is None:
+            out += [_pair(measured, int(i), float(away_m[i])) for i in single]
+            continue
+        out += bad_rows(shots, single)
+        out += _blocks(measured, behind_gap(distance, k), here, away_m, _limit_m(session, measured))
+    return out
+
+
+def _blocks(measured: Measured, apart: NDArray[np.bool_], place: Ints, away_m: Floats, limit_m: float) -> list[Blunder]:
+    """Rows that follow one another, all farther off than a bump moves anything."""
+    block = np.flatnonzero(apart & lasting(apart, place))
+    if len(block) == 0 or float(np.median(away_m[block])) < limit_m:
+        return []
+    rows = tuple(sorted(int(r) for r in measured.sample_rows[block, -1]))
+    what = f"{1e3 * float(np.median(away_m[block])):.3g} mm from where all other rows have it"
+    remedy = "another session was joined here, or something was put elsewhere: diagnose them as a file of their own"
+    return [Blunder(BlunderKind.OTHER_SESSION, rows, ", ".join(columns_of(measured)), what, remedy)]
+
+
+def _limit_m(session: Session, measured: Measured) -> float:
+    """A spot that should lie beyond the face it was read on is none that a bump moved."""
+    fixture = session.rig.fixture
+    return LIMIT if measured.name != "dual-psd" or fixture is None else min(LIMIT, fixture.half_size_m)
+
+
+def _pair(measured: Measured, i: int, away_m: float) -> Blunder:
+    """Of a pair of rows nobody can say which one is wrong."""
+    rows = tuple(sorted(int(r) for r in measured.sample_rows[i]))
+    what = f"{measured.name} {1e3 * away_m:.3g} mm away from what all other rows say"
+    return Blunder(BlunderKind.BAD_SHOT, rows, ", ".join(columns_of(measured)), what, "take both again, or remove them")

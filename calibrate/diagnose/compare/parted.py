@@ -1,0 +1,156 @@
+"""Whether a link of the chain parts: its own difference against the noise that both sessions may have."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from acquisition.recording.columns import SPOTS
+from acquisition.recording.rig_schema import Rig
+from acquisition.recording.samples import Samples
+from calibrate.diagnose.compare.chain import READINGS, Difference, Pair, columns_of
+from calibrate.diagnose.compare.own_noise import chance_of_structure, scatter_of
+
+Floats = NDArray[np.float64]
+
+ALARM = 1e-3  # over all links
+FEWEST = 10  # of degrees of freedom of repeats
+SMALLEST = float(np.finfo(float).tiny)  # no probability is zero
+ROUNDING = 1e-9  # rad or m: below, two files of one number
+NUDGE_RAD = 1e-6  # of a joint, for its lever on the readings
+
+
+@dataclass(frozen=True)
+class Parted:
+    """One link, judged. `noise` is one sigma of a difference; None: nothing says what it may be."""
+
+    link: str
+    unit: str
+    rows: int
+    rms_raw: float
+    rms_own: float
+    largest_own: float
+    largest_row: int  # of the pair
+    largest_channel: str
+    noise: float | None
+    noise_from: str
+    p: float | None
+    parts: bool
+    first_row: int | None  # of the pair: from where it is beyond its noise
+    offset: tuple[float, ...]  # (channel,) mean of the own difference
+    scatter: float  # of the own difference from row to row: the noise that was found
+
+
+def judged(differences: tuple[Difference, ...], rig: Rig, pair: Pair) -> tuple[Parted, ...]:
+    """In the order of the chain."""
+    return tuple(_judged(one, rig, pair, len(differences)) for one in differences)
+
+
+def _judged(one: Difference, rig: Rig, pair: Pair, links: int) -> Parted:
+    own, good = one.own, np.isfinite(one.own)
+    sigma, where = _noise(one, rig, pair)
+    at_row, at_channel = np.unravel_index(int(np.nanargmax(np.abs(own))), own.shape)
+    largest = float(np.abs(own[at_row, at_channel]))
+    p, first = None, None
+    if sigma is None:
+        beyond = np.abs(own) > ROUNDING
+        parts = bool(np.any(beyond & good))
+    else:
+        p = min(1.0, links * float(chi2.sf(float(np.nansum((own / sigma) ** 2)), int(good.sum()))))
+        p = min(p, links * _in_means(own, sigma, good))
+        p = max(min(p, links * chance_of_structure(own)), SMALLEST)
+        parts = p < ALARM and largest > ROUNDING
+        beyond = np.abs(own) > 4.0 * sigma
+    if parts:
+        rows = np.flatnonzero(np.any(beyond & good, axis=1))
+        first = int(rows[0]) if len(rows) else int(np.flatnonzero(good.any(axis=1))[0])
+    return Parted(
+        one.link,
+        one.unit,
+        int(good.any(axis=1).sum()),
+        float(np.sqrt(np.nanmean(one.raw**2))),
+        float(np.sqrt(np.nanmean(own**2))),
+        largest,
+        int(at_row),
+        one.names[int(at_channel)],
+        None if sigma is None else float(np.median(sigma[good])),
+        where,
+        p,
+        parts,
+        first,
+        tuple(float(v) for v in np.nanmean(own, axis=0)),
+        float(np.nan_to_num(np.nanmedian(scatter_of(own)))),
+    )
+
+
+def _in_means(own: Floats, sigma: Floats, good: NDArray[np.bool_]) -> float:
+    """Chance of the channels' means: a small shift of all rows that no single row shows."""
+    count = good.sum(axis=0)
+    seen = count > 0
+    mean = np.nansum(own, axis=0)[seen] / count[seen]
+    of_mean = np.sqrt(np.nansum(np.where(good, sigma, 0.0) ** 2, axis=0)[seen]) / count[seen]
+    return float(chi2.sf(float(np.sum((mean / of_mean) ** 2)), int(seen.sum())))
+
+
+def _noise(one: Difference, rig: Rig, pair: Pair) -> tuple[Floats | None, str]:
+    """(row, channel) sigma of a difference, and where it is from."""
+    repeats = _from_repeats(one, pair)
+    if repeats is not None:
+        return np.broadcast_to(repeats, one.own.shape), "repeated poses"
+    joint = _joint_noise(rig, pair[0].n_joints)
+    if one.unit == "rad":
+        if one.link == "command":
+            return None, "a set-point has none"
+        return np.broadcast_to(np.sqrt(2.0) * joint, one.own.shape), "believed, and one count of the encoders"
+    believed = {"spots": rig.noise.psd_m, "position": rig.noise.position_m, "wire": rig.noise.wire_m}.get(one.link)
+    if believed is None and one.link == "spots":
+        stated = _stated(pair)
+        if stated is not None:
+            return stated, "scatter within the samples"
+    if believed is None:
+        return None, "unknown"
+    return np.sqrt(2.0) * np.hypot(believed, _through_joints(one, rig, pair)), "believed, of reading and joints"
+
+
+def _through_joints(one: Difference, rig: Rig, pair: Pair) -> Floats:
+    """(row, channel) what the joints' believed noise does to a reading, by differences of the model."""
+    joint = _joint_noise(rig, pair[0].n_joints)
+    explained = {link: function for link, _, _, function in READINGS}[one.link]
+    total = np.zeros(one.own.shape)
+    for j, sigma in enumerate(joint):
+        name = f"q{j + 1}_rad"
+        nudged = columns_of(pair[1], {name: pair[1].column(name) + NUDGE_RAD})
+        total += (sigma * explained(rig, (nudged, pair[1])) / NUDGE_RAD) ** 2
+    return np.sqrt(np.nan_to_num(total))
+
+
+def _joint_noise(rig: Rig, joints: int) -> Floats:
+    counts = [joint.encoder_counts for joint in rig.arm.joints]
+    count = np.array([2.0 * np.pi / c / np.sqrt(12.0) if c else 1e-7 for c in counts[:joints]])
+    return np.hypot(count, rig.noise.joint_rad or 0.0)
+
+
+def _stated(pair: Pair) -> Floats | None:
+    names = [name.removesuffix("_m") + "_sigma_m" for name in SPOTS]
+    if not all(name in samples for samples in pair for name in names):
+        return None
+    both = [np.stack([samples.column(name) for name in names], axis=1) for samples in pair]
+    sigma = np.hypot(*both)
+    return np.where(sigma > 0.0, sigma, np.nan)
+
+
+def _from_repeats(one: Difference, pair: Pair) -> Floats | None:
+    """(channel,) scatter of the own difference within groups of repeats; None for too few."""
+    group = _groups(pair[0])
+    squares, freedom = np.zeros(one.own.shape[1]), 0
+    for label in np.unique(group[group >= 0]):
+        rows = one.own[(group == label) & np.all(np.isfinite(one.own), axis=1)]
+        if len(rows) > 1:
+            squares += np.sum((rows - rows.mean(axis=0)) ** 2, axis=0)
+            freedom += len(rows) - 1
+    return np.sqrt(squares / freedom) if freedom >= FEWEST and np.all(squares > 0.0) else None
+
+
+def _groups(samples: Samples) -> NDArray[np.int64]:
+    return samples.integers("repeat", -1)

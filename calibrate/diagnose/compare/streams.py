@@ -1,0 +1,94 @@
+"""The streams of two recordings of one motion: each device's clock against its twin, and what is left then."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.diagnose.streams.clock import ClockFit, ClockStatus, clock_between
+from calibrate.diagnose.streams.recorded import Device
+from calibrate.diagnose.streams.track import Curve, Track, white_noise
+
+Floats = NDArray[np.float64]
+
+ORDER = ("command", "joints", "encoders", "spots")
+BEYOND = 5.0  # sigmas of a sample's noise, of the median of what differs: more than noise can do
+
+
+@dataclass(frozen=True)
+class StreamPair:
+    """One device in both; numbers None where the clocks could not be brought together."""
+
+    stream: str
+    unit: str
+    clock: ClockFit
+    samples: int
+    level: tuple[float, ...] | None  # (channel,) median of measured less simulated
+    rms: float | None  # about the level
+    noise: float | None  # of one difference, by both streams' own
+    largest: float | None
+    largest_s: float | None  # on the measured clock
+    parts: bool | None
+
+
+def stream_pairs(measured: Mapping[str, Device], simulated: Mapping[str, Device]) -> tuple[StreamPair, ...]:
+    """Of every device that both recordings have, in the order of the chain."""
+    return tuple(
+        _pair(name, measured[name], simulated[name]) for name in ORDER if name in measured and name in simulated
+    )
+
+
+def _pair(name: str, measured: Device, simulated: Device) -> StreamPair:
+    """Two sessions were not recorded by one host at one time, so its stamps say nothing: the motion itself does."""
+    one, two = measured.track.read(), simulated.track.read()
+    clock = clock_between(two, one) if one.channels == two.channels else ClockFit(ClockStatus.UNRELATED)
+    if clock.offset_s is None:
+        return StreamPair(name, one.unit, clock, 0, None, None, None, None, None, None)
+    left = one.values - Curve(two).at(clock.to_reference(one.time_s))
+    good = np.all(np.isfinite(left), axis=1)
+    left, time_s = left[good], one.time_s[good]
+    noise = np.hypot(white_noise(one.values), white_noise(two.values))
+    level = np.median(left, axis=0)
+    about = left - level
+    row, channel = np.unravel_index(int(np.argmax(np.abs(about))), about.shape)
+    usual = np.median(np.abs(about), axis=0)
+    floor = np.maximum(noise, _resolution(one))
+    return StreamPair(
+        name,
+        one.unit,
+        clock,
+        len(left),
+        tuple(float(v) for v in level),
+        float(np.sqrt(np.mean(about**2))),
+        float(np.median(floor)),
+        float(np.abs(about[row, channel])),
+        float(time_s[row]),
+        bool(np.any(usual > BEYOND * floor) or np.any(np.abs(level) > BEYOND * floor)),
+    )
+
+
+def _resolution(track: Track) -> Floats:
+    """(channel,) one count of what is quantised; 1e-9 of the unit for exact numbers."""
+    steps = np.abs(np.diff(track.values, axis=0))
+    finest = np.array([np.min(c[c > 0.0], initial=np.inf) for c in steps.T])
+    return np.maximum(np.where(np.isfinite(finest), np.minimum(finest, 1e-4), 0.0), 1e-9)
+
+
+def late_against_joints(pairs: tuple[StreamPair, ...]) -> Mapping[str, tuple[float, float]]:
+    """Device -> (s, sigma) by which its readings come later after the motion of the joints than in the simulation.
+
+    Only where devices of one recording share a clock, or keep theirs apart alike, is that a cause of its own.
+    """
+    at = {pair.stream: pair.clock for pair in pairs if pair.clock.offset_s is not None}
+    joints = at.get("joints")
+    if joints is None or joints.offset_s is None:
+        return {}
+    out: dict[str, tuple[float, float]] = {}
+    for name, clock in at.items():
+        if name == "joints" or clock.offset_s is None:
+            continue
+        here = float(joints.to_reference(np.array([clock.middle_s]))[0]) - clock.middle_s
+        sigma = float(np.hypot(clock.offset_sigma_s or 0.0, joints.offset_sigma_s or 0.0))
+        out[name] = (here - clock.offset_s, sigma)
+    return out

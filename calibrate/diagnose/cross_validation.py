@@ -1,0 +1,42 @@
+"""Does each term predict rows that the fit has not seen: exact for the linearised model, without a refit.
+
+Errors of a fold that was left out are (I - H_ff)^-1 r_f. Source: Cook, Weisberg, Residuals and Influence in Regression,
+1982, section 2.2 (several rows deleted).
+"""
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from calibrate.diagnose.bench import Bench
+from calibrate.diagnose.folds import k_folds, units
+
+Floats = NDArray[np.float64]
+
+FOLDS = 10
+NU = 5.0  # of the law of noise, as in calibrate/diagnose/scatter.py
+
+
+def predicts(bench: Bench, rng: Generator) -> Floats:
+    """(term,) 2 ln L of unseen rows that each accepted term gains; below zero it only fitted noise."""
+    rows = bench.state.rows
+    data = np.flatnonzero(rows.data)
+    labels = units(bench.state.drivers)[rows.sample[data]]
+    folds = [data[f] for f in k_folds(labels, FOLDS, rng)]
+    whole = _loss(bench.sight.basis, bench.sight.residual, folds)
+    out: list[float] = []
+    for gone in bench.gone:
+        # The span of the model without a term: the complement of what only the term spans.
+        basis = bench.sight.basis - gone.span @ (gone.span.T @ bench.sight.basis)
+        out.append(_loss(basis, bench.sight.residual + gone.span @ gone.part, folds) - whole)
+    return np.array(out)
+
+
+def _loss(basis: Floats, residual: Floats, folds: list[NDArray[np.intp]]) -> float:
+    """-2 log L of Student's t law, rows apart. `basis` may be an orthonormal one less some directions."""
+    total = 0.0
+    for fold in folds:
+        Q = basis[fold]
+        error = np.linalg.solve((1.0 + 1e-9) * np.eye(len(fold)) - Q @ Q.T, residual[fold])
+        total += float(np.sum((NU + 1.0) * np.log1p(error**2 / NU)))
+    return total

@@ -1,0 +1,70 @@
+"""The whole diagnosis of one fitted session: search, unknowns, proof, doubt, what to do next."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from calibrate.diagnose.diagnosis import Diagnosis, Finding, Rejected
+from calibrate.diagnose.doubt import doubted
+from calibrate.diagnose.findings import named
+from calibrate.diagnose.linearised import State
+from calibrate.diagnose.noise_law import noise_law
+from calibrate.diagnose.proof import floors, proofs
+from calibrate.diagnose.search import Search
+from calibrate.effects.term import Missing
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+
+def diagnose(state: State, rng: Generator, missing: Sequence[Missing] = ()) -> Diagnosis:
+    """Of a state with geometry fitted and no terms; `missing`: what effects of the catalogue lack in this record."""
+    found = doubted(state, rng, missing)
+    at = found.at
+    samples = np.unique(at.state.rows.sample[at.state.rows.data])
+    law = noise_law(at.state.rows, at.bench.sight, at.state.drivers.t_s, rng)
+    return Diagnosis(
+        verdict=found.verdict,
+        findings=found.findings,
+        unexplained=found.unexplained,
+        proofs=proofs(state, at.state, samples, rng),
+        floors=floors(at.state, samples, at.state.rows.geometry.shape[1]),
+        lack_of_fit=found.misfit,
+        noise_wanders=law.wanders,
+        rejected=_rejected(at),
+        invisible=tuple(dict.fromkeys(named(term) for term in at.bench.menu.invisible)),
+        missing=tuple(missing),
+        next=(*_measure(found.findings), *found.next),
+        model=at.state,
+    )
+
+
+def _rejected(at: Search) -> tuple[Rejected, ...]:
+    """The best candidate of every physics that is not among the accepted."""
+    menu, gains = at.bench.menu, at.bench.scores.gain
+    taken = {a.term.physics for a in at.state.accepted}
+    best: dict[str, Rejected] = {}
+    for entry in np.argsort(-gains):
+        term = menu.terms[menu.entries[entry].term]
+        if term.physics in taken or term.physics in best:
+            continue
+        gain = float(gains[entry])
+        why = "these poses do not show it" if not np.isfinite(gain) else "explains too little for its parameters"
+        if gain > 0.0:
+            why = "not beyond what searching through noise finds"
+        best[term.physics] = Rejected(named(term), gain, why)
+    return tuple(best.values())
+
+
+def _measure(findings: Sequence[Finding]) -> tuple[str, ...]:
+    out: list[str] = []
+    for finding in findings:
+        if finding.rivals:
+            others = ", ".join(f"{r.name.physics} at {r.name.where}" for r in finding.rivals)
+            out.append(
+                f"{finding.name.physics} at {finding.name.where} could also be {others}: "
+                "measure poses that separate them (calibeam diagnose --plan-out)"
+            )
+    return tuple(out)

@@ -1,0 +1,110 @@
+"""The result of a diagnosis: frozen records with the words of docs/formats.md, nothing without its doubt."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.diagnose.lack_of_fit import LackOfFit
+from calibrate.diagnose.linearised import State
+from calibrate.diagnose.proof import Floor, HeldOut
+from calibrate.effects.term import Missing, Size
+
+Floats = NDArray[np.float64]
+
+UNKNOWN = "unknown"
+
+
+class Verdict(Enum):
+    """Words of docs/formats.md."""
+
+    MISMATCH = "mismatch"
+    CONSISTENT = "consistent"
+    UNDECIDABLE = "undecidable"
+
+
+@dataclass(frozen=True)
+class Named:
+    """Place, driver, form and physics of a cause."""
+
+    where: str
+    depends_on: tuple[str, ...]
+    shape: str
+    order: int | None
+    physics: str
+
+
+@dataclass(frozen=True)
+class RivalName:
+    """Another cause that the data cannot tell from the finding."""
+
+    name: Named
+    confidence: float
+    margin: float  # BIC by which the finding is better
+    refitted: bool  # margin from a full refit, or linearised
+
+
+@dataclass(frozen=True)
+class Pulled:
+    """Residual without the finding, divided by how the readings feel its port; the picture of a finding."""
+
+    driver: str
+    values: Floats  # (sample,)
+    residual: Floats  # (sample,) in the unit of the port; nan where nothing is felt
+    fitted: Floats  # (sample,)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One cause, its size and its doubt."""
+
+    name: Named
+    parameters: Mapping[str, Size]
+    share: float  # of the removable error variance
+    confidence: float
+    p: float  # family-wise, of nothing at all looking like this
+    gain: float  # of BIC when taken out and everything else refitted
+    predicts: float  # 2 ln L that it gains on rows held out
+    says: str
+    rivals: tuple[RivalName, ...]
+    pulled: Pulled | None
+
+
+@dataclass(frozen=True)
+class Rejected:
+    """A cause that was tested and is not there."""
+
+    name: Named
+    gain: float  # of BIC, best of its kind in the final model
+    why: str
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """Structure without a name."""
+
+    where: str
+    depends_on: tuple[str, ...]
+    share: float  # of the residual's variance
+    p: float
+    why: str
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Everything that may be said of a session."""
+
+    verdict: Verdict
+    findings: tuple[Finding, ...]
+    unexplained: tuple[Unexplained, ...]
+    proofs: tuple[HeldOut, ...]
+    floors: tuple[Floor, ...]
+    lack_of_fit: LackOfFit | None
+    noise_wanders: bool
+    rejected: tuple[Rejected, ...]
+    invisible: tuple[Named, ...]
+    missing: tuple[Missing, ...]
+    next: tuple[str, ...]
+    model: State  # geometry, and the terms behind the findings

@@ -1,0 +1,135 @@
+"""Drivers of a session: what the record holds beside the readings, and what the model predicts."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from acquisition.recording.columns import ORIENTATION, POSITION, SPOTS, joint_of, per_joint
+from acquisition.recording.samples import Samples
+from calibrate.chain import Chain
+from calibrate.diagnose.session import Session
+from calibrate.effects.drivers import Drivers, Readout
+from calibrate.sensors.dual_psd import DualPsd
+from calibrate.sensors.seat import Seat
+from calibrate.weighting import Measured
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+MOVED_RAD = 1e-4  # a joint that went less far has not moved: two readings of one standstill
+SMOOTHING = 0.01  # of the samples, at least 3: thermometers are noisy, what they measure is slow
+NAMED = {
+    *SPOTS,
+    *POSITION,
+    *ORIENTATION,
+    *("t_s", "placement", "first_psd", "psd1_sum_v", "psd2_sum_v", "wire_m", "seat", "bar", "bar_end", "repeat"),
+    *("payload_kg", "payload_com_x_m", "payload_com_y_m", "payload_com_z_m"),
+}
+
+
+def drivers_of(session: Session, frames: Floats, expected: Mapping[str, Floats], own: Mapping[str, Floats]) -> Drivers:
+    """At frames (sample, joint + 1, 4, 4) and expected readings (row, k) of each instrument, with the values of its own
+    parameters.
+    """
+    samples, n = session.samples, session.arm.n_joints
+    q = samples.joints()
+    moves = np.diff(q, axis=0, prepend=q[:1])
+    recorded = _per_joint(samples, "approach", "", n)
+    commanded = samples.commanded()
+    return Drivers(
+        rig=session.rig,
+        q_rad=q,
+        t_s=samples.column("t_s"),
+        frames=frames,
+        readouts={m.name: _readout(m, expected[m.name], own[m.name], frames) for m in session.measured},
+        approach=_last_direction(moves) if recorded is None else recorded,
+        approach_derived=recorded is None,
+        last_move_rad=moves,
+        qd_rad_s=_per_joint(samples, "qd", "_rad_s", n),
+        cmd_minus_q_rad=None if commanded is None else np.nan_to_num(commanded - q),
+        temperatures_degC=_temperatures(samples),
+        payload_kg=np.nan_to_num(samples.column("payload_kg")) if "payload_kg" in samples else None,
+        payload_com_m=_stacked(samples, ("payload_com_x_m", "payload_com_y_m", "payload_com_z_m")),
+        psd_sum_v=_stacked(samples, ("psd1_sum_v", "psd2_sum_v")),
+        extra=_extra(samples, n),
+        repeat=samples.integers("repeat", -1) if "repeat" in samples else None,
+    )
+
+
+def _readout(measured: Measured, expected: Floats, own: Floats, frames: Floats) -> Readout:
+    n, rows = len(frames), measured.sample_rows[:, -1]
+    predicted, seen = np.full((n, expected.shape[1]), np.nan), np.zeros(n, dtype=bool)
+    predicted[rows], seen[rows] = expected, True
+    chain = measured.problem.chain
+    sensor = chain.sensor if isinstance(chain, Chain) else None
+    if isinstance(sensor, DualPsd):
+        phi = own[len(chain.model.parameters) :]
+        incidence, first, place = np.full((n, 2), np.nan), np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+        hit = sensor.strike(phi, frames[rows, -1])
+        incidence[rows] = np.arccos(np.clip(np.abs(hit.facing), 0.0, 1.0))
+        first[rows], place[rows] = sensor.first_psd, sensor.placement
+        lean = np.zeros((n, 2, 2))
+        lean[rows] = sensor.leans(phi, frames[rows, -1])
+        return Readout(measured.name, predicted, seen, incidence, lean, first, place)
+    if isinstance(sensor, Seat):
+        place = np.zeros(n, dtype=np.int64)
+        place[rows] = sensor.seat
+        return Readout(measured.name, predicted, seen, place=place)
+    return Readout(measured.name, predicted, seen)
+
+
+def _per_joint(samples: Samples, stem: str, unit: str, n: int) -> Floats | None:
+    """(sample, joint); None where no joint has the column, zero for a joint that lacks it."""
+    names = per_joint(stem, unit, n)
+    if not any(name in samples for name in names):
+        return None
+    zero = np.zeros(len(samples))
+    return np.stack([np.nan_to_num(samples.column(c)) if c in samples else zero for c in names], axis=1)
+
+
+def _last_direction(moves: Floats) -> Floats:
+    """(sample, joint) sign of the last move that was one."""
+    out = np.where(np.abs(moves) > MOVED_RAD, np.sign(moves), 0.0)
+    for row in range(1, len(out)):
+        out[row] = np.where(out[row] == 0.0, out[row - 1], out[row])
+    return out
+
+
+def _temperatures(samples: Samples) -> dict[str, Floats]:
+    """Smoothed in the order of time."""
+    order = np.argsort(samples.column("t_s"), kind="stable")
+    width = max(3.0, SMOOTHING * len(samples))
+    out: dict[str, Floats] = {}
+    for name in samples.names:
+        if name.startswith("temp_") and name.endswith("_degC"):
+            values = _filled(samples.column(name))
+            smooth = np.empty_like(values)
+            smooth[order] = gaussian_filter1d(values[order], width, mode="nearest")
+            out[name.removeprefix("temp_").removesuffix("_degC")] = smooth
+    return out
+
+
+def _stacked(samples: Samples, names: tuple[str, ...]) -> Floats | None:
+    if not all(name in samples for name in names):
+        return None
+    return np.stack([_filled(samples.column(name)) for name in names], axis=1)
+
+
+def _extra(samples: Samples, n: int) -> dict[str, Floats]:
+    """Numeric columns that the format does not name and that vary."""
+    out: dict[str, Floats] = {}
+    for name in samples.names:
+        if name in NAMED or name.endswith("_sigma_m") or name.startswith("temp_") or joint_of(name) is not None:
+            continue
+        values = samples.column(name)
+        if np.isfinite(values).any() and np.ptp(values[np.isfinite(values)]) > 0.0:
+            out[name] = _filled(values)
+    return out
+
+
+def _filled(values: Floats) -> Floats:
+    """Empty cells take the middle of the others: they say nothing."""
+    good = np.isfinite(values)
+    return np.where(good, values, np.median(values[good]) if good.any() else 0.0)

@@ -1,0 +1,309 @@
+"""A session with geometry and terms fitted together: robust, with the noise that the residuals show.
+
+Weights and least squares take turns (calibrate/diagnose/scatter.py); drivers that the model predicts are refreshed in
+between. A new term is tried from unit weights, too: data of a moved seat look like outliers to the model before it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.diagnose.augmented import Around, Augmented, plain_sizes
+from calibrate.diagnose.driver_values import drivers_of
+from calibrate.diagnose.linearised import Accepted, Rows, Unseen
+from calibrate.diagnose.scatter import Scatter, likelihood_of, scatter_of
+from calibrate.diagnose.session import Session
+from calibrate.effects.catalogue import terms_of
+from calibrate.effects.drivers import Drivers
+from calibrate.effects.term import Term
+from calibrate.fit import FAR_START, NEAR_START, Fit, Loss, solve
+from calibrate.identification.session import believed_sigma
+from calibrate.parameters import Parameter, plausible_sizes, priors, start_values
+from calibrate.problem import whitener_of
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+TURNS = 12  # of weights and least squares; mismatch wants at least four
+FEWEST_TURNS = 4
+REFRESHED = 2  # turns after which drivers have settled: what a nanometre changes in them decides nothing
+STEPS = 6  # of a solver in the first turn
+FEW_STEPS = 2  # in each further turn: the next one goes on from there
+TOLERANCE = 1e-3  # of chi2 in a turn, 3 % of a sigma
+# Of the largest diagonal element. Next to nothing holds a term's coefficients where geometry can stand in for them: a
+# full step along such a direction leaves the range in which the model is linear.
+DAMPING = 1e-9
+WILD = 0.1  # weight of a row that may have bent the first, plain fit
+SETTLED = 0.1  # of -2 log L: far below any difference that decides
+MOST_FITTED = 0.2  # of the rows that are left over, at least, when noise is judged
+PLACES = ("placement", "seat", "point")  # parameters of where something stood; a place may be met unseen
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """State of calibrate/diagnose/linearised.py."""
+
+    session: Session
+    active: Ints  # samples that the fit sees, sorted
+    problem: Augmented
+    values: Floats  # of the problem's parameters
+    scatters: tuple[Scatter, ...]  # of each instrument, over its active rows
+    covariance: Floats  # (value, value) posterior; zero for held ones
+
+    @cached_property
+    def _split(self) -> tuple[Floats, tuple[Accepted, ...]]:
+        return self.problem.split(self.values)
+
+    @property
+    def geometry(self) -> Floats:
+        """(param,) values of session.parameters."""
+        return self._split[0]
+
+    @property
+    def accepted(self) -> tuple[Accepted, ...]:
+        return self._split[1]
+
+    @property
+    def samples(self) -> int:
+        return len(self.active)
+
+    @cached_property
+    def around(self) -> Around:
+        """Frames and expected readings of all samples, active or not."""
+        return self.problem.around(self.values)
+
+    @property
+    def drivers(self) -> Drivers:
+        """As this state predicts them."""
+        return self._drivers
+
+    @cached_property
+    def _drivers(self) -> Drivers:
+        joint, session = self.session.weighting.unweighted, self.session
+        expected = {m.name: e for m, e in zip(session.measured, self.around.expected, strict=True)}
+        own = {m.name: joint.of_block(i, self.geometry) for i, m in enumerate(session.measured)}
+        return drivers_of(session, self.around.frames, expected, own)
+
+    @property
+    def rows(self) -> Rows:
+        return self._rows
+
+    @cached_property
+    def _rows(self) -> Rows:
+        parameters = self.problem.parameters
+        free = np.flatnonzero([p.free for p in parameters])
+        believed = free[np.isfinite(priors(parameters)[free])]
+        scale, sigma = plausible_sizes(parameters), priors(parameters)
+        known = sum(block.rows for block in self.session.weighting.known)
+        residual = np.concatenate(
+            [-self.problem.residual(self.values), -(self.values - start_values(parameters))[believed] / sigma[believed]]
+        )
+        beliefs = np.zeros((len(believed), len(free)))
+        beliefs[range(len(believed)), np.searchsorted(free, believed)] = scale[believed] / sigma[believed]
+        slope = self.problem.jacobian(self.values)[:, free] * scale[free]
+        none = np.full(known + len(believed), -1, dtype=np.intp)
+        labels = [np.concatenate([x, none]) for x in self._labels]
+        return Rows(residual, np.concatenate([slope, beliefs]), *labels, owner=self.problem.owner[free])
+
+    @cached_property
+    def _labels(self) -> tuple[Ints, Ints, Ints]:
+        """Of the data rows: sample, group, instrument."""
+        sample, group, instrument = [], [], []
+        seen = 0
+        for i, (m, rows) in enumerate(zip(self.session.measured, self.problem.rows, strict=True)):
+            k = m.problem.observed.shape[1]
+            sample.append(np.repeat(m.sample_rows[rows, -1], k))
+            group.append(np.repeat(np.arange(seen, seen + len(rows)), k))
+            instrument.append(np.full(len(rows) * k, i))
+            seen += len(rows)
+        return np.concatenate(sample), np.concatenate(group), np.concatenate(instrument)
+
+    @property
+    def minus_two_log_likelihood(self) -> float:
+        return self._minus_two_log_likelihood
+
+    @cached_property
+    def _minus_two_log_likelihood(self) -> float:
+        parameters = self.problem.parameters[: len(self.session.parameters)]
+        sigma = priors(parameters)
+        believed = np.isfinite(sigma) & np.array([p.free for p in parameters])
+        away = (self.geometry - start_values(parameters))[believed] / sigma[believed]
+        known = self.problem.residual(self.values)[len(self._labels[0]) :]
+        return sum(s.minus_two_log_likelihood for s in self.scatters) + float(away @ away + known @ known)
+
+    def columns(self, term: Term, inner: Floats) -> Floats:
+        parts = self.problem.columns(term.port, term.basis(self.drivers, inner), self.around)
+        data = [
+            (W @ c[rows]).reshape(-1, c.shape[-1])
+            for c, rows, W in zip(parts, self.problem.rows, self.problem.whiteners, strict=True)
+        ]
+        rest = len(self.rows.residual) - len(self._labels[0])
+        return np.concatenate([*data, np.zeros((rest, data[0].shape[1]))])
+
+    def candidates(self) -> Sequence[Term]:
+        return terms_of(self.drivers)
+
+    def refitted(self, accepted: Sequence[Accepted]) -> "Fitted":
+        kept = {a.term.key for a in self.accepted}
+        fits = [self._refitted(tuple(accepted), self.scatters)]
+        if any(a.term.key not in kept and _makes_outliers(a.term) for a in accepted):
+            fits.append(self._refitted(tuple(accepted), _trusting(self.scatters)))
+        return min(fits, key=lambda fit: fit.minus_two_log_likelihood)
+
+    def select(self, samples: Ints) -> "Fitted":
+        return _cut(self, np.sort(samples))
+
+    def held_out(self, samples: Ints) -> tuple[Unseen, ...]:
+        rows = _rows_of(self.session, np.sort(samples))
+        moved = self._places_found(rows)
+        at = self.problem.around(moved)
+        out: list[Unseen] = []
+        for i, (m, r) in enumerate(zip(self.session.measured, rows, strict=True)):
+            if len(r) == 0 or len(self.problem.rows[i]) == 0:  # without a row in the fit nobody knows its noise
+                continue
+            misfit = m.problem.observed[r] - at.expected[i][r]
+            W = whitener_of(_covariance_at(self.scatters[i], self.problem.rows[i], r))
+            out.append(Unseen(m.name, m.sample_rows[r, -1], misfit, np.einsum("nij,nj->ni", W, misfit)))
+        return tuple(out)
+
+    def _places_found(self, rows: tuple[Ints, ...]) -> Floats:
+        """Values in which a place that the fit has not met is found from these rows."""
+        parameters = self.problem.parameters
+        place = np.array([p.free and p.name.startswith(PLACES) for p in parameters])
+        met = np.any(self.problem.jacobian(self.values)[: len(self._labels[0])] != 0.0, axis=0)
+        unmet = place & ~met
+        if not unmet.any():
+            return self.values
+        whiteners = tuple(
+            whitener_of(_covariance_at(s, old, r))
+            for s, old, r in zip(self.scatters, self.problem.rows, rows, strict=True)
+        )
+        held = tuple(p if u else replace(p, free=False) for p, u in zip(parameters, unmet, strict=True))
+        there = _Held(replace(self.problem, rows=rows, whiteners=whiteners, last={}, slopes={}), held)
+        return solve(there, start=self.values, damping=NEAR_START).theta
+
+    def _refitted(self, accepted: tuple[Accepted, ...], scatters: tuple[Scatter, ...]) -> "Fitted":
+        drivers, whiteners, rows = self.drivers if accepted else None, _whiteners(scatters), self.problem.rows
+        sizes = plain_sizes(self.session, accepted, drivers, whiteners, rows)
+        problem = Augmented(self.session, accepted, drivers, rows, whiteners, sizes)
+        start = np.concatenate([self.geometry, problem.start[len(self.geometry) :]])
+        return _settled(_turn(problem, self.active, start, scatters))
+
+
+@dataclass(frozen=True, eq=False)
+class _Held:
+    """A problem with other beliefs."""
+
+    problem: Augmented
+    parameters: tuple[Parameter, ...]
+
+    def residual(self, theta: Floats) -> Floats:
+        return self.problem.residual(theta)
+
+    def jacobian(self, theta: Floats) -> Floats:
+        return self.problem.jacobian(theta)
+
+
+def fit_geometry(session: Session, active: Ints | None = None) -> Fitted:
+    """Geometry alone, from the closed-form start; `active` samples only, all if None."""
+    chosen = np.arange(len(session.samples)) if active is None else np.sort(active)
+    rows = _rows_of(session, chosen)
+    unit = tuple(
+        np.eye(m.problem.observed.shape[1]) / believed_sigma(m)[r].mean()
+        for m, r in zip(session.measured, rows, strict=True)
+    )
+    whiteners = tuple(np.broadcast_to(W, (len(r), *W.shape)) for W, r in zip(unit, rows, strict=True))
+    problem = Augmented(session, (), None, rows, whiteners, ())
+    fits: list[Fitted] = []
+    for loss in (Loss.SQUARE, Loss.HUBER):
+        rough = solve(problem, start=session.start, damping=FAR_START, loss=loss)
+        fits.append(_settled(_turn(problem, chosen, rough.theta, _scatters(problem, rough))))
+        if all(np.all(s.weights > WILD) for s in fits[0].scatters):
+            break
+    return min(fits, key=lambda fit: fit.minus_two_log_likelihood)
+
+
+def _makes_outliers(term: Term) -> bool:
+    """Whether data without the term may look like wild rows: few of them follow it."""
+    return term.slow or term.open
+
+
+def _settled(fitted: Fitted) -> Fitted:
+    """Weights and least squares in turns, until neither changes the likelihood."""
+    for turn in range(1, TURNS):
+        last, problem = fitted.minus_two_log_likelihood, fitted.problem
+        if fitted.accepted and turn <= REFRESHED:
+            problem = problem.refreshed(fitted.drivers)
+        fitted = _turn(problem, fitted.active, fitted.values, fitted.scatters, FEW_STEPS)
+        if turn + 1 >= FEWEST_TURNS and abs(last - fitted.minus_two_log_likelihood) < SETTLED:
+            break
+    return fitted
+
+
+def _turn(problem: Augmented, active: Ints, start: Floats, scatters: tuple[Scatter, ...], steps: int = STEPS) -> Fitted:
+    """Least squares under the noise so far, then the noise that is left."""
+    problem = problem.under(_whiteners(scatters))
+    fit = solve(problem, start=start, damping=DAMPING, max_steps=steps, tolerance=TOLERANCE)
+    return Fitted(problem.session, active, problem, fit.theta, _scatters(problem, fit), fit.covariance)
+
+
+def _scatters(problem: Augmented, fit: Fit) -> tuple[Scatter, ...]:
+    """Noise of every instrument at the values of a fit."""
+    at, larger = problem.around(fit.theta), _freedom(problem, fit)
+    out: list[Scatter] = []
+    for i, (m, rows) in enumerate(zip(problem.session.measured, problem.rows, strict=True)):
+        residual = m.problem.observed[rows] - at.expected[i][rows]
+        found = scatter_of(residual, problem.by_joint(at, i)[rows], believed_sigma(m)[rows])
+        out.append(replace(found, covariance=found.covariance * larger))
+    return tuple(out)
+
+
+def _freedom(problem: Augmented, fit: Fit) -> float:
+    """Rows over rows less what was fitted to them: residuals of a fit are smaller than the noise."""
+    rows = sum(
+        len(r) * m.problem.observed.shape[1] for m, r in zip(problem.session.measured, problem.rows, strict=True)
+    )
+    free = np.array([p.free for p in problem.parameters])
+    believed = np.diag(fit.covariance)[free] / priors(problem.parameters)[free] ** 2
+    fitted = float(np.sum(1.0 - np.clip(np.nan_to_num(believed), 0.0, 1.0)))
+    return rows / max(rows - fitted, MOST_FITTED * rows)
+
+
+def _cut(state: Fitted, active: Ints) -> Fitted:
+    rows = _rows_of(state.session, active)
+    scatters: list[Scatter] = []
+    for i, (m, r) in enumerate(zip(state.session.measured, rows, strict=True)):
+        covariance = _covariance_at(state.scatters[i], state.problem.rows[i], r)
+        value, weights = likelihood_of(m.problem.observed[r] - state.around.expected[i][r], covariance)
+        scatters.append(Scatter(covariance, weights, value, state.scatters[i].free))
+    problem = replace(
+        state.problem, rows=rows, whiteners=_whiteners(tuple(scatters)), last=dict(state.problem.last), slopes={}
+    )
+    return replace(state, active=active, problem=problem, scatters=tuple(scatters))
+
+
+def _rows_of(session: Session, active: Ints) -> tuple[Ints, ...]:
+    return tuple(np.flatnonzero(np.isin(m.sample_rows, active).all(axis=1)) for m in session.measured)
+
+
+def _whiteners(scatters: tuple[Scatter, ...]) -> tuple[Floats, ...]:
+    return tuple(whitener_of(s.covariance) * np.sqrt(s.weights)[:, None, None] for s in scatters)
+
+
+def _trusting(scatters: tuple[Scatter, ...]) -> tuple[Scatter, ...]:
+    return tuple(replace(s, weights=np.ones(len(s.weights))) for s in scatters)
+
+
+def _covariance_at(scatter: Scatter, known: Ints, rows: Ints) -> Floats:
+    """(row, k, k) noise at rows: as found where the fit has seen them, else the middle one of those it has."""
+    if len(scatter.covariance) == 0:  # nobody knows: as good as no weight
+        return np.broadcast_to(np.eye(scatter.covariance.shape[-1]), (len(rows), *scatter.covariance.shape[1:]))
+    # A whole one of them: medians of single entries together need be no covariance.
+    middle = np.argsort(np.trace(scatter.covariance, axis1=1, axis2=2))[len(scatter.covariance) // 2]
+    out = np.broadcast_to(scatter.covariance[middle], (len(rows), *scatter.covariance.shape[1:])).copy()
+    seen = np.isin(rows, known)
+    out[seen] = scatter.covariance[np.searchsorted(known, rows[seen])]
+    return out

@@ -1,0 +1,65 @@
+"""Which samples a proof leaves out: at random, each place in turn, the end of the session. Repeats stay together."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from calibrate.effects.drivers import Drivers
+
+Ints = NDArray[np.intp]
+
+SHARE = 0.2  # of the samples
+MOST = 3  # places that are left out in turn, the largest ones: each costs two refits
+FEWEST = 10  # samples of a place, and of anything that is left out
+
+
+@dataclass(frozen=True)
+class Split:
+    """Each fold is predicted from all samples that are not in it."""
+
+    name: str
+    unseen: tuple[Ints, ...]
+
+
+def splits_of(drivers: Drivers, samples: Ints, rng: Generator) -> tuple[Split, ...]:
+    """Those that a session allows."""
+    found = [Split("random", (samples[np.isin(units(drivers)[samples], _some(drivers, samples, rng))],))]
+    place = places(drivers)[samples]
+    folds = [samples[place == p] for p in np.unique(place[place >= 0])]
+    folds = sorted((fold for fold in folds if len(fold) >= FEWEST), key=len, reverse=True)[:MOST]
+    if len(folds) > 1:
+        found.append(Split("place", tuple(folds)))
+    order = samples[np.argsort(drivers.t_s[samples], kind="stable")]
+    found.append(Split("last block", (np.sort(order[len(order) - max(1, round(SHARE * len(order))) :]),)))
+    return tuple(split for split in found if all(FEWEST <= len(f) <= len(samples) - FEWEST for f in split.unseen))
+
+
+def units(drivers: Drivers) -> Ints:
+    """(sample,) samples of one repeated pose share a number."""
+    alone = np.arange(len(drivers.t_s))
+    if drivers.repeat is None:
+        return alone
+    return np.where(drivers.repeat >= 0, len(alone) + drivers.repeat, alone).astype(np.intp)
+
+
+def places(drivers: Drivers) -> Ints:
+    """(sample,) place of the fixture, or seat; -1 without any."""
+    out = np.full(len(drivers.t_s), -1, dtype=np.intp)
+    for offset, readout in enumerate(drivers.readouts.values()):
+        if readout.place is not None:
+            out = np.where(readout.seen, 1000 * offset + readout.place, out)
+    return out
+
+
+def k_folds(labels: Ints, k: int, rng: Generator) -> Sequence[Ints]:
+    """Indices of `labels` (row,) in k parts, equal labels together."""
+    names = rng.permutation(np.unique(labels))
+    return [np.flatnonzero(np.isin(labels, part)) for part in np.array_split(names, k)]
+
+
+def _some(drivers: Drivers, samples: Ints, rng: Generator) -> Ints:
+    names = rng.permutation(np.unique(units(drivers)[samples]))
+    return names[: max(1, round(SHARE * len(names)))]

@@ -1,0 +1,99 @@
+"""From the samples of a recording to a diagnosis, by whatever instruments they hold: blunders, fit, physics."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from acquisition.recording.rig_schema import Rig
+from acquisition.recording.samples import Samples
+from calibrate.blunders.finding import Blunder, BlunderKind
+from calibrate.diagnose.blunders_first import Cleared, blunders_first
+from calibrate.diagnose.diagnose import diagnose
+from calibrate.diagnose.diagnosis import Diagnosis
+from calibrate.diagnose.fitted import Fitted, fit_geometry
+from calibrate.diagnose.free_space_change import FreeSpaceChange, free_space_change
+from calibrate.diagnose.session import Session, session_of
+from calibrate.diagnose.wild_rows import unexplained_rows
+from calibrate.effects.catalogue import missing_of
+from calibrate.errors import DataError
+from calibrate.identification.session import columns_of
+from calibrate.weighting import Measured
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+FEWEST = 20  # samples: below, no term can be told from noise, whatever it is
+STANDING = ("device.", "tool.", "seat")  # corrections about frames that were found anew: not those of another fit
+
+
+@dataclass(frozen=True, eq=False)
+class Physics:
+    """A diagnosis with both fits behind it."""
+
+    diagnosis: Diagnosis
+    geometry: Fitted  # alone
+    model: Fitted  # with the terms of the findings
+    free_space: FreeSpaceChange | None
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosed:
+    """`physics` is None where the whole file is wrong: nothing was sought then."""
+
+    cleared: Cleared
+    blunders: tuple[Blunder, ...]  # of the file, and rows that no model explains
+    physics: Physics | None
+
+
+def diagnose_samples(rig: Rig, samples: Samples, rng: Generator, start: Mapping[str, float] | None = None) -> Diagnosed:
+    """`start`: corrections of an identified model, by name. DataError where there is too little to diagnose."""
+    cleared = blunders_first(rig, samples)
+    if cleared.whole_file:
+        return Diagnosed(cleared, cleared.blunders, None)
+    if len(cleared.rows) < FEWEST:
+        raise DataError(
+            f"{len(cleared.rows)} samples are left to diagnose, fewer than {FEWEST}: no cause can be told from noise; "
+            "measure more poses"
+        )
+    session = _started(session_of(rig, cleared.samples), start or {})
+    geometry = fit_geometry(session)
+    diagnosis = diagnose(geometry, rng, missing_of(geometry.drivers))
+    model = geometry if not diagnosis.findings else _fitted(diagnosis)
+    physics = Physics(diagnosis, geometry, model, free_space_change(geometry, model, rng))
+    return Diagnosed(cleared, cleared.blunders + _left(model, cleared), physics)
+
+
+def _fitted(diagnosis: Diagnosis) -> Fitted:
+    if not isinstance(diagnosis.model, Fitted):
+        raise TypeError(f"a diagnosis of {type(diagnosis.model).__name__}, which is no fit to a recording")
+    return diagnosis.model
+
+
+def _started(session: Session, start: Mapping[str, float]) -> Session:
+    values = session.start.copy()
+    for i, p in enumerate(session.parameters):
+        if p.free and p.name in start and not p.name.startswith(STANDING):
+            values[i] = start[p.name]
+    return replace(session, start=values)
+
+
+def _left(model: Fitted, cleared: Cleared) -> tuple[Blunder, ...]:
+    """Rows that stay far off after all physics: they had next to no weight."""
+    by_name = {m.name: m for m in model.session.measured}
+    out: list[Blunder] = []
+    for unseen in model.held_out(model.active):
+        for i in unexplained_rows(unseen.whitened):
+            away_m = float(np.linalg.norm(unseen.misfit[i, :3]))
+            sigmas = float(np.linalg.norm(unseen.whitened[i]))
+            out.append(_far(by_name[unseen.instrument], int(cleared.rows[unseen.sample[i]]), away_m, sigmas))
+    return tuple(out)
+
+
+def _far(measured: Measured, row: int, away_m: float, sigmas: float) -> Blunder:
+    what = f"{1e6 * away_m:.3g} um away from what all other rows say ({sigmas:.0f} sigma), also after all physics"
+    return Blunder(
+        BlunderKind.BAD_SHOT, (row,), ", ".join(columns_of(measured)), what, "measure it again, or remove it"
+    )

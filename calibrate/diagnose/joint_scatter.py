@@ -1,0 +1,127 @@
+"""Scatter that is innocent: an instrument's own, and the repeatability of the joints seen through the arm.
+
+Joints that come back to a pose by chance a little off scatter more where the arm's lever is long; no driver is missing
+for that (repeatability, ISO 9283, section 7.2). A clock that runs late scatters all joints likewise, but only where the
+arm moves: two kinds of samples, against one kind with heavy tails (Student's t law, Lange, Little, Taylor, J. Am. Stat.
+Assoc. 84(408), 1989; mixture of two, Dempster, Laird, Rubin, J. Royal Stat. Soc. B 39(1), 1977).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln, logsumexp
+
+from calibrate.diagnose.scatter import NU
+
+Floats = NDArray[np.float64]
+
+LOUDNESS = (
+    0.03,
+    0.1,
+    0.3,
+    1.0,
+    3.0,
+    10.0,
+    100.0,
+    1000.0,
+    1e4,
+)  # variance through the joints over that of the noise, mean trace
+SHARES = (0.15, 0.3, 0.5, 0.7, 0.85)  # of samples that scatter through the joints
+TURNS = 12
+BLOCK = 3  # channels of one unit: a position, a rotation; two detectors have one unit, too
+
+
+@dataclass(frozen=True, eq=False)
+class Innocent:
+    """The covariance of an instrument's observations without any driver."""
+
+    whitener: Floats  # (observation, k, k)
+    two_log_likelihood: float
+    through_joints: bool
+    restless: float  # 2 ln L by which some samples scatter through the joints and the others do not; 0 where none do
+
+
+def innocent(raw: Floats, joints: Floats) -> Innocent:
+    """Of residuals (observation, k) in the instrument's unit and how they follow each joint (joint, observation, k)."""
+    best: Innocent | None = None
+    for form in _forms(raw):
+        A: Floats = np.asarray(np.linalg.inv(np.linalg.cholesky(form)), dtype=np.float64)
+        y, felt = raw @ A.T, joints @ A.T
+        w, V = spectrum(felt)
+        turned = np.einsum("okm,ok->om", V, y) ** 2
+        for loud in (0.0, *LOUDNESS):
+            width = 1.0 + loud * w
+            scale = float(np.mean(turned / width))
+            value = 2.0 * len(raw) * _log_det(A) - float(np.sum(np.log(width))) - y.size * (np.log(scale) + 1.0)
+            if best is None or value > best.two_log_likelihood:
+                root = np.einsum("okm,om,ojm->okj", V, 1.0 / np.sqrt(width), V) @ A / np.sqrt(scale)
+                restless = _restless(turned, w) if loud > 0.0 else 0.0
+                best = Innocent(root, value, loud > 0.0, restless)
+    if best is None:
+        raise ValueError("no form of noise to choose from")
+    return best
+
+
+def spectrum(felt: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues (observation, k), mean trace k, and vectors of the scatter by levers (lever, observation, k)."""
+    form = np.einsum("lok,lom->okm", felt, felt)
+    size = float(np.mean(np.trace(form, axis1=1, axis2=2))) / felt.shape[2]
+    w, V = np.linalg.eigh(form / max(size, 1e-300))
+    return np.maximum(w, 0.0), V
+
+
+def _forms(raw: Floats) -> list[Floats]:
+    """Own noise as the residuals have it, and alike in all channels of one unit."""
+    found = raw.T @ raw / len(raw)
+    own, k = np.diag(found).copy(), raw.shape[1]
+    blocks = [slice(0, BLOCK), slice(BLOCK, k)] if k == 2 * BLOCK else [slice(0, k)]
+    for block in blocks:
+        own[block] = own[block].mean()
+    return [found + 1e-9 * np.diag(own), np.diag(own)]
+
+
+def _restless(turned: Floats, w: Floats) -> float:
+    """2 ln L of two kinds of samples over that of one kind, be it Gaussian or of heavy tails."""
+    one = max(max(_gaussian(turned, 1.0 + loud * w), _student(turned, 1.0 + loud * w)) for loud in LOUDNESS)
+    two = max(_mixed(turned, w, loud, share) for loud in LOUDNESS for share in SHARES)
+    return max(0.0, 2.0 * (two - one))
+
+
+def _gaussian(turned: Floats, width: Floats) -> float:
+    scale = float(np.mean(turned / width))
+    return float(np.sum(_log_normal(turned, scale * width)))
+
+
+def _student(turned: Floats, width: Floats) -> float:
+    k = turned.shape[1]
+    square, scale = np.sum(turned / width, axis=1), float(np.mean(turned / width))
+    for _ in range(TURNS):
+        scale = float(np.mean((NU + k) / (NU + square / scale) * square)) / k
+    constant = gammaln((NU + k) / 2.0) - gammaln(NU / 2.0) - 0.5 * k * np.log(NU * np.pi * scale)
+    each = constant - 0.5 * np.sum(np.log(width), axis=1) - 0.5 * (NU + k) * np.log1p(square / scale / NU)
+    return float(np.sum(each))
+
+
+def _mixed(turned: Floats, w: Floats, loud: float, share: float) -> float:
+    """Some samples as the instrument alone, `share` of them through the joints, too."""
+    scale = float(np.median(turned)) / 0.4549 if share < 0.5 else float(np.mean(turned / (1.0 + loud * w)))
+    widths = (np.ones_like(w), 1.0 + loud * w)
+    priors = np.log(np.array([1.0 - share, share]))
+    value = -np.inf
+    for _ in range(TURNS):
+        each = np.stack([_log_normal(turned, scale * width) for width in widths], axis=1) + priors
+        total = np.asarray(logsumexp(each, axis=1))
+        value = float(np.sum(total))
+        belongs = np.exp(each - total[:, None])
+        squares = np.stack([np.sum(turned / width, axis=1) for width in widths], axis=1)
+        scale = float(np.sum(belongs * squares)) / turned.size
+    return value
+
+
+def _log_normal(turned: Floats, variance: Floats) -> Floats:
+    return np.asarray(-0.5 * np.sum(np.log(2.0 * np.pi * variance) + turned / variance, axis=1))
+
+
+def _log_det(A: Floats) -> float:
+    return float(np.sum(np.log(np.diag(A))))

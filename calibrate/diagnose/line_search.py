@@ -1,0 +1,83 @@
+"""Inner parameters of one candidate to their best value, before anything is refitted.
+
+A grid step away from the truth turns rows into outliers and breeds followers.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from calibrate.diagnose.bench import Bench
+from calibrate.diagnose.linearised import Accepted
+from calibrate.diagnose.score import Removed
+from calibrate.diagnose.visible import VISIBLE
+from calibrate.effects.term import Inner, Term
+
+Floats = NDArray[np.float64]
+
+SWEEPS = 3  # over several inner parameters in turn
+FINE = 1e-3  # of the bracket
+
+
+def refined(bench: Bench, term: Term, inner: Floats, without: Removed | None = None) -> Accepted:
+    """The term with inner values that explain most, and the coefficients that belong to them."""
+    best = inner.copy()
+    for _ in range(SWEEPS if len(term.inner) > 1 else min(len(term.inner), 1)):
+        for j, spec in enumerate(term.inner):
+            best[j] = _best_of_one(_explains(bench, term, best, j, without), spec, best[j], bench)
+    return Accepted(term, solved(bench, term, best, without)[0], best)
+
+
+def solved(bench: Bench, term: Term, inner: Floats, without: Removed | None = None) -> tuple[Floats, float]:
+    """(coefficient,) with everything else refitted, and what they explain of the residual's square."""
+    columns = bench.state.columns(term, inner)
+    size = np.linalg.norm(columns, axis=0)
+    unit = (columns / np.where(size > 0.0, size, 1.0)).T
+    seen = bench.sight.complement(unit)
+    gram, along = seen @ seen.T, seen @ bench.sight.residual
+    if without is not None:
+        back = unit @ without.span
+        gram, along = gram + back @ back.T, along + back @ without.part
+    w, V = np.linalg.eigh(gram)
+    turned = np.where(w > VISIBLE, V.T @ along, 0.0)
+    found = V @ (turned / np.maximum(w, VISIBLE))
+    return found / np.where(size > 0.0, size, 1.0), float(np.sum(turned**2 / np.maximum(w, VISIBLE)))
+
+
+def _explains(bench: Bench, term: Term, inner: Floats, j: int, without: Removed | None) -> Callable[[float], float]:
+    def squares(value: float) -> float:
+        trial = inner.copy()
+        trial[j] = value
+        return solved(bench, term, trial, without)[1]
+
+    return squares
+
+
+def _best_of_one(squares: Callable[[float], float], spec: Inner, value: float, bench: Bench) -> float:
+    """Between the neighbours of a value on the grid."""
+    grid = np.array([spec.lower, *spec.grid, spec.upper])
+    below, above = grid[grid < value], grid[grid > value]
+    low, high = (float(below.max()) if len(below) else value), (float(above.min()) if len(above) else value)
+    if high <= low:
+        return value
+    if spec.discrete:
+        return _best_of(squares, [value, *_between_samples(bench, low, high)])
+
+    def left(x: float) -> float:
+        return -squares(x)
+
+    found = minimize_scalar(left, bounds=(low, high), method="bounded", options={"xatol": FINE * (high - low)})
+    return _best_of(squares, [value, float(found.x)])
+
+
+def _best_of(squares: Callable[[float], float], values: Sequence[float]) -> float:
+    return max(values, key=squares)
+
+
+def _between_samples(bench: Bench, low: float, high: float) -> list[float]:
+    """Times between neighbouring samples: all that a step can be told by."""
+    t = np.unique(bench.state.drivers.t_s)
+    middle = (t[1:] + t[:-1]) / 2.0
+    return [float(x) for x in middle[(middle > low) & (middle < high)]]

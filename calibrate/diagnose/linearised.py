@@ -1,0 +1,101 @@
+"""What the search sees: a session around one fitted state, whitened, as plain rows; and the seam to the fit itself.
+
+`State` is calibrate/diagnose/fitted.py on real sessions; tests may bring a linear one.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.effects.drivers import Drivers
+from calibrate.effects.term import Term
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """A term in the model, with its values."""
+
+    term: Term
+    coefficients: Floats  # (coefficient,)
+    inner: Floats  # (inner,)
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Whitened rows: first those of the data, then one for every prior. Unit noise where the model holds."""
+
+    residual: Floats  # (row,) observed minus expected, robust weights included
+    geometry: Floats  # (row, param) derivative of expected by everything already fitted, in plausible units
+    sample: Ints  # (row,) of the data rows: index of the sample, -1 of prior rows
+    group: Ints  # (row,) data rows of one observation (the k values read at one pose) share a number; -1 prior rows
+    instrument: Ints  # (row,) index of the instrument, -1 prior rows
+    owner: Ints  # (param,) of geometry: index in State.accepted whose value it is, -1: geometry proper
+
+    @property
+    def data(self) -> NDArray[np.bool_]:
+        return self.sample >= 0
+
+
+@dataclass(frozen=True)
+class Unseen:
+    """One instrument's observations that the fit has not seen."""
+
+    instrument: str
+    sample: Ints  # (observation,)
+    misfit: Floats  # (observation, k) observed minus expected, in the instrument's unit
+    whitened: Floats  # (observation, k) by the noise of the fit, without robust weights
+
+
+class State(Protocol):
+    """A session with geometry and terms fitted. Immutable: every verb gives another state."""
+
+    @property
+    def accepted(self) -> tuple[Accepted, ...]: ...
+
+    @property
+    def rows(self) -> Rows:
+        """Linearised at this state; `geometry` holds geometry and the coefficients and inner values of `accepted`."""
+        ...
+
+    @property
+    def minus_two_log_likelihood(self) -> float:
+        """Of the data under Student-t noise of the size that this state estimated, priors included; compares states
+        of one session through BIC.
+        """
+        ...
+
+    @property
+    def samples(self) -> int: ...
+
+    @property
+    def drivers(self) -> Drivers:
+        """Of all samples of the session, as this state predicts them."""
+        ...
+
+    def columns(self, term: Term, inner: Floats) -> Floats:
+        """(row, coefficient) whitened derivative of expected by a term's coefficients at zero; zero in prior rows."""
+        ...
+
+    def candidates(self) -> Sequence[Term]:
+        """All terms that the session allows, drivers refreshed from this state."""
+        ...
+
+    def refitted(self, accepted: Sequence[Accepted]) -> Self:
+        """Joint non-linear refit of geometry and these terms (values given are the start), noise and weights anew."""
+        ...
+
+    def select(self, samples: Ints) -> Self:
+        """The same model over some of the samples, not refitted."""
+        ...
+
+    def held_out(self, samples: Ints) -> tuple["Unseen", ...]:
+        """What this state, fitted on other samples, predicts of these. Where a place or seat occurs in these samples
+        only, its own frame or point is found from them first, everything else being held.
+        """
+        ...

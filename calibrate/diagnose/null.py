@@ -1,0 +1,101 @@
+"""How large the best gain of a whole catalogue gets when there is nothing: the price of searching.
+
+The maximum over all candidates is drawn, so the multiplicity of hundreds of correlated ones is paid (family-wise
+error). Source: Westfall, Young, Resampling-based multiple testing, 1993, ch. 2. Slow terms are a family of their own:
+where the noise wanders, theirs is the gain over a wander fitted to what remains, before and after.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from calibrate.diagnose.noise_law import NoiseLaw
+from calibrate.diagnose.score import Removed, bic_gain, directions, whitened
+from calibrate.diagnose.tail import Tail
+from calibrate.diagnose.visible import Menu, Sight
+from calibrate.effects.term import Term
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+DRAWS = 600
+FAMILIES = 2  # alpha is shared by fast and slow terms
+
+
+@dataclass(frozen=True)
+class Null:
+    """Law of the best gain of either family without any effect."""
+
+    fast: Tail
+    slow: Tail
+    law: NoiseLaw
+
+    def p(self, menu: Menu, entry: int, gain: float) -> float:
+        """Family-wise probability that nothing at all gives an entry that gains so much."""
+        if not is_slow(menu.terms[menu.entries[entry].term]):
+            return min(1.0, FAMILIES * self.fast.p(gain))
+        if self.law.wanders:
+            gain = _beyond_wander(self.law, menu.sight.residual, directions(menu, entry), menu, entry)
+        return min(1.0, FAMILIES * self.slow.p(gain))
+
+    def p_of_worth(self, slow: bool, sight: Sight, gone: Removed) -> float:
+        """The same of what a model holds already: what comes back when it is taken out.
+
+        Weights that a term has tuned make it look larger than it scored among draws: the law's curvature undoes that.
+        """
+        part = self.law.curvature * gone.part
+        if slow and self.law.wanders:
+            before = sight.residual + gone.span @ part
+            gain = self.law.gain(before, sight.residual) - gone.cost * float(np.log(sight.data))
+        else:
+            squares = float(part @ part)
+            gain = float(bic_gain(np.array(squares), sight.rss + squares, np.array(gone.cost), sight.data))
+        return min(1.0, FAMILIES * (self.slow if slow else self.fast).p(gain))
+
+
+def is_slow(term: Term) -> bool:
+    """A function of time, or of what changes with it."""
+    return term.slow or any(name == "t" or name.startswith("temp_") for name in term.depends_on)
+
+
+def null_of(menu: Menu, law: NoiseLaw, rng: Generator, draws: int = DRAWS) -> Null:
+    """Draws noise, lets geometry absorb its part and scores every entry of the menu."""
+    noise = law.draw(rng, draws)
+    left = noise - menu.sight.basis @ (menu.sight.basis.T @ noise)
+    gains = gains_of(menu, left)
+    slow = menu.of_terms(np.array([is_slow(term) for term in menu.terms], dtype=bool))
+    fast = np.max(gains[~slow], axis=0, initial=-np.inf)
+    return Null(Tail(fast), Tail(_slow_maxima(menu, law, left, gains, slow)), law)
+
+
+def gains_of(menu: Menu, left: Floats) -> Floats:
+    """(entry, draw) of residuals (row, draw) that geometry has left."""
+    rss, gains = np.sum(left**2, axis=0), np.full((len(menu.entries), left.shape[1]), -np.inf)
+    for block in menu.blocks:
+        W = whitened(block)
+        count, k, rows = W.shape
+        squares = np.sum((W.reshape(-1, rows) @ left).reshape(count, k, -1) ** 2, axis=1)
+        rank = np.sum(np.any(W != 0.0, axis=2), axis=1)
+        gain = bic_gain(squares, rss, (rank + menu.numbers[block.entries])[:, None], menu.sight.data)
+        gains[block.entries] = np.where(rank[:, None] > 0, gain, -np.inf)
+    return gains
+
+
+def _slow_maxima(menu: Menu, law: NoiseLaw, left: Floats, gains: Floats, slow: Bools) -> Floats:
+    if not slow.any():
+        return np.zeros(0)
+    if not law.wanders:
+        return np.max(gains[slow], axis=0)
+    best = np.flatnonzero(slow)[np.argmax(gains[slow], axis=0)]
+    spans = {int(entry): directions(menu, int(entry)) for entry in np.unique(best)}
+    return np.array(
+        [_beyond_wander(law, left[:, d], spans[int(entry)], menu, int(entry)) for d, entry in enumerate(best)]
+    )
+
+
+def _beyond_wander(law: NoiseLaw, left: Floats, span: Floats, menu: Menu, entry: int) -> float:
+    """BIC gain of an entry with directions (k, row) if noise wanders, whatever way fits best with it and without."""
+    after = left - span.T @ (span @ left)
+    return law.gain(left, after) - (len(span) + menu.numbers[entry]) * float(np.log(menu.sight.data))

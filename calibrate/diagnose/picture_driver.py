@@ -1,0 +1,53 @@
+"""The driver of a finding as numbers for the axis of its picture, also where it is computed and not recorded."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.diagnose.causes import causes_of
+from calibrate.effects.drivers import Drivers
+from calibrate.effects.gravity import overturning_nm, stated_torque_nm
+
+Floats = NDArray[np.float64]
+
+
+def picture_driver(drivers: Drivers, names: Sequence[str]) -> tuple[str, Floats]:
+    """(name, (pose,)) of the first driver that can be drawn; the order of the samples where none can."""
+    recorded = causes_of(drivers)
+    for name in names:
+        values = recorded.get(name)
+        values = _computed(drivers, name) if values is None else values
+        if values is not None and np.ptp(values[np.isfinite(values)]) > 0.0:
+            return name, values
+    return "sample", np.arange(1.0, len(drivers.t_s) + 1.0)
+
+
+def _computed(drivers: Drivers, name: str) -> Floats | None:
+    stem = name.rstrip("0123456789")
+    number = int(name[len(stem) :] or 0)
+    match stem:
+        case "gravity_torque":
+            return stated_torque_nm(drivers, number)
+        case "overturning_moment":
+            return np.linalg.norm(overturning_nm(drivers)[:, :2], axis=1)
+        case "approach":
+            return None if drivers.approach is None else drivers.approach[:, number - 1]
+        case "spot" | "incidence" | "reading" | "first_psd":
+            return _of_readout(drivers, stem, number)
+        case _:
+            return None
+
+
+def _of_readout(drivers: Drivers, stem: str, number: int) -> Floats | None:
+    """Of the first instrument that has it."""
+    for readout in drivers.readouts.values():
+        if stem == "spot" and readout.predicted.shape[1] == 4:
+            return np.hypot(*readout.predicted[:, 2 * number - 2 : 2 * number].T)
+        if stem == "incidence" and readout.incidence_rad is not None:
+            return readout.incidence_rad[:, number - 1]
+        if stem == "first_psd" and readout.first_psd is not None:
+            return readout.first_psd.astype(np.float64)
+        if stem == "reading":
+            return np.linalg.norm(readout.predicted, axis=1)
+    return None

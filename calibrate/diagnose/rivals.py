@@ -1,0 +1,79 @@
+"""Who else could it be: candidates that could stand in for a finding with everything else refitted.
+
+Weights within the class are those of BIC: Kass, Raftery, Bayes factors, J. Am. Stat. Assoc. 90(430), 1995, section 4.1.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.diagnose.bench import Bench
+from calibrate.diagnose.line_search import refined
+from calibrate.diagnose.linearised import Accepted
+from calibrate.diagnose.score import Removed, gain_of, scores
+from calibrate.diagnose.search import cause_of
+from calibrate.effects.term import Term
+
+Floats = NDArray[np.float64]
+
+WITHIN = 10.0  # of BIC: beyond, very strong evidence against
+NEAR = 20.0  # of BIC by the linear score: refitted to be sure
+REFITS = 4  # of the nearest ones
+FEW = 4  # terms: in larger models the linear margin has to do, a refit costs seconds
+LARGE = 800  # samples: the same of larger sessions
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another candidate in the place of a finding."""
+
+    accepted: Accepted
+    margin: float  # BIC by which the finding is better; negative: the rival is
+    refitted: bool  # margin from a full refit, or from the linear score
+
+    @property
+    def term(self) -> Term:
+        return self.accepted.term
+
+
+def rivals_of(bench: Bench, i: int) -> tuple[Rival, ...]:
+    """Of accepted term i: all candidates within 10 BIC, nearest first; sizes that no machine has are none."""
+    gone, own = bench.gone[i], bench.state.accepted[i].term
+    refits = REFITS if len(bench.state.accepted) <= FEW and bench.state.samples <= LARGE else 0
+    near = _near(bench, gone, gain_of(gone, bench.sight), {cause_of(a.term) for a in bench.state.accepted})
+    found = [_confirmed(bench, i, r) if rank < refits else r for rank, r in enumerate(near)]
+    kept = [r for r in found if r.margin <= WITHIN and r.term.key != own.key]
+    return tuple(sorted(kept, key=lambda r: r.margin))
+
+
+def confidences(rivals: Sequence[Rival]) -> Floats:
+    """(1 + rival,) share of belief of the finding, then of each rival."""
+    margins = np.array([0.0, *(r.margin for r in rivals)])
+    weights = np.exp(-0.5 * (margins - margins.min()))
+    return weights / weights.sum()
+
+
+def _near(bench: Bench, gone: Removed, worth: float, taken: set[tuple[object, ...]]) -> list[Rival]:
+    found = scores(bench.menu, gone)
+    out: list[Rival] = []
+    seen: set[tuple[object, ...]] = set(taken)
+    for entry in np.argsort(-found.gain):
+        margin = worth - float(found.gain[entry])
+        if margin > NEAR or not np.isfinite(margin):
+            break
+        term = bench.menu.terms[bench.menu.entries[entry].term]
+        if cause_of(term) in seen:
+            continue
+        seen.add(cause_of(term))
+        proposed = refined(bench, term, bench.menu.entries[entry].inner, gone)
+        if term.plausible(proposed.coefficients, proposed.inner, bench.noise_rad):
+            out.append(Rival(proposed, margin, refitted=False))
+    return out
+
+
+def _confirmed(bench: Bench, i: int, rival: Rival) -> Rival:
+    accepted = [rival.accepted if j == i else a for j, a in enumerate(bench.state.accepted)]
+    trial = Bench(bench.state.refitted(accepted))
+    return Rival(trial.state.accepted[i], trial.bic - bench.bic, refitted=True)

@@ -1,0 +1,80 @@
+"""A session as the diagnosis sees it: instruments with beliefs about all geometry, so that nothing is singular.
+
+Drawings hold what data cannot see; where a rig states no tolerance, wide beliefs stand in. They are no opinion about
+well-seen parameters, but keep cones, which hold no scale, from shrinking the arm.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.recording.rig_schema import Rig, Tolerance
+from acquisition.recording.samples import Samples
+from calibrate.arms.belief import LinkBelief
+from calibrate.arms.catalogue import arm_of
+from calibrate.arms.serial import SerialArm
+from calibrate.default_belief import PAIR, SCALELESS, WIDE
+from calibrate.instruments import instruments_of
+from calibrate.parameters import Parameter
+from calibrate.weighting import Measured, Weighting
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+GAUGE = 30.0  # plausible sizes: belief of a parameter about which nobody has an opinion
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """All instruments of a session over all its samples."""
+
+    rig: Rig
+    samples: Samples
+    arm: SerialArm
+    weighting: Weighting
+    start: Floats  # (param,)
+
+    @property
+    def measured(self) -> tuple[Measured, ...]:
+        return self.weighting.measured
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Geometry, every free one with a belief."""
+        return tuple(_believed(p) for p in self.weighting.parameters)
+
+
+def session_of(rig: Rig, samples: Samples) -> Session:
+    """The session of a table of samples without blunders. DataError where it holds no observation."""
+    belief = _belief(rig, samples)
+    arm = arm_of(rig, belief)
+    found = instruments_of(samples, _doubted(rig, belief), arm=arm)
+    return Session(rig, samples, arm, found.weighting, found.start)
+
+
+def _belief(rig: Rig, samples: Samples) -> LinkBelief | None:
+    if rig.tolerance is not None:
+        return None
+    scaleless = "seat" in samples and not any(c in samples for c in ("bar", "x_m", "wire_m"))
+    return SCALELESS if scaleless else WIDE
+
+
+def _doubted(rig: Rig, belief: LinkBelief | None) -> Rig:
+    """The rig with a belief about the detectors' bracket, where none is stated.
+
+    Gains are held unless the rig doubts them: they are then a cause to be named.
+    """
+    stated = rig.tolerance
+    if stated is None:
+        links = WIDE if belief is None else belief
+        stated = Tolerance(length_m=links.length_sigma_m, angle_rad=links.angle_sigma_rad)
+    if stated.psd2_m is None or stated.psd2_rad is None:
+        stated = msgspec.structs.replace(stated, psd2_m=PAIR.length_sigma_m, psd2_rad=PAIR.angle_sigma_rad)
+    return msgspec.structs.replace(rig, tolerance=stated)
+
+
+def _believed(p: Parameter) -> Parameter:
+    return p if not p.free or np.isfinite(p.prior) else replace(p, prior=GAUGE * p.plausible)

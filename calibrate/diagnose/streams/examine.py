@@ -1,0 +1,221 @@
+"""Every finder over the streams of one recording: what is wrong with them, where, how much, and what cannot be told."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.diagnose.streams.clock import ClockFit, ClockStatus, clock_between
+from calibrate.diagnose.streams.clock_steps import judged, shares_host_clock
+from calibrate.diagnose.streams.coarse_clock import Ticks
+from calibrate.diagnose.streams.continuity import Fault, breaks
+from calibrate.diagnose.streams.finding import Outcome, StreamFinding
+from calibrate.diagnose.streams.following import SMALLEST_S, Following, following
+from calibrate.diagnose.streams.lateness import lateness
+from calibrate.diagnose.streams.recorded import Device, start_between
+from calibrate.diagnose.streams.ringing import Levers, ringing
+from calibrate.diagnose.streams.sample_times import by_host
+from calibrate.diagnose.streams.settling import Window, unsettled
+from calibrate.diagnose.streams.slips import slips
+from calibrate.diagnose.streams.stands import Stand, stands_of
+from calibrate.diagnose.streams.told import (
+    told_breaks,
+    told_following,
+    told_late,
+    told_reading_lag,
+    told_ringing,
+    told_slip,
+    told_unsettled,
+)
+from calibrate.diagnose.streams.track import Track
+
+Floats = NDArray[np.float64]
+Predicted = Callable[[Floats, Floats], Floats]  # (row, joint) rad and (row,) joints' clock -> (row, 4) spots, NaN: none
+
+SERVO_S = 0.05  # after the set-point stands, before what still swings is called ringing: a usual servo's own settling
+NUDGE_RAD = 1e-5  # of a joint, for its lever on the spots: far below what bends the beam's path
+FEWEST_JOINTS = 3  # whose common lag is the clock's
+
+
+@dataclass(frozen=True, eq=False)
+class StreamReport:
+    """`clocks`: other device -> its clock against the joints' one. `unseen`: in words, what this motion cannot show."""
+
+    findings: tuple[StreamFinding, ...]
+    clocks: Mapping[str, ClockFit]
+    following: tuple[Following, ...]
+    stands: tuple[Stand, ...]
+    unseen: tuple[str, ...]
+
+
+def examine(
+    devices: Mapping[str, Device], predicted: Predicted | None = None, windows: Sequence[Window] | None = None
+) -> StreamReport:
+    """Streams as `devices_of` gives them. `predicted`: a model's word on the spots; without it their clock is open.
+
+    `windows`: when the samples were taken, on the clock of the spots, one a sample.
+    """
+    found, devices = _mended(devices)
+    joints, command = devices.get("joints"), devices.get("command")
+    if joints is None:
+        return StreamReport(tuple(found), {}, (), (), ("no stream of joints: nothing can be compared with the motion",))
+    stands = stands_of((command or joints).track)
+    clocks: dict[str, ClockFit] = {}
+    behind: tuple[Following, ...] = ()
+    if command is not None:
+        behind = following(command.track, joints.track)
+        found += [told_following(one) for one in behind if one.outcome is Outcome.FOUND]
+    if "encoders" in devices:
+        clocks["encoders"], more = _encoders(joints, devices["encoders"], stands)
+        found += more
+    if "spots" in devices:
+        seen = _spots(joints, devices["spots"], stands, predicted)
+        found += seen.findings + _unsettled(devices["spots"], seen, windows, stands, joints.track.channels)
+        if seen.clock is not None:
+            clocks["spots"] = seen.clock
+    for name, fit in clocks.items():
+        late = lateness(joints, devices[name], fit)
+        if late is not None and late.counts:
+            found.append(told_late(name, late, joints.track.channels))
+    found += _rings(joints.track, stands)
+    return StreamReport(tuple(found), clocks, behind, stands, tuple(_unseen(devices, clocks, behind, windows)))
+
+
+def _unseen(
+    devices: Mapping[str, Device],
+    clocks: Mapping[str, ClockFit],
+    behind: Sequence[Following],
+    windows: Sequence[Window] | None,
+) -> Iterator[str]:
+    for name, fit in clocks.items():
+        if fit.offset_s is None:
+            yield f"clock of {name}: {fit.status.value}"
+    if "spots" in devices and "spots" not in clocks:
+        yield "clock of spots: no fitted model says where they are during the motion"
+    if "spots" in devices and windows is None:
+        yield "samples taken unsettled: the recording does not say when each sample was averaged"
+    yield from (f"following error of joint {f.joint}: it hardly moves" for f in behind if f.behind_s is None)
+
+
+def _mended(devices: Mapping[str, Device]) -> tuple[list[StreamFinding], dict[str, Device]]:
+    """What is broken in each stream, and the streams with steps of their clocks taken out.
+
+    Joints share the clock of their set-point; spots are never without noise; encoders are judged once aligned.
+    """
+    found: list[StreamFinding] = []
+    out: dict[str, Device] = {}
+    for name, device in devices.items():
+        moving = devices["command"].track if name == "joints" and "command" in devices else None
+        faults = breaks(device.track, device.sequence, moving, noisy=name == "spots")
+        told, out[name] = judged(device, faults)
+        found += told_breaks(device.track, told)
+    return found, out
+
+
+def _encoders(joints: Device, encoders: Device, stands: tuple[Stand, ...]) -> tuple[ClockFit, list[StreamFinding]]:
+    fit = clock_between(joints.track, encoders.track, start_between(joints, encoders))
+    if fit.offset_s is None:
+        return _by_stamps(joints, encoders, stands) if shares_host_clock(encoders) else (fit, [])
+    lags = following(joints.track, _moved(encoders.track, fit))
+    alike = _alike(lags)
+    if len(alike) >= FEWEST_JOINTS and any(one.outcome is Outcome.FOUND for one in lags):
+        # one late joint pulls the common clock: what most joints share is the clock, the rest is that joint's own
+        again = clock_between(_of(joints.track, alike), _of(encoders.track, alike), start_between(joints, encoders))
+        fit = fit if again.offset_s is None else again
+        lags = following(joints.track, _moved(encoders.track, fit))
+    at_joints = _moved(encoders.track, fit)
+    found = [told_reading_lag(one) for one in lags if one.outcome is Outcome.FOUND]
+    found += [told_slip(one) for one in slips(at_joints, joints.track, stands).found]
+    frozen = [one for one in breaks(at_joints, None, joints.track) if one.fault is Fault.FROZEN]
+    return fit, found + told_breaks(at_joints, frozen) + _rings(at_joints, stands)
+
+
+def _by_stamps(joints: Device, encoders: Device, stands: tuple[Stand, ...]) -> tuple[ClockFit, list[StreamFinding]]:
+    """A host that runs at no even pace beside the joints leads to their clock piece by piece, to some milliseconds.
+
+    That is enough for what stays from stand to stand, and for nothing that is a matter of time.
+    """
+    at_s = np.interp(encoders.track.time_s, np.maximum.accumulate(joints.host_s), joints.track.time_s)
+    track = replace(encoders.track, time_s=at_s)
+    fit = clock_between(joints.track, track, Ticks(0.0))
+    if fit.offset_s is None:
+        return fit, []
+    found = [told_slip(one) for one in slips(_moved(track, fit), joints.track, stands).found]
+    return ClockFit(ClockStatus.UNEVEN), found
+
+
+def _alike(lags: Sequence[Following]) -> list[int]:
+    """Channels as late as most of those that moved."""
+    behind = {one.joint - 1: one.behind_s for one in lags if one.behind_s is not None}
+    if not behind:
+        return []
+    usual = float(np.median(list(behind.values())))
+    scatter = 1.4826 * float(np.median([abs(b - usual) for b in behind.values()]))
+    return [c for c, b in behind.items() if abs(b - usual) <= max(3.0 * scatter, SMALLEST_S)]
+
+
+def _of(track: Track, channels: list[int]) -> Track:
+    return replace(track, values=track.values[:, channels])
+
+
+@dataclass(frozen=True, eq=False)
+class _Spots:
+    """The spots on the clock of the joints: by the motion where a model tells it, else as the host's stamps say."""
+
+    track: Track
+    clock: ClockFit | None
+    findings: list[StreamFinding]
+
+
+def _spots(joints: Device, spots: Device, stands: tuple[Stand, ...], predicted: Predicted | None) -> _Spots:
+    by_stamps = replace(spots.track, time_s=by_host(spots.track.time_s, spots, joints))
+    if predicted is None:
+        return _Spots(by_stamps, None, [])
+    track = joints.track.read()
+    model = Track("predicted spots", "m", track.time_s, predicted(track.values, track.time_s))
+    fit = clock_between(model, spots.track, start_between(joints, spots))
+    at_joints = _moved(spots.track, fit) if fit.offset_s is not None else by_stamps
+    rings = ringing(at_joints, stands, levers_of(track, predicted), SERVO_S)
+    return _Spots(at_joints, fit, [told_ringing(at_joints, rings)] if rings.stops else [])
+
+
+def _unsettled(
+    spots: Device, seen: _Spots, windows: Sequence[Window] | None, stands: tuple[Stand, ...], joints: int
+) -> list[StreamFinding]:
+    """Windows move with the spots, so the samples in them stay the same whatever the clocks."""
+    if not windows:
+        return []
+    from_s, to_s = (
+        np.interp(np.array(at), spots.track.time_s, seen.track.time_s)
+        for at in ([w.from_s for w in windows], [w.to_s for w in windows])
+    )
+    moved = [Window(float(a), float(b)) for a, b in zip(from_s, to_s, strict=True)]
+    each = unsettled(seen.track, moved, stands)
+    if not any(one.outcome is Outcome.FOUND for one in each):
+        return []
+    return [told_unsettled(seen.track, moved, each, joints)]
+
+
+def levers_of(joints: Track, predicted: Predicted) -> Levers:
+    """What a turn of each joint does to the spots, by differences of the model."""
+    curve = joints.curve
+
+    def levers(time_s: float) -> Floats:
+        q = curve.at(np.array([time_s]))
+        n = q.shape[1]
+        nudged = np.repeat(q, 2 * n, axis=0) + NUDGE_RAD * np.concatenate([np.eye(n), -np.eye(n)])
+        spots = predicted(nudged, np.full(2 * n, time_s))
+        return np.nan_to_num((spots[:n] - spots[n:]).T / (2.0 * NUDGE_RAD))
+
+    return levers
+
+
+def _moved(track: Track, fit: ClockFit) -> Track:
+    return replace(track, time_s=fit.to_reference(track.time_s))
+
+
+def _rings(track: Track, stands: tuple[Stand, ...]) -> list[StreamFinding]:
+    """Of angles: every joint turns its own reading only."""
+    rings = ringing(track, stands, lambda _: np.eye(track.channels), SERVO_S)
+    return [told_ringing(track, rings)] if rings.stops else []

@@ -1,0 +1,97 @@
+"""Following error of each joint: how far the reading is behind the set-point, by speed and by acceleration.
+
+    command - reading = level + v / K_v + a / K_a
+
+K_v is the velocity gain of a position loop (Altintas, Manufacturing Automation, 2nd ed., section 5.4: steady following
+error of a ramp). A pure delay T and a first-order lag tau give the same 1 / K_v = T + tau; by acceleration they differ:
+- T^2 / 2 against - tau^2 (series of exp(-sT) and 1 / (1 + s tau)).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from calibrate.diagnose.streams.clustered import Line, fit
+from calibrate.diagnose.streams.finding import Outcome
+from calibrate.diagnose.streams.track import Track
+
+Floats = NDArray[np.float64]
+
+BLOCK_S = 0.5
+SLOWEST_RAD_S = 0.02  # rms speed of a joint below which it has not moved
+ALARM = 1e-3
+SMALLEST_S = 2e-5  # a fiftieth of the finest sampling: nothing is claimed below
+SMOOTH_S = 0.008  # over which a speed is formed: one sample of the slowest controller
+
+
+@dataclass(frozen=True)
+class Following:
+    """One joint (from 1). Behind by `behind_s` of speed and `by_acceleration_s2`; `kind` where they tell it."""
+
+    joint: int
+    outcome: Outcome
+    behind_s: float | None = None
+    behind_sigma_s: float | None = None
+    by_acceleration_s2: float | None = None
+    by_acceleration_sigma_s2: float | None = None
+    largest_rad: float | None = None  # in this motion
+    kind: str = "undetermined"  # "delay", "first-order lag", "undetermined"
+    p: float = 1.0
+
+    @property
+    def velocity_gain_per_s(self) -> float | None:
+        """None where the reading is not behind."""
+        return 1.0 / self.behind_s if self.behind_s is not None and self.behind_s > 0.0 else None
+
+
+def following(command: Track, reading: Track) -> tuple[Following, ...]:
+    """Both on one clock, one channel a joint."""
+    reading = reading.read()
+    curve = command.curve
+    at = curve.at(reading.time_s)
+    v = (curve.at(reading.time_s + SMOOTH_S) - curve.at(reading.time_s - SMOOTH_S)) / (2.0 * SMOOTH_S)
+    bend = curve.at(reading.time_s + SMOOTH_S) - 2.0 * at + curve.at(reading.time_s - SMOOTH_S)
+    a = bend / SMOOTH_S**2
+    good = np.all(np.isfinite(at) & np.isfinite(v) & np.isfinite(a), axis=1)
+    block = np.floor((reading.time_s - reading.time_s[:1].sum()) / BLOCK_S).astype(np.intp)
+    return tuple(
+        _joint(j + 1, (at - reading.values)[good, j], v[good, j], a[good, j], block[good])
+        for j in range(reading.channels)
+    )
+
+
+def _joint(joint: int, error: Floats, v: Floats, a: Floats, block: NDArray[np.intp]) -> Following:
+    if not len(error) or float(np.sqrt(np.mean(v**2))) < SLOWEST_RAD_S:
+        return Following(joint, Outcome.NOT_DETERMINABLE)
+    line = fit(np.stack([v, a, np.ones_like(v)], axis=1), error, block, rounds=1)
+    if line is None:
+        return Following(joint, Outcome.NOT_DETERMINABLE)
+    behind_s, sigma_s = float(line.values[0]), float(line.sigma[0])
+    p = float(2.0 * norm.sf(abs(behind_s) / max(sigma_s, 1e-300)))
+    found = p < ALARM and abs(behind_s) > SMALLEST_S
+    moving = np.abs(v) > SLOWEST_RAD_S
+    return Following(
+        joint,
+        Outcome.FOUND if found else Outcome.ABSENT,
+        behind_s,
+        sigma_s,
+        float(line.values[1]),
+        float(line.sigma[1]),
+        float(np.max(np.abs(error[moving]), initial=0.0)),
+        _kind(line) if found else "undetermined",
+        p,
+    )
+
+
+def _kind(line: Line) -> str:
+    """By what acceleration adds, where its sigma tells the two apart."""
+    behind_s, by_a = float(line.values[0]), float(line.values[1])
+    sigma = float(line.sigma[1])
+    delay, lag = -(behind_s**2) / 2.0, -(behind_s**2)
+    if abs(delay - lag) < 6.0 * sigma:
+        return "undetermined"
+    if abs(by_a - delay) < max(3.0 * sigma, 0.15 * behind_s**2):
+        return "delay"
+    return "first-order lag" if abs(by_a - lag) < max(3.0 * sigma, 0.15 * behind_s**2) else "undetermined"

@@ -1,0 +1,110 @@
+"""The tracks that a recording holds, each on its device's own clock, by the names of their channels."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.recording.recording import Recording
+from acquisition.recording.stream import Stream
+from calibrate.diagnose.streams.coarse_clock import Ticks, straight_line
+from calibrate.diagnose.streams.track import Track
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+COMMAND, JOINTS, ENCODERS, CURRENTS = "target_q_rad", "actual_q_rad", "position_rad", "photocurrent_a"
+DARK = 0.2  # of the usual light: a beam half off a face falls from full to nothing within its own width
+WINDOWS = 30  # of host time, in each of which the promptest stamp counts
+
+
+@dataclass(frozen=True, eq=False)
+class Device:
+    """A track with its device's counter and the host's stamps."""
+
+    track: Track
+    sequence: Ints
+    host_s: Floats
+
+
+def devices_of(recording: Recording) -> Mapping[str, Device]:
+    """Those that the recording has of "command", "joints", "encoders", "spots"."""
+    found = {
+        "command": _of(recording, COMMAND, "command"),
+        "joints": _of(recording, JOINTS, "joints"),
+        "encoders": _of(recording, ENCODERS, "encoders"),
+        "spots": _spots(recording),
+    }
+    return {name: device for name, device in found.items() if device is not None}
+
+
+def start_between(reference: Device, other: Device) -> Ticks | None:
+    """From the host's stamps: each device's promptest ones, which were delayed least. None where they say nothing."""
+    one, two = _host_line(reference), _host_line(other)
+    if one is None or two is None:
+        return None
+    at_s = float(other.track.time_s.mean())
+    rate = two[1] / one[1]
+    host_s = two[0] + two[1] * at_s
+    return Ticks((host_s - one[0]) / one[1] - at_s, rate - 1.0, at_s)
+
+
+def stamps_scatter_s(device: Device) -> float:
+    """How well the host's stamps tell the device's time, in its seconds: scatter of the promptest about their line.
+
+    Infinite without a line.
+    """
+    line = _host_line(device)
+    if line is None:
+        return float("inf")
+    late_s = (device.host_s - line[0] - line[1] * device.track.time_s)[_prompt(device)]
+    return 1.4826 * float(np.median(np.abs(late_s))) / line[1]
+
+
+def _stream(recording: Recording, channel: str) -> Stream | None:
+    return next((s for s in recording.streams.values() if channel in s.values and len(s.host_s)), None)
+
+
+def _of(recording: Recording, channel: str, name: str) -> Device | None:
+    stream = _stream(recording, channel)
+    if stream is None:
+        return None
+    values = np.asarray(stream.values[channel], dtype=float).reshape(len(stream.host_s), -1)
+    return Device(Track(name, "rad", stream.device_s, values), stream.sequence, stream.host_s)
+
+
+def _spots(recording: Recording) -> Device | None:
+    """Of every photocurrent, by the duo-lateral formula (On-Trak Photonics, "PSD theory"); NaN unless both are lit."""
+    stream, fixture = _stream(recording, CURRENTS), recording.rig.fixture
+    if stream is None or fixture is None:
+        return None
+    current = np.asarray(stream.values[CURRENTS], dtype=float).reshape(-1, 2, 2, 2)  # face, axis, electrode
+    total = current.sum(axis=3)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        spot = fixture.half_size_m * (current[..., 1] - current[..., 0]) / total
+    usual = np.nanpercentile(total, 90.0, axis=0)
+    dark = np.any(~(total > DARK * usual), axis=(1, 2))
+    values = np.where(dark[:, None], np.nan, spot.reshape(-1, 4))
+    return Device(Track("spots", "m", stream.device_s, values), stream.sequence, stream.host_s)
+
+
+def _host_line(device: Device) -> tuple[float, float] | None:
+    """Level and rate of host = level + rate device, through the least delayed stamps."""
+    prompt = _prompt(device)
+    if len(prompt) < WINDOWS // 2:
+        return None
+    level, rate = straight_line(device.track.time_s[prompt], device.host_s[prompt])
+    return (level, rate) if rate > 0.0 else None
+
+
+def _prompt(device: Device) -> list[int]:
+    """The sample of each window that came least late."""
+    t, host = device.track.time_s, device.host_s
+    if len(t) < 4 * WINDOWS or not np.ptp(t) > 0.0 or not np.ptp(host) > 0.0:
+        return []
+    late = host - np.ptp(host) / np.ptp(t) * t
+    edges = np.linspace(t[0], t[-1], WINDOWS + 1)
+    at = (np.flatnonzero((t >= a) & (t <= b)) for a, b in pairwise(edges))
+    return [int(rows[np.argmin(late[rows])]) for rows in at if len(rows)]

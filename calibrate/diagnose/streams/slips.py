@@ -1,0 +1,156 @@
+"""Slips: steps in the difference of two readings of one joint that stay, with time and size.
+
+Judged from stand to stand, because between them everything that moves adds to the difference. What may be innocent is
+taken along: an error of either reading that depends on the angle (first two orders, Bai and Teo 2002), a slow drift.
+The noise is what scatters from stand to stand then. Steps are found one by one, the largest first (binary
+segmentation: Vostrikova 1981), each by its F statistic over all places; p from the largest of as many tests.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import orth
+from scipy.stats import t as student
+
+from calibrate.diagnose.streams.stands import Stand
+from calibrate.diagnose.streams.track import Curve, Track
+
+Floats = NDArray[np.float64]
+
+ALARM = 1e-3  # over all joints and places
+SPARE = 5  # stands beyond the numbers that are fitted
+MOST = 5  # slips of one joint: then it is not slipping but loose
+EDGE_S = 0.1  # after the set-point stands, before readings count
+
+
+@dataclass(frozen=True)
+class Slip:
+    """Joint (from 1); the reading of `track` against the other steps by `size`; between the end of one stand and the
+    beginning of the next, or within one stand, found to a sample.
+    """
+
+    joint: int
+    from_s: float
+    to_s: float
+    size_rad: float
+    sigma_rad: float
+    p: float
+
+
+@dataclass(frozen=True)
+class Slips:
+    """`judged` (joint,): False where stands are too few to tell."""
+
+    found: tuple[Slip, ...]
+    judged: tuple[bool, ...]
+
+
+def slips(track: Track, other: Track, stands: Sequence[Stand]) -> Slips:
+    """Of `track` against `other`, same channels, same clock. Within a stand a step divides it in two."""
+    track = track.read()
+    difference = Track("difference", track.unit, track.time_s, track.values - other.curve.at(track.time_s)).read()
+    at = other.curve
+    found: list[Slip] = []
+    judged: list[bool] = []
+    for j in range(track.channels):
+        pieces = _pieces(difference, at, stands, j)
+        one = _of_joint(j + 1, pieces, track.channels)
+        judged.append(one is not None)
+        found += one or []
+    return Slips(tuple(sorted(found, key=lambda slip: slip.from_s)), tuple(judged))
+
+
+def _pieces(difference: Track, at: Curve, stands: Sequence[Stand], j: int) -> Floats:
+    """(stand, 4): begin, end, mean difference, angle; a stand with a jump in it gives two."""
+    out: list[tuple[float, float, float, float]] = []
+    for stand in stands:
+        rows = difference.between(stand.from_s + EDGE_S, stand.to_s)
+        if len(rows.time_s) < 4:
+            continue
+        d = rows.values[:, j]
+        cut = _jump(d)
+        for piece in (slice(0, cut), slice(cut, None)) if cut else (slice(None),):
+            t = rows.time_s[piece]
+            angle = float(np.nanmean(at.at(t)[:, j]))
+            out.append((float(t[0]), float(t[-1]), float(np.median(d[piece])), angle))
+    return np.array(out).reshape(-1, 4)
+
+
+def _jump(d: Floats) -> int:
+    """Where the two halves of a stand differ by far more than neighbours do; 0: nowhere."""
+    n = len(d)
+    if n < 12:
+        return 0
+    cuts = np.arange(4, n - 4)
+    total, sums = d.sum(), np.cumsum(d)[cuts - 1]
+    apart = np.abs((total - sums) / (n - cuts) - sums / cuts)
+    score = apart * np.sqrt(cuts * (n - cuts) / n)
+    best = int(cuts[np.argmax(score)])
+    inside = np.concatenate([d[:best] - d[:best].mean(), d[best:] - d[best:].mean()])
+    return best if score.max() > 8.0 * max(float(inside.std()), 1e-12) else 0
+
+
+def _of_joint(joint: int, pieces: Floats, joints: int) -> list[Slip] | None:
+    """None where stands are too few."""
+    n = len(pieces)
+    if n < SPARE + 4:
+        return None
+    q, d, t = pieces[:, 3], pieces[:, 2], pieces[:, 0]
+    level = [np.ones(n)]
+    if n >= SPARE + 9 and np.ptp(q) > 0.0:
+        level += [np.sin(q), np.cos(q), np.sin(2.0 * q), np.cos(2.0 * q)]
+    if n >= SPARE + 6:
+        level.append((t - t.mean()) / max(float(np.ptp(t)), 1e-12))
+    places: list[int] = []
+    out: dict[int, Slip] = {}
+    while len(places) < MOST:
+        base = np.stack([*level, *((np.arange(n) >= k).astype(float) for k in places)], axis=1)
+        best = _best(base, d, n * joints)
+        if best is None or best[0] in places:
+            break
+        places.append(best[0])
+        out = _sized(joint, pieces, level, d, places, n * joints)
+    return list(out.values())
+
+
+def _best(base: Floats, d: Floats, tests: int) -> tuple[int, float] | None:
+    """First piece after the step, and p; None where no step is significant."""
+    U = orth(base)
+    residual = d - U @ (U.T @ d)
+    n, k = len(d), U.shape[1] + 1
+    if n - k < SPARE - 1:
+        return None
+    best: tuple[int, float] | None = None
+    for place in range(2, n - 1):
+        step = (np.arange(n) >= place).astype(float)
+        step -= U @ (U.T @ step)
+        size = float(step @ step)
+        if size < 0.05:
+            continue
+        value = float(step @ residual) / size
+        left = float(np.sum((residual - value * step) ** 2)) / (n - k)
+        p = tests * 2.0 * float(student.sf(abs(value) / np.sqrt(max(left, 1e-300) / size), n - k))
+        if p < ALARM and (best is None or p < best[1]):
+            best = place, p
+    return best
+
+
+def _sized(
+    joint: int, pieces: Floats, level: list[Floats], d: Floats, places: list[int], tests: int
+) -> dict[int, Slip]:
+    """All steps together, each with its sigma."""
+    n = len(d)
+    X = np.stack([*level, *((np.arange(n) >= k).astype(float) for k in places)], axis=1)
+    inverse = np.linalg.pinv(X.T @ X)
+    values = inverse @ X.T @ d
+    left = max(n - X.shape[1], 1)
+    variance = float(np.sum((d - X @ values) ** 2)) / left
+    out: dict[int, Slip] = {}
+    for i, place in enumerate(places):
+        at = len(level) + i
+        sigma = float(np.sqrt(variance * inverse[at, at]))
+        p = min(1.0, tests * 2.0 * float(student.sf(abs(values[at]) / max(sigma, 1e-300), left)))
+        out[place] = Slip(joint, float(pieces[place - 1, 1]), float(pieces[place, 0]), float(values[at]), sigma, p)
+    return out

@@ -1,0 +1,192 @@
+"""From a diagnosis to the record of it that diagnosis.json holds."""
+
+import math
+from importlib.metadata import version
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.recording.recording import Recording
+from acquisition.recording.rig import rig_sha256
+from calibrate.blunders.finding import Blunder
+from calibrate.diagnose.bench import Bench
+from calibrate.diagnose.diagnosis import Diagnosis, Finding, Named, Pulled, Rejected, RivalName, Unexplained, Verdict
+from calibrate.diagnose.findings import named
+from calibrate.diagnose.from_recording import Diagnosed, Physics
+from calibrate.diagnose.isolability import isolability
+from calibrate.diagnose.proof import Floor, HeldOut
+from calibrate.diagnose.schema import (
+    SCHEMA,
+    BlunderRecord,
+    CurveRecord,
+    DiagnosisFile,
+    FindingRecord,
+    FloorRecord,
+    FreeSpaceRecord,
+    LackOfFitRecord,
+    NameRecord,
+    NotRecorded,
+    RejectedRecord,
+    RigRecord,
+    RivalRecord,
+    SizeRecord,
+    SmallestRecord,
+    SplitRecord,
+    UnexplainedRecord,
+)
+from calibrate.diagnose.smallest_visible import Smallest, smallest_visible
+from calibrate.effects.catalogue import EFFECTS
+
+Floats = NDArray[np.float64]
+
+SOFTWARE = f"calibeam {version('calibeam')}"
+JUDGED = "random"  # the split whose rms stands at the top of the file
+DERIVED_APPROACH = "approach: from the order of the samples"
+ANGULAR = ("angle", "tilt", "twist", "direction")
+
+
+def file_of(diagnosed: Diagnosed, recording: Recording) -> DiagnosisFile:
+    """The record to write."""
+    rig = RigRecord(recording.rig.name, rig_sha256(recording.rig_text))
+    blunders = tuple(map(_blunder, diagnosed.blunders))
+    if diagnosed.physics is None:
+        return DiagnosisFile(
+            schema=SCHEMA,
+            verdict=Verdict.UNDECIDABLE.value,
+            noise_floor_m=None,
+            rms_before_m=None,
+            rms_after_m=None,
+            findings=(),
+            unexplained=None,
+            next=tuple(f"put the file right: {b.column}: {b.remedy}" for b in diagnosed.blunders if b.whole_file),
+            software=SOFTWARE,
+            rig=rig,
+            samples=len(recording.samples),
+            blunders=blunders,
+        )
+    return _with_physics(diagnosed.physics, rig, blunders)
+
+
+def _with_physics(physics: Physics, rig: RigRecord, blunders: tuple[BlunderRecord, ...]) -> DiagnosisFile:
+    said = physics.diagnosis
+    judged = _judged(said)
+    floor = next((f for f in said.floors if judged is not None and f.instrument == judged.instrument), None)
+    after_m = None if judged is None else judged.rms_after_m
+    first, *others = [_unexplained(u, after_m) for u in said.unexplained] or [None]
+    drivers, misfit, change = physics.geometry.drivers, said.lack_of_fit, physics.free_space
+    bench = Bench(physics.geometry)
+    return DiagnosisFile(
+        schema=SCHEMA,
+        verdict=said.verdict.value,
+        noise_floor_m=None if floor is None else _number(floor.rms_m),
+        rms_before_m=None if judged is None else _number(judged.rms_before_m),
+        rms_after_m=None if judged is None else _number(judged.rms_after_m),
+        findings=tuple(map(_finding, said.findings)),
+        unexplained=first,
+        next=said.next,
+        software=SOFTWARE,
+        rig=rig,
+        samples=physics.geometry.samples,
+        noise_floor_source="" if floor is None else floor.source,
+        noise_wanders=said.noise_wanders,
+        also_unexplained=tuple(u for u in others if u is not None),
+        splits=tuple(map(_split, said.proofs)),
+        floors=tuple(map(_floor, said.floors)),
+        free_space=None if change is None else FreeSpaceRecord(change.before_m, change.after_m, change.poses),
+        lack_of_fit=None
+        if misfit is None
+        else LackOfFitRecord(misfit.groups, misfit.ratio, misfit.p, misfit.significant),
+        rejected=tuple(map(_rejected, said.rejected)),
+        invisible=tuple(map(_name, said.invisible)),
+        smallest=tuple(map(_smallest, smallest_visible(bench))),
+        confusable=_confusable(bench),
+        not_recorded=tuple(dict.fromkeys(NotRecorded(m.driver, m.column, m.physics) for m in said.missing)),
+        derived=(DERIVED_APPROACH,) if drivers.approach_derived else (),
+        blunders=blunders,
+    )
+
+
+def _judged(said: Diagnosis) -> HeldOut | None:
+    """Of the instrument with the most observations, on the first split that there is."""
+    asked = [p for p in said.proofs if p.split == JUDGED] or list(said.proofs)
+    return max(asked, key=lambda p: p.observations, default=None)
+
+
+def _finding(finding: Finding) -> FindingRecord:
+    return FindingRecord(
+        *_words(finding.name),
+        parameters={
+            name: SizeRecord(_number(size.value), _number(size.sigma)) for name, size in finding.parameters.items()
+        },
+        share=finding.share,
+        confidence=finding.confidence,
+        says=finding.says,
+        rivals=tuple(map(_rival, finding.rivals)),
+        p=finding.p,
+        bic_gain=finding.gain,
+        held_out_gain=finding.predicts,
+        explains=next((e.explains for e in EFFECTS if e.physics == finding.name.physics), ""),
+        curve=None if finding.pulled is None else _curve(finding.pulled, finding.name.where),
+    )
+
+
+def _rival(rival: RivalName) -> RivalRecord:
+    return RivalRecord(*_words(rival.name), confidence=rival.confidence, margin=rival.margin)
+
+
+def _curve(pulled: Pulled, where: str) -> CurveRecord:
+    unit = "rad" if where.endswith(ANGULAR) else "m"
+    return CurveRecord(pulled.driver, unit, _numbers(pulled.values), _numbers(pulled.residual), _numbers(pulled.fitted))
+
+
+def _unexplained(found: Unexplained, rms_m: float | None) -> UnexplainedRecord:
+    size = None if rms_m is None else _number(math.sqrt(max(found.share, 0.0)) * rms_m)
+    return UnexplainedRecord(found.where, ",".join(found.depends_on), size, found.share, found.p, found.why)
+
+
+def _split(proof: HeldOut) -> SplitRecord:
+    low, high = proof.removed
+    before_m, after_m = _number(proof.rms_before_m), _number(proof.rms_after_m)
+    return SplitRecord(
+        proof.split, proof.instrument, proof.observations, proof.wild, before_m, after_m, _number(low), _number(high)
+    )
+
+
+def _floor(floor: Floor) -> FloorRecord:
+    return FloorRecord(floor.instrument, _number(floor.rms_m), floor.source)
+
+
+def _rejected(rejected: Rejected) -> RejectedRecord:
+    return RejectedRecord(*_words(rejected.name), bic_gain=_number(rejected.gain), why=rejected.why)
+
+
+def _smallest(found: Smallest) -> SmallestRecord:
+    return SmallestRecord(*_words(found.name), parameter=found.parameter, value=found.value)
+
+
+def _confusable(bench: Bench) -> tuple[tuple[NameRecord, NameRecord, float], ...]:
+    """Causes that these poses could not tell apart by their nature, whatever the data."""
+    pairs = isolability(bench.menu).confusable()
+    out = {(named(a), named(b)): r2 for a, b, r2 in pairs if named(a) != named(b)}
+    return tuple((_name(a), _name(b), r2) for (a, b), r2 in out.items())
+
+
+def _blunder(blunder: Blunder) -> BlunderRecord:
+    return BlunderRecord(blunder.kind.value, tuple(row + 1 for row in blunder.rows), blunder.column, blunder.says)
+
+
+def _name(name: Named) -> NameRecord:
+    return NameRecord(*_words(name))
+
+
+def _words(name: Named) -> tuple[str, str, str, int | None, str]:
+    return name.where, ",".join(name.depends_on), name.shape, name.order, name.physics
+
+
+def _numbers(values: Floats) -> tuple[float | None, ...]:
+    return tuple(map(_number, values.tolist()))
+
+
+def _number(value: float) -> float | None:
+    """JSON has no word for what is not a number."""
+    return value if math.isfinite(value) else None

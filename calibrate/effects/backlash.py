@@ -1,0 +1,81 @@
+"""Slack in a drive: the joint stops on the flank it came from, or on the one that gravity chooses."""
+
+import numpy as np
+
+from calibrate.effects.drivers import Drivers
+from calibrate.effects.form import Floats, Form, at_joint
+from calibrate.effects.gravity import likely_torque_nm
+from calibrate.effects.kind import Kind
+from calibrate.effects.term import Inner, Missing, Shape, Term
+from calibrate.effects.time_laws import varies
+
+LIMIT_RAD = 5e-3  # 0.3 degrees; worn industrial wrists show 1e-3 (ISO 9283:1998, 7.2.2 tests for it)
+
+
+def _terms(drivers: Drivers) -> tuple[Term, ...]:
+    out: list[Term] = []
+    for joint in range(1, drivers.n_joints + 1):
+        if drivers.approach is not None and varies(drivers.approach[:, joint - 1]):
+            out.append(_by_friction(drivers, joint, drivers.approach))
+        torque = likely_torque_nm(drivers, joint)
+        if torque.min() < 0.0 < torque.max():
+            out.append(_by_gravity(drivers, joint))
+    return tuple(out)
+
+
+def _by_friction(drivers: Drivers, joint: int, approach: Floats) -> Term:
+    """`approach` as recorded: moves are far longer than the play, so its operator stands on the flank it came from."""
+    port, direction = at_joint(joint, drivers.n_joints)
+
+    def function(drivers: Drivers, inner: Floats) -> Floats:
+        side = approach if drivers.approach is None else drivers.approach  # of the poses asked for
+        return -side[:, joint - 1 : joint] / 2.0
+
+    return Form(
+        port,
+        (f"approach{joint}",),
+        Shape.HYSTERESIS if drivers.approach_derived else Shape.SIGN,
+        "backlash",
+        function=function,
+        names=("play_rad",),
+        limit=LIMIT_RAD,
+        sentence=f"Joint {joint} stops {{play_rad}} apart, depending on which way it came: slack in the drive",
+        directions=direction,
+    )
+
+
+def _by_gravity(drivers: Drivers, joint: int) -> Term:
+    port, direction = at_joint(joint, drivers.n_joints)
+    largest = float(np.abs(likely_torque_nm(drivers, joint)).max())
+    grid = tuple(largest * share for share in (0.02, 0.1, 0.3))
+
+    def function(drivers: Drivers, inner: Floats) -> Floats:
+        return np.tanh(likely_torque_nm(drivers, joint) / inner[0])[:, None] / 2.0
+
+    return Form(
+        port,
+        (f"gravity_torque{joint}",),
+        Shape.SIGN,
+        "backlash",
+        None,
+        (Inner("turning_torque_nm", grid, grid[0] / 4.0, grid[-1] * 2.0),),
+        function=function,
+        names=("play_rad",),
+        limit=LIMIT_RAD,
+        sentence=f"Joint {joint} hangs {{play_rad}} from flank to flank, by the sign of its load: slack in the drive",
+        directions=direction,
+    )
+
+
+def _missing(drivers: Drivers) -> tuple[Missing, ...]:
+    return (Missing("approach", "approach1 ...", "backlash"),) if drivers.approach_derived else ()
+
+
+EFFECT = Kind(
+    "backlash",
+    "Between the flanks of a gear there is room; where the joint stands in it depends on friction and load.",
+    ("reading-lag", "joint-compliance"),
+    "play operator, half width on either side: Visintin, Differential Models of Hysteresis, 1994, ch. III.2",
+    _terms,
+    _missing,
+)

@@ -1,0 +1,89 @@
+"""All effects, one line each; tests/calibrate/effects checks every one by law."""
+
+from calibrate.effects import (
+    arm_thermal_growth,
+    axis_wobble,
+    backlash,
+    base_compliance,
+    base_moved,
+    device_drift,
+    device_periodic,
+    device_scale,
+    encoder_eccentricity,
+    encoder_harmonic,
+    encoder_slip,
+    fixture_moved,
+    gear_ratio_error,
+    gear_transmission_error,
+    hand_force,
+    joint_compliance,
+    joint_coupling,
+    laser_thermal_drift,
+    laser_warm_up,
+    latency,
+    link_bending,
+    link_thermal_growth,
+    not_settled,
+    open_at_frames,
+    open_at_joints,
+    open_at_readouts,
+    open_by_columns,
+    payload_compliance,
+    psd_ambient_light,
+    psd_cover_glass,
+    psd_gain,
+    psd_nonlinearity,
+    reading_lag,
+    seat_moved,
+    tool_sag,
+)
+from calibrate.effects.drivers import Drivers
+from calibrate.effects.term import Effect, Missing, Term
+
+EFFECTS: tuple[Effect, ...] = (
+    encoder_eccentricity.EFFECT,
+    encoder_harmonic.EFFECT,
+    gear_transmission_error.EFFECT,
+    gear_ratio_error.EFFECT,
+    joint_coupling.EFFECT,
+    joint_compliance.EFFECT,
+    hand_force.EFFECT,
+    payload_compliance.EFFECT,
+    backlash.EFFECT,
+    reading_lag.EFFECT,
+    not_settled.EFFECT,
+    latency.EFFECT,
+    encoder_slip.EFFECT,
+    axis_wobble.EFFECT,
+    link_bending.EFFECT,
+    link_thermal_growth.EFFECT,
+    arm_thermal_growth.EFFECT,
+    base_compliance.EFFECT,
+    device_drift.EFFECT,  # before base-moved: the same to look at, and a tripod gives way sooner than a bolted base
+    base_moved.EFFECT,
+    tool_sag.EFFECT,
+    laser_warm_up.EFFECT,
+    laser_thermal_drift.EFFECT,
+    fixture_moved.EFFECT,
+    psd_gain.EFFECT,
+    psd_nonlinearity.EFFECT,
+    psd_ambient_light.EFFECT,
+    psd_cover_glass.EFFECT,
+    seat_moved.EFFECT,
+    device_scale.EFFECT,
+    device_periodic.EFFECT,
+    open_at_joints.EFFECT,
+    open_at_frames.EFFECT,
+    open_at_readouts.EFFECT,
+    open_by_columns.EFFECT,
+)
+
+
+def terms_of(drivers: Drivers) -> tuple[Term, ...]:
+    """Every place and form that the catalogue knows and this session allows."""
+    return tuple(term for effect in EFFECTS for term in effect.terms(drivers))
+
+
+def missing_of(drivers: Drivers) -> tuple[Missing, ...]:
+    """What was not recorded and would let an effect be told."""
+    return tuple(m for effect in EFFECTS for m in effect.missing(drivers))

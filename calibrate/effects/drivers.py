@@ -1,0 +1,57 @@
+"""Drivers: what a defect may depend on, one value a pose. From the record or from the model, never from what was
+measured: a measured spot as driver leaks the answer (a gain would explain any noise).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.recording.rig_schema import Rig
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Readout:
+    """One instrument as the model predicts it; rows (pose,) that it does not see are NaN."""
+
+    name: str  # "dual-psd", "position", "wire", "seat", "bar", "full-pose"
+    predicted: Floats  # (pose, k)
+    seen: NDArray[np.bool_]  # (pose,)
+    incidence_rad: Floats | None = None  # (pose, 2) of the beam on PSD 1, 2
+    lean: Floats | None = None  # (pose, 2, 2) x, y that the arriving beam travels along face 1, 2 per depth
+    first_psd: Ints | None = None  # (pose,)
+    place: Ints | None = None  # (pose,) placement or seat
+
+
+@dataclass(frozen=True, eq=False)
+class Drivers:
+    """Of the whole session, in the order of its samples. None: not recorded."""
+
+    rig: Rig
+    q_rad: Floats  # (pose, joint) as reported
+    t_s: Floats  # (pose,)
+    frames: Floats  # (pose, joint + 1, 4, 4) B_0 ... B_n of the model with its terms
+    readouts: Mapping[str, Readout]
+    approach: Floats | None  # (pose, joint) -1, 0, 1
+    approach_derived: bool  # from the order of the samples, not recorded
+    last_move_rad: Floats  # (pose, joint) from the sample before
+    qd_rad_s: Floats | None  # (pose, joint)
+    cmd_minus_q_rad: Floats | None  # (pose, joint)
+    temperatures_degC: Mapping[str, Floats]  # where -> (pose,), smoothed over time
+    payload_kg: Floats | None  # (pose,)
+    payload_com_m: Floats | None  # (pose, 3) in the flange frame
+    psd_sum_v: Floats | None  # (pose, 2)
+    extra: Mapping[str, Floats]  # every other numeric column, NaN filled
+    repeat: Ints | None  # (pose,) group, -1: none
+
+    @property
+    def n_joints(self) -> int:
+        return self.q_rad.shape[1]
+
+    @property
+    def gravity_m_s2(self) -> Floats:
+        return np.array(self.rig.arm.gravity_m_s2)

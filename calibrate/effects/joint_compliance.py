@@ -1,0 +1,130 @@
+"""Soft joint: gravity torque twists the drive behind the encoder."""
+
+import numpy as np
+
+from calibrate.effects.drivers import Drivers
+from calibrate.effects.form import Floats, Form, at_joint
+from calibrate.effects.gravity import loaded, stated_torque_nm, unknown_torques
+from calibrate.effects.kind import Kind
+from calibrate.effects.term import Inner, Missing, Shape, Term
+
+LIMIT_RAD_NM = 1e-3  # fourteen times the softest seen on a small arm (mismatch catalogue: 1 to 70 urad per Nm)
+KNEES = (0.15, 0.3, 0.5, 0.75)  # of the largest torque
+LIMIT_RAD = 2e-2  # of the deflection, where masses are not known
+
+
+def _terms(drivers: Drivers) -> tuple[Term, ...]:
+    out: list[Term] = []
+    for joint in range(1, drivers.n_joints + 1):
+        if loaded(drivers, joint):
+            out += [_stiff(drivers, joint), _stiffening(drivers, joint), _knee(drivers, joint)]
+        if unknown_torques(drivers, joint).shape[1]:
+            out.append(_unknown_masses(drivers, joint))
+    return tuple(out)
+
+
+def _stiff(drivers: Drivers, joint: int) -> Term:
+    port, direction = at_joint(joint, drivers.n_joints)
+
+    def function(drivers: Drivers, inner: Floats) -> Floats:
+        return stated_torque_nm(drivers, joint)[:, None]
+
+    return Form(
+        port,
+        (f"gravity_torque{joint}",),
+        Shape.LINEAR,
+        "joint-compliance",
+        function=function,
+        names=("compliance_rad_nm",),
+        limit=LIMIT_RAD_NM,
+        sentence=f"Joint {joint} yields {{compliance_rad_nm}}: elastic drive",
+        directions=direction,
+    )
+
+
+def _stiffening(drivers: Drivers, joint: int) -> Term:
+    """Stiffer or softer, smoothly, as torque grows."""
+    port, direction = at_joint(joint, drivers.n_joints)
+
+    def function(drivers: Drivers, inner: Floats) -> Floats:
+        torque = stated_torque_nm(drivers, joint)
+        return np.stack([torque, torque * (torque / np.abs(torque).max()) ** 2], axis=1)
+
+    return Form(
+        port,
+        (f"gravity_torque{joint}",),
+        Shape.CUBIC,
+        "joint-compliance",
+        function=function,
+        names=("compliance_rad_nm", "compliance_change_rad_nm"),
+        limit=LIMIT_RAD_NM,
+        sentence=f"Joint {joint} yields {{compliance_rad_nm}} at small torque and {{compliance_change_rad_nm}} more "
+        "at the largest: elastic drive",
+        directions=direction,
+    )
+
+
+def _knee(drivers: Drivers, joint: int) -> Term:
+    """Two slopes with a knee: the teeth of a flexspline engage fully above a certain torque (makers' K1, K2, T1)."""
+    port, direction = at_joint(joint, drivers.n_joints)
+    largest = float(np.abs(stated_torque_nm(drivers, joint)).max())
+    knees = tuple(largest * share for share in KNEES)
+
+    def function(drivers: Drivers, inner: Floats) -> Floats:
+        torque = stated_torque_nm(drivers, joint)
+        below = np.clip(torque, -inner[0], inner[0])
+        return np.stack([below, torque - below], axis=1)
+
+    return Form(
+        port,
+        (f"gravity_torque{joint}",),
+        Shape.SMOOTH,
+        "joint-compliance",
+        None,
+        (Inner("knee_nm", knees, knees[0] / 2.0, 0.95 * largest),),
+        variant="knee",
+        function=function,
+        names=("compliance_rad_nm", "compliance_above_rad_nm"),
+        limit=LIMIT_RAD_NM,
+        sentence=f"Joint {joint} yields {{compliance_rad_nm}} up to {{knee_nm}} and {{compliance_above_rad_nm}} "
+        "beyond: two slopes of a harmonic drive",
+        directions=direction,
+    )
+
+
+def _unknown_masses(drivers: Drivers, joint: int) -> Term:
+    port, direction = at_joint(joint, drivers.n_joints)
+    names = tuple(f"combination{k}_rad" for k in range(1, unknown_torques(drivers, joint).shape[1] + 1))
+
+    def function(drivers: Drivers, inner: Floats) -> Floats:
+        columns = unknown_torques(drivers, joint)[:, : len(names)]
+        return np.pad(columns, ((0, 0), (0, len(names) - columns.shape[1])))
+
+    return Form(
+        port,
+        (f"gravity_torque{joint}",),
+        Shape.LINEAR,
+        "joint-compliance",
+        variant="unknown masses",
+        function=function,
+        names=names,
+        limit=LIMIT_RAD,
+        sentence=f"Joint {joint} yields under its load ({{combination1_rad}} rms): elastic drive; masses are not known",
+        directions=direction,
+    )
+
+
+def _missing(drivers: Drivers) -> tuple[Missing, ...]:
+    if drivers.rig.tool.mass_kg is not None or any(j.mass_kg is not None for j in drivers.rig.arm.joints):
+        return ()
+    return (Missing("gravity_torque", "arm.joint.mass_kg and com_m in the rig", "joint-compliance"),)
+
+
+EFFECT = Kind(
+    "joint-compliance",
+    "The drive between encoder and link is a spring; the weight it carries turns the joint by torque over stiffness.",
+    ("encoder-eccentricity", "payload-compliance", "link-bending"),
+    "Nubiola, Bonev, Absolute calibration of an ABB IRB 1600 robot using a laser tracker, Robotics CIM 29(1), 2013",
+    _terms,
+    _missing,
+)

@@ -1,0 +1,82 @@
+"""How a laser beam turns or shifts by a law of drivers: about the laser and across the drawn beam."""
+
+import numpy as np
+
+from calibrate.effects.drivers import Drivers
+from calibrate.effects.form import Floats, Form
+from calibrate.effects.ports import Place, Port
+from calibrate.effects.term import Inner, Shape, Term
+from calibrate.effects.time_laws import Law
+
+LIMIT_RAD = 5e-3  # what a mount that is not loose does; diode modules drift by 5 to 50 urad (makers' data sheets)
+LIMIT_M = 1e-3
+
+
+def beam_axes(drivers: Drivers) -> tuple[Floats, Floats, Floats]:
+    """Origin of the beam and two unit vectors across it, in the flange frame, as drawn."""
+    tool = drivers.rig.tool
+    direction = np.array(tool.laser_direction or (0.0, 0.0, 1.0))
+    direction = direction / np.linalg.norm(direction)
+    u = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
+    u = np.asarray(u / np.linalg.norm(u), dtype=np.float64)
+    v = np.asarray(np.cross(direction, u), dtype=np.float64)
+    return np.array(tool.laser_origin_m or (0.0, 0.0, 0.0)), u, v
+
+
+def pointing(
+    drivers: Drivers,
+    physics: str,
+    driver: str,
+    shape: Shape,
+    law: Law,
+    inner: tuple[Inner, ...] = (),
+    open_family: bool = False,
+) -> Term:
+    """The beam turns with `law` (pose, 1) of the driver."""
+    origin, u, v = beam_axes(drivers)
+    directions = np.stack([np.concatenate([np.cross(origin, t), t]) for t in (u, v)], axis=1)
+    per = "_per_k" if driver.startswith("temp") else ""
+    return Form(
+        Port("laser.direction", Place.FRAME, drivers.n_joints),
+        (driver,),
+        shape,
+        physics,
+        None,
+        inner,
+        slow=driver == "t",
+        open=open_family,
+        function=law,
+        names=(f"turn_u_rad{per}", f"turn_v_rad{per}"),
+        limit=LIMIT_RAD,
+        sentence=f"The laser beam turns by {{turn_u_rad{per}}} and {{turn_v_rad{per}}} across itself with {driver}",
+        directions=directions,
+    )
+
+
+def shifting(
+    drivers: Drivers,
+    physics: str,
+    driver: str,
+    shape: Shape,
+    law: Law,
+    inner: tuple[Inner, ...] = (),
+    open_family: bool = False,
+) -> Term:
+    """The beam shifts across itself, its direction kept."""
+    _, u, v = beam_axes(drivers)
+    per = "_per_k" if driver.startswith("temp") else ""
+    return Form(
+        Port("laser.origin", Place.FRAME, drivers.n_joints),
+        (driver,),
+        shape,
+        physics,
+        None,
+        inner,
+        slow=driver == "t",
+        open=open_family,
+        function=law,
+        names=(f"shift_u_m{per}", f"shift_v_m{per}"),
+        limit=LIMIT_M,
+        sentence=f"The laser beam shifts by {{shift_u_m{per}}} and {{shift_v_m{per}}} across itself with {driver}",
+        directions=np.concatenate([np.stack([u, v], axis=1), np.zeros((3, 2))]),
+    )

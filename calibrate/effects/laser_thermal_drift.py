@@ -1,0 +1,41 @@
+"""The laser points elsewhere as it gets warmer or colder."""
+
+from calibrate.effects import time_laws
+from calibrate.effects.drivers import Drivers
+from calibrate.effects.kind import Kind
+from calibrate.effects.laser_pointing import pointing, shifting
+from calibrate.effects.term import Missing, Shape, Term
+from calibrate.effects.time_laws import varies
+
+
+def _terms(drivers: Drivers) -> tuple[Term, ...]:
+    if "dual-psd" not in drivers.readouts or drivers.rig.tool.laser_direction is None:
+        return ()
+    return tuple(
+        moves(
+            drivers,
+            "laser-thermal-drift",
+            f"temp_{where}",
+            Shape.LINEAR,
+            lambda d, inner, where=where: time_laws.with_temperature(where, d, inner),
+        )
+        for where, T in drivers.temperatures_degC.items()
+        if varies(T)
+        for moves in (pointing, shifting)
+    )
+
+
+def _missing(drivers: Drivers) -> tuple[Missing, ...]:
+    if "dual-psd" not in drivers.readouts or drivers.temperatures_degC:
+        return ()
+    return (Missing("temp", "temp_<where>_degC", "laser-thermal-drift"),)
+
+
+EFFECT = Kind(
+    "laser-thermal-drift",
+    "Beam pointing of a diode module follows its temperature, 2 to 12 urad per K.",
+    ("laser-warm-up", "base-moved"),
+    "mismatch catalogue: laser pointing",
+    _terms,
+    _missing,
+)

@@ -1,0 +1,26 @@
+"""The laser points elsewhere while it warms up."""
+
+from calibrate.effects import time_laws
+from calibrate.effects.drivers import Drivers
+from calibrate.effects.kind import Kind
+from calibrate.effects.laser_pointing import pointing, shifting
+from calibrate.effects.term import Shape, Term
+
+
+def _terms(drivers: Drivers) -> tuple[Term, ...]:
+    if "dual-psd" not in drivers.readouts or drivers.rig.tool.laser_direction is None:
+        return ()
+    inner = time_laws.constant_inner(drivers)
+    return tuple(
+        moves(drivers, "laser-warm-up", "t", Shape.EXPONENTIAL, time_laws.towards, inner)
+        for moves in (pointing, shifting)
+    )
+
+
+EFFECT = Kind(
+    "laser-warm-up",
+    "A diode's mount expands after switching on and turns the beam until it is in balance.",
+    ("base-moved", "laser-thermal-drift"),
+    "pointing stability of diode modules, 5 to 50 urad over the first half hour (makers' data sheets)",
+    _terms,
+)

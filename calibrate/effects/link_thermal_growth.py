@@ -1,0 +1,89 @@
+"""A link, or the whole arm, grows with its temperature."""
+
+import numpy as np
+
+from calibrate.effects import time_laws
+from calibrate.effects.drivers import Drivers
+from calibrate.effects.form import Floats, Form
+from calibrate.effects.kind import Kind
+from calibrate.effects.ports import Place, Port
+from calibrate.effects.term import Inner, Missing, Shape, Term
+from calibrate.effects.time_laws import varies
+
+LIMIT_PER_K = 1e-4  # aluminium 24e-6; a thermometer far from the link sees less than the link does
+LIMIT_GROWTH = 3e-3  # relative, where time stands for temperature
+SHORTEST_M = 0.02
+
+
+def _terms(drivers: Drivers) -> tuple[Term, ...]:
+    out: list[Term] = []
+    for link in range(1, drivers.n_joints + 1):
+        if np.linalg.norm(link_vectors(drivers, link)[0]) < SHORTEST_M:
+            continue
+        for where, T in drivers.temperatures_degC.items():
+            if varies(T):
+                out.append(_with_temperature(link, where))
+        out.append(_over_time(drivers, link))
+    return tuple(out)
+
+
+def link_vectors(drivers: Drivers, link: int) -> Floats:
+    """(pose, 3) from the origin of B_(link-1) to that of B_link, in the latter's axes: constant in a rigid link."""
+    B = drivers.frames
+    span = B[:, link, :3, 3] - B[:, link - 1, :3, 3]
+    return np.einsum("nji,nj->ni", B[:, link, :3, :3], span)
+
+
+def _with_temperature(link: int, where: str) -> Term:
+    def law(drivers: Drivers, inner: Floats) -> Floats:
+        return time_laws.with_temperature(where, drivers, inner)
+
+    return _term(link, f"temp_{where}", Shape.LINEAR, law, (), "expansion_per_k", LIMIT_PER_K)
+
+
+def _over_time(drivers: Drivers, link: int) -> Term:
+    inner = time_laws.constant_inner(drivers)
+    return _term(link, "t", Shape.EXPONENTIAL, time_laws.towards, inner, "growth_share", LIMIT_GROWTH)
+
+
+def _term(
+    link: int,
+    driver: str,
+    shape: Shape,
+    law: time_laws.Law,
+    inner: tuple[Inner, ...],
+    name: str,
+    limit: float,
+) -> Term:
+    def function(drivers: Drivers, values: Floats) -> Floats:
+        out = np.zeros((len(drivers.t_s), 6, 1))
+        out[:, :3, 0] = law(drivers, values) * link_vectors(drivers, link)
+        return out
+
+    return Form(
+        Port(f"link{link}.length", Place.FRAME, link),
+        (driver,),
+        shape,
+        "link-thermal-growth",
+        None,
+        inner,
+        slow=driver == "t",
+        function=function,
+        names=(name,),
+        limit=limit,
+        sentence=f"Link {link} grows by {{{name}}}: heat",
+    )
+
+
+def _missing(drivers: Drivers) -> tuple[Missing, ...]:
+    return () if drivers.temperatures_degC else (Missing("temp", "temp_<where>_degC", "link-thermal-growth"),)
+
+
+EFFECT = Kind(
+    "link-thermal-growth",
+    "Motors and the room heat a casting, and it grows by its expansion coefficient.",
+    ("base-moved", "device-drift"),
+    "6 to 24e-6 per K, steel to aluminium: ISO/TR 16015:2003, annex",
+    _terms,
+    _missing,
+)

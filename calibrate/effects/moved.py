@@ -1,0 +1,83 @@
+"""Something that should stand has moved: the six-component laws that base, fixture, device and seat share."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.effects import time_laws
+from calibrate.effects.drivers import Drivers
+from calibrate.effects.form import Floats, Form
+from calibrate.effects.ports import Place, Port
+from calibrate.effects.term import Inner, Shape, Term
+from calibrate.effects.time_laws import Law, varies
+
+SIX = ("shift_x_m", "shift_y_m", "shift_z_m", "turn_x_rad", "turn_y_rad", "turn_z_rad")
+LIMIT = 2e-2  # m, rad: farther, and it was put somewhere else
+
+
+def drifts(drivers: Drivers, where: str, physics: str, what: str) -> list[Term]:
+    """A pose that creeps towards a new one, steadily, or with any temperature."""
+    out = [
+        motion(where, physics, "t", Shape.EXPONENTIAL, time_laws.towards, what, time_laws.constant_inner(drivers)),
+        motion(where, physics, "t", Shape.LINEAR, time_laws.steadily, what),
+    ]
+    for place, T in drivers.temperatures_degC.items():
+        if varies(T):
+            out.append(motion(where, physics, f"temp_{place}", Shape.LINEAR, _warmed(place), what))
+    return out
+
+
+def motion(
+    where: str,
+    physics: str,
+    driver: str,
+    shape: Shape,
+    law: Law,
+    what: str,
+    inner: tuple[Inner, ...] = (),
+    among: Law | None = None,
+    width: int = 6,
+    variant: str = "",
+    open_family: bool = False,
+) -> Term:
+    """Shift and turn by a law of drivers, about the middle of what the arm reached (turns and shifts stay apart).
+
+    `among` (pose, 1) is one where the thing that moved was in use.
+    """
+    per = "_per_k" if driver.startswith("temp_") and not open_family else ""
+    names = tuple(name + per for name in SIX[:width])
+    told = [", ".join(f"{{{name}}}" for name in names[k : k + 3]) for k in (0, 3)]
+
+    def function(drivers: Drivers, values: Floats) -> Floats:
+        amount = law(drivers, values) * (1.0 if among is None else among(drivers, values))
+        directions = np.eye(6)[:, :width]
+        middle = drivers.frames[:, -1, :3, 3].mean(axis=0)
+        if width == 6:
+            directions[:3, 3:] = np.cross(middle, np.eye(3)).T
+        return amount[:, :, None] * directions
+
+    return Form(
+        Port(where, Place.SURROUNDINGS),
+        (driver,),
+        shape,
+        physics,
+        None,
+        inner,
+        slow=driver == "t",
+        variant=variant,
+        open=open_family,
+        function=function,
+        names=names,
+        limit=LIMIT,
+        sentence=f"{what} moved by {told[0]} in x, y, z of the base"
+        + (f" and turned by {told[1]}" if width == 6 else "")
+        + ("" if driver == "t" else f" with {driver}"),
+    )
+
+
+def in_use(where: NDArray[np.bool_]) -> Law:
+    """(pose, 1) one at these poses."""
+    return lambda drivers, inner: where.astype(float)[:, None]
+
+
+def _warmed(place: str) -> Law:
+    return lambda drivers, inner: time_laws.with_temperature(place, drivers, inner)

@@ -1,0 +1,62 @@
+"""Ports: the places along the chain, from joint reading to instrument reading, where physics can enter.
+
+A port says where in `Perturbation` a term acts and how many components it has there. Frames are those of
+arms.serial.SerialArm: B_0 in front of joint 1, joint i turns about z of B_(i-1), B_n is the flange.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+class Place(Enum):
+    """What a port perturbs; the number of components is that of one sample."""
+
+    JOINTS = "joints"  # (joint,) rad added to the readings
+    FRAME = "frame"  # (6,) body twist [v; w] (m, rad) of B_i and all behind it
+    SURROUNDINGS = "surroundings"  # (6,) base twist of all that is not the arm: fixture, device, seat
+    READING = "reading"  # (k,) added to what one instrument reads, in its unit
+
+
+@dataclass(frozen=True)
+class Port:
+    """`where` in the words of docs/formats.md; `index` is the frame of FRAME, `instrument` the one of READING."""
+
+    where: str
+    place: Place
+    index: int = 0
+    instrument: str = ""
+
+
+@dataclass(frozen=True)
+class Perturbation:
+    """What all terms together do to every pose of a session. Sums of small twists: second-order terms are left out."""
+
+    joints_rad: Floats  # (pose, joint)
+    frames: Floats  # (pose, joint + 1, 6) body twists [v; w] of B_0 ... B_n
+    surroundings: Floats  # (pose, 6) base twists
+    readings: dict[str, Floats]  # instrument -> (pose, k); absent: none
+
+    @classmethod
+    def none(cls, poses: int, joints: int) -> "Perturbation":
+        return cls(np.zeros((poses, joints)), np.zeros((poses, joints + 1, 6)), np.zeros((poses, 6)), {})
+
+    def plus(self, port: Port, amount: Floats) -> "Perturbation":
+        """With `amount` (pose, width of the port) added at a port."""
+        joints, frames, around = self.joints_rad, self.frames, self.surroundings
+        readings = self.readings
+        match port.place:
+            case Place.JOINTS:
+                joints = joints + amount
+            case Place.FRAME:
+                frames = frames.copy()
+                frames[:, port.index] += amount
+            case Place.SURROUNDINGS:
+                around = around + amount
+            case Place.READING:
+                readings = readings | {port.instrument: readings.get(port.instrument, 0.0) + amount}
+        return Perturbation(joints, frames, around, readings)

@@ -1,0 +1,134 @@
+"""The seam of the catalogue: a term is one piece of physics at one port of one session, linear in its coefficients.
+
+An effect (one file each) lists the terms that a session allows: `terms(drivers)`. The search sees columns only; names,
+units, limits and sentences stay with the term.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.effects.drivers import Drivers
+from calibrate.effects.ports import Port
+
+Floats = NDArray[np.float64]
+
+
+class Shape(Enum):
+    """Words of docs/formats.md."""
+
+    CONSTANT = "constant"
+    LINEAR = "linear"
+    QUADRATIC = "quadratic"
+    CUBIC = "cubic"
+    HARMONIC = "harmonic"
+    SIGN = "sign"
+    HYSTERESIS = "hysteresis"
+    EXPONENTIAL = "exponential"
+    STEP = "step"
+    PRODUCT = "product"
+    RADIAL = "radial"
+    SMOOTH = "smooth"
+
+
+@dataclass(frozen=True)
+class Inner:
+    """A parameter that enters non-linearly: a step's time, a time constant, a period."""
+
+    name: str  # with its unit: "time_s"
+    grid: tuple[float, ...]  # coarse values for the search; a line search follows
+    lower: float
+    upper: float
+    discrete: bool = False  # only a search finds it (a step's time): the refit leaves it alone
+
+
+@dataclass(frozen=True)
+class Size:
+    """A parameter as a person reads it."""
+
+    value: float
+    sigma: float
+
+
+@dataclass(frozen=True)
+class Term(ABC):
+    """One candidate. Subclasses are frozen dataclasses with what they need to know."""
+
+    port: Port
+    depends_on: tuple[str, ...]  # driver names of docs/formats.md
+    shape: Shape
+    physics: str  # of docs/formats.md
+    order: int | None = None
+    inner: tuple[Inner, ...] = ()
+    slow: bool = False  # a function of time: has to beat a wandering null, too
+    variant: str = ""  # tells terms apart that a person would give one name
+    open: bool = False  # an open family (spline, product, unknown period): competes, but names no physics
+
+    @abstractmethod
+    def basis(self, drivers: Drivers, inner: Floats) -> Floats:
+        """(pose, width of the port, coefficient) what each coefficient adds at the port, for inner values (inner,)."""
+
+    def amount(self, drivers: Drivers, coefficients: Floats, inner: Floats) -> Floats:
+        """(pose, width) the exact formula; override where it is not linear in the coefficients."""
+        return self.basis(drivers, inner) @ coefficients
+
+    @abstractmethod
+    def sizes(self, coefficients: Floats, covariance: Floats, inner: Floats, inner_sigma: Floats) -> Mapping[str, Size]:
+        """Parameters with units in their names, from coefficients and their covariance."""
+
+    @abstractmethod
+    def plausible(self, coefficients: Floats, inner: Floats, noise_rad: float) -> bool:
+        """Whether a real machine could have this size. `noise_rad`: a floor on limits, from the data's own noise."""
+
+    @abstractmethod
+    def says(self, sizes: Mapping[str, Size]) -> str:
+        """One plain sentence with size and unit."""
+
+    @property
+    def key(self) -> tuple[str, tuple[str, ...], str, int | None, str, str]:
+        """What makes it the same term."""
+        return (self.port.where, self.depends_on, self.shape.value, self.order, self.physics, self.variant)
+
+
+@dataclass(frozen=True)
+class Missing:
+    """A driver that an effect needs and the session does not hold."""
+
+    driver: str
+    column: str  # how it would be named in samples.csv, or the rig key
+    physics: str
+
+
+class Effect(Protocol):
+    """A kind of physics of the catalogue; a module-level instance in each file, one line in effects/catalogue.py."""
+
+    @property
+    def physics(self) -> str: ...
+
+    @property
+    def explains(self) -> str:
+        """One sentence of physics."""
+        ...
+
+    @property
+    def mistaken_for(self) -> tuple[str, ...]:
+        """Names of physics that look alike."""
+        ...
+
+    @property
+    def source(self) -> str:
+        """Paper, section, manual page."""
+        ...
+
+    def terms(self, drivers: Drivers, /) -> tuple[Term, ...]:
+        """Where in this session it could sit."""
+        ...
+
+    def missing(self, drivers: Drivers, /) -> tuple[Missing, ...]:
+        """What would have to be recorded for it to be told."""
+        ...

@@ -1,0 +1,95 @@
+"""What was tested and rejected, what these poses cannot see, what was not recorded, faults of the file."""
+
+from collections.abc import Iterator, Sequence
+
+from calibrate.diagnose.schema import DiagnosisFile, NameRecord
+from calibrate.report.diagnosis.words import hardest_to_see, place_words, size_of, stream_words
+from calibrate.report.elements import Html, bullets, folded, section, table, tag
+from calibrate.report.quantities import DASH, fixed, length, significant
+
+TITLE = "Doubt and limits"
+MOST_PAIRS = 40  # of confusable causes: the file holds them all
+
+
+def limits(file: DiagnosisFile) -> Html:
+    """Chapter `diagnosis-limits`."""
+    lead = "What could be there and was not found, or could not be."
+    return section(
+        "diagnosis-limits",
+        TITLE,
+        lead,
+        *_unexplained(file),
+        *_listed("Faults of the file", [b.says for b in file.blunders]),
+        *_listed("In the streams", list(stream_words(file))),
+        *_listed("Derived, not recorded", list(file.derived)),
+        *_missing(file),
+        *_visible(file),
+        *_rejected(file),
+        *_invisible(file.invisible),
+        *_confusable(file),
+    )
+
+
+def _unexplained(file: DiagnosisFile) -> Iterator[Html]:
+    rows = [
+        (u.where or "somewhere", u.says, f"{fixed(100.0 * u.share, 0)} %", _length(u.rms_m), significant(u.p, 2))
+        for u in (file.unexplained, *file.also_unexplained)
+        if u is not None
+    ]
+    if rows:
+        head = ("Where", "what", "of the variance", "rms", "p")
+        yield table(head, rows, numeric=(2, 3, 4), caption="There, and without a name")
+
+
+def _listed(title: str, lines: Sequence[str]) -> Iterator[Html]:
+    if lines:
+        yield tag("h3", title)
+        yield bullets(lines)
+
+
+def _missing(file: DiagnosisFile) -> Iterator[Html]:
+    if file.not_recorded:
+        rows = [(m.column, m.driver, m.physics) for m in file.not_recorded]
+        caption = "Not recorded: of this physics nothing can be said"
+        yield table(("Column", "driver", "physics"), rows, caption=caption)
+
+
+def _visible(file: DiagnosisFile) -> Iterator[Html]:
+    if not file.smallest:
+        return
+    hardest = [
+        (one.physics, one.where, size_of(one.parameter, one.value), one.parameter) for one in hardest_to_see(file)
+    ]
+    head = ("Physics", "where it is seen worst", "found from", "of")
+    caption = "What these poses could show: a smaller one may be there, and nobody could know (19 times out of 20)"
+    yield table(head, hardest, numeric=(2,), caption=caption)
+    every = [(one.where, one.physics, size_of(one.parameter, one.value), one.parameter) for one in file.smallest]
+    title = f"The same at every place: {len(every)} causes"
+    yield folded(title, table(("Where", "physics", "found from", "of"), sorted(every), numeric=(2,)))
+
+
+def _rejected(file: DiagnosisFile) -> Iterator[Html]:
+    if file.rejected:
+        rows = [(place_words(r), DASH if r.bic_gain is None else fixed(r.bic_gain, 1), r.why) for r in file.rejected]
+        head = ("Best candidate of its kind", "BIC gain", "why not")
+        yield table(head, rows, numeric=(1,), caption="Tested and rejected")
+
+
+def _invisible(names: Sequence[NameRecord]) -> Iterator[Html]:
+    if names:
+        title = f"Invisible with these poses: {len(names)} causes that geometry would swallow"
+        yield folded(title, bullets(place_words(name) for name in names))
+
+
+def _confusable(file: DiagnosisFile) -> Iterator[Html]:
+    if file.confusable:
+        ranked = sorted(file.confusable, key=lambda pair: -pair[2])[:MOST_PAIRS]
+        rows = [(place_words(a), place_words(b), f"{r2:.3f}") for a, b, r2 in ranked]
+        more = len(file.confusable) - len(ranked)
+        title = f"Not to be told apart with these poses: {len(file.confusable)} pairs"
+        note = (tag("p", f"{more} more in diagnosis.json."),) if more else ()
+        yield folded(title, table(("One cause", "another", "R²"), rows, numeric=(2,)), *note)
+
+
+def _length(value_m: float | None) -> str:
+    return DASH if value_m is None else length(value_m)

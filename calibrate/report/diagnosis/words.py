@@ -1,0 +1,152 @@
+"""Words of a diagnosis for a person, the same in terminal and report."""
+
+from collections.abc import Iterator, Sequence
+
+from calibrate.diagnose.schema import (
+    ClockRecord,
+    DiagnosisFile,
+    FreeSpaceRecord,
+    NameRecord,
+    RivalRecord,
+    SmallestRecord,
+    SplitRecord,
+    UnexplainedRecord,
+)
+
+NOISE = 1.15  # times the floor: some dozen samples held out scatter by so much
+TOLD = ("encoder-eccentricity", "joint-compliance", "backlash")  # in a sentence; all of them stand in the table
+UNITS = (  # ending of a parameter's name, factor, unit
+    ("_rad_per_rad", 1e6, "urad/rad"),
+    ("_rad_per_nm", 1e6, "urad/Nm"),
+    ("_rad_nm", 1e6, "urad/Nm"),
+    ("_rad_per_k", 1e6, "urad/K"),
+    ("_rad_k", 1e6, "urad/K"),
+    ("_m_per_k", 1e6, "um/K"),
+    ("_per_k", 1e6, "ppm/K"),
+    ("_share", 1e6, "ppm"),
+    ("_rad", 1e6, "urad"),
+    ("_m", 1e6, "um"),
+)
+
+
+def verdict_words(file: DiagnosisFile) -> str:
+    """What was found, what is left, and what the answer is worth."""
+    if any(not blunder.rows for blunder in file.blunders):
+        return "The file is wrong as a whole: nothing can be said about the arm."
+    match file.verdict:
+        case "mismatch":
+            n = len(file.findings)
+            return f"Recording and model part: {n} cause{'s' if n > 1 else ''} found{_how_far(file)}."
+        case "consistent":
+            return f"Recording and model agree: nothing is there beyond the noise{_tested(file)}."
+        case _:
+            return f"Undecidable: {_something(file)}{_tested(file)}."
+
+
+def _how_far(file: DiagnosisFile) -> str:
+    left = [u for u in (file.unexplained, *file.also_unexplained) if u is not None]
+    if left:
+        share = max(u.share for u in left)
+        size = f", up to {100.0 * share:.0f} % of what is left," if share > 0.0 else ""
+        return f", but not the whole of it: something{size} stays without a name ({_places(left)})"
+    if file.rms_after_m is None or not file.noise_floor_m:
+        return ""
+    ratio = file.rms_after_m / file.noise_floor_m
+    if ratio <= NOISE:
+        return ", and what remains is noise"
+    return f"; unseen samples are still missed by {ratio:.2g} times the noise"
+
+
+def _something(file: DiagnosisFile) -> str:
+    left = [u for u in (file.unexplained, *file.also_unexplained) if u is not None]
+    if not left:
+        return "something is there that no recorded column explains"
+    return f"something is there that no recorded column explains ({_places(left)})"
+
+
+def _places(left: Sequence[UnexplainedRecord]) -> str:
+    return ", ".join(dict.fromkeys(u.where or "at no one place" for u in left))
+
+
+def _tested(file: DiagnosisFile) -> str:
+    """What the answer is worth."""
+    if not file.smallest:
+        return ""
+    kinds = len({one.physics for one in file.smallest})
+    shown = [visible_words(one) for one in hardest_to_see(file) if one.physics in TOLD]
+    seen = f"; it would have shown, for instance, {'; '.join(shown)}" if shown else ""
+    lacking = ", ".join(dict.fromkeys(m.physics for m in file.not_recorded))
+    blind = f". Not tested, for lack of columns: {lacking}" if lacking else ""
+    return f". Tested were {kinds} kinds of physics, {len(file.smallest)} places and causes{seen}{blind}"
+
+
+def visible_words(smallest: SmallestRecord) -> str:
+    """'encoder-eccentricity at joint2.angle from 12 urad on': hence at better seen places, too."""
+    return f"{smallest.physics} at {smallest.where} from {size_of(smallest.parameter, smallest.value)} on"
+
+
+def size_of(parameter: str, value: float) -> str:
+    """With the unit that stands in the parameter's name."""
+    for ending, factor, unit in UNITS:
+        if parameter.endswith(ending):
+            return f"{factor * value:.3g} {unit}"
+    return f"{value:.3g} ({parameter})"
+
+
+def hardest_to_see(file: DiagnosisFile) -> tuple[SmallestRecord, ...]:
+    """Of every physics the place where most of it could stay unseen."""
+    worst: dict[str, SmallestRecord] = {}
+    for one in file.smallest:
+        known = worst.get(one.physics)
+        if known is None or (one.parameter == known.parameter and one.value > known.value):
+            worst[one.physics] = one
+    return tuple(worst.values())
+
+
+def place_words(name: NameRecord) -> str:
+    """'encoder-eccentricity at joint2.angle, harmonic 1 of q2'."""
+    order = "" if name.order is None else f" {name.order}"
+    return f"{name.physics} at {name.where}, {name.shape}{order} of {name.depends_on.replace(',', ', ')}"
+
+
+def rival_words(rival: RivalRecord) -> str:
+    """With how far behind it is."""
+    return f"{place_words(rival)} (confidence {rival.confidence:.2g}, {rival.margin:.1f} BIC behind)"
+
+
+def before_after(split: SplitRecord) -> tuple[str, str]:
+    """In micrometres."""
+    return micrometres(split.rms_before_m), micrometres(split.rms_after_m)
+
+
+def micrometres(value_m: float | None) -> str:
+    """'12.3 um', or a dash."""
+    return "-" if value_m is None else f"{1e6 * value_m:.3g} um"
+
+
+def free_space_words(change: FreeSpaceRecord) -> str:
+    """One sentence."""
+    return (
+        f"predicted error anywhere between the angles of this session: {micrometres(change.rms_before_m)} "
+        f"with geometry alone, {micrometres(change.rms_after_m)} with the physics (rms, {change.poses} poses)"
+    )
+
+
+def stream_words(file: DiagnosisFile) -> Iterator[str]:
+    """Clocks of the devices, what is usual in the streams, and what they cannot show; nothing without streams."""
+    if file.streams is None:
+        return
+    for clock in file.streams.clocks:
+        yield _clock_words(clock)
+    for usual in file.streams.usual:
+        yield f"usual: {usual.says}"
+    yield from file.streams.unseen
+
+
+def _clock_words(clock: ClockRecord) -> str:
+    if clock.offset_s is None or clock.offset_sigma_s is None:
+        return f"clock of {clock.stream}: not told ({clock.status})"
+    said = f"clock of {clock.stream}: {1e3 * clock.offset_s:.3f} ± {1e3 * clock.offset_sigma_s:.3f} ms"
+    if clock.drift is None or clock.drift_sigma is None:
+        return said
+    return f"{said}, drift {1e6 * clock.drift:.2g} ± {1e6 * clock.drift_sigma:.2g} ppm"

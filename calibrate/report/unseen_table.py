@@ -1,0 +1,30 @@
+"""Rows that a fit has not seen, predicted from the others: one line a split and instrument."""
+
+from collections.abc import Sequence
+
+from calibrate.model_file import UnseenRows
+from calibrate.report.elements import Html, table, tag
+from calibrate.report.quantities import fixed, length
+from calibrate.report.session_evidence import SAID
+
+
+def unseen_rows(found: Sequence[UnseenRows], unproven: Sequence[str]) -> list[Html]:
+    """A table, or a sentence where nothing was kept out; then why a split proves nothing."""
+    reasons = [tag("p", f"No proof by {why}.") for why in unproven]
+    if not found:
+        return [tag("p", "No rows were kept out of the fit: too few, or it was not asked for."), *reasons]
+    head = ("Left out", "reading", "count", "as drawn, rms", "identified, rms", "over the noise")
+    caption = "Rows that the fit has not seen, predicted from the others"
+    return [table(head, (_proof(p) for p in found), numeric=(2, 3, 4, 5), caption=caption), *reasons]
+
+
+def _proof(proof: UnseenRows) -> tuple[str, ...]:
+    name = SAID.get(proof.instrument, proof.instrument)
+    return (
+        proof.split,
+        name,
+        str(proof.observations),
+        length(proof.rms_before),
+        length(proof.rms_after),
+        fixed(proof.chi_after, 2),
+    )

@@ -1,0 +1,118 @@
+"""The rig file: what is believed, never what is true."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulators.conceal.drawing import Drawing, origin_and_rotation
+from simulators.conceal.rig import Device, DualPsd, TrueRig
+from simulators.conceal.toml_text import Inline
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class KnownDistance:
+    """A length between the PSD 1 centres of two places, as it was measured."""
+
+    first: int
+    second: int
+    length_m: float
+    sigma_m: float
+
+
+@dataclass(frozen=True, eq=False)
+class Belief:
+    """All that goes into rig.toml."""
+
+    drawing: Drawing
+    rig: TrueRig  # as believed
+    tool_kg: float | None
+    tool_com_m: Floats
+    device_known: bool
+    distances: Sequence[KnownDistance]
+    bars_m: Sequence[float]
+    noise: Mapping[str, float]
+    tolerance: Mapping[str, float]  # empty: the file has none
+
+
+def rig_document(belief: Belief) -> dict[str, Any]:
+    """The rig file as nested values, in the order of the interchange format."""
+    document: dict[str, Any] = {"schema": 1, "name": belief.drawing.name}
+    document["arm"] = _arm(belief)
+    document["tool"] = _tool(belief)
+    instrument = belief.rig.instrument
+    if isinstance(instrument, DualPsd):
+        document["fixture"] = {
+            "half_size_m": instrument.half_size_m,
+            "psd2_in_psd1": Inline(_pose(instrument.psd2_in_psd1)),
+        }
+        document["placement"] = [
+            {"id": number, "psd1_in_base": Inline(_pose(place))}
+            for number, place in enumerate(instrument.places, start=1)
+        ]
+    if isinstance(instrument, Device) and belief.device_known:
+        document["device"] = _pose(instrument.pose)
+    if belief.distances:
+        document["known_distance"] = [
+            {"from": one.first, "to": one.second, "length_m": one.length_m, "sigma_m": one.sigma_m}
+            for one in belief.distances
+        ]
+    if belief.bars_m:
+        document["bar"] = [{"id": number, "length_m": length} for number, length in enumerate(belief.bars_m, start=1)]
+    document["noise"] = dict(belief.noise)
+    if belief.tolerance:
+        document["tolerance"] = dict(belief.tolerance)
+    return document
+
+
+def _arm(belief: Belief) -> dict[str, Any]:
+    drawing = belief.drawing
+    flange = dict(zip(("origin_m", "rotation_rad"), map(list, drawing.flange), strict=True))
+    return {
+        "model": drawing.model,
+        "gravity_m_s2": belief.rig.arm.gravity_m_s2.tolist(),
+        "joint": [_joint(drawing, index) for index in range(drawing.n_joints)],
+        "flange": flange,
+    }
+
+
+def _joint(drawing: Drawing, index: int) -> dict[str, Any]:
+    if drawing.model == "local-poe":
+        origin_m, rotation_rad = drawing.fixed[index]
+        joint: dict[str, Any] = {"origin_m": list(origin_m), "rotation_rad": list(rotation_rad)}
+    else:
+        row = drawing.rows[index]
+        joint = {
+            "a_m": row.a_m,
+            "alpha_rad": row.alpha_rad,
+            "d_m": row.d_m,
+            "theta_offset_rad": row.theta_offset_rad,
+        }
+    joint |= {"lower_rad": drawing.lower_rad[index], "upper_rad": drawing.upper_rad[index]}
+    if drawing.gear_ratio:
+        joint["gear_ratio"] = drawing.gear_ratio[index]
+    if drawing.mass_kg:
+        joint |= {"mass_kg": drawing.mass_kg[index], "com_m": list(drawing.com_m[index])}
+    return joint
+
+
+def _tool(belief: Belief) -> dict[str, Any]:
+    tool: dict[str, Any] = {}
+    if belief.tool_kg is not None:
+        tool |= {"mass_kg": belief.tool_kg, "com_m": belief.tool_com_m.tolist()}
+    instrument = belief.rig.instrument
+    if isinstance(instrument, DualPsd):
+        return tool | {
+            "laser_origin_m": instrument.laser_origin_m.tolist(),
+            "laser_direction": instrument.laser_direction.tolist(),
+        }
+    return tool | {"point_m": belief.rig.tool_point_m.tolist()}
+
+
+def _pose(pose: Floats) -> dict[str, Any]:
+    origin_m, rotation_rad = origin_and_rotation(pose)
+    return {"origin_m": list(origin_m), "rotation_rad": list(rotation_rad)}

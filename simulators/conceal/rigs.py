@@ -1,0 +1,162 @@
+"""Draws a rig: the arm and its notation, what hangs at it, how far the truth lies off the drawing."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulators.conceal.arms import ARM_CMM, ROBOTS
+from simulators.conceal.artefacts import artefacts
+from simulators.conceal.drawing import Drawing, as_local_poe, fixed_parts, turning_com_m
+from simulators.conceal.dual_poses import reachable_share
+from simulators.conceal.kinematics import Arm
+from simulators.conceal.perturb import Spread, perturbed
+from simulators.conceal.rig import Artefacts, Device, DualPsd, TrueRig
+from simulators.conceal.wanted import ConcealError, Wanted
+from simulators.defects.rigid import moved, turned
+
+Floats = NDArray[np.float64]
+PLACE_TRIES = 30
+REACHABLE = 0.06  # share of random lines to a place that one attempt reaches
+NO_LASER_PLACE = np.eye(4)[np.newaxis]
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnRig:
+    """Drawing, belief and truth."""
+
+    drawing: Drawing  # as the rig file shows it: perhaps in another notation, perhaps without masses
+    believed: TrueRig
+    true: TrueRig
+    spread: Spread
+
+
+def draw_rig(wanted: Wanted, rng: np.random.Generator) -> DrawnRig:
+    """The rig of a session. ConcealError for an arm of unknown name or places that cannot be reached."""
+    full = _choose_arm(wanted, rng)
+    shown = as_local_poe(full) if full.gear_ratio and rng.random() < 0.25 else full
+    if rng.random() < 0.15:
+        shown = replace(shown, mass_kg=(), com_m=())
+    spread = _spread(full, rng)
+    arm = _believed_arm(full, rng)
+    if wanted.family == "dual-psd":
+        believed, true = _with_fixture(arm, full, wanted.places, spread, rng)
+    else:
+        point_m = np.array([0.0, 0.0, 0.05]) + rng.uniform(-0.06, 0.06, 3) if full.gear_ratio else np.zeros(3)
+        believed = TrueRig(arm, point_m, _others(wanted, full, rng))
+        true = perturbed(believed, spread, rng)
+    return DrawnRig(shown, believed, true, spread)
+
+
+def _choose_arm(wanted: Wanted, rng: np.random.Generator) -> Drawing:
+    if wanted.family == "cones":
+        return ARM_CMM
+    names = {drawing.name: drawing for drawing in ROBOTS}
+    if wanted.arm is None:
+        return ROBOTS[int(rng.integers(len(ROBOTS)))]
+    if wanted.arm not in names:
+        raise ConcealError(f"arm '{wanted.arm}' is not known; there are {', '.join(names)}")
+    return names[wanted.arm]
+
+
+def _spread(drawing: Drawing, rng: np.random.Generator) -> Spread:
+    """Machining and assembly of a robot, 0.2 to 0.5 mm for a metre of reach; half of that for a measuring arm."""
+    length_m = float(rng.uniform(1.5e-4, 4e-4) * max(drawing.reach_m, 0.8) * (1.0 if drawing.gear_ratio else 0.4))
+    return Spread(
+        length_m=length_m,
+        angle_rad=float(rng.uniform(3e-4, 7e-4)),
+        zero_rad=float(rng.uniform(2e-3, 8e-3)) if drawing.gear_ratio else 1e-3,
+        tool_m=5e-4,
+        laser_rad=3e-3,
+        place_m=3e-3,
+        place_rad=9e-3,
+        psd2_m=1e-4,
+        psd2_rad=1e-3,
+        device_m=5e-3,
+        device_rad=5e-3,
+        mass=float(rng.uniform(0.1, 0.3)),
+    )
+
+
+def _believed_arm(drawing: Drawing, rng: np.random.Generator) -> Arm:
+    n = drawing.n_joints
+    weighed = bool(drawing.mass_kg)
+    return Arm(
+        fixed=fixed_parts(drawing),
+        zero_rad=np.zeros(n),
+        lower_rad=np.asarray(drawing.lower_rad),
+        upper_rad=np.asarray(drawing.upper_rad),
+        mass_kg=np.asarray(drawing.mass_kg) if weighed else np.zeros(n),
+        com_m=turning_com_m(drawing) if weighed else np.zeros((n, 3)),
+        tool_kg=float(rng.uniform(0.3, 1.0) * max(drawing.reach_m, 0.5)) if weighed else 0.0,
+        tool_com_m=np.array([0.0, 0.0, 0.04]) + rng.uniform(-0.02, 0.02, 3),
+        gravity_m_s2=np.array([0.0, 0.0, -9.81]),
+    )
+
+
+def _others(wanted: Wanted, drawing: Drawing, rng: np.random.Generator) -> Device | Artefacts:
+    """A tracker or drum two to three reaches away; cones on the table around the arm."""
+    if wanted.family == "cones":
+        azimuth = rng.uniform(-np.pi, np.pi) + 2.0 * np.pi * np.arange(wanted.places) / wanted.places
+        radius_m = drawing.reach_m * rng.uniform(0.4, 0.75, wanted.places)
+        height_m = rng.uniform(-0.1, 0.5, wanted.places)
+        cone_m = np.stack((radius_m * np.cos(azimuth), radius_m * np.sin(azimuth), height_m), axis=1)
+        return artefacts(cone_m, drawing.reach_m, rng)
+    azimuth = rng.uniform(-np.pi, np.pi)
+    far_m = drawing.reach_m * rng.uniform(1.6, 2.6) + (0.5 if wanted.family == "tracker" else 0.0)
+    origin_m = np.array([far_m * np.cos(azimuth), far_m * np.sin(azimuth), rng.uniform(0.0, 1.0)])
+    return Device(moved(origin_m, rng.uniform(-0.05, 0.05, 3) + np.array([0.0, 0.0, rng.uniform(-np.pi, np.pi)])))
+
+
+def _with_fixture(
+    arm: Arm, drawing: Drawing, places: int, spread: Spread, rng: np.random.Generator
+) -> tuple[TrueRig, TrueRig]:
+    """Laser 60 to 90 deg off the flange axis; places that can be reached, drawn one by one on the true arm."""
+    lean, around = np.radians(rng.uniform(60.0, 90.0)), rng.uniform(-np.pi, np.pi)
+    bare = DualPsd(
+        laser_origin_m=np.array([0.0, 0.0, 0.05]) + rng.uniform(-0.05, 0.05, 3),
+        laser_direction=np.array([np.sin(lean) * np.cos(around), np.sin(lean) * np.sin(around), np.cos(lean)]),
+        half_size_m=float(rng.choice([0.010, 0.010, 0.015, 0.020])),
+        psd2_in_psd1=_second_face(rng),
+        places=NO_LASER_PLACE,
+    )
+    true = perturbed(TrueRig(arm, np.zeros(3), bare), spread, rng)
+    believed_places = [_place(true, drawing, rng) for _ in range(places)]
+    off = moved(spread.place_m * rng.standard_normal((places, 3)), spread.place_rad * rng.standard_normal((places, 3)))
+    nominal = np.stack(believed_places)
+    fixture = true.instrument
+    assert isinstance(fixture, DualPsd)  # noqa: S101 - narrows the type
+    return (
+        TrueRig(arm, np.zeros(3), replace(bare, places=nominal)),
+        replace(true, instrument=replace(fixture, places=nominal @ off)),
+    )
+
+
+def _second_face(rng: np.random.Generator) -> Floats:
+    """PSD 2 in PSD 1: both faces see each other at one angle, so that either may be struck first from the same side."""
+    incidence, apart_m = np.radians(rng.uniform(30.0, 40.0)), rng.uniform(0.06, 0.12)
+    origin_m = apart_m * np.array([0.0, np.sin(incidence), np.cos(incidence)])
+    return moved(origin_m, np.array([np.pi - 2.0 * incidence, 0.0, 0.0]))
+
+
+def _place(true: TrueRig, drawing: Drawing, rng: np.random.Generator) -> Floats:
+    """A place that looks towards the arm and that enough poses reach; of many tries the best."""
+    best, best_share = np.eye(4), 0.0
+    fixture = true.instrument
+    assert isinstance(fixture, DualPsd)  # noqa: S101 - narrows the type
+    for _ in range(PLACE_TRIES):
+        azimuth = rng.uniform(-2.2, 2.2)
+        radius_m, height_m = drawing.reach_m * rng.uniform(0.35, 0.85), drawing.reach_m * rng.uniform(0.05, 0.75)
+        facing = turned(np.array([0.0, 0.0, azimuth - 0.5 * np.pi + rng.uniform(-1.0, 1.0)]))
+        place = facing @ turned(np.array([rng.uniform(-0.6, 0.6), rng.uniform(-0.4, 0.4), 0.0]))
+        place[:3, 3] = radius_m * np.cos(azimuth), radius_m * np.sin(azimuth), height_m
+        share = reachable_share(true, replace(fixture, places=place[np.newaxis]), 1, rng)
+        if share > best_share:
+            best, best_share = place, share
+        if best_share >= REACHABLE:
+            return best
+    if best_share < 0.01:
+        raise ConcealError(
+            f"no place of {PLACE_TRIES} that {drawing.name} can look at from enough sides; take another seed"
+        )
+    return best

@@ -1,0 +1,60 @@
+"""A tripod that settles: the device slowly moves and turns, more slowly as time goes on."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulators.defects.directions import Vector, direction, spread
+from simulators.defects.rigid import moved
+from simulators.defects.scene import Scene
+from simulators.defects.site import Site
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DriftingDevice:
+    """Device that moves by `shift_m` in the end, with one time constant."""
+
+    shift_m: float
+    along: Vector
+    turn_rad_m: float
+    about: Vector
+    time_constant_s: float
+
+    KIND: ClassVar[str] = "drifting-device"
+    PHYSICS: ClassVar[str] = "device-drift"
+    SIZE: ClassVar[str] = "shift_m"
+    TYPICAL: ClassVar[float] = 5e-5
+    INSTRUMENTS: ClassVar[tuple[str, ...]] = ("position", "wire")
+    HABIT: ClassVar[str] = ""
+
+    @property
+    def port(self) -> str:
+        return "device.pose"
+
+    @property
+    def drivers(self) -> tuple[str, ...]:
+        return ("t",)
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        return ()
+
+    @property
+    def figures(self) -> Mapping[str, float]:
+        return {"shift_m": self.shift_m, "time_constant_s": self.time_constant_s}
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        time_constant_s = float(rng.uniform(0.2, 0.6) * site.duration_s)
+        return cls(
+            spread(rng, cls.TYPICAL), direction(rng), float(rng.uniform(0.1, 0.6)), direction(rng), time_constant_s
+        )
+
+    def device_motion(self, scene: Scene) -> Floats:
+        gone_m = self.shift_m * (1.0 - np.exp(-scene.t_s / self.time_constant_s))[:, np.newaxis]
+        return moved(gone_m * np.asarray(self.along), self.turn_rad_m * gone_m * np.asarray(self.about))

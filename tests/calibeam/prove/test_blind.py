@@ -1,0 +1,59 @@
+"""Guard rails: the diagnosing process has the recording, and no way to the truth."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+from calibeam.prove.concealing import conceal_cases, publish
+from calibeam.prove.diagnosing import bare_environment
+from calibeam.prove.layout import Layout
+from calibeam.prove.scenario import Mix
+from calibeam.prove.seal import fingerprint, opened
+
+MIX = Mix(kinds=("one",), families=("tracker",), mechanism="encoder-eccentricity")
+
+
+def test_the_diagnosing_process_may_not_import_the_simulators() -> None:
+    script = (
+        "import sys; from calibeam.prove.blind import NoSimulators; sys.meta_path.insert(0, NoSimulators())\n"
+        "import calibeam.diagnosis, calibeam.prove.unseen_poses, calibeam.prove.unseen_file\n"
+        "import simulators.conceal.case"
+    )
+    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False)
+    assert "may not import simulators" in result.stderr
+
+
+def test_what_a_diagnosis_needs_loads_no_simulator() -> None:
+    script = (
+        "import sys, calibeam.prove.blind, calibeam.diagnosis\n"
+        "import calibeam.prove.unseen_poses, calibeam.prove.unseen_file\n"
+        "print([name for name in sys.modules if name.split('.')[0] == 'simulators'])"
+    )
+    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)
+    assert result.stdout.strip() == "[]"
+
+
+def test_the_diagnosing_process_gets_a_bare_environment() -> None:
+    told = bare_environment({"PATH": "/bin", "CALIBEAM_SEAL": "sealed", "PWD": "/home/proof", "OLDPWD": "/home"})
+    assert told["PATH"] == "/bin"
+    assert not {"CALIBEAM_SEAL", "PWD", "OLDPWD"} & set(told)
+
+
+def test_nothing_of_the_truth_lies_in_clear_before_the_reveal(tmp_path: Path) -> None:
+    layout = Layout(tmp_path)
+    [one] = conceal_cases(layout, MIX, seed=11, cases=1, jobs=1)
+    name = one.scenario.name
+    assert {p.name for p in layout.recording(name).iterdir()} == {"rig.toml", "samples.csv"}
+    files = [p for p in tmp_path.rglob("*") if p.is_file()]
+    assert not any(b"eccentricity" in p.read_bytes() for p in files)
+    assert not any(str(one.scenario.wanted.seed).encode() in p.read_bytes() for p in files)
+    truth = opened(layout.seal(name).read_bytes(), one.key, one.sha256)
+    assert b"encoder-eccentricity" in truth
+
+
+def test_the_published_hash_stands_for_all_seals(tmp_path: Path) -> None:
+    layout = Layout(tmp_path)
+    cases = list(conceal_cases(layout, MIX, seed=11, cases=2, jobs=1))
+    published = publish(layout, cases)
+    assert published == fingerprint(layout.hashes.read_bytes())
+    assert [line.split()[0] for line in layout.hashes.read_text().splitlines()] == [c.sha256 for c in cases]

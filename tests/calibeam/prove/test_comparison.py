@@ -1,0 +1,93 @@
+"""After the reveal: an oracle, other methods, and columns hidden on purpose, on one session with one effect."""
+
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from acquisition.recording.read import read
+from calibeam.prove.baselines.features import features
+from calibeam.prove.comparison import GEOMETRY, compare
+from calibeam.prove.hidden_angle import hidden_angles
+from calibeam.prove.oracle import fold_of, oracle_terms
+from calibeam.prove.truth import Truth, truth_of
+from calibeam.prove.unseen_poses import tool_at
+from calibrate.diagnose.diagnosis import Verdict
+from calibrate.diagnose.file import write_diagnosis
+from calibrate.diagnose.fitted import Fitted, fit_geometry
+from calibrate.diagnose.schema import DiagnosisFile
+from calibrate.diagnose.session import session_of
+from simulators.conceal.case import conceal
+from simulators.conceal.reveal import truth_document
+from simulators.conceal.wanted import Wanted
+from simulators.conceal.write import write_case
+
+WANTED = Wanted("tracker", seed=41, defects=("encoder-eccentricity",), enr=3.0, samples=200)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("case")
+    write_case(conceal(WANTED), out)
+    return out / "recording"
+
+
+@pytest.fixture(scope="module")
+def truth() -> Truth:
+    return truth_of(msgspec.json.encode(truth_document(conceal(WANTED))))
+
+
+@pytest.fixture(scope="module")
+def state(folder: Path) -> Fitted:
+    source = read(folder)
+    return fit_geometry(session_of(source.rig, source.samples))
+
+
+def test_the_oracle_fits_what_is_true(state: Fitted, truth: Truth) -> None:
+    terms = oracle_terms(state, truth.defects, "tracker")
+    assert terms is not None
+    assert {(a.term.port.where, a.term.physics) for a in terms} == {(truth.defects[0].port, "encoder-eccentricity")}
+
+
+def test_there_is_no_oracle_for_what_no_catalogue_lists(state: Fitted, truth: Truth) -> None:
+    unlisted = msgspec.structs.replace(truth.defects[0], physics="unknown")
+    assert oracle_terms(state, (unlisted,), "tracker") is None
+
+
+def test_a_diagnosis_that_finds_nothing_gains_nothing(folder: Path, truth: Truth, tmp_path: Path) -> None:
+    silent = DiagnosisFile(1, Verdict.CONSISTENT.value, 1e-5, 1e-5, 1e-5, (), None, ())
+    write_diagnosis(tmp_path / "diagnosis.json", silent)
+    found = compare(folder, tmp_path, truth, "tracker")
+    assert found is not None
+    assert found.oracle_m < 0.5 * found.before_m
+    gains = {b.method: b.gain for b in found.baselines}
+    assert gains[GEOMETRY] == 0.0
+    assert gains["diagnosis"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_learners_are_not_given_the_answer(state: Fitted) -> None:
+    """No feature is a reading as measured, nor follows the misfit by itself."""
+    fold = fold_of(state, 1)
+    X, names = features(fold.geometry)
+    unseen = fold.geometry.held_out(fold.test)[0]
+    assert len(names) == X.shape[1]
+    matched = [abs(np.corrcoef(column[unseen.sample], unseen.misfit[:, 0])[0, 1]) for column in X.T]
+    assert max(matched) < 0.9
+
+
+def test_a_hidden_angle_is_inferred_as_well_as_stated(folder: Path) -> None:
+    for hidden in hidden_angles(read(folder)):
+        if hidden.rms_rad is not None and hidden.expected_rad is not None:
+            assert hidden.rms_rad < 2.0 * hidden.expected_rad
+
+
+def test_unseen_poses_of_geometry_alone_are_those_of_the_arm(state: Fitted) -> None:
+    """At measured poses the tip is where the fit says, up to where the device stands."""
+    q_rad = state.session.samples.joints()[:30]
+    tip_m = tool_at(state, q_rad, np.sign(q_rad))
+    assert isinstance(tip_m, np.ndarray)
+    expected = state.around.expected[0][:30]
+    for a, b in ((0, 7), (3, 21), (11, 29)):
+        said, fitted = np.linalg.norm(tip_m[a] - tip_m[b]), np.linalg.norm(expected[a] - expected[b])
+        assert said == pytest.approx(fitted, abs=1e-9)

@@ -1,0 +1,61 @@
+"""The small proof of every change: conceal, diagnose in another process, reveal, score; and what is refused."""
+
+import json
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from calibeam import cli
+from calibeam.prove.record import ProofFile
+
+PLAIN = ("--family", "tracker", "--enr", "3", "4", "--jobs", "1", "--seed", "21")
+
+
+def _proved(out: Path, *options: str) -> ProofFile:
+    assert cli.run(["prove", "--out", str(out), *PLAIN, *options, "--json"]) == 0
+    return msgspec.json.decode((out / "proof.json").read_bytes(), type=ProofFile)
+
+
+@pytest.mark.timeout(300)
+def test_a_plain_effect_is_found_named_and_better_where_nobody_measured(tmp_path: Path) -> None:
+    proof = _proved(tmp_path / "p", "--kind", "one", "--mechanism", "encoder-eccentricity", "--cases", "1")
+    [case] = proof.cases
+    assert case.error == ""
+    assert case.defects[0].named
+    assert case.held_out_after_m is not None
+    assert case.floor_m is not None
+    assert case.held_out_after_m < 1.2 * case.floor_m
+    assert case.free_space_after_m is not None
+    assert case.free_space_before_m is not None
+    assert case.free_space_after_m < 0.5 * case.free_space_before_m
+    truth = json.loads((tmp_path / "p" / "revealed" / f"{case.name}.json").read_bytes())
+    assert truth["defects"][0]["mechanism"] == "encoder-eccentricity"
+    assert "as it should be" in (tmp_path / "p" / "proof.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.timeout(300)
+def test_an_effect_taken_out_of_the_catalogue_turns_unknown_at_its_place(tmp_path: Path) -> None:
+    """Reading lag: nothing else of the catalogue depends on the last move of a joint alone."""
+    options = ("--kind", "one", "--mechanism", "slow-filter", "--cases", "1", "--without", "reading-lag")
+    [case] = _proved(tmp_path / "p", *options).cases
+    assert case.defects[0].physics == "unknown"
+    assert case.defects[0].located
+    assert case.defects[0].unknown_there
+    assert not case.misnamed
+
+
+def test_a_seed_of_development_is_not_published(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["prove", "--out", str(tmp_path / "p"), "--seed", "21", "--publish"]) == 1
+    assert "seed 21 is one of development" in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_folder_with_something_in_it_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "old.txt").write_text("of another proof")
+    assert cli.run(["prove", "--out", str(tmp_path), "--cases", "1"]) == 1
+    assert "not empty" in capsys.readouterr().err
+
+
+def test_physics_that_no_catalogue_has_cannot_be_taken_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["prove", "--out", str(tmp_path / "p"), "--without", "magic"]) == 1
+    assert "no physics of the catalogue" in " ".join(capsys.readouterr().err.split())

@@ -1,0 +1,153 @@
+"""One case: said against hidden, by the words of the file formats."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calibeam.prove.concealing import Concealed
+from calibeam.prove.diagnosing import Answered
+from calibeam.prove.layout import Layout
+from calibeam.prove.record import CaseScore
+from calibeam.prove.scenario import Scenario
+from calibeam.prove.scoring import score
+from calibeam.prove.truth import Exact, FreeSpace, TrueDefect, TrueNoise, Truth
+from calibrate.diagnose.file import write_diagnosis
+from calibrate.diagnose.schema import DiagnosisFile, FindingRecord, NotRecorded, RivalRecord, SizeRecord
+from simulators.conceal.wanted import Wanted
+
+NAME = "case-0000"
+JOINT = """
+[[arm.joint]]
+a_m = 0.4
+alpha_rad = 0.0
+d_m = 0.0
+theta_offset_rad = 0.0
+lower_rad = -3.0
+upper_rad = 3.0
+"""
+RIG = f"""
+schema = 1
+name = "two joints"
+[arm]
+model = "dh"
+gravity_m_s2 = [0, 0, -9.81]
+{JOINT}
+{JOINT}
+[tool]
+point_m = [0.0, 0.0, 0.0]
+"""
+NOISE_M = 1e-5
+
+Scored = Callable[..., CaseScore]
+MakeDefect = Callable[..., TrueDefect]
+
+
+@pytest.fixture
+def scored(tmp_path: Path) -> Scored:
+    """Of defects, findings and what else a file says."""
+
+    def run(
+        defects: tuple[TrueDefect, ...], *findings: FindingRecord, withheld: tuple[str, ...] = (), **more: object
+    ) -> CaseScore:
+        layout = Layout(tmp_path)
+        exact = _write_recording(layout.recording(NAME))
+        fields: dict[str, object] = {"verdict": "mismatch" if findings else "consistent"} | more
+        file = DiagnosisFile(
+            schema=1,
+            noise_floor_m=NOISE_M,
+            rms_before_m=5e-5,
+            rms_after_m=1e-5,
+            findings=findings,
+            unexplained=None,
+            next=(),
+            **fields,  # type: ignore[arg-type]
+        )
+        write_diagnosis(layout.answer(NAME) / "diagnosis.json", file)
+        truth = Truth({}, defects, withheld, TrueNoise("white", NOISE_M, NOISE_M), Exact(exact), FreeSpace())
+        kind = "withheld" if withheld else "one"
+        concealed = Concealed(Scenario(NAME, kind, Wanted("tracker", seed=5000)), "", b"", 0)
+        return score(layout, concealed, Answered(NAME, 1.0, ""), truth)
+
+    return run
+
+
+def _write_recording(folder: Path) -> list[list[float]]:
+    rng = np.random.default_rng(1)
+    exact = rng.uniform(-0.5, 0.5, (400, 3))
+    seen = exact + NOISE_M * rng.standard_normal(exact.shape)
+    seen[7] += 0.01  # wild: of nobody's making
+    folder.mkdir(parents=True)
+    (folder / "rig.toml").write_text(RIG, encoding="utf-8")
+    rows = [f"{i},{0.1},{0.2},{','.join(map(repr, row.tolist()))}" for i, row in enumerate(seen)]
+    (folder / "samples.csv").write_text("\n".join(["t_s,q1_rad,q2_rad,x_m,y_m,z_m", *rows]) + "\n", encoding="utf-8")
+    return exact.tolist()
+
+
+def _finding(where: str, physics: str, depends_on: str = "q2", **more: object) -> FindingRecord:
+    fields: dict[str, object] = {"rivals": (), "parameters": {}} | more
+    return FindingRecord(
+        where,
+        depends_on,
+        "harmonic",
+        1,
+        physics,
+        share=1.0,
+        confidence=0.99,
+        says="",
+        p=1e-4,
+        bic_gain=100.0,
+        held_out_gain=50.0,
+        **fields,  # type: ignore[arg-type]
+    )
+
+
+def test_place_and_physics_are_named(scored: Scored, defect: MakeDefect) -> None:
+    size = {"amplitude_rad": SizeRecord(1.05e-4, 4e-6)}
+    case = scored((defect(),), _finding("joint2.angle", "encoder-eccentricity", parameters=size))
+    [one] = case.defects
+    assert (one.located, one.named, one.driver, one.among_rivals) == (True, True, True, True)
+    assert [(s.name, s.inside) for s in one.sizes] == [("amplitude_rad", True)]
+    assert not case.misnamed
+
+
+def test_another_place_is_neither_located_nor_named(scored: Scored, defect: MakeDefect) -> None:
+    case = scored((defect(),), _finding("joint3.angle", "encoder-eccentricity"))
+    assert (case.defects[0].located, case.defects[0].named) == (False, False)
+    assert case.misnamed
+
+
+def test_a_rival_that_is_true_counts_as_said(scored: Scored, defect: MakeDefect) -> None:
+    rival = RivalRecord("joint2.angle", "q2", "harmonic", 1, "encoder-eccentricity", confidence=0.4, margin=1.0)
+    case = scored((defect(),), _finding("joint2.angle", "encoder-harmonic", rivals=(rival,)))
+    assert (case.defects[0].named, case.defects[0].among_rivals) == (False, True)
+
+
+def test_each_of_several_causes_needs_a_finding_of_its_own(scored: Scored, defect: MakeDefect) -> None:
+    two = (defect(), defect("backlash", "joint4.angle"))
+    case = scored(two, _finding("joint2.angle", "encoder-eccentricity"))
+    assert [d.named for d in case.defects] == [True, False]
+
+
+def test_unknown_at_its_place_is_right_for_what_no_catalogue_lists(scored: Scored, defect: MakeDefect) -> None:
+    case = scored((defect("unknown"),), _finding("joint2.angle", "unknown"))
+    assert case.kind == "outside"
+    assert case.defects[0].unknown_there
+    assert not case.misnamed
+
+
+def test_a_missing_column_has_to_be_named_in_doubt(scored: Scored, defect: MakeDefect) -> None:
+    lacking = (NotRecorded("approach2", "approach1 ...", "backlash"),)
+    hidden = (defect("backlash"),)
+    assert scored(hidden, withheld=("approach",), verdict="undecidable", not_recorded=lacking).asks_for
+
+
+def test_a_missing_column_is_not_asked_for_by_calling_all_consistent(scored: Scored, defect: MakeDefect) -> None:
+    lacking = (NotRecorded("approach2", "approach1 ...", "backlash"),)
+    assert not scored((defect("backlash"),), withheld=("approach",), not_recorded=lacking).asks_for
+
+
+def test_the_floor_is_the_noise_that_was_added(scored: Scored, defect: MakeDefect) -> None:
+    case = scored((defect(),))
+    assert case.floor_m == pytest.approx(NOISE_M, rel=0.05)

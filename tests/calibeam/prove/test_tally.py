@@ -1,0 +1,72 @@
+"""Sums: every hidden cause counts once, every alarm counts, and shares carry their doubt."""
+
+from collections.abc import Callable
+
+import pytest
+
+from calibeam.prove.confusion import confusion
+from calibeam.prove.interval import Share, share
+from calibeam.prove.record import CaseScore, DefectScore, Said, SizeScore
+from calibeam.prove.story import faults
+from calibeam.prove.tally import by_enr, figures
+
+Case = Callable[..., CaseScore]
+Found = Callable[..., DefectScore]
+
+
+def _said(physics: str = "backlash", *, right: bool = False, confidence: float = 0.99) -> Said:
+    return Said("joint2.angle", "q2", physics, confidence, "", placed=right, right=right)
+
+
+def test_wilson_interval_of_none_in_ten() -> None:
+    """Newcombe, Statistics in Medicine 17, 1998, table I gives 0 / 20 as 0 to 0.1611."""
+    assert Share(0, 20).interval == pytest.approx((0.0, 0.1611), abs=1e-4)
+    assert Share(81, 263).interval == pytest.approx((0.2553, 0.3662), abs=1e-4)
+
+
+def test_a_share_of_nothing_is_no_number() -> None:
+    assert str(share([])) == "-"
+
+
+def test_causes_count_in_their_bin(case: Case, found: Found) -> None:
+    lines = {line.label: line for line in by_enr([case((found(enr=0.4),)), case((found(enr=3.0, named=False),))])}
+    assert (lines["0.3 - 0.6"].named.k, lines["0.3 - 0.6"].named.n) == (1, 1)
+    assert (lines["2 - 5"].named.k, lines["2 - 5"].located.k) == (0, 1)
+
+
+def test_a_finding_in_mere_noise_is_a_false_alarm(case: Case) -> None:
+    table = {f.label: f.said for f in figures([case(), case(said=(_said(),))])}
+    assert table["false alarms, white noise"].startswith("50 %")
+    assert faults(case(said=(_said(),)))
+    assert not faults(case())
+
+
+def test_a_confident_name_for_what_no_catalogue_lists_is_a_fault(case: Case, found: Found) -> None:
+    outside = found(physics="unknown", named=False)
+    assert case((outside,), (_said(),), kind="outside").misnamed
+    assert not case((outside,), (_said(confidence=0.5),), kind="outside").misnamed
+    assert not case((outside,), (_said("unknown", right=True),), kind="outside").misnamed
+
+
+def test_a_faint_cause_need_not_be_found(case: Case, found: Found) -> None:
+    assert not faults(case((found(enr=0.2, located=False, named=False),)))
+    assert faults(case((found(enr=0.8, located=False, named=False),)))
+
+
+def test_a_stated_size_has_to_hold() -> None:
+    assert SizeScore("play_rad", 1e-4, 1.1e-4, 0.6e-5).inside
+    assert not SizeScore("play_rad", 1e-4, 1.3e-4, 1e-5).inside
+
+
+def test_the_confusion_matrix_has_right_answers_on_its_diagonal(case: Case, found: Found) -> None:
+    cases = [
+        case((found(),), (_said(right=True),)),
+        case((found(named=False),), (_said("reading-lag"),)),
+        case(),
+    ]
+    hidden, said, counts = confusion(cases)
+    assert hidden == ["backlash", "nothing"]
+    assert counts[0, said.index("backlash")] == 1
+    assert counts[0, said.index("reading-lag")] == 1
+    assert counts[1, said.index("nothing")] == 1
+    assert counts.sum() == len(cases)

@@ -1,0 +1,50 @@
+"""Rows of two sessions of one motion find each other by pose and order."""
+
+import numpy as np
+import pytest
+
+from acquisition.recording.samples import Samples
+from calibrate.diagnose.compare.matched import SAME_RAD, match
+from calibrate.errors import DataError
+
+
+def session(q_rad, **columns):
+    q = np.asarray(q_rad, dtype=float)
+    joints = {f"q{i + 1}_rad": q[:, i] for i in range(q.shape[1])}
+    return Samples({"t_s": np.arange(len(q), dtype=float), **joints, **columns}, q.shape[1])
+
+
+@pytest.fixture
+def poses():
+    return np.random.default_rng(1).uniform(-1.0, 1.0, (40, 3))
+
+
+def test_rows_missing_on_either_side_are_told(poses):
+    one, two = np.delete(poses, [4, 5], axis=0), np.delete(poses, [20], axis=0)
+    found = match(session(one), session(two))
+    assert np.array_equal(one[found.measured], two[found.simulated])
+    assert len(found.measured) == 37
+    assert found.only_measured.tolist() == [18]
+    assert found.only_simulated.tolist() == [4, 5]
+
+
+def test_a_pose_taken_twice_keeps_its_order(poses):
+    both = np.concatenate([poses[:5], poses[:5]])
+    found = match(session(both), session(both))
+    assert found.measured.tolist() == found.simulated.tolist() == list(range(10))
+
+
+def test_another_placement_is_another_sample(poses):
+    one, two = session(poses, placement=np.ones(40)), session(poses, placement=np.full(40, 2.0))
+    with pytest.raises(DataError, match="same motion"):
+        match(one, two)
+
+
+def test_a_servo_that_stopped_a_little_elsewhere_is_the_same_pose(poses):
+    found = match(session(poses + 0.4 * SAME_RAD), session(poses))
+    assert len(found.measured) == 40
+
+
+def test_arms_of_other_joints_are_refused(poses):
+    with pytest.raises(DataError, match="2 joints"):
+        match(session(poses), session(poses[:, :2]))

@@ -1,0 +1,67 @@
+"""From a session folder to findings, for sessions of the concealed bench; truth is opened by the test alone."""
+
+import json
+
+import numpy as np
+import pytest
+
+from calibrate.diagnose.diagnosis import Verdict
+from calibrate.diagnose.from_recording import diagnose_samples
+from calibrate.diagnose.to_file import file_of
+from calibrate.errors import DataError
+
+from .concealed import changed, recording_of
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("tracker")
+
+
+@pytest.fixture(scope="module")
+def recording(folder):
+    return recording_of(
+        folder, family="tracker", seed=31, samples=120, arm="irb120", defects=("encoder-eccentricity",), enr=2.0
+    )
+
+
+@pytest.fixture(scope="module")
+def found(recording):
+    return diagnose_samples(recording.rig, recording.samples, np.random.default_rng(1))
+
+
+def test_the_concealed_defect_is_found_where_it_is(found, folder):
+    (hidden,) = json.loads((folder / "sealed" / "truth.json").read_text())["defects"]
+    assert found.physics.diagnosis.verdict is Verdict.MISMATCH
+    largest = found.physics.diagnosis.findings[0]
+    assert largest.name.where == hidden["port"]
+    candidates = {largest.name.physics, *(rival.name.physics for rival in largest.rivals)}
+    assert hidden["physics"] in candidates
+
+
+def test_free_space_is_predicted_better_with_the_physics(found):
+    change = found.physics.free_space
+    assert change.before_m > change.after_m > 0.0
+
+
+def test_the_file_says_the_same(found, recording):
+    file = file_of(found, recording)
+    assert file.verdict == "mismatch"
+    assert file.findings[0].where == found.physics.diagnosis.findings[0].name.where
+    assert file.rms_after_m < file.rms_before_m
+    curve = file.findings[0].curve
+    assert len(curve.values) == len(curve.residual) == len(curve.fitted) == file.samples
+
+
+def test_a_file_that_is_wrong_as_a_whole_is_undecidable_and_says_why(recording):
+    turned = changed(recording.samples, q2_rad=-recording.samples.column("q2_rad"))
+    found = diagnose_samples(recording.rig, turned, np.random.default_rng(1))
+    file = file_of(found, recording)
+    assert (file.verdict, file.findings, file.rms_before_m) == ("undecidable", (), None)
+    assert file.blunders[0].rows == ()
+    assert "q2" in file.next[0]
+
+
+def test_a_handful_of_samples_is_refused(recording):
+    with pytest.raises(DataError, match="measure more poses"):
+        diagnose_samples(recording.rig, recording.samples.take(np.arange(15)), np.random.default_rng(1))

@@ -1,0 +1,69 @@
+"""Scatter without a column: whose lever it follows, which missing column would do it, and what is innocent."""
+
+import numpy as np
+
+from calibrate.diagnose.bench import Bench
+from calibrate.diagnose.joint_scatter import innocent
+from calibrate.diagnose.noise_law import noise_law
+from calibrate.diagnose.unrecorded import unrecorded
+from calibrate.effects.term import Missing
+
+SEEDS = 6
+APPROACH = Missing("approach", "approach1 ...", "backlash")
+SPEED = Missing("qd", "qd1_rad_s ...", "latency")
+
+
+def scattered(world, rng, joints, moving):
+    """A session whose joints turn by chance, all alike, at some of the samples."""
+    drawn = rng.normal(size=(len(moving), len(joints))) * moving[:, None]
+
+    def turned(drivers):
+        return sum(world.at_joint(j, lambda _, x=drawn[:, c]: x)(drivers) for c, j in enumerate(joints))
+
+    return world.session(rng, [(turned, 2.0)])
+
+
+def asked(world, seed, joints, share, missing):
+    rng = np.random.default_rng(seed)
+    n = len(world.session(rng).drivers.t_s)
+    return unrecorded(Bench(scattered(world, rng, joints, rng.random(n) < share)), rng, missing)
+
+
+def test_the_missing_column_is_named_at_its_joint(world):
+    found = [asked(world, seed, (3,), 2.0, (APPROACH, SPEED)) for seed in range(SEEDS)]
+    right = [f for f in found if f is not None and f.port.where == "joint3.angle" and f.missing == (APPROACH,)]
+    assert len(right) >= 5
+
+
+def test_joints_that_do_not_repeat_well_lack_no_driver(world):
+    joints = tuple(range(1, world.session(np.random.default_rng(0)).drivers.n_joints + 1))
+    found = [asked(world, seed, joints, 2.0, (APPROACH, SPEED)) for seed in range(SEEDS)]
+    assert sum(f is not None for f in found) <= 1
+
+
+def test_joints_that_scatter_at_some_samples_only_were_moving(world):
+    joints = tuple(range(1, world.session(np.random.default_rng(0)).drivers.n_joints + 1))
+    found = [asked(world, seed, joints, 0.4, (APPROACH, SPEED)) for seed in range(SEEDS)]
+    right = [f for f in found if f is not None and f.port.where == "time" and f.missing == (SPEED,)]
+    assert len(right) >= 5
+
+
+def test_innocent_scatter_is_whitened():
+    rng = np.random.default_rng(4)
+    joints = rng.normal(size=(3, 400, 4))
+    raw = rng.normal(size=(400, 4)) + 2.0 * np.einsum("jok,oj->ok", joints, rng.normal(size=(400, 3)))
+    base = innocent(raw, joints)
+    white = np.einsum("oij,oj->oi", base.whitener, raw)
+    assert base.through_joints
+    assert np.allclose(white.T @ white / 400, np.eye(4), atol=0.2)
+    assert base.restless < 12.0
+
+
+def test_a_step_of_the_fit_is_longer_than_the_least_squares_step(world):
+    """Gaussian data under the t law: curvature E[psi'] / E[w] below one, above its value for data of that law."""
+    found = []
+    for seed in range(SEEDS):
+        rng = np.random.default_rng(seed)
+        bench = Bench(world.session(rng))
+        found.append(noise_law(bench.state.rows, bench.sight, bench.state.drivers.t_s, rng).curvature)
+    assert 0.7 < np.mean(found) < 0.95

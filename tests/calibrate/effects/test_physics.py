@@ -1,0 +1,115 @@
+"""What single entries add, against mechanics worked out another way."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calibrate.diagnose.ported import perturbed_frames
+from calibrate.effects.arm_thermal_growth import EFFECT as ARM_GROWTH
+from calibrate.effects.backlash import EFFECT as BACKLASH
+from calibrate.effects.curves import bumps, splines
+from calibrate.effects.encoder_eccentricity import EFFECT as ECCENTRICITY
+from calibrate.effects.gravity import gravity_in_flange, masses
+from calibrate.effects.link_bending import EFFECT as BENDING
+from calibrate.effects.open_at_readouts import EFFECT as READOUTS
+from calibrate.effects.ports import Perturbation
+from calibrate.effects.term import Shape
+from calibrate.effects.tool_sag import EFFECT as SAG
+
+from .conftest import full_session
+
+NOTHING = np.zeros(0)
+
+
+def test_an_encoder_off_centre_reads_by_the_exact_formula():
+    drivers, e, f = full_session("tracker").drivers, 0.05, 0.7
+    term = ECCENTRICITY.terms(drivers)[2]
+    q = drivers.q_rad[:, 2]
+    amount = term.amount(drivers, np.array([-e * np.cos(f), e * np.sin(f)]), NOTHING)
+    assert amount[:, 2] == pytest.approx(-np.arctan2(e * np.sin(q - f), 1.0 + e * np.cos(q - f)), abs=1e-15)
+    assert not np.any(np.delete(amount, 2, axis=1))
+
+
+def test_a_bending_link_is_an_elastic_line():
+    """Slope and sag of the end by summing curvature along the link in 2000 pieces, for all weight behind it."""
+    drivers, c, pieces = full_session("tracker").drivers, 2e-6, 2000
+    term = BENDING.terms(drivers)[0]
+    link, pose = int(term.port.where[4 : term.port.where.index(".")]), 17
+    B = drivers.frames[pose]
+    start, end = B[link - 1, :3, 3], B[link, :3, 3]
+    along = (end - start) / np.linalg.norm(end - start)
+    slope, sag = np.zeros(3), np.zeros(3)
+    for share in (np.arange(pieces) + 0.5) / pieces:
+        at = start + share * (end - start)
+        moment = np.zeros(3)
+        for mass, i, com in masses(drivers):
+            if i > link:
+                moment += np.cross(B[i, :3, :3] @ np.array(com) + B[i, :3, 3] - at, mass * drivers.gravity_m_s2)
+        if drivers.payload_kg is not None:
+            moment += np.cross(B[-1, :3, 3] - at, drivers.payload_kg[pose] * drivers.gravity_m_s2)
+        curvature = c / pieces * (moment - (moment @ along) * along)
+        slope += curvature
+        sag += np.cross(curvature, end - at)
+    twist = term.amount(drivers, np.array([c]), NOTHING)[pose]
+    assert B[link, :3, :3] @ twist[3:] == pytest.approx(slope, rel=1e-4, abs=1e-12)
+    assert B[link, :3, :3] @ twist[:3] == pytest.approx(sag, rel=1e-4, abs=1e-12)
+
+
+def test_a_warm_arm_keeps_its_angles_and_scales_its_reach():
+    fitted = full_session("tracker")
+    drivers, growth = fitted.drivers, 1e-5
+    term = next(t for t in ARM_GROWTH.terms(drivers) if t.depends_on == ("temp_room",))
+    none = Perturbation.none(len(drivers.t_s), drivers.n_joints)
+    theta = fitted.geometry[: len(fitted.session.arm.parameters)]
+    warm = none.plus(term.port, term.amount(drivers, np.array([growth]), NOTHING))
+    before = perturbed_frames(fitted.session.arm, theta, drivers.q_rad, none)
+    after = perturbed_frames(fitted.session.arm, theta, drivers.q_rad, warm)
+    T = drivers.temperatures_degC["room"]
+    reach = before[:, -1, :3, 3] - before[:, 0, :3, 3]
+    assert after[:, -1, :3, :3] == pytest.approx(before[:, -1, :3, :3], abs=1e-12)
+    assert after[:, -1, :3, 3] - before[:, -1, :3, 3] == pytest.approx(
+        growth * (T - T.mean())[:, None] * reach, abs=1e-12
+    )
+
+
+def test_a_soft_bracket_lowers_its_tip():
+    """A tip on its overhang never rises under its own weight, and most where the overhang lies level."""
+    drivers = full_session("tracker").drivers
+    term = next(t for t in SAG.terms(drivers) if t.variant == "bracket, overhang to its tip")
+    tip = np.array(drivers.rig.tool.point_m)
+    turn = term.amount(drivers, np.array([1e-4]), NOTHING)[:, 3:]
+    g = gravity_in_flange(drivers)
+    fall = np.einsum("ni,ni->n", np.cross(turn, tip), g)
+    level = np.linalg.norm(np.cross(tip / np.linalg.norm(tip), g), axis=1)
+    assert fall == pytest.approx(1e-4 * np.linalg.norm(tip) * level**2, abs=1e-12)
+
+
+def test_an_approach_that_is_derived_is_called_hysteresis():
+    drivers = full_session("tracker").drivers
+    shapes = {d: {t.shape for t in BACKLASH.terms(replace(drivers, approach_derived=d))} for d in (False, True)}
+    assert Shape.HYSTERESIS not in shapes[False]
+    assert Shape.HYSTERESIS in shapes[True]
+
+
+def test_bent_light_falls_along_gravity_by_the_square_of_the_level_range():
+    drivers = full_session("tracker").drivers
+    term = next(t for t in READOUTS.terms(drivers) if t.variant == "towards gravity")
+    bend = term.basis(drivers, NOTHING)[:, :3, 0]
+    size = np.linalg.norm(bend, axis=1)
+    down = bend / size[:, None]
+    assert down == pytest.approx(np.broadcast_to(down[0], down.shape), abs=1e-12)
+    seen = drivers.readouts["position"].predicted
+    level = np.linalg.norm(seen - np.outer(seen @ down[0], down[0]), axis=1)
+    assert size == pytest.approx(level**2 / 2.0)
+
+
+def test_splines_and_a_constant_span_every_cubic():
+    x = np.linspace(-2.0, 1.0, 200)
+    columns = np.concatenate([splines(x), np.ones((200, 1))], axis=1)
+    cubic = 1.0 - 2.0 * x + 0.5 * x**3
+    assert columns @ np.linalg.lstsq(columns, cubic)[0] == pytest.approx(cubic, abs=1e-10)
+
+
+def test_a_bump_is_one_at_its_place_and_gone_four_widths_off():
+    assert bumps(np.array([0.3, 0.7]), np.array([0.3, 0.1]))[:, 0] == pytest.approx([1.0, np.exp(-8.0)])

@@ -1,0 +1,138 @@
+"""The pages of a diagnosis: everything of the file is on them, in one HTML that needs nothing else."""
+
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from calibrate.diagnose.schema import (
+    BlunderRecord,
+    CurveRecord,
+    DiagnosisFile,
+    FindingRecord,
+    FloorRecord,
+    FreeSpaceRecord,
+    LackOfFitRecord,
+    NameRecord,
+    NotRecorded,
+    RejectedRecord,
+    RigRecord,
+    RivalRecord,
+    SizeRecord,
+    SplitRecord,
+    UnexplainedRecord,
+)
+from calibrate.errors import DataError
+from calibrate.report.diagnosis.chain_figure import chain_figure, chain_of
+from calibrate.report.diagnosis.finding_page import size_words
+from calibrate.report.diagnosis.page import chapters_of, contents_of, inserted
+from calibrate.report.diagnosis.words import verdict_words
+
+Q = np.linspace(-1.5, 1.5, 60)
+CURVE = CurveRecord(
+    "q3", "rad", tuple(Q.tolist()), (None, *(1e-4 * np.sin(Q[1:])).tolist()), tuple((1e-4 * np.sin(Q)).tolist())
+)
+COMPLIANCE = ("joint3.angle", "gravity_torque3", "linear", None, "joint-compliance")
+FINDING = FindingRecord(
+    "joint3.angle",
+    "q3",
+    "harmonic",
+    1,
+    "encoder-eccentricity",
+    parameters={"amplitude_rad": SizeRecord(1.1e-4, 4e-6), "phase_rad": SizeRecord(0.4, 0.03)},
+    share=0.83,
+    confidence=0.9,
+    says="Joint 3 reads off by <110> µrad",
+    rivals=(RivalRecord(*COMPLIANCE, confidence=0.1, margin=4.4),),
+    p=1e-9,
+    bic_gain=80.0,
+    held_out_gain=70.0,
+    curve=CURVE,
+)
+FILE = DiagnosisFile(
+    schema=1,
+    verdict="mismatch",
+    noise_floor_m=2.1e-6,
+    rms_before_m=4.1e-5,
+    rms_after_m=2.2e-6,
+    findings=(FINDING,),
+    unexplained=UnexplainedRecord("joint5.angle", "", 1e-6, 0.2, 0.003, "scatter without a column"),
+    next=("encoder-eccentricity at joint3.angle could also be another: measure more",),
+    rig=RigRecord("irb", "0"),
+    samples=60,
+    splits=(SplitRecord("random", "dual-psd", 12, 0, 4.1e-5, 2.2e-6, 0.9, 0.99),),
+    floors=(FloorRecord("dual-psd", 2.1e-6, "scatter within repeats"),),
+    free_space=FreeSpaceRecord(2e-4, 8e-6, 300),
+    lack_of_fit=LackOfFitRecord(15, 0.98, 0.5, False),
+    rejected=(RejectedRecord("joint4.angle", "q4", "sign", None, "backlash", bic_gain=-3.0, why="too little"),),
+    invisible=(NameRecord("psd1.reading", "incidence1", "smooth", None, "psd-cover-glass"),),
+    confusable=((NameRecord(*COMPLIANCE), NameRecord("joint3.angle", "q3", "linear", None, "gear-ratio-error"), 0.98),),
+    not_recorded=(NotRecorded("payload", "payload_kg", "payload-compliance"),),
+    blunders=(BlunderRecord("bad shot", (8,), "x_m", "row 8, x_m: far off; measure it again"),),
+)
+
+
+@pytest.fixture(scope="module")
+def text():
+    return "".join(chapters_of(FILE, 6))
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "Joint 3 reads off by &lt;110&gt; µrad",
+        "110.0 ± 4.0 µrad".replace(" ", "\N{NO-BREAK SPACE}"),
+        "joint-compliance at joint3.angle",
+        "scatter without a column",
+        "payload_kg",
+        "backlash at joint4.angle",
+        "psd-cover-glass at psd1.reading",
+        "row 8, x_m: far off",
+        "0.980",
+        "What to do",
+    ],
+)
+def test_everything_that_was_said_is_on_the_pages(text, said):
+    assert said in text
+
+
+def test_every_heading_of_the_contents_has_its_chapter(text):
+    assert set(contents_of(FILE)) <= set(re.findall(r'<section id="([^"]*)"', text))
+
+
+def test_the_place_is_marked_in_the_chain_and_nowhere_else():
+    drawn = chain_figure("1", "psd2.reading", chain_of(6, ("dual-psd",)))
+    assert drawn.count("reading</text>") == 1
+    assert "PSD 2" in drawn
+    assert "device" not in drawn
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "said"),
+    [
+        ("phase_rad", SizeRecord(np.pi / 2, np.pi / 180), "90.0 ± 1.0 °"),
+        ("shift_x_m", SizeRecord(2e-5, 1e-6), "20.0 ± 1.0 µm"),
+        ("compliance_rad_nm", SizeRecord(6.8e-5, 2e-6), "6.80 × 10⁻⁵ ± 2.0 × 10⁻⁶"),
+        ("order", SizeRecord(None, 1.0), "\N{EN DASH}"),
+    ],
+)
+def test_sizes_have_a_unit_that_fits(name, size, said):
+    assert size_words(name, size).replace("\N{NO-BREAK SPACE}", " ") == said
+
+
+def test_the_verdict_says_whether_noise_is_what_remains():
+    assert verdict_words(FILE).endswith("what remains is noise.")
+
+
+def test_pages_go_before_the_last_chapter_of_another_report():
+    rig = SimpleNamespace(name="irb", arm=SimpleNamespace(joints=(None,) * 6))
+    contents, chapters = inserted({"a": "A", "provenance": "P"}, ["first", "last"], FILE, rig)
+    assert list(contents) == ["a", *contents_of(FILE), "provenance"]
+    assert (chapters[0], chapters[-1]) == ("first", "last")
+    assert len(chapters) == 2 + len(contents_of(FILE))
+
+
+def test_a_diagnosis_of_another_rig_is_refused():
+    with pytest.raises(DataError, match="of rig 'irb', the recording of 'other'"):
+        inserted({}, [], FILE, SimpleNamespace(name="other"))
