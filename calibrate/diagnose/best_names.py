@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.rivals import Rival, rivals_of
-from calibrate.diagnose.search import Search
+from calibrate.diagnose.search import BETTER, Search
 
 # Of BIC: no more than a bare mention. Source: Kass, Raftery, Bayes factors, J. Am. Stat. Assoc. 90(430), 1995, section
 # 3.2.
@@ -39,7 +39,11 @@ def _exchanged(at: Search, rivals: Rivals) -> Search | None:
     for i, (own, mine) in enumerate(zip(at.state.accepted, rivals, strict=True)):
         class_ = [(0.0, own), *((r.margin, r.accepted) for r in mine if r.refitted)]
         least = min(margin for margin, _ in class_)
-        best = min((c for c in class_ if c[0] <= least + TIED), key=lambda c: (len(c[1].term.depends_on), c[0]))[1]
+        # A hair's breadth is no reason: where nothing tells names apart, the catalogue's order has chosen.
+        best = min(
+            (c for c in class_ if c[0] <= least + TIED),
+            key=lambda c: (len(c[1].term.depends_on), c[0] if c[1] is not own else c[0] - BETTER),
+        )[1]
         if best is own:
             continue
         bench = Bench(at.state.refitted([best if j == i else a for j, a in enumerate(at.state.accepted)]))

@@ -68,7 +68,7 @@ class Elsewhere:
         basis = term.basis(self.drivers, accepted.inner)
         here = basis[: len(was)].reshape(-1, basis.shape[-1])
         same, *_ = np.linalg.lstsq(here, was.ravel(), rcond=None)
-        return Accepted(term, same, accepted.inner)
+        return Accepted(term, np.asarray(same, dtype=np.float64), accepted.inner)
 
     @cached_property
     def _terms(self) -> dict[tuple[object, ...], Term]:

@@ -29,6 +29,7 @@ LOUDNESS = (
 )  # variance through the joints over that of the noise, mean trace
 SHARES = (0.15, 0.3, 0.5, 0.7, 0.85)  # of samples that scatter through the joints
 TURNS = 12
+HEAVY = (2.5, NU)  # degrees of freedom of innocent tails
 BLOCK = 3  # channels of one unit: a position, a rotation; two detectors have one unit, too
 
 
@@ -83,7 +84,10 @@ def _forms(raw: Floats) -> list[Floats]:
 
 def _restless(turned: Floats, w: Floats) -> float:
     """2 ln L of two kinds of samples over that of one kind, be it Gaussian or of heavy tails."""
-    one = max(max(_gaussian(turned, 1.0 + loud * w), _student(turned, 1.0 + loud * w)) for loud in LOUDNESS)
+    one = max(
+        max(_gaussian(turned, 1.0 + loud * w), *(_student(turned, 1.0 + loud * w, nu) for nu in HEAVY))
+        for loud in (0.0, *LOUDNESS)
+    )
     two = max(_mixed(turned, w, loud, share) for loud in LOUDNESS for share in SHARES)
     return max(0.0, 2.0 * (two - one))
 
@@ -93,13 +97,13 @@ def _gaussian(turned: Floats, width: Floats) -> float:
     return float(np.sum(_log_normal(turned, scale * width)))
 
 
-def _student(turned: Floats, width: Floats) -> float:
+def _student(turned: Floats, width: Floats, nu: float) -> float:
     k = turned.shape[1]
     square, scale = np.sum(turned / width, axis=1), float(np.mean(turned / width))
     for _ in range(TURNS):
-        scale = float(np.mean((NU + k) / (NU + square / scale) * square)) / k
-    constant = gammaln((NU + k) / 2.0) - gammaln(NU / 2.0) - 0.5 * k * np.log(NU * np.pi * scale)
-    each = constant - 0.5 * np.sum(np.log(width), axis=1) - 0.5 * (NU + k) * np.log1p(square / scale / NU)
+        scale = float(np.mean((nu + k) / (nu + square / scale) * square)) / k
+    constant = gammaln((nu + k) / 2.0) - gammaln(nu / 2.0) - 0.5 * k * np.log(nu * np.pi * scale)
+    each = constant - 0.5 * np.sum(np.log(width), axis=1) - 0.5 * (nu + k) * np.log1p(square / scale / nu)
     return float(np.sum(each))
 
 

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from calibrate.diagnose.diagnosis import Verdict
+from calibrate.diagnose.fitted import fit_geometry
 from calibrate.diagnose.from_recording import diagnose_samples
+from calibrate.diagnose.session import session_of
 from calibrate.diagnose.to_file import file_of
 from calibrate.errors import DataError
 
@@ -65,3 +67,14 @@ def test_a_file_that_is_wrong_as_a_whole_is_undecidable_and_says_why(recording):
 def test_a_handful_of_samples_is_refused(recording):
     with pytest.raises(DataError, match="measure more poses"):
         diagnose_samples(recording.rig, recording.samples.take(np.arange(15)), np.random.default_rng(1))
+
+
+def test_an_instrument_may_have_all_its_rows_held_out(tmp_path):
+    """A bar measured in one go is gone when that part of the session is: the rest is still judged."""
+    recording = recording_of(tmp_path, family="cones", seed=72, samples=160)
+    fitted = fit_geometry(session_of(recording.rig, recording.samples))
+    bars = np.unique(next(m for m in fitted.session.measured if m.name == "bar").sample_rows)
+    rest = np.setdiff1d(fitted.active, bars)
+    unseen = fitted.select(rest[20:]).refitted(()).held_out(np.sort(np.concatenate([bars, rest[:20]])))
+    assert [u.instrument for u in unseen] == ["seat"]
+    assert np.all(np.isfinite(unseen[0].whitened))
