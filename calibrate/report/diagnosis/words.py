@@ -137,7 +137,8 @@ def stream_words(file: DiagnosisFile) -> Iterator[str]:
     if file.streams is None:
         return
     for clock in file.streams.clocks:
-        yield _clock_words(clock)
+        if clock.offset_s is not None:  # one that is not told stands, with its reason, in what cannot be seen
+            yield _clock_words(clock)
     for usual in file.streams.usual:
         yield f"usual: {usual.says}"
     yield from file.streams.unseen

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from calibrate.rigid import transform
 from calibrate.sensors.device import Device
-from calibrate.sensors.dual_psd import DualPsd, Fixture
+from calibrate.sensors.dual_psd import DualPsd, Fixture, PairBelief
 from calibrate.sensors.full_pose import FullPose
 from calibrate.sensors.laser import LaserMount
 from calibrate.sensors.point_line import PointLine, meeting_points
@@ -46,7 +46,7 @@ def dual_psd():
     faces = Fixture(
         0.01, transform([0, 0.12, 0.12], [2.356, 0, 0]), {k: transform([k, 0, 0], [0, 0.1, 0]) for k in (1, 2)}
     )
-    return DualPsd(MOUNT, faces, GROUP, 1 + np.arange(POSES) % 2, 1e-3, (1e-4, 1e-3))
+    return DualPsd(MOUNT, faces, GROUP, 1 + np.arange(POSES) % 2, 1e-3, PairBelief(1e-4, 1e-3))
 
 
 SENSORS = {
