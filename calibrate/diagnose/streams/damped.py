@@ -16,6 +16,7 @@ from scipy.stats import f
 
 Floats = NDArray[np.float64]
 
+GONE = 1e-9  # of a swing within one step: that is none
 POLES = 6  # one oscillation is two; the others take settling and noise
 MOST = 300  # samples of the pencil, averaged to that: it is a start only
 SAME = 0.05  # starts nearer than this in turn lead to the same place
@@ -92,11 +93,12 @@ def _starts(t: Floats, y: Floats) -> list[tuple[float, float]]:
     if length < 2 * POLES:
         return []
     rows = np.vstack([hankel(c[: len(t) - length], c[len(t) - length - 1 :]) for c in y.T])
-    _, _, Vt = np.linalg.svd(rows, full_matrices=False)
+    strongest = np.linalg.eigh(rows.T @ rows)[1][:, ::-1]  # right singular vectors, good enough for a start
     out: list[tuple[float, float]] = []
     for order in (3, POLES):
-        V = Vt[:order].T
-        poles = np.log(np.linalg.eigvals(np.linalg.lstsq(V[:-1], V[1:], rcond=None)[0]).astype(complex)) / step_s
+        V = strongest[:, :order]
+        turns = np.linalg.eigvals(np.linalg.lstsq(V[:-1], V[1:], rcond=None)[0]).astype(complex)
+        poles = np.log(turns[np.abs(turns) > GONE]) / step_s
         out += [(-float(p.real), float(p.imag)) for p in poles if p.imag > 0.0]
     slowest, fastest = 2.0 * np.pi * FEWEST_CYCLES / (t[-1] - t[0]), 2.0 * np.pi / (FINEST * step_s)
     good = [(max(decay, 0.01 * turn), turn) for decay, turn in out if slowest < turn < fastest and decay < turn]

@@ -53,11 +53,11 @@ def _told_kind(track: Track, fault: Fault, where: str, of: str, alike: list[Brea
 def told_late(device: str, late: Late, joints: int) -> StreamFinding:
     sizes = {"latency_s": Size(late.late_s, late.sigma_s)}
     way = "later" if late.late_s >= 0.0 else "earlier"
-    says = f"{device} carry times {1e3 * abs(late.late_s):.4g} +- {1e3 * late.sigma_s:.2g} ms {way} than the joints'"
+    says = f"{device} carry times {1e3 * abs(late.late_s):.4g} ± {1e3 * late.sigma_s:.2g} ms {way} than the joints'"
     if late.drift is not None and late.drift_sigma is not None:
         sizes["drift_s_per_s"] = Size(late.drift, late.drift_sigma)
         if late.drifts:
-            says += f"; their clocks drift by {1e6 * late.drift:+.4g} +- {1e6 * late.drift_sigma:.2g} us/s"
+            says += f"; their clocks drift by {1e6 * late.drift:+.4g} ± {1e6 * late.drift_sigma:.2g} us/s"
     name = Named("time", tuple(f"qd{i + 1}" for i in range(joints)), "linear", None, "latency")
     return StreamFinding(name, device, Outcome.FOUND, sizes, None, None, max(late.p, CERTAIN), says)
 
@@ -115,7 +115,7 @@ def told_slip(one: Slip) -> StreamFinding:
     name = Named(f"joint{one.joint}.angle", ("t",), "step", None, "encoder-slip")
     sizes = {"slip_rad": Size(one.size_rad, one.sigma_rad), "time_s": Size(one.to_s, one.to_s - one.from_s)}
     says = (
-        f"the encoder of joint {one.joint} slipped by {1e6 * one.size_rad:+.1f} +- {1e6 * one.sigma_rad:.1f} urad "
+        f"the encoder of joint {one.joint} slipped by {1e6 * one.size_rad:+.1f} ± {1e6 * one.sigma_rad:.1f} urad "
         f"between {one.from_s:.3f} and {one.to_s:.3f} s"
     )
     return StreamFinding(name, "encoders", Outcome.FOUND, sizes, one.from_s, one.to_s, max(one.p, CERTAIN), says)
@@ -142,7 +142,7 @@ def told_ringing(track: Track, one: Ringing) -> StreamFinding:
 
 
 def _ms(one: Following) -> str:
-    return f"{1e3 * abs(one.behind_s or 0.0):.4g} +- {1e3 * (one.behind_sigma_s or 0.0):.2g}"
+    return f"{1e3 * abs(one.behind_s or 0.0):.4g} ± {1e3 * (one.behind_sigma_s or 0.0):.2g}"
 
 
 def _behind(one: Following) -> dict[str, Size]:
