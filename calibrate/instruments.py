@@ -109,7 +109,7 @@ def _point_line(table: SampleTable) -> tuple[Measured, ...]:
             f"samples: no row has all spots within {CENTRED_M} m of the centres; centre poses, or use spots"
         )
     mount = laser_of(table.rig)
-    sensor = PointLine(mount, meeting_points(mount, table.T_base_flange[rows], place), place)
+    sensor = PointLine(mount, meeting_points(mount, table.T_base_flange[rows], place))
     own = {"line": np.full((len(rows), 2), LINE_BELIEVED_M)}
     chain = Chain(table.arm, sensor)
     return (table.measured("point", chain, rows, np.zeros((len(rows), 2)), own, condition=True),)
@@ -172,7 +172,7 @@ def _seat(table: SampleTable) -> tuple[Measured, ...]:
     if len(rows) == 0:
         return ()
     seat = table.samples.integers("seat", 0)[rows]
-    sensor = Seat(table.target, mean_tips(table.tips_m[rows], seat), seat)
+    sensor = Seat(table.target, mean_tips(table.tips_m[rows], seat))
     own = {"seat": np.full((len(rows), 3), table.rig.noise.seat_m or SEAT_BELIEVED_M)}
     chain = Chain(table.arm, sensor)
     return (table.measured("seat", chain, rows, np.zeros((len(rows), 3)), own, condition=True),)

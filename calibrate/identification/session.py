@@ -108,5 +108,5 @@ def about_of(weighting: Weighting) -> About:
             T = sensor.device.T_base_device
             out["device"] = (*T[:3, 3].tolist(), *Rotation.from_matrix(T[:3, :3]).as_rotvec().tolist())
         if isinstance(sensor, Seat):
-            out |= {f"seat{k}": tuple(point.tolist()) for k, point in sensor.start_m.items()}
+            out |= {f"seat{k}": tuple(point.tolist()) for k, point in sensor.points.start_m.items()}
     return out

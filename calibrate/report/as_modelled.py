@@ -85,8 +85,10 @@ def _placed(measured: Measured, about: About) -> Measured:
     if "device" in known and "device" in about:
         place = transform(about["device"][:3], about["device"][3:])
         changed["device"] = replace(sensor.device, T_base_device=place)
-    if "start_m" in known:
-        changed["start_m"] = {k: np.array(about.get(f"seat{k}", at)) for k, at in sensor.start_m.items()}
+    if "points" in known:
+        points = sensor.points
+        start_m = {k: np.array(about.get(f"{points.kind}{k}", at)) for k, at in points.start_m.items()}
+        changed["points"] = replace(points, start_m=start_m)
     if not changed:
         return measured
     return replace(measured, problem=replace(measured.problem, chain=replace(chain, sensor=replace(sensor, **changed))))

@@ -5,9 +5,7 @@ Source of the constraint: Deng, Ding, Zhang, Food & Machinery 2019(3); here the 
 are taken where the beam passes it, so that each pose gives two equations of its own.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -28,31 +26,19 @@ POINT_PLAUSIBLE_M = 0.05  # about the point nearest to the nominal lines
 
 @dataclass(frozen=True)
 class PointLine:
-    """The beam of pose j passes point `point[j]`. Parameters: laser mount 4, then 3 of each point: shifts, base."""
+    """The beam of pose j passes the point of pose j. Parameters: laser mount 4, then those of the points."""
 
     mount: LaserMount
-    start_m: Mapping[int, Floats]  # point -> (3,) in the base
-    point: Ints  # (pose,)
+    points: SharedPoints
 
     unit = "m"
 
-    def __post_init__(self) -> None:
-        _ = self._points  # says what is wrong with them
-
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        return self._parameters
-
-    @cached_property
-    def _parameters(self) -> tuple[Parameter, ...]:
-        return self.mount.parameters + self._points.parameters
-
-    @cached_property
-    def _points(self) -> SharedPoints:
-        return SharedPoints("point", self.start_m, self.point, POINT_PLAUSIBLE_M)
+        return self.mount.parameters + self.points.parameters
 
     def select(self, rows: NDArray[np.intp]) -> Self:
-        return replace(self, point=self.point[rows])
+        return replace(self, points=self.points.select(rows))
 
     def expect(self, phi: Floats, T_base_flange: Floats) -> Floats:
         beside, travel_m = self._beside(phi, T_base_flange)
@@ -61,7 +47,7 @@ class PointLine:
     def by_twist(self, phi: Floats, T_base_flange: Floats) -> Floats:
         """The flange moving by a twist is the point moving by its opposite."""
         seen = self._across(phi) @ np.swapaxes(T_base_flange[:, :3, :3], 1, 2)  # (pose, 2, 3)
-        point = self._points.at_poses_m(phi[4:])
+        point = self.points.at_poses_m(phi[4:])
         out = np.empty((len(T_base_flange), 2, 6))
         out[..., :3] = -seen
         out[..., 3:] = cross(seen, point[:, None])  # -a . (w x p) = (a x p) . w
@@ -73,7 +59,7 @@ class PointLine:
         by_mount[:, range(2), range(2)] = -1.0
         by_mount[:, range(2), range(2, 4)] = -travel_m[:, None]
         seen = self._across(phi) @ np.swapaxes(T_base_flange[:, :3, :3], 1, 2)
-        return np.concatenate([by_mount, self._points.by_shift(seen)], axis=-1)
+        return np.concatenate([by_mount, self.points.by_shift(seen)], axis=-1)
 
     def _across(self, phi: Floats) -> Floats:
         """(2, 3) derivative of the observation by the point, both in the flange frame."""
@@ -83,14 +69,14 @@ class PointLine:
     def _beside(self, phi: Floats, T_base_flange: Floats) -> tuple[Floats, Floats]:
         """(pose, 2) offsets from, and (pose,) travel along the beam as drawn."""
         m = self.mount
-        point = self._points.at_poses_m(phi[4:])
+        point = self.points.at_poses_m(phi[4:])
         R = T_base_flange[:, :3, :3]
         in_flange = np.einsum("nji,nj->ni", R, point - T_base_flange[:, :3, 3]) - m.origin_m
         return in_flange @ np.stack([m.u, m.v], axis=1), in_flange @ m.direction
 
 
-def meeting_points(mount: LaserMount, T_base_flange: Floats, point: Ints) -> dict[int, Floats]:
-    """Start of every point: nearest to the nominal lines that pass it. DataError where these are parallel or one."""
+def meeting_points(mount: LaserMount, T_base_flange: Floats, point: Ints) -> SharedPoints:
+    """The points, each from nearest to the nominal lines that pass it. DataError where these are parallel or one."""
     beam = mount.beam(np.zeros(4), T_base_flange)
     out: dict[int, Floats] = {}
     for k in sorted(set(point.tolist())):
@@ -100,4 +86,4 @@ def meeting_points(mount: LaserMount, T_base_flange: Floats, point: Ints) -> dic
             raise DataError(f"point {k}: {len(rows)} lines, all parallel; take poses that cross there at an angle")
         none = np.zeros((len(rows), 3, 0))
         out[k] = nearest_point(Lines(beam.origin_m[rows], direction, none, none))[0]
-    return out
+    return SharedPoints("point", out, point, POINT_PLAUSIBLE_M)

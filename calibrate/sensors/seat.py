@@ -4,9 +4,7 @@ Observed at a pose: tip less seat (m), which is zero. Cones hold no scale: an ar
 So weights must be the joints' noise mapped through the arm (calibrate/variance.py), and one known length is needed.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -25,45 +23,38 @@ PLAUSIBLE_M = 0.05  # about the mean of the nominal tips: nominal arms are off b
 
 @dataclass(frozen=True)
 class Seat:
-    """Pose j sits in cone `seat[j]`. Parameters: target 3, then 3 of each seat: shifts of its start in the base."""
+    """Pose j sits in cone `seat[j]`. Parameters: target 3, then those of the seats."""
 
     target: Target
-    start_m: Mapping[int, Floats]  # seat -> (3,) in the base
-    seat: Ints  # (pose,)
+    points: SharedPoints
 
     unit = "m"
 
-    def __post_init__(self) -> None:
-        _ = self._points  # says what is wrong with them
+    @property
+    def seat(self) -> Ints:
+        """(pose,) number of the cone."""
+        return self.points.of_pose
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        return self._parameters
-
-    @cached_property
-    def _parameters(self) -> tuple[Parameter, ...]:
-        return self.target.parameters + self._points.parameters
-
-    @cached_property
-    def _points(self) -> SharedPoints:
-        return SharedPoints("seat", self.start_m, self.seat, PLAUSIBLE_M)
+        return self.target.parameters + self.points.parameters
 
     def select(self, rows: NDArray[np.intp]) -> Self:
-        return replace(self, seat=self.seat[rows])
+        return replace(self, points=self.points.select(rows))
 
     def expect(self, phi: Floats, T_base_flange: Floats) -> Floats:
-        return self.target.in_base(phi[:3], T_base_flange) - self._points.at_poses_m(phi[3:])
+        return self.target.in_base(phi[:3], T_base_flange) - self.points.at_poses_m(phi[3:])
 
     def by_twist(self, phi: Floats, T_base_flange: Floats) -> Floats:
         return point_by_twist(self.target.in_base(phi[:3], T_base_flange))
 
     def by_parameter(self, phi: Floats, T_base_flange: Floats) -> Floats:
-        by_seat = self._points.by_shift(np.broadcast_to(-np.eye(3), (len(self.seat), 3, 3)))
+        by_seat = self.points.by_shift(np.broadcast_to(-np.eye(3), (len(self.seat), 3, 3)))
         return np.concatenate([T_base_flange[:, :3, :3], by_seat], axis=-1)
 
 
-def mean_tips(tips_m: Floats, seat: Ints) -> dict[int, Floats]:
-    """Start point of every seat: the mean of its nominal tips (pose, 3). DataError for a seat with one pose only."""
+def mean_tips(tips_m: Floats, seat: Ints) -> SharedPoints:
+    """The cones, each from the mean of its nominal tips (pose, 3). DataError for a seat with one pose only."""
     out: dict[int, Floats] = {}
     for k in sorted(set(seat.tolist())):
         rows = np.flatnonzero(seat == k)
@@ -72,4 +63,4 @@ def mean_tips(tips_m: Floats, seat: Ints) -> dict[int, Floats]:
                 f"seat {k}: 1 row; one articulation says nothing, take it again from other sides or drop it"
             )
         out[k] = tips_m[rows].mean(axis=0)
-    return out
+    return SharedPoints("seat", out, seat, PLAUSIBLE_M)

@@ -1,8 +1,9 @@
 """Points in the base that nobody knows and that several poses share: cones, or where centred beams meet."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +43,10 @@ class SharedPoints:
         return tuple(
             Parameter(f"{self.kind}{k}.{a}", "m", self.plausible_m, free=k in used) for k in self.numbers for a in "xyz"
         )
+
+    def select(self, rows: NDArray[np.intp]) -> Self:
+        """The same points, of some of the poses."""
+        return replace(self, of_pose=self.of_pose[rows])
 
     def at_poses_m(self, shifts_m: Floats) -> Floats:
         """(pose, 3) in the base, for shifts (3 * point,)."""

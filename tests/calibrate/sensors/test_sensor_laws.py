@@ -53,8 +53,8 @@ SENSORS = {
     "position": lambda: Position(TARGET, DEVICE),
     "full pose": full_pose,
     "wire": lambda: Wire(TARGET, DEVICE),
-    "seat": lambda: Seat(TARGET, mean_tips(flanges(1)[:, :3, 3], GROUP), GROUP),
-    "point on laser lines": lambda: PointLine(MOUNT, meeting_points(MOUNT, flanges(1), GROUP), GROUP),
+    "seat": lambda: Seat(TARGET, mean_tips(flanges(1)[:, :3, 3], GROUP)),
+    "point on laser lines": lambda: PointLine(MOUNT, meeting_points(MOUNT, flanges(1), GROUP)),
 }
 PAIRS = {"tip distance": lambda: TipDistance(TARGET)}
 

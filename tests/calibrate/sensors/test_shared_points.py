@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 from calibrate.errors import DataError
-from calibrate.sensors.seat import Seat
 from calibrate.sensors.shared_points import SharedPoints
-from calibrate.sensors.target import Target
 
 START_M = {2: np.array([1.0, 2.0, 3.0]), 7: np.array([4.0, 5.0, 6.0])}
 SHIFTS_M = np.array([0.1, 0.2, 0.3, -0.1, -0.2, -0.3])
@@ -29,4 +27,4 @@ def test_a_point_without_poses_is_held():
 
 def test_a_pose_at_a_point_that_nobody_knows_is_refused():
     with pytest.raises(DataError, match="seat 3 has no start point; give one for every seat of the data"):
-        Seat(Target(np.zeros(3)), START_M, np.array([2, 3]))
+        SharedPoints("seat", START_M, np.array([2, 3]), 0.05)
