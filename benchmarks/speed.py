@@ -1,6 +1,6 @@
 """Speed on one core, in one run beside Pinocchio, scipy and plain numpy: CPU-time medians, ratios, aims.
 
-Every rival is first checked to give the same numbers. Aims are of issue 3, for one core of the kind of machine that is
+Every rival is first checked to give the same numbers. Aims are for one core of the kind of machine that is
 described in docs/decisions/0005; a busy machine shows larger figures, so look at the ratios too.
 """
 
