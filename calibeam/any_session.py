@@ -8,6 +8,7 @@ import numpy as np
 from acquisition.recording.columns import POSITION, SPOTS
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import rig_sha256
+from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.fit_plan import DEFAULT, FitPlan, read_plan
 from calibrate.identification.identify import identify
@@ -18,11 +19,13 @@ from calibrate.model_file import ModelFile, RigIdentity, write_model
 OTHERS = (POSITION[0], "wire_m", "seat", "bar")  # columns of the instruments beside the dual PSD
 
 
-def only_spots(samples: Samples) -> bool:
-    """Whether the dual PSD is the only instrument: its session asks for joint zeros, and has a method of its own."""
-    return SPOTS[0] in samples and not any(
-        name in samples and bool(np.any(np.isfinite(samples.column(name)))) for name in OTHERS
-    )
+def asks_for_zeros(rig: Rig, samples: Samples) -> bool:
+    """Whether spots are all there is: such a session shows joint zeros but no length, and has a method of its own.
+
+    A known distance between placements gives the scale, so it is worth the whole fit.
+    """
+    others = any(name in samples and bool(np.any(np.isfinite(samples.column(name)))) for name in OTHERS)
+    return SPOTS[0] in samples and not others and not rig.known_distances
 
 
 @dataclass(frozen=True)

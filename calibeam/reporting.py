@@ -4,7 +4,7 @@ from pathlib import Path
 
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import rig_sha256
-from calibeam.any_session import identify_session, only_spots
+from calibeam.any_session import asks_for_zeros, identify_session
 from calibeam.identification import Identified, identify_recording
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.errors import DataError
@@ -26,7 +26,7 @@ def write_any_report(
     DataError where the recording holds nothing to fit, the model is not of it, or the file cannot be written.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    if only_spots(recording.samples) and (model is None or ZEROS_ONLY in model.noise):
+    if asks_for_zeros(recording.rig, recording.samples) and (model is None or ZEROS_ONLY in model.noise):
         identified = identify_recording(recording)
         if model is not None:
             _refuse_other(model, identified, recording)

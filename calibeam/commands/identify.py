@@ -7,7 +7,7 @@ from cyclopts import Parameter, validators
 from rich.console import Console
 
 from acquisition.recording.read import read
-from calibeam.any_session import Planned, identify_session, only_spots, write_session_model
+from calibeam.any_session import Planned, asks_for_zeros, identify_session, write_session_model
 from calibeam.ending import naming, refuse_nothing, tell_unfinished
 from calibeam.identification import identify_recording, write_identified
 from calibeam.session_table import print_identification
@@ -68,7 +68,7 @@ def _identify(
     recording: Path, planned: Planned, bootstrap: int | None, out: Path, export: tuple[ExportForm, ...]
 ) -> None:
     source, console = read(recording), Console()
-    if only_spots(source.samples) and planned.text is None and not bootstrap:
+    if asks_for_zeros(source.rig, source.samples) and planned.text is None and not bootstrap:
         identified = identify_recording(source)
         status = identified.zeros.status
         refuse_nothing(status, identified.zeros.estimates)
