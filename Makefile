@@ -4,8 +4,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 BENCH := .venv-bench
+CLIENTS := .venv-clients
 
-.PHONY: setup demo test lint prove bench pins clean
+.PHONY: setup demo test clients endure lint prove prove-table mutate bench pins clean
 
 setup: $(READY)
 
@@ -20,8 +21,22 @@ $(READY): requirements/all.txt pyproject.toml
 demo: $(READY)
 	$(BIN)/calibeam demo --out out/demo
 
-test: $(READY)
-	$(BIN)/python -m pytest
+test: $(READY) $(CLIENTS)/.ready
+	$(BIN)/python -m pytest -m "not endure and not wired" -n 2 --dist loadfile
+	$(BIN)/python -m pytest -m "wired and not endure"
+
+# What takes too long for every day: a million mutated inputs a codec, a hundred plugs pulled, and more of the same.
+endure: $(READY)
+	$(BIN)/python -m pytest -m endure --timeout 3600
+
+# Third-party clients that tests start as processes, in an environment of their own.
+clients: $(CLIENTS)/.ready
+
+$(CLIENTS)/.ready: requirements/clients.txt
+	@test -n "$(PYTHON)" || { echo "calibeam needs Python 3.11 or newer (Debian: apt-get install python3 python3-venv)"; exit 1; }
+	$(PYTHON) -m venv $(CLIENTS)
+	$(CLIENTS)/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/clients.txt
+	@touch $@
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -32,7 +47,16 @@ lint: $(READY)
 # The concealed proof, with the libraries that it is compared with: see docs/proof.md. About ten minutes on two cores.
 prove: $(BENCH)/.ready
 	rm -rf out/proof
-	$(BENCH)/bin/calibeam prove --cases $(or $(CASES),150) --compare 16 --publish --out out/proof
+	$(BENCH)/bin/calibeam prove --cases $(or $(CASES),150) --wire $(or $(WIRE),2) --compare 16 --publish --out out/proof
+
+# Its table into the README: of the published seed only.
+prove-table: $(READY)
+	$(BIN)/python -m calibeam.prove.published out/proof/proof.json README.md
+
+# Effects taken out of the catalogue, one after the other: their cases have to turn into "unknown, at the right place".
+mutate: $(READY)
+	rm -rf out/mutate
+	$(BIN)/python -m calibeam.prove.mutations out/mutate $(NAMES)
 
 # In an environment of its own, which also holds the libraries that are compared with. One thread, quiet waiting.
 bench: $(BENCH)/.ready
@@ -52,6 +76,8 @@ pins:
 	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host -o requirements/all.txt pyproject.toml
 	pip-compile --quiet --generate-hashes --strip-extras --allow-unsafe \
 	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host -o requirements/bench.txt requirements/bench.in
+	pip-compile --quiet --generate-hashes --strip-extras --allow-unsafe \
+	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host -o requirements/clients.txt requirements/clients.in
 
 clean:
-	rm -rf $(VENV) $(BENCH) out .pytest_cache .ruff_cache
+	rm -rf $(VENV) $(BENCH) $(CLIENTS) out .pytest_cache .ruff_cache

@@ -18,7 +18,7 @@ from acquisition.errors import NoLightError, SpotLostError, UnreachableError
 from acquisition.journal import Journal
 from acquisition.learner import Learner
 from acquisition.servo.centring import Limits, centre
-from acquisition.servo.registered import Registered
+from acquisition.servo.registered import FIRST_GAIN, Registered
 from acquisition.servo.status import Centring
 
 Floats = NDArray[np.float64]
@@ -26,6 +26,7 @@ Floats = NDArray[np.float64]
 LANDING_TRIES = 12  # on the way to a pose: halvings of the jump and stops to learn, together
 GLANCE_S = 0.01  # enough to tell light from dark: 10 samples at 1 kHz
 FINDING_STAND_OFF_M = 0.2
+KNOWN_GAIN = 1.0
 NEAR = Limits(tolerance_m=1.5e-3, max_steps=8)  # anywhere near the asked-for spots will do
 
 
@@ -125,7 +126,8 @@ class Navigator:
         raise SpotLostError(f"no light on the way to roll {target.roll_rad:.2f} rad in {LANDING_TRIES} tries")
 
     def _centre(self, target: BeamTarget, T: Floats, limits: Limits) -> Centring:
-        strategy = Registered(self._learner.arm, self._learner.optics, T, target.first)
+        first_gain = KNOWN_GAIN if self._lit else FIRST_GAIN  # after a lit pose of this block T is known, not guessed
+        strategy = Registered(self._learner.arm, self._learner.optics, T, target.first, first_gain)
         run = centre(self._bench, self._learner.arm, strategy, self.q_rad, np.array(target.spots_m), limits)
         for step in run.trace[1:]:
             self._note(step.q_rad)

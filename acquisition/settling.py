@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+SAMPLES_FOR_A_MEAN = 3
 
 
 @dataclass(frozen=True)
@@ -35,15 +36,18 @@ class Stretch:
 def stretch_to_average(device_s: Floats, spots_m: Floats, dwell_s: float, rule: SettleRule) -> Stretch | None:
     """`dwell_s` of the samples so far, from where they have settled; the last ones when they do not; None: wait on.
 
-    At least one window: a dwell shorter than that may hold a single sample of a slow box, which has no sigma.
+    At least one window, and SAMPLES_FOR_A_MEAN of a slow or halting box: a single sample has no sigma.
     """
     dwell_s = max(dwell_s, rule.window_s)
     last_s = float(device_s[-1])
     start_s = settled_from(device_s, spots_m, rule)
     if start_s is not None:
-        return Stretch(start_s, start_s + dwell_s, settled=True) if last_s - start_s >= dwell_s else None
-    if last_s - float(device_s[0]) > rule.limit_s + dwell_s:
-        return Stretch(last_s - dwell_s, last_s, settled=False)
+        later_s = device_s[device_s >= start_s]
+        if len(later_s) < SAMPLES_FOR_A_MEAN or last_s - start_s < dwell_s:
+            return None
+        return Stretch(start_s, max(start_s + dwell_s, float(later_s[SAMPLES_FOR_A_MEAN - 1])), settled=True)
+    if last_s - float(device_s[0]) > rule.limit_s + dwell_s and len(device_s) >= SAMPLES_FOR_A_MEAN:
+        return Stretch(min(last_s - dwell_s, float(device_s[-SAMPLES_FOR_A_MEAN])), last_s, settled=False)
     return None
 
 

@@ -1,18 +1,33 @@
-"""Stops the arm when any device fails, and lets the session know at its next step."""
+"""Stops the arm when any device fails or falls silent, and lets the session know at its next step."""
 
 import threading
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Generator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 
-from drivers.errors import DeviceError
+from drivers.clock import Clock, SystemClock
+from drivers.errors import DeviceError, DeviceStale
+
+STALE_S = 1.0  # twice what a reader itself waits: this is for one that hangs in a library and tells nothing
+LOOK_S = 0.05
+
+
+@dataclass(frozen=True)
+class _Watched:
+    name: str
+    newest_s: Callable[[], float | None]
+    since_s: float
+    limit_s: float
 
 
 class Supervisor:
-    """Owns the first failure of a session. `stop_arm` must work from any thread."""
+    """Owns the first failure of a session. `hold_arm` must work from any thread, and refuse every later motion."""
 
-    def __init__(self, stop_arm: Callable[[], None]) -> None:
-        self._stop_arm = stop_arm
+    def __init__(self, hold_arm: Callable[[], None], clock: Clock | None = None) -> None:
+        self._hold_arm = hold_arm
+        self._clock: Clock = clock or SystemClock()
         self._lock = threading.Lock()
+        self._watched: list[_Watched] = []
         self.failure: Exception | None = None
 
     def failed(self, failure: Exception) -> None:
@@ -25,9 +40,37 @@ class Supervisor:
             first, self.failure = self.failure is None, self.failure or failure
         if first:
             with suppress(DeviceError):
-                self._stop_arm()
+                self._hold_arm()
 
     def check(self) -> None:
         """Raise the first failure, if there was one."""
         if self.failure is not None:
             raise self.failure
+
+    @contextmanager
+    def watching(self, name: str, newest_s: Callable[[], float | None], limit_s: float = STALE_S) -> Generator[None]:
+        """Inside, the arm is stopped when the newest sample (host time; None: none yet) is older than the limit."""
+        watched = _Watched(name, newest_s, self._clock.now_s(), limit_s)
+        done = threading.Event()
+        watcher = threading.Thread(target=self._watch, args=(watched, done), name=f"watch {name}", daemon=True)
+        watcher.start()
+        try:
+            yield
+        finally:
+            done.set()
+            watcher.join()
+
+    def look(self, watched: _Watched) -> bool:
+        """Whether the samples are fresh enough; fails the session when they are not."""
+        newest_s = watched.newest_s()
+        age_s = self._clock.now_s() - (watched.since_s if newest_s is None else newest_s)
+        if age_s <= watched.limit_s:
+            return True
+        self.failed(
+            DeviceStale(f"{watched.name}: its newest sample is {age_s:.2f} s old, {watched.limit_s:.2f} s are allowed")
+        )
+        return False
+
+    def _watch(self, watched: _Watched, done: threading.Event) -> None:
+        while not done.wait(LOOK_S) and self.look(watched):
+            pass

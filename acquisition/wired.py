@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.bench import Look
-from acquisition.psd_view import PsdView, PsdWindow
+from acquisition.psd_view import PsdView, PsdWindow, psd_window
 from acquisition.settling import SettleRule, stretch_to_average
 from acquisition.streams import Pump
 from acquisition.supervisor import Supervisor
@@ -102,18 +102,20 @@ class WiredBench:
             self._start_s = float(window.device_s[0])
         psd1, psd2 = self.view.mean(window)
         robot = self._since(self.pumps.robot, window)
-        joint_degC = robot["joint_temperature_degC"][-1]
+        joint_degC = robot["joint_temperature_degC"][-1] if "joint_temperature_degC" in robot else ()
         temperatures = {f"joint{i + 1}": float(t) for i, t in enumerate(joint_degC)}
+        q_rad = robot["actual_q_rad"]
+        qd_rad_s = robot.get("actual_qd_rad_s", np.full_like(q_rad, np.nan))  # not every register map has speeds
         return Look(
             host_s=float(window.host_s[-1]),
             t_s=float(window.device_s.mean()) - self._start_s,
-            q_rad=robot["actual_q_rad"].mean(axis=0),
-            qd_rad_s=robot["actual_qd_rad_s"].mean(axis=0),
+            q_rad=q_rad.mean(axis=0),
+            qd_rad_s=qd_rad_s.mean(axis=0),
             cmd_rad=self._cmd_rad.copy(),
             encoder_rad=self._encoders(window),
             psd1=psd1,
             psd2=psd2,
-            temperatures_degC={"psd": float(window.temperature_degC.mean()), **temperatures},
+            temperatures_degC={**window.mean_temperature(), **temperatures},
             settled=settled,
             window_s=(float(window.device_s[0]), float(window.device_s[-1])),
         )
@@ -135,18 +137,3 @@ class WiredBench:
         blocks = pump.recent(begin_s) or pump.wait(begin_s, SILENCE_S)
         keep = np.concatenate([block.host_s for block in blocks]) >= begin_s
         return {name: np.concatenate([block.values[name] for block in blocks])[keep] for name in blocks[0].values}
-
-
-def psd_window(blocks: list[Block]) -> PsdWindow:
-    """The samples of consecutive blocks of a PSD box."""
-
-    def column(name: str) -> NDArray[np.float64]:
-        return np.concatenate([block.values[name] for block in blocks])
-
-    return PsdWindow(
-        np.concatenate([block.host_s for block in blocks]),
-        np.concatenate([block.device_s for block in blocks]),
-        column("photocurrent_a"),
-        column("flags").astype(np.int64),
-        column("temperature_degC"),
-    )

@@ -5,7 +5,24 @@ from collections.abc import Callable
 from pathlib import Path
 
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from benchmarks import blunders, centring, coverage, false_alarms, real_diagnosis, speed, streams, zeros
+from benchmarks import (
+    blunders,
+    can_frames,
+    centring,
+    centring_plot,
+    coverage,
+    damaged,
+    device_faults,
+    false_alarms,
+    inverse,
+    killed,
+    log_cost,
+    real_diagnosis,
+    rtde_jitter,
+    speed,
+    streams,
+    zeros,
+)
 
 RIG = Path(__file__).parents[1] / "rigs" / "ur5e-dual-psd.toml"
 
@@ -13,7 +30,10 @@ RIG = Path(__file__).parents[1] / "rigs" / "ur5e-dual-psd.toml"
 def run_centring() -> None:
     rig, plain = load_rig(RIG), plain_rig(rig_text(RIG), str(RIG))
     print("centring from 100 random starts, fixture pose wrong by up to 80 deg and 50 mm, orders alternating")
-    print("\n".join(centring.lines(centring.run(rig, plain))))
+    runs = centring.run(rig, plain)
+    print("\n".join(centring.lines(runs)))
+    centring_plot.write_plot(RIG.parents[1] / "out" / "centring.svg", runs)
+    print("steps to 5 um drawn in out/centring.svg")
     print("\n".join(centring.search_lines(centring.run_search(rig, plain))))
 
 
@@ -60,8 +80,44 @@ def run_false_alarms() -> None:
         print(row, flush=True)
 
 
+def run_inverse() -> None:
+    print("inverse kinematics in batch")
+    for row in inverse.lines(RIG):
+        print(row, flush=True)
+
+
+def run_faults() -> None:
+    print("13 fault kinds at 4 devices in 5 phases: each must end in a defined state within 2 s")
+    for row in device_faults.lines():
+        print(row, flush=True)
+
+
+def run_rtde() -> None:
+    print("RTDE at 500 Hz into a recording for ten minutes")
+    print("\n".join(rtde_jitter.lines(RIG, 600.0, RIG.parents[1] / "out" / "rtde")))
+
+
+def run_rtde_minute() -> None:
+    print("RTDE at 500 Hz into a recording for one minute")
+    print("\n".join(rtde_jitter.lines(RIG, 60.0, RIG.parents[1] / "out" / "rtde-minute")))
+
+
+def run_recording() -> None:
+    print("a recording killed, cut, damaged; CAN frames through it")
+    for module in (killed, damaged, can_frames):
+        for row in module.lines(RIG):
+            print(row, flush=True)
+
+
+def run_log_cost() -> None:
+    print("`calibeam log encoders`: six encoders at 1 kHz, positions and every frame")
+    for row in log_cost.lines(RIG):
+        print(row, flush=True)
+
+
 BENCHMARKS: dict[str, Callable[[], None]] = {
     "centring": run_centring,
+    "inverse": run_inverse,
     "zeros": run_zeros,
     "coverage": run_coverage,
     "blunders": run_blunders,
@@ -69,6 +125,11 @@ BENCHMARKS: dict[str, Callable[[], None]] = {
     "false_alarms": run_false_alarms,
     "streams": run_streams,
     "real": run_real,
+    "recording": run_recording,
+    "log_cost": run_log_cost,
+    "faults": run_faults,
+    "rtde": run_rtde,
+    "rtde-minute": run_rtde_minute,
 }
 
 

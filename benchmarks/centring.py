@@ -34,7 +34,9 @@ STRATEGIES: tuple[tuple[str, Make], ...] = (
     ("registered (sessions use it)", Registered),
     ("measured Jacobian, Broyden", Measured),
     ("law (8), gain 0.3", lambda arm, optics, T, first: FixedGuess(arm, optics, T, first, 0.3)),
-    ("law (8), gain 0.6", lambda arm, optics, T, first: FixedGuess(arm, optics, T, first, 0.6)),
+    ("law (8), gain 0.5", lambda arm, optics, T, first: FixedGuess(arm, optics, T, first, 0.5)),
+    ("law (8), gain 0.7", lambda arm, optics, T, first: FixedGuess(arm, optics, T, first, 0.7)),
+    ("law (8), gain 1.0", lambda arm, optics, T, first: FixedGuess(arm, optics, T, first, 1.0)),
 )
 TURN_RAD = np.deg2rad(80.0)
 SHIFT_M = 0.05

@@ -14,19 +14,26 @@ from rich.markup import escape
 
 from acquisition.errors import AcquisitionError
 from acquisition.recording.errors import RecordingError, RigFileError, SamplesError
+from calibeam.commands.check import check_command
 from calibeam.commands.compare import compare_command
 from calibeam.commands.demo import demo
 from calibeam.commands.diagnose import diagnose_command
 from calibeam.commands.emulate import emulate
 from calibeam.commands.export import export_command, import_command
 from calibeam.commands.identify import identify_command
+from calibeam.commands.jog import jog_command
+from calibeam.commands.log import log
+from calibeam.commands.motion import motion_command
+from calibeam.commands.move import move_command
 from calibeam.commands.predict import predict_command
 from calibeam.commands.prove import prove_command
+from calibeam.commands.psd_check import psd_check_command
+from calibeam.commands.recover import recover_command
 from calibeam.commands.report import report_command
 from calibeam.commands.session import session
 from calibeam.commands.tool_axes import tool_axes_command
 from calibeam.emulation import EmulationError
-from calibeam.outcome import PartialResult
+from calibeam.outcome import CheckFailed, PartialResult
 from calibeam.prove.seal import BrokenSealError
 from calibrate.errors import DataError
 from drivers.errors import DeviceError
@@ -38,6 +45,7 @@ from simulators.world.errors import WorldError
 TOLD = (
     AcquisitionError,
     BrokenSealError,
+    CheckFailed,
     ConcealError,
     DataError,
     DeviceError,
@@ -58,6 +66,8 @@ app = App(
 app.command(demo)
 app.command(session)
 app.command(emulate)
+app.command(check_command, name="check")
+app.command(log)
 app.command(identify_command, name="identify")
 app.command(diagnose_command, name="diagnose")
 app.command(compare_command, name="compare")
@@ -65,8 +75,13 @@ app.command(predict_command, name="predict")
 app.command(prove_command, name="prove")
 app.command(report_command, name="report")
 app.command(tool_axes_command, name="tool-axes")
+app.command(psd_check_command, name="psd-check")
+app.command(move_command, name="move")
+app.command(jog_command, name="jog")
+app.command(motion_command, name="motion")
 app.command(export_command, name="export")
 app.command(import_command, name="import")
+app.command(recover_command, name="recover")
 
 
 def main() -> None:

@@ -9,7 +9,7 @@ from acquisition.recording.samples import Samples
 from calibeam.comparison_record import ComparisonFile, LinkRecord, StreamRecord
 from calibeam.diagnosis import diagnose_recording
 from calibeam.software import SOFTWARE
-from calibrate.diagnose.compare.chain import Difference, differences
+from calibrate.diagnose.compare.chain import READINGS, Difference, differences
 from calibrate.diagnose.compare.matched import Matched, match
 from calibrate.diagnose.compare.observed import difference_samples
 from calibrate.diagnose.compare.parted import ROUNDING, Parted, judged
@@ -18,15 +18,19 @@ from calibrate.diagnose.diagnosis import Verdict
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.diagnose.streams.recorded import devices_of
 from calibrate.errors import DataError
+from calibrate.identification.identify import wrong_file
+from calibrate.report.quantities import angle, length
 
 FEWEST = 20  # samples of a diagnosis; fewer hold no more than the geometry
-READING = ("spots", "position", "wire")
+READING = tuple(reading.link for reading in READINGS)
 CLEAR = 5.0  # sigmas of a time that is told
-PERSON = {"rad": ("urad", 1e6), "m": ("um", 1e6)}
+SAYS = {"rad": angle, "m": length}  # how a person reads a size
 
 
 def compare(measured: Recording, simulated: Recording, *, diagnosed: bool = True) -> ComparisonFile:
     """DataError where the two are not of one arm and one motion. `diagnosed`: seek physics in what differs."""
+    for recording in (measured, simulated):
+        _refuse_wrong(recording)
     rows = match(measured.samples, simulated.samples)
     pair = measured.samples.take(rows.measured), simulated.samples.take(rows.simulated)
     links = differences(simulated.rig, pair)
@@ -54,6 +58,16 @@ def compare(measured: Recording, simulated: Recording, *, diagnosed: bool = True
     )
 
 
+def _refuse_wrong(recording: Recording) -> None:
+    """DataError naming the recording whose file is written by another convention as a whole."""
+    try:
+        wrong = wrong_file(recording.rig, recording.samples)
+    except (DataError, np.linalg.LinAlgError):
+        return  # joints alone, or another arm: no reading tells which convention was meant
+    if wrong:
+        raise DataError(f"{recording.path}: {'; besides, '.join(blunder.says for blunder in wrong)}")
+
+
 def _by_structure(one: Parted) -> Parted:
     """A reading whose difference has a cause parts, however large its noise was believed to be."""
     if one.link not in READING or one.parts:
@@ -73,15 +87,14 @@ def _says(told: tuple[Parted, ...], measured: Samples) -> str:
     first = next((link for link in told if link.parts), None)
     if first is None:
         return "measured and simulated agree in every link of the chain, within the noise that is known or believed"
-    unit, factor = PERSON[first.unit]
+    says = SAYS[first.unit]
     before = [link.link for link in told[: told.index(first)]]
     agree = f"{', '.join(before)} agree; " if before else ""
     at_s = measured.column("t_s")[first.first_row or 0]
-    noise = "" if first.noise is None else f", where noise makes {factor * first.noise:.3g} {unit} ({first.noise_from})"
+    noise = "" if first.noise is None else f", where noise makes {says(first.noise)} ({first.noise_from})"
     return (
         f"{agree}they part at the {first.link}, from t = {at_s:.3f} s on: "
-        f"{factor * first.rms_own:.3g} {unit} rms{noise}, "
-        f"at most {factor * first.largest_own:.3g} {unit} in {first.largest_channel}"
+        f"{says(first.rms_own)} rms{noise}, at most {says(first.largest_own)} in {first.largest_channel}"
     )
 
 

@@ -3,7 +3,7 @@
 from rich.console import Console
 from rich.table import Table
 
-from calibeam.comparison import CLEAR, PERSON
+from calibeam.comparison import CLEAR, SAYS
 from calibeam.comparison_record import ComparisonFile, LinkRecord, StreamRecord
 from calibeam.diagnosis_lines import print_diagnosis
 
@@ -55,14 +55,14 @@ def _chain(links: tuple[LinkRecord, ...]) -> Table:
 
 def _streams(streams: tuple[StreamRecord, ...]) -> Table:
     table = Table(title="streams, each on the clock of its twin", title_justify="left")
-    for heading in ("stream", "clocks apart (s)", "drift (us/s)", "differ by (rms)", "noise", "parts"):
+    for heading in ("stream", "clocks apart (s)", "drift (µs/s)", "differ by (rms)", "noise", "parts"):
         table.add_column(heading, justify="left" if heading in ("stream", "parts") else "right")
     for one in streams:
         if one.offset_s is None or one.rms is None or one.noise is None:
             table.add_row(one.stream, "-", "-", "-", "-", one.status)
             continue
-        drift = "-" if one.drift is None else f"{1e6 * one.drift:+.2f} +- {1e6 * (one.drift_sigma or 0.0):.2g}"
-        offset = f"{one.offset_s:+.6f} +- {one.offset_sigma_s:.2g}"
+        drift = "-" if one.drift is None else f"{1e6 * one.drift:+.2f} ± {1e6 * (one.drift_sigma or 0.0):.2g}"
+        offset = f"{one.offset_s:+.6f} ± {one.offset_sigma_s:.2g}"
         parts = "yes" if one.parts else "no"
         table.add_row(one.stream, offset, drift, _size(one.rms, one.unit), _size(one.noise, one.unit), parts)
     return table
@@ -72,9 +72,8 @@ def _late(one: StreamRecord) -> str | None:
     late, sigma = one.later_than_joints_s, one.later_than_joints_sigma_s
     if late is None or sigma is None or abs(late) < max(CLEAR * sigma, 1e-4):
         return None
-    return f"{one.stream}: {1e3 * late:+.3f} +- {1e3 * sigma:.2g} ms later after the joints than in the simulation"
+    return f"{one.stream}: {1e3 * late:+.3f} ± {1e3 * sigma:.2g} ms later after the joints than in the simulation"
 
 
 def _size(value: float, unit: str) -> str:
-    name, factor = PERSON[unit]
-    return f"{factor * value:.3g} {name}"
+    return SAYS[unit](value)

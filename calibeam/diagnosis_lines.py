@@ -9,6 +9,7 @@ from calibrate.diagnose.schema import DiagnosisFile, FindingRecord
 from calibrate.report.diagnosis.words import (
     before_after,
     free_space_words,
+    micrometres,
     place_words,
     rival_words,
     stream_words,
@@ -69,6 +70,6 @@ def _proof(file: DiagnosisFile) -> Table:
             str(split.observations),
             before,
             after,
-            "-" if floor is None else f"{1e6 * floor:.3g} um",
+            micrometres(floor),
         )
     return table

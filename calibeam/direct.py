@@ -16,8 +16,7 @@ from acquisition.bench import Look
 from acquisition.psd_view import NO_LIGHT, PsdView, PsdWindow
 from acquisition.recording.rig_schema import Rig
 from acquisition.settling import SettleRule, stretch_to_average
-from drivers.psd_daq.messages import FaceIdentity
-from drivers.psd_faces import FaceKind
+from drivers.psd_faces import Face, FaceKind
 from simulators.wire import TICK_S
 from simulators.world.world import World
 
@@ -43,7 +42,7 @@ class DirectBench:
     def __post_init__(self) -> None:
         self.world.psd_rate(self.rate_hz)
         self._cmd_rad = self.world.joints().q_rad
-        face = FaceIdentity(FaceKind.DUO_LATERAL, 2.0 * self.half_size_m)
+        face = Face(FaceKind.DUO_LATERAL, 2.0 * self.half_size_m)
         self._view = PsdView((face, face), TRANSIMPEDANCE_V_A)
 
     @property

@@ -44,6 +44,7 @@ def write_zero_report(identified: Identified, path: Path, diagnosis: DiagnosisFi
         point_constraint=identified.four_poses,
         left_out=[blunder.says for blunder in identified.blunders],
         proved=None if identified.proved is None else evidence_fields(identified.proved.evidence),
+        alarms=() if identified.proved is None else identified.proved.alarms,
         diagnosis=diagnosis,
     )
 

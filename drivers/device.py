@@ -58,7 +58,7 @@ class Device(Protocol):
 
 
 class Movable(Protocol):
-    """An arm that can be told where to go; `stop` works in every state, also from another thread."""
+    """An arm that can be told where to go; `stop` and `hold` work in every state, also from another thread."""
 
     name: str
 
@@ -68,6 +68,12 @@ class Movable(Protocol):
         """Blocks until the controller says the motion has ended. DeviceRefused on a stop, DeviceLost, DeviceStale."""
         ...
 
-    def stop(self) -> None: ...
+    def stop(self) -> None:
+        """Brakes; a move that was sent before the stop, even if it has not begun yet, ends with DeviceRefused."""
+        ...
+
+    def hold(self) -> None:
+        """As `stop`, and every later motion is refused until `connect`: for who stops without owning the motion."""
+        ...
 
     def close(self) -> None: ...

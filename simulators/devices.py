@@ -4,16 +4,24 @@ A section missing from [devices] is a device that is not emulated.
 """
 
 import importlib
+import ipaddress
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
+from simulators.faults.injector import Injector
+from simulators.faults.light import DisturbedLight
+from simulators.faults.verbs import with_faults
 from simulators.host.errors import HostError
 from simulators.host.loop import Host
 from simulators.wire import Bench, SerialPort, TcpPort
 from simulators.world.world import World
 
 DEFAULT_BITRATE = 1_000_000
+UR = "ur-rtde"
+PSD_DAQ = "psd-daq"
+PSDS = {PSD_DAQ: "psd_daq", "kpa101": "kpa101"}
+ROBOTS = {UR: "ur", "modbus": "modbus"}  # the rig's driver -> the emulator that it talks to
 
 
 @dataclass(frozen=True)
@@ -23,6 +31,7 @@ class EmulatedDevices:
     psd: Bench | None
     encoders: Bench | None
     robot: Bench | None
+    injectors: Mapping[str, Injector] = field(default_factory=dict[str, Injector])  # by the announcement's names
 
     @property
     def benches(self) -> list[Bench]:
@@ -32,17 +41,25 @@ class EmulatedDevices:
 def build_devices(world: World, rig: Mapping[str, Any], robot_host: str | None) -> EmulatedDevices:
     """The benches of a rig; `robot_host` goes before the one in [devices.robot]. HostError when there is none."""
     wanted: Mapping[str, Any] = rig.get("devices", {})
-    robot: Bench | None = None
-    if "robot" in wanted:
-        host = robot_host or wanted["robot"].get("host")
-        if host is None:
-            raise HostError('rig file: devices.robot has no host; give one, for example host = "127.0.0.2"')
-        robot = _build("ur", world, rig, host)
-    return EmulatedDevices(
-        psd=_build("psd_daq", world, rig) if "psd" in wanted else None,
-        encoders=_build("encoders", world, rig) if "encoders" in wanted else None,
-        robot=robot,
-    )
+    light = DisturbedLight(world)
+    psd = _build(PSDS[wanted["psd"].get("driver", PSD_DAQ)], light, rig) if "psd" in wanted else None
+    encoders = _build("encoders", world, rig) if "encoders" in wanted else None
+    robot = _robot(world, rig, wanted["robot"], robot_host) if "robot" in wanted else None
+    faulty = {
+        name: with_faults(name, bench, light if bench is psd else None)
+        for name, bench in (("psd", psd), ("can", encoders), ("robot", robot))
+        if bench is not None
+    }
+    benches = {name: bench for name, (bench, _) in faulty.items()}
+    injectors = {name: injector for name, (_, injector) in faulty.items()}
+    return EmulatedDevices(benches.get("psd"), benches.get("can"), benches.get("robot"), injectors)
+
+
+def _robot(world: World, rig: Mapping[str, Any], device: Mapping[str, Any], robot_host: str | None) -> Bench:
+    host = robot_host or device.get("host")
+    if host is None and "serial_port" not in device:
+        raise HostError('rig file: devices.robot has no host; give one, for example host = "127.0.0.2"')
+    return _build(ROBOTS[device.get("driver", UR)], world, rig, host)
 
 
 def _build(folder: str, *arguments: Any) -> Bench:
@@ -67,14 +84,36 @@ def without_links(devices: EmulatedDevices) -> EmulatedDevices:
         ports = [replace(port, link=None) if isinstance(port, SerialPort) else port for port in bench.ports]
         return replace(bench, ports=ports)
 
-    return EmulatedDevices(unlinked(devices.psd), unlinked(devices.encoders), unlinked(devices.robot))
+    return replace(
+        devices, psd=unlinked(devices.psd), encoders=unlinked(devices.encoders), robot=unlinked(devices.robot)
+    )
+
+
+def check_private(devices: EmulatedDevices) -> None:
+    """HostError when a device would listen where other machines reach it: their protocols know no password."""
+    for bench in devices.benches:
+        for port in bench.ports:
+            if isinstance(port, TcpPort) and not is_loopback(port.host):
+                raise HostError(
+                    f"{port.name}: {port.host} can be reached from the network, and {port.name} knows no password; "
+                    "emulate on one of 127.0.0.x, or ask for it with --expose"
+                )
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine reaches that address. A name that is no address counts as public."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
 def addresses(host: Host, devices: EmulatedDevices, rig: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Where each device listens, in the form that `emulate --json` prints."""
     found: dict[str, dict[str, Any]] = {}
     if devices.psd is not None:
-        found["psd"] = {"port": host.serial_address(_serial_name(devices.psd))}
+        ports = [host.serial_address(port.name) for port in devices.psd.ports if isinstance(port, SerialPort)]
+        found["psd"] = {"port": ports[0]} if len(ports) == 1 else {"ports": ports}
     if devices.encoders is not None:
         found["can"] = {
             "interface": "slcan",
@@ -82,10 +121,21 @@ def addresses(host: Host, devices: EmulatedDevices, rig: Mapping[str, Any]) -> d
             "bitrate": rig["devices"]["encoders"].get("bitrate", DEFAULT_BITRATE),
         }
     if devices.robot is not None:
-        found["robot"] = {"host": next(port.host for port in devices.robot.ports if isinstance(port, TcpPort))}
+        found["robot"] = _robot_address(host, devices.robot, rig["devices"]["robot"].get("driver", UR))
     control_host, control_port = host.tcp_address("control")
     found["control"] = {"host": control_host, "port": control_port}
     return found
+
+
+def _robot_address(host: Host, robot: Bench, driver: str) -> dict[str, Any]:
+    """A UR controller has the ports of its make; a Modbus server says which."""
+    sockets = [port for port in robot.ports if isinstance(port, TcpPort)]
+    if not sockets:
+        return {"serial_port": host.serial_address(_serial_name(robot))}
+    if driver != "modbus":
+        return {"host": sockets[0].host}
+    address, number = host.tcp_address(sockets[0].name)
+    return {"host": address, "port": number}
 
 
 def _serial_name(bench: Bench) -> str:

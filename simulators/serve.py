@@ -5,6 +5,7 @@ serve(rig, ServeOptions(robot_host="auto"), announce=print)
 
 import math
 import os
+import secrets
 import signal
 import sys
 from collections.abc import Callable, Generator, Mapping, Sequence
@@ -14,10 +15,20 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from simulators.devices import EmulatedDevices, addresses, build_devices, with_robot_on, without_links
+from simulators.defects.written import defects_of
+from simulators.devices import (
+    EmulatedDevices,
+    addresses,
+    build_devices,
+    check_private,
+    is_loopback,
+    with_robot_on,
+    without_links,
+)
+from simulators.faults.verbs import fault_verbs
 from simulators.host.errors import HostError, PortBusy
 from simulators.host.loop import Host
-from simulators.host.side_channel import side_channel
+from simulators.host.side_channel import Control, side_channel
 from simulators.wire import Bench
 from simulators.world.rig import read_rig
 from simulators.world.truth import write_truth
@@ -37,8 +48,11 @@ class ServeOptions:
     truth_path: Path | None = None  # where the concealed truth is written, outside of any recording
     seed: int | None = None
     time_scale: float | None = None  # emulated seconds per real second
+    expose: bool = False  # devices may listen on addresses that other machines reach
+    control_host: str = "127.0.0.1"  # of the side channel; anywhere but on loopback it wants a token
     links: bool = True  # make the symbolic links that the rig names as serial ports
     end_with_stdin: bool = False  # stop when stdin closes, so that a parent that dies leaves no emulators behind
+    hidden: Sequence[Mapping[str, Any]] = ()  # mechanisms at work in the world, see simulators/defects/written.py
 
 
 class _Stop:
@@ -55,23 +69,31 @@ def serve(rig: Mapping[str, Any], options: ServeOptions, announce: Callable[[Ann
     """Emulates until SIGTERM or SIGINT (or end of stdin); `announce` is called once when every port is open.
 
     Must run in the main thread, for only that takes signals. Raises WorldError for a rig that cannot be emulated,
-    PortBusy and HostError for ports that cannot be opened.
+    WrittenError for mechanisms that cannot be read, PortBusy and HostError for ports that cannot be opened.
     """
     time_scale = _time_scale(rig, options)
-    world = World.from_rig(rig, seed=options.seed, q_rad=rig.get("motion", {}).get("home_rad"))
+    hidden = defects_of(options.hidden)
+    world = World.from_rig(rig, seed=options.seed, q_rad=rig.get("motion", {}).get("home_rad"), hidden=hidden)
     auto = options.robot_host == AUTO
     devices = build_devices(world, rig, AUTO_HOSTS[0] if auto else options.robot_host)
     if not options.links:
         devices = without_links(devices)
+    if not options.expose:
+        check_private(devices)
+    token = None if is_loopback(options.control_host) else secrets.token_urlsafe(24)
+    control = Control(options.control_host, token)
     if options.truth_path is not None:
         write_truth(world.truth, options.truth_path)
     with _stop_on_signals() as stop:
         robot_hosts = AUTO_HOSTS if auto and devices.robot is not None else (None,)
-        host, devices = _open_host(devices, world, time_scale, robot_hosts)
+        host, devices = _open_host(devices, world, time_scale, robot_hosts, control)
         try:
             if options.end_with_stdin:
                 _stop_at_end_of(sys.stdin.fileno(), host, stop)
-            announce(addresses(host, devices, rig))
+            where = addresses(host, devices, rig)
+            if control.token is not None:
+                where["control"]["token"] = control.token
+            announce(where)
             host.run(lambda: stop.asked)
         finally:
             host.close()
@@ -85,7 +107,7 @@ def _time_scale(rig: Mapping[str, Any], options: ServeOptions) -> float:
 
 
 def _open_host(
-    devices: EmulatedDevices, world: World, time_scale: float, robot_hosts: Sequence[str | None]
+    devices: EmulatedDevices, world: World, time_scale: float, robot_hosts: Sequence[str | None], control: Control
 ) -> tuple[Host, EmulatedDevices]:
     """Opens all ports, the robot's on the first of `robot_hosts` that is free (None: where it was built for).
 
@@ -94,14 +116,14 @@ def _open_host(
     for robot_host in robot_hosts:
         moved = devices if robot_host is None else with_robot_on(devices, robot_host)
         try:
-            return _start_host(moved, world, time_scale), moved
+            return _start_host(moved, world, time_scale, control), moved
         except PortBusy as busy:
             if robot_host is None or busy.host != robot_host:
                 raise
     raise HostError(f"robot: no address from {robot_hosts[0]} to {robot_hosts[-1]} is free; stop some emulators")
 
 
-def _start_host(devices: EmulatedDevices, world: World, time_scale: float) -> Host:
+def _start_host(devices: EmulatedDevices, world: World, time_scale: float, control: Control) -> Host:
     def place(id: int) -> None:  # noqa: A002 - the verb's argument is called id
         world.place_fixture(id)
 
@@ -112,12 +134,13 @@ def _start_host(devices: EmulatedDevices, world: World, time_scale: float) -> Ho
         "fixture.place": place,
         "world.time": lambda: world.time_s,
         "host.pace": pace,
+        **fault_verbs(devices.injectors),
     }
     for bench in devices.benches:
         verbs.update(bench.verbs)
     bench = Bench(
         instruments=[instrument for bench in devices.benches for instrument in bench.instruments],
-        ports=[*(port for bench in devices.benches for port in bench.ports), side_channel(verbs)],
+        ports=[*(port for bench in devices.benches for port in bench.ports), side_channel(verbs, control)],
     )
     host = Host(bench, world, time_scale=time_scale)
     return host

@@ -14,14 +14,18 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from simulators.faults.device_clock import DeviceClock
+
 TICK_S = 0.002  # one cycle of an e-Series controller, 500 Hz (reference: RTDE guide)
 
 
 class Wire(Protocol):
     """One connection's protocol. Its docstring says what it does NOT imitate.
 
-    A wire of a TcpPort may have an attribute `closing`: once it is true and all bytes are sent, the host closes the
-    connection (dashboard `quit`, a controller that drops its clients). A wire that raises loses its connection.
+    A wire may have an attribute `closing`. Once it is true and all bytes are sent, the host closes a TCP connection
+    (dashboard `quit`, a controller that drops its clients); a serial port is unplugged for as long as it is true.
+    A wire that raises loses its connection. For fault injection it may have `damaged` and `refusal`: see
+    simulators/faults/faulty_wire.py.
     """
 
     def handle(self, data: bytes) -> bytes:
@@ -69,8 +73,10 @@ class Bench:
 
     `verbs` are called by the loopback side channel with JSON arguments, for example "fixture.place" with {"id": 2}.
     What `emulate --json` prints is put together in simulators/serve.py from where the ports were opened.
+    `clock` gives the device's time stamps, if it sends any; fault injection disturbs it.
     """
 
     instruments: Sequence[Instrument]
     ports: Sequence[SerialPort | TcpPort]
     verbs: Mapping[str, Callable[..., Any]] = field(default_factory=dict[str, Callable[..., Any]])
+    clock: DeviceClock | None = None

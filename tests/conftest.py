@@ -1,3 +1,36 @@
-"""Loaded before any test: the same thread setting that the program has."""
+"""Loaded before any test: the same thread setting that the program has. Marks the tests that want the machine alone."""
+
+from pathlib import Path
+
+import pytest
 
 import calibeam  # noqa: F401 - sets the thread count before numpy is loaded
+
+HERE = Path(__file__).parent
+# Several processes talk in real time here: beside other work they starve, and rightly say that a device is silent.
+WIRED = (
+    "calibeam/prove/test_wired.py",
+    "calibeam/test_check_cli.py",
+    "calibeam/test_cli.py",
+    "calibeam/test_device_faults.py",
+    "calibeam/test_log_cli.py",
+    "calibeam/test_modbus_session.py",
+    "calibeam/test_motion_cli.py",
+    "calibeam/test_psd_check_cli.py",
+    "calibeam/test_same_on_wires.py",
+    "calibeam/test_wired_session.py",
+    "drivers",
+    "simulators/encoders",
+    "simulators/faults",
+    "simulators/host",
+    "simulators/kpa101",
+    "simulators/modbus",
+    "simulators/psd_daq",
+    "simulators/ur",
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if any(item.path.is_relative_to(HERE / wired) for wired in WIRED):
+            item.add_marker("wired")

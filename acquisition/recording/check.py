@@ -1,4 +1,4 @@
-"""What is wrong with a recording, as data: gaps, times that do not rise, silent streams, a file cut short."""
+"""What is wrong with a recording, as data: gaps, times that do not rise, saturation, silence, a file cut short."""
 
 import enum
 from collections.abc import Iterator
@@ -6,8 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from acquisition.recording.can_frames import CHANNELS_NOTE, FLAGS, FrameFlag, is_frames
+from acquisition.recording.layout import SEGMENT_NOTE
 from acquisition.recording.recording import Recording
 from acquisition.recording.stream import Floats, Stream
+
+LOG_NOTES = (SEGMENT_NOTE, CHANNELS_NOTE)
 
 
 class Problem(enum.Enum):
@@ -20,6 +24,8 @@ class Problem(enum.Enum):
     TIME_ORDER = "time-order"
     DUPLICATE_TIME = "duplicate-time"
     NO_SAMPLES = "no-samples"
+    SATURATED = "saturated"
+    ERROR_FRAMES = "error-frames"
 
 
 @dataclass(frozen=True)
@@ -57,6 +63,27 @@ def _streams(recording: Recording) -> Iterator[Finding]:
             yield Finding(Problem.GAP, where, f"{count} samples missing {between}: {gap.reason}")
         yield from _device_times(where, stream)
         yield from _order(where, "host_s", stream.host_s)
+        yield from _saturation(recording, where, stream)
+        yield from _error_frames(where, stream)
+
+
+def _saturation(recording: Recording, where: str, stream: Stream) -> Iterator[Finding]:
+    for channel in stream.channels:
+        values = np.abs(stream.values[channel.name].reshape(stream.host_s.size, -1))
+        at = np.flatnonzero((values >= channel.full_scale).any(axis=1))
+        if at.size:
+            share = f"{at.size} of {stream.host_s.size} samples"
+            first = f"first at {_since(recording, float(stream.host_s[at[0]]))}"
+            limit = f"{channel.full_scale:.6g} {channel.unit}".rstrip()
+            yield Finding(Problem.SATURATED, where, f"{channel.name} at its full scale, {limit}, in {share}, {first}")
+
+
+def _error_frames(where: str, stream: Stream) -> Iterator[Finding]:
+    if not is_frames(stream):
+        return
+    count = int(np.count_nonzero(stream.values[FLAGS].astype(np.int64) & FrameFlag.ERROR))
+    if count:
+        yield Finding(Problem.ERROR_FRAMES, where, f"{count} error frames; check termination, bit rate and cables")
 
 
 def _device_times(where: str, stream: Stream) -> Iterator[Finding]:
@@ -76,12 +103,17 @@ def _order(where: str, name: str, times_s: Floats) -> Iterator[Finding]:
 
 def _samples(recording: Recording) -> Iterator[Finding]:
     times_s = recording.samples.column("t_s")
-    if times_s.size == 0:
+    if times_s.size == 0 and not is_log(recording):
         yield Finding(Problem.NO_SAMPLES, "samples", "not one settled sample was taken")
     yield from _order("samples", "t_s", times_s)
     repeats = int(np.count_nonzero(np.diff(times_s) == 0.0))
     if repeats:
         yield Finding(Problem.DUPLICATE_TIME, "samples", f"t_s repeats {repeats} times in consecutive rows")
+
+
+def is_log(recording: Recording) -> bool:
+    """Whether it was recorded, or imported, without a session: then nobody expects settled samples in it."""
+    return any(note in recording.notes for note in LOG_NOTES)
 
 
 def _since(recording: Recording, host_s: float) -> str:

@@ -8,7 +8,8 @@ from acquisition.recording.rig import parse_rig, rig_text
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
 from acquisition.recording.samples_csv import read_csv, write_csv
-from acquisition.recording.samples_parquet import read_parquet
+from acquisition.recording.samples_parquet import read_parquet, write_parquet
+from acquisition.recording.tables import TableFormat
 
 RIG = "rig.toml"
 CSV = "samples.csv"
@@ -24,8 +25,8 @@ def read_folder(folder: Path) -> Recording:
     return Recording(path=folder, rig_text=text, rig=rig, samples=_read_samples(folder, rig), complete=True)
 
 
-def export(recording: Recording, folder: Path | str) -> None:
-    """Write rig.toml to the letter and samples.csv without loss. RecordingError if the folder is not empty."""
+def export(recording: Recording, folder: Path | str, table: TableFormat = TableFormat.CSV) -> None:
+    """Write rig.toml to the letter and the samples without loss. RecordingError if the folder is not empty."""
     folder = Path(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -36,7 +37,10 @@ def export(recording: Recording, folder: Path | str) -> None:
         raise RecordingError(
             f"{folder}: cannot write the session folder ({error.strerror}); choose another place"
         ) from error
-    write_csv(recording.samples, folder / CSV)
+    if table is TableFormat.CSV:
+        write_csv(recording.samples, folder / CSV)
+    else:
+        write_parquet(recording.samples, folder / PARQUET)
 
 
 def _read_samples(folder: Path, rig: Rig) -> Samples:

@@ -10,7 +10,15 @@ from google.protobuf.message import DecodeError
 from mcap.records import Channel as McapChannel
 from mcap.records import Message, Metadata, Schema
 
-from acquisition.recording.layout import EVENTS_TOPIC, GAPS_TOPIC, SAMPLES_TOPIC, STREAM_METADATA, STREAM_TOPIC
+from acquisition.recording.layout import (
+    CHECKSUM,
+    EVENTS_TOPIC,
+    GAPS_TOPIC,
+    SAMPLES_TOPIC,
+    STREAM_METADATA,
+    STREAM_TOPIC,
+    checksum,
+)
 from acquisition.recording.messages import MessageType, embedded_type
 from acquisition.recording.samples import Cell
 from acquisition.recording.stream import Channel, Event, Gap, Stream
@@ -62,7 +70,10 @@ class Content:
         return {name: self._stream(name, channels) for name, channels in self._declared.items()}
 
     def _take_metadata(self, record: Metadata) -> None:
-        self.metadata[record.name] = record.metadata
+        values = dict(record.metadata)
+        if values.pop(CHECKSUM, None) not in (None, checksum(values)):  # None: of an older version, which wrote none
+            raise ValueError(f"the record '{record.name}' does not fit its checksum")
+        self.metadata[record.name] = values
         if record.name.startswith(STREAM_METADATA):
             self._declare(record.name.removeprefix(STREAM_METADATA), record.metadata["channels"])
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from mcap.writer import Writer
 
 from acquisition.recording.disk_file import DiskFile, create_file
-from acquisition.recording.layout import PROFILE
+from acquisition.recording.layout import CHECKSUM, PROFILE, checksum
 from acquisition.recording.messages import MessageType
 
 
@@ -21,8 +21,8 @@ class McapFile:
         self._latest_ns = self.safe_ns = 0
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """A named record that stands in the file where it is written."""
-        self._writer.add_metadata(name, dict(values))
+        """A named record that stands in the file where it is written, with its own checksum: MCAP gives it none."""
+        self._writer.add_metadata(name, {**values, CHECKSUM: checksum(values)})
 
     def topic(self, topic: str, kind: MessageType, metadata: Mapping[str, str]) -> int:
         """Declares messages of one kind under a topic; returns the number to write them with."""

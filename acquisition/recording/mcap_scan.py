@@ -1,11 +1,12 @@
 """Every readable record of an MCAP file, in file order, however the file ends.
 
 Reads from the front, because the index at the end is missing when a session was killed. Layout of the records:
-https://mcap.dev/spec. A batch whose checksum is wrong is left out and told; the batches after it are still read.
+https://mcap.dev/spec. A batch whose checksum is wrong is left out and told; the batches after it are still
+read, also where the length of a record is damaged and the next batch must be searched for.
 """
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import IO
 
@@ -15,6 +16,7 @@ from mcap.records import Channel, Chunk, DataEnd, Header, McapRecord, Message, M
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 from acquisition.recording.errors import RecordingError
+from acquisition.recording.mcap_search import next_batch
 
 # What the parser raises on bytes that make no sense; CRC errors are ValueErrors.
 DAMAGE = (
@@ -29,6 +31,9 @@ DAMAGE = (
 )
 
 
+Content = Header | Schema | Channel | Message | Metadata
+
+
 class Scan:
     """One pass over a file; `damage` says afterwards what could not be read, `whole` whether the end was reached."""
 
@@ -37,8 +42,11 @@ class Scan:
         self.damage: list[str] = []
         self.whole = False
 
-    def records(self) -> Iterator[Header | Schema | Channel | Message | Metadata]:
-        """The records that carry content. RecordingError if the file is missing, empty or not MCAP."""
+    def records(self) -> Iterator[Content]:
+        """The records that carry content: header, metadata, and what stands in batches.
+
+        RecordingError if the file is missing, empty or not MCAP.
+        """
         try:
             with self._path.open("rb") as file:
                 size = file.seek(0, 2)
@@ -51,8 +59,17 @@ class Scan:
                 f"{self._path}: cannot read the recording ({error.strerror}); check the path"
             ) from error
 
-    def _contents(self, file: IO[bytes], size: int) -> Iterator[Header | Schema | Channel | Message | Metadata]:
-        reader = StreamReader(file, emit_chunks=True, validate_crcs=True, record_size_limit=size)
+    def _contents(self, file: IO[bytes], size: int) -> Iterator[Content]:
+        """Piece by piece: after bytes that make no sense the reading goes on at the next batch, if there is one."""
+        begin: int | None = 0
+        while begin is not None:
+            file.seek(begin)
+            failed_at = yield from self._piece(file, size, first=begin == 0)
+            begin = None if failed_at is None else next_batch(file, failed_at + 1, size)
+
+    def _piece(self, file: IO[bytes], size: int, *, first: bool) -> Generator[Content, None, int | None]:
+        """Records from here on; where they make no sense any more, or None at the end."""
+        reader = StreamReader(file, skip_magic=not first, emit_chunks=True, validate_crcs=True, record_size_limit=size)
         records = iter(reader.records)
         in_summary = False  # what follows the data repeats it
         while True:
@@ -61,15 +78,15 @@ class Scan:
                 record = next(records)
             except StopIteration:
                 self.whole = True
-                return
+                return None
             except DAMAGE as error:
                 self.damage.append(f"byte {at} of {size}: {_says(error)}; everything before it was read")
-                return
+                return at
             if isinstance(record, Chunk):
                 yield from self._chunk(record, at)
             elif isinstance(record, DataEnd):
                 in_summary = True
-            elif isinstance(record, Header | Schema | Channel | Message | Metadata) and not in_summary:
+            elif isinstance(record, Header | Metadata) and not in_summary:
                 yield record
 
     def _chunk(self, chunk: Chunk, at: int) -> Iterator[Schema | Channel | Message]:

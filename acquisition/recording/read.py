@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+import msgspec
 from mcap.records import Header
 
 from acquisition.recording.errors import RecordingError
@@ -13,6 +14,7 @@ from acquisition.recording.layout import (
     NOTES_METADATA,
     PROFILE,
     RECORDING_METADATA,
+    RECOVERY_METADATA,
     RIG_METADATA,
 )
 from acquisition.recording.mcap_content import Content
@@ -50,7 +52,7 @@ def _read_mcap(path: Path) -> Recording:
         )
     rig_text = _rig_text(content, path, scan)
     rig = parse_rig(rig_text, f"{path} (rig)")
-    damage = (*scan.damage, *_undecodable(content))
+    damage = (*scan.damage, *_undecodable(content), *_before_recovery(content))
     ended = content.metadata.get(END_METADATA, {}).get("complete") == "true"
     return Recording(
         path=path,
@@ -72,7 +74,10 @@ def _read_mcap(path: Path) -> Recording:
 def _metadata(content: Content, name: str, path: Path, scan: Scan) -> Mapping[str, str]:
     if name not in content.metadata:
         why = scan.damage[0] if scan.damage else "the record was never written"
-        raise RecordingError(f"{path}: '{name}' cannot be read ({why}), so nothing can be made of the rest; use a copy")
+        raise RecordingError(
+            f"{path}: '{name}' cannot be read ({why}), so nothing can be made of the rest; use a copy, "
+            "or try `calibeam recover`"
+        )
     return content.metadata[name]
 
 
@@ -97,6 +102,13 @@ def _samples(content: Content, rig: Rig, path: Path) -> Samples:
         return no_samples(rig)
     columns = {column: [row.get(column) for row in content.rows] for column in content.columns}
     return checked_samples(columns, rig, lambda row: str(path) if row is None else f"{path} sample {row + 1}")
+
+
+def _before_recovery(content: Content) -> tuple[str, ...]:
+    """What `recover` could not save, told by the file that it made."""
+    told = content.metadata.get(RECOVERY_METADATA, {})
+    lost = msgspec.json.decode(told.get("damage", "[]"), type=list[str])
+    return tuple(f"before its recovery from {told.get('source')}: {says}" for says in lost)
 
 
 def _undecodable(content: Content) -> tuple[str, ...]:

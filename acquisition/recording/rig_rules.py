@@ -6,7 +6,9 @@ Every rule yields faults as (key path, what is wrong and what to do); the reader
 import math
 from collections.abc import Iterator
 
+from acquisition.recording.rig_instruments import instrument_faults
 from acquisition.recording.rig_lines import KeyPath
+from acquisition.recording.rig_robot import robot_faults
 from acquisition.recording.rig_schema import ArmModel, Joint, Rig
 
 Fault = tuple[KeyPath, str]
@@ -23,7 +25,8 @@ def faults(rig: Rig) -> Iterator[Fault]:
     yield from _placement_faults(rig)
     yield from _twice(("bar",), tuple(bar.id for bar in rig.bar_list))
     yield from _tolerance_faults(rig)
-    yield from _device_faults(rig)
+    yield from instrument_faults(rig)
+    yield from robot_faults(rig)
     yield from _motion_faults(rig)
 
 
@@ -46,6 +49,13 @@ def _joint_faults(path: KeyPath, joint: Joint, model: ArmModel) -> Iterator[Faul
 
 
 def _motion_faults(rig: Rig) -> Iterator[Fault]:
+    for key in ("keep_out", "slow_area"):
+        for index, box in enumerate(getattr(rig.motion, key)):
+            if any(lower >= upper for lower, upper in zip(box.lower_m, box.upper_m, strict=True)):
+                yield (
+                    ("motion", key, index, "lower_m"),
+                    f"box '{box.name}': lower_m is not below upper_m in all three; exchange or correct them",
+                )
     home_rad = rig.motion.home_rad
     if home_rad is None:
         return
@@ -105,22 +115,3 @@ def _tolerance_faults(rig: Rig) -> Iterator[Fault]:
             yield ("tolerance",), f"[tolerance] says only half of how well {what} is known: add '{missing[0]}'"
         elif not missing and getattr(rig, section) is None:
             yield ("tolerance", f"{what}_m"), f"{what}_m is there, but there is no [{section}] that it is the sigma of"
-
-
-def _device_faults(rig: Rig) -> Iterator[Fault]:
-    psd, encoders = rig.devices.psd, rig.devices.encoders
-    if psd is not None and (psd.port is None) == (psd.serial_number is None):
-        yield (
-            ("devices", "psd"),
-            "[devices.psd] needs either 'port' (a path) or 'serial_number' (of its USB), and one only",
-        )
-    if encoders is None:
-        return
-    nodes = encoders.nodes
-    if len(nodes) != rig.n_joints:
-        yield (
-            ("devices", "encoders", "nodes"),
-            f"nodes = {list(nodes)} names {len(nodes)} encoders, the arm has {rig.n_joints} joints; name one per joint",
-        )
-    if len(set(nodes)) != len(nodes):
-        yield ("devices", "encoders", "nodes"), f"nodes = {list(nodes)} names a node twice; every encoder has its own"

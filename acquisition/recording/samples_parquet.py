@@ -7,8 +7,9 @@ from typing import Any
 from acquisition.recording.errors import SamplesError
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.sample_rules import checked_samples
-from acquisition.recording.samples import Samples
+from acquisition.recording.samples import Samples, cells_of
 from acquisition.recording.samples_csv import check_header
+from acquisition.recording.tables import TableFormat, write_table
 
 
 def read_parquet(path: Path, rig: Rig) -> Samples:
@@ -21,6 +22,12 @@ def read_parquet(path: Path, rig: Rig) -> Samples:
     check_header(table.column_names, str(path))
     columns = {name: table.column(name).to_pylist() for name in table.column_names}
     return checked_samples(columns, rig, lambda row: str(path) if row is None else f"{path} row {row + 1}")
+
+
+def write_parquet(samples: Samples, path: Path) -> None:
+    """Every cell so that it reads back bit for bit, null for a missing one. RecordingError when the disk refuses."""
+    columns = {name: cells_of(name, values) for name, values in samples.columns.items()}
+    write_table(columns, path, TableFormat.PARQUET)
 
 
 def _pyarrow_parquet(path: Path) -> Any:

@@ -11,7 +11,9 @@ from acquisition.recording.mcap_file import McapFile
 from acquisition.recording.spool import Spool
 from acquisition.recording.stream_encoder import StreamEncoder
 
-FLUSH_S = 0.1  # a killed process loses at most this; with an own thread the sync costs the others nothing
+# A killed process loses what waits and what is being written, as long again: together 0.1 s. With an own thread the
+# sync costs the others nothing.
+FLUSH_S = 0.05
 
 Entry = Callable[[McapFile], None]  # what is to be written, by whom it was left
 

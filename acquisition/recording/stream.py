@@ -26,6 +26,13 @@ class Channel:
     resolution: float = 0.0
 
 
+def scalar_names(channel: Channel) -> tuple[str, ...]:
+    """Names of a channel's elements in views and tables: "q_rad_1" ... row by row; a scalar keeps its own name."""
+    if channel.shape == ():
+        return (channel.name,)
+    return tuple(f"{channel.name}_{number + 1}" for number in range(math.prod(channel.shape)))
+
+
 @dataclass(frozen=True)
 class Gap:
     """A stretch of host time in which samples of a stream are known to be missing, and why."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from acquisition.recording.layout import STREAM_TOPIC, VIEW_TOPIC, log_ns
 from acquisition.recording.mcap_file import McapFile
 from acquisition.recording.messages import Field, FieldType, MessageType, Presence, message_type, packed
-from acquisition.recording.stream import Channel, Floats
+from acquisition.recording.stream import Channel, Floats, scalar_names
 
 BATCH = 100  # samples a message: a tenth of the time and of the size of single ones, measured with this library
 VIEW_S = 0.05  # 20 Hz: as fast as an eye follows a curve
@@ -100,13 +100,6 @@ class StreamEncoder:
                     scalars = piece.values[channel.name][row].reshape(-1).tolist()
                     values |= dict(zip(scalar_names(channel), map(float, scalars), strict=True))
                 file.write(topic, log_ns(host_s), packed(kind, values))
-
-
-def scalar_names(channel: Channel) -> tuple[str, ...]:
-    """Names of a channel's elements in the view: "q_rad_1" ... "q_rad_6" row by row; a scalar keeps its own name."""
-    if channel.shape == ():
-        return (channel.name,)
-    return tuple(f"{channel.name}_{number + 1}" for number in range(int(np.prod(channel.shape))))
 
 
 def channels_json(channels: tuple[Channel, ...]) -> str:

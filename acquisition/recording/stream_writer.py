@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from acquisition.recording.stream import Channel, Floats, Gap
-from acquisition.recording.stream_encoder import Piece, scalar_names
+from acquisition.recording.stream import Channel, Floats, Gap, scalar_names
+from acquisition.recording.stream_encoder import Piece
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _STREAM_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
@@ -20,13 +20,23 @@ class StreamWriter:
     """Made by `RecordingWriter.stream`. May be used by several threads; samples keep the order of the calls."""
 
     def __init__(
-        self, name: str, channels: tuple[Channel, ...], put: Callable[[Piece], None], put_gap: Callable[[Gap], None]
+        self,
+        name: str,
+        channels: tuple[Channel, ...],
+        put: Callable[[Piece], None],
+        put_gap: Callable[[Gap], None],
+        after: tuple[int, float] | None = None,
     ) -> None:
         self.name, self.channels = name, channels
         self._put, self._put_gap = put, put_gap
         self._turn = threading.Lock()
         self._kinds: dict[str, str] = {}  # channel -> "i" or "f", from the first block
-        self._last: tuple[int, float] | None = None  # sequence and host time of the last sample
+        self._last = after  # sequence and host time of the last sample
+
+    @property
+    def last(self) -> tuple[int, float] | None:
+        """Sequence and host time of the last sample; None before the first."""
+        return self._last
 
     def append(
         self, host_s: ArrayLike, device_s: ArrayLike, sequence: ArrayLike, values: Mapping[str, ArrayLike]

@@ -108,9 +108,16 @@ class RecordingWriter:
             raise RecordingError(f"{self.path}: cannot begin the recording ({error.strerror}); free space") from error
         self._scribe.start()
 
-    def stream(self, name: str, channels: tuple[Channel, ...], viewer: tuple[str, ...] | None = None) -> StreamWriter:
+    def stream(
+        self,
+        name: str,
+        channels: tuple[Channel, ...],
+        viewer: tuple[str, ...] | None = None,
+        after: tuple[int, float] | None = None,
+    ) -> StreamWriter:
         """Declare a device's stream. `viewer` names the channels of the thinned 20 Hz view; None: all.
 
+        `after`: sequence and host time of the last sample in the file before, where this one goes on with it.
         ValueError for names that cannot stand in a file, stand twice, or are not declared.
         """
         channels = tuple(channels)
@@ -125,7 +132,7 @@ class RecordingWriter:
             encoder = StreamEncoder(name, channels, names if viewer is None else viewer)
             self._spool.put(partial(self._begin_stream, name=name, channels=channels, encoder=encoder), 0)
             self._streams[name] = StreamWriter(
-                name, channels, partial(self._put_piece, encoder), partial(self._put_gap, name)
+                name, channels, partial(self._put_piece, encoder), partial(self._put_gap, name), after
             )
             return self._streams[name]
 

@@ -32,8 +32,16 @@ class Registered:
 
     name = "registered"
 
-    def __init__(self, arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, first: int) -> None:
-        self._arm, self._optics, self._first = arm, optics, first
+    def __init__(
+        self,
+        arm: BelievedArm,
+        optics: FixtureOptics,
+        T_base_fixture: Floats,
+        first: int,
+        first_gain: float = FIRST_GAIN,
+    ) -> None:
+        """`first_gain` is 1 for a fixture pose that earlier poses have told: then the first step is a whole one."""
+        self._arm, self._optics, self._first, self._first_gain = arm, optics, first, first_gain
         self.T_base_fixture = T_base_fixture
         self._q_rad: list[Floats] = []
         self._spots_m: list[Floats] = []
@@ -48,7 +56,7 @@ class Registered:
     def propose(self, target_m: Floats) -> Proposal:
         q_rad, spots_m = self._q_rad[-1], self._spots_m[-1]
         step = correction(self._arm, self._optics, self.T_base_fixture, q_rad, target_m - spots_m, spots_m, self._first)
-        return Proposal(step if len(self._q_rad) > 1 else FIRST_GAIN * step, "correct")
+        return Proposal(step if len(self._q_rad) > 1 else self._first_gain * step, "correct")
 
     def _onto_beam(self, T_guess: Floats, q_rad: Floats, spots_m: Floats) -> Floats:
         """The guess, turned and shifted as little as possible so that the measured beam lies on the believed one."""

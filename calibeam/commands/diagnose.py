@@ -56,7 +56,8 @@ def diagnose_command(
             print_diagnosis(console, file)
         refuse_wrong_file(found, out)
         planned = "" if plan_out is None else plan_next(found, plan_out)
-    page = write_diagnosis_report(out.with_suffix(".html") if report is None else report, source, file)
+    told = msgspec.structs.replace(file, next=(*file.next, planned)) if planned else file
+    page = write_diagnosis_report(out.with_suffix(".html") if report is None else report, source, told)
     if not json:
         for line in filter(None, (planned, f"diagnosis: {out}", f"report: {page}")):
             console.print(line, markup=False, highlight=False)

@@ -18,11 +18,15 @@ def emulate(
     time_scale: float | None = None,
     truth: Path | None = None,
     links: bool = True,
+    expose: bool = False,
+    control_host: str = "127.0.0.1",
     end_with_stdin: Annotated[bool, Parameter(show=False)] = False,
 ) -> None:
     """Emulate every device of a rig file on real wires, and stay up until Ctrl-C.
 
     Example: calibeam emulate rigs/ur5e-dual-psd.toml
+    Trouble on their wires: {"do": "fault.inject", "with": {"device": "psd", "kind": "silence", "count": 100}} as one
+    line to the address "control"; the kinds stand in docs/protocols/faults.md.
 
     Parameters
     ----------
@@ -42,12 +46,25 @@ def emulate(
         End when standard input closes.
     links
         Make the symbolic links to the pseudo-terminals that the rig file names as ports.
+    expose
+        Let devices listen on addresses that other machines reach. Device protocols know no password.
+    control_host
+        Address of the side channel. Anywhere but on loopback it wants the token that is announced with it.
 
     """
     from simulators.serve import ServeOptions, serve  # the physics takes a second to load: only here
 
     load_rig(rig)  # tells what is wrong with the file in its own words
-    options = ServeOptions(robot_host, truth, seed, time_scale, links, end_with_stdin)
+    options = ServeOptions(
+        robot_host=robot_host,
+        truth_path=truth,
+        seed=seed,
+        time_scale=time_scale,
+        expose=expose,
+        control_host=control_host,
+        links=links,
+        end_with_stdin=end_with_stdin,
+    )
     serve(plain_rig(rig_text(rig), str(rig)), options, _print_json if json_ else _print_table)
 
 

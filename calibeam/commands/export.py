@@ -1,43 +1,79 @@
-"""`calibeam export` and `calibeam import`: session folders in and out of recordings."""
+"""`calibeam export` and `calibeam import`: session folders, tables and CAN logs out of and into recordings."""
 
 from pathlib import Path
 
+from acquisition.recording.can_log import SUFFIXES, export_can, import_can
+from acquisition.recording.errors import RecordingError
 from acquisition.recording.folder import export
 from acquisition.recording.import_folder import import_folder
 from acquisition.recording.read import read
+from acquisition.recording.rig import rig_text
+from acquisition.recording.tables import TableFormat, write_tables
+from calibeam.outcome import PartialResult
 from calibeam.software import SOFTWARE
 
+STREAMS = "streams"  # folder of the tables beside samples and rig
 
-def export_command(recording: Path, *, out: Path) -> None:
-    """Write a recording's rig and settled samples as a session folder: rig.toml and samples.csv.
+
+def export_command(recording: Path, *, out: Path, table: TableFormat = TableFormat.CSV, streams: bool = False) -> None:
+    """Write a recording as a session folder of tables, or its raw CAN frames as a CAN log.
 
     Example: calibeam export out/demo/recording.mcap --out session
+
+    Example: calibeam export out/demo/recording.mcap --out tables --streams --table parquet
+
+    Example: calibeam export encoder-log/segment-0001.mcap --out bus.blf
 
     Parameters
     ----------
     recording
         A recording, or a session folder.
     out
-        The folder to make.
+        The folder to make; or a file that ends with .blf, .asc, .csv or .log (candump), for the CAN frames.
+    table
+        Kind of the tables: samples and, with --streams, streams.
+    streams
+        Also every stream, events and gaps, one table each, in the folder "streams".
 
     """
     source = read(recording)
-    export(source, out)
-    print(f"{out}: rig.toml and samples.csv with {len(source.samples)} samples")
+    if out.suffix.lower() in SUFFIXES:
+        print(f"{out}: {export_can(source, out)} CAN frames")
+        return
+    export(source, out, table)
+    print(f"{out}: rig.toml and samples.{table.value} with {len(source.samples)} samples")
+    if streams:
+        (out / STREAMS).mkdir()
+        for path in write_tables(source, out / STREAMS, table):
+            print(f"{path}: {path.stat().st_size} bytes")
 
 
-def import_command(folder: Path, *, out: Path) -> None:
-    """Make a recording of a session folder (rig.toml and samples.csv or samples.parquet).
+def import_command(source: Path, *, out: Path, rig: Path | None = None) -> None:
+    """Make a recording of a session folder (rig.toml and samples.csv or samples.parquet), or of a CAN log.
 
     Example: calibeam import session --out session.mcap
 
+    Example: calibeam import bus.blf --rig rigs/ur5e-dual-psd.toml --out bus.mcap
+
     Parameters
     ----------
-    folder
-        The session folder.
+    source
+        The session folder; or a CAN log: .blf, .asc, .csv or .log (candump).
     out
         The recording to make.
+    rig
+        The rig that a CAN log was heard on; a session folder has its own.
 
     """
-    import_folder(folder, out, software=SOFTWARE)
-    print(f"{out}: {len(read(out).samples)} samples")
+    if source.suffix.lower() not in SUFFIXES or source.is_dir():
+        if rig is not None:
+            raise RecordingError(f"--rig {rig}: a session folder has its own rig.toml; leave --rig out")
+        import_folder(source, out, software=SOFTWARE)
+        print(f"{out}: {len(read(out).samples)} samples")
+        return
+    if rig is None:
+        raise RecordingError(f"{source}: a CAN log does not say of which rig it is; give --rig RIG.toml")
+    done = import_can(source, out, rig_text=rig_text(rig), software=SOFTWARE)
+    print(f"{out}: {done.frames} CAN frames in {', '.join(done.streams)}")
+    if done.damage is not None:
+        raise PartialResult(f"{source}: {done.damage}; everything before it is in {out}")

@@ -27,6 +27,7 @@ def prove_command(
     mechanism: str | None = None,
     jobs: int = 2,
     without: tuple[str, ...] = (),
+    wire: int = 0,
     compare: int = 0,
     real: Path | None = None,
     publish: bool = False,
@@ -56,6 +57,8 @@ def prove_command(
         Processes at a time.
     without
         Physics to take out of the catalogue: then its cases have to be called unknown, at the right place.
+    wire
+        Further cases whose recordings come over emulated wires: a minute each, two cores.
     compare
         For how many cases an oracle, which is told the truth, and other methods are asked for comparison.
     real
@@ -74,9 +77,9 @@ def prove_command(
         raise DataError(f"seed {seed} is one of development (below {DEVELOPMENT}); publish with another --seed")
     if publish and without:
         raise DataError("--without makes the catalogue another one; its table is not the one to publish")
-    if cases < 1 or jobs < 1:
-        raise DataError(f"--cases {cases} --jobs {jobs}: both must be 1 or more")
-    plan = Plan(Mix(kind, family, enr, mechanism), seed, cases, jobs, without, compare)
+    if cases < 1 or jobs < 1 or wire < 0:
+        raise DataError(f"--cases {cases} --jobs {jobs} --wire {wire}: cases, jobs 1 or more, wire 0 or more")
+    plan = Plan(Mix(kind, family, enr, mechanism), seed, cases, jobs, without, wire, compare)
     proof = prove(out, plan, lambda word: _tell(console, word), " ".join(["calibeam", *sys.argv[1:]]))
     print_proof(console, proof)
     console.print(f"proof: {out / 'proof.json'}\npage: {out / 'proof.html'}", markup=False, highlight=False)

@@ -29,11 +29,9 @@ class NoSimulators:
 
 def answer(recording: Path, asked: Path, out: Path) -> None:
     """Writes diagnosis.json and, where both models say it, unseen.npz with the tool at the poses asked."""
-    import numpy as np
-
     from acquisition.recording.read import read
     from calibeam.diagnosis import diagnose_recording
-    from calibeam.prove.unseen_file import write_unseen
+    from calibeam.prove.unseen_file import read_asked, write_unseen
     from calibeam.prove.unseen_poses import tool_at
     from calibrate.diagnose.file import write_diagnosis
 
@@ -42,8 +40,7 @@ def answer(recording: Path, asked: Path, out: Path) -> None:
     write_diagnosis(out / "diagnosis.json", file)
     if found.physics is None or not asked.is_file():
         return
-    table = np.loadtxt(asked, delimiter=",", skiprows=1)
-    q_rad, approach = np.hsplit(table, 2)
+    q_rad, approach = read_asked(asked)
     write_unseen(
         out / "unseen.npz",
         tool_at(found.physics.geometry, q_rad, approach),

@@ -35,7 +35,11 @@ def compared_cases(
             tell(f"compared {number} of {len(fit)}")
             if found is not None:
                 out[i] = msgspec.structs.replace(
-                    out[i], oracle_before_m=found.before_m, oracle_m=found.oracle_m, baselines=found.baselines
+                    out[i],
+                    oracle_before_m=found.before_m,
+                    oracle_m=found.oracle_m,
+                    oracle_free_space_m=found.free_space_m,
+                    baselines=found.baselines,
                 )
     return out
 
@@ -48,6 +52,6 @@ def _compared(order: tuple[Layout, str, Truth, str]) -> Compared | None:
     """None where a recording cannot be fitted at all: the diagnosis has said so already."""
     layout, name, truth, family = order
     try:
-        return compare(layout.recording(name), layout.answer(name), truth, family)
+        return compare(layout.recording(name), layout.answer(name), layout.asked(name), truth, family)
     except DataError:
         return None

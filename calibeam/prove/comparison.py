@@ -11,9 +11,12 @@ from acquisition.recording.read import read
 from calibeam.prove.baselines.features import features
 from calibeam.prove.baselines.method import Method
 from calibeam.prove.baselines.methods import installed
+from calibeam.prove.free_space import errors_m
 from calibeam.prove.oracle import Fold, fold_of, misfit_m, oracle_terms, rms_m, said_terms, wild_of
 from calibeam.prove.record import DIAGNOSIS, BaselineScore
 from calibeam.prove.truth import Truth
+from calibeam.prove.unseen_file import read_asked
+from calibeam.prove.unseen_poses import tool_at
 from calibrate.diagnose.file import read_diagnosis
 from calibrate.diagnose.fitted import Fitted, fit_geometry
 from calibrate.diagnose.linearised import Unseen
@@ -33,11 +36,15 @@ class Compared:
 
     before_m: float
     oracle_m: float
+    free_space_m: float | None  # of the oracle; None where its terms say nothing of other poses
     baselines: tuple[BaselineScore, ...]
 
 
-def compare(recording: Path, answer: Path, truth: Truth, family: str) -> Compared | None:
-    """None where the catalogue does not hold what was hidden, so that there is no oracle."""
+def compare(recording: Path, answer: Path, asked: Path, truth: Truth, family: str) -> Compared | None:
+    """None where the catalogue does not hold what was hidden, so that there is no oracle.
+
+    `asked`: the poses at which the truth says where the tool is.
+    """
     source = read(recording)
     state = fit_geometry(session_of(source.rig, source.samples))
     terms = oracle_terms(state, truth.defects, family)
@@ -52,7 +59,8 @@ def compare(recording: Path, answer: Path, truth: Truth, family: str) -> Compare
     scores = [BaselineScore(GEOMETRY, before_m, _gain(before_m, before_m, oracle_m), "no place and no cause")]
     scores += [_rival(m, rest) for m in installed()]
     scores += _diagnosed(state, read_diagnosis(answer / "diagnosis.json"), rest)
-    return Compared(before_m, oracle_m, tuple(scores))
+    free_space_m = errors_m(tool_at(state.refitted(terms), *read_asked(asked)), truth.free_space)
+    return Compared(before_m, oracle_m, free_space_m, tuple(scores))
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,11 +6,13 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
 
 from calibeam.prove.layout import Layout
-from calibeam.prove.scenario import DRAWS, Mix, Scenario, scenario
+from calibeam.prove.scenario import DRAWS, WIRED_DRAWS, Mix, Scenario, scenario, wired_scenario
 from calibeam.prove.seal import fingerprint, new_key, sealed
+from calibeam.prove.streamed import conceal_streams, told
+from calibeam.prove.unseen_file import write_asked
+from calibeam.prove.wired import conceal_on_wires
 from simulators.conceal.belief import rig_document
 from simulators.conceal.case import Case, conceal
 from simulators.conceal.reveal import truth_document
@@ -37,13 +39,19 @@ class _Order:
     seed: int
     number: int
     key: bytes
+    wired: bool = False
 
 
-def conceal_cases(layout: Layout, mix: Mix, seed: int, cases: int, jobs: int) -> Iterator[Concealed]:
-    """Cases in their order. ConcealError where one cannot be drawn at all."""
-    orders = [_Order(layout, mix, seed, number, new_key()) for number in range(cases)]
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        yield from pool.map(_conceal, orders)
+def conceal_cases(layout: Layout, mix: Mix, seed: int, cases: int, jobs: int, wired: int = 0) -> Iterator[Concealed]:
+    """The wired cases first, one at a time, for emulators and readers take two cores; then all others in their order.
+
+    ConcealError where one cannot be drawn at all, or a machine is too busy for a session on the wires.
+    """
+    orders = [_Order(layout, mix, seed, number, new_key(), number >= cases) for number in range(cases + wired)]
+    for few, at_a_time in ((orders[cases:], 1), (orders[:cases], jobs)):
+        if few:
+            with ProcessPoolExecutor(at_a_time, mp_context=get_context("spawn")) as pool:
+                yield from pool.map(_conceal, few)
 
 
 def publish(layout: Layout, cases: list[Concealed]) -> str:
@@ -56,9 +64,13 @@ def publish(layout: Layout, cases: list[Concealed]) -> str:
 def _conceal(order: _Order) -> Concealed:
     drawn, case, attempts = _drawn(order)
     truth = truth_document(case)
+    recorded = order.layout.recorded(drawn.name)
+    if drawn.kind == "streams":
+        truth["defects"] = told(conceal_streams(case, order.mix.mechanism, recorded))
+    elif not order.wired:
+        _write_recording(case, order.layout.recording(drawn.name))
     text = json.dumps(truth).encode()
-    _write_recording(case, order.layout.recording(drawn.name))
-    _write_asked(truth["free_space"], order.layout.asked(drawn.name))
+    write_asked(truth["free_space"], order.layout.asked(drawn.name))
     seal = order.layout.seal(drawn.name)
     seal.parent.mkdir(parents=True, exist_ok=True)
     seal.write_bytes(sealed(text, order.key))
@@ -67,13 +79,16 @@ def _conceal(order: _Order) -> Concealed:
 
 def _drawn(order: _Order) -> tuple[Scenario, Case, int]:
     last: ConcealError | None = None
-    for attempt in range(DRAWS):
-        drawn = scenario(order.mix, order.seed, order.number, attempt)
+    for attempt in range(WIRED_DRAWS if order.wired else DRAWS):
         try:
+            if order.wired:
+                drawn = wired_scenario(order.seed, order.number, attempt)
+                return drawn, conceal_on_wires(drawn.wanted, order.layout.recorded(drawn.name)), attempt
+            drawn = scenario(order.mix, order.seed, order.number, attempt)
             return drawn, conceal(drawn.wanted), attempt
         except ConcealError as reason:
             last = reason
-    raise ConcealError(f"case {order.number}: {DRAWS} draws gave no session; the last one: {last}")
+    raise ConcealError(f"case {order.number}: no draw gave a session; the last one: {last}")
 
 
 def _write_recording(case: Case, folder: Path) -> None:
@@ -81,13 +96,3 @@ def _write_recording(case: Case, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "rig.toml").write_text(toml_text(rig_document(case.belief)), encoding="utf-8")
     (folder / "samples.csv").write_text(csv_text(columns(case)), encoding="utf-8", newline="")
-
-
-def _write_asked(free_space: dict[str, Any], path: Path) -> None:
-    """Joint readings and the side from which each joint came: standing, unloaded, as warm as at the first sample."""
-    readings, approach = free_space["reading_rad"], free_space["approach"]
-    joints = range(1, len(readings[0]) + 1)
-    lines = [",".join([*(f"q{j}_rad" for j in joints), *(f"approach{j}" for j in joints)])]
-    lines += [",".join(map(repr, [*q, *a])) for q, a in zip(readings, approach, strict=True)]
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")

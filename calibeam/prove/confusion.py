@@ -14,6 +14,7 @@ from calibrate.report.svg import drawn
 from calibrate.report.tones import Tone
 
 PLAIN = 0.6  # effect over noise
+SINGLE = ("one", "disturbed", "outside", "streams")
 NOTHING = "nothing"
 FAILED = "failed"
 LAST = (UNKNOWN, NOTHING, FAILED)
@@ -25,9 +26,9 @@ def confusion(cases: Sequence[CaseScore]) -> tuple[list[str], list[str], NDArray
     """Words hidden, words said, counts. Of cases with none or one cause; several at once have no single answer."""
     pairs: Counter[tuple[str, str]] = Counter()
     for case in cases:
-        if case.kind in ("one", "disturbed", "outside") and case.defects[0].enr >= PLAIN:
+        if case.kind in SINGLE and case.defects and case.defects[0].enr >= PLAIN:
             pairs[case.defects[0].physics, _said(case)] += 1
-        elif case.kind == "none":
+        elif not case.defects:
             pairs[NOTHING, _said(case)] += 1
     hidden = _ordered({h for h, _ in pairs})
     said = _ordered({s for _, s in pairs} | set(hidden))

@@ -5,6 +5,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 Z = 1.959964  # 95 %
+NO_BREAK = "\u00a0"
+TO = "\u2011"  # a hyphen at which no line ends
 
 
 @dataclass(frozen=True)
@@ -28,11 +30,16 @@ class Share:
         half = Z * math.sqrt(p * (1 - p) / n + Z**2 / (4 * n**2)) / (1 + Z**2 / n)
         return (max(0.0, middle - half), min(1.0, middle + half))
 
-    def __str__(self) -> str:
+    @property
+    def brief(self) -> str:
+        """Without n; each half stays together where a line is short."""
         if not self.n:
             return "-"
         low, high = self.interval
-        return f"{100 * self.value:.0f} % ({100 * low:.0f}-{100 * high:.0f}, n {self.n})"
+        return f"{100 * self.value:.0f}{NO_BREAK}% ({100 * low:.0f}{TO}{100 * high:.0f})"
+
+    def __str__(self) -> str:
+        return self.brief if not self.n else f"{self.brief[:-1]}, n{NO_BREAK}{self.n})"
 
 
 def share(hits: Iterable[bool]) -> Share:

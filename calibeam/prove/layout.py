@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+RECORDED = "recording.mcap"
+
 
 @dataclass(frozen=True)
 class Layout:
@@ -11,8 +13,13 @@ class Layout:
     out: Path
 
     def recording(self, name: str) -> Path:
-        """What a site would hand over."""
-        return self.out / "recordings" / name
+        """What a site would hand over: a session folder, or the file that was recorded."""
+        folder = self.out / "recordings" / name
+        return folder / RECORDED if (folder / RECORDED).is_file() else folder
+
+    def recorded(self, name: str) -> Path:
+        """The file of a session that is recorded."""
+        return self.out / "recordings" / name / RECORDED
 
     def asked(self, name: str) -> Path:
         """Poses that nobody measured: where will the tool be?"""

@@ -5,10 +5,11 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.table import Table
 
+from calibeam.prove.free_space_sums import by_instrument
 from calibeam.prove.hidden_angle import HiddenAngle
 from calibeam.prove.real import RealScore
 from calibeam.prove.record import CaseScore, ProofFile
-from calibeam.prove.tally import Figure, Line, at_once, by, by_effect, by_enr, figures, rivals
+from calibeam.prove.tally import Figure, Line, at_once, by, by_effect, by_enr, by_fault, figures, rivals
 
 
 def print_proof(console: Console, proof: ProofFile) -> None:
@@ -16,9 +17,12 @@ def print_proof(console: Console, proof: ProofFile) -> None:
     cases = proof.cases
     console.print(_lines("one hidden effect, by effect over noise", by_enr(cases)))
     console.print(_lines("effect over noise >= 0.6, by instrument", by(cases, lambda c: c.family)))
+    console.print(_lines("effect over noise >= 0.6, by the way of the recording", by(cases, lambda c: c.path)))
     console.print(_lines("several at once", [at_once(cases, "three"), at_once(cases, "eighteen")]))
     console.print(_lines("effect over noise >= 0.6, by mechanism", by_effect(cases)))
+    console.print(_lines("faults of motion, stamps and second encoders, in streams", by_fault(cases)))
     console.print(_figures(cases))
+    console.print(_free_space(cases))
     others = rivals(cases)
     if others:
         console.print(_shares(others))
@@ -29,13 +33,12 @@ def print_proof(console: Console, proof: ProofFile) -> None:
 
 def _lines(title: str, lines: Sequence[Line]) -> Table:
     table = Table(title=title, title_justify="left")
-    for heading in ("", "located", "named", "among rivals", "others said, a case"):
+    for heading in ("", "n", "located", "named", "among rivals", "others said, a case"):
         table.add_column(heading)
     for line in lines:
         if line.located.n:
-            table.add_row(
-                line.label, str(line.located), str(line.named), str(line.among_rivals), f"{line.spurious:.2f}"
-            )
+            shares = (share.brief for share in line.shares)
+            table.add_row(line.label, str(line.located.n), *shares, f"{line.spurious:.2f}")
     return table
 
 
@@ -45,6 +48,15 @@ def _figures(cases: Sequence[CaseScore]) -> Table:
         table.add_column(heading)
     for figure in figures(cases):
         table.add_row(figure.label, figure.said, figure.wanted)
+    return table
+
+
+def _free_space(cases: Sequence[CaseScore]) -> Table:
+    table = Table(title="free space against the truth, medians of the cases that were compared", title_justify="left")
+    for heading in ("", "cases", "geometry", "with what was found", "oracle"):
+        table.add_column(heading)
+    for line in by_instrument(cases):
+        table.add_row(line.label, str(line.cases), *map(_um, (line.geometry_m, line.found_m, line.oracle_m)))
     return table
 
 

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from calibeam.prove.confusion import confusion_figure
+from calibeam.prove.free_space_sums import by_instrument
 from calibeam.prove.record import CaseScore, ProofFile
 from calibeam.prove.story import faults, hidden_words, said_words
-from calibeam.prove.tally import Figure, Line, at_once, by, by_effect, by_enr, figures, rivals
+from calibeam.prove.tally import Figure, Line, at_once, by, by_effect, by_enr, by_fault, figures, rivals
 from calibrate.report.elements import Html, bullets, figure, folded, section, table, tag
 from calibrate.report.page import page, write_page
 from calibrate.report.quantities import DASH, length
@@ -19,7 +20,7 @@ CONTENTS = {
     "stories": "Each case",
     "repeat": "To repeat it",
 }
-HEAD = ("", "located", "named", "among rivals", "others said, a case")
+HEAD = ("", "n", "located", "named", "among rivals", "others said, a case")
 
 
 def write_proof_page(path: Path, proof: ProofFile) -> Path:
@@ -63,14 +64,27 @@ def _sums(cases: Sequence[CaseScore]) -> Html:
         lead,
         _lines("One effect, by its size over the noise after geometry", by_enr(cases)),
         _lines("By instrument, effects of 0.6 times the noise and more", by(cases, lambda c: c.family)),
+        _lines("The same, by the way that the recording came", by(cases, lambda c: c.path)),
         _lines("Several at once", several),
+        _lines("Faults of motion, stamps and second encoders, found in streams", by_fault(cases)),
         _lines("By mechanism, effects of 0.6 times the noise and more", by_effect(cases)),
     )
 
 
 def _doubt(cases: Sequence[CaseScore]) -> Html:
     lead = "What is said where nothing is to be said, how sizes and errors hold against the truth."
-    return section("doubt", CONTENTS["doubt"], lead, _figures(("", "measured", "wanted"), figures(cases)))
+    said = _figures(("", "measured", "wanted"), figures(cases))
+    return section("doubt", CONTENTS["doubt"], lead, said, *_free_space(cases))
+
+
+def _free_space(cases: Sequence[CaseScore]) -> list[Html]:
+    found = [
+        (f.label, str(f.cases), length(f.geometry_m), length(f.found_m), length(f.oracle_m))
+        for f in by_instrument(cases)
+    ]
+    head = ("", "cases", "geometry", "with what was found", "oracle")
+    caption = "Free space against the truth: medians of the cases that were compared with the oracle"
+    return [table(head, found, numeric=(1, 2, 3, 4), caption=caption)] if found else []
 
 
 def _confusion(cases: Sequence[CaseScore]) -> Html:
@@ -113,9 +127,9 @@ def _stories(cases: Sequence[CaseScore]) -> Html:
 
 def _story(case: CaseScore) -> Html:
     wrong = faults(case)
-    title = (
-        f"{case.name} · {case.kind}, {case.family}, {case.samples} samples · {'; '.join(wrong) or 'as it should be'}"
-    )
+    way = "" if case.path == "in process" else f" {case.path}"
+    what = f"{case.kind}, {case.family}{way}, {case.samples} samples"
+    title = f"{case.name} · {what} · {'; '.join(wrong) or 'as it should be'}"
     lines = [f"Hidden: {hidden_words(case)}.", f"Said: {said_words(case)}."]
     lines += [s.says for s in case.said]
     lines.append(
@@ -123,7 +137,8 @@ def _story(case: CaseScore) -> Html:
         f"found; noise {_m(case.floor_m)}; oracle {_m(case.oracle_m)}."
     )
     lines.append(
-        f"Free space, against the truth: {_m(case.free_space_before_m)} before, {_m(case.free_space_after_m)} after."
+        f"Free space, against the truth: {_m(case.free_space_before_m)} before, {_m(case.free_space_after_m)} after; "
+        f"oracle {_m(case.oracle_free_space_m)}."
     )
     lines += [
         f"Size of {d.mechanism}: {s.name} {s.true:.3g}, said {s.said:.3g} ± {s.sigma:.2g}."
@@ -148,11 +163,11 @@ def _repeat(proof: ProofFile) -> Html:
 
 def _lines(caption: str, lines: Sequence[Line]) -> Html:
     rows = [
-        (line.label, str(line.located), str(line.named), str(line.among_rivals), f"{line.spurious:.2f}")
+        (line.label, str(line.located.n), *(share.brief for share in line.shares), f"{line.spurious:.2f}")
         for line in lines
         if line.located.n
     ]
-    return table(HEAD, rows, caption=caption)
+    return table(HEAD, rows, numeric=(1, 5), caption=caption)
 
 
 def _figures(head: Sequence[str], found: Sequence[Figure]) -> Html:

@@ -33,23 +33,25 @@ class Plan:
     cases: int
     jobs: int
     without: tuple[str, ...] = ()  # physics that is taken out of the catalogue, to see what is said then
+    wired: int = 0  # further cases, whose recordings come over emulated wires
     compare: int = 0  # cases for which the oracle and other methods are asked, too
 
 
 def prove(out: Path, plan: Plan, tell: Tell, command: str) -> ProofFile:
     """Everything, and proof.json in `out`. DataError where `out` holds something already."""
     _refuse_unlisted(plan.without)
-    layout, began_s = fresh(out), time.monotonic()
+    layout, began_s, total = fresh(out), time.monotonic(), plan.cases + plan.wired
     concealed: list[Concealed] = []
-    for one in conceal_cases(layout, plan.mix, plan.seed, plan.cases, plan.jobs):
+    for one in conceal_cases(layout, plan.mix, plan.seed, plan.cases, plan.jobs, plan.wired):
         concealed.append(one)
-        tell(f"concealed {len(concealed)} of {plan.cases}")
+        tell(f"concealed {len(concealed)} of {total}")
+    concealed.sort(key=lambda one: one.scenario.name)
     published = publish(layout, concealed)
-    tell(f"SHA-256 of {layout.hashes.name}, which seals all {plan.cases} cases: {published}")
+    tell(f"SHA-256 of {layout.hashes.name}, which seals all {total} cases: {published}")
     answered: list[Answered] = []
     for answer in diagnose_cases(layout, [c.scenario.name for c in concealed], plan.jobs, plan.without):
         answered.append(answer)
-        tell(f"diagnosed {len(answered)} of {plan.cases}")
+        tell(f"diagnosed {len(answered)} of {total}")
     truths = [_opened(layout, c, plan.without) for c in concealed]
     scored = [score(layout, c, a, t) for c, a, t in zip(concealed, answered, truths, strict=True)]
     scored = compared_cases(layout, scored, truths, plan.compare, plan.jobs, tell)

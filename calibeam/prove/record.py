@@ -93,7 +93,9 @@ class CaseScore(Record, frozen=True):
     error: str = ""
     oracle_before_m: float | None = None  # geometry alone on the samples that the oracle is judged by
     oracle_m: float | None = None  # with the true terms; None: not compared
+    oracle_free_space_m: float | None = None
     baselines: tuple[BaselineScore, ...] = ()
+    path: str = "in process"  # or "on wires": how the recording came about
 
     @property
     def alarmed(self) -> bool:

@@ -48,6 +48,7 @@ def score(layout: Layout, concealed: Concealed, answered: Answered, truth: Truth
         free_space_after_m=after_m,
         cpu_s=answered.cpu_s,
         error=answered.error,
+        path=drawn.path,
     )
 
 

@@ -27,7 +27,7 @@ def faults(case: CaseScore) -> list[str]:
     if case.error:
         return [f"failed: {case.error}"]
     out: list[str] = []
-    if case.kind == "none":
+    if not case.defects:
         return out + (["false alarm"] if case.said else [])
     out += [f"misnamed with confidence: {s.physics} at {s.where}" for s in case.said if _misnamed(case, s.physics)]
     if case.kind == "withheld":

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from calibeam.prove.free_space_sums import shares_of_oracle
 from calibeam.prove.interval import Share, share
 from calibeam.prove.record import DIAGNOSIS, CaseScore, DefectScore
 
@@ -23,6 +24,10 @@ class Line:
     named: Share
     among_rivals: Share
     spurious: float  # findings beyond one for each hidden cause, a case
+
+    @property
+    def shares(self) -> tuple[Share, Share, Share]:
+        return (self.located, self.named, self.among_rivals)
 
 
 @dataclass(frozen=True)
@@ -49,6 +54,17 @@ def by(cases: Sequence[CaseScore], what: Callable[[CaseScore], str]) -> list[Lin
     return [_line(word, [c for c in ones if what(c) == word]) for word in sorted({what(c) for c in ones})]
 
 
+def plain(cases: Sequence[CaseScore], label: str) -> Line:
+    """Plain single effects, all together."""
+    return _line(label, [c for c in cases if c.kind in SINGLE and _enr(c) >= PLAIN])
+
+
+def over_the_wire(cases: Sequence[CaseScore]) -> Line:
+    """Plain single effects of sessions that went over the emulated wires; they count above, too."""
+    ones = [c for c in cases if c.kind in SINGLE and _enr(c) >= PLAIN and c.path == "on wires"]
+    return _line("of these, over the emulated wires", ones)
+
+
 def by_effect(cases: Sequence[CaseScore]) -> list[Line]:
     """Plain effects, single or several at once, by mechanism."""
     kept = [c for c in cases if c.kind in (*SINGLE, "three", "eighteen")]
@@ -66,6 +82,18 @@ def at_once(cases: Sequence[CaseScore], kind: str) -> Line:
     return _line(kind, [c for c in cases if c.kind == kind])
 
 
+def in_streams(cases: Sequence[CaseScore]) -> Line:
+    """All faults that streams tell, together."""
+    return _line("faults that streams tell", [c for c in cases if c.kind == "streams"])
+
+
+def by_fault(cases: Sequence[CaseScore]) -> list[Line]:
+    """Faults of motion, stamps and second encoders, found in streams."""
+    ones = [c for c in cases if c.kind == "streams" and c.defects]
+    words = sorted({c.defects[0].mechanism for c in ones})
+    return [_line(word, [c for c in ones if c.defects[0].mechanism == word]) for word in words]
+
+
 def figures(cases: Sequence[CaseScore]) -> list[Figure]:
     """The rest of what was promised."""
     null = [c for c in cases if c.kind == "none"]
@@ -77,6 +105,8 @@ def figures(cases: Sequence[CaseScore]) -> list[Figure]:
         Figure(f"false alarms, {noise} noise", str(share(c.alarmed for c in null if c.noise == noise)), wanted)
         for noise, wanted in (("white", "<= 6 %"), ("heavy", "<= 6 %"), ("wandering", "<= 8 %"))
     ]
+    healthy = [c for c in cases if c.kind == "streams" and not c.defects]
+    out.append(Figure("false alarms, healthy streams", str(share(c.alarmed for c in healthy)), "none"))
     return [
         *out,
         Figure("faint (0.15 - 0.3): what is named is right", str(share(not c.misnamed for c in faint)), "all"),
@@ -102,6 +132,8 @@ def _ratios(cases: Sequence[CaseScore]) -> Iterable[Figure]:
     found = [c for c in free if c.said]
     ratio = [(c.free_space_after_m or 0.0) / (c.free_space_before_m or 1.0) for c in found]
     yield Figure("free-space error, after / before, where something was found", _percentiles(ratio), "")
+    shares = shares_of_oracle(cases)
+    yield Figure("free-space gain, share of the oracle's, median and p10", _percentiles(shares, 50, 10), ">= 0.9")
     yield Figure("free-space error worse by more than a tenth", str(share(r > 1.1 for r in ratio)), "")
     yield Figure("seconds a case (CPU), median and p90", _percentiles([c.cpu_s for c in cases]), "<= 5")
 

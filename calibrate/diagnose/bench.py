@@ -74,6 +74,12 @@ class Bench:
         ]
         return float(np.sqrt(self.state.samples) / max(felt)) if felt and max(felt) > 0.0 else 0.0
 
+    @cached_property
+    def plausible(self) -> NDArray[np.bool_]:
+        """(term,) whether each accepted term is of a size that a machine could have."""
+        accepted = self.state.accepted
+        return np.array([a.term.plausible(a.coefficients, a.inner, self.noise_rad) for a in accepted], dtype=bool)
+
     def with_taken(self, proposed: Accepted) -> "Bench":
         """As if a term had been fitted: the linear part of a refit."""
         columns = self.state.columns(proposed.term, proposed.inner)

@@ -14,6 +14,7 @@ from calibrate.diagnose.folds import k_folds, units
 Floats = NDArray[np.float64]
 
 FOLDS = 10
+RIDGE = 1e-9  # keeps a direction that only one fold knows finite
 NU = 5.0  # of the law of noise, as in calibrate/diagnose/scatter.py
 
 
@@ -34,9 +35,10 @@ def predicts(bench: Bench, rng: Generator) -> Floats:
 
 def _loss(basis: Floats, residual: Floats, folds: list[NDArray[np.intp]]) -> float:
     """-2 log L of Student's t law, rows apart. `basis` may be an orthonormal one less some directions."""
-    total = 0.0
+    total, p = 0.0, basis.shape[1]
     for fold in folds:
+        # (I - Q Q')^-1 r = r + Q (I - Q' Q)^-1 Q' r: a fold has more rows than the model has directions.
         Q = basis[fold]
-        error = np.linalg.solve((1.0 + 1e-9) * np.eye(len(fold)) - Q @ Q.T, residual[fold])
+        error = residual[fold] + Q @ np.linalg.solve((1.0 + RIDGE) * np.eye(p) - Q.T @ Q, Q.T @ residual[fold])
         total += float(np.sum((NU + 1.0) * np.log1p(error**2 / NU)))
     return total

@@ -57,8 +57,13 @@ class Curve(Term):
     @property
     def unit(self) -> str:
         """Of the component."""
-        rotates = self.port.place is Place.JOINTS or (self.port.place in WIDTHS and self.component >= 3)
-        return "rad" if rotates else "m"
+        return unit_of(self.port, self.component)
+
+
+def unit_of(port: Port, component: int) -> str:
+    """Of a component of a port: rad or m."""
+    rotates = port.place is Place.JOINTS or (port.place in WIDTHS and component >= 3)
+    return "rad" if rotates else "m"
 
 
 def curve(port: Port, component: int, names: tuple[str, ...], waves: int) -> Curve:

@@ -12,7 +12,7 @@ from calibrate.diagnose.findings import named
 from calibrate.diagnose.linearised import State
 from calibrate.diagnose.noise_law import noise_law
 from calibrate.diagnose.proof import floors, proofs
-from calibrate.diagnose.search import Search
+from calibrate.diagnose.searching import Search
 from calibrate.effects.term import Missing
 
 Floats = NDArray[np.float64]

@@ -14,18 +14,20 @@ from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.best_names import with_best_names
 from calibrate.diagnose.cross_validation import predicts
 from calibrate.diagnose.diagnosis import Finding, Unexplained, Verdict
+from calibrate.diagnose.drifts import doubtful, suspects, untold
 from calibrate.diagnose.findings import findings_of
 from calibrate.diagnose.hidden_levers import TIME
 from calibrate.diagnose.lack_of_fit import LackOfFit, lack_of_fit
 from calibrate.diagnose.linearised import State
-from calibrate.diagnose.search import Search, search, without
+from calibrate.diagnose.pruning import without
+from calibrate.diagnose.score import gain_of
+from calibrate.diagnose.search import search
+from calibrate.diagnose.searching import Search
 from calibrate.diagnose.thinned import thinned
 from calibrate.diagnose.unknown import with_unknowns
 from calibrate.diagnose.unrecorded import Unrecorded, unrecorded
-from calibrate.effects.term import Missing, Shape
+from calibrate.effects.term import Missing
 
-DRIFTS = (Shape.EXPONENTIAL.value, Shape.LINEAR.value, Shape.SMOOTH.value)
-WARMTH = "temp"  # driver of what a thermometer would have told
 SPEED = "qd"
 MOTION = ("approach", "last_move")
 SEVERAL = 3  # joints: one clock is simpler than slack in each
@@ -54,26 +56,29 @@ def doubted(state: State, rng: Generator, missing: Sequence[Missing] = ()) -> Do
     if at.state.samples < state.samples:
         at = at.at(Bench(state.refitted(at.state.accepted)))
     at, rivals = with_best_names(at)
+    if (kept := _predicting(at, rng)) is not at:
+        at, rivals = with_best_names(kept)
     scatter, misfit = unrecorded(at.bench, rng, missing), lack_of_fit(at.bench)
     speed = [m for m in missing if m.driver == SPEED]
     moving = _moving(at, speed)
     left = [*_scattered(scatter), *_repeated(misfit), *moving]
     findings = findings_of(at, rivals, predicts(at.bench, rng), final=not left)
-    warmth = [m for m in missing if m.driver == WARMTH]
-    drifting = [_drift(f, warmth) for f in findings if warmth and _drifts(f)]
+    drifts = [(f, hidden) for f in findings if (hidden := suspects(f, missing))]
+    findings = tuple(doubtful(f) if suspects(f, missing) else f for f in findings)
     lacking = [*(scatter.missing if scatter is not None else ()), *(speed if moving else ())]
-    lacking += warmth if drifting else []
+    lacking += [m for _, hidden in drifts for m in hidden]
     if left and not lacking:
         lacking = list(missing)
-    return Doubted(at, findings, (*left, *drifting), misfit, _records(lacking))
+    return Doubted(at, findings, (*left, *(untold(f, hidden) for f, hidden in drifts)), misfit, _records(lacking))
 
 
 def _predicting(at: Search, rng: Generator) -> Search:
-    """Without terms that do not help on rows held out, the worst first."""
+    """Without terms that do not help on rows held out, or are not worth their parameters any more, the worst first."""
     while at.state.accepted:
         wins = predicts(at.bench, rng)
-        worst = int(np.argmin(wins))
-        if wins[worst] > 0.0:
+        worth = np.array([gain_of(gone, at.bench.sight) for gone in at.bench.gone])
+        worst = int(np.argmin(np.minimum(wins, worth)))
+        if min(wins[worst], worth[worst]) > 0.0:
             return at
         at = without(at, worst)
     return at
@@ -106,17 +111,6 @@ def _repeated(misfit: LackOfFit | None) -> list[Unexplained]:
         return []
     share = max(0.0, 1.0 - 1.0 / misfit.ratio)
     return [Unexplained("", (), share, misfit.p, "misfit that comes back when a pose is repeated")]
-
-
-def _drifts(finding: Finding) -> bool:
-    """A smooth function of time; a step is no matter of warmth."""
-    return finding.name.depends_on == ("t",) and finding.name.shape in DRIFTS
-
-
-def _drift(finding: Finding, warmth: Sequence[Missing]) -> Unexplained:
-    columns = ", ".join(dict.fromkeys(m.column for m in warmth))
-    why = f"a drift with time; whether it follows a temperature cannot be told; not recorded: {columns}"
-    return Unexplained(finding.name.where, (WARMTH,), finding.share, finding.p, why)
 
 
 def _records(lacking: Sequence[Missing]) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from acquisition.recording.samples import Samples
 from calibrate.chain import Chain
 from calibrate.diagnose.augmented import Around, Augmented, columns_of, plain_sizes
 from calibrate.diagnose.driver_values import drivers_of
+from calibrate.diagnose.extended import alike
 from calibrate.diagnose.fitted import Fitted
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.session import Session
@@ -65,10 +66,8 @@ class Elsewhere:
         if term is None:
             return None
         was = accepted.term.amount(self.state.drivers, accepted.coefficients, accepted.inner)
-        basis = term.basis(self.drivers, accepted.inner)
-        here = basis[: len(was)].reshape(-1, basis.shape[-1])
-        same, *_ = np.linalg.lstsq(here, was.ravel(), rcond=None)
-        return Accepted(term, np.asarray(same, dtype=np.float64), accepted.inner)
+        same, _ = alike(term.basis(self.drivers, accepted.inner)[: len(was)], was[..., None])
+        return Accepted(term, same[:, 0], accepted.inner)
 
     @cached_property
     def _terms(self) -> dict[tuple[object, ...], Term]:
@@ -202,4 +201,7 @@ def _drivers(session: Session, at: Around, state: Fitted, poses: NewPoses) -> Dr
     usual = np.median(np.abs(out.last_move_rad[:n]), axis=0)
     moves = np.concatenate([out.last_move_rad[:n], poses.approach * usual])
     before = np.zeros((n, poses.approach.shape[1])) if out.approach is None else out.approach[:n]
-    return replace(out, last_move_rad=moves, approach=np.concatenate([before, poses.approach]))
+    # Smoothed over the session's own time: new poses have the temperatures of those that they are like.
+    known = state.drivers.temperatures_degC
+    warm = {place: np.concatenate([values, values[poses.like]]) for place, values in known.items()}
+    return replace(out, last_move_rad=moves, approach=np.concatenate([before, poses.approach]), temperatures_degC=warm)

@@ -14,14 +14,16 @@ from numpy.typing import NDArray
 from calibrate.diagnose.augmented import Around, Augmented, plain_sizes
 from calibrate.diagnose.driver_values import drivers_of
 from calibrate.diagnose.linearised import Accepted, Rows, Unseen
-from calibrate.diagnose.scatter import Scatter, likelihood_of, scatter_of
+from calibrate.diagnose.noise_of_fit import covariance_at, scatters_of, trusted, whiteners_of
+from calibrate.diagnose.scatter import Scatter, likelihood_of
 from calibrate.diagnose.session import Session
+from calibrate.diagnose.unmet_places import places_found
 from calibrate.effects.catalogue import terms_of
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.term import Term
-from calibrate.fit import FAR_START, NEAR_START, Fit, Loss, solve
+from calibrate.fit import FAR_START, Loss, solve
 from calibrate.identification.session import believed_sigma
-from calibrate.parameters import Parameter, plausible_sizes, priors, start_values
+from calibrate.parameters import plausible_sizes, priors, start_values
 from calibrate.problem import whitener_of
 
 Floats = NDArray[np.float64]
@@ -36,10 +38,9 @@ TOLERANCE = 1e-3  # of chi2 in a turn, 3 % of a sigma
 # Of the largest diagonal element. Next to nothing holds a term's coefficients where geometry can stand in for them: a
 # full step along such a direction leaves the range in which the model is linear.
 DAMPING = 1e-9
-WILD = 0.1  # weight of a row that may have bent the first, plain fit
+WILD = 0.1  # weight of a row that may have bent a plain fit
+SWALLOWED = 0.3  # weight of a row that next to nothing of a model follows: five sigmas off
 SETTLED = 0.1  # of -2 log L: far below any difference that decides
-MOST_FITTED = 0.2  # of the rows that are left over, at least, when noise is judged
-PLACES = ("placement", "seat", "point")  # parameters of where something stood; a place may be met unseen
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +70,14 @@ class Fitted:
     @property
     def samples(self) -> int:
         return len(self.active)
+
+    @property
+    def distrusted(self) -> int:
+        return sum(int(np.sum(s.weights < SWALLOWED)) for s in self.scatters)
+
+    def trusting(self) -> "Fitted":
+        scatters = trusted(self.scatters)
+        return replace(self, problem=self.problem.under(whiteners_of(scatters)), scatters=scatters)
 
     @cached_property
     def around(self) -> Around:
@@ -150,7 +159,7 @@ class Fitted:
         kept = {a.term.key for a in self.accepted}
         fits = [self._refitted(tuple(accepted), self.scatters)]
         if any(a.term.key not in kept and _makes_outliers(a.term) for a in accepted):
-            fits.append(self._refitted(tuple(accepted), _trusting(self.scatters)))
+            fits.append(self._refitted(tuple(accepted), trusted(self.scatters)))
         return min(fits, key=lambda fit: fit.minus_two_log_likelihood)
 
     def select(self, samples: Ints) -> "Fitted":
@@ -158,53 +167,23 @@ class Fitted:
 
     def held_out(self, samples: Ints) -> tuple[Unseen, ...]:
         rows = _rows_of(self.session, np.sort(samples))
-        moved = self._places_found(rows)
+        moved = places_found(self.problem, self.values, self.scatters, rows, len(self._labels[0]))
         at = self.problem.around(moved)
         out: list[Unseen] = []
         for i, (m, r) in enumerate(zip(self.session.measured, rows, strict=True)):
             if len(r) == 0 or len(self.problem.rows[i]) == 0:  # without a row in the fit nobody knows its noise
                 continue
             misfit = m.problem.observed[r] - at.expected[i][r]
-            W = whitener_of(_covariance_at(self.scatters[i], self.problem.rows[i], r))
+            W = whitener_of(covariance_at(self.scatters[i], self.problem.rows[i], r))
             out.append(Unseen(m.name, m.sample_rows[r, -1], misfit, np.einsum("nij,nj->ni", W, misfit)))
         return tuple(out)
 
-    def _places_found(self, rows: tuple[Ints, ...]) -> Floats:
-        """Values in which a place that the fit has not met is found from these rows."""
-        parameters = self.problem.parameters
-        place = np.array([p.free and p.name.startswith(PLACES) for p in parameters])
-        met = np.any(self.problem.jacobian(self.values)[: len(self._labels[0])] != 0.0, axis=0)
-        unmet = place & ~met
-        if not unmet.any():
-            return self.values
-        whiteners = tuple(
-            whitener_of(_covariance_at(s, old, r))
-            for s, old, r in zip(self.scatters, self.problem.rows, rows, strict=True)
-        )
-        held = tuple(p if u else replace(p, free=False) for p, u in zip(parameters, unmet, strict=True))
-        there = _Held(replace(self.problem, rows=rows, whiteners=whiteners, last={}, slopes={}), held)
-        return solve(there, start=self.values, damping=NEAR_START).theta
-
     def _refitted(self, accepted: tuple[Accepted, ...], scatters: tuple[Scatter, ...]) -> "Fitted":
-        drivers, whiteners, rows = self.drivers if accepted else None, _whiteners(scatters), self.problem.rows
+        drivers, whiteners, rows = self.drivers if accepted else None, whiteners_of(scatters), self.problem.rows
         sizes = plain_sizes(self.session, accepted, drivers, whiteners, rows)
         problem = Augmented(self.session, accepted, drivers, rows, whiteners, sizes)
         start = np.concatenate([self.geometry, problem.start[len(self.geometry) :]])
         return _settled(_turn(problem, self.active, start, scatters))
-
-
-@dataclass(frozen=True, eq=False)
-class _Held:
-    """A problem with other beliefs."""
-
-    problem: Augmented
-    parameters: tuple[Parameter, ...]
-
-    def residual(self, theta: Floats) -> Floats:
-        return self.problem.residual(theta)
-
-    def jacobian(self, theta: Floats) -> Floats:
-        return self.problem.jacobian(theta)
 
 
 def fit_geometry(session: Session, active: Ints | None = None) -> Fitted:
@@ -220,7 +199,7 @@ def fit_geometry(session: Session, active: Ints | None = None) -> Fitted:
     fits: list[Fitted] = []
     for loss in (Loss.SQUARE, Loss.HUBER):
         rough = solve(problem, start=session.start, damping=FAR_START, loss=loss)
-        fits.append(_settled(_turn(problem, chosen, rough.theta, _scatters(problem, rough))))
+        fits.append(_settled(_turn(problem, chosen, rough.theta, scatters_of(problem, rough))))
         if all(np.all(s.weights > WILD) for s in fits[0].scatters):
             break
     return min(fits, key=lambda fit: fit.minus_two_log_likelihood)
@@ -245,65 +224,23 @@ def _settled(fitted: Fitted) -> Fitted:
 
 def _turn(problem: Augmented, active: Ints, start: Floats, scatters: tuple[Scatter, ...], steps: int = STEPS) -> Fitted:
     """Least squares under the noise so far, then the noise that is left."""
-    problem = problem.under(_whiteners(scatters))
+    problem = problem.under(whiteners_of(scatters))
     fit = solve(problem, start=start, damping=DAMPING, max_steps=steps, tolerance=TOLERANCE)
-    return Fitted(problem.session, active, problem, fit.theta, _scatters(problem, fit), fit.covariance)
-
-
-def _scatters(problem: Augmented, fit: Fit) -> tuple[Scatter, ...]:
-    """Noise of every instrument at the values of a fit."""
-    at, larger = problem.around(fit.theta), _freedom(problem, fit)
-    out: list[Scatter] = []
-    for i, (m, rows) in enumerate(zip(problem.session.measured, problem.rows, strict=True)):
-        residual = m.problem.observed[rows] - at.expected[i][rows]
-        found = scatter_of(residual, problem.by_joint(at, i)[rows], believed_sigma(m)[rows])
-        out.append(replace(found, covariance=found.covariance * larger))
-    return tuple(out)
-
-
-def _freedom(problem: Augmented, fit: Fit) -> float:
-    """Rows over rows less what was fitted to them: residuals of a fit are smaller than the noise."""
-    rows = sum(
-        len(r) * m.problem.observed.shape[1] for m, r in zip(problem.session.measured, problem.rows, strict=True)
-    )
-    free = np.array([p.free for p in problem.parameters])
-    believed = np.diag(fit.covariance)[free] / priors(problem.parameters)[free] ** 2
-    fitted = float(np.sum(1.0 - np.clip(np.nan_to_num(believed), 0.0, 1.0)))
-    return rows / max(rows - fitted, MOST_FITTED * rows)
+    return Fitted(problem.session, active, problem, fit.theta, scatters_of(problem, fit), fit.covariance)
 
 
 def _cut(state: Fitted, active: Ints) -> Fitted:
     rows = _rows_of(state.session, active)
     scatters: list[Scatter] = []
     for i, (m, r) in enumerate(zip(state.session.measured, rows, strict=True)):
-        covariance = _covariance_at(state.scatters[i], state.problem.rows[i], r)
+        covariance = covariance_at(state.scatters[i], state.problem.rows[i], r)
         value, weights = likelihood_of(m.problem.observed[r] - state.around.expected[i][r], covariance)
         scatters.append(Scatter(covariance, weights, value, state.scatters[i].free))
     problem = replace(
-        state.problem, rows=rows, whiteners=_whiteners(tuple(scatters)), last=dict(state.problem.last), slopes={}
+        state.problem, rows=rows, whiteners=whiteners_of(tuple(scatters)), last=dict(state.problem.last), slopes={}
     )
     return replace(state, active=active, problem=problem, scatters=tuple(scatters))
 
 
 def _rows_of(session: Session, active: Ints) -> tuple[Ints, ...]:
     return tuple(np.flatnonzero(np.isin(m.sample_rows, active).all(axis=1)) for m in session.measured)
-
-
-def _whiteners(scatters: tuple[Scatter, ...]) -> tuple[Floats, ...]:
-    return tuple(whitener_of(s.covariance) * np.sqrt(s.weights)[:, None, None] for s in scatters)
-
-
-def _trusting(scatters: tuple[Scatter, ...]) -> tuple[Scatter, ...]:
-    return tuple(replace(s, weights=np.ones(len(s.weights))) for s in scatters)
-
-
-def _covariance_at(scatter: Scatter, known: Ints, rows: Ints) -> Floats:
-    """(row, k, k) noise at rows: as found where the fit has seen them, else the middle one of those it has."""
-    if len(scatter.covariance) == 0:  # nobody knows: as good as no weight
-        return np.broadcast_to(np.eye(scatter.covariance.shape[-1]), (len(rows), *scatter.covariance.shape[1:]))
-    # A whole one of them: medians of single entries together need be no covariance.
-    middle = np.argsort(np.trace(scatter.covariance, axis1=1, axis2=2))[len(scatter.covariance) // 2]
-    out = np.broadcast_to(scatter.covariance[middle], (len(rows), *scatter.covariance.shape[1:])).copy()
-    seen = np.isin(rows, known)
-    out[seen] = scatter.covariance[np.searchsorted(known, rows[seen])]
-    return out

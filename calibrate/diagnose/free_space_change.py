@@ -16,13 +16,18 @@ from numpy.typing import NDArray
 from calibrate.blunders.rough_fit import rough_fit
 from calibrate.diagnose.extended import carried_over, extended
 from calibrate.diagnose.fitted import Fitted
+from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.ported import flange_twists, perturbed_frames
+from calibrate.effects.drivers import Drivers
 from calibrate.effects.ports import Perturbation, Place
 from calibrate.rigid import cross_matrix
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 
 POSES = 300
+AT_ONCE = 30  # poses
+AMONG = 100.0  # measured poses, copies counted, for each new one: what is chosen by the poses stays as it was to 1 %
 OF_THE_ARM = (Place.JOINTS, Place.FRAME)  # other ports move fixture, device or reading: the arm is where it was
 
 
@@ -43,12 +48,11 @@ def free_space_change(before: Fitted, after: Fitted, rng: Generator) -> FreeSpac
     like = rng.integers(len(measured), size=POSES)
     nothing = Perturbation.none(POSES, measured.shape[1])
     frames = perturbed_frames(session.arm, after.geometry[:n_arm], q_rad, nothing)
-    drivers = extended(after.drivers, q_rad, frames, like)
     by, slopes, columns = nothing, list[Floats](), list[int]()
     for i, accepted in enumerate(after.accepted):
         if accepted.term.port.place not in OF_THE_ARM:
             continue
-        basis = carried_over(accepted, after.drivers, drivers)
+        basis = _told(accepted, after.drivers, q_rad, frames, like)
         if basis is None:
             return None
         by = by.plus(accepted.term.port, basis @ accepted.coefficients)
@@ -61,6 +65,19 @@ def free_space_change(before: Fitted, after: Fitted, rng: Generator) -> FreeSpac
     doubt = _doubt(after, truth, point_m, np.concatenate([arm, *slopes], axis=2), [*range(n_arm), *columns])
     missed = _missed(alone, truth, point_m)
     return FreeSpaceChange(float(np.sqrt(missed + doubt)), float(np.sqrt(doubt)), POSES)
+
+
+def _told(accepted: Accepted, drivers: Drivers, q_rad: Floats, frames: Floats, like: Ints) -> Floats | None:
+    """(pose, width, coefficient) what a term adds at the poses, some at a time; None: it cannot be said there."""
+    copies = max(1, int(np.ceil(AMONG * AT_ONCE / len(drivers.q_rad))))
+    parts: list[Floats] = []
+    for i in range(0, len(like), AT_ONCE):
+        some = slice(i, i + AT_ONCE)
+        basis = carried_over(accepted, drivers, extended(drivers, q_rad[some], frames[some], like[some], copies))
+        if basis is None:
+            return None
+        parts.append(basis[-len(like[some]) :])
+    return np.concatenate(parts)
 
 
 def _target_m(state: Fitted) -> Floats:

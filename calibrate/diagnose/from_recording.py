@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.blunders.finding import Blunder, BlunderKind
+from calibrate.diagnose.beyond_noise import beyond_noise
 from calibrate.diagnose.blunders_first import Cleared, blunders_first
 from calibrate.diagnose.diagnose import diagnose
-from calibrate.diagnose.diagnosis import Diagnosis
+from calibrate.diagnose.diagnosis import Diagnosis, Verdict
 from calibrate.diagnose.fitted import Fitted, fit_geometry
 from calibrate.diagnose.free_space_change import FreeSpaceChange, free_space_change
 from calibrate.diagnose.session import Session, session_of
@@ -62,8 +63,18 @@ def diagnose_samples(rig: Rig, samples: Samples, rng: Generator, start: Mapping[
     geometry = fit_geometry(session)
     diagnosis = diagnose(geometry, rng, missing_of(geometry.drivers))
     model = geometry if not diagnosis.findings else _fitted(diagnosis)
+    diagnosis = _with_scatter(diagnosis, model)
     physics = Physics(diagnosis, geometry, model, free_space_change(geometry, model, rng))
     return Diagnosed(cleared, cleared.blunders + _left(model, cleared), physics)
+
+
+def _with_scatter(diagnosis: Diagnosis, model: Fitted) -> Diagnosis:
+    """Readings that scatter beyond belief are left without a name, and no session with them is consistent."""
+    found = None if diagnosis.unexplained else beyond_noise(model, diagnosis.missing)
+    if found is None:
+        return diagnosis
+    verdict = Verdict.UNDECIDABLE if diagnosis.verdict is Verdict.CONSISTENT else diagnosis.verdict
+    return replace(diagnosis, unexplained=(found,), verdict=verdict)
 
 
 def _fitted(diagnosis: Diagnosis) -> Fitted:

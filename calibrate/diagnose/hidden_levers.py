@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.diagnose.bench import Bench
-from calibrate.diagnose.port_process import lever, places_of
+from calibrate.diagnose.port_process import TIME, lever, places_of
 from calibrate.effects.gravity import payload_levers
 from calibrate.effects.ports import Place, Port
 from calibrate.effects.term import Missing
 
 Floats = NDArray[np.float64]
 
-TIME = "time"  # port where all joints are off at once, each by its speed
 SPOT_PAIR = 2  # coordinates of one detector
 
 
@@ -33,9 +32,8 @@ class Wish:
 
 def wishes(bench: Bench, missing: Sequence[Missing] = ()) -> tuple[Wish, ...]:
     """Every port by itself, and what each column that is missing would do to it."""
-    places = [(port, component) for port, component in places_of(bench) if port.where != TIME]
-    felt = {(port, component): lever(bench, port, component) for port, component in places}
-    out = [_alone(port, felt[port, component], missing) for port, component in places]
+    felt = {(port, component): lever(bench, port, component) for port, component in places_of(bench)}
+    out = [_alone(port, rows, missing) for (port, _), rows in felt.items()]
     for kind in KINDS:
         out += kind(bench, felt, missing)
     return tuple(out)

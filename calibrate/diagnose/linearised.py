@@ -74,6 +74,15 @@ class State(Protocol):
     def samples(self) -> int: ...
 
     @property
+    def distrusted(self) -> int:
+        """Observations that robust weights have all but taken out."""
+        ...
+
+    def trusting(self) -> Self:
+        """The same values, every observation with its full weight."""
+        ...
+
+    @property
     def drivers(self) -> Drivers:
         """Of all samples of the session, as this state predicts them."""
         ...

@@ -5,19 +5,17 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.diagnose.causes import causes_of
+from calibrate.diagnose.causes import cause
 from calibrate.effects.drivers import Drivers
-from calibrate.effects.gravity import overturning_nm, stated_torque_nm
+from calibrate.effects.gravity import likely_torque_nm, overturning_nm
 
 Floats = NDArray[np.float64]
 
 
 def picture_driver(drivers: Drivers, names: Sequence[str]) -> tuple[str, Floats]:
     """(name, (pose,)) of the first driver that can be drawn; the order of the samples where none can."""
-    recorded = causes_of(drivers)
     for name in names:
-        values = recorded.get(name)
-        values = _computed(drivers, name) if values is None else values
+        values = _computed(drivers, name)
         if values is not None and np.ptp(values[np.isfinite(values)]) > 0.0:
             return name, values
     return "sample", np.arange(1.0, len(drivers.t_s) + 1.0)
@@ -28,7 +26,7 @@ def _computed(drivers: Drivers, name: str) -> Floats | None:
     number = int(name[len(stem) :] or 0)
     match stem:
         case "gravity_torque":
-            return stated_torque_nm(drivers, number)
+            return likely_torque_nm(drivers, number)
         case "overturning_moment":
             return np.linalg.norm(overturning_nm(drivers)[:, :2], axis=1)
         case "approach":
@@ -36,7 +34,16 @@ def _computed(drivers: Drivers, name: str) -> Floats | None:
         case "spot" | "incidence" | "reading" | "first_psd":
             return _of_readout(drivers, stem, number)
         case _:
-            return None
+            return _recorded(drivers, name)
+
+
+def _recorded(drivers: Drivers, name: str) -> Floats | None:
+    """As it stands in the session, however few its levels; None where it does not."""
+    try:
+        values = cause(drivers, name)
+    except KeyError:
+        return None
+    return values if np.issubdtype(values.dtype, np.number) and np.any(np.isfinite(values)) else None
 
 
 def _of_readout(drivers: Drivers, stem: str, number: int) -> Floats | None:

@@ -22,10 +22,14 @@ from calibrate.effects.ports import Port
 from calibrate.effects.term import Shape
 
 Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 WAVES = {1: 10, 2: 5}  # of each driver, by their number
 SCALES = (0.15, 0.3, 0.6, 1.2)  # length over half the range of a driver
 LOUDNESS = (0.003, 0.03, 0.3, 3.0, 30.0, 300.0)  # variance of the process over that of the noise
+TIME = "time"  # port where all joints are off at once, each by its speed
+CHUNK = 12  # curves that are asked at once
+RIDGE = 1e-9  # of a Gram matrix's mean diagonal: far below what any process amplifies
 
 
 @dataclass(frozen=True)
@@ -38,22 +42,58 @@ class Processes:
     raw: Floats  # (curve * k, row)
     rows: int  # data rows
 
-    def gains(self, residual: Floats, without: Removed | None = None) -> Floats:
-        """(curve, draw) of residuals (row, draw) on the complement; terms taken out first."""
+    def gains(self, residual: Floats) -> Floats:
+        """(curve, draw) of residuals (row, draw) on the complement."""
         count, k = self.gram.shape[:2]
-        gram, along = self.gram, (self.columns @ residual).reshape(count, k, -1)
-        rss = np.sum(residual**2, axis=0)
+        return self._gains(self.gram, (self.columns @ residual).reshape(count, k, -1), np.sum(residual**2, axis=0))
+
+    def best(
+        self, residual: Floats, allowed: Bools, without: Removed | None = None, least: float = 0.0
+    ) -> tuple[int, float] | None:
+        """The curve that gains most of a residual (row,), and its gain; terms taken out first, if any.
+
+        None where none gains more than `least`.
+
+        No process explains more than plain least squares on its features, so curves are asked in the order of that
+        bound until it falls below what is found.
+        """
+        count, k = self.gram.shape[:2]
+        gram, along, rss = self.gram, (self.columns @ residual).reshape(count, k, 1), float(residual @ residual)
         if without is not None:
             back = (self.raw @ without.span).reshape(count, k, -1)
             gram, along = gram + back @ np.swapaxes(back, 1, 2), along + (back @ without.part)[:, :, None]
-            rss = rss + without.squares
-        best = np.full((count, along.shape[2]), -np.inf)
-        drivers = len(self.curves[0].depends_on) if self.curves else 1
-        omega = frequencies(drivers, WAVES[drivers])
-        for scales in product(SCALES, repeat=drivers):
+            rss += without.squares
+        bound = np.where(allowed, self._bound(gram, along[..., 0], rss), -np.inf)
+        order, found, most = np.argsort(-bound), -1, least
+        for first in range(0, count, CHUNK):
+            some = order[first : first + CHUNK]
+            if bound[some[0]] <= most:
+                break
+            gain = np.where(allowed[some], self._gains(gram[some], along[some], np.array([rss]))[:, 0], -np.inf)
+            best = int(np.argmax(gain))
+            if gain[best] > most:
+                found, most = int(some[best]), float(gain[best])
+        return None if found < 0 else (found, most)
+
+    def _bound(self, gram: Floats, along: Floats, rss: float) -> Floats:
+        """(curve,) gain with everything that the features can follow, and nothing paid but for scales."""
+        k = gram.shape[1]
+        ridge = RIDGE * np.maximum(np.trace(gram, axis1=1, axis2=2) / max(k, 1), 1e-300)
+        solved = np.linalg.solve(gram + ridge[:, None, None] * np.eye(k), along[..., None])[..., 0]
+        left = np.maximum(rss - np.einsum("ck,ck->c", along, solved), 1e-12 * rss)
+        return np.asarray(self.rows * np.log(rss / left) - (self._drivers + 1) * np.log(self.rows))
+
+    @property
+    def _drivers(self) -> int:
+        return len(self.curves[0].depends_on) if self.curves else 1
+
+    def _gains(self, gram: Floats, along: Floats, rss: Floats) -> Floats:
+        best = np.full((len(along), along.shape[2]), -np.inf)
+        omega = frequencies(self._drivers, WAVES[self._drivers])
+        for scales in product(SCALES, repeat=self._drivers):
             density = np.exp(-0.5 * np.sum((omega * np.array(scales)[:, None]) ** 2, axis=0))
             best = np.maximum(best, self._of_density(density, gram, along, rss))
-        return best - (drivers + 1) * np.log(self.rows)
+        return best - (self._drivers + 1) * np.log(self.rows)
 
     def _of_density(self, density: Floats, gram: Floats, along: Floats, rss: Floats) -> Floats:
         root = np.sqrt(density / density.sum())
@@ -95,12 +135,16 @@ def lever(bench: Bench, port: Port, component: int) -> Floats:
 
 
 def places_of(bench: Bench) -> tuple[tuple[Port, int], ...]:
-    """Ports of the catalogue and the components where a candidate acts; lengths of links are left to geometry."""
+    """Ports of the catalogue and the components where a candidate acts.
+
+    Lengths of links are left to geometry, and what a late clock does at each joint to the joint itself.
+    """
     found: dict[tuple[str, int], tuple[Port, int]] = {}
     drivers = bench.state.drivers
     for term in {(t.port.where, t.physics): t for t in bench.state.candidates()}.values():
         inner = np.array([spec.grid[len(spec.grid) // 2] for spec in term.inner])
-        if term.port.where.startswith("link") and not term.port.where.endswith(".tilt"):
+        where = term.port.where
+        if where == TIME or (where.startswith("link") and not where.endswith(".tilt")):
             continue
         acts = np.any(term.basis(drivers, inner) != 0.0, axis=(0, 2))
         for component in np.flatnonzero(acts):

@@ -10,15 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.diagnose.bench import Bench
+from calibrate.diagnose.causes import is_slow_cause
 from calibrate.diagnose.line_search import refined
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.score import Removed, gain_of, scores
-from calibrate.diagnose.search import cause_of
+from calibrate.diagnose.searching import cause_of
 from calibrate.effects.term import Term
 
 Floats = NDArray[np.float64]
 
-WITHIN = 10.0  # of BIC: beyond, very strong evidence against
+WITHIN = 6.0  # of BIC: beyond, strong evidence against (mismatch catalogue, rivals)
 NEAR = 20.0  # of BIC by the linear score: refitted to be sure
 REFITS = 4  # of the nearest ones
 FEW = 4  # terms: in larger models the linear margin has to do, a refit costs seconds
@@ -39,13 +40,24 @@ class Rival:
 
 
 def rivals_of(bench: Bench, i: int) -> tuple[Rival, ...]:
-    """Of accepted term i: all candidates within 10 BIC, nearest first; sizes that no machine has are none."""
+    """Of accepted term i: all candidates within 6 BIC, nearest first; sizes that no machine has are none."""
     gone, own = bench.gone[i], bench.state.accepted[i].term
     refits = REFITS if len(bench.state.accepted) <= FEW and bench.state.samples <= LARGE else 0
     near = _near(bench, gone, gain_of(gone, bench.sight), {cause_of(a.term) for a in bench.state.accepted})
     found = [_confirmed(bench, i, r) if rank < refits else r for rank, r in enumerate(near)]
-    kept = [r for r in found if r.margin <= WITHIN and r.term.key != own.key]
+    known = [r for r in found if r is not None and r.term.key != own.key]
+    kept = [r for r in known if r.margin - _clock_price(bench, own, r.term) <= WITHIN]
     return tuple(sorted(kept, key=lambda r: r.margin))
+
+
+def _clock_price(bench: Bench, own: Term, other: Term) -> float:
+    """BIC that a time constant costs and a thermometer does not: where temperature follows time, neither is ruled out
+    by it (mismatch catalogue, lessons).
+    """
+    drivers = [term.depends_on[0] for term in (own, other)]
+    if len(set(drivers)) != len(drivers) or not all(is_slow_cause(name) for name in drivers):
+        return 0.0
+    return max(len(other.inner) - len(own.inner), 0) * float(np.log(bench.sight.data))
 
 
 def confidences(rivals: Sequence[Rival]) -> Floats:
@@ -73,7 +85,11 @@ def _near(bench: Bench, gone: Removed, worth: float, taken: set[tuple[object, ..
     return out
 
 
-def _confirmed(bench: Bench, i: int, rival: Rival) -> Rival:
+def _confirmed(bench: Bench, i: int, rival: Rival) -> Rival | None:
+    """None where the refit takes it to a size that no machine has."""
     accepted = [rival.accepted if j == i else a for j, a in enumerate(bench.state.accepted)]
     trial = Bench(bench.state.refitted(accepted))
-    return Rival(trial.state.accepted[i], trial.bic - bench.bic, refitted=True)
+    found = trial.state.accepted[i]
+    if not found.term.plausible(found.coefficients, found.inner, bench.noise_rad):
+        return None
+    return Rival(found, trial.bic - bench.bic, refitted=True)

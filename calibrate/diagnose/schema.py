@@ -57,6 +57,9 @@ class FindingRecord(NameRecord, frozen=True):
     bic_gain: float | None
     held_out_gain: float | None
     explains: str = ""
+    plausible_to: float | None = (
+        None  # the largest that a machine of its kind shows, in the unit of the first parameter
+    )
     curve: CurveRecord | None = None
     stream: str | None = None  # where it was found, if not in the samples
     from_s: float | None = None  # on the clock of that stream

@@ -12,16 +12,17 @@ from calibrate.diagnose.linearised import State
 
 Ints = NDArray[np.intp]
 
-MOST = 600  # samples: an effect of a fifth of the noise is plain to see in so many
+MOST = 1800  # rows, 600 positions: an effect of a fifth of the noise is plain to see in so many
 
 
 def thinned(state: State, rng: Generator) -> State:
     """The state itself, or fitted to samples drawn at random; repeats stay together."""
     samples = np.unique(state.rows.sample[state.rows.data])
-    if len(samples) <= MOST:
+    most = MOST * len(samples) // max(int(state.rows.data.sum()), 1)
+    if len(samples) <= most:
         return state
     label = units(state.drivers)[samples]
     names, count = np.unique(label, return_counts=True)
     order = rng.permutation(len(names))
-    kept = names[order[np.cumsum(count[order]) <= MOST]]
+    kept = names[order[np.cumsum(count[order]) <= most]]
     return state.select(samples[np.isin(label, kept)]).refitted(())

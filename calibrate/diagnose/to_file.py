@@ -12,6 +12,7 @@ from calibrate.blunders.finding import Blunder
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.diagnosis import Diagnosis, Finding, Named, Pulled, Rejected, RivalName, Unexplained, Verdict
 from calibrate.diagnose.findings import named
+from calibrate.diagnose.fitted import Fitted
 from calibrate.diagnose.from_recording import Diagnosed, Physics
 from calibrate.diagnose.isolability import isolability
 from calibrate.diagnose.proof import Floor, HeldOut
@@ -36,6 +37,7 @@ from calibrate.diagnose.schema import (
 )
 from calibrate.diagnose.smallest_visible import Smallest, smallest_visible
 from calibrate.effects.catalogue import EFFECTS
+from calibrate.effects.form import Form
 
 Floats = NDArray[np.float64]
 
@@ -74,14 +76,14 @@ def _with_physics(physics: Physics, rig: RigRecord, blunders: tuple[BlunderRecor
     after_m = None if judged is None else judged.rms_after_m
     first, *others = [_unexplained(u, after_m) for u in said.unexplained] or [None]
     drivers, misfit, change = physics.geometry.drivers, said.lack_of_fit, physics.free_space
-    bench = Bench(physics.geometry)
+    bench, limits = Bench(physics.geometry), _limits(physics.model)
     return DiagnosisFile(
         schema=SCHEMA,
         verdict=said.verdict.value,
         noise_floor_m=None if floor is None else _number(floor.rms_m),
         rms_before_m=None if judged is None else _number(judged.rms_before_m),
         rms_after_m=None if judged is None else _number(judged.rms_after_m),
-        findings=tuple(map(_finding, said.findings)),
+        findings=tuple(_finding(f, limits.get(f.name)) for f in said.findings),
         unexplained=first,
         next=said.next,
         software=SOFTWARE,
@@ -112,7 +114,13 @@ def _judged(said: Diagnosis) -> HeldOut | None:
     return max(asked, key=lambda p: p.observations, default=None)
 
 
-def _finding(finding: Finding) -> FindingRecord:
+def _limits(model: Fitted) -> dict[Named, float]:
+    """By name, of the causes in the model whose form states one; an unknown cause may be of any size."""
+    known = [a.term for a in model.accepted if isinstance(a.term, Form) and not a.term.open]
+    return {named(term): term.limit for term in known}
+
+
+def _finding(finding: Finding, plausible_to: float | None) -> FindingRecord:
     return FindingRecord(
         *_words(finding.name),
         parameters={
@@ -126,6 +134,7 @@ def _finding(finding: Finding) -> FindingRecord:
         bic_gain=finding.gain,
         held_out_gain=finding.predicts,
         explains=next((e.explains for e in EFFECTS if e.physics == finding.name.physics), ""),
+        plausible_to=plausible_to,
         curve=None if finding.pulled is None else _curve(finding.pulled, finding.name.where),
     )
 

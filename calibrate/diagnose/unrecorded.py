@@ -104,13 +104,10 @@ def _said(asked: Sequence[Wish], best: Floats) -> int:
 def _gains(felt: Floats, z: Floats) -> Floats:
     """(loudness, draw) of residuals z (draw, observation, k) with levers (lever, observation, k), noise estimated."""
     w, V = spectrum(felt)
-    turned = np.einsum("okm,dok->dom", V, z) ** 2
-    rss, count = np.sum(z**2, axis=(1, 2)), z.shape[1] * z.shape[2]
-    out: list[Floats] = []
-    for loud in LOUDNESS:
-        left = np.sum(turned / (1.0 + loud * w), axis=(1, 2))
-        out.append(count * np.log(rss / left) - float(np.sum(np.log1p(loud * w))))
-    return np.stack(out)
+    turned = (np.swapaxes(np.swapaxes(z, 0, 1) @ V, 0, 1) ** 2).reshape(len(z), -1)
+    rss, count = np.sum(z**2, axis=(1, 2)), turned.shape[1]
+    width = 1.0 + np.array(LOUDNESS)[:, None] * w.reshape(-1)
+    return count * np.log(rss / ((1.0 / width) @ turned.T)) - np.sum(np.log(width), axis=1)[:, None]
 
 
 def _leverage_corrected(bench: Bench) -> Floats:

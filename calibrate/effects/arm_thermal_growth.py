@@ -6,7 +6,8 @@ from calibrate.effects import time_laws
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.form import Floats, Form
 from calibrate.effects.kind import Kind
-from calibrate.effects.link_thermal_growth import LIMIT_GROWTH, LIMIT_PER_K, link_vectors
+from calibrate.effects.link_span import beyond_end_m, link_vectors
+from calibrate.effects.link_thermal_growth import LIMIT_GROWTH, LIMIT_PER_K
 from calibrate.effects.ports import Place, Port
 from calibrate.effects.term import Inner, Shape, Term
 from calibrate.effects.time_laws import Law, varies
@@ -40,7 +41,8 @@ def _term(
 
     def function(drivers: Drivers, values: Floats) -> Floats:
         flange = drivers.frames[:, -1]
-        reach = flange[:, :3, 3] - drivers.frames[:, 0, :3, 3]
+        start = drivers.frames[:, 0, :3, 3] - beyond_end_m(drivers, 0) * drivers.frames[:, 0, :3, 2]
+        reach = flange[:, :3, 3] - start
         out = np.zeros((len(reach), 6, 1))
         out[:, :3, 0] = law(drivers, values) * np.einsum("nji,nj->ni", flange[:, :3, :3], reach)
         return out

@@ -5,6 +5,7 @@ import numpy as np
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.form import Floats, Form
 from calibrate.effects.kind import Kind
+from calibrate.effects.link_span import beyond_end_m
 from calibrate.effects.ports import Place, Port
 from calibrate.effects.term import Shape, Term
 
@@ -23,6 +24,8 @@ def _term(joint: int, order: int) -> Term:
         out = np.zeros((len(angle), 6, 2))
         out[:, 3, 0], out[:, 4, 0] = -np.sin(angle), np.cos(angle)
         out[:, 3, 1], out[:, 4, 1] = np.cos(angle), np.sin(angle)
+        # The bearing sits where the link starts, which need not be the frame's origin.
+        out[:, :3] = np.cross(out[:, 3:], [0.0, 0.0, beyond_end_m(drivers, joint - 1)], axisa=1, axisc=1)
         return out
 
     return Form(

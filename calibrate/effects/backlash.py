@@ -4,11 +4,12 @@ import numpy as np
 
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.form import Floats, Form, at_joint
-from calibrate.effects.gravity import likely_torque_nm
+from calibrate.effects.gravity import likely_torque_nm, loaded
 from calibrate.effects.kind import Kind
 from calibrate.effects.term import Inner, Missing, Shape, Term
 from calibrate.effects.time_laws import varies
 
+STRAIGHT = 0.5  # of the largest torque: tanh(2) is 0.96, gentler turns are straight lines to the data
 LIMIT_RAD = 5e-3  # 0.3 degrees; worn industrial wrists show 1e-3 (ISO 9283:1998, 7.2.2 tests for it)
 
 
@@ -47,10 +48,11 @@ def _by_friction(drivers: Drivers, joint: int, approach: Floats) -> Term:
 def _by_gravity(drivers: Drivers, joint: int) -> Term:
     port, direction = at_joint(joint, drivers.n_joints)
     largest = float(np.abs(likely_torque_nm(drivers, joint)).max())
-    grid = tuple(largest * share for share in (0.02, 0.1, 0.3))
+    unit, name = (1.0, "turning_torque_nm") if loaded(drivers, joint) else (largest, "turning_torque_share")
+    grid = tuple(largest / unit * share for share in (0.02, 0.1, 0.3))
 
     def function(drivers: Drivers, inner: Floats) -> Floats:
-        return np.tanh(likely_torque_nm(drivers, joint) / inner[0])[:, None] / 2.0
+        return np.tanh(likely_torque_nm(drivers, joint) / (unit * inner[0]))[:, None] / 2.0
 
     return Form(
         port,
@@ -58,12 +60,14 @@ def _by_gravity(drivers: Drivers, joint: int) -> Term:
         Shape.SIGN,
         "backlash",
         None,
-        (Inner("turning_torque_nm", grid, grid[0] / 4.0, grid[-1] * 2.0),),
+        (Inner(name, grid, grid[0] / 4.0, grid[-1] * 2.0),),
         function=function,
         names=("play_rad",),
         limit=LIMIT_RAD,
         sentence=f"Joint {joint} hangs {{play_rad}} from flank to flank, by the sign of its load: slack in the drive",
         directions=direction,
+        # A flank that the largest load of the session hardly turns over to is no flank: that is a spring.
+        believable=lambda coefficients, inner: unit * inner[0] < STRAIGHT * largest,
     )
 
 

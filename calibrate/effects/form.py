@@ -17,6 +17,8 @@ Exact = Callable[
     [Drivers, Floats, Floats], Floats
 ]  # (pose, 1 or width) for coefficients (m,) and inner values (inner,)
 
+Believable = Callable[[Floats, Floats], bool]  # of coefficients (m,) and inner values (inner,)
+
 NOISE_ALLOWS = 30.0  # times the data's own noise: a coarse machine may be worse than a limit for good ones
 
 
@@ -31,6 +33,7 @@ class Form(Term):
     directions: Floats | None = field(kw_only=True, default=None)  # (width, d); None: the function has its own
     polar: bool = field(kw_only=True, default=False)  # coefficients are (sine, cosine): amplitude and phase are told
     exact: Exact | None = field(kw_only=True, default=None)  # where `function` is the first order only
+    believable: Believable | None = field(kw_only=True, default=None)  # what is more than a limit of size
 
     def basis(self, drivers: Drivers, inner: Floats) -> Floats:
         values = self.function(drivers, inner)
@@ -53,6 +56,8 @@ class Form(Term):
         return out
 
     def plausible(self, coefficients: Floats, inner: Floats, noise_rad: float) -> bool:
+        if self.believable is not None and not self.believable(coefficients, inner):
+            return False
         return bool(np.max(np.abs(coefficients), initial=0.0) <= max(self.limit, NOISE_ALLOWS * noise_rad))
 
     def says(self, sizes: Mapping[str, Size]) -> str:

@@ -1,91 +1,80 @@
-"""Moments of weight: about every joint axis, about the base, in every link; of stated masses and of unknown ones.
+"""Moments of weight about joint axes, about the base, in links; of any loads (calibrate/effects/loads.py)."""
 
-Of unknown masses a moment is linear in each link's mass and first moment (Atkeson, An, Hollerbach, Estimation of
-Inertial Parameters of Manipulator Loads and Links, Int. J. Robotics Research 5(3), 1986). Only what differs over the
-session's poses can be told apart, so those columns are reduced to their strongest combinations.
-"""
-
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.effects.drivers import Drivers
+from calibrate.effects.loads import Load, carried, load_at, payload, stated_masses, states_masses
 from calibrate.effects.time_laws import varies
 from calibrate.rigid import cross
 
 Floats = NDArray[np.float64]
 
-FIRST_MOMENT_M = 0.1  # a link's centre of mass is about this far from its frame: scales columns only
-STRONGEST = 4  # combinations of unknown masses at a joint
-WEAKEST = 0.03  # of the strongest: below, a combination is not worth its column
 UPRIGHT = 0.02  # sine of the angle below which an axis along gravity turns nothing against it
 KEPT = 64  # sessions and joints whose columns are remembered
+
+
+def torques_nm(drivers: Drivers, joint: int, loads: Sequence[Load]) -> Floats:
+    """(pose, load) about the axis of a joint (from 1); zero of what hangs before it."""
+    before, g = drivers.frames[:, joint - 1], drivers.gravity_m_s2
+    turning = cross(g[None], before[:, :3, 2])  # axis . (first moment x g) = first moment . (g x axis)
+    out = np.zeros((len(before), len(loads)))
+    for k, load in enumerate(loads):
+        if load.frame >= joint:
+            out[:, k] = np.einsum("nj,nj->n", _first_moment(drivers, before[:, :3, 3], load), turning)
+    return out
+
+
+def bending_nm(drivers: Drivers, frame: int, loads: Sequence[Load]) -> Floats:
+    """(pose, 3, load) moment about the origin of B_frame, in its axes; zero of what hangs before it."""
+    B = drivers.frames[:, frame]
+    behind = np.array([load.frame > frame for load in loads])
+    moments = _moments_nm(drivers, B[:, :3, 3], loads) * behind
+    return np.swapaxes(B[:, :3, :3], 1, 2) @ moments
+
+
+def weights_n(drivers: Drivers, frame: int, loads: Sequence[Load]) -> Floats:
+    """(pose, 3, load) force in the axes of B_frame of what hangs behind it."""
+    down = np.einsum("nji,j->ni", drivers.frames[:, frame, :3, :3], drivers.gravity_m_s2)
+    zero = np.zeros(len(down))
+    masses_kg = np.stack([zero + (load.mass_kg if load.frame > frame else 0.0) for load in loads], axis=1)
+    return down[:, :, None] * masses_kg[:, None, :]
 
 
 @lru_cache(maxsize=KEPT)
 def stated_torque_nm(drivers: Drivers, joint: int) -> Floats:
     """(pose,) about the axis of a joint (from 1), of stated masses behind it and the payload."""
-    rig = drivers.rig
-    links = rig.arm.joints[joint - 1 :]
-    total = np.zeros(len(drivers.q_rad))
-    for i, link in enumerate(links, start=joint):
-        if link.mass_kg:
-            total += _torque(drivers, joint, link.mass_kg, point_of(drivers, i, link.com_m or (0.0, 0.0, 0.0)))
-    if rig.tool.mass_kg:
-        com = rig.tool.com_m or (0.0, 0.0, 0.0)
-        total += _torque(drivers, joint, rig.tool.mass_kg, point_of(drivers, drivers.n_joints, com))
-    if drivers.payload_kg is not None:
-        total += drivers.payload_kg * payload_levers(drivers, joint)[:, 0]
-    return total
+    return torques_nm(drivers, joint, carried(drivers)).sum(axis=1)
 
 
 @lru_cache(maxsize=KEPT)
 def likely_torque_nm(drivers: Drivers, joint: int) -> Floats:
     """(pose,) as stated_torque_nm; where no mass is stated, of one kilogram at each frame: its sign, not its size."""
-    if any(i >= joint for _, i, _ in _stated(drivers)):
+    if states_masses(drivers.rig):
         return stated_torque_nm(drivers, joint)
-    each = [_torque(drivers, joint, 1.0, drivers.frames[:, i, :3, 3]) for i in range(joint, drivers.n_joints + 1)]
-    return np.sum(each, axis=0)
+    ones = [load_at(i, 1.0, (0.0, 0.0, 0.0)) for i in range(joint, drivers.n_joints + 1)]
+    return torques_nm(drivers, joint, ones).sum(axis=1)
 
 
 def loaded(drivers: Drivers, joint: int) -> bool:
     """Whether the rig states masses behind a joint (from 1) that turn it differently from pose to pose."""
-    rig = drivers.rig
-    stated = rig.tool.mass_kg is not None or any(link.mass_kg is not None for link in rig.arm.joints[joint - 1 :])
-    return stated and varies(stated_torque_nm(drivers, joint))
-
-
-@lru_cache(maxsize=KEPT)
-def unknown_torques(drivers: Drivers, joint: int) -> Floats:
-    """(pose, m) strongest combinations of the moments that unknown masses make about a joint, each of rms 1."""
-    columns: list[Floats] = []
-    for i in range(joint, drivers.n_joints + 1):
-        frame, g = drivers.frames[:, i], drivers.gravity_m_s2
-        columns.append(_torque(drivers, joint, 1.0, frame[:, :3, 3]))
-        axis = drivers.frames[:, joint - 1, :3, 2]
-        columns += [FIRST_MOMENT_M * np.einsum("nj,nj->n", axis, cross(frame[:, :3, k], g[None])) for k in range(3)]
-    return strongest(np.stack(columns, axis=1))
+    return any(link.mass_kg is not None for link in drivers.rig.arm.joints[joint - 1 :]) and varies(
+        stated_torque_nm(drivers, joint)
+    )
 
 
 def payload_levers(drivers: Drivers, joint: int) -> Floats:
     """(pose, 1) torque of 1 kg at the payload's stated centre of mass; (pose, 4) at the flange origin and by first
     moments of 1 kg m, where the centre is not stated.
     """
-    flange, g = drivers.frames[:, -1], drivers.gravity_m_s2
+    at, one = drivers.n_joints, np.array(1.0)
     if drivers.payload_com_m is not None:
-        return _torque(drivers, joint, 1.0, _payload_at_m(drivers))[:, None]
-    axis = drivers.frames[:, joint - 1, :3, 2]
-    moments = [np.einsum("nj,nj->n", axis, cross(flange[:, :3, k], g[None])) for k in range(3)]
-    return np.stack([_torque(drivers, joint, 1.0, flange[:, :3, 3]), *moments], axis=1)
-
-
-def _payload_at_m(drivers: Drivers) -> Floats:
-    """(pose, 3) in the base; the flange where the payload's centre is not stated."""
-    flange = drivers.frames[:, -1]
-    if drivers.payload_com_m is None:
-        return flange[:, :3, 3]
-    return flange[:, :3, 3] + np.einsum("nij,nj->ni", flange[:, :3, :3], drivers.payload_com_m)
+        return torques_nm(drivers, joint, [Load(at, one, drivers.payload_com_m)])
+    moments = [Load(at, np.array(0.0), axis) for axis in np.eye(3)]
+    return torques_nm(drivers, joint, [Load(at, one, np.zeros(3)), *moments])
 
 
 def gravity_in_flange(drivers: Drivers) -> Floats:
@@ -110,66 +99,33 @@ def point_of(drivers: Drivers, frame: int, point_m: tuple[float, float, float]) 
 
 def masses(drivers: Drivers) -> list[tuple[float, int, tuple[float, float, float]]]:
     """Mass (kg), frame and centre of every link and the tool; where none is stated, one kilogram at each frame."""
-    return _stated(drivers) or [(1.0, i, (0.0, 0.0, 0.0)) for i in range(1, drivers.n_joints + 1)]
-
-
-def _stated(drivers: Drivers) -> list[tuple[float, int, tuple[float, float, float]]]:
-    rig = drivers.rig
-    stated = [
-        (link.mass_kg, i, link.com_m or (0.0, 0.0, 0.0))
-        for i, link in enumerate(rig.arm.joints, start=1)
-        if link.mass_kg
-    ]
-    if rig.tool.mass_kg:
-        stated.append((rig.tool.mass_kg, drivers.n_joints, rig.tool.com_m or (0.0, 0.0, 0.0)))
-    return stated
-
-
-@lru_cache(maxsize=KEPT)
-def moment_behind_nm(drivers: Drivers, frame: int) -> Floats:
-    """(pose, 3) moment, about the origin of B_frame and in its axes, of all weight behind it; payload included."""
-    B = drivers.frames[:, frame]
-    total = np.zeros((len(B), 3))
-    for mass, i, com in masses(drivers):
-        if i > frame:
-            total += cross(point_of(drivers, i, com) - B[:, :3, 3], mass * drivers.gravity_m_s2[None])
-    if drivers.payload_kg is not None:
-        weight = drivers.payload_kg[:, None] * drivers.gravity_m_s2
-        total += cross(_payload_at_m(drivers) - B[:, :3, 3], weight)
-    return np.einsum("nji,nj->ni", B[:, :3, :3], total)
-
-
-@lru_cache(maxsize=KEPT)
-def weight_behind_n(drivers: Drivers, frame: int) -> Floats:
-    """(pose, 3) force in the axes of B_frame of all weight behind it; payload included."""
-    carried = np.full(len(drivers.t_s), sum(mass for mass, i, _ in masses(drivers) if i > frame))
-    if drivers.payload_kg is not None:
-        carried += drivers.payload_kg
-    turned = np.einsum("nji,j->ni", drivers.frames[:, frame, :3, :3], drivers.gravity_m_s2)
-    return carried[:, None] * turned
+    if states_masses(drivers.rig):
+        return stated_masses(drivers)
+    return [(1.0, i, (0.0, 0.0, 0.0)) for i in range(1, drivers.n_joints + 1)]
 
 
 @lru_cache(maxsize=KEPT)
 def overturning_nm(drivers: Drivers) -> Floats:
-    """(pose, 3) moment of all weight about the base origin, in the base."""
-    total = np.zeros((len(drivers.q_rad), 3))
-    for mass, i, com in masses(drivers):
-        total += cross(point_of(drivers, i, com), mass * drivers.gravity_m_s2[None])
+    """(pose, 3) moment of all weight about the base origin, in the base; where none is stated, by `masses`."""
+    loads = [load_at(i, mass, com) for mass, i, com in masses(drivers)]
     if drivers.payload_kg is not None:
-        total += cross(_payload_at_m(drivers), drivers.payload_kg[:, None] * drivers.gravity_m_s2)
-    return total
+        loads.append(payload(drivers, drivers.payload_kg))
+    return overturning_by(drivers, loads).sum(axis=2)
 
 
-def strongest(columns: Floats, most: int = STRONGEST) -> Floats:
-    """(pose, m) principal combinations, each of rms 1; none where all are zero."""
-    U, s, _ = np.linalg.svd(columns, full_matrices=False)
-    if s[0] <= 1e-9 * np.sqrt(len(columns)):
-        return np.zeros((len(columns), 0))
-    kept = int(np.sum(s[:most] > WEAKEST * s[0]))
-    return U[:, :kept] * np.sqrt(len(columns))
+def overturning_by(drivers: Drivers, loads: Sequence[Load]) -> Floats:
+    """(pose, 3, load) moment of each load about the base origin, in the base."""
+    return _moments_nm(drivers, np.zeros((len(drivers.frames), 3)), loads)
 
 
-def _torque(drivers: Drivers, joint: int, mass_kg: float, at_m: Floats) -> Floats:
-    before = drivers.frames[:, joint - 1]
-    lever = at_m - before[:, :3, 3]
-    return mass_kg * np.einsum("nj,nj->n", before[:, :3, 2], cross(lever, drivers.gravity_m_s2[None]))
+def _moments_nm(drivers: Drivers, about_m: Floats, loads: Sequence[Load]) -> Floats:
+    """(pose, 3, load) of the weight of each load about points (pose, 3), in the base."""
+    g = drivers.gravity_m_s2[None]
+    return np.stack([cross(_first_moment(drivers, about_m, load), g) for load in loads], axis=2)
+
+
+def _first_moment(drivers: Drivers, about_m: Floats, load: Load) -> Floats:
+    """(pose, 3) of a load about points (pose, 3), in the base's axes."""
+    B = drivers.frames[:, load.frame]
+    own = np.einsum("nij,nj->ni", B[:, :3, :3], np.broadcast_to(load.moment_kg_m, (len(B), 3)))
+    return own + load.mass_kg[..., None] * (B[:, :3, 3] - about_m)

@@ -1,12 +1,16 @@
 """Soft joint: gravity torque twists the drive behind the encoder."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.form import Floats, Form, at_joint
-from calibrate.effects.gravity import loaded, stated_torque_nm, unknown_torques
+from calibrate.effects.gravity import loaded, stated_torque_nm, torques_nm
 from calibrate.effects.kind import Kind
+from calibrate.effects.loads import Load
 from calibrate.effects.term import Inner, Missing, Shape, Term
+from calibrate.effects.weighed import By, Weighed, by_corrected, by_unknown, yields
 
 LIMIT_RAD_NM = 1e-3  # fourteen times the softest seen on a small arm (mismatch catalogue: 1 to 70 urad per Nm)
 KNEES = (0.15, 0.3, 0.5, 0.75)  # of the largest torque
@@ -16,11 +20,21 @@ LIMIT_RAD = 2e-2  # of the deflection, where masses are not known
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
     out: list[Term] = []
     for joint in range(1, drivers.n_joints + 1):
+        by = _turned(joint)
         if loaded(drivers, joint):
-            out += [_stiff(drivers, joint), _stiffening(drivers, joint), _knee(drivers, joint)]
-        if unknown_torques(drivers, joint).shape[1]:
-            out.append(_unknown_masses(drivers, joint))
+            out += [_stiff(drivers, joint), _knee(drivers, joint), _stiffening(drivers, joint)]
+            corrected = by_corrected(drivers, by)
+            out += [_corrected(drivers, joint, corrected)] if corrected is not None else []
+        elif (unknown := by_unknown(drivers, by, joint)) is not None:
+            out.append(_unknown_masses(drivers, joint, unknown))
     return tuple(out)
+
+
+def _turned(joint: int) -> By:
+    def by(drivers: Drivers, loads: Sequence[Load]) -> Floats:
+        return torques_nm(drivers, joint, loads)[:, None, :]
+
+    return by
 
 
 def _stiff(drivers: Drivers, joint: int) -> Term:
@@ -39,6 +53,29 @@ def _stiff(drivers: Drivers, joint: int) -> Term:
         limit=LIMIT_RAD_NM,
         sentence=f"Joint {joint} yields {{compliance_rad_nm}}: elastic drive",
         directions=direction,
+        believable=lambda coefficients, inner: yields(coefficients),
+    )
+
+
+def _corrected(drivers: Drivers, joint: int, weighed: Weighed) -> Term:
+    """One stiffness, under masses that are off by what stated masses are."""
+    port, direction = at_joint(joint, drivers.n_joints)
+
+    def function(drivers: Drivers, inner: Floats) -> Floats:
+        return weighed.at(drivers)[:, 0]
+
+    return Form(
+        port,
+        (f"gravity_torque{joint}",),
+        Shape.LINEAR,
+        "joint-compliance",
+        variant="masses corrected",
+        function=function,
+        names=("compliance_rad_nm", *(f"mass_correction{k}_rad_nm" for k in range(1, weighed.columns))),
+        limit=LIMIT_RAD_NM,
+        sentence=f"Joint {joint} yields {{compliance_rad_nm}}: elastic drive; stated masses are off",
+        directions=direction,
+        believable=lambda coefficients, inner: yields(coefficients, weighed.corrections),
     )
 
 
@@ -56,11 +93,13 @@ def _stiffening(drivers: Drivers, joint: int) -> Term:
         Shape.CUBIC,
         "joint-compliance",
         function=function,
-        names=("compliance_rad_nm", "compliance_change_rad_nm"),
+        names=("compliance_at_rest_rad_nm", "compliance_change_rad_nm"),
         limit=LIMIT_RAD_NM,
-        sentence=f"Joint {joint} yields {{compliance_rad_nm}} at small torque and {{compliance_change_rad_nm}} more "
-        "at the largest: elastic drive",
+        sentence=f"Joint {joint} yields {{compliance_at_rest_rad_nm}} at no torque and {{compliance_change_rad_nm}} "
+        "more at the largest: elastic drive",
         directions=direction,
+        # Deflection over torque is c + d x^2 for x in 0 ... 1: a spring gives way along its load.
+        believable=lambda coefficients, inner: bool(coefficients[0] >= max(0.0, -coefficients[1])),
     )
 
 
@@ -89,16 +128,15 @@ def _knee(drivers: Drivers, joint: int) -> Term:
         sentence=f"Joint {joint} yields {{compliance_rad_nm}} up to {{knee_nm}} and {{compliance_above_rad_nm}} "
         "beyond: two slopes of a harmonic drive",
         directions=direction,
+        believable=lambda coefficients, inner: yields(coefficients) and inner[0] < largest,
     )
 
 
-def _unknown_masses(drivers: Drivers, joint: int) -> Term:
+def _unknown_masses(drivers: Drivers, joint: int, weighed: Weighed) -> Term:
     port, direction = at_joint(joint, drivers.n_joints)
-    names = tuple(f"combination{k}_rad" for k in range(1, unknown_torques(drivers, joint).shape[1] + 1))
 
     def function(drivers: Drivers, inner: Floats) -> Floats:
-        columns = unknown_torques(drivers, joint)[:, : len(names)]
-        return np.pad(columns, ((0, 0), (0, len(names) - columns.shape[1])))
+        return weighed.at(drivers)[:, 0]
 
     return Form(
         port,
@@ -107,10 +145,11 @@ def _unknown_masses(drivers: Drivers, joint: int) -> Term:
         "joint-compliance",
         variant="unknown masses",
         function=function,
-        names=names,
+        names=weighed.names("compliance_rad_nm"),
         limit=LIMIT_RAD,
         sentence=f"Joint {joint} yields under its load ({{combination1_rad}} rms): elastic drive; masses are not known",
         directions=direction,
+        believable=weighed.believable,
     )
 
 

@@ -1,71 +1,135 @@
 """Bending link: the weight behind it bends a link about its own axes."""
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
 from calibrate.effects.drivers import Drivers
-from calibrate.effects.form import Floats, Form
-from calibrate.effects.gravity import moment_behind_nm, weight_behind_n
+from calibrate.effects.form import Believable, Floats, Form
+from calibrate.effects.gravity import bending_nm, weights_n
 from calibrate.effects.kind import Kind
-from calibrate.effects.link_thermal_growth import link_vectors
+from calibrate.effects.link_span import SHORTEST_M, beyond_end_m, link_vectors
+from calibrate.effects.loads import Load, carried, states_masses
 from calibrate.effects.ports import Place, Port
 from calibrate.effects.term import Shape, Term
 from calibrate.effects.time_laws import varies
+from calibrate.effects.weighed import By, Weighed, by_corrected, by_stated, by_unknown, yields
 from calibrate.rigid import cross
 
 LIMIT_RAD_NM = 5e-4  # ten times the softest link of a small arm (mismatch catalogue: 1 to 50 urad per Nm)
+LIMIT_RAD = 1e-2  # of the slope, where masses are not known
 PARALLEL = 0.1  # sine between link and axis
-SHORTEST_M = 0.02
 
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
-    return tuple(
-        _term(link, ways)
-        for link in range(1, drivers.n_joints)
-        if np.linalg.norm(link_vectors(drivers, link)[0]) >= SHORTEST_M and varies(moment_behind_nm(drivers, link))
-        for ways in (1, 2)
-    )
+    links = [
+        link for link in range(1, drivers.n_joints) if np.linalg.norm(link_vectors(drivers, link)[0]) >= SHORTEST_M
+    ]
+    return tuple(term for link in links for term in _of_link(drivers, link))
 
 
-def _term(link: int, ways: int) -> Term:
-    """As stiff all round, or with a stiffness of its own about each of two axes across the link."""
+def _of_link(drivers: Drivers, link: int) -> list[Term]:
+    by = _bent(link)
+    if not states_masses(drivers.rig):
+        unknown = by_unknown(drivers, by, link + 1)
+        return [] if unknown is None else [_unknown_masses(link, unknown)]
+    if not varies(bending_nm(drivers, link, carried(drivers)).sum(axis=2)):
+        return []
+    plain, corrected = by_stated(by), by_corrected(drivers, by)
+    terms = [_stated(link, plain, ""), _each_way(link)]
+    return terms if corrected is None else [*terms, _stated(link, corrected, "masses corrected")]
 
-    def function(drivers: Drivers, inner: Floats) -> Floats:
+
+def _bent(link: int, way: int | None = None) -> By:
+    """Bending that is as stiff all round, or of the first or second of two axes across the link alone."""
+
+    def by(drivers: Drivers, loads: Sequence[Load]) -> Floats:
         r = link_vectors(drivers, link)
-        end, by_weight = moment_behind_nm(drivers, link), cross(r, weight_behind_n(drivers, link))
         along = r / np.linalg.norm(r, axis=1, keepdims=True)
-        slopes, sags = _ways(end + by_weight / 2.0, along, ways), _ways(end / 2.0 + by_weight / 3.0, along, ways)
-        out = np.zeros((len(r), 6, ways))
-        for k, (slope, sag) in enumerate(zip(slopes, sags, strict=True)):
-            out[:, 3:, k] = slope
-            out[:, :3, k] = cross(sag, r)
+        weights, beyond = weights_n(drivers, link, loads), np.array([0.0, 0.0, beyond_end_m(drivers, link)])
+        ends = bending_nm(drivers, link, loads) + np.cross(beyond, weights, axisb=1, axisc=1)
+        out = np.zeros((len(r), 6, len(loads)))
+        for k, load in enumerate(loads):
+            if load.frame <= link:
+                continue
+            by_weight = cross(r, weights[:, :, k])
+            out[:, 3:, k] = _across(ends[:, :, k] + by_weight / 2.0, along, way)
+            sag = cross(_across(ends[:, :, k] / 2.0 + by_weight / 3.0, along, way), r)
+            out[:, :3, k] = sag + cross(out[:, 3:, k], beyond[None])
         return out
 
-    return Form(
-        Port(f"link{link}.tilt", Place.FRAME, link),
-        (f"gravity_torque{link}", f"gravity_torque{link + 1}"),
-        Shape.LINEAR,
-        "link-bending",
-        variant="" if ways == 1 else "each way its own",
-        function=function,
-        names=("compliance_rad_nm",) if ways == 1 else ("compliance_u_rad_nm", "compliance_v_rad_nm"),
-        limit=LIMIT_RAD_NM,
-        sentence=f"Link {link} bends by {{compliance_rad_nm}}: soft"
-        if ways == 1
-        else f"Link {link} bends by {{compliance_u_rad_nm}} one way, {{compliance_v_rad_nm}} the other: soft",
-    )
+    return by
 
 
-def _ways(moment: Floats, along: Floats, ways: int) -> list[Floats]:
-    """Of a moment (pose, 3) what bends: all of it across the link, or its parts about two axes across the link."""
+def _across(moment: Floats, along: Floats, way: int | None) -> Floats:
+    """Of a moment (pose, 3) what bends: all of it across the link, or its part about one of two axes there."""
     across = moment - np.einsum("ni,ni->n", moment, along)[:, None] * along
-    if ways == 1:
-        return [across]
+    if way is None:
+        return across
     u = np.cross(along, np.array([0.0, 0.0, 1.0]))  # square to the next joint's axis
     if np.linalg.norm(u[0]) < PARALLEL:  # the link runs along that axis
         u = np.cross(along, np.array([1.0, 0.0, 0.0]))
     u /= np.linalg.norm(u, axis=1, keepdims=True)
     first = np.einsum("ni,ni->n", across, u)[:, None] * u
-    return [first, across - first]
+    return first if way == 0 else across - first
+
+
+def _stated(link: int, weighed: Weighed, variant: str) -> Term:
+    return _term(
+        link,
+        lambda drivers, inner: weighed.at(drivers),
+        variant,
+        ("compliance_rad_nm", *(f"mass_correction{k}_rad_nm" for k in range(1, weighed.columns))),
+        f"Link {link} bends by {{compliance_rad_nm}}: soft",
+        lambda coefficients, inner: yields(coefficients, weighed.corrections),
+    )
+
+
+def _each_way(link: int) -> Term:
+    ways = [by_stated(_bent(link, way)) for way in (0, 1)]
+    return _term(
+        link,
+        lambda drivers, inner: np.concatenate([way.at(drivers) for way in ways], axis=2),
+        "each way its own",
+        ("compliance_u_rad_nm", "compliance_v_rad_nm"),
+        f"Link {link} bends by {{compliance_u_rad_nm}} one way, {{compliance_v_rad_nm}} the other: soft",
+        lambda coefficients, inner: yields(coefficients),
+    )
+
+
+def _unknown_masses(link: int, weighed: Weighed) -> Term:
+    return _term(
+        link,
+        lambda drivers, inner: weighed.at(drivers),
+        "unknown masses",
+        weighed.names("compliance_rad_nm"),
+        f"Link {link} bends under its load ({{combination1_rad}} rms): soft; masses are not known",
+        weighed.believable,
+        LIMIT_RAD,
+    )
+
+
+def _term(
+    link: int,
+    function: Callable[[Drivers, Floats], Floats],
+    variant: str,
+    names: tuple[str, ...],
+    sentence: str,
+    believable: Believable,
+    limit: float = LIMIT_RAD_NM,
+) -> Term:
+    return Form(
+        Port(f"link{link}.tilt", Place.FRAME, link),
+        (f"gravity_torque{link}", f"gravity_torque{link + 1}"),
+        Shape.LINEAR,
+        "link-bending",
+        variant=variant,
+        function=function,
+        names=names,
+        limit=limit,
+        sentence=sentence,
+        believable=believable,
+    )
 
 
 EFFECT = Kind(

@@ -6,13 +6,13 @@ from calibrate.effects import time_laws
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.form import Floats, Form
 from calibrate.effects.kind import Kind
+from calibrate.effects.link_span import SHORTEST_M, link_vectors
 from calibrate.effects.ports import Place, Port
 from calibrate.effects.term import Inner, Missing, Shape, Term
 from calibrate.effects.time_laws import varies
 
-LIMIT_PER_K = 1e-4  # aluminium 24e-6; a thermometer far from the link sees less than the link does
+LIMIT_PER_K = 2.4e-4  # aluminium 24e-6; a thermometer far from the link sees a tenth of what the link does
 LIMIT_GROWTH = 3e-3  # relative, where time stands for temperature
-SHORTEST_M = 0.02
 
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
@@ -25,13 +25,6 @@ def _terms(drivers: Drivers) -> tuple[Term, ...]:
                 out.append(_with_temperature(link, where))
         out.append(_over_time(drivers, link))
     return tuple(out)
-
-
-def link_vectors(drivers: Drivers, link: int) -> Floats:
-    """(pose, 3) from the origin of B_(link-1) to that of B_link, in the latter's axes: constant in a rigid link."""
-    B = drivers.frames
-    span = B[:, link, :3, 3] - B[:, link - 1, :3, 3]
-    return np.einsum("nji,nj->ni", B[:, link, :3, :3], span)
 
 
 def _with_temperature(link: int, where: str) -> Term:
@@ -72,6 +65,8 @@ def _term(
         names=(name,),
         limit=limit,
         sentence=f"Link {link} grows by {{{name}}}: heat",
+        # What is warmed grows; over time it may cool, too.
+        believable=None if driver == "t" else lambda coefficients, inner: bool(coefficients[0] >= 0.0),
     )
 
 

@@ -12,7 +12,7 @@ from calibrate.effects.drivers import Drivers
 from calibrate.effects.form import Floats, Form, at_joint
 from calibrate.effects.kind import Kind
 from calibrate.effects.laser_pointing import pointing, shifting
-from calibrate.effects.link_thermal_growth import SHORTEST_M, link_vectors
+from calibrate.effects.link_span import SHORTEST_M, link_vectors
 from calibrate.effects.moved import motion
 from calibrate.effects.ports import Place, Port
 from calibrate.effects.psd_terms import spot

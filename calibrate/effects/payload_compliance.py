@@ -40,6 +40,7 @@ def _term(drivers: Drivers, joint: int, payload_kg: Floats, columns: int) -> Ter
         limit=LIMIT,
         sentence=f"Joint {joint} yields {{compliance_rad_nm}} to the payload",
         directions=direction,
+        believable=lambda coefficients, inner: bool(coefficients[0] >= 0.0),  # a spring gives way along the load
     )
 
 

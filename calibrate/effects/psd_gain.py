@@ -21,11 +21,13 @@ def _two(drivers: Drivers, detector: int, spot: Floats) -> Floats:
     return out
 
 
+def _skew(drivers: Drivers, detector: int, spot: Floats) -> Floats:
+    """Axes that are not square, half of it seen from either: the other half turns the detector, which geometry does."""
+    return spot[:, ::-1, None] / 2.0
+
+
 def _cross(drivers: Drivers, detector: int, spot: Floats) -> Floats:
-    out = np.zeros((len(spot), 2, 4))
-    out[:, 0, 0], out[:, 1, 1] = spot.T
-    out[:, 0, 2], out[:, 1, 3] = spot[:, 1], spot[:, 0]
-    return out
+    return np.concatenate([_two(drivers, detector, spot), _skew(drivers, detector, spot)], axis=2)
 
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
@@ -37,12 +39,13 @@ def _terms(drivers: Drivers) -> tuple[Term, ...]:
             ("gain_x_error_share", "gain_y_error_share"),
             "PSD {k} reads {{gain_x_error_share}} too far out in x, {{gain_y_error_share}} in y",
         ),
+        ("skew", _skew, ("cross_share",), "PSD {k}'s axes are off square by {{cross_share}}: each reads of the other"),
         (
-            "crosstalk",
+            "each axis and skew",
             _cross,
-            ("gain_x_error_share", "gain_y_error_share", "x_from_y_share", "y_from_x_share"),
-            "PSD {k} mixes its axes, x from y by {{x_from_y_share}}, y from x by {{y_from_x_share}}, and reads "
-            "{{gain_x_error_share}}, {{gain_y_error_share}} too far out",
+            ("gain_x_error_share", "gain_y_error_share", "cross_share"),
+            "PSD {k} reads {{gain_x_error_share}} too far out in x, {{gain_y_error_share}} in y, and its axes are off "
+            "square by {{cross_share}}",
         ),
     )
     return tuple(

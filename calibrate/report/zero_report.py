@@ -48,11 +48,13 @@ def write_report(
     angles: Angles = "reported",
     left_out: Sequence[str] = (),
     proved: EvidenceFields | None = None,
+    alarms: Sequence[str] = (),
     diagnosis: DiagnosisFile | None = None,
 ) -> Path:
     """One HTML file at `path`, over what may be there; returns it.
 
     `left_out` are sentences, each naming rows that were recorded but not fitted; `proved` is None where nothing was;
+    `alarms` are what to read before the numbers;
     `diagnosis` adds its pages.
     `result` must come from `recording` with these `angles`. DataError if it does not, or the file cannot be written.
     """
@@ -64,6 +66,7 @@ def write_report(
         angles=angles,
         left_out=left_out,
         proved=proved,
+        alarms=alarms,
         diagnosis=diagnosis,
     )
     return write_page(path, text)
@@ -78,6 +81,7 @@ def report_html(
     angles: Angles = "reported",
     left_out: Sequence[str] = (),
     proved: EvidenceFields | None = None,
+    alarms: Sequence[str] = (),
     diagnosis: DiagnosisFile | None = None,
 ) -> str:
     """The page as text; arguments as in `write_report`."""
@@ -90,7 +94,7 @@ def report_html(
         residuals.residuals(known),
         zeros.zeros(known),
         point.point(point_constraint, result.zeros, why_no_point_constraint),
-        *([] if proved is None else [proofs.proofs(proved)]),
+        *([] if proved is None else [proofs.proofs(proved, alarms)]),
         unseen.unseen(known, left_out),
         provenance.provenance(recording, result.n_poses, "with both spots", f"{result.software}, {result.steps} steps"),
     )

@@ -8,13 +8,16 @@ from drivers.cia406.objects import Operating
 SPEED_LIMIT_RAD_S = (
     100.0  # 16 turns a second: no arm joint turns so fast, even in an emulation run at ten times the pace
 )
+READINGS_OF_A_SLIP = 3  # a glitch on the line or in the disc is gone with the next reading
+SLIPS_KEPT = 256
+TIME_SCATTER_S = 0.002  # host times of SYNCs against the latching; measured: below 1 ms, busy host 2 ms
 
 
 @dataclass(frozen=True)
 class Scale:
     """What the encoder says of its counts."""
 
-    units_per_turn: int
+    units_per_turn: float  # of CiA 406 a whole number
     range_units: int  # the position wraps here
     rises_counter_clockwise: bool
 
@@ -22,6 +25,11 @@ class Scale:
     def unit_rad(self) -> float:
         """Angle of one count, counter-clockwise positive."""
         return math.copysign(math.tau / self.units_per_turn, 1.0 if self.rises_counter_clockwise else -1.0)
+
+    @property
+    def multi_turn(self) -> bool:
+        """The position tells turns apart."""
+        return self.range_units > self.units_per_turn
 
 
 def scale_of(operating: int, units_per_turn: int, range_units: int, resolution: int, turns: int) -> Scale:
@@ -34,33 +42,102 @@ def scale_of(operating: int, units_per_turn: int, range_units: int, resolution: 
     return Scale(units, total, bool(operating & Operating.COUNTER_CLOCKWISE))
 
 
+@dataclass(frozen=True)
+class Slip:
+    """The position moved without motion, and stayed: a coupling that slipped, a preset, a turn lost."""
+
+    time_s: float
+    size_rad: float
+
+
 class ContinuousAngle:
     """Unwraps one encoder's position. The first reading lies within half the range of zero.
 
-    Step = ((new - old + R/2) mod R) - R/2, R the range in units; a step faster than the speed limit is no motion and
-    gives NaN (a glitch, a preset, a wrong wrap), until the time since the last good reading would allow it.
+    Step = ((new - old + R/2) mod R) - R/2, R the range in units. A step is motion when it is no faster than the speed
+    limit and, where an acceleration limit is given, no farther from the last speed v than a dt^2 + 2 |v| j allows, j
+    the scatter of the host's times. Any other is NaN. When READINGS_OF_A_SLIP of them in a row agree with each other
+    the position has slipped: it is told from there on, and the slip is kept.
     """
 
-    def __init__(self, scale: Scale, speed_limit_rad_s: float = SPEED_LIMIT_RAD_S) -> None:
+    def __init__(
+        self,
+        scale: Scale,
+        speed_limit_rad_s: float = SPEED_LIMIT_RAD_S,
+        acceleration_limit_rad_s2: float = math.inf,
+    ) -> None:
         self.jumps = 0
+        self.wraps = 0
+        self.slips: tuple[Slip, ...] = ()
         self._scale = scale
         self._speed_limit_rad_s = speed_limit_rad_s
-        self._units: int | None = None  # continuous
-        self._time_s = 0.0
+        self._acceleration_limit_rad_s2 = acceleration_limit_rad_s2
+        self._last: _Reading | None = None
+        self._doubted: list[_Reading] = []
+
+    @property
+    def slip_rad(self) -> float:
+        """All slips together."""
+        return sum(slip.size_rad for slip in self.slips)
 
     def follow(self, position: int, time_s: float) -> float:
         """Angle in rad for a position read at `time_s`, or NaN."""
-        scale = self._scale
-        step = self._step(position, 0 if self._units is None else self._units)
-        if self._units is not None:
-            reach_rad = self._speed_limit_rad_s * (time_s - self._time_s)
-            if abs(step * scale.unit_rad) > reach_rad + abs(scale.unit_rad):
-                self.jumps += 1
-                return math.nan
-        self._units = (self._units or 0) + step
-        self._time_s = time_s
-        return self._units * scale.unit_rad
+        last = self._last
+        if last is None:
+            self._last = _Reading(self._step(position, 0), time_s, math.nan)
+            return self._last.units * self._scale.unit_rad
+        before = self._doubted[-1] if self._doubted else last
+        if self._doubted and not self._is_motion(self._next(before, position, time_s), before):
+            self._doubted.clear()
+            before = last
+        reading = self._next(before, position, time_s)
+        if not self._doubted and self._is_motion(reading, last):
+            return self._accept(reading)
+        self.jumps += 1
+        self._doubted.append(reading if self._doubted else _Reading(reading.units, time_s, last.rate))
+        if len(self._doubted) < READINGS_OF_A_SLIP:
+            return math.nan
+        return self._slipped(last, self._doubted[0], reading)
+
+    def _slipped(self, last: "_Reading", first: "_Reading", reading: "_Reading") -> float:
+        rate = 0.0 if math.isnan(last.rate) else last.rate
+        unmoved = last.units + rate * (first.time_s - last.time_s)
+        self.slips = (*self.slips, Slip(first.time_s, (first.units - unmoved) * self._scale.unit_rad))[-SLIPS_KEPT:]
+        return self._accept(reading)
+
+    def _accept(self, reading: "_Reading") -> float:
+        last = self._last
+        if last is not None:
+            self.wraps += abs(reading.units // self._scale.range_units - last.units // self._scale.range_units)
+        self._last = reading
+        self._doubted.clear()
+        return reading.units * self._scale.unit_rad
+
+    def _next(self, before: "_Reading", position: int, time_s: float) -> "_Reading":
+        step = self._step(position, before.units)
+        elapsed_s = time_s - before.time_s
+        return _Reading(before.units + step, time_s, step / elapsed_s if elapsed_s > 0.0 else before.rate)
+
+    def _is_motion(self, reading: "_Reading", before: "_Reading") -> bool:
+        unit_rad = abs(self._scale.unit_rad)
+        elapsed_s = reading.time_s - before.time_s
+        step = reading.units - before.units
+        if abs(step) * unit_rad > self._speed_limit_rad_s * elapsed_s + unit_rad:
+            return False
+        if math.isinf(self._acceleration_limit_rad_s2) or math.isnan(before.rate):
+            return True
+        off_rad = abs(step - before.rate * elapsed_s) * unit_rad
+        scatter_rad = 2.0 * abs(before.rate) * unit_rad * TIME_SCATTER_S
+        return off_rad <= self._acceleration_limit_rad_s2 * elapsed_s**2 + scatter_rad + 2.0 * unit_rad
 
     def _step(self, position: int, old: int) -> int:
         half = self._scale.range_units // 2
         return (position - old + half) % self._scale.range_units - half
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """A position made continuous, and how fast it was moving then, in units a second; NaN: not known yet."""
+
+    units: int
+    time_s: float
+    rate: float

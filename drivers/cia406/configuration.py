@@ -11,7 +11,8 @@ from drivers.cia406.objects import Operating
 from drivers.errors import DeviceRefused, DeviceStale
 
 ANSWER_S = 0.5  # SDO answers come within some ms; the rest is for a busy host
-HEARTBEAT_MS = 200
+HEARTBEAT_MS = 400  # 1.5 of them are 0.6 s; a node that answers no SYNC is found after 0.5 s
+MULTI_TURN = 2
 POSITION_ENTRY = objects.POSITION << 16 | 32
 
 
@@ -28,6 +29,11 @@ class EncoderIdentity:
     scale: Scale
     pdo_id: int  # CAN identifier of its TPDO2
     mapping: tuple[MappedObject, ...]
+
+    @property
+    def multi_turn(self) -> bool:
+        """As 1000h says in its high word: 1 single-turn, 2 multi-turn (CiA 406, 1000h)."""
+        return self.device_type >> 16 == MULTI_TURN
 
 
 class EncoderObjects:
@@ -92,6 +98,25 @@ def configure(encoder: EncoderObjects) -> EncoderIdentity:
     return EncoderIdentity(
         encoder.number, device_type, vendor, product, revision, serial_number, scale, pdo_id, mapping
     )
+
+
+def preset(encoder: EncoderObjects, scale: Scale, angle_rad: float, *, store: bool) -> None:
+    """The present position reads `angle_rad` from now on. DeviceRefused when the encoder says no.
+
+    `store` keeps it through power-off where the encoder does not by itself; its memory wears: never in a loop.
+    """
+    units = round(angle_rad / scale.unit_rad)
+    encoder.write(objects.PRESET, 0, units % scale.range_units, 4)
+    if store:
+        encoder.write(objects.STORE, 1, objects.SAVE, 4)
+
+
+def set_direction(encoder: EncoderObjects, *, counter_clockwise: bool) -> None:
+    """Which way of turning makes 6004h rise; the other bits of 6000h stay."""
+    operating = encoder.read(objects.OPERATING_PARAMETERS)
+    wanted = operating | Operating.COUNTER_CLOCKWISE if counter_clockwise else operating & ~Operating.COUNTER_CLOCKWISE
+    if wanted != operating:
+        encoder.write(objects.OPERATING_PARAMETERS, 0, wanted, 2)
 
 
 def _scale(encoder: EncoderObjects) -> Scale:

@@ -1,13 +1,19 @@
-"""One SYNC and its answers, and when the next SYNC is due. No I/O: times and frames come in, rows come out.
+"""SYNCs and their answers, and when the next SYNC is due. No I/O: times and frames come in, rows come out.
 
-An answer says nothing of the SYNC that it answers, so a SYNC goes out only when the previous one is answered or given
-up: never two on the way. A deadline missed for that reason is left out and shows as a step of the sequence.
+An answer says nothing of the SYNC that it answers: a node's answers belong to the SYNCs in their order. That is certain
+only when in the end each node has answered as often as it was asked. So rows are held until nothing is on the way any
+more, which between two SYNCs of a quick bus is always; where it is not, no SYNC goes out after HOLD_S until it is. When
+answers are missing then, what that node said since is in doubt and becomes NaN. A deadline left out shows as a step of
+the sequence.
 """
 
 import math
-from dataclasses import dataclass
+from collections import deque
+from dataclasses import dataclass, field
 
 ANSWER_LIMIT_S = 0.1  # answers take some ms; measured with an emulator on a busy host: now and then 50 ms
+HOLD_S = 0.1  # rows are told of no later than this, and what waits for the file is no more
+MOST_UNDER_WAY = 16  # feels right: 16 ms at 1 kHz, which is more than a USB adapter keeps back
 
 
 @dataclass(frozen=True)
@@ -20,8 +26,18 @@ class Row:
     position_rad: tuple[float, ...]
 
 
+@dataclass
+class _Sync:
+    """One that was sent."""
+
+    number: int
+    sent_s: float
+    arrived_s: float
+    answers: dict[int, float] = field(default_factory=dict[int, float])
+
+
 class SyncCycle:
-    """The schedule of SYNCs at fixed deadlines from `start_s`, and the answers to the one under way."""
+    """The schedule of SYNCs at fixed deadlines from `start_s`, and the answers to those under way."""
 
     def __init__(self, nodes: int, period_s: float, start_s: float, first_sequence: int) -> None:
         self.late_answers = 0
@@ -31,64 +47,93 @@ class SyncCycle:
         self._start_s = start_s
         self._first = first_sequence
         self._next = 0  # deadline number
-        self._number = 0  # of the SYNC under way
-        self._open = False
-        self._sent_s = self._arrived_s = start_s
-        self._answers: dict[int, float] = {}
-        self._in_doubt: set[int] = set()  # an answer of theirs may be to the SYNC before
+        self._under_way: deque[_Sync] = deque()  # not answered by all
+        self._answered: list[_Sync] = []  # by all, but since the last moment at which nothing was under way
+        self._busy_since_s = start_s
+        self._in_doubt: set[int] = set()  # an answer of theirs may be to an earlier SYNC
 
-    @property
-    def next_sequence(self) -> int:
-        """The lowest number that no row has yet."""
-        return self._first + self._next
+    def sequence_at(self, now_s: float) -> int:
+        """Number of the first deadline after `now_s`, for a schedule that goes on after this one; 0 if it sent none."""
+        if self._next == 0:
+            return self._first
+        return self._first + max(self._next, math.ceil((now_s - self._start_s) / self._period_s))
 
     @property
     def wakes_s(self) -> float:
         """When something is to be done without any frame coming: give up, or send the next SYNC."""
-        return self._sent_s + ANSWER_LIMIT_S if self._open else self._start_s + self._next * self._period_s
+        if not self._under_way:
+            return self._due_s
+        gives_up_s = self._under_way[0].sent_s + ANSWER_LIMIT_S
+        return min(gives_up_s, self._due_s) if self._has_room else gives_up_s
 
     def sync_due(self, now_s: float) -> bool:
-        return not self._open and now_s >= self.wakes_s
+        return now_s >= self._due_s and (not self._under_way or self._has_room)
 
     def sent(self, now_s: float) -> None:
         """A SYNC went out: it takes the number of the last deadline that has passed."""
-        self._number = max(self._next, math.floor((now_s - self._start_s) / self._period_s))
-        self._next = self._number + 1
-        self._open, self._sent_s, self._arrived_s = True, now_s, now_s
-        self._answers.clear()
+        if not self._under_way:
+            self._busy_since_s = now_s
+        number = max(self._next, math.floor((now_s - self._start_s) / self._period_s))
+        self._next = number + 1
+        self._under_way.append(_Sync(number, now_s, now_s))
 
     def awaits(self, node: int) -> bool:
-        """True when an answer of this node belongs to the SYNC under way; else it is counted as late."""
-        awaited = self._open and node not in self._answers
+        """True when an answer of this node belongs to a SYNC under way; else it is counted as late."""
+        awaited = bool(self._under_way) and node not in self._under_way[-1].answers
         self.late_answers += not awaited
         return awaited
 
-    def answer(self, node: int, position_rad: float, now_s: float) -> Row | None:
-        """Takes a node's answer; the row, if any position, when it was the last missing."""
-        self._answers[node] = math.nan if node in self._in_doubt else position_rad
-        self._arrived_s = now_s
+    def answer(self, node: int, position_rad: float, now_s: float) -> tuple[Row, ...]:
+        """Takes an answer that was awaited; all rows that are certain now, when it was the last missing."""
+        sync = next(sync for sync in self._under_way if node not in sync.answers)
+        sync.answers[node] = math.nan if node in self._in_doubt else position_rad
+        sync.arrived_s = now_s
         self._silent_since_s.pop(node, None)
-        return self._close() if len(self._answers) == self._nodes else None
+        while self._under_way and len(self._under_way[0].answers) == self._nodes:
+            self._answered.append(self._under_way.popleft())
+        return () if self._under_way else self._close(set())
 
-    def give_up(self, now_s: float) -> Row | None:
-        """Ends a SYNC that waited too long; the row, when it holds any position."""
-        if not self._open or now_s < self.wakes_s:
-            return None
-        for node in set(range(self._nodes)) - self._answers.keys():
-            self._silent_since_s.setdefault(node, self._sent_s)
-        return self._close()
+    def give_up(self, now_s: float) -> tuple[Row, ...]:
+        """Ends the wait for answers, if it was too long; the rows that hold any position.
+
+        To be called only when no frame waits to be taken: else what is late is the reader.
+        """
+        if not self._under_way or now_s < self._under_way[0].sent_s + ANSWER_LIMIT_S:
+            return ()
+        for sync in self._under_way:
+            for node in set(range(self._nodes)) - sync.answers.keys():
+                self._silent_since_s.setdefault(node, sync.sent_s)
+        return self._close(set(range(self._nodes)) - self._under_way[-1].answers.keys())
 
     def silent(self, limit_s: float, now_s: float) -> list[int]:
         """Nodes that answered nothing for `limit_s`; each is told once, and again after as long."""
+        if not self._silent_since_s:
+            return []
         mute = sorted(node for node, since_s in self._silent_since_s.items() if now_s - since_s >= limit_s)
         for node in mute:
             self._silent_since_s[node] = now_s
         return mute
 
-    def _close(self) -> Row | None:
-        self._open = False
-        self._in_doubt = set(range(self._nodes)) - self._answers.keys()
-        positions = tuple(self._answers.get(node, math.nan) for node in range(self._nodes))
-        if all(math.isnan(position_rad) for position_rad in positions):
-            return None
-        return Row(self._first + self._number, self._sent_s, self._arrived_s, positions)
+    @property
+    def _due_s(self) -> float:
+        return self._start_s + self._next * self._period_s
+
+    @property
+    def _has_room(self) -> bool:
+        """Whether the next SYNC may go out at its time while answers are on the way."""
+        held_s = self._due_s - self._busy_since_s
+        return not self._in_doubt and held_s < HOLD_S and len(self._under_way) < MOST_UNDER_WAY
+
+    def _close(self, short: set[int]) -> tuple[Row, ...]:
+        """Nothing is under way any more; `short` are the nodes that answered too seldom, so that none of it counts."""
+        syncs = [*self._answered, *self._under_way]
+        self._answered, self._in_doubt = [], short
+        self._under_way.clear()
+        rows: list[Row] = []
+        for sync in syncs:
+            positions = tuple(
+                math.nan if node in short else sync.answers.get(node, math.nan) for node in range(self._nodes)
+            )
+            if not all(math.isnan(position_rad) for position_rad in positions):
+                rows.append(Row(self._first + sync.number, sync.sent_s, sync.arrived_s, positions))
+        return tuple(rows)

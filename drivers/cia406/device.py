@@ -3,23 +3,32 @@
 One thread uses it at a time, except `close`. `read` sends the SYNCs; while nobody reads, nothing is sampled.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 import can
 import canopen
 
 from drivers.cia406 import objects
-from drivers.cia406.angle import SPEED_LIMIT_RAD_S, ContinuousAngle
+from drivers.cia406.angle import SPEED_LIMIT_RAD_S, ContinuousAngle, Slip
+from drivers.cia406.bus_faults import BusFault, BusFaults
 from drivers.cia406.codec import Emergency, extract
-from drivers.cia406.configuration import EncoderIdentity, EncoderObjects, check_profile, configure
+from drivers.cia406.configuration import (
+    HEARTBEAT_MS,
+    EncoderIdentity,
+    EncoderObjects,
+    check_profile,
+    configure,
+    preset,
+    set_direction,
+)
 from drivers.cia406.cycle import Row, SyncCycle
 from drivers.cia406.network import (
     SEND_LIMIT_S,
     BoundedNetwork,
-    OpenBus,
     listening,
     lost_as_device_lost,
-    opened,
     shut_down,
 )
 from drivers.cia406.rows import WatchedRow, to_block
@@ -27,16 +36,19 @@ from drivers.cia406.watch import NodeWatch
 from drivers.clock import Clock, SystemClock
 from drivers.device import Block, Channel
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale
+from drivers.transports.can_interfaces import OpenBus, opened
 
 MAX_SYNC_HZ = 1000.0  # six encoders fill half of a bus of 1 Mbit/s
 SILENT_S = 0.5  # a node that answers no SYNC for so long is gone
+HEARTBEAT_GOES_ON_S = 0.45  # a heartbeat this fresh is one of after the silence began
 BATCH_S = 0.02  # rows gathered in one block; more only delays a reader
 SYNC = can.Message(arbitration_id=objects.SYNC_ID, is_extended_id=False)
 NMT_START, NMT_PRE_OPERATIONAL = 0x01, 0x80
 
 
 class Cia406Encoders:
-    """A `drivers.device.Device`. Channels: position_rad (node,), NaN where no answer came; emergency_code (node,).
+    """A `drivers.device.Device`. Channels: position_rad (node,), NaN where no answer came; emergency_code (node,);
+    slip_rad (node,), the sum of all steps that were no motion; bus_errors, error frames so far.
 
     device_s is when the SYNC was sent, by the host's clock, which is when all encoders latch: they have no clock of
     their own. `Cia406Encoders(bus_opener("socketcan", "can0", 1_000_000), nodes=[1, 2, 3, 4, 5, 6])`.
@@ -51,8 +63,13 @@ class Cia406Encoders:
         name: str = "encoders",
         clock: Clock | None = None,
         speed_limit_rad_s: float = SPEED_LIMIT_RAD_S,
+        acceleration_limit_rad_s2: float = math.inf,
+        patience: float = 1.0,
     ) -> None:
-        """ValueError for a rate beyond 1 to 1000 Hz, no nodes, one twice, or one that CANopen does not have."""
+        """`patience` stretches the wait for a heartbeat, for emulators, whose clock a busy machine slows down.
+
+        ValueError for a rate beyond 1 to 1000 Hz, no nodes, one twice, or one that CANopen does not have.
+        """
         _check(name, nodes, sync_hz)
         self.name = name
         self.nodes = tuple(nodes)
@@ -61,13 +78,14 @@ class Cia406Encoders:
         self._period_s = 1.0 / sync_hz
         self._batch = max(1, round(BATCH_S * sync_hz))
         self._clock: Clock = SystemClock() if clock is None else clock
-        self._speed_limit_rad_s = speed_limit_rad_s
+        self._limits = speed_limit_rad_s, acceleration_limit_rad_s2
         self._bus: can.BusABC | None = None
         self._operational = False
         self._cycle = SyncCycle(len(self.nodes), self._period_s, 0.0, 0)
         self._angles: tuple[ContinuousAngle, ...] = ()
         self._node_of_pdo: dict[int, int] = {}  # CAN identifier to place in `nodes`
-        self._watch = NodeWatch(name, self.nodes)
+        self._watch = NodeWatch(name, self.nodes, HEARTBEAT_MS * 1e-3 * patience)
+        self._faults = BusFaults(name)
         self._bad_lines = 0
         self._rows: list[WatchedRow] = []
 
@@ -75,6 +93,18 @@ class Cia406Encoders:
     def emergencies(self) -> tuple[Emergency, ...]:
         """All that came, in order; the newest 256."""
         return self._watch.emergencies
+
+    @property
+    def bus_faults(self) -> tuple[BusFault, ...]:
+        """Error frames, in order; the newest 256."""
+        return self._faults.newest
+
+    @property
+    def slips(self) -> tuple[tuple[int, Slip], ...]:
+        """(node, slip) of this connection, in order of nodes."""
+        return tuple(
+            (node, slip) for node, angle in zip(self.nodes, self._angles, strict=False) for slip in angle.slips
+        )
 
     @property
     def bad_frames(self) -> int:
@@ -101,6 +131,8 @@ class Cia406Encoders:
         return (
             Channel("position_rad", "rad", shape, float("inf"), count_rad),
             Channel("emergency_code", "", shape),
+            Channel("slip_rad", "rad", shape),
+            Channel("bus_errors", ""),
         )
 
     def read(self, timeout_s: float) -> Block:
@@ -111,13 +143,25 @@ class Cia406Encoders:
                 if now_s >= deadline_s:
                     break
                 self._keep_pace(now_s)
-                self._take(self._receive(min(self._cycle.wakes_s, deadline_s) - now_s))
+                message = self._receive(min(self._cycle.wakes_s, deadline_s) - now_s)
+                self._take(message, watched=True)
+                if message is None:
+                    self._add(self._cycle.give_up(self._clock.now_s()))
         if not self._rows:
             raise DeviceStale(
                 f"{self.name}: no encoder answered a SYNC within {timeout_s:g} s; check power, bus and bitrate"
             )
         rows, self._rows = self._rows, []
         return to_block(rows)
+
+    def preset(self, node: int, angle_rad: float, *, store: bool = False) -> None:
+        """The present position of that encoder reads `angle_rad` from now on; all are set up anew. DeviceRefused."""
+        place = self._place(node)
+        self._change(place, lambda encoder: preset(encoder, self.identities[place].scale, angle_rad, store=store))
+
+    def set_direction(self, node: int, *, counter_clockwise: bool) -> None:
+        """Which way of turning makes the encoder's own count rise; angles stay counter-clockwise positive."""
+        self._change(self._place(node), lambda encoder: set_direction(encoder, counter_clockwise=counter_clockwise))
 
     def close(self) -> None:
         bus, self._bus = self._bus, None
@@ -135,6 +179,23 @@ class Cia406Encoders:
 
     # --- setting up
 
+    def _place(self, node: int) -> int:
+        if node not in self.nodes:
+            raise ValueError(f"{self.name}: no encoder {node}; there are {', '.join(map(str, self.nodes))}")
+        return self.nodes.index(node)
+
+    def _change(self, place: int, change: Callable[[EncoderObjects], None]) -> None:
+        """Parameters are writable in the pre-operational state only (CiA 406); then everything is set up anew."""
+        bus, number = self._connected(), self.nodes[place]
+        with lost_as_device_lost(self.name, "setting up"):
+            self._stop_taking()
+            network = BoundedNetwork(bus)
+            with listening(network, bus, self._take):
+                remote = network.add_node(canopen.RemoteNode(number, canopen.ObjectDictionary()))
+                remote.nmt.send_command(NMT_PRE_OPERATIONAL)
+                change(EncoderObjects(self.name, number, remote))
+            self._set_up(bus)
+
     def _set_up(self, bus: can.BusABC) -> None:
         network = BoundedNetwork(bus)
         self._stop_taking()
@@ -143,45 +204,45 @@ class Cia406Encoders:
             self.identities = self._configured(network)
             for node in self.nodes:
                 bus.send(_nmt(NMT_START, node), SEND_LIMIT_S)
-        self._angles = tuple(ContinuousAngle(i.scale, self._speed_limit_rad_s) for i in self.identities)
+        self._angles = tuple(ContinuousAngle(i.scale, *self._limits) for i in self.identities)
         self._node_of_pdo = {identity.pdo_id: place for place, identity in enumerate(self.identities)}
         if len(self._node_of_pdo) < len(self.nodes):
             raise DeviceRefused(f"{self.name}: two encoders send TPDO2 under one identifier; correct their 1801h:01")
         start_s = self._clock.now_s()
-        sequence = self._cycle.next_sequence
-        self._cycle = SyncCycle(len(self.nodes), self._period_s, start_s, sequence + 1 if sequence else 0)
+        self._cycle = SyncCycle(len(self.nodes), self._period_s, start_s, self._cycle.sequence_at(start_s))
         self._operational = True
-        self._watch.set_operational(True)
+        self._watch.set_operational(True, start_s)
 
     def _stop_taking(self) -> None:
         """Positions, heartbeats and boot-ups mean nothing until the set-up is done; emergencies do."""
         self._operational = False
-        self._watch.set_operational(False)
+        self._watch.set_operational(False, self._clock.now_s())
 
     def _configured(self, network: canopen.Network) -> tuple[EncoderIdentity, ...]:
-        """All missing nodes are named in one error, not one after the other."""
+        """All missing nodes are named in one error, not one after the other.
+
+        The nodes are asked side by side, a thread each until all are done: one after the other six take six times as
+        long, which with a slow adapter is more than a second.
+        """
         encoders: list[EncoderObjects] = []
-        missing: list[int] = []
         for node in self.nodes:
             remote = network.add_node(canopen.RemoteNode(node, canopen.ObjectDictionary()))
             remote.nmt.send_command(NMT_PRE_OPERATIONAL)
             encoders.append(EncoderObjects(self.name, node, remote))
-        for encoder in encoders:
-            try:
-                check_profile(encoder)
-            except DeviceStale:
-                missing.append(encoder.number)
+        with ThreadPoolExecutor(len(encoders)) as side_by_side:
+            answered = list(side_by_side.map(_answers, encoders))
+        missing = [encoder.number for encoder, there in zip(encoders, answered, strict=True) if not there]
         if missing:
             raise DeviceStale(
                 f"{self.name}: no answer from encoder node {', '.join(map(str, missing))} of {len(self.nodes)}; "
                 "check power, node numbers, bit rate and bus termination"
             )
-        return tuple(configure(encoder) for encoder in encoders)
+        with ThreadPoolExecutor(len(encoders)) as side_by_side:
+            return tuple(side_by_side.map(configure, encoders))
 
     # --- streaming
 
     def _keep_pace(self, now_s: float) -> None:
-        self._add(self._cycle.give_up(now_s))
         self._check_silence(now_s)
         if self._cycle.sync_due(now_s):
             self._connected().send(SYNC, SEND_LIMIT_S)
@@ -194,8 +255,14 @@ class Cia406Encoders:
             self._bad_lines += 1
             return None
 
-    def _take(self, message: can.Message | None) -> None:
-        """One frame: a position, a heartbeat, an emergency, or nothing of ours."""
+    def _take(self, message: can.Message | None, *, watched: bool = False) -> None:
+        """One frame: a position, a heartbeat, an emergency, an error, or nothing of ours."""
+        if watched and message is None:
+            self._watch.check_heartbeats()
+        elif watched:
+            self._watch.look(self._clock.now_s())
+        if message is not None and message.is_error_frame:
+            self._faults.take(message, self._clock.now_s())
         if message is None or message.is_extended_id or message.is_remote_frame or message.is_error_frame:
             return
         place = self._node_of_pdo.get(message.arbitration_id)
@@ -216,20 +283,31 @@ class Cia406Encoders:
         silent = self._cycle.silent(SILENT_S, now_s)
         if not silent:
             return
-        alive = self._watch.heard_within(silent, SILENT_S, now_s)
+        self._faults.check(self._connected())
+        alive = self._watch.heard_within(silent, HEARTBEAT_GOES_ON_S, now_s)
         remedy = "its heartbeat goes on: check SYNC and TPDO2" if alive else "check its power, cable and termination"
         mute = ", ".join(str(self.nodes[place]) for place in silent)
         raise DeviceStale(f"{self.name}: encoder {mute} has answered no SYNC for {SILENT_S:g} s; {remedy}")
 
-    def _add(self, row: Row | None) -> None:
-        if row is not None:
-            self._rows.append((row, self._watch.codes))
+    def _add(self, rows: Sequence[Row]) -> None:
+        for row in rows:
+            slips_rad = tuple(angle.slip_rad for angle in self._angles)
+            self._rows.append(WatchedRow(row, self._watch.codes, slips_rad, self._faults.count))
 
     def _connected(self) -> can.BusABC:
         bus = self._bus
         if bus is None:
             raise DeviceLost(f"{self.name}: not connected; call connect() first")
         return bus
+
+
+def _answers(encoder: EncoderObjects) -> bool:
+    """Whether the node is there; DeviceRefused when it is no encoder."""
+    try:
+        check_profile(encoder)
+    except DeviceStale:
+        return False
+    return True
 
 
 def _check(name: str, nodes: Sequence[int], sync_hz: float) -> None:

@@ -4,7 +4,7 @@ python-can and canopen raise CanError, OSError and pyserial's exceptions when an
 DeviceLost, with the cause kept.
 """
 
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from typing import Any
 
@@ -16,10 +16,7 @@ from drivers.errors import DeviceError, DeviceLost
 
 SEND_LIMIT_S = 0.5  # an adapter that takes no frame for so long has stopped
 LISTEN_S = 0.02  # how soon the listening thread of the set-up ends when told
-SLCAN_SETTLE_S = 0.05  # python-can waits 2 s by default, for boards that reset when opened; ours need not
 GONE = (can.CanError, SerialException, OSError)
-
-OpenBus = Callable[[], can.BusABC]
 
 
 class BoundedNetwork(canopen.Network):
@@ -32,28 +29,6 @@ class BoundedNetwork(canopen.Network):
         with self.send_lock:
             self.bus.send(message, SEND_LIMIT_S)
         self.check()
-
-
-def bus_opener(interface: str, channel: str, bitrate: int, options: Mapping[str, Any] | None = None) -> OpenBus:
-    """How to open a bus of any python-can interface, from these arguments only: no configuration file is read."""
-    settings: dict[str, Any] = {"sleep_after_open": SLCAN_SETTLE_S} if interface == "slcan" else {}
-    settings |= options or {}
-
-    def open_bus() -> can.BusABC:
-        return can.Bus(channel, interface=interface, bitrate=bitrate, ignore_config=True, **settings)
-
-    return open_bus
-
-
-def opened(open_bus: OpenBus, name: str) -> can.BusABC:
-    """The open bus. DeviceLost naming the cause when there is none."""
-    try:
-        return open_bus()
-    except (*GONE, ValueError, ImportError, NotImplementedError) as cause:
-        raise DeviceLost(
-            f"{name}: the CAN bus cannot be opened ({cause}); check the adapter, and interface, channel and bitrate "
-            "in the rig file"
-        ) from cause
 
 
 @contextmanager

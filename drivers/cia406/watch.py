@@ -4,8 +4,9 @@ from collections.abc import Sequence
 
 from drivers.cia406 import objects
 from drivers.cia406.codec import Emergency, emergency, heartbeat_state
+from drivers.cia406.heartbeats import Heartbeats
 from drivers.cia406.objects import NmtState
-from drivers.errors import DeviceLost, DeviceRefused
+from drivers.errors import DeviceLost, DeviceRefused, DeviceStale
 
 EMERGENCIES_KEPT = 256
 
@@ -13,7 +14,8 @@ EMERGENCIES_KEPT = 256
 class NodeWatch:
     """Takes every frame that is not a position. `codes` holds each node's last emergency code, 0 for none."""
 
-    def __init__(self, name: str, nodes: Sequence[int]) -> None:
+    def __init__(self, name: str, nodes: Sequence[int], heartbeat_s: float) -> None:
+        """`heartbeat_s`: the period that the nodes are told, in host time."""
         self.emergencies: tuple[Emergency, ...] = ()  # the newest EMERGENCIES_KEPT, in the order they came
         self.codes = tuple(0 for _ in nodes)
         self.bad_frames = 0
@@ -22,8 +24,9 @@ class NodeWatch:
         self._heard_s: dict[int, float] = {}  # last heartbeat
         self._operational = False
         self._started: set[int] = set()  # nodes that have said that they are operational
+        self._heartbeats = Heartbeats(nodes, heartbeat_s)
 
-    def set_operational(self, operational: bool) -> None:
+    def set_operational(self, operational: bool, now_s: float) -> None:
         """From now on a boot-up, or another state than operational, is a fault; or no longer.
 
         Not the other states before a node has said "operational": a heartbeat may cross the start command on its way.
@@ -31,6 +34,20 @@ class NodeWatch:
         self._operational = operational
         self._heard_s = {}
         self._started = set()
+        self._heartbeats.begin(now_s)
+
+    def look(self, now_s: float) -> None:
+        """A frame of anybody came, `now_s`."""
+        self._heartbeats.look(now_s)
+
+    def check_heartbeats(self) -> None:
+        """DeviceStale naming the nodes whose heartbeat stays away; call when nothing waits to be received."""
+        late = self._heartbeats.late() if self._operational else ()
+        if late:
+            raise DeviceStale(
+                f"{self._name}: encoder {', '.join(map(str, late))} has sent no heartbeat for 1.5 periods; "
+                "check its power and cable, and whether another master changed its 1017h"
+            )
 
     def forget_codes(self) -> None:
         """Nodes were configured anew: what they reported before is history."""
@@ -62,6 +79,7 @@ class NodeWatch:
     def _take_heartbeat(self, node: int, data: bytes, now_s: float) -> None:
         state = heartbeat_state(data)
         self._heard_s[node] = now_s
+        self._heartbeats.heard(node)
         if state is NmtState.BOOT_UP:
             raise DeviceLost(
                 f"{self._name}: encoder {node} has restarted by itself (boot-up while operational); "

@@ -27,7 +27,7 @@ from drivers.psd_daq.messages import (
     StopStream,
 )
 from drivers.psd_daq.samples import to_block
-from drivers.psd_daq.sequence import SequenceCount
+from drivers.psd_daq.sequence import RepeatFilter, SequenceCount
 from drivers.psd_daq.stranger import name_stranger
 from drivers.transports.transport import Transport
 
@@ -67,6 +67,7 @@ class PsdDaq:
         self._line: Transport | None = None
         self._codec = PsdDaqCodec()
         self._count = SequenceCount()
+        self._repeats = RepeatFilter()
         self._pending: list[tuple[float, Samples]] = []  # host time of arrival, samples
 
     def connect(self) -> None:
@@ -79,7 +80,6 @@ class PsdDaq:
         try:
             self.identity = self._identify()
             self._check_rate(self.identity)
-            self._pending.clear()  # of a stream that another program left running
             self._ask(StartStream(self._rate_hz), MessageType.START_STREAM, Ack)
         except BaseException:
             self.close()
@@ -183,12 +183,20 @@ class PsdDaq:
         others: list[Message] = []
         for message in self._codec.feed(data):
             if isinstance(message, Samples):
-                self._pending.append((host_s, message))
+                if self._repeats.is_new(message.sequence, len(message.flags)):
+                    self._pending.append((host_s, message))
             elif isinstance(message, BadFrame):
                 self._note_bad(message)
             else:
+                if isinstance(message, Ack) and message.request == MessageType.START_STREAM:
+                    self._begin_stream()
                 others.append(message)
         return others
+
+    def _begin_stream(self) -> None:
+        """What came before the answer is of a stream that another program left running, with a count of its own."""
+        self._pending.clear()
+        self._repeats = RepeatFilter()
 
     def _note_bad(self, bad: BadFrame) -> None:
         """One damaged frame shows as a gap of the sequence; only a line with nothing else is an error."""

@@ -23,3 +23,17 @@ class SequenceCount:
         rising = raw + self._shift
         self._next = rising + count
         return rising
+
+
+class RepeatFilter:
+    """Finds frames of one stream that came before: their samples must not count twice."""
+
+    def __init__(self) -> None:
+        self._next: int | None = None
+
+    def is_new(self, raw: int, count: int) -> bool:
+        """Whether the frame with this first sample, `count` samples long, begins behind all that were new."""
+        if self._next is not None and (raw - self._next) % WRAP >= WRAP // 2:
+            return False
+        self._next = (raw + count) % WRAP
+        return True

@@ -6,14 +6,17 @@ closed by another thread; pyserial issues 331, 506): here all of them become Dev
 
 import errno
 from collections.abc import Callable, Generator, Iterable
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
 import serial
 from serial.tools import list_ports
 
+from drivers.clock import Clock
 from drivers.errors import DeviceLost
+
+PURGE_DWELL_S = 0.05  # APT communications protocol, "Implementing the protocol": before and after the purge
 
 
 def _errors_of_a_gone_port() -> tuple[type[Exception], ...]:
@@ -26,6 +29,7 @@ def _errors_of_a_gone_port() -> tuple[type[Exception], ...]:
 
 GONE = _errors_of_a_gone_port()
 BUSY = (errno.EBUSY, errno.EAGAIN, errno.EACCES)
+NO_MODEM_LINES = (errno.ENOTTY, errno.EINVAL)
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,29 @@ class SerialLine:
             if self._serial.write_timeout != timeout_s:
                 self._serial.write_timeout = timeout_s
             self._serial.write(data)
+
+    def begin_apt(self, clock: Clock) -> None:
+        """What a Thorlabs unit wants of its FTDI plug: short latency, purge, flow control, RTS. DeviceLost.
+
+        An FTDI chip keeps back less than 62 bytes for 16 ms unless told otherwise: replies of 18 would come at 60 Hz.
+        A port without modem lines (pseudo-terminal, socket) is no FTDI plug: nothing of this is done.
+        Source: Thorlabs, APT communications protocol, "Implementing the protocol" (order and dwell times).
+        """
+        with _lost(self.name, "preparing"):
+            try:
+                self._serial.rts = True
+            except OSError as cause:
+                if cause.errno in NO_MODEM_LINES:
+                    return
+                raise
+            with suppress(ValueError, NotImplementedError, AttributeError, OSError):  # other systems set it elsewhere
+                self._serial.set_low_latency_mode(True)
+            clock.sleep_s(PURGE_DWELL_S)
+            self._serial.reset_input_buffer()
+            self._serial.reset_output_buffer()
+            clock.sleep_s(PURGE_DWELL_S)
+            self._serial.rtscts = True
+            self._serial.rts = True
 
     def close(self) -> None:
         try:

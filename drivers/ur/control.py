@@ -17,18 +17,19 @@ from numpy.typing import ArrayLike
 
 from drivers.clock import Clock, SystemClock
 from drivers.device import Floats
-from drivers.errors import DeviceError, DeviceLost, DeviceRefused
+from drivers.errors import DeviceError, DeviceLost, DeviceRefused, DeviceStale
 from drivers.ur.control_link import (
     Ended,
+    Motion,
     MoveJoints,
     MoveLine,
     Outcome,
     Ready,
-    Request,
     ServoJoints,
     ServoStop,
 )
 from drivers.ur.dashboard import UrDashboard
+from drivers.ur.pulse import check_stream
 from drivers.ur.supervised import SupervisedChild
 
 CONNECT_LIMIT_S = 15.0  # ur_rtde itself waits 5 s for its program to run
@@ -61,6 +62,7 @@ class UrControl:
         self._child: SupervisedChild | None = None
         self._calling = threading.Lock()
         self._stopping = threading.Lock()
+        self._holds = 0
         self._q_rad: Floats | None = None  # where the last move ended, when known
 
     @property
@@ -73,7 +75,9 @@ class UrControl:
         DeviceRefused: stopped, switched off, or not in remote control. DeviceLost, DeviceStale: no controller there.
         """
         self.close()
+        holds = self._holds
         self._check_state()
+        check_stream(self._host, self.place, self._clock)
         child = SupervisedChild(self._host, self._watchdog_hz, self.place, self._clock)
         try:
             answer = child.wait_ready(limit_s)
@@ -83,7 +87,10 @@ class UrControl:
             child.kill()
             child.release()
             raise
-        self.ready, self._child = answer, child
+        with self._stopping:
+            if self._holds != holds:  # told to hold while connecting
+                child.hold()
+            self.ready, self._child = answer, child
 
     def move_joints(self, q_rad: ArrayLike, speed_rad_s: float, acceleration_rad_s2: float) -> None:
         """To joint readings (6,) in rad; blocks until the arm has arrived.
@@ -127,9 +134,15 @@ class UrControl:
         DeviceLost when no way to the controller is left: press the emergency stop.
         """
         with self._stopping:
-            child = self._child
-            if child is None or not child.stop(STOP_DECELERATION_RAD_S2):
-                self._stop_independently(child)
+            self._brake()
+
+    def hold(self) -> None:
+        """As `stop`; every motion from now on ends with DeviceRefused, until `connect`."""
+        with self._stopping:
+            self._holds += 1
+            if self._child is not None:
+                self._child.hold()
+            self._brake()
 
     def close(self) -> None:
         """Ends the control program and the child; safe in every state and more than once."""
@@ -149,7 +162,12 @@ class UrControl:
 
     # --- inside
 
-    def _call(self, request: Request, limit_s: float) -> None:
+    def _brake(self) -> None:
+        child = self._child
+        if child is None or not child.stop(STOP_DECELERATION_RAD_S2):
+            self._stop_independently(child)
+
+    def _call(self, request: Motion, limit_s: float) -> None:
         with self._calling:
             child = self._child
             if child is None:
@@ -173,6 +191,12 @@ class UrControl:
                 self._give_up(child)
                 return DeviceLost(
                     f"{self.place}: ur_rtde has lost the controller; check power and cable, then connect again"
+                )
+            case Outcome.SILENT:
+                self._give_up(child)
+                return DeviceStale(
+                    f"{self.place}: the controller has sent nothing new for half a second; look at the pendant, "
+                    "then connect again"
                 )
             case Outcome.NOT_RUNNING:
                 self._give_up(child)

@@ -17,6 +17,7 @@ from typing import Any, Protocol
 
 from drivers.ur.control_link import (
     Alive,
+    Call,
     Close,
     Ended,
     Link,
@@ -24,17 +25,18 @@ from drivers.ur.control_link import (
     MoveLine,
     Outcome,
     Ready,
-    Request,
     ServoJoints,
     ServoStop,
     Stop,
 )
+from drivers.ur.pulse import Pulse
 
 WATCH_S = 0.001  # between two looks at a running motion; the control object itself learns of its end every 2 ms
 ALIVE_S = 0.1  # the parent gives up after many of these
 KICKS_PER_WATCHDOG = 20  # kicks in the time that the watchdog allows, so that a busy machine may miss many
 NO_REAL_TIME_PRIORITY = -1  # the control object would otherwise try to raise its own priority
 DEFAULT_FREQUENCY = -1.0
+LAST_WORDS_S = 3.0  # for stopping arm and program: a dead controller would be waited for, without end
 CAP_PORT = 50002  # of ur_rtde's constructor; not used without the URCap flag
 
 
@@ -62,9 +64,18 @@ class ControlChild:
     """Obeys one call at a time, and a stop at any time."""
 
     def __init__(
-        self, control: Control, calls: Link, stops: Link, watchdog_hz: float, now_s: Callable[[], float]
+        self,
+        control: Control,
+        calls: Link,
+        stops: Link,
+        watchdog_hz: float,
+        now_s: Callable[[], float],
+        silent: Callable[[], bool] = lambda: False,
     ) -> None:
+        """`silent`: whether the controller sends nothing new any more, which the control object notices late."""
         self._control, self._calls, self._stops, self._now_s = control, calls, stops, now_s
+        self._silent = silent
+        self._stopped_up_to = 0
         self._kick_every_s = 1.0 / (watchdog_hz * KICKS_PER_WATCHDOG)
         self._kicked_s = self._told_s = now_s()
         self._servoing = False
@@ -82,7 +93,7 @@ class ControlChild:
                 request = self._calls.next_request(0.0)
                 if isinstance(request, Close):
                     return
-                if request is not None:
+                if isinstance(request, Call):
                     self._calls.send(self._obey(request))
             except ConnectionError as error:
                 raise ParentGone from error
@@ -91,12 +102,14 @@ class ControlChild:
         """The arm to rest, whatever it does."""
         self._brake(2.0)
 
-    def _obey(self, request: Request) -> Ended:
+    def _obey(self, call: Call) -> Ended:
+        if call.number <= self._stopped_up_to:
+            return Ended(Outcome.STOPPED)
         fault = self._fault()
         if fault is not None:
             return fault
         try:
-            match request:
+            match call.request:
                 case MoveJoints(q, speed, acceleration):
                     return self._watch(self._control.moveJ(q, speed, acceleration, True))
                 case MoveLine(pose, speed, acceleration):
@@ -107,8 +120,6 @@ class ControlChild:
                 case ServoStop(deceleration):
                     self._servoing = False
                     return self._judge(self._control.servoStop(deceleration))
-                case _:
-                    return Ended(Outcome.REFUSED, f"{type(request).__name__} belongs on the stop line")
         except (RuntimeError, ValueError, TypeError) as error:  # what ur_rtde throws for arguments out of range
             return Ended(Outcome.REFUSED, str(error))
 
@@ -137,15 +148,22 @@ class ControlChild:
         """Return values of ur_rtde alone say nothing after a loss: its own flags are asked as well."""
         if not self._control.isConnected():
             return Ended(Outcome.DISCONNECTED)
+        if self._silent():
+            return Ended(Outcome.SILENT)
         return None if self._control.isProgramRunning() else Ended(Outcome.NOT_RUNNING)
 
     def _take_stop(self, timeout_s: float) -> bool:
         request = self._stops.next_request(timeout_s)
         if not isinstance(request, Stop):
             return False
+        self._stopped_up_to = max(self._stopped_up_to, request.up_to)
         self._stops.send(Alive())
+        fault = self._fault()
+        if fault is not None:  # told before braking, which then waits in vain for the controller's answer
+            self._stops.send(fault)
         self._brake(request.deceleration_rad_s2)
-        self._stops.send(self._fault() or Ended(Outcome.DONE))
+        if fault is None:
+            self._stops.send(self._fault() or Ended(Outcome.DONE))
         return True
 
     def _brake(self, deceleration_rad_s2: float) -> None:
@@ -172,11 +190,13 @@ def main(arguments: Sequence[str]) -> int:
     except Exception as error:  # ur_rtde throws many types; each means that there is no control
         calls.send(Ended(Outcome.REFUSED, str(error)))
         return 1
-    child = ControlChild(control, calls, stops, watchdog_hz, time.monotonic)
+    pulse = Pulse(host, time.monotonic)
+    child = ControlChild(control, calls, stops, watchdog_hz, time.monotonic, pulse.silent)
     try:
         calls.send(ready)
         child.run()
     except (ParentGone, ConnectionError):
+        signal.setitimer(signal.ITIMER_REAL, LAST_WORDS_S)  # its default action ends the process, whatever it waits for
         child.halt()
         control.stopScript()
         return 3

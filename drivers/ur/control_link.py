@@ -41,10 +41,21 @@ class ServoStop(msgspec.Struct, frozen=True, tag=True):
     deceleration_rad_s2: float
 
 
+class Call(msgspec.Struct, frozen=True, tag=True):
+    """One request on the line of calls; numbers count up from 1."""
+
+    number: int
+    request: MoveJoints | MoveLine | ServoJoints | ServoStop
+
+
 class Stop(msgspec.Struct, frozen=True, tag=True):
-    """On the stop line only. Answered by Alive at once, then by Ended when the arm stands."""
+    """On the stop line only. Answered by Alive at once, then by Ended when the arm stands.
+
+    Calls up to this number that have not begun yet never will: the two lines do not keep order between each other.
+    """
 
     deceleration_rad_s2: float
+    up_to: int = 0
 
 
 class Close(msgspec.Struct, frozen=True, tag=True):
@@ -55,9 +66,10 @@ class Outcome(StrEnum):
     """How a call ended."""
 
     DONE = "done"
-    STOPPED = "stopped"  # by a Stop in the middle
+    STOPPED = "stopped"  # by a Stop in the middle, or before it began
     NOT_RUNNING = "not running"  # the control program has ended: safety stop, pendant, dashboard, watchdog
     DISCONNECTED = "disconnected"  # the controller's line is gone
+    SILENT = "silent"  # the line is there, but nothing new comes over it
     REFUSED = "refused"  # an argument that ur_rtde or the controller does not take, or no control at all
 
 
@@ -79,7 +91,8 @@ class Ended(msgspec.Struct, frozen=True, tag=True):
     text: str = ""
 
 
-Request = MoveJoints | MoveLine | ServoJoints | ServoStop | Stop | Close
+Motion = MoveJoints | MoveLine | ServoJoints | ServoStop
+Request = Call | Stop | Close
 Answer = Ready | Alive | Ended
 _requests = msgspec.json.Decoder[Request](Request)
 _answers = msgspec.json.Decoder[Answer](Answer)

@@ -12,7 +12,8 @@ from drivers.clock import Clock, SystemClock
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale, WireError
 
 DASHBOARD_PORT = 29999
-TIMEOUT_S = 2.0  # for a whole conversation; replies come within tenths
+TIMEOUT_S = 1.0  # for a whole conversation; replies come within tenths
+STOP_TIMEOUT_S = 0.6  # who stops wants to know soon that this way is closed
 BANNER = "Connected: Universal Robots Dashboard Server"
 MAX_LINE_BYTES = 4096
 
@@ -30,6 +31,14 @@ class ArmState:
         return self.robot_mode == "RUNNING" and self.safety_status == "NORMAL"
 
 
+@dataclass(frozen=True)
+class Identity:
+    """Model and serial number, for example ("UR5", "20195000001"): an e-Series arm calls itself by its size only."""
+
+    model: str
+    serial_number: str
+
+
 class UrDashboard:
     """Verbs of the dashboard. Each raises DeviceLost, DeviceStale, or DeviceRefused with the controller's own words."""
 
@@ -44,9 +53,12 @@ class UrDashboard:
         mode, safety, remote = self._converse(["robotmode", "safetystatus", "is in remote control"])
         return ArmState(_after_colon(mode), _after_colon(safety), "false" not in remote.lower())
 
+    def identity(self) -> Identity:
+        return Identity(*self._converse(["get robot model", "get serial number"]))
+
     def stop(self) -> None:
         """Ends the running program; the arm brakes."""
-        self._command("stop", "Stopped")
+        self._command("stop", "Stopped", min(STOP_TIMEOUT_S, self._timeout_s))
 
     def unlock_protective_stop(self) -> None:
         """Refused for the first 5 s. Look for the cause before: the arm may move again afterwards."""
@@ -63,15 +75,16 @@ class UrDashboard:
     def _place(self) -> str:
         return f"dashboard at {self._host}:{self._port}"
 
-    def _command(self, line: str, expected: str) -> None:
-        (reply,) = self._converse([line])
+    def _command(self, line: str, expected: str, timeout_s: float | None = None) -> None:
+        (reply,) = self._converse([line], timeout_s)
         if reply != expected:
             raise DeviceRefused(f'{self._place}: "{line}" is refused: {reply}; look at the pendant')
 
-    def _converse(self, lines: list[str]) -> list[str]:
-        deadline_s = self._clock.now_s() + self._timeout_s
+    def _converse(self, lines: list[str], timeout_s: float | None = None) -> list[str]:
+        limit_s = self._timeout_s if timeout_s is None else timeout_s
+        deadline_s = self._clock.now_s() + limit_s
         try:
-            with socket.create_connection((self._host, self._port), self._timeout_s) as line:
+            with socket.create_connection((self._host, self._port), limit_s) as line:
                 replies = _Lines(line, self._clock, deadline_s)
                 banner = replies.next()
                 if not banner.startswith(BANNER):
@@ -79,7 +92,7 @@ class UrDashboard:
                 return [replies.ask(text) for text in lines]
         except TimeoutError as error:
             raise DeviceStale(
-                f"{self._place}: no reply to {lines} within {self._timeout_s:.3g} s; is the controller hung?"
+                f"{self._place}: no reply to {lines} within {limit_s:.3g} s; is the controller hung?"
             ) from error
         except ConnectionError as error:
             raise DeviceLost(

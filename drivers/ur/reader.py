@@ -9,6 +9,7 @@ and the gap shows in `sequence`.
 
 import contextlib
 import logging
+import math
 import select
 import socket
 from collections.abc import Mapping, Sequence
@@ -39,10 +40,11 @@ from drivers.ur.rtde_codec import (
 )
 
 RTDE_PORT = 30004
-ANSWER_TIMEOUT_S = 2.0  # real controllers answer within a few cycles; busy ones within tenths
-CONNECT_TIMEOUT_S = 2.0
+ANSWER_TIMEOUT_S = 1.0  # real controllers answer within a few cycles; busy ones within tenths
+CONNECT_TIMEOUT_S = 1.5  # a lost first packet is sent again after 1 s
 READ_BYTES = 1 << 18
 RECEIVE_BUFFER_BYTES = 1 << 20  # about 3 s of this recipe at 500 Hz (349 bytes), if the system grants it
+RESTARTED_S = 0.1  # a clock that goes back by more than packages could be late
 WAKE_S = 0.01  # wait for so much of the stream: reading one package costs as much as five, and 10 ms hurt nobody
 
 Answer = TypeVar("Answer", ProtocolAnswer, ControllerVersion, OutputsAnswer, StartAnswer)
@@ -71,6 +73,7 @@ class UrReader:
         self._channels: tuple[tuple[str, Channel], ...] = ()
         self._unread: list[Message] = []
         self._first_s: float | None = None  # device time of the first sample: number 0
+        self._last_s = -math.inf  # and of the newest
 
     @property
     def place(self) -> str:
@@ -82,7 +85,7 @@ class UrReader:
         DeviceLost: nobody there. DeviceStale: no answer. DeviceRefused or WireError: not an RTDE server of version 2.
         """
         self.close()
-        self._codec, self._unread, self._first_s = RtdeCodec(), [], None
+        self._codec, self._unread, self._first_s, self._last_s = RtdeCodec(), [], None, -math.inf
         self._open()
         try:
             self._negotiate()
@@ -95,15 +98,16 @@ class UrReader:
         return tuple(channel for _, channel in self._channels)
 
     def read(self, timeout_s: float) -> Block:
-        """All samples since the last read, at least one.
+        """All samples since the last read, at least one; a package that was sent twice counts once.
 
-        DeviceStale: none within `timeout_s`. DeviceLost: the line is closed. WireError: bytes that are no RTDE.
+        DeviceStale: nothing new within `timeout_s`. DeviceLost: the line is closed, or the controller has started
+        anew. WireError: bytes that are no RTDE.
         """
         deadline_s = self._clock.now_s() + timeout_s
         while True:
             packages = [message.packages for message in self._take_messages() if isinstance(message, Data)]
-            if packages:
-                return self._block(np.concatenate(packages))
+            if packages and len(new := self._new(np.concatenate(packages))):
+                return self._block(new)
             if not self._receive(deadline_s - self._clock.now_s()):
                 raise DeviceStale(
                     f"{self.place}: no sample for {timeout_s:.3g} s while the line is open; "
@@ -248,6 +252,15 @@ class UrReader:
                 f"{self.place}: unexpected package of type {message.kind}: {message.payload[:32].hex(' ')}; "
                 "is this the RTDE port of a UR controller (30004)?"
             )
+
+    def _new(self, packages: np.ndarray) -> np.ndarray:
+        """Those whose time stamp is later than all before."""
+        stamps_s = packages[TIMESTAMP].astype(np.float64)
+        newest_s = np.maximum.accumulate(np.concatenate(([self._last_s], stamps_s)))
+        if (stamps_s < newest_s[:-1] - RESTARTED_S).any():
+            raise self._lost(f"its clock went back from {newest_s[-1]:.3f} to {stamps_s.min():.3f} s, it has restarted")
+        self._last_s = float(newest_s[-1])
+        return packages[stamps_s > newest_s[:-1]]
 
     def _block(self, packages: np.ndarray) -> Block:
         device_s = packages[TIMESTAMP].astype(np.float64)

@@ -7,14 +7,16 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 
 from drivers.clock import Clock
 from drivers.errors import DeviceLost, DeviceStale
-from drivers.ur.control_link import Alive, Answer, Close, Ended, Link, Ready, Request, Stop
+from drivers.ur.control_link import Alive, Answer, Call, Close, Ended, Link, Motion, Outcome, Ready, Request, Stop
 
 SILENCE_LIMIT_S = 2.0  # twenty heartbeats of the child; ur_rtde itself blocks up to 4 s when it waits in vain
 STOP_NOTICE_S = 0.3  # the child looks at its stop line every millisecond; a busy machine may take tenths
-STOP_LIMIT_S = 4.0  # braking from full speed at 1 rad/s2 takes 3.1 s
+STOP_LIMIT_S = 1.0  # braking from full speed at 5 rad/s2 takes 0.63 s; after this the other way is taken
+UNREACHED = (Outcome.DISCONNECTED, Outcome.SILENT)  # then nobody knows whether the arm brakes
 CLOSE_LIMIT_S = 1.0
 CHILD_MODULE = "drivers.ur.control_child"
 SHOWN_BYTES = 300  # of what ur_rtde printed last
@@ -26,6 +28,9 @@ class SupervisedChild:
     def __init__(self, host: str, watchdog_hz: float, place: str, clock: Clock) -> None:
         self._place, self._clock = place, clock
         self.killed = False
+        self._ordering = threading.Lock()  # a stop falls before a call or after it
+        self._number = 0
+        self._held = False
         calls, child_calls = socket.socketpair()
         stops, child_stops = socket.socketpair()
         self._calls, self._stops = Link(calls), Link(stops)
@@ -59,10 +64,17 @@ class SupervisedChild:
             "restart it, then connect again"
         )
 
-    def call(self, request: Request, limit_s: float) -> Ended:
-        """A call and its end. DeviceStale: no sign of life, or no end within `limit_s`. DeviceLost: the child died."""
+    def call(self, request: Motion, limit_s: float) -> Ended:
+        """A call and its end; STOPPED at once when held.
+
+        DeviceStale: no sign of life, or no end within `limit_s`. DeviceLost: the child died.
+        """
         deadline_s = self._clock.now_s() + limit_s
-        self._send(self._calls, request)
+        with self._ordering:
+            if self._held:
+                return Ended(Outcome.STOPPED)
+            self._number += 1
+            self._send(self._calls, Call(self._number, request))
         while True:
             left_s = deadline_s - self._clock.now_s()
             answer = self._next_answer(self._calls, min(SILENCE_LIMIT_S, left_s))
@@ -74,15 +86,22 @@ class SupervisedChild:
                     raise DeviceStale(f"{self._place}: {name}: ur_rtde is silent for {SILENCE_LIMIT_S:.3g} s")
                 raise DeviceStale(f"{self._place}: {name} has not ended within {limit_s:.3g} s")
 
+    def hold(self) -> None:
+        """No call is sent any more."""
+        with self._ordering:
+            self._held = True
+
     def stop(self, deceleration_rad_s2: float) -> bool:
         """From any thread, also in the middle of a call. False when the child did not obey in time."""
         try:
             while self._stops.next_answer(0.0) is not None:
                 pass  # late answers to a stop that was given up
-            self._stops.send(Stop(deceleration_rad_s2))
+            with self._ordering:
+                self._stops.send(Stop(deceleration_rad_s2, self._number))
             if not isinstance(self._stops.next_answer(STOP_NOTICE_S), Alive):
                 return False
-            return isinstance(self._stops.next_answer(STOP_LIMIT_S), Ended)
+            ended = self._stops.next_answer(STOP_LIMIT_S)
+            return isinstance(ended, Ended) and ended.outcome not in UNREACHED
         except OSError:
             return False
 

@@ -7,11 +7,26 @@ adapter at another bit rate than the nodes hears and reaches nobody.
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 from simulators.encoders.frame import CanFrame, bus_bits
-from simulators.encoders.node import EncoderNode
 
 MOST_WAITING = 256  # frames of all senders; more are lost, as in full transmit buffers
+
+
+class Node(Protocol):
+    """A participant: answers what it hears, sends what is due. `silent` is a fault: as if its plug were pulled."""
+
+    node_id: int
+    silent: bool
+
+    def handle(self, frame: CanFrame, now_s: float) -> list[CanFrame]: ...
+
+    def due(self, now_s: float) -> list[CanFrame]: ...
+
+    def raise_emergency(self, code: int) -> None: ...
+
+    def reset(self) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -25,7 +40,7 @@ class _Waiting:
 class CanBus:
     """`heard` are the frames that the adapter saw, each with the time of its end."""
 
-    def __init__(self, bitrate: int, nodes: Sequence[EncoderNode]) -> None:
+    def __init__(self, bitrate: int, nodes: Sequence[Node]) -> None:
         self.bitrate = bitrate
         self.nodes = tuple(nodes)
         self.heard: deque[tuple[float, CanFrame]] = deque()

@@ -6,12 +6,15 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.encoders.bus import CanBus
+from simulators.encoders.bus import CanBus, Node
 from simulators.encoders.node import EncoderNode
+from simulators.encoders.plain import PlainEncoder
 from simulators.encoders.slcan import SlcanAdapter
 from simulators.wire import Bench, SerialPort
 
 DEFAULT_BITRATE = 1_000_000
+DEFAULT_SYNC_HZ = 200.0
+PLAIN = "can-dbc"  # the rig's word for encoders that send by themselves
 
 
 class TurningShafts(Protocol):
@@ -43,17 +46,24 @@ class EncoderBus:
 def build(world: TurningShafts, rig: Mapping[str, Any]) -> Bench:
     """One node for each of `rig["devices"]["encoders"]["nodes"]`, the first on joint 1; linked when a path is named.
 
+    With driver "can-dbc" one plain encoder for each of `signals`, nodes 1, 2, ...: those of rigs/encoders-plain.dbc.
+
     Verbs: "encoders.silence" {node, on}, "encoders.emergency" {node, code} (0 ends it), "encoders.reset" {node} (a
     power dip: boot-up without being asked). ValueError for more nodes than joints or a node twice.
     """
     device = rig["devices"]["encoders"]
-    numbers = [int(number) for number in device["nodes"]]
+    plain = device.get("driver") == PLAIN
+    numbers = list(range(1, len(device["signals"]) + 1)) if plain else [int(number) for number in device["nodes"]]
     joints = len(world.link_encoders_rad())
     if len(numbers) > joints or len(set(numbers)) != len(numbers):
         raise ValueError(
             f"devices.encoders.nodes {numbers}: give different nodes, at most one for each of {joints} joints"
         )
-    nodes = [EncoderNode(number, _shaft(world, joint)) for joint, number in enumerate(numbers)]
+    period_s = 1.0 / float(device.get("sync_hz", DEFAULT_SYNC_HZ))
+    nodes: list[Node] = [
+        PlainEncoder(number, _shaft(world, joint), period_s) if plain else EncoderNode(number, _shaft(world, joint))
+        for joint, number in enumerate(numbers)
+    ]
     bus = CanBus(int(device.get("bitrate", DEFAULT_BITRATE)), nodes)
     channel = str(device.get("channel", ""))
     port = SerialPort("can", SlcanAdapter(bus, world), channel if "/" in channel else None)
@@ -64,8 +74,8 @@ def _shaft(world: TurningShafts, joint: int) -> Callable[[], float]:
     return lambda: float(world.link_encoders_rad()[joint])
 
 
-def _verbs(nodes: list[EncoderNode]) -> dict[str, Callable[..., Any]]:
-    def named(number: int) -> EncoderNode:
+def _verbs(nodes: list[Node]) -> dict[str, Callable[..., Any]]:
+    def named(number: int) -> Node:
         for node in nodes:
             if node.node_id == number:
                 return node

@@ -59,6 +59,15 @@ class SlcanAdapter:
                 out += as_line(frame)
         return bytes(out)
 
+    def damaged(self, output: bytes) -> bytes:
+        """For injected faults: frames whose checksum is wrong end in the adapter, which tells the client nothing."""
+        lines = output.split(CR)
+        return CR.join(line for line in lines if line[:1] not in (b"t", b"T", b"r", b"R"))
+
+    def refusal(self, request: bytes) -> bytes | None:
+        """For injected faults: BEL for every command."""
+        return BEL * request.count(CR) or None
+
     @property
     def _hears(self) -> bool:
         return self._open and self._bitrate == self._bus.bitrate

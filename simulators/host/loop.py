@@ -136,6 +136,10 @@ class Host:
             instrument.after_step(t_s)
         self.ticks += 1
         for line in self._lines:
+            if line.to_unplug:
+                self._ignore(line)
+                line.unplug()
+            line.plug_when_due()
             line.send_due()
             self._follow(line)
         for connection in list(self._connections):
@@ -147,7 +151,11 @@ class Host:
         if line.attached and line.fd not in self._watched:
             self._watched.add(line.fd)
             self._selector.register(line.fd, selectors.EVENT_READ, lambda: self._receive_serial(line))
-        elif not line.attached and line.fd in self._watched:
+        elif not line.attached:
+            self._ignore(line)
+
+    def _ignore(self, line: SerialLine) -> None:
+        if line.fd in self._watched:
             self._watched.discard(line.fd)
             self._selector.unregister(line.fd)
 

@@ -29,7 +29,7 @@ class SerialLine:
         self._link = None if port.link is None else Path(port.link).absolute()
         self.fd, self.path = _open_terminal(port.name)
         self._outbox = Outbox(lambda data: os.write(self.fd, data))
-        self.attached = False
+        self.attached = self.unplugged = False
         if self._link is not None:
             try:
                 make_link(self.name, self._link, self.path)
@@ -62,7 +62,7 @@ class SerialLine:
 
     def send_due(self) -> None:
         """Sends what became due; called once a tick. Also looks for a new client, which raises no event."""
-        if not self.attached:
+        if not self.attached and not self.unplugged:
             self.receive()
         try:
             data = self._wire.due()
@@ -71,7 +71,29 @@ class SerialLine:
             return
         self._send(data, self._outbox.stream)
 
+    @property
+    def to_unplug(self) -> bool:
+        """The wire wants the plug pulled that still is in."""
+        return not self.unplugged and bool(getattr(self._wire, "closing", False))
+
+    def unplug(self) -> None:
+        """The client's end hangs up, and its name goes, as when a USB cable is pulled. Unwatch `fd` before."""
+        self.close()
+        self._outbox.clear()
+        self.attached, self.unplugged = False, True
+
+    def plug_when_due(self) -> None:
+        """Back again, on a new terminal under the same link, once the wire wants that."""
+        if not self.unplugged or getattr(self._wire, "closing", False):
+            return
+        self.fd, self.path = _open_terminal(self.name)
+        self.unplugged = False
+        if self._link is not None:
+            make_link(self.name, self._link, self.path)
+
     def close(self) -> None:
+        if self.unplugged:
+            return
         if self._link is not None:
             remove_link(self._link, self.path)
         os.close(self.fd)

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.faults.device_clock import DeviceClock
 from simulators.psd_daq import frames
 from simulators.psd_daq.frames import Kind, Refusal, Request
 from simulators.psd_daq.line import TransmitLine
@@ -41,8 +42,8 @@ class LitFaces(Protocol):
 class PsdDaqBox:
     """An instrument of `simulators.wire`: samples after each physics step, sends whole frames.
 
-    Does not imitate: the converter's own noise (the world's noise is the sum of all), a clock that drifts (device time
-    is the world's), a power-on delay.
+    Does not imitate: the converter's own noise (the world's noise is the sum of all), a clock that drifts of itself
+    (device time is the world's until somebody disturbs `clock`), a power-on delay.
     """
 
     name = "psd"
@@ -50,6 +51,7 @@ class PsdDaqBox:
     def __init__(self, world: LitFaces, length_m: float, serial_number: str, line: TransmitLine) -> None:
         """`length_m`: electrode to electrode, of both faces."""
         self.line = line
+        self.clock = DeviceClock()
         self.silent = False  # fault: samples are taken and never leave
         self.damaged_frames = 0  # fault: so many of the next data frames get one bit turned
         self._world = world
@@ -145,7 +147,9 @@ class PsdDaqBox:
         first_ns, last_ns = self._waiting_ns[0], self._waiting_ns[n - 1]
         currents, flags = np.array(self._waiting_pa[:n]), np.array(self._waiting_flags[:n])
         temperature = self._world.psd_temperature_degC
-        encoded = frames.data(self._sequence, first_ns // 1000, self._period_ns, temperature, currents, flags)
+        ahead_us = round((self.clock.tells(first_ns * 1e-9) - first_ns * 1e-9) * 1e6)
+        stamp_us = max(0, first_ns // 1000 + ahead_us)
+        encoded = frames.data(self._sequence, stamp_us, self._period_ns, temperature, currents, flags)
         self._sequence += n
         del self._waiting_ns[:n], self._waiting_pa[:n], self._waiting_flags[:n]
         if self.silent:

@@ -28,4 +28,4 @@ def build(world: LitFaces, rig: Mapping[str, Any], baud: int = DEFAULT_BAUD) -> 
         box.damaged_frames = frames
 
     port = SerialPort("psd", PsdDaqWire(box, world), device.get("port"))
-    return Bench((box,), (port,), {"psd.silence": silence, "psd.damage": damage})
+    return Bench((box,), (port,), {"psd.silence": silence, "psd.damage": damage}, box.clock)

@@ -1,7 +1,7 @@
 """One serial connection to the box."""
 
 from simulators.psd_daq.daq import LitFaces, PsdDaqBox
-from simulators.psd_daq.frames import RequestReader
+from simulators.psd_daq.frames import Refusal, RequestReader, nak
 
 
 class PsdDaqWire:
@@ -23,3 +23,8 @@ class PsdDaqWire:
 
     def due(self) -> bytes:
         return self._box.line.delivered(self._world.time_s)
+
+    def refusal(self, request: bytes) -> bytes | None:
+        """For injected faults: the box does not take a request that it knows."""
+        requests = RequestReader().feed(request)
+        return nak(requests[0].kind, Refusal.UNKNOWN_REQUEST, "injected fault") if requests else None

@@ -175,3 +175,8 @@ class DashboardWire:
         greeting = b"" if self._greeted else BANNER
         self._greeted = True
         return greeting
+
+    def refusal(self, request: bytes) -> bytes | None:
+        """For injected faults: the reply to a command that it does not know."""
+        words = request.decode("ascii", errors="replace").strip()
+        return self.due() + f"could not understand: '{words}'\n".encode() if request.endswith(b"\n") else None

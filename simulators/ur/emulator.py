@@ -2,14 +2,16 @@
 
     bench = build(world, rig, "127.0.0.2")
 
-What it does not imitate: Modbus, the primary and secondary state streams, PolyScope X, stored programs, URCaps,
+What it does not imitate: Modbus (simulators/modbus does), PolyScope X, stored programs, URCaps,
 speed of the controller's own start. What each port leaves out stands in its own file: rtde_server, script_port,
 script_text, dashboard_server, control_script; what the arm leaves out, in motion.
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, Protocol
 
+from simulators.faults.device_clock import DeviceClock
 from simulators.ur.control_script import ControlScript
 from simulators.ur.dashboard_server import Dashboard
 from simulators.ur.kinematics import NominalArm
@@ -21,9 +23,11 @@ from simulators.ur.rtde_server import RtdeServer
 from simulators.ur.script_port import ScriptWire
 from simulators.ur.script_program import LineProgram
 from simulators.ur.script_text import ScriptRefused, is_control_program, read_control_program, read_lines
+from simulators.ur.state_streams import primary_stream, realtime_stream
 from simulators.wire import Bench, TcpPort, Wire
 
 RTDE_PORT, DASHBOARD_PORT, SCRIPT_PORTS = 30004, 29999, (30001, 30002, 30003)
+REALTIME_PORT = 30003
 VERSION = (5, 12, 0, 1101)  # later than 5.22 changes recipes and breaks upper registers of ur_rtde 1.6.5
 SERIAL_NUMBER, MODEL = "20195000001", "UR5"  # a UR5e calls itself UR5 on the dashboard
 FULL_TURN_RAD = 6.283185307179586
@@ -45,6 +49,7 @@ class UrController:
         self.runner = ProgramRunner(arm)
         self.rtde = RtdeServer(memory, VERSION, self._read)
         self.dashboard = Dashboard(arm, self.runner, ".".join(map(str, VERSION)), SERIAL_NUMBER, MODEL)
+        self.clock = DeviceClock()
         self._tick = 0
         self._wires: list[Closable] = []
 
@@ -84,15 +89,16 @@ class UrController:
         for wire in self._wires:
             wire.closing = True
 
-    def script_wire(self) -> ScriptWire:
-        return ScriptWire(self.run_script)
+    def script_wire(self, port: int = REALTIME_PORT) -> ScriptWire:
+        begin = realtime_stream if port == REALTIME_PORT else primary_stream
+        return ScriptWire(self.run_script, begin(lambda: self.rtde.readout, VERSION).due)
 
     def _closed(self, wire: Wire) -> None:
         self._wires = [other for other in self._wires if other is not wire]
         self.memory.release(wire)
 
     def _read(self) -> Readout:
-        return Readout(self._tick, self.arm, self.memory, self.runner.state)
+        return Readout(self._tick, self.arm, self.memory, self.runner.state, self.clock)
 
 
 def build(world: ArmWorld, rig: Mapping[str, Any], host: str, *, unlock_delay_s: float = 0.0) -> Bench:
@@ -107,7 +113,7 @@ def build(world: ArmWorld, rig: Mapping[str, Any], host: str, *, unlock_delay_s:
     ports = [
         controller.port("rtde", host, RTDE_PORT, controller.rtde.accept),
         controller.port("dashboard", host, DASHBOARD_PORT, controller.dashboard.accept),
-        *(controller.port(f"script-{port}", host, port, controller.script_wire) for port in SCRIPT_PORTS),
+        *(controller.port(f"script-{n}", host, n, partial(controller.script_wire, n)) for n in SCRIPT_PORTS),
     ]
     return Bench(
         [controller],
@@ -121,7 +127,9 @@ def build(world: ArmWorld, rig: Mapping[str, Any], host: str, *, unlock_delay_s:
             "robot.unlock_delay": verbs.unlock_delay,
             "robot.remote_control": verbs.remote_control,
             "robot.state": verbs.state,
+            "robot.standing": verbs.standing,
         },
+        controller.clock,
     )
 
 
@@ -165,6 +173,10 @@ class Safety:
 
     def remote_control(self, on: bool) -> None:
         self._controller.dashboard.remote_control = on
+
+    def standing(self) -> bool:
+        """Nothing moves, and nothing is about to."""
+        return not self._controller.arm.moving
 
     def state(self) -> dict[str, str]:
         """The states by name, and why the last program ended."""

@@ -2,6 +2,7 @@
 
 from functools import cached_property
 
+from simulators.faults.device_clock import DeviceClock
 from simulators.ur.kinematics import Axis, tool_speed
 from simulators.ur.motion import ArmController, Joints
 from simulators.ur.poses import Frame, Pose, compose, pose_of
@@ -17,8 +18,11 @@ TORQUE_PER_CURRENT_NM_A = (11.7, 11.7, 11.7, 7.0, 7.0, 7.0)
 class Readout:
     """One cycle; made anew every tick."""
 
-    def __init__(self, tick: int, arm: ArmController, memory: Memory, runtime: RuntimeState) -> None:
-        self.tick, self.timestamp_s = tick, tick * TICK_S
+    def __init__(
+        self, tick: int, arm: ArmController, memory: Memory, runtime: RuntimeState, clock: DeviceClock | None = None
+    ) -> None:
+        self.tick = tick
+        self.timestamp_s = tick * TICK_S if clock is None else clock.tells(tick * TICK_S)
         self.arm, self.memory, self.runtime = arm, memory, runtime
         self.setpoint: SetPoint = arm.setpoint
         self.joints: Joints = arm.joints

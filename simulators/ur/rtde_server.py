@@ -98,6 +98,17 @@ class RtdeWire:
         self._credit -= 1.0
         return self._server.pack(self._output)
 
+    def damaged(self, output: bytes) -> bytes:
+        """For injected faults: the first frame says that it is one byte longer. RTDE itself has no checksum."""
+        size, kind = HEADER.unpack_from(output)
+        return HEADER.pack(size + 1, kind) + output[HEADER.size :]
+
+    def refusal(self, request: bytes) -> bytes | None:
+        """For injected faults: an error message instead of the answer that a client waits for."""
+        if len(request) < HEADER.size or request[2] in (FrameType.DATA_PACKAGE, FrameType.TEXT_MESSAGE):
+            return None
+        return self._message(1, "injected fault")
+
     def _answer(self, kind: int, payload: bytes) -> bytes:
         match kind:
             case FrameType.REQUEST_PROTOCOL_VERSION:

@@ -1,7 +1,4 @@
-"""Script ports 30001, 30002, 30003: take URScript text and hand it to the controller.
-
-What they do not imitate: the state streams that a real controller sends on these ports (ur_rtde never reads them).
-"""
+"""Script ports 30001, 30002, 30003: take URScript text and hand it to the controller, and stream its state."""
 
 from collections.abc import Callable
 
@@ -11,9 +8,9 @@ MAX_TEXT_BYTES = 1 << 20  # a control script has 42 kB; what grows beyond this i
 class ScriptWire:
     """One client's connection. A program is complete with a line `end` at column 0, a bare call with its line."""
 
-    def __init__(self, run: Callable[[str], None]) -> None:
-        """`run` gets each complete program or line; it never raises."""
-        self._run = run
+    def __init__(self, run: Callable[[str], None], stream: Callable[[], bytes] = bytes) -> None:
+        """`run` gets each complete program or line; it never raises. `stream`: what is to be sent this cycle."""
+        self._run, self._stream = run, stream
         self.closing = False
         self._line = bytearray()
         self._program: list[str] = []
@@ -30,7 +27,7 @@ class ScriptWire:
         return b""
 
     def due(self) -> bytes:
-        return b""
+        return self._stream()
 
     def _take(self, line: str) -> None:
         if self._program:

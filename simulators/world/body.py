@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.world.engine import Engine
+from simulators.world.exposure import Exposure
+from simulators.world.hidden import Hidden
 from simulators.world.model import build_mjcf, torque_limits_nm
 from simulators.world.optics import Ray
 from simulators.world.reference import Reference
@@ -18,17 +20,22 @@ from simulators.world.truth import Truth
 
 Floats = NDArray[np.float64]
 STANDS_RAD = 1e-13
+WAKES_RAD = 1e-11  # by which a mechanism has moved the reading of a standing joint: the servo takes it up
 STANDS_RAD_S = 1e-11  # dies out within about 1/150 s of the servo, so less than 1e-13 rad is still to come
 
 
 class ArmBody:
     """Owns the physics state. Joint vectors are (n,), in joint order."""
 
-    def __init__(self, rig: WorldRig, truth: Truth, q_rad: Floats, rng: np.random.Generator) -> None:
+    def __init__(
+        self, rig: WorldRig, truth: Truth, q_rad: Floats, rng: np.random.Generator, hidden: Hidden | None = None
+    ) -> None:
         n = len(truth.links)
+        self._hidden, self._exposure = hidden, Exposure(q_rad)
         self._engine = Engine(build_mjcf(rig, truth))
         self._at, self._driven = self._engine.joint_addresses([f"joint{number}" for number in range(1, n + 1)])
         self._laser_origin, self._laser_axes = self._engine.site("laser")
+        self._turning = [self._engine.body(f"axis{number}") for number in range(1, n + 1)]
         self._zero_rad: Floats = np.array(truth.joint_zero_rad)
         self._reference = Reference(q_rad)
         self._repeatability = Repeatability(rig.emulation.joint_repeatability_rad, n, rng)
@@ -38,9 +45,10 @@ class ArmBody:
         self._servo.drive(np.zeros(n), np.zeros(n))
         self.stands = True
 
-    def aim(self, q_rad: Floats) -> None:
+    def aim(self, q_rad: Floats, time_s: float) -> None:
         """A new set-point, in the controller's own readings."""
         if self._reference.aim(q_rad):
+            self._exposure.commanded(q_rad, time_s)
             self._repeatability.setpoint_changed()
             self.stands = False
 
@@ -57,6 +65,18 @@ class ArmBody:
         if self._reference.arrived and self._repeatability.seated:
             self.stands = self._at_rest(error_rad)
 
+    def feel(self, time_s: float, placement: int) -> None:
+        """What hidden mechanisms do from now on; held until the next call."""
+        if self._hidden is None:
+            return
+        before_rad = self._hidden.turn_rad
+        own_rad = self._zero_rad + self._repeatability.offset_rad
+        scene = self._exposure.scene(time_s, self._reference.qd_rad_s, placement)
+        turning = np.stack([_pose(*frame) for frame in self._turning])
+        self._hidden.felt(scene, self.true_rad(), own_rad, turning, self._stiff_flange())
+        if np.abs(self._hidden.turn_rad - before_rad).max() > WAKES_RAD:
+            self.stands = False
+
     def _at_rest(self, error_rad: Floats) -> bool:
         """Every joint of the model, driven or not, has come to rest."""
         return bool(np.abs(error_rad).max() < STANDS_RAD and np.abs(self._engine.qvel).max() < STANDS_RAD_S)
@@ -66,7 +86,7 @@ class ArmBody:
         return self._engine.qpos[self._at]
 
     def reading_rad(self) -> Floats:
-        """What the controller's own sensors see: the truth less zero and repeatability."""
+        """What the controller's own sensors see: the truth less zero, repeatability and what is hidden."""
         return self.true_rad() - self._offset_rad()
 
     def speed_rad_s(self) -> Floats:
@@ -79,15 +99,25 @@ class ArmBody:
         """The laser in the base frame."""
         x, y, z = self._laser_origin.tolist()
         along = self._laser_axes.tolist()
-        return Ray(x, y, z, along[2], along[5], along[8])
+        beam = Ray(x, y, z, along[2], along[5], along[8])
+        return beam if self._hidden is None else self._hidden.bent(beam)
 
     def T_base_flange(self) -> Floats:
         """The true flange pose, (4, 4)."""
-        origin_m, axes = self._engine.site("flange")
-        pose = np.eye(4)
-        pose[:3, :3] = axes.reshape(3, 3)
-        pose[:3, 3] = origin_m
-        return pose
+        pose = self._stiff_flange()
+        return pose if self._hidden is None else self._hidden.carried(pose)
+
+    def _stiff_flange(self) -> Floats:
+        return _pose(*self._engine.site("flange"))
 
     def _offset_rad(self) -> Floats:
-        return self._zero_rad + self._repeatability.offset_rad
+        own_rad = self._zero_rad + self._repeatability.offset_rad
+        return own_rad if self._hidden is None else own_rad + self._hidden.turn_rad
+
+
+def _pose(origin_m: Floats, axes: Floats) -> Floats:
+    """(4, 4) of an origin (3,) and a rotation matrix (9,), row by row."""
+    pose = np.eye(4)
+    pose[:3, :3] = axes.reshape(3, 3)
+    pose[:3, 3] = origin_m
+    return pose

@@ -1,4 +1,4 @@
-"""MuJoCo behind seven typed words: the one place that touches its untyped module.
+"""MuJoCo behind eight typed words: the one place that touches its untyped module.
 
 A step of MuJoCo falls in two: `mj_step1` works out everything that belongs to the present state, `mj_step2` applies
 forces and integrates. Here `step` is the second followed by the first, so that between steps all poses, inertias and
@@ -48,6 +48,11 @@ class Engine:
         """Position (3,) m and rotation matrix (9,), row by row, of a named frame in the base frame."""
         site = self._data.site(name)
         return site.xpos, site.xmat
+
+    def body(self, name: str) -> tuple[Floats, Floats]:
+        """The same of a named body."""
+        body = self._data.body(name)
+        return body.xpos, body.xmat
 
     def inertia_times(self, vector: Floats) -> Floats:
         """M(q) vector, (n_freedoms,)."""

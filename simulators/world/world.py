@@ -3,6 +3,8 @@
     world = World.from_rig(tomllib.loads(text))
     world.command(q_rad); world.advance(0.002); world.photocurrents_a(times_s)
 
+With `hidden` mechanisms (simulators/defects) at work, arm and light are what they make of them.
+
 Instruments (simulators/<device>) read it through `joints`, `link_encoders_rad` and `photocurrents_a`; `truth`, `beam`,
 `spots` and `T_base_flange` are taps for tests and go over no wire. The joints' own noise is their quantisation only.
 """
@@ -15,18 +17,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from simulators.defects.defect import Defect
 from simulators.world.body import ArmBody
 from simulators.world.errors import WorldError
+from simulators.world.hidden import Hidden
 from simulators.world.history import EDGE_S, Knot, interpolate
 from simulators.world.model import STEP_S
 from simulators.world.optics import DARK, Face, Ray, Spots, place_faces, trace
 from simulators.world.photocurrent import ELECTRODES, NOISE_RATE_HZ, Photodetectors, sample_a
-from simulators.world.rig import WorldRig, read_rig
+from simulators.world.rig import Pose, WorldRig, read_rig
+from simulators.world.seen_light import fixture_at, seen
 from simulators.world.truth import Truth, draw_truth
 from simulators.world.warming import joint_temperature_degC, psd_temperature_degC
+from simulators.world.weights import arm_of
 
 Floats = NDArray[np.float64]
 NO_FIXTURE = 0
+HELD_STEPS = 10  # of a moving arm, between two looks at what hidden mechanisms do
+HELD_S = 0.050  # of a standing one: what drifts does so in minutes
 
 
 @dataclass(frozen=True)
@@ -42,30 +50,44 @@ class JointState:
 class World:
     """Arm, laser and fixture. Starts standing at `q_rad`, with the fixture at the rig's first place."""
 
-    def __init__(self, rig: WorldRig, truth: Truth, q_rad: ArrayLike | None = None) -> None:
+    def __init__(
+        self, rig: WorldRig, truth: Truth, q_rad: ArrayLike | None = None, hidden: Sequence[Defect] = ()
+    ) -> None:
         """`q_rad`: (n,) readings at power-on, zero when not given. WorldError when their number is wrong."""
         repeat_seed, noise_seed = np.random.SeedSequence([truth.seed, 2]).spawn(2)
         self.truth = truth
         self.n_joints = len(truth.links)
         start_rad = self._checked(np.zeros(self.n_joints) if q_rad is None else q_rad)
-        self._body = ArmBody(rig, truth, start_rad, np.random.default_rng(repeat_seed))
+        self._hidden = Hidden(hidden, arm_of(rig, truth)) if hidden else None
+        self._body = ArmBody(rig, truth, start_rad, np.random.default_rng(repeat_seed), self._hidden)
         self._detectors = Photodetectors(
             rig.fixture.half_size_m, rig.emulation.laser_power_w, rig.emulation.psd_noise_m
         )
         self._noise = np.random.default_rng(noise_seed)
         self._quantise = quantiser([joint.encoder_counts for joint in rig.arm.joint])
-        self._places = {place.id: place_faces(rig.fixture, place.psd1_in_base) for place in truth.placements}
-        self._faces: tuple[Face, Face] | None = self._places[truth.placements[0].id]
+        self._fixture = rig.fixture
+        self._places: dict[int, Pose] = {place.id: place.psd1_in_base for place in truth.placements}
+        self._faces_at = {place: place_faces(rig.fixture, pose) for place, pose in self._places.items()}
+        self._placement = truth.placements[0].id
         self._rate_hz = NOISE_RATE_HZ
         self._steps = 0
+        self._felt_step = 0
+        self._faces = self._feel()
         self._knots = [Knot(self._body.beam())]
         self._knots_start_s = 0.0
 
     @classmethod
-    def from_rig(cls, rig: Mapping[str, Any], *, seed: int | None = None, q_rad: ArrayLike | None = None) -> "World":
+    def from_rig(
+        cls,
+        rig: Mapping[str, Any],
+        *,
+        seed: int | None = None,
+        q_rad: ArrayLike | None = None,
+        hidden: Sequence[Defect] = (),
+    ) -> "World":
         """The world of a rig as `tomllib` gives it; `seed` goes before the one in [emulation]. WorldError if bad."""
         checked = read_rig(rig)
-        return cls(checked, draw_truth(checked, checked.emulation.seed if seed is None else seed), q_rad)
+        return cls(checked, draw_truth(checked, checked.emulation.seed if seed is None else seed), q_rad, hidden)
 
     # --- time and action
 
@@ -76,7 +98,7 @@ class World:
 
     def command(self, q_rad: ArrayLike) -> None:
         """Set-point (n,) in the controller's own readings, held until the next. WorldError unless n finite numbers."""
-        self._body.aim(self._checked(q_rad))
+        self._body.aim(self._checked(q_rad), self.time_s)
 
     def advance(self, until_s: float) -> None:
         """Physics up to that time, in steps of 1 ms; what is left of a step waits for the next call."""
@@ -86,8 +108,13 @@ class World:
         while self._steps < last and not self._body.stands:
             self._body.step()
             self._steps += 1
+            if self._hidden is not None and (self._body.stands or self._steps - self._felt_step >= HELD_STEPS):
+                self._faces = self._feel()
             self._knots.append(Knot(self._body.beam()))
         self._steps = max(self._steps, last)
+        if self._hidden is not None and self._steps - self._felt_step >= HELD_S / STEP_S:
+            self._faces = self._feel()
+            self._knots.append(Knot(self._body.beam()))
 
     def place_fixture(self, placement_id: int) -> None:
         """Puts the fixture at one of the rig's places at once; 0 takes it away. WorldError on an unknown place."""
@@ -96,7 +123,8 @@ class World:
             raise WorldError(
                 f"fixture: no placement {placement_id!r}; the rig has {known}, and 0 takes the fixture away"
             )
-        self._faces = self._places.get(placement_id)
+        self._placement = placement_id
+        self._faces = self._feel()
         self._knots = [Knot(self._body.beam())]
 
     def psd_rate(self, rate_hz: float) -> None:
@@ -141,7 +169,20 @@ class World:
         return self._detectors.see(self._spots(beam))
 
     def _spots(self, beam: Ray) -> Spots:
-        return DARK if self._faces is None else trace(beam, self._faces)
+        if self._faces is None:
+            return DARK
+        spots = trace(beam, self._faces)
+        return spots if self._hidden is None else seen(spots, beam, self._faces, self._hidden)
+
+    def _feel(self) -> tuple[Face, Face] | None:
+        """Has hidden mechanisms work on what is here and now; the faces where the fixture then stands."""
+        self._felt_step = self._steps
+        self._body.feel(self.time_s, self._placement)
+        if self._placement not in self._faces_at:
+            return None
+        if self._hidden is None or self._hidden.fixture is None:
+            return self._faces_at[self._placement]
+        return place_faces(self._fixture, fixture_at(self._places[self._placement], self._hidden.fixture))
 
     # --- taps on the truth, for tests
 
@@ -150,7 +191,7 @@ class World:
         return self._body.beam()
 
     def spots(self) -> Spots:
-        """Where the beam truly strikes now."""
+        """Where the beam strikes now, as a detector without noise says it."""
         return self._spots(self._body.beam())
 
     def true_joints_rad(self) -> Floats:

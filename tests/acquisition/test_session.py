@@ -53,6 +53,11 @@ def test_takes_every_place_in_both_orders(rig, taken) -> None:
     assert taken[0].skipped == 0
 
 
+def test_once_a_block_has_light_a_pose_takes_a_motion_or_two(taken) -> None:
+    """The fixture pose is known from the poses before: the first step of the servo is a whole one."""
+    assert np.median(taken[0].centring_steps[5:]) <= 2
+
+
 def test_centred_poses_are_within_5_um(taken) -> None:
     centred = [sample.look.spots_m() for sample in taken[0].samples if sample.centred and sample.repeat is None]
     assert len(centred) == 12

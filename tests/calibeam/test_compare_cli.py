@@ -131,3 +131,21 @@ def test_streams_tell_which_device_is_late(tmp_path):
     streams = {one["stream"]: one for one in said["streams"]}
     assert streams["joints"]["offset_s"] == pytest.approx(0.0, abs=1e-4)
     assert streams["encoders"]["later_than_joints_s"] == pytest.approx(3e-3, abs=1e-4)
+
+
+def test_a_file_in_millimetres_is_named_before_anything_is_compared(sessions, tmp_path, capsys):
+    spots = ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")
+    wrong = rewritten(
+        sessions[1], tmp_path / "millimetres", lambda columns: {**columns, **{n: 1e3 * columns[n] for n in spots}}
+    )
+    assert run(["compare", str(sessions[1]), str(wrong), "--out", str(tmp_path / "c.json")]) == 1
+    said = capsys.readouterr().err
+    assert str(wrong) in said
+    assert "millimetres" in said
+    assert not (tmp_path / "c.json").exists()
+
+
+def test_a_recording_without_samples_is_one_sentence(sessions, tmp_path, capsys):
+    empty = rewritten(sessions[1], tmp_path / "empty", lambda columns: {n: v[:0] for n, v in columns.items()})
+    assert run(["compare", str(empty), str(sessions[1]), "--out", str(tmp_path / "c.json")]) == 1
+    assert "measured: no sample" in capsys.readouterr().err

@@ -2,7 +2,8 @@
 
 A link's own difference is what is left when everything in front of it is taken out: joints less set-points, encoders
 less joints, readings less what the model says the joints' difference does to them. So the first link that differs is
-where the two part, and those behind it do not repeat it.
+where the two part, and those behind it do not repeat it. Of a probe in a cone or at a bar the joints are the reading:
+such rows are compared in calibrate/diagnose/compare/seated.py.
 """
 
 from collections.abc import Callable, Mapping
@@ -10,17 +11,21 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from acquisition.recording.columns import ORIENTATION, POSITION, SPOTS, per_joint
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.alignment import align
 from calibrate.arms.catalogue import arm_of
+from calibrate.diagnose.compare.seated import BAR, TIP, bar_differences, is_seated, tip_differences
 from calibrate.errors import DataError
 from calibrate.predict import NOWHERE, Predictor, predict
 
 Floats = NDArray[np.float64]
 Pair = tuple[Samples, Samples]  # measured, simulated; row by row the same pose
+OfPair = Callable[[Rig, Pair], Floats | None]  # (row, channel), NaN where either has no reading
+Explained = Callable[[Rig, Pair], Floats]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,32 +39,52 @@ class Difference:
     own: Floats  # (row, channel) without what the links in front of it explain
 
 
+@dataclass(frozen=True)
+class Reading:
+    """An instrument at the end of the chain. `by_joints`: what a difference of the joints does to it, by the model."""
+
+    link: str
+    names: tuple[str, ...]
+    unit: str
+    raw: OfPair
+    explained: Explained
+    by_joints: Explained
+
+
 def differences(rig: Rig, pair: Pair) -> tuple[Difference, ...]:
     """In the order of the chain, of the links whose columns both tables have."""
     n = pair[0].n_joints
-    upstream = np.zeros((len(pair[0]), n))
+    upstream, seated = np.zeros((len(pair[0]), n)), is_seated(pair[0])[:, None]
     out: list[Difference] = []
     for link, stem in (("command", "cmd"), ("joints", "q"), ("encoders", "enc")):
         names = per_joint(stem, "_rad", n)
-        raw = _raw(pair, names)
-        if raw is None:
+        apart = _columns_apart(pair, names)
+        if apart is None:
             continue
-        out.append(Difference(link, names, "rad", raw, raw - upstream if link != "command" else raw))
+        raw, own = apart, apart - upstream if link != "command" else apart
+        if link == "joints":  # where the probe is seated they are the reading
+            raw, own = np.where(seated, np.nan, raw), np.where(seated, np.nan, own)
+        if np.any(np.isfinite(own)):
+            out.append(Difference(link, names, "rad", raw, own))
         if link != "encoders":
-            upstream = np.nan_to_num(raw)
-    for link, names, unit, explained in READINGS:
-        raw = _raw(pair, names)
-        if raw is not None:
-            out.append(Difference(link, names, unit, raw, raw - explained(rig, pair)))
+            upstream = np.nan_to_num(apart)
+    for reading in READINGS:
+        raw = reading.raw(rig, pair)
+        if raw is not None and np.any(np.isfinite(raw)):
+            out.append(Difference(reading.link, reading.names, reading.unit, raw, raw - reading.explained(rig, pair)))
     return tuple(out)
 
 
-def _raw(pair: Pair, names: tuple[str, ...]) -> Floats | None:
+def _columns_apart(pair: Pair, names: tuple[str, ...]) -> Floats | None:
     if not all(name in one for one in pair for name in names):
         return None
     measured, simulated = (np.stack([one.column(name) for name in names], axis=1) for one in pair)
     raw = measured - simulated
     return raw if np.any(np.isfinite(raw)) else None
+
+
+def _of_columns(names: tuple[str, ...]) -> OfPair:
+    return lambda rig, pair: _columns_apart(pair, names)
 
 
 def of_rig(rig: Rig) -> Predictor:
@@ -89,8 +114,24 @@ def _position(rig: Rig, pair: Pair) -> Floats:
     return (tips[0] - tips[1]) @ device_of(rig, pair[1])[:3, :3]
 
 
-def _rotation(rig: Rig, pair: Pair) -> Floats:
-    return np.zeros((len(pair[0]), 3))  # told as raw: a rotation vector is no vector, and turns say what positions say
+def _turned(rig: Rig, pair: Pair) -> Floats | None:
+    """(row, 3) rotation vector from simulated to measured: a difference of two vectors would break at half a turn."""
+    if not all(name in one for one in pair for name in ORIENTATION):
+        return None
+    seen = [np.stack([one.column(name) for name in ORIENTATION], axis=1) for one in pair]
+    good = np.all(np.isfinite(np.concatenate(seen, axis=1)), axis=1)
+    out = np.full(seen[0].shape, np.nan)
+    if good.any():
+        measured, simulated = (Rotation.from_rotvec(one[good]) for one in seen)
+        out[good] = (measured * simulated.inv()).as_rotvec()
+    return out
+
+
+def _turned_by_joints(rig: Rig, pair: Pair) -> Floats:
+    """However the target is screwed on: its mounting cancels."""
+    model, R_base_device = of_rig(rig), device_of(rig, pair[1])[:3, :3]
+    measured, simulated = (model.flange(one.joints())[:, :3, :3] for one in pair)
+    return Rotation.from_matrix(measured @ np.swapaxes(simulated, 1, 2)).as_rotvec() @ R_base_device
 
 
 def device_of(rig: Rig, simulated: Samples) -> Floats:
@@ -109,12 +150,33 @@ def device_of(rig: Rig, simulated: Samples) -> Floats:
     return align(tips[good], seen[good]).T_a_b
 
 
-Explained = Callable[[Rig, Pair], Floats]
-READINGS: tuple[tuple[str, tuple[str, ...], str, Explained], ...] = (
-    ("spots", SPOTS, "m", _spots),
-    ("position", POSITION, "m", _position),
-    ("orientation", ORIENTATION, "rad", _rotation),
-    ("wire", ("wire_m",), "m", _wire),
+def _seats(rig: Rig, pair: Pair) -> Floats | None:
+    return tip_differences(of_rig(rig), *pair)
+
+
+def _bars(rig: Rig, pair: Pair) -> Floats | None:
+    return bar_differences(of_rig(rig), *pair)
+
+
+def _nothing(channels: int) -> Explained:
+    return lambda rig, pair: np.zeros((len(pair[0]), channels))
+
+
+def _known(raw: OfPair, channels: int) -> Explained:
+    def of(rig: Rig, pair: Pair) -> Floats:
+        found = raw(rig, pair)
+        return np.zeros((len(pair[0]), channels)) if found is None else found
+
+    return of
+
+
+READINGS: tuple[Reading, ...] = (
+    Reading("spots", SPOTS, "m", _of_columns(SPOTS), _spots, _spots),
+    Reading("position", POSITION, "m", _of_columns(POSITION), _position, _position),
+    Reading("orientation", ORIENTATION, "rad", _turned, _turned_by_joints, _turned_by_joints),
+    Reading("wire", ("wire_m",), "m", _of_columns(("wire_m",)), _wire, _wire),
+    Reading("seat", TIP, "m", _seats, _nothing(3), _known(_seats, 3)),
+    Reading("bar", BAR, "m", _bars, _nothing(1), _known(_bars, 1)),
 )
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.columns import per_joint
 from acquisition.recording.samples import Samples
+from calibrate.diagnose.compare.seated import NONE, lengths_of
 from calibrate.errors import DataError
 
 Floats = NDArray[np.float64]
@@ -18,7 +19,7 @@ Ints = NDArray[np.intp]
 
 # Of every joint: a servo that centres goes to a slightly other place; poses of a plan lie farther apart.
 SAME_RAD = 0.02
-WHAT = ("placement", "first_psd", "seat", "bar")  # where both say it, it must be the same
+WHAT = ("placement", "first_psd", "seat", "bar", "bar_end")  # where both say it, it must be the same
 
 
 @dataclass(frozen=True)
@@ -38,8 +39,11 @@ def match(measured: Samples, simulated: Samples) -> Matched:
             f"measured: {measured.n_joints} joints, simulated: {simulated.n_joints} joints; "
             "give recordings of the same arm"
         )
+    for name, samples in (("measured", measured), ("simulated", simulated)):
+        if len(samples) == 0:
+            raise DataError(f"{name}: no sample; give a recording that holds some")
     near = _nearness(measured, simulated)
-    rows, columns = _longest(near)
+    rows, columns = _whole_bars(measured, *_longest(near))
     if not len(rows):
         raise DataError(
             f"no sample of the one recording was taken at a pose of the other (within {SAME_RAD} rad of each joint); "
@@ -55,9 +59,26 @@ def _nearness(measured: Samples, simulated: Samples) -> Floats:
     may = apart < SAME_RAD
     for name in WHAT:
         if name in measured and name in simulated:
-            one, two = measured.column(name)[:, None], simulated.column(name)[None]
+            one, two = _labels(measured, name)[:, None], _labels(simulated, name)[None]
             may &= (one == two) | np.isnan(one) | np.isnan(two)
     return np.where(may, 2.0 - apart / SAME_RAD, 0.0)
+
+
+def _labels(samples: Samples, name: str) -> Floats:
+    """(row,) as numbers, NaN where nothing is said."""
+    if name != "bar_end":
+        return samples.column(name)
+    end = samples.columns[name]
+    return np.where(end == "a", 0.0, np.where(end == "b", 1.0, np.nan))
+
+
+def _whole_bars(measured: Samples, rows: Ints, columns: Ints) -> tuple[Ints, Ints]:
+    """Without ends of a bar whose other end has no partner: half a length says nothing."""
+    if "bar" not in measured:
+        return rows, columns
+    alone = measured.integers("bar", NONE)[rows] != NONE
+    alone[lengths_of(measured.take(rows)).ravel()] = False
+    return rows[~alone], columns[~alone]
 
 
 def _poses(samples: Samples, other: Samples) -> Floats:

@@ -18,6 +18,8 @@ ALARM = 1e-3  # over all links
 FEWEST = 10  # of degrees of freedom of repeats
 SMALLEST = float(np.finfo(float).tiny)  # no probability is zero
 ROUNDING = 1e-9  # rad or m: below, two files of one number
+COMMAND = "command"
+JOINTS = (COMMAND, "joints", "encoders")  # links that are angles of every joint
 NUDGE_RAD = 1e-6  # of a joint, for its lever on the readings
 
 
@@ -53,9 +55,12 @@ def _judged(one: Difference, rig: Rig, pair: Pair, links: int) -> Parted:
     at_row, at_channel = np.unravel_index(int(np.nanargmax(np.abs(own))), own.shape)
     largest = float(np.abs(own[at_row, at_channel]))
     p, first = None, None
-    if sigma is None:
+    if sigma is None and one.link == COMMAND:
         beyond = np.abs(own) > ROUNDING
         parts = bool(np.any(beyond & good))
+    elif sigma is None:
+        p = max(min(1.0, links * chance_of_structure(own)), SMALLEST)
+        beyond, parts = np.abs(own) > 4.0 * scatter_of(own), p < ALARM and largest > ROUNDING
     else:
         p = min(1.0, links * float(chi2.sf(float(np.nansum((own / sigma) ** 2)), int(good.sum()))))
         p = min(p, links * _in_means(own, sigma, good))
@@ -99,11 +104,14 @@ def _noise(one: Difference, rig: Rig, pair: Pair) -> tuple[Floats | None, str]:
     if repeats is not None:
         return np.broadcast_to(repeats, one.own.shape), "repeated poses"
     joint = _joint_noise(rig, pair[0].n_joints)
-    if one.unit == "rad":
-        if one.link == "command":
+    if one.link in JOINTS:
+        if one.link == COMMAND:
             return None, "a set-point has none"
         return np.broadcast_to(np.sqrt(2.0) * joint, one.own.shape), "believed, and one count of the encoders"
-    believed = {"spots": rig.noise.psd_m, "position": rig.noise.position_m, "wire": rig.noise.wire_m}.get(one.link)
+    noise = rig.noise
+    told = {"spots": noise.psd_m, "position": noise.position_m, "wire": noise.wire_m, "seat": noise.seat_m}
+    ends_m = None if noise.seat_m is None else np.sqrt(2.0) * noise.seat_m
+    believed = ends_m if one.link == "bar" else told.get(one.link)
     if believed is None and one.link == "spots":
         stated = _stated(pair)
         if stated is not None:
@@ -116,7 +124,7 @@ def _noise(one: Difference, rig: Rig, pair: Pair) -> tuple[Floats | None, str]:
 def _through_joints(one: Difference, rig: Rig, pair: Pair) -> Floats:
     """(row, channel) what the joints' believed noise does to a reading, by differences of the model."""
     joint = _joint_noise(rig, pair[0].n_joints)
-    explained = {link: function for link, _, _, function in READINGS}[one.link]
+    explained = next(reading.by_joints for reading in READINGS if reading.link == one.link)
     total = np.zeros(one.own.shape)
     for j, sigma in enumerate(joint):
         name = f"q{j + 1}_rad"

@@ -96,7 +96,8 @@ def _frozen(track: Track, moving: Track | None) -> list[Break]:
         seen = None if other is None else other[:, c]
         least = 0.0 if seen is None or not long else _least(values, seen)
         for first, last in long:
-            if _moved(seen[first : last + 1], least) if seen is not None else _too_long(equal, first, last):
+            # Its neighbours in time may belong to the motion before and after: clocks are known to a part of a sample.
+            if _moved(seen[first + 1 : last], least) if seen is not None else _too_long(equal, first, last):
                 found.setdefault((first, last), []).append(c)
     return [
         Break(

@@ -127,8 +127,18 @@ def _encoders(joints: Device, encoders: Device, stands: tuple[Stand, ...]) -> tu
     at_joints = _moved(encoders.track, fit)
     found = [told_reading_lag(one) for one in lags if one.outcome is Outcome.FOUND]
     found += [told_slip(one) for one in slips(at_joints, joints.track, stands).found]
-    frozen = [one for one in breaks(at_joints, None, joints.track) if one.fault is Fault.FROZEN]
+    frozen = [one for one in breaks(at_joints, None, _behind(joints.track, lags)) if one.fault is Fault.FROZEN]
     return fit, found + told_breaks(at_joints, frozen) + _rings(at_joints, stands)
+
+
+def _behind(track: Track, lags: Sequence[Following]) -> Track:
+    """As late in each channel as its reading: what has not moved yet is not frozen."""
+    values = track.values.copy()
+    for one in lags:
+        if one.outcome is Outcome.FOUND and one.behind_s is not None:
+            later = track.curve.at(track.time_s - one.behind_s)[:, one.joint - 1]
+            values[:, one.joint - 1] = np.where(np.isfinite(later), later, values[:, one.joint - 1])
+    return replace(track, values=values)
 
 
 def _by_stamps(joints: Device, encoders: Device, stands: tuple[Stand, ...]) -> tuple[ClockFit, list[StreamFinding]]:

@@ -1,19 +1,22 @@
 """Whether two clocks are farther apart than their devices' stamps at the host say: readings that come late.
 
 Where two devices count from is nobody's fault, so an offset is judged against the one that the host's stamps show, with
-their own scatter. A quartz is off by some 100 us/s at worst; what drifts more is a fault of its clock.
+their own scatter and what lines delay, which no stamp tells. A device without a clock carries the host's: then its own
+stamps are those. A quartz is off by some 100 us/s at worst; what drifts more is a fault of its clock.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import norm
 
 from calibrate.diagnose.streams.clock import ClockFit
+from calibrate.diagnose.streams.clock_steps import shares_host_clock
 from calibrate.diagnose.streams.recorded import Device, stamps_scatter_s, start_between
 
 SIGMAS = 5.0
-MATTERS_S = 1e-4  # the finest time that is promised
+# What two lines may delay differently: a USB frame 1 ms, a SYNC and the answers of six encoders at 1 Mbit/s 0.8 ms.
+MATTERS_S = 1.2e-3
 QUARTZ = 1e-4  # s/s
 OTHER_PACE = 1e-2  # s/s: no clock drifts so; an emulation runs faster than its host
 
@@ -41,6 +44,7 @@ class Late:
 
 def lateness(joints: Device, other: Device, fit: ClockFit) -> Late | None:
     """None where clocks or stamps say nothing."""
+    other = replace(other, host_s=other.track.time_s) if shares_host_clock(other) else other
     start = start_between(joints, other)
     if fit.offset_s is None or fit.offset_sigma_s is None or start is None:
         return None

@@ -57,7 +57,7 @@ def told_late(device: str, late: Late, joints: int) -> StreamFinding:
     if late.drift is not None and late.drift_sigma is not None:
         sizes["drift_s_per_s"] = Size(late.drift, late.drift_sigma)
         if late.drifts:
-            says += f"; their clocks drift by {1e6 * late.drift:+.4g} ± {1e6 * late.drift_sigma:.2g} us/s"
+            says += f"; their clocks drift by {1e6 * late.drift:+.4g} ± {1e6 * late.drift_sigma:.2g} µs/s"
     name = Named("time", tuple(f"qd{i + 1}" for i in range(joints)), "linear", None, "latency")
     return StreamFinding(name, device, Outcome.FOUND, sizes, None, None, max(late.p, CERTAIN), says)
 
@@ -77,7 +77,7 @@ def told_unsettled(track: Track, windows: Sequence[Window], each: Sequence[Unset
     rows = ", ".join(str(k + 1) for k, _, _ in found[:MOST]) + (", ..." if len(found) > MOST else "")
     says = (
         f"{len(found)} of {len(windows)} samples (rows {rows}) were taken before the arm had settled: "
-        f"up to {1e6 * largest:.3g} u{track.unit} of the {track.name} were still to come"
+        f"up to {1e6 * largest:.3g} µ{track.unit} of the {track.name} were still to come"
     )
     moves = tuple(f"last_move{i + 1}" for i in range(joints))
     name = Named("time", moves, "linear", None, "not-settled")
@@ -115,7 +115,7 @@ def told_slip(one: Slip) -> StreamFinding:
     name = Named(f"joint{one.joint}.angle", ("t",), "step", None, "encoder-slip")
     sizes = {"slip_rad": Size(one.size_rad, one.sigma_rad), "time_s": Size(one.to_s, one.to_s - one.from_s)}
     says = (
-        f"the encoder of joint {one.joint} slipped by {1e6 * one.size_rad:+.1f} ± {1e6 * one.sigma_rad:.1f} urad "
+        f"the encoder of joint {one.joint} slipped by {1e6 * one.size_rad:+.1f} ± {1e6 * one.sigma_rad:.1f} µrad "
         f"between {one.from_s:.3f} and {one.to_s:.3f} s"
     )
     return StreamFinding(name, "encoders", Outcome.FOUND, sizes, one.from_s, one.to_s, max(one.p, CERTAIN), says)
@@ -136,7 +136,7 @@ def told_ringing(track: Track, one: Ringing) -> StreamFinding:
     place = "no single joint explains it: base, link or tool" if one.joint is None else f"it is joint {one.joint}"
     says = (
         f"{track.name} ring on after {one.stops} stops with {one.frequency_hz:.3g} Hz, "
-        f"damping {100 * one.damping:.2g} %, up to {1e6 * one.amplitude:.3g} u{track.unit}; {place}"
+        f"damping {100 * one.damping:.2g} %, up to {1e6 * one.amplitude:.3g} µ{track.unit}; {place}"
     )
     return StreamFinding(name, track.name, Outcome.FOUND, sizes, one.from_s, None, max(one.p, CERTAIN), says, others)
 

@@ -1,15 +1,16 @@
 """One finding, one page: sentence, picture, place, size, proof, rivals, what to do."""
 
-import math
 from collections.abc import Iterator, Sequence
 
 from calibrate.diagnose.schema import DiagnosisFile, FindingRecord, SizeRecord
 from calibrate.report.diagnosis.chain_figure import Link, chain_figure
 from calibrate.report.diagnosis.pulled_figure import pulled_figure
+from calibrate.report.diagnosis.units import unit_of
 from calibrate.report.diagnosis.words import place_words
 from calibrate.report.elements import Html, facts, figure, panels, section, table, tag
-from calibrate.report.quantities import DASH, doubted_angle, doubted_length, fixed, significant
+from calibrate.report.quantities import DASH, TIED, decimals_of, fixed, significant
 
+TWO_SIDED = 1.96  # sigmas of 95 %
 SURE = 1e-6  # probability below which only its smallness is told
 
 
@@ -40,20 +41,28 @@ def title_of(finding: FindingRecord) -> str:
 
 
 def _sizes(finding: FindingRecord) -> Html:
-    rows = [(name, size_words(name, size)) for name, size in finding.parameters.items()]
-    return table(("Parameter", "size ± sigma"), rows, numeric=(1,), caption=place_words(finding))
+    rows = [(name, size_words(name, size), interval_words(name, size)) for name, size in finding.parameters.items()]
+    head = ("Parameter", "size ± sigma", "95 % interval")
+    return table(head, rows, numeric=(1, 2), caption=place_words(finding))
 
 
 def size_words(name: str, size: SizeRecord) -> str:
     """With a unit that fits, from the unit in the name."""
     if size.value is None or size.sigma is None:
         return DASH
-    if name == "phase_rad":
-        return f"{fixed(math.degrees(size.value), 1)} ± {fixed(math.degrees(size.sigma), 1)} °"
-    for ending, doubted in (("_m", doubted_length), ("_rad", doubted_angle)):
-        if name.endswith(ending) and not name.endswith(("per_m", "per_rad")):
-            return doubted(size.value, size.sigma)
-    return f"{significant(size.value)} ± {significant(size.sigma, 2)}"
+    factor, unit = unit_of(name, size.value)
+    decimals = decimals_of(factor * size.sigma)
+    value, sigma = fixed(factor * size.value, decimals), fixed(factor * size.sigma, decimals)
+    return f"{value}{TIED}±{TIED}{sigma}{unit}"
+
+
+def interval_words(name: str, size: SizeRecord) -> str:
+    """'40.6 to 46.5 µrad per rad'; a dash for what was counted."""
+    if size.value is None or size.sigma is None or not size.sigma > 0.0:
+        return DASH
+    factor, unit = unit_of(name, size.value)
+    decimals, half = decimals_of(factor * size.sigma), TWO_SIDED * factor * size.sigma
+    return f"{fixed(factor * size.value - half, decimals)} to {fixed(factor * size.value + half, decimals)}{unit}"
 
 
 def _proof(finding: FindingRecord) -> Iterator[tuple[str, str]]:
@@ -61,6 +70,10 @@ def _proof(finding: FindingRecord) -> Iterator[tuple[str, str]]:
         yield "found in", f"the stream of {finding.stream}{_when(finding)}"
     if finding.share is not None:
         yield "share of what all findings explain", f"{fixed(100.0 * finding.share, 0)} %"
+    if finding.plausible_to is not None and finding.parameters:
+        name = next(iter(finding.parameters))
+        factor, unit = unit_of(name, finding.plausible_to)
+        yield "a machine shows at most", f"{significant(factor * finding.plausible_to)}{unit}"
     yield "confidence in the name", f"{finding.confidence:.3f}"
     chance = f"below {significant(SURE, 1)}" if finding.p < SURE else significant(finding.p, 2)
     yield "chance that noise alone looks like any cause as much", chance

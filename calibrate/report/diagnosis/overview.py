@@ -76,6 +76,8 @@ def _proof(file: DiagnosisFile) -> Html:
 
 
 def _fit(file: DiagnosisFile) -> Iterator[Html]:
+    if file.rms_after_m is not None and file.noise_floor_m:
+        yield tag("p", f"Explained down to {significant(file.rms_after_m / file.noise_floor_m)} times the floor.")
     if file.lack_of_fit is None:
         yield tag("p", "Lack of fit: too few poses were repeated to tell misfit from noise.")
     else:

@@ -16,16 +16,16 @@ from calibrate.diagnose.schema import (
 NOISE = 1.15  # times the floor: some dozen samples held out scatter by so much
 TOLD = ("encoder-eccentricity", "joint-compliance", "backlash")  # in a sentence; all of them stand in the table
 UNITS = (  # ending of a parameter's name, factor, unit
-    ("_rad_per_rad", 1e6, "urad/rad"),
-    ("_rad_per_nm", 1e6, "urad/Nm"),
-    ("_rad_nm", 1e6, "urad/Nm"),
-    ("_rad_per_k", 1e6, "urad/K"),
-    ("_rad_k", 1e6, "urad/K"),
-    ("_m_per_k", 1e6, "um/K"),
+    ("_rad_per_rad", 1e6, "µrad/rad"),
+    ("_rad_per_nm", 1e6, "µrad/Nm"),
+    ("_rad_nm", 1e6, "µrad/Nm"),
+    ("_rad_per_k", 1e6, "µrad/K"),
+    ("_rad_k", 1e6, "µrad/K"),
+    ("_m_per_k", 1e6, "µm/K"),
     ("_per_k", 1e6, "ppm/K"),
     ("_share", 1e6, "ppm"),
-    ("_rad", 1e6, "urad"),
-    ("_m", 1e6, "um"),
+    ("_rad", 1e6, "µrad"),
+    ("_m", 1e6, "µm"),
 )
 
 
@@ -81,7 +81,7 @@ def _tested(file: DiagnosisFile) -> str:
 
 
 def visible_words(smallest: SmallestRecord) -> str:
-    """'encoder-eccentricity at joint2.angle from 12 urad on': hence at better seen places, too."""
+    """'encoder-eccentricity at joint2.angle from 12 µrad on': hence at better seen places, too."""
     return f"{smallest.physics} at {smallest.where} from {size_of(smallest.parameter, smallest.value)} on"
 
 
@@ -120,8 +120,8 @@ def before_after(split: SplitRecord) -> tuple[str, str]:
 
 
 def micrometres(value_m: float | None) -> str:
-    """'12.3 um', or a dash."""
-    return "-" if value_m is None else f"{1e6 * value_m:.3g} um"
+    """'12.3 µm', or a dash."""
+    return "-" if value_m is None else f"{1e6 * value_m:.3g} µm"
 
 
 def free_space_words(change: FreeSpaceRecord) -> str:

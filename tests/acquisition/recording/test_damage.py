@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from acquisition.recording import mcap_file
+from acquisition.recording import writer as writer_module
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
@@ -149,11 +151,43 @@ def test_a_file_of_another_program_is_refused(whole: bytes, tmp_path: Path) -> N
         read(tmp_path / "other.mcap")
 
 
-def test_a_file_of_a_later_format_is_refused(whole: bytes, tmp_path: Path) -> None:
-    key = b"format_version\x01\x00\x00\x00"
-    (tmp_path / "later.mcap").write_bytes(whole.replace(key + b"1", key + b"2", 1))
+def test_a_file_of_a_later_format_is_refused(
+    open_writer: Callable[..., RecordingWriter], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(writer_module, "FORMAT_VERSION", "2")
+    later = open_writer()
+    later.close()
     with pytest.raises(RecordingError, match="format version 2 is not known"):
-        read(tmp_path / "later.mcap")
+        read(later.path)
+
+
+def test_a_metadata_record_of_a_torn_file_is_proved_by_its_own_checksum(whole: bytes, tmp_path: Path) -> None:
+    torn = whole[: chunk_ends(whole)[1]]
+    for name, value in ((b"calibeam.notes", b"31415926"), (b"calibeam.recording", b"1000.0")):
+        at = torn.index(value, torn.index(name))
+        recording = read_bytes(tmp_path / "hurt.mcap", torn[:at] + b"2" + torn[at + 1 :])
+        assert recording is None or (recording.notes == {} and recording.damage)
+
+
+def test_batches_behind_a_damaged_length_are_found_again(whole: bytes, tmp_path: Path) -> None:
+    hurt = bytearray(whole)
+    ends = chunk_ends(whole)
+    start = whole.index(b"\x04\x00\x00\x00zstd", ends[3]) - 37  # of the fifth batch, by the layout of a chunk
+    hurt[start + 6] ^= 0x40  # its length becomes 2^46
+    recording = read_bytes(tmp_path / "hurt.mcap", bytes(hurt))
+    assert recording is not None
+    assert not recording.complete
+    assert [event.detail["batch"] for event in recording.events] == [batch for batch in range(BATCHES) if batch != 4]
+
+
+def test_a_recording_of_a_version_without_checksums_is_read(
+    open_writer: Callable[..., RecordingWriter], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mcap_file, "CHECKSUM", "another key")
+    with open_writer(notes={"seed": "3"}) as older:
+        pass
+    assert read(older.path).notes["seed"] == "3"
+    assert read(older.path).complete
 
 
 RECORD_UNTIL_KILLED = """

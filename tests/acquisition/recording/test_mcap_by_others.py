@@ -1,6 +1,7 @@
-"""The file opened by an independent reader: the mcap package and protobuf, nothing of ours after writing."""
+"""The file opened by independent readers, mcap with protobuf and mcap's own decoder; nothing of ours after writing."""
 
 import json
+import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
 
 from acquisition.recording.stream import Channel, Event
 from acquisition.recording.writer import RecordingWriter
@@ -90,6 +92,15 @@ def test_the_index_and_the_metadata_are_whole(recorded: Path, rig_source: str) -
     assert summary.statistics.message_count == sum(len(list(messages(recorded, topic))) for topic in
                                                    ("stream/psd", "view/psd", "samples", "events"))  # fmt: skip
     assert metadata["calibeam.rig"]["text"] == rig_source
-    assert metadata["calibeam.notes"] == {"seed": "3"}
+    assert metadata["calibeam.notes"] == {"seed": "3", "crc32": f"{zlib.crc32(b'seed=3' + bytes([10])):08x}"}
     assert metadata["calibeam.recording"]["software"] == "calibeam 0.1.0"
-    assert metadata["calibeam.end"] == {"complete": "true"}
+    assert metadata["calibeam.end"]["complete"] == "true"
+
+
+def test_the_decoder_of_mcap_for_protobuf_reads_every_topic(recorded: Path) -> None:
+    with recorded.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        decoded = [(channel.topic, message) for _, channel, _, message in reader.iter_decoded_messages()]
+    assert {topic for topic, _ in decoded} == {"stream/psd", "view/psd", "samples", "events"}
+    numbers = [number for topic, message in decoded if topic == "stream/psd" for number in message.sequence]
+    assert numbers == list(range(2000))

@@ -1,6 +1,7 @@
 """After the reveal: an oracle, other methods, and columns hidden on purpose, on one session with one effect."""
 
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -12,6 +13,7 @@ from calibeam.prove.comparison import GEOMETRY, compare
 from calibeam.prove.hidden_angle import hidden_angles
 from calibeam.prove.oracle import fold_of, oracle_terms
 from calibeam.prove.truth import Truth, truth_of
+from calibeam.prove.unseen_file import write_asked
 from calibeam.prove.unseen_poses import tool_at
 from calibrate.diagnose.diagnosis import Verdict
 from calibrate.diagnose.file import write_diagnosis
@@ -34,8 +36,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def truth() -> Truth:
-    return truth_of(msgspec.json.encode(truth_document(conceal(WANTED))))
+def document() -> dict[str, Any]:
+    return truth_document(conceal(WANTED))
+
+
+@pytest.fixture(scope="module")
+def truth(document: dict[str, Any]) -> Truth:
+    return truth_of(msgspec.json.encode(document))
 
 
 @pytest.fixture(scope="module")
@@ -55,11 +62,16 @@ def test_there_is_no_oracle_for_what_no_catalogue_lists(state: Fitted, truth: Tr
     assert oracle_terms(state, (unlisted,), "tracker") is None
 
 
-def test_a_diagnosis_that_finds_nothing_gains_nothing(folder: Path, truth: Truth, tmp_path: Path) -> None:
+def test_a_diagnosis_that_finds_nothing_gains_nothing(
+    folder: Path, document: dict[str, Any], truth: Truth, tmp_path: Path
+) -> None:
     silent = DiagnosisFile(1, Verdict.CONSISTENT.value, 1e-5, 1e-5, 1e-5, (), None, ())
     write_diagnosis(tmp_path / "diagnosis.json", silent)
-    found = compare(folder, tmp_path, truth, "tracker")
+    write_asked(document["free_space"], tmp_path / "asked.csv")
+    found = compare(folder, tmp_path, tmp_path / "asked.csv", truth, "tracker")
     assert found is not None
+    assert found.free_space_m is not None
+    assert found.free_space_m < 1e-4  # noise of 15 um, over poses that nobody measured
     assert found.oracle_m < 0.5 * found.before_m
     gains = {b.method: b.gain for b in found.baselines}
     assert gains[GEOMETRY] == 0.0

@@ -22,7 +22,7 @@ def _samples() -> Samples:
 def _file(depends_on: str, course: np.ndarray) -> DiagnosisFile:
     curve = CurveRecord("t", "m", tuple(T_S.tolist()), tuple(course.tolist()), tuple(course.tolist()))
     finding = FindingRecord(
-        "link2.length", depends_on, "smooth", None, "unknown", {}, 1.0, 0.9, "", (), 1e-3, 20.0, 20.0, "", curve
+        "link2.length", depends_on, "smooth", None, "unknown", {}, 1.0, 0.9, "", (), 1e-3, 20.0, 20.0, curve=curve
     )
     return DiagnosisFile(1, "mismatch", 1e-5, 2e-5, 1e-5, (finding,), None, ())
 

@@ -45,6 +45,19 @@ def test_an_effect_taken_out_of_the_catalogue_turns_unknown_at_its_place(tmp_pat
     assert not case.misnamed
 
 
+@pytest.mark.timeout(300)
+def test_a_fault_that_only_streams_tell_is_found_and_named(tmp_path: Path) -> None:
+    options = ("--kind", "streams", "--mechanism", "stream-slipping-encoder", "--cases", "1")
+    [case] = _proved(tmp_path / "p", *options).cases
+    assert case.error == ""
+    assert case.defects[0].physics == "encoder-slip"
+    assert case.defects[0].named
+    [slip] = case.defects[0].sizes
+    assert abs(slip.said - slip.true) < 4.0 * slip.sigma
+    recorded = tmp_path / "p" / "recordings" / case.name / "recording.mcap"
+    assert b"slipping" not in recorded.read_bytes()
+
+
 def test_a_seed_of_development_is_not_published(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.run(["prove", "--out", str(tmp_path / "p"), "--seed", "21", "--publish"]) == 1
     assert "seed 21 is one of development" in " ".join(capsys.readouterr().err.split())

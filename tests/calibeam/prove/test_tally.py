@@ -36,7 +36,7 @@ def test_causes_count_in_their_bin(case: Case, found: Found) -> None:
 
 def test_a_finding_in_mere_noise_is_a_false_alarm(case: Case) -> None:
     table = {f.label: f.said for f in figures([case(), case(said=(_said(),))])}
-    assert table["false alarms, white noise"].startswith("50 %")
+    assert table["false alarms, white noise"].startswith("50\u00a0% ")
     assert faults(case(said=(_said(),)))
     assert not faults(case())
 

@@ -111,6 +111,13 @@ class LinearSession:
     def samples(self) -> int:
         return len(self.active)
 
+    @property
+    def distrusted(self) -> int:
+        return int(np.sum(self.weights < 0.3))
+
+    def trusting(self) -> "LinearSession":
+        return replace(self, weights=np.ones(len(self.active)))
+
     def _design(self, accepted) -> Floats:
         parts = [self.geometry]
         for a in accepted:

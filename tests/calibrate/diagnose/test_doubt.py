@@ -7,13 +7,13 @@ from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.cross_validation import predicts
 from calibrate.diagnose.diagnose import diagnose
 from calibrate.diagnose.diagnosis import Verdict
-from calibrate.diagnose.findings import sizes_of
 from calibrate.diagnose.isolability import isolability
 from calibrate.diagnose.lack_of_fit import lack_of_fit
 from calibrate.diagnose.line_search import refined
 from calibrate.diagnose.next_poses import Contest, Duel, next_poses
 from calibrate.diagnose.rivals import confidences, rivals_of
 from calibrate.diagnose.search import search
+from calibrate.diagnose.stated_sizes import sizes_of
 from calibrate.diagnose.unrecorded import unrecorded
 
 

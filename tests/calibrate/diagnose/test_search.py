@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from calibrate.diagnose.bench import Bench
-from calibrate.diagnose.search import ALPHA_FURTHER, Search, search
+from calibrate.diagnose.search import search
+from calibrate.diagnose.searching import ALPHA_FURTHER, Search
 from calibrate.diagnose.unknown import with_unknowns
 
 

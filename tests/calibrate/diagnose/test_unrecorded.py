@@ -3,7 +3,7 @@
 import numpy as np
 
 from calibrate.diagnose.bench import Bench
-from calibrate.diagnose.joint_scatter import innocent
+from calibrate.diagnose.joint_scatter import UNEQUAL, innocent
 from calibrate.diagnose.noise_law import noise_law
 from calibrate.diagnose.unrecorded import RESTLESS, unrecorded
 from calibrate.effects.term import Missing
@@ -13,9 +13,9 @@ APPROACH = Missing("approach", "approach1 ...", "backlash")
 SPEED = Missing("qd", "qd1_rad_s ...", "latency")
 
 
-def scattered(world, rng, joints, moving):
-    """A session whose joints turn by chance, all alike, at some of the samples."""
-    drawn = rng.normal(size=(len(moving), len(joints))) * moving[:, None]
+def scattered(world, rng, joints, moving, sizes=1.0):
+    """A session whose joints turn by chance, at some of the samples; `sizes` of each joint, alike if one number."""
+    drawn = sizes * rng.normal(size=(len(moving), len(joints))) * moving[:, None]
 
     def turned(drivers):
         return sum(world.at_joint(j, lambda _, x=drawn[:, c]: x)(drivers) for c, j in enumerate(joints))
@@ -38,6 +38,18 @@ def test_the_missing_column_is_named_at_its_joint(world):
 def test_joints_that_do_not_repeat_well_lack_no_driver(world):
     joints = tuple(range(1, world.session(np.random.default_rng(0)).drivers.n_joints + 1))
     found = [asked(world, seed, joints, 2.0, (APPROACH, SPEED)) for seed in range(SEEDS)]
+    assert sum(f is not None for f in found) <= 1
+
+
+def test_joints_that_repeat_unequally_well_lack_no_driver(world):
+    """The worst up to three times worse than the best, four times the instrument's noise."""
+    found = []
+    for seed in range(SEEDS + 2):
+        rng = np.random.default_rng(seed)
+        every = tuple(range(1, world.session(rng).drivers.n_joints + 1))
+        sizes = np.exp(rng.uniform(0.0, np.log(UNEQUAL), len(every)))
+        session = scattered(world, rng, every, np.ones(world.samples), sizes)
+        found.append(unrecorded(Bench(session), rng, (APPROACH, SPEED)))
     assert sum(f is not None for f in found) <= 1
 
 

@@ -49,6 +49,18 @@ def test_proofs_of_the_same_fit_have_a_chapter_where_they_were_made(recorded, id
     assert 'href="#proofs"' not in page
 
 
+def test_observability_and_alarms_stand_beside_the_proofs(recorded, identified):
+    proved = evidence_fields(identified.proved.evidence)
+    told = text_of(report_html(recorded, identified.zeros, proved=proved, alarms=["chi-square is above the noise"]))
+    calm = text_of(report_html(recorded, identified.zeros, proved=proved))
+    indices = [f"O{k}" for k in range(1, 6)]
+    assert " ".join(indices) in told
+    assert f"the {proved['observability'].parameters} parameters" in told
+    assert "chi-square is above the noise" in told
+    assert "raises no alarm" in calm
+    assert "raises no alarm" not in told
+
+
 def test_every_element_is_closed(page: str) -> None:
     balance = Balance()
     balance.feed(page)

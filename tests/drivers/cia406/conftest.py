@@ -86,6 +86,12 @@ class MemoryBus(can.BusABC):
         self.sent: list[tuple[float, can.Message]] = []
         self.lose: Callable[[CanFrame], bool] = lambda frame: False
         self.waiting: list[tuple[float, CanFrame]] = []  # when it arrives
+        self.errors: list[can.Message] = []  # error frames, heard before anything else
+        self.said = can.BusState.ACTIVE
+
+    @property
+    def state(self) -> can.BusState:
+        return self.said
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         now_s = self.clock.now_s()
@@ -102,6 +108,8 @@ class MemoryBus(can.BusABC):
     def recv(self, timeout: float | None = None) -> can.Message | None:
         for node in self.nodes:
             self.put(node.due(self.clock.now_s()))
+        if self.errors:
+            return self.errors.pop(0)
         until_s = self.clock.now_s() + (timeout or 0.0)
         if self.waiting and self.waiting[0][0] <= until_s:
             arrives_s, frame = self.waiting.pop(0)

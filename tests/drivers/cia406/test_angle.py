@@ -2,11 +2,12 @@
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.cia406.angle import ContinuousAngle, Scale, scale_of
+from drivers.cia406.angle import ContinuousAngle, Scale, Slip, scale_of
 
 TURN, RANGE = 1 << 20, 1 << 32
 MULTI_TURN = Scale(TURN, RANGE, True)
@@ -58,11 +59,59 @@ def test_a_step_faster_than_any_joint_is_no_motion():
     assert angle.follow(10, 0.010) == pytest.approx(10 * UNIT_RAD)
 
 
-def test_a_lasting_step_is_believed_once_it_could_be_motion():
+def test_a_lasting_step_is_a_slip_and_told_from_there_on():
     angle = ContinuousAngle(MULTI_TURN, speed_limit_rad_s=10.0)
     angle.follow(0, 0.0)
     assert math.isnan(angle.follow(TURN // 2, 0.1))
-    assert angle.follow(TURN // 2, 0.4) == pytest.approx(math.pi)
+    assert math.isnan(angle.follow(TURN // 2, 0.11))
+    assert angle.follow(TURN // 2, 0.12) == pytest.approx(math.pi)
+    assert angle.slips == (Slip(0.1, pytest.approx(math.pi)),)
+    assert angle.slip_rad == pytest.approx(math.pi)
+
+
+def turning(rate_rad_s: float, time_s: float, offset_rad: float = 0.0) -> int:
+    return round((rate_rad_s * time_s + offset_rad) / UNIT_RAD) % RANGE
+
+
+@pytest.mark.parametrize("rate_rad_s", [0.0, 2.0, -2.0])
+@pytest.mark.parametrize("slip_rad", [0.15, -0.15])
+def test_a_slip_below_the_speed_limit_is_found_by_acceleration(rate_rad_s, slip_rad):
+    """0.15 rad in 10 ms is 15 rad/s: any joint limit that allows for it hides it; 20 rad/s^2 does not."""
+    angle = ContinuousAngle(MULTI_TURN, acceleration_limit_rad_s2=20.0)
+    for n in range(100):
+        offset_rad = slip_rad if n >= 50 else 0.0
+        found = angle.follow(turning(rate_rad_s, 0.01 * n, offset_rad), 0.01 * n)
+        assert math.isnan(found) == (n in (50, 51))
+    assert angle.slips == (Slip(pytest.approx(0.5), pytest.approx(slip_rad, abs=3 * UNIT_RAD)),)
+
+
+def test_motion_within_the_limit_is_no_slip_however_late_the_host_is():
+    """Starts, stops and turns at 10 rad/s^2 against a limit of 20, with host times off by up to 1 ms."""
+    rng = np.random.default_rng(2)
+    angle = ContinuousAngle(MULTI_TURN, acceleration_limit_rad_s2=20.0)
+    position_rad = speed_rad_s = 0.0
+    for n in range(3000):
+        speed_rad_s = float(np.clip(speed_rad_s + 0.01 * rng.uniform(-10.0, 10.0), -2.0, 2.0))
+        position_rad += 0.01 * speed_rad_s
+        angle.follow(round(position_rad / UNIT_RAD) % RANGE, 0.01 * n + rng.uniform(-0.001, 0.001))
+    assert angle.slips == ()
+    assert angle.jumps == 0
+
+
+def test_a_glitch_is_no_slip():
+    angle = ContinuousAngle(MULTI_TURN, acceleration_limit_rad_s2=20.0)
+    found = [angle.follow(TURN // 8 if n in (7, 20, 21) else 5, 0.01 * n) for n in range(40)]
+    assert [n for n, each in enumerate(found) if math.isnan(each)] == [7, 20, 21]
+    assert angle.slips == ()
+
+
+def test_ends_of_the_range_are_counted():
+    angle = ContinuousAngle(SINGLE_TURN)
+    for n in range(100):
+        angle.follow(n * TURN // 10 % TURN, 0.1 * n)
+    assert angle.wraps == 9
+    assert not SINGLE_TURN.multi_turn
+    assert MULTI_TURN.multi_turn
 
 
 def test_a_still_encoder_may_flicker_by_one_count_at_any_rate():

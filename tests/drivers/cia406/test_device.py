@@ -7,9 +7,10 @@ import can
 import numpy as np
 import pytest
 
+from drivers.cia406.cycle import HOLD_S
 from drivers.cia406.device import Cia406Encoders
-from drivers.cia406.network import bus_opener
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale
+from drivers.transports.can_interfaces import bus_opener
 from simulators.encoders.frame import CanFrame
 
 NODES = [1, 2, 3, 4, 5, 6]
@@ -107,9 +108,9 @@ def test_sync_keeps_its_deadlines_when_answers_are_slow(memory):
     memory.bus.delay_s = 0.012
     start_s = memory.clock.now_s()
     blocks = [memory.encoders.read(1.0) for _ in range(20)]
-    assert set(np.diff(np.concatenate([block.sequence for block in blocks]))) == {1, 2}  # every fifth or so left out
-    syncs = np.array(memory.syncs_s()) - start_s
-    assert (np.diff(syncs) >= 0.012 - 1e-9).all()  # never two on the way
+    assert set(np.diff(np.concatenate([block.sequence for block in blocks]))) == {1}  # though longer than a period
+    late_s = np.mod(np.array(memory.syncs_s()) - start_s + 1e-9, 0.01)
+    assert late_s.max() < 0.003  # one in ten waits until the bus has come to rest
 
 
 def test_a_lost_answer_is_nan_for_that_node_only(memory):
@@ -120,7 +121,9 @@ def test_a_lost_answer_is_nan_for_that_node_only(memory):
     blocks = [memory.encoders.read(1.0) for _ in range(10)]
     position_rad = np.concatenate([block.values["position_rad"] for block in blocks])
     assert np.isfinite(position_rad[:, 0]).all()
-    assert np.isnan(position_rad[:, 1]).sum() == 2  # the lost one, and the next, which might have been it
+    in_doubt = np.flatnonzero(np.isnan(position_rad[:, 1]))
+    assert 2 <= in_doubt.size <= HOLD_S * 100.0 + 2.0  # until the bus has come to rest, and the next
+    np.testing.assert_array_equal(in_doubt, in_doubt[0] + np.arange(in_doubt.size))
     assert np.isfinite(position_rad[-1]).all()
 
 
@@ -181,7 +184,7 @@ def test_a_restart_that_nobody_ordered_is_lost_and_connecting_again_heals_it(mem
 
 def test_a_node_stopped_by_somebody_else_is_refused(memory):
     memory.encoders.connect()
-    read_for(memory, 0.3)  # a heartbeat of every node has come
+    read_for(memory, 0.5)  # a heartbeat of every node has come
     memory.nodes[0].handle(CanFrame(0x000, b"\x02\x01"), memory.clock.now_s())
     with pytest.raises(DeviceRefused, match="encoder 1 is STOPPED, not operational"):
         read_for(memory, 1.0)

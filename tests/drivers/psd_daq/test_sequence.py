@@ -1,6 +1,6 @@
 """The box's 32-bit count as one that only rises."""
 
-from drivers.psd_daq.sequence import WRAP, SequenceCount
+from drivers.psd_daq.sequence import WRAP, RepeatFilter, SequenceCount
 
 
 def test_a_wrap_goes_on_counting():
@@ -35,3 +35,20 @@ def test_a_frame_that_comes_twice_does_not_count_as_a_wrap():
     count.unwrap(0, 10)
     count.unwrap(10, 10)
     assert count.unwrap(10, 10) == 10
+
+
+def test_a_frame_that_came_before_is_not_new() -> None:
+    frames = RepeatFilter()
+    assert frames.is_new(0, 10)
+    assert frames.is_new(10, 10)
+    assert not frames.is_new(10, 10)
+    assert not frames.is_new(0, 10)
+    assert frames.is_new(50, 10)  # a gap is no repeat
+    assert frames.is_new(2**31 - 1, 10)
+
+
+def test_a_wrap_is_no_repeat() -> None:
+    frames = RepeatFilter()
+    assert frames.is_new(WRAP - 10, 10)
+    assert frames.is_new(0, 10)
+    assert not frames.is_new(WRAP - 10, 10)

@@ -122,3 +122,72 @@ def test_closing_ends_a_read_of_another_thread(pair):
     assert len(outcome) == 1
     assert outcome[0] == b"" or isinstance(outcome[0], DeviceLost)
     line.close()
+
+
+class FtdiPort:
+    """What pyserial shows of a real plug, writing down what is done with it."""
+
+    def __init__(self) -> None:
+        self.done: list[object] = []
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name != "done":
+            self.done.append((name, value))
+        object.__setattr__(self, name, value)
+
+    def set_low_latency_mode(self, on: bool) -> None:
+        self.done.append(("low latency", on))
+
+    def reset_input_buffer(self) -> None:
+        self.done.append("purge in")
+
+    def reset_output_buffer(self) -> None:
+        self.done.append("purge out")
+
+
+class NotingClock:
+    def __init__(self, done: list[object]) -> None:
+        self.done = done
+
+    def now_s(self) -> float:
+        return 0.0
+
+    def sleep_s(self, seconds: float) -> None:
+        self.done.append(seconds)
+
+
+def test_an_ftdi_plug_is_prepared_in_the_order_of_the_apt_protocol(pair):
+    line = SerialLine(pair[1], 115200)
+    real, line._serial = line._serial, FtdiPort()
+    done = line._serial.done
+    line.begin_apt(NotingClock(done))
+    assert done == [
+        ("rts", True),
+        ("low latency", True),
+        0.05,
+        "purge in",
+        "purge out",
+        0.05,
+        ("rtscts", True),
+        ("rts", True),
+    ]
+    real.close()
+
+
+def test_a_port_without_modem_lines_is_left_as_it_is(pair):
+    line = SerialLine(pair[1], 115200)
+    slept: list[object] = []
+    line.begin_apt(NotingClock(slept))
+    assert slept == []
+    line.close()
+
+
+def test_a_plug_that_goes_while_it_is_prepared_is_lost():
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    line = SerialLine(os.ttyname(slave), 115200)
+    os.close(slave)
+    os.close(master)
+    with pytest.raises(DeviceLost, match="gone while preparing"):
+        line.begin_apt(NotingClock([]))
+    line.close()

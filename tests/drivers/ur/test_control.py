@@ -1,4 +1,5 @@
 import os
+import select
 import signal
 import subprocess
 import sys
@@ -143,6 +144,16 @@ def test_stop_of_a_hung_child_goes_through_the_dashboard(control, watch) -> None
     control.move_joints(HOME, 2.0, 10.0)
 
 
+def test_after_hold_every_motion_is_refused_until_connect(control) -> None:
+    control.hold()
+    with pytest.raises(DeviceRefused, match=r"stop\(\)"):
+        control.move_joints(HOME + 0.1, 2.0, 10.0)
+    with pytest.raises(DeviceRefused, match=r"stop\(\)"):
+        control.servo_joints(HOME)
+    control.connect()
+    control.move_joints(HOME + 0.1, 2.0, 10.0)
+
+
 def test_stop_works_without_a_connection(emulated) -> None:
     UrControl(emulated.host).stop()
 
@@ -206,15 +217,45 @@ def test_a_silent_controller_does_not_hang_a_move(emulated, control) -> None:
     assert time.monotonic() - start_s < 6.0
 
 
-def test_a_dead_parent_stops_the_arm(emulated, watch) -> None:
+def test_a_dead_parent_stops_the_arm(emulated) -> None:
     code = (
         "import sys; from drivers.ur.control import UrControl; c = UrControl(sys.argv[1]); c.connect();"
-        f"c.move_joints({HOME.tolist()}, 2.0, 10.0); c.move_joints({FAR.tolist()}, {SLOW_RAD_S}, 3.0)"
+        f"c.move_joints({HOME.tolist()}, 2.0, 10.0); print(flush=True);"
+        f"c.move_joints({FAR.tolist()}, {SLOW_RAD_S}, 3.0)"
     )
-    with subprocess.Popen([sys.executable, "-c", code, emulated.host]) as parent:
+    reader = UrReader(emulated.host)
+    with subprocess.Popen([sys.executable, "-c", code, emulated.host], stdout=subprocess.PIPE) as parent:
+        assert parent.stdout is not None
+        assert parent.stdout.readline()  # it is at home, and about to go far
+        reader.connect()  # not before: what it saw meanwhile would be read first
+        watch = Watch(reader)
         watch.until(lambda q, qd: bool(q[0] > 0.02 and qd[0] > 0.5 * SLOW_RAD_S))
         parent.kill()
-    assert watch.until_standing()[0] < 2.0
+    at_rest = watch.until_standing()
+    reader.close()
+    assert at_rest[0] < 2.0
+
+
+def test_a_dead_parent_and_a_dead_controller_leave_no_process_behind(emulated) -> None:
+    code = (
+        "import sys; from drivers.ur.control import UrControl; c = UrControl(sys.argv[1]);"
+        "c.connect(); print(flush=True); input()"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", code, emulated.host], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as parent:
+        assert parent.stdout is not None
+        assert parent.stdout.readline()
+        child = int(Path(f"/proc/{parent.pid}/task/{parent.pid}/children").read_text().split()[0])
+        watched = os.pidfd_open(child)
+        try:
+            emulated.do("robot.silence", on=True)
+            parent.kill()
+            ended, _, _ = select.select([watched], [], [], 30.0)
+        finally:
+            emulated.do("robot.silence", on=False)
+            os.close(watched)
+    assert ended
 
 
 def test_local_control_is_refused_before_anything_moves(emulated) -> None:

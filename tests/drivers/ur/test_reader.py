@@ -125,13 +125,17 @@ def test_a_server_that_says_nothing_is_stale(scripted, monkeypatch: pytest.Monke
 
 def older_controller(missing: set[str]):
     """Answers a handshake; knows every variable but the missing ones, and sends one package."""
-    vectors = {"target_q", "actual_q", "actual_qd", "actual_current", "joint_temperatures"}
-    doubles = {"timestamp", "speed_scaling", "payload"}
+    kinds = {
+        "DOUBLE": "timestamp speed_scaling target_speed_fraction standard_analog_input0 standard_analog_input1 payload",
+        "VECTOR6D": "target_q target_qd target_current actual_q actual_qd actual_current joint_temperatures "
+        "actual_TCP_pose tcp_offset",
+        "VECTOR3D": "payload_cog",
+        "VECTOR6INT32": "joint_mode",
+    }
+    kind_by_name = {name: kind for kind, names in kinds.items() for name in names.split()}
 
     def kind_of(name: str) -> str:
-        if name in missing:
-            return "NOT_FOUND"
-        return "VECTOR6D" if name in vectors else "DOUBLE" if name in doubles else "INT32"
+        return "NOT_FOUND" if name in missing else kind_by_name.get(name, "INT32")
 
     def talk(client: socket.socket) -> None:
         types: list[str] = []
@@ -145,7 +149,7 @@ def older_controller(missing: set[str]):
                     types = [kind_of(name) for name in payload[8:].decode().split(",")]
                     client.sendall(frame("O", b"\x01" + ",".join(types).encode()))
                 case "S":
-                    sizes = {"DOUBLE": 8, "VECTOR6D": 48, "INT32": 4}
+                    sizes = {"DOUBLE": 8, "VECTOR6D": 48, "INT32": 4, "VECTOR3D": 24, "VECTOR6INT32": 24}
                     client.sendall(frame("S", b"\x01") + frame("U", b"\x01" + bytes(sum(sizes[t] for t in types))))
 
     return talk

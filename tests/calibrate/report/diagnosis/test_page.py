@@ -26,7 +26,7 @@ from calibrate.diagnose.schema import (
 )
 from calibrate.errors import DataError
 from calibrate.report.diagnosis.chain_figure import chain_figure, chain_of
-from calibrate.report.diagnosis.finding_page import size_words
+from calibrate.report.diagnosis.finding_page import interval_words, size_words
 from calibrate.report.diagnosis.page import chapters_of, contents_of, inserted
 from calibrate.report.diagnosis.words import verdict_words
 
@@ -114,12 +114,27 @@ def test_the_place_is_marked_in_the_chain_and_nowhere_else():
     [
         ("phase_rad", SizeRecord(np.pi / 2, np.pi / 180), "90.0 ± 1.0 °"),
         ("shift_x_m", SizeRecord(2e-5, 1e-6), "20.0 ± 1.0 µm"),
-        ("compliance_rad_nm", SizeRecord(6.8e-5, 2e-6), "6.80 × 10⁻⁵ ± 2.0 × 10⁻⁶"),
+        ("compliance_rad_nm", SizeRecord(6.8e-5, 2e-6), "68.0 ± 2.0 µrad per Nm"),
+        ("drift_s_per_s", SizeRecord(-4e-4, 2e-6), "\N{MINUS SIGN}400.0 ± 2.0 µs per s"),
+        ("frequency_hz", SizeRecord(7.0, 0.02), "7.000 ± 0.020 Hz"),
+        ("expansion_per_k", SizeRecord(1.2e-5, 1e-6), "12.0 ± 1.0 µm per m and K"),
         ("order", SizeRecord(None, 1.0), "\N{EN DASH}"),
     ],
 )
 def test_sizes_have_a_unit_that_fits(name, size, said):
     assert size_words(name, size).replace("\N{NO-BREAK SPACE}", " ") == said
+
+
+def test_an_interval_holds_95_of_100_sizes():
+    said = interval_words("compliance_rad_nm", SizeRecord(6.8e-5, 2e-6)).replace("\N{NO-BREAK SPACE}", " ")
+    assert said == "64.1 to 71.9 µrad per Nm"
+    assert interval_words("samples_count", SizeRecord(20.0, 0.0)) == "\N{EN DASH}"
+
+
+def test_the_largest_size_that_a_machine_shows_stands_beside(text):
+    assert "a machine shows at most" not in text
+    known = msgspec.structs.replace(FILE, findings=(msgspec.structs.replace(FINDING, plausible_to=3e-4),))
+    assert "300 µrad" in "".join(chapters_of(known, 6)).replace("\N{NO-BREAK SPACE}", " ")
 
 
 def test_the_verdict_says_whether_noise_is_what_remains():

@@ -1,0 +1,36 @@
+"""What motion needs to know of an arm: passed in, never imported. Joint i + 1 turns about z of frame i."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+class Kinematics(Protocol):
+    """An arm of turning joints, nominal or calibrated."""
+
+    lower_rad: Floats  # (joint,)
+    upper_rad: Floats
+
+    def frames(self, q_rad: Floats) -> Floats:
+        """T_base_frame (pose, joint + 1, 4, 4) at joint readings (pose, joint); the last is the flange."""
+        ...
+
+
+def flange(arm: Kinematics, q_rad: Floats) -> Floats:
+    """T_base_flange (4, 4) at joint readings (joint,)."""
+    out: Floats = arm.frames(q_rad[None])[0, -1]
+    return out
+
+
+def jacobian(frames: Floats) -> Floats:
+    """(pose, 6, joint): velocity of the flange origin (m) and turn (rad) in the base by each joint, of `frames`."""
+    axes, arms_m = frames[:, :-1, :3, 2], frames[:, -1:, :3, 3] - frames[:, :-1, :3, 3]
+    out = np.empty((len(frames), 6, frames.shape[1] - 1))
+    out[:, 0] = axes[..., 1] * arms_m[..., 2] - axes[..., 2] * arms_m[..., 1]
+    out[:, 1] = axes[..., 2] * arms_m[..., 0] - axes[..., 0] * arms_m[..., 2]
+    out[:, 2] = axes[..., 0] * arms_m[..., 1] - axes[..., 1] * arms_m[..., 0]
+    out[:, 3:] = np.swapaxes(axes, 1, 2)
+    return out

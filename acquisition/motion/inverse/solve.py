@@ -1,0 +1,180 @@
+"""Joint readings for flange poses on any arm, one or many at a time: damped Newton steps from given starts.
+
+Source of the damping: T. Sugihara, Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method, IEEE
+Trans. Robotics 27 (2011) 984: the damping is the squared error itself, so the last steps are Newton's.
+"""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.motion.inverse.closed_form import Starts
+from acquisition.motion.inverse.kinematics import Kinematics, jacobian
+from acquisition.motion.rigid import rotation_vector
+
+Floats = NDArray[np.float64]
+
+CLOSE = 1e-10  # m and rad: a tenth of what is promised, thousands of times the rounding of a 1 m arm
+MAX_STEPS = 40
+STEP_RAD = 0.5  # longest step of one joint: half of where a linear picture of an arm still means something
+SMALL_TURN_RAD = 1e-3  # here half the skew part is the turn to 2e-10 of itself, and far cheaper than the exact vector
+MORE_STEPS = 12  # near a singular posture each step halves the error only
+FEW_STEPS = 6  # a good start is there after two to four; what takes more waits until those are done
+FAR_RAD = 1e3  # further than any way of an arm: what is out of range is tried after all that is in it
+SAME_RAD = 1e-6  # solutions nearer than this are one
+RANDOM_STARTS = 8  # at once, for poses that nothing better leads to
+RANDOM_ROUNDS = 4
+ALL_RANDOM_STARTS = 128  # to list solutions: eight branches, each found with all but certainty
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """`q_rad` (pose, joint), NaN where not `found` (pose,)."""
+
+    q_rad: Floats
+    found: NDArray[np.bool_]
+
+
+def refine(
+    arm: Kinematics, T_base_flange: Floats, start_rad: Floats, max_steps: int = MAX_STEPS, close: float = CLOSE
+) -> Solved:
+    """From one start (pose, joint) each, until within `close` (m and rad); joint limits are not looked at."""
+    q_rad, found = start_rad.copy(), np.zeros(len(start_rad), dtype=bool)
+    active = np.arange(len(start_rad))
+    for _ in range(max_steps + 1):
+        frames = arm.frames(q_rad[active])
+        error = _error(T_base_flange[active], frames[:, -1])
+        size = np.max(np.abs(error), axis=1)
+        found[active[size < close]] = True
+        going = np.isfinite(size) & (size >= close)
+        active, error, frames = active[going], error[going], frames[going]
+        if active.size == 0:
+            break
+        step = _step(jacobian(frames), error)
+        q_rad[active] += step * np.minimum(1.0, STEP_RAD / np.max(np.abs(step), axis=1, keepdims=True))
+    return Solved(np.where(found[:, None], q_rad, np.nan), found)
+
+
+def solve_many(
+    arm: Kinematics, T_base_flange: Floats, near_rad: Floats, starts: Starts | None, rng: np.random.Generator
+) -> Solved:
+    """One solution each within the joint range, tried in the order of nearness to `near_rad` (joint,) or (pose, joint).
+
+    Starts are the closed form's branches; where there is none, or none leads there, random ones.
+    """
+    near = np.broadcast_to(near_rad, (len(T_base_flange), arm.lower_rad.size))
+    q_rad, found = np.full(near.shape, np.nan), np.zeros(len(near), dtype=bool)
+    tried = near[:, None]
+    if starts is not None:
+        branches = _in_order(arm, unwound(starts(T_base_flange), near[:, None], arm), near)
+        for steps, k in product((FEW_STEPS, MORE_STEPS), range(branches.shape[1])):
+            _try(arm, T_base_flange, branches[:, k : k + 1], near, q_rad, found, steps)
+        tried = np.concatenate([branches, tried], axis=1)
+    _try(arm, T_base_flange, tried, near, q_rad, found)
+    for _ in range(RANDOM_ROUNDS):
+        if found.all():
+            break
+        drawn = rng.uniform(arm.lower_rad, arm.upper_rad, (len(near), RANDOM_STARTS, near.shape[1]))
+        _try(arm, T_base_flange, drawn, near, q_rad, found)
+    return Solved(q_rad, found)
+
+
+def all_solutions(
+    arm: Kinematics, T_base_flange: Floats, near_rad: Floats, starts: Starts | None, rng: np.random.Generator
+) -> Floats:
+    """Every solution (solution, joint) for one pose (4, 4) within the joint range, nearest to `near_rad` first.
+
+    Each stands in the turns nearest to `near_rad`. Without a closed form: those that random starts lead to.
+    """
+    if starts is None:
+        begin = rng.uniform(arm.lower_rad, arm.upper_rad, (ALL_RANDOM_STARTS, arm.lower_rad.size))
+    else:
+        begin = starts(T_base_flange[None])[0]
+    begin = np.concatenate([begin, near_rad[None]])
+    begin = begin[np.all(np.isfinite(begin), axis=1)]
+    solved = refine(arm, np.broadcast_to(T_base_flange, (len(begin), 4, 4)), begin)
+    q_rad = unwound(solved.q_rad[solved.found], near_rad[None], arm)
+    q_rad = q_rad[within(arm, q_rad)]
+    q_rad = q_rad[np.argsort(np.linalg.norm(q_rad - near_rad, axis=1), kind="stable")]
+    out: list[Floats] = []
+    for q in q_rad:
+        if all(np.max(np.abs((q - other + np.pi) % (2.0 * np.pi) - np.pi)) > SAME_RAD for other in out):
+            out.append(q)
+    return np.array(out).reshape(-1, arm.lower_rad.size)
+
+
+def unwound(q_rad: Floats, near_rad: Floats, arm: Kinematics) -> Floats:
+    """(..., joint) the same postures, every joint in the turn nearest to `near_rad` that its range allows."""
+    q = q_rad + 2.0 * np.pi * np.round((near_rad - q_rad) / (2.0 * np.pi))
+    q = np.where(q > arm.upper_rad, q - 2.0 * np.pi, q)
+    return np.where(q < arm.lower_rad, q + 2.0 * np.pi, q)
+
+
+def within(arm: Kinematics, q_rad: Floats) -> NDArray[np.bool_]:
+    """(...) whether every joint (..., joint) is in its range."""
+    return np.asarray(np.all((q_rad >= arm.lower_rad) & (q_rad <= arm.upper_rad), axis=-1))
+
+
+def _try(
+    arm: Kinematics,
+    T: Floats,
+    starts: Floats,
+    near: Floats,
+    q_rad: Floats,
+    found: NDArray[np.bool_],
+    max_steps: int = MAX_STEPS,
+) -> None:
+    """Fill in those not found yet, each from all its starts (pose, start, joint) at once; the first good one counts."""
+    todo = np.flatnonzero(~found)
+    if todo.size == 0:
+        return
+    pose, start = np.nonzero(np.all(np.isfinite(starts[todo]), axis=2))
+    solved = refine(arm, T[todo[pose]], starts[todo[pose], start], max_steps)
+    q = unwound(solved.q_rad, near[todo[pose]], arm)
+    good = np.flatnonzero(solved.found & within(arm, q))
+    which, first = np.unique(pose[good], return_index=True)
+    q_rad[todo[which]], found[todo[which]] = q[good[first]], True
+
+
+def _in_order(arm: Kinematics, branches: Floats, near: Floats) -> Floats:
+    """(pose, branch, joint) the nearest branch within the range first, those out of range last, NaN behind them."""
+    way = np.linalg.norm(branches - near[:, None], axis=2) + FAR_RAD * ~within(arm, branches)
+    order = np.argsort(way, axis=1, kind="stable")
+    return np.take_along_axis(branches, order[..., None], axis=1)
+
+
+def _step(J: Floats, error: Floats) -> Floats:
+    """(pose, joint); square arms by their own equations, others by the damped normal equations of the short side."""
+    damping = np.sum(error**2, axis=1)[:, None, None] + 1e-15
+    short = J @ np.swapaxes(J, 1, 2)
+    small = damping[:, 0, 0] < 1e-12
+    out = np.empty((len(J), J.shape[2]))
+    square = J.shape[1] == J.shape[2]
+    newton = small & square
+    if newton.any():
+        out[newton] = _solved(J[newton] + 1e-13 * np.eye(6), error[newton])
+    rest = ~newton
+    if rest.any():
+        weights = _solved(short[rest] + damping[rest] * np.eye(6), error[rest])
+        out[rest] = (np.swapaxes(J[rest], 1, 2) @ weights[..., None])[..., 0]
+    return out
+
+
+def _solved(A: Floats, b: Floats) -> Floats:
+    return np.asarray(np.linalg.solve(A, b[..., None])[..., 0], dtype=np.float64)
+
+
+def _error(T_goal: Floats, T: Floats) -> Floats:
+    """(pose, 6) shift m and turn rad in the base that are missing; exact also half a turn away."""
+    turn = T_goal[:, :3, :3] @ np.swapaxes(T[:, :3, :3], 1, 2)
+    out = np.empty((len(T), 6))
+    out[:, :3] = T_goal[:, :3, 3] - T[:, :3, 3]
+    out[:, 3] = 0.5 * (turn[:, 2, 1] - turn[:, 1, 2])
+    out[:, 4] = 0.5 * (turn[:, 0, 2] - turn[:, 2, 0])
+    out[:, 5] = 0.5 * (turn[:, 1, 0] - turn[:, 0, 1])
+    far = np.einsum("pii->p", turn) < 3.0 - SMALL_TURN_RAD**2
+    if far.any():
+        out[far, 3:] = rotation_vector(turn[far])
+    return out

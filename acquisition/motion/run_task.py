@@ -1,0 +1,98 @@
+"""Teaches a task and runs its program through the gate: a sweep of the arm, a reading of the camera, the next sweep."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.motion.errors import TaskError
+from acquisition.motion.gate import Followed, Gate
+from acquisition.motion.inverse.solver import Solver
+from acquisition.motion.paths.path import STANDING, Belt
+from acquisition.motion.plan import Plan
+from acquisition.motion.setpoints import BeltNow
+from acquisition.motion.task.graph import TaskGraph
+from acquisition.motion.task.program import Step, unrolled
+from acquisition.motion.task.sweeps import GRASP, next_sweep
+from acquisition.motion.task.task_file import Task, Teach
+
+Floats = NDArray[np.float64]
+
+
+class Hand(Protocol):
+    """What grips; both return when it has."""
+
+    def grasp(self) -> None: ...
+    def release(self) -> None: ...
+
+
+def no_hand(action: str) -> None:
+    """For an arm that carries nothing: GRASP and RELEASE only wait."""
+
+
+def no_camera(name: str) -> Floats:
+    """TaskError: there is none."""
+    raise TaskError(f"READ {name}: no camera is connected; give the transform in the task instead")
+
+
+@dataclass(frozen=True)
+class Around:
+    """What a program needs beside the arm. `belt` tells how far the belt has gone, now."""
+
+    joints: Callable[[], Floats]  # readings (joint,) of the arm, which rests
+    read: Callable[[str], Floats] = no_camera  # T (4, 4) of a transform that a camera sees
+    act: Callable[[str], None] = no_hand  # GRASP, RELEASE
+    belt: BeltNow = lambda: STANDING
+    watch: Callable[[], None] = lambda: None
+
+
+@dataclass
+class Ran:
+    """What a program did: the task with everything read, and each sweep as planned and as streamed."""
+
+    graph: TaskGraph
+    sweeps: list[tuple[Plan, Followed]] = field(default_factory=list[tuple[Plan, Followed]])
+
+
+def hand_actions(hand: Hand) -> Callable[[str], None]:
+    """The actions of a program, done by a hand."""
+    return lambda action: hand.grasp() if action == GRASP else hand.release()
+
+
+def teach(graph: TaskGraph, steps: Sequence[Teach], solver: Solver, placed: Callable[[str], Floats]) -> TaskGraph:
+    """The task with its transforms taught; `placed` has the arm placed at a position and tells its readings (joint,).
+
+    TaskError where a step cannot be solved yet.
+    """
+    for step in steps:
+        if step.at not in graph.positions:
+            raise TaskError(f"teach {step.transform}: {step.at} is not among the positions of the task")
+        graph = graph.taught(step.transform, step.at, solver.flange(placed(step.at)))
+    return graph
+
+
+def run_task(gate: Gate, task: Task, around: Around) -> Ran:
+    """The whole program. TaskError, RefusedMotionError before a sweep; InterruptedMotionError, DeviceError in one."""
+    ran = Ran(task.graph)
+    steps: Sequence[Step] = task.program
+    plain = list(unrolled(tuple(steps)))
+    while plain:
+        segments, count = next_sweep(ran.graph, plain)
+        if segments:
+            now_rad = around.joints()
+            made = gate.plan(now_rad, segments, _expected(around.belt()))
+            followed = gate.run(made, around.joints(), around.belt, around.act, around.watch)
+            ran.sweeps.append((made, followed))
+        if count < len(plain):
+            name = plain[count].transform  # type: ignore[union-attr] - a sweep ends before a READ only
+            ran.graph = ran.graph.with_value(name, around.read(name))
+            ran.graph.check()
+        plain = plain[count + 1 :]
+    return ran
+
+
+def _expected(belt: Belt) -> Callable[[float], Belt]:
+    """The belt as it will be if it keeps its speed."""
+    return lambda t_s: Belt(belt.s_m + belt.rate_m_s * t_s, belt.rate_m_s)

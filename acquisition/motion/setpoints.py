@@ -1,0 +1,79 @@
+"""Set-points between solutions: each is solved a period ahead and interpolated to over the next one.
+
+At t_k the belt is read and the solution for t_k + 2/f begun; it is ready at t_k + 1/f, and interpolated to from there.
+So a belt that stops dead is overshot by 2 Vc / f, and between solutions y apart the joints leave a straight track at
+distance R by y^2 / (8 R). Source: R. Paul, Robot Manipulators, 1981, ch. 5 (rates); lecture chapter 8, "Rates".
+"""
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.motion.paths.path import Belt
+
+Floats = NDArray[np.float64]
+BeltNow = Callable[[], Belt]
+
+
+class Followable(Protocol):
+    """A path, solved while it is followed or beforehand."""
+
+    @property
+    def ends_s(self) -> float: ...
+    @property
+    def actions(self) -> list[tuple[float, str]]: ...
+    def at(self, t_s: float, belt: Belt) -> Floats: ...
+
+
+PER_STRUCTURAL = 10.0  # solutions per period of the lowest structural resonance: steps then excite none
+
+
+def solve_rate_hz(structural_hz: float, stream_hz: float) -> float:
+    """f_solve = 10 f_structural, never more than one solution for each set-point of the stream."""
+    return min(PER_STRUCTURAL * structural_hz, stream_hz)
+
+
+class LookAhead:
+    """The one owner of how far a path has been solved; `reached_s`: path time that the set-points have passed.
+
+    Path time runs by `scale`, which the caller may change.
+    """
+
+    def __init__(self, path: Followable, solve_hz: float, belt: BeltNow, start_rad: Floats) -> None:
+        self.path = path
+        self.scale = 1.0
+        self._path_s = 0.0  # path time of the solution after these
+        self._period_s, self._belt = 1.0 / solve_hz, belt
+        self._behind_rad = self._ahead_rad = self._next_rad = start_rad
+        self.reached_s = self._ahead_s = self._next_s = 0.0  # path times of the three
+        self._interval = -1
+
+    def at(self, t_s: float) -> Floats:
+        """The set-point (joint,) at stream time t, not before an earlier one. RefusedMotionError."""
+        interval = int(t_s / self._period_s + 1e-9)
+        while self._interval < interval:
+            self._interval += 1
+            self._behind_rad, self._ahead_rad = self._ahead_rad, self._next_rad
+            self.reached_s, self._ahead_s, self._next_s = self._ahead_s, self._next_s, self._path_s
+            self._next_rad = self._solved()
+        share = t_s / self._period_s - self._interval
+        return self._behind_rad + (self._ahead_rad - self._behind_rad) * share
+
+    def restart(self, t_s: float) -> None:
+        """The arm has come to rest on the set-point of stream time t: the path goes on from there, from standing."""
+        share = min(1.0, t_s / self._period_s - self._interval)
+        here_rad = self._behind_rad + (self._ahead_rad - self._behind_rad) * share
+        here_s = self.reached_s + (self._ahead_s - self.reached_s) * share
+        self._behind_rad = self._ahead_rad = self._next_rad = here_rad
+        self.reached_s = self._ahead_s = self._next_s = self._path_s = here_s
+        self.scale = 0.0
+
+    def _solved(self) -> Floats:
+        """Two periods ahead of the belt that is read now."""
+        belt = self._belt()
+        ahead = Belt(belt.s_m + belt.rate_m_s * 2.0 * self._period_s, belt.rate_m_s)
+        q_rad = self.path.at(self._path_s, ahead)
+        self._path_s += self.scale * self._period_s
+        return q_rad

@@ -1,0 +1,90 @@
+"""Raw CAN frames as a stream of a recording: one sample a frame, sent ones too, in the order heard.
+
+`host_s` is when the frame reached, or left, this program; `device_s` is the adapter's own stamp, NaN where it has none.
+`sequence` counts frames, so that a frame lost between here and the file is a gap.
+"""
+
+import enum
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.recording.stream import Channel, Floats, Stream
+
+STREAM = "can"
+CLASSIC_BYTES, FD_BYTES = 8, 64  # ISO 11898-1: longest payload of a frame
+CHANNELS_NOTE = "can_channels"  # note of an import, JSON: stream -> the channel of the file it came from
+CAN_ID, FLAGS, LENGTH, DATA = "can_id", "flags", "length", "data"
+
+
+class FrameFlag(enum.IntFlag):
+    """What kind of frame it was; the values stand in files and never change."""
+
+    EXTENDED = 1  # identifier of 29 bits
+    REMOTE = 2  # asks for data; `length` is what it asks for
+    ERROR = 4  # told by the adapter: bus off, passive, form, bit, ...
+    FD = 8
+    BIT_RATE_SWITCH = 16
+    ERROR_STATE = 32  # ESI: its sender is error passive
+    SENT = 64  # by this program
+
+
+class Frame(NamedTuple):  # and no dataclass: thousands a second are made of these
+    """One frame; `flags` are those of FrameFlag."""
+
+    host_s: float
+    device_s: float  # NaN: the adapter gave no stamp
+    can_id: int
+    flags: int
+    length: int
+    data: bytes  # empty in a remote frame
+
+
+@dataclass(frozen=True)
+class FrameBlock:
+    """Consecutive frames as a stream takes them."""
+
+    host_s: Floats
+    device_s: Floats
+    values: dict[str, NDArray[np.int64]]
+
+
+def channels(width: int = CLASSIC_BYTES) -> tuple[Channel, ...]:
+    """Of a stream of frames with up to `width` bytes; shorter payloads are filled up with zeros."""
+    return (Channel(CAN_ID, ""), Channel(FLAGS, ""), Channel(LENGTH, ""), Channel(DATA, "", (width,)))
+
+
+def block_of(frames: Sequence[Frame], width: int = CLASSIC_BYTES) -> FrameBlock:
+    """ValueError for a payload that is longer than `width`."""
+    longest = max((len(frame.data) for frame in frames), default=0)
+    if longest > width:
+        raise ValueError(f"a CAN frame of {longest} bytes in a stream of {width}; open the stream for CAN FD")
+    payload = b"".join(frame.data.ljust(width, b"\0") for frame in frames)
+    return FrameBlock(
+        np.array([frame.host_s for frame in frames]),
+        np.array([frame.device_s for frame in frames]),
+        {
+            CAN_ID: np.array([frame.can_id for frame in frames], dtype=np.int64),
+            FLAGS: np.array([frame.flags for frame in frames], dtype=np.int64),
+            LENGTH: np.array([frame.length for frame in frames], dtype=np.int64),
+            DATA: np.frombuffer(payload, dtype=np.uint8).reshape(-1, width).astype(np.int64),
+        },
+    )
+
+
+def is_frames(stream: Stream) -> bool:
+    """Whether a stream holds raw CAN frames."""
+    return {CAN_ID, FLAGS, LENGTH, DATA} <= {channel.name for channel in stream.channels}
+
+
+def frames_of(stream: Stream) -> Iterator[Frame]:
+    """The frames of such a stream, in its order."""
+    payloads = stream.values[DATA].astype(np.uint8)
+    columns = (stream.host_s, stream.device_s, stream.values[CAN_ID], stream.values[FLAGS], stream.values[LENGTH])
+    rows = zip(*(np.asarray(column).tolist() for column in columns), strict=True)
+    for at, (host_s, device_s, can_id, flags, length) in enumerate(rows):
+        data = b"" if int(flags) & FrameFlag.REMOTE else payloads[at, : int(length)].tobytes()
+        yield Frame(host_s, device_s, int(can_id), int(flags), int(length), data)

@@ -1,0 +1,247 @@
+"""CAN frames in and out: BLF (Vector), ASC, CSV and candump files through python-can, from and to recordings.
+
+A file's channels become streams: `can`, or `can-<channel>` where it names them. Absolute times are kept: a frame's
+host time counts from the first frame, whose date is the recording's start. Formats that need a data base or another
+package (.db, .mf4) are not taken: python-can's .db writer loses frames when it is stopped.
+"""
+
+import math
+import re
+import struct
+import zlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from functools import partial
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import can
+import msgspec
+import numpy as np
+from can.io.blf import BLFParseError
+from can.io.generic import MessageReader, MessageWriter
+
+from acquisition.recording.can_frames import (
+    CHANNELS_NOTE,
+    CLASSIC_BYTES,
+    FD_BYTES,
+    STREAM,
+    Frame,
+    block_of,
+    channels,
+    frames_of,
+    is_frames,
+)
+from acquisition.recording.can_message import frame_of, message_of
+from acquisition.recording.errors import RecordingError
+from acquisition.recording.recording import Recording
+from acquisition.recording.stream_writer import StreamWriter
+from acquisition.recording.writer import RecordingWriter
+
+BLOCK = 10_000  # frames at a time into the recording
+MALFORMED = (  # what python-can's readers raise on lines and bytes that make no sense
+    BLFParseError,
+    EOFError,
+    IndexError,
+    KeyError,
+    OverflowError,
+    TypeError,
+    ValueError,
+    can.CanError,
+    struct.error,
+    zlib.error,
+)
+
+_READERS: Mapping[str, Callable[[Any], MessageReader]] = MappingProxyType(
+    {
+        ".blf": can.BLFReader,
+        ".asc": partial(can.ASCReader, relative_timestamp=False),
+        ".csv": can.CSVReader,
+        ".log": can.CanutilsLogReader,
+    }
+)
+_WRITERS: Mapping[str, Callable[[Path], MessageWriter]] = MappingProxyType(
+    {
+        ".blf": can.BLFWriter,
+        ".asc": can.ASCWriter,
+        ".csv": can.CSVWriter,
+        ".log": can.CanutilsLogWriter,
+    }
+)
+SUFFIXES = tuple(_READERS)
+
+
+@dataclass(frozen=True)
+class CanImport:
+    """What an import brought; `damage` says where the file could not be read further."""
+
+    frames: int
+    streams: tuple[str, ...]
+    damage: str | None
+
+
+def import_can(source: Path, path: Path, *, rig_text: str, software: str) -> CanImport:
+    """Make a recording of a CAN log; its kind is known by its suffix.
+
+    RecordingError when it cannot be opened, holds no frame, or is of no known kind; of a damaged one everything before
+    the damage is kept, and the recording is not complete.
+    """
+    survey = _surveyed(source)
+    log = _Log(source)
+    with RecordingWriter(
+        path,
+        rig_text=rig_text,
+        software=software,
+        clock=_FirstFrame(),
+        notes={"imported_from": source.name, CHANNELS_NOTE: msgspec.json.encode(survey.channels).decode()},
+        started_utc=datetime.fromtimestamp(0, UTC) + timedelta(seconds=survey.start_s),
+    ) as writer:
+        inlets = {
+            channel: _Inlet(writer.stream(name, channels(survey.width), viewer=()), survey)
+            for name, channel in survey.channels.items()
+        }
+        for message in log:
+            inlets[_bus(message)].take(message)
+        for inlet in inlets.values():
+            inlet.write()
+        writer.close(complete=log.damage is None)
+    return CanImport(sum(inlet.count for inlet in inlets.values()), tuple(survey.channels), log.damage)
+
+
+def export_can(recording: Recording, path: Path) -> int:
+    """Write every raw frame of a recording, all its buses by time; the number of frames.
+
+    RecordingError when there is none, the suffix is unknown, the file exists, or the disk refuses.
+    """
+    make = _WRITERS.get(path.suffix.lower())
+    if make is None:
+        raise RecordingError(f"{path}: no CAN log format '{path.suffix}'; give one of {', '.join(SUFFIXES)}")
+    if path.exists():
+        raise RecordingError(f"{path}: the file exists; nothing is overwritten, choose another name")
+    count = 0
+    messages = _messages(recording)
+    try:
+        with make(path) as writer:
+            for message in messages:
+                writer.on_message_received(message)
+                count += 1
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot write the CAN log ({error.strerror}); choose another place") from error
+    return count
+
+
+def _messages(recording: Recording) -> Iterator[can.Message]:
+    streams = [stream for stream in recording.streams.values() if is_frames(stream)]
+    if not streams:
+        raise RecordingError(
+            f"{recording.path}: no raw CAN frames in it; record them with `calibeam log encoders --raw`"
+        )
+    named: dict[str, int | str | None] = msgspec.json.decode(recording.notes.get(CHANNELS_NOTE, "{}"))
+    start_s = _since_1970(recording.started_utc) - recording.host_s0
+    rows: list[tuple[float, int | str | None, Frame]] = []
+    for stream in streams:
+        channel = named.get(stream.name)
+        rows += [(frame.host_s, channel, frame) for frame in frames_of(stream)]
+    if len(streams) > 1:
+        rows.sort(key=lambda row: row[0])  # stable: frames of one bus keep their order
+    return (message_of(frame, start_s + host_s, channel) for host_s, channel, frame in rows)
+
+
+class _FirstFrame:
+    """The clock of a log that is over: its times count from its first frame."""
+
+    def now_s(self) -> float:
+        return 0.0
+
+
+class _Log:
+    """The messages of a file up to its end or to where it makes no sense; then `damage` says so."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.damage: str | None = None
+        reader = _READERS.get(path.suffix.lower())
+        if reader is None:
+            raise RecordingError(f"{path}: no CAN log format '{path.suffix}'; give one of {', '.join(SUFFIXES)}")
+        self._open = reader
+        self._mode = "rb" if path.suffix.lower() == ".blf" else "r"
+
+    def __iter__(self) -> Iterator[can.Message]:
+        count = 0
+        try:
+            # opened here: python-can leaves a file open whose beginning it does not know
+            with self._path.open(self._mode) as file, self._open(file) as messages:
+                for message in messages:
+                    yield message
+                    count += 1
+        except OSError as error:
+            raise RecordingError(f"{self._path}: cannot read it ({error.strerror or error}); check the path") from error
+        except MALFORMED as error:
+            self.damage = f"after {count} frames the file makes no sense ({type(error).__name__}: {error})"
+
+
+@dataclass(frozen=True)
+class _Survey:
+    """What must be known of a file before its first frame can be written."""
+
+    start_s: float
+    width: int
+    channels: dict[str, int | str | None]  # stream -> channel of the file
+
+
+def _surveyed(source: Path) -> _Survey:
+    log = _Log(source)
+    start_s, longest, named = math.nan, 0, dict[str, int | str | None]()
+    for message in log:
+        start_s = message.timestamp if math.isnan(start_s) else start_s
+        longest = max(longest, len(message.data))
+        named[stream_name(_bus(message))] = _bus(message)
+    if not named:
+        raise RecordingError(f"{source}: no CAN frame in it ({log.damage or 'it is empty'}); check the file")
+    return _Survey(start_s, FD_BYTES if longest > CLASSIC_BYTES else CLASSIC_BYTES, named)
+
+
+class _Inlet:
+    """Frames of one channel into its stream."""
+
+    def __init__(self, stream: StreamWriter, survey: _Survey) -> None:
+        self.count = 0
+        self._stream, self._survey = stream, survey
+        self._frames: list[Frame] = []
+
+    def take(self, message: can.Message) -> None:
+        host_s = message.timestamp - self._survey.start_s
+        self._frames.append(frame_of(message, host_s, sent=not message.is_rx))
+        if len(self._frames) == BLOCK:
+            self.write()
+
+    def write(self) -> None:
+        if not self._frames:
+            return
+        block = block_of(self._frames, self._survey.width)
+        first, self.count = self.count, self.count + len(self._frames)
+        self._frames = []
+        self._stream.append(block.host_s, block.device_s, np.arange(first, self.count), block.values)
+
+
+def _bus(message: can.Message) -> int | str | None:
+    """The channel of a file that a message came on; python-can allows bonded ones, which get one name together."""
+    channel = message.channel
+    return channel if channel is None or isinstance(channel, int | str) else "-".join(map(str, channel))
+
+
+def stream_name(channel: int | str | None) -> str:
+    """The stream of a file's channel: letters, digits and - only."""
+    if channel is None:
+        return STREAM
+    return f"{STREAM}-{re.sub(r'[^A-Za-z0-9]+', '-', str(channel))}"
+
+
+def _since_1970(started_utc: str) -> float:
+    try:
+        start = datetime.fromisoformat(started_utc)
+    except ValueError:
+        return math.nan
+    return (start - datetime.fromtimestamp(0, UTC)) / timedelta(seconds=1)

@@ -1,0 +1,46 @@
+"""Between python-can's message and a frame of the recording.
+
+Apart from `can_frames`, because this loads python-can, and a fit reads recordings without it.
+"""
+
+import math
+
+import can
+
+from acquisition.recording.can_frames import Frame, FrameFlag
+
+_FLAGS = (
+    ("is_extended_id", int(FrameFlag.EXTENDED)),
+    ("is_remote_frame", int(FrameFlag.REMOTE)),
+    ("is_error_frame", int(FrameFlag.ERROR)),
+    ("is_fd", int(FrameFlag.FD)),
+    ("bitrate_switch", int(FrameFlag.BIT_RATE_SWITCH)),
+    ("error_state_indicator", int(FrameFlag.ERROR_STATE)),
+)
+_SENT = int(FrameFlag.SENT)
+
+
+def frame_of(message: can.Message, host_s: float, *, sent: bool) -> Frame:
+    """A frame as it was heard, or sent, at host time `host_s`."""
+    flags = _SENT if sent else 0
+    for name, flag in _FLAGS:
+        if getattr(message, name):
+            flags |= flag
+    stamp_s = math.nan if sent or not message.timestamp else message.timestamp
+    data = b"" if message.is_remote_frame else bytes(message.data)
+    return Frame(host_s, stamp_s, message.arbitration_id, flags, message.dlc, data)
+
+
+def message_of(frame: Frame, time_s: float, channel: int | str | None) -> can.Message:
+    """A frame for python-can's files; `time_s` since 1970. ValueError for one that cannot be a CAN frame."""
+    named = {name: bool(frame.flags & flag) for name, flag in _FLAGS}
+    return can.Message(
+        timestamp=time_s,
+        arbitration_id=frame.can_id,
+        dlc=frame.length,
+        data=None if frame.flags & FrameFlag.REMOTE else frame.data,
+        channel=channel,
+        is_rx=not frame.flags & _SENT,
+        check=True,
+        **named,
+    )

@@ -1,0 +1,285 @@
+"""Every fault kind at every device in every phase: each case must end in a defined state within LIMIT_S.
+
+Defined are: the call returned and what it returned is in order, or a DeviceError was raised; and an arm that was moving
+stands. A kind that a device cannot have (a clock step where no time is sent) is refused by the emulator, and counted
+apart. What the faults do is in docs/protocols/faults.md.
+"""
+
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from acquisition.guarded import Guarded
+from acquisition.recording.rig import load_rig, plain_rig, rig_text
+from acquisition.recording.rig_schema import Rig
+from acquisition.streams import Pump
+from acquisition.supervisor import Supervisor
+from calibeam.encoders import emulated_encoders, encoder_driver
+from calibeam.psd import emulated_psd, psd_driver
+from calibeam.robot import emulated_robot, robot_of
+from drivers.clock import SystemClock
+from drivers.device import Block, Device, Movable
+from drivers.errors import DeviceError
+from simulators.faults.injector import KINDS
+from simulators.process import Emulators, EmulatorsError
+
+RIGS = Path(__file__).parents[1] / "rigs"
+LIMIT_S = 2.0
+WATCHED_S = 0.6  # of a stream under a fault that it survives
+READ_S = 0.5  # what a pump waits for a sample
+PHASES = ("connect", "idle", "stream", "move", "close")
+SPEED_RAD_S, ACCELERATION_RAD_S2 = 1.0, 5.0
+WAY_RAD = 0.4  # half a second
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A device under test: its name to the emulators, how to make its driver, and the arm that moves meanwhile."""
+
+    name: str
+    injected: str
+    make: Callable[[], Device]
+    arm: Callable[[], Movable]
+    home_rad: np.ndarray
+    emulators: Emulators
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a case ended: "good", the error's type, "no such fault", or what was wrong with the end itself."""
+
+    device: str
+    kind: str
+    phase: str
+    ended: str
+    took_s: float
+
+    @property
+    def defined(self) -> bool:
+        return not self.ended.startswith("UNDEFINED") and self.took_s < LIMIT_S
+
+
+def subjects(cleaning: ExitStack) -> list[Subject]:
+    """PSD box, CAN encoders, RTDE and Modbus controller, each of emulators that run until `cleaning` ends."""
+    ur, modbus = (_started(RIGS / name, cleaning) for name in ("ur5e-dual-psd.toml", "irb120-modbus.toml"))
+    return [*_with_ur(*ur), _with_modbus(*modbus)]
+
+
+def run(
+    found: Sequence[Subject], kinds: Sequence[str] = KINDS, phases: Sequence[str] = PHASES, count: int | None = None
+) -> Iterator[Outcome]:
+    """All cases in turn; `count` strikes each, None: until the case has ended."""
+    for subject in found:
+        for kind in kinds:
+            for phase in phases:
+                yield _case(subject, kind, phase, count)
+
+
+def lines() -> Iterator[str]:
+    """The table of all cases, as they end."""
+    with ExitStack() as cleaning:
+        outcomes: list[Outcome] = []
+        for outcome in run(subjects(cleaning)):
+            outcomes.append(outcome)
+            if not outcome.defined:
+                yield f"{outcome.device} {outcome.kind} {outcome.phase}: {outcome.ended} after {outcome.took_s:.2f} s"
+        yield from summary(outcomes)
+
+
+def summary(outcomes: Sequence[Outcome]) -> Iterator[str]:
+    for device in dict.fromkeys(outcome.device for outcome in outcomes):
+        mine = [outcome for outcome in outcomes if outcome.device == device]
+        ends = ", ".join(f"{n} {end}" for end, n in Counter(outcome.ended for outcome in mine).most_common())
+        yield f"{device:8s} {sum(o.defined for o in mine)} of {len(mine)} defined within {LIMIT_S:.0f} s: {ends}"
+    slowest = max(outcomes, key=lambda outcome: outcome.took_s)
+    yield f"slowest: {slowest.device} {slowest.kind} {slowest.phase} {slowest.took_s:.2f} s"
+
+
+def _started(path: Path, cleaning: ExitStack) -> tuple[Rig, Emulators]:
+    rig, plain = load_rig(path), plain_rig(rig_text(path), str(path))
+    links = cleaning.enter_context(_Folder())
+    for device in ("psd", "encoders"):
+        if device in plain["devices"]:
+            key = "port" if device == "psd" else "channel"
+            plain["devices"][device][key] = str(links / device)
+    return rig, cleaning.enter_context(Emulators(plain))
+
+
+def _with_ur(rig: Rig, emulators: Emulators) -> Iterator[Subject]:
+    clock, where = SystemClock(), emulators.address
+    psd, encoders = emulated_psd(_given(rig.devices.psd), where["psd"]), rig.devices.encoders
+    bus = emulated_encoders(_given(encoders), where["can"])
+    device = emulated_robot(_given(rig.devices.robot), where["robot"])
+
+    def arm() -> Movable:
+        return robot_of(device, clock).arm()
+
+    home_rad = np.array(rig.motion.home_rad)
+    yield Subject("psd", "psd", lambda: psd_driver(psd, rig, clock), arm, home_rad, emulators)
+    yield Subject("can", "can", lambda: encoder_driver(bus, clock), arm, home_rad, emulators)
+    yield Subject("rtde", "robot", lambda: robot_of(device, clock).reader, arm, home_rad, emulators)
+
+
+def _with_modbus(rig: Rig, emulators: Emulators) -> Subject:
+    clock = SystemClock()
+    device = emulated_robot(_given(rig.devices.robot), emulators.address["robot"])
+    return Subject(
+        "modbus",
+        "robot",
+        lambda: robot_of(device, clock).reader,
+        lambda: robot_of(device, clock).arm(),
+        np.array(rig.motion.home_rad),
+        emulators,
+    )
+
+
+def _case(subject: Subject, kind: str, phase: str, count: int | None) -> Outcome:
+    device = Guarded(subject.make())
+    threads = threading.active_count()
+    begun: list[float] = []
+
+    def inject() -> None:
+        subject.emulators.inject(subject.injected, kind, count=count)
+        begun[:] = [time.monotonic()]
+
+    try:
+        ended = _PHASES[phase](subject, device, inject)
+    except EmulatorsError:
+        ended = "no such fault"
+    except DeviceError as error:
+        ended = next(t.__name__ for t in type(error).__mro__ if t.__module__ == DeviceError.__module__)
+    except Exception as error:  # what must not happen
+        ended = f"UNDEFINED {type(error).__name__}: {error}"
+    took_s = time.monotonic() - begun[0] if begun else 0.0
+    subject.emulators.clear()
+    device.close()
+    if phase == "move" and begun and not _stands(subject.emulators):
+        ended = f"UNDEFINED: the arm moves ({ended})"
+    if threading.active_count() > threads:
+        ended = f"UNDEFINED: a thread is left ({ended})"
+    _well_again(subject)
+    return Outcome(subject.name, kind, phase, ended, took_s)
+
+
+def _well_again(subject: Subject) -> None:
+    """Until the device can be reached as before: one that was unplugged comes back after a tenth of a second."""
+    end_s = time.monotonic() + 3.0
+    while True:
+        device = subject.make()
+        try:
+            device.connect()
+            return
+        except DeviceError:
+            if time.monotonic() > end_s:
+                raise
+        finally:
+            device.close()
+
+
+def _connect(subject: Subject, device: Device, inject: Callable[[], None]) -> str:
+    inject()
+    device.connect()
+    return _in_order([device.read(READ_S)])
+
+
+def _idle(subject: Subject, device: Device, inject: Callable[[], None]) -> str:
+    device.connect()
+    inject()
+    return _in_order([device.read(READ_S)])
+
+
+def _stream(subject: Subject, device: Device, inject: Callable[[], None]) -> str:
+    device.connect()
+    blocks = [device.read(READ_S)]
+    inject()
+    end_s = time.monotonic() + WATCHED_S
+    while time.monotonic() < end_s:
+        blocks.append(device.read(READ_S))
+    return _in_order(blocks)
+
+
+def _move(subject: Subject, device: Device, inject: Callable[[], None]) -> str:
+    """A move under a supervisor, as a session makes it; the fault comes when the arm is on its way."""
+    inject()  # refused here, when there is no such fault, and not in the timer's thread
+    subject.emulators.clear()
+    arm = subject.arm()
+    supervisor = Supervisor(arm.hold)
+    pump = Pump(device, SystemClock(), lambda block: None, supervisor.failed)
+    device.connect()
+    try:
+        arm.connect()
+        arm.move_joints(subject.home_rad, SPEED_RAD_S, ACCELERATION_RAD_S2)
+        pump.start()
+        threading.Timer(0.1, inject).start()
+        with supervisor.watching(device.name, lambda: _newest_s(pump)):
+            try:
+                arm.move_joints(subject.home_rad + WAY_RAD, SPEED_RAD_S, ACCELERATION_RAD_S2)
+            except DeviceError:
+                supervisor.check()
+                raise
+        supervisor.check()
+    finally:
+        for timer in threading.enumerate():
+            if isinstance(timer, threading.Timer):
+                timer.join()
+        subject.emulators.clear()
+        arm.close()
+        pump.stop()
+    return "good"
+
+
+def _close(subject: Subject, device: Device, inject: Callable[[], None]) -> str:
+    device.connect()
+    device.read(READ_S)
+    inject()
+    device.close()
+    return "good"
+
+
+_PHASES = {"connect": _connect, "idle": _idle, "stream": _stream, "move": _move, "close": _close}
+
+
+def _in_order(blocks: Sequence[Block]) -> str:
+    """Every sample once, in order, in numbers."""
+    sequence = np.concatenate([block.sequence for block in blocks])
+    return "good" if (np.diff(sequence) > 0).all() else "UNDEFINED: samples twice or out of order"
+
+
+def _newest_s(pump: Pump) -> float | None:
+    block = pump.latest()
+    return None if block is None else float(block.host_s[-1])
+
+
+def _stands(emulators: Emulators) -> bool:
+    """Within the time that braking takes."""
+    end_s = time.monotonic() + 1.0
+    while not emulators.ask("robot.standing"):
+        if time.monotonic() > end_s:
+            return False
+    return True
+
+
+def _given(device: Any) -> Any:
+    if device is None:
+        raise ValueError("the rig lacks this device")
+    return device
+
+
+class _Folder:
+    """A temporary one for the links, so that an unplugged device comes back under its name."""
+
+    def __enter__(self) -> Path:
+        import tempfile
+
+        self._folder = tempfile.TemporaryDirectory()
+        return Path(self._folder.name)
+
+    def __exit__(self, *error: object) -> None:
+        self._folder.cleanup()

@@ -1,0 +1,106 @@
+"""`calibeam log`: a device recorded for as long as it takes, without a session."""
+
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+from cyclopts import App, Parameter
+from rich.console import Console
+
+from acquisition.recording.errors import RecordingError
+from acquisition.recording.rig import load_rig, rig_text
+from acquisition.recording.segments import Rotation
+from calibeam.encoder_log import EncoderLog, State
+from calibeam.outcome import PartialResult
+from drivers.clock import Clock, SystemClock
+from drivers.errors import DeviceError, DeviceRefused
+
+log = App(name="log", help="Record a device for as long as it takes. Example: calibeam log encoders RIG.toml")
+
+MEGABYTE = 1e6
+
+
+@log.command
+def encoders(
+    rig: Path,
+    *,
+    out: Path = Path("encoder-log"),
+    raw: bool = True,
+    rotate_mb: float = 256.0,
+    rotate_min: float = 60.0,
+    for_s: float | None = None,
+    json_: Annotated[bool, Parameter(name="--json")] = False,
+) -> None:
+    """Log the encoders until Ctrl-C: positions and every CAN frame, in segments of which each is a whole recording.
+
+    Example: calibeam log encoders rigs/ur5e-dual-psd.toml --out encoder-log
+
+    A bus that is lost is attached again, with a gap in the recording. Started again with the same folder, the log goes
+    on in a new segment. Whatever ends it, 0.1 s are lost at most.
+
+    Parameters
+    ----------
+    rig
+        The rig file; [devices.encoders] says how they are reached.
+    out
+        Folder for segment-0001.mcap and those after it; nothing in it is overwritten.
+    raw
+        Also every frame on the bus, sent and received, as it was; `calibeam export` makes BLF, ASC, CSV or candump of
+        them.
+    rotate_mb
+        Size of a segment from which the next is begun.
+    rotate_min
+        Age of a segment, in minutes, from which the next is begun.
+    for_s
+        End by itself after so many seconds.
+    json_
+        Print one line of JSON at the end, and nothing else.
+
+    """
+    if rotate_mb <= 0.0 or rotate_min <= 0.0:
+        raise DeviceRefused(f"--rotate-mb {rotate_mb:g}, --rotate-min {rotate_min:g}: give numbers above 0")
+    loaded, clock = load_rig(rig), SystemClock()
+    device = loaded.devices.encoders
+    if device is None:
+        raise DeviceRefused(f"rig {loaded.name}: no [devices.encoders]; say there how the encoders are reached")
+    rotation = Rotation(round(rotate_mb * MEGABYTE), 60.0 * rotate_min)
+    job = EncoderLog(device, rig_text(rig), out, clock, rotation, raw=raw)
+    console = Console(quiet=json_)
+    try:
+        with console.status("connecting", refresh_per_second=2.0) as status:
+            job.run(partial(_is_over, job, for_s, clock), lambda state: status.update(_now(state)))
+    except (DeviceError, RecordingError) as why:
+        if job.state.rows == 0:
+            raise
+        raise PartialResult(f"{why}; {job.state.rows} rows are kept in {out}") from why
+    console.print(_summary(job.state, job.segments), highlight=False)
+    if json_:
+        print(msgspec.json.encode(_as_json(job.state, job.segments)).decode())
+
+
+def _is_over(job: EncoderLog, for_s: float | None, clock: Clock) -> bool:
+    """Counted from the moment at which the encoders are set up."""
+    return for_s is not None and job.since_s is not None and clock.now_s() >= job.since_s + for_s
+
+
+def _now(state: State) -> str:
+    away = "" if state.away is None else f"; AWAY: {state.away}"
+    return f"{state.segment.name}: {state.rows} rows, {state.frames} frames{away} (Ctrl-C ends the log)"
+
+
+def _summary(state: State, segments: list[Path]) -> str:
+    which = segments[0].name if len(segments) == 1 else f"{segments[0].name} to {segments[-1].name}"
+    outages = f", {state.outages} outages" if state.outages else ""
+    errors = f", {state.error_frames} of them error frames" if state.error_frames else ""
+    return f"{segments[0].parent}: {which}: {state.rows} rows, {state.frames} frames{errors}{outages}"
+
+
+def _as_json(state: State, segments: list[Path]) -> dict[str, Any]:
+    return {
+        "segments": [str(path) for path in segments],
+        "rows": state.rows,
+        "frames": state.frames,
+        "error_frames": state.error_frames,
+        "outages": state.outages,
+    }

@@ -1,0 +1,73 @@
+"""`calibeam motion`: the motion examples on an emulated controller, with plots that a person can check."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+from rich.console import Console
+from rich.table import Table
+
+from acquisition.motion.errors import TaskError
+from acquisition.recording.rig import load_rig
+from calibeam.commands.demo import RIG
+from calibeam.emulation import Emulation
+from drivers.clock import SystemClock
+
+
+def motion_command(
+    *,
+    out: Path = Path("out/motion"),
+    rig: Path = RIG,
+    only: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = (),
+    json_: Annotated[bool, Parameter(name="--json")] = False,
+) -> None:
+    """Run the motion examples on an emulated controller: joints, straight lines, blend, belt, two pins with teaching.
+
+    Example: calibeam motion --out out/motion
+
+    Parameters
+    ----------
+    out
+        Folder for the plots and motion.json.
+    rig
+        The rig file; its arm has to be a UR5e, for which the examples' cells are laid out.
+    only
+        Some of them: joint, straight, belt, two-pins.
+    json_
+        Print the figures as one line of JSON.
+
+    """
+    from calibeam.motion.example_plots import numbers_of, plot
+    from calibeam.motion.examples import EXAMPLES, Stage
+    from calibeam.motion.gate_of_rig import gate_of, solver_of
+    from calibeam.motion.robot import streamed_robot
+
+    strangers = sorted(set(only) - EXAMPLES.keys())
+    if strangers:
+        raise TaskError(f"--only {' '.join(strangers)}: the examples are {', '.join(EXAMPLES)}")
+    loaded, clock = load_rig(rig), SystemClock()
+    out.mkdir(parents=True, exist_ok=True)
+    solver, told = solver_of(loaded), dict[str, dict[str, float]]()
+    with Emulation(rig) as emulation, streamed_robot(loaded, clock, emulation.address["robot"]) as robot:
+        stage = Stage(robot, gate_of(loaded, solver, robot.arm, clock), solver)
+        for name in only or EXAMPLES:
+            shown = EXAMPLES[name](stage)
+            plot(shown, solver, out)
+            told[name] = numbers_of(shown, solver)
+    (out / "motion.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+    if json_:
+        print(json.dumps(told))
+    else:
+        _print(Console(), told, out)
+
+
+def _print(console: Console, told: dict[str, dict[str, float]], out: Path) -> None:
+    table = Table("example", "figure", "value", box=None)
+    for name, numbers in told.items():
+        for what, value in numbers.items():
+            metres = what.endswith(", m")
+            table.add_row(name, what.removesuffix(", m"), f"{1e3 * value:.4f} mm" if metres else f"{value:.4g}")
+            name = ""
+    console.print(table)
+    console.print(f"plots: {', '.join(str(path) for path in sorted(out.glob('*.svg')))}")

@@ -1,0 +1,32 @@
+"""`calibeam recover`: a whole recording of what is good in a torn or damaged one."""
+
+from pathlib import Path
+
+from acquisition.recording.recover import recover
+from acquisition.recording.rig import rig_text
+from calibeam.outcome import PartialResult
+
+
+def recover_command(recording: Path, *, out: Path, rig: Path | None = None) -> None:
+    """Write what can be read of a torn or damaged recording into a new, whole file.
+
+    Example: calibeam recover session-1/recording.mcap --out recovered.mcap
+
+    Every batch is proved by its checksum: what is in the new file is as it was recorded. Ends with 0 when nothing was
+    wrong, 3 when something is lost (the new file tells what), 1 when nothing can be had.
+
+    Parameters
+    ----------
+    recording
+        The torn or damaged recording; it is left as it is.
+    out
+        The recording to make.
+    rig
+        A rig file to put in the place of one that is damaged.
+
+    """
+    done = recover(recording, out, None if rig is None else rig_text(rig))
+    print(f"{out}: {done.messages} messages")
+    if not done.whole:
+        why = "; ".join(done.damage) or "the recording was cut short before its end"
+        raise PartialResult(f"{recording}: {why}; what is good is in {out}")

@@ -1,0 +1,184 @@
+"""`calibeam check` of a rig: every device tried for a moment, and what it is, how it reads, what is wrong with it."""
+
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.guarded import one_error_tree
+from acquisition.psd_view import psd_window
+from acquisition.recording.rig_schema import Rig, RobotDriver
+from calibeam.encoders import encoder_driver, identities_of
+from calibeam.psd import psd_driver, psd_view
+from calibeam.robot import robot_of
+from drivers.clock import Clock
+from drivers.device import Block, Device
+from drivers.errors import DeviceError
+from drivers.psd_daq.messages import Flag
+from drivers.ur.dashboard import UrDashboard
+from drivers.ur.reader import UrReader
+
+READ_S = 1.0  # host time that a device is listened to
+FIRST_SAMPLE_S = 1.0
+LEAST_RATE = 0.9  # of the rate asked for; below this samples are lost or the device cannot keep up
+NAMES = ("psd", "encoders", "robot")
+
+
+@dataclass(frozen=True)
+class DeviceCheck:
+    """One line. `wrong` is empty for a device that is fit for a session, else it says what is wrong and what to do."""
+
+    device: str
+    what: str = ""
+    firmware: str = ""
+    rate_hz: float = 0.0
+    noise: str = ""
+    wrong: str = ""
+
+    @property
+    def line(self) -> str:
+        if self.wrong and not self.what:
+            return f"{self.device:9s} BAD   {self.wrong}"
+        facts = [self.what, f"firmware {self.firmware}" if self.firmware else "", f"{self.rate_hz:.0f} Hz", self.noise]
+        told = ", ".join(fact for fact in facts if fact)
+        return f"{self.device:9s} BAD   {told}: {self.wrong}" if self.wrong else f"{self.device:9s} good  {told}"
+
+
+def check_devices(rig: Rig, clock: Clock) -> Iterator[DeviceCheck]:
+    """One after the other, the arm stands still; devices that the rig does not name are left out."""
+    checks: dict[str, Callable[[Rig, Clock], DeviceCheck]] = {"psd": _psd, "encoders": _encoders, "robot": _robot}
+    for name in NAMES:
+        if getattr(rig.devices, name) is None:
+            continue
+        try:
+            with one_error_tree(name, "checking"):
+                yield checks[name](rig, clock)
+        except DeviceError as error:
+            yield DeviceCheck(name, wrong=str(error))
+
+
+@contextmanager
+def _listened(device: Device, clock: Clock) -> Generator[list[Block]]:
+    """The connected device's blocks of READ_S; closed at the end."""
+    try:
+        device.connect()
+        blocks = [device.read(FIRST_SAMPLE_S)]
+        end_s = clock.now_s() + READ_S
+        while clock.now_s() < end_s:
+            blocks.append(device.read(FIRST_SAMPLE_S))
+        yield blocks
+    finally:
+        device.close()
+
+
+def _psd(rig: Rig, clock: Clock) -> DeviceCheck:
+    device = rig.devices.psd
+    assert device is not None  # noqa: S101 - asked by check_devices
+    psd = psd_driver(device, rig, clock)
+    with _listened(psd, clock) as blocks:
+        identity = psd.identity
+        window = psd_window(blocks)
+        spots_m = psd_view(psd, device).each(window)
+    dark = [k + 1 for k in (0, 1) if np.isnan(spots_m[:, 2 * k]).mean() > 0.5]
+    noise = "no light on either face" if len(dark) == 2 else f"noise {1e6 * _noise(spots_m):.2f} um a sample"
+    rate_hz, wrong = _pace(blocks, device.rate_hz)
+    if (window.flags & (Flag.PSD1_SATURATED | Flag.PSD2_SATURATED)).any():
+        wrong = wrong or "a face is saturated: lessen the laser's power or the gain"
+    what = "" if identity is None else f"{identity.model} {identity.serial_number}"
+    return DeviceCheck("psd", what, "" if identity is None else identity.firmware, rate_hz, noise, wrong)
+
+
+def _encoders(rig: Rig, clock: Clock) -> DeviceCheck:
+    device = rig.devices.encoders
+    assert device is not None  # noqa: S101 - asked by check_devices
+    driver = encoder_driver(device, clock)
+    with _listened(driver, clock) as blocks:
+        q_rad = np.concatenate([block.values["position_rad"] for block in blocks])
+        identities = identities_of(driver)
+    rate_hz, wrong = _pace(blocks, device.sync_hz)
+    mute = [k + 1 for k in range(q_rad.shape[1]) if np.isnan(q_rad[:, k]).all()]
+    if mute:
+        wrong = f"encoders of joints {mute} do not answer: check their node numbers, power and cable"
+    numbers = ", ".join(str(identity.get("serial_number", "?")) for identity in identities)
+    what = f"{q_rad.shape[1]} encoders on {device.interface} {device.channel}"
+    what += f" (serial numbers {numbers})" if numbers else ""
+    firmware = "/".join(sorted({f"{identity.get('revision', 0):#x}" for identity in identities}))
+    return DeviceCheck("encoders", what, firmware, rate_hz, f"noise {1e6 * _noise(q_rad):.2f} urad", wrong)
+
+
+def _robot(rig: Rig, clock: Clock) -> DeviceCheck:
+    device = rig.devices.robot
+    assert device is not None  # noqa: S101 - asked by check_devices
+    robot = robot_of(device, clock)
+    with _listened(robot.reader, clock) as blocks:
+        q_rad = np.concatenate([block.values["actual_q_rad"] for block in blocks])
+    rate_hz, wrong = _pace(blocks, device.rate_hz)
+    what, firmware = f"Modbus controller with {len(device.registers)} registers in the map", ""
+    if device.driver is RobotDriver.UR_RTDE and isinstance(robot.reader, UrReader) and device.host is not None:
+        version = robot.reader.version
+        firmware = "" if version is None else f"{version.major}.{version.minor}.{version.bugfix}.{version.build}"
+        what, state = _ur(device.host)
+        wrong = state or wrong
+    elif device.driver is RobotDriver.MODBUS:
+        robot.arm().close()  # DeviceRefused when the map cannot move it
+        wrong = _stopped(blocks[-1]) or wrong
+    wrong = wrong or _misplaced(rig, q_rad[-1])
+    return DeviceCheck("robot", what, firmware, rate_hz, f"noise {1e6 * _noise(q_rad):.2f} urad", wrong)
+
+
+def _ur(host: str) -> tuple[str, str]:
+    """What the dashboard says that it is, and why it would not move."""
+    dashboard = UrDashboard(host)
+    identity, state = dashboard.identity(), dashboard.state()
+    what = f"{identity.model} {identity.serial_number}"
+    if state.safety_status != "NORMAL":
+        return what, f"safety is {state.safety_status}: clear the cause and unlock on the pendant"
+    if state.robot_mode != "RUNNING":
+        return what, f"the arm is in {state.robot_mode}: power on and release the brakes"
+    return what, "" if state.remote_control else "it is in local control: switch to remote control on the pendant"
+
+
+def _stopped(block: Block) -> str:
+    """Why it would not move, as far as its register map tells."""
+    if block.values.get("emergency_stopped", np.zeros(1))[-1]:
+        return "emergency stop: release it and switch the motors on at the controller"
+    if block.values.get("protective_stopped", np.zeros(1))[-1]:
+        return "protective stop: clear the cause and unlock it at the controller"
+    return ""
+
+
+def _misplaced(rig: Rig, q_rad: NDArray[np.float64]) -> str:
+    """Joint readings that the rig says cannot be: another arm, or a wrong register map."""
+    if len(q_rad) != rig.n_joints:
+        return f"it has {len(q_rad)} joints, the rig file {rig.n_joints}: correct the rig file"
+    for number, (q, joint) in enumerate(zip(q_rad, rig.arm.joints, strict=True), start=1):
+        if not joint.lower_rad <= q <= joint.upper_rad:
+            return (
+                f"joint {number} reads {q:.3f} rad, its range in the rig file is {joint.lower_rad:.3f} to "
+                f"{joint.upper_rad:.3f}: correct the range, the unit or the register map"
+            )
+    return ""
+
+
+def _pace(blocks: list[Block], wanted_hz: float) -> tuple[float, str]:
+    """Samples a second of the device's clock, and what is wrong with them."""
+    device_s = np.concatenate([block.device_s for block in blocks])
+    sequence = np.concatenate([block.sequence for block in blocks])
+    span_s = float(device_s[-1] - device_s[0])
+    if len(device_s) < 2 or span_s <= 0.0:
+        return 0.0, "its clock stands still: restart it"
+    rate_hz = (len(device_s) - 1) / span_s
+    lost = int((np.diff(sequence) - 1).clip(0).sum())
+    if rate_hz < LEAST_RATE * wanted_hz:
+        lines = f"{lost} samples were lost on the way" if lost else "it cannot keep up"
+        return rate_hz, f"{wanted_hz:.0f} Hz are asked for, {lines}: lower the rate in the rig file, or free the line"
+    return rate_hz, ""
+
+
+def _noise(values: NDArray[np.float64]) -> float:
+    """One sigma of the noisiest column from neighbouring samples (von Neumann 1941); slow motion does not count."""
+    steps = np.diff(values, axis=0)
+    steps = steps[np.isfinite(steps).all(axis=1)] if np.isfinite(steps).all(axis=1).any() else np.nan_to_num(steps)
+    return float(np.sqrt(0.5 * (steps**2).mean(axis=0)).max()) if len(steps) else 0.0

@@ -1,0 +1,195 @@
+"""The examples of the source on a controller: joint and straight motion, a blend, a belt, two pins with their teaching.
+
+Each plans, streams, and keeps what the controller said beside what was planned. The cell of the examples is this
+file's; a rig on site has its own tasks.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.motion.gate import Followed, Gate
+from acquisition.motion.inverse.solver import Solver
+from acquisition.motion.paths.path import Belt
+from acquisition.motion.paths.segments import By, Segment
+from acquisition.motion.plan import Plan
+from acquisition.motion.rigid import apart, transform
+from acquisition.motion.run_task import Around, run_task, teach
+from acquisition.motion.task.graph import TaskGraph
+from acquisition.motion.task.place import Place
+from acquisition.motion.task.task_file import Task, read_task
+from calibeam.motion.robot import StreamedRobot
+
+Floats = NDArray[np.float64]
+
+TASKS = Path(__file__).parents[2] / "rigs" / "tasks"
+START_RAD = np.radians([0.0, -90.0, 90.0, -90.0, -90.0, 0.0])  # the hand points down in front of the arm
+TOOL = transform((0.0, 0.0, 0.15))
+BELT_M_S = 0.05
+PART_ON_BELT = transform((0.10, 0.02, 0.03), (0.0, np.pi, 0.0))
+# Where things truly stand in the example's cell; the task is only taught.
+PINS: Mapping[str, Floats] = {
+    "P": transform((-0.45, -0.25, 0.15), (3.1, 0.1, 0.05)),
+    "PA": transform((0.0, 0.0, -0.10)),
+    "PD": transform((0.0, 0.0, -0.12)),
+    "H": transform((-0.50, 0.10, 0.12), (3.0, 0.5, 0.0)),
+    "PHA": transform((0.0, 0.0, -0.08)),
+    "PCH": transform((0.002, 0.0, -0.03), (0.05, 0.0, 0.0)),
+    "PAL": transform((0.0, 0.0, -0.025)),
+    "HR2": transform((-0.03, 0.0, 0.0)),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """One sweep of an example: planned, and as the controller said (time s, readings)."""
+
+    name: str
+    plan: Plan
+    followed: Followed
+    t_s: Floats
+    q_rad: Floats
+    corners: tuple[Floats, ...]  # (4, 4) of the tool at every target that stands
+    belt: Callable[[float], Belt] | None = None  # by controller time since the sweep began
+    figures: Mapping[str, float] | None = None
+
+
+@dataclass(frozen=True)
+class Stage:
+    """The robot with its gate."""
+
+    robot: StreamedRobot
+    gate: Gate
+    solver: Solver
+
+    def go(self, segments: list[Segment]) -> tuple[Plan, Followed]:
+        made = self.gate.plan(self.robot.joints(), segments)
+        self.robot.track.clear()
+        return made, self.gate.run(made, self.robot.joints(), watch=self.robot.supervisor.check)
+
+    def to_start(self) -> None:
+        """By joints to where the examples begin."""
+        place = Place("start", self.solver.flange(START_RAD), np.eye(4))
+        segment = Segment("to the start", By.JOINTS, place)
+        self.go([segment])
+
+    def shown(self, name: str, made: Plan, followed: Followed) -> Shown:
+        t_s, q_rad = self.robot.track.joints()
+        corners = tuple(s.place.flange_at(0.0) @ s.place.tool for s in made.segments if s.place.coord is None)
+        return Shown(name, made, followed, t_s - t_s[0], q_rad, corners)
+
+
+def joint_motion(stage: Stage) -> Shown:
+    """Through two corners by joints, and back."""
+    stage.to_start()
+    targets = [(0.10, 0.15, -0.05), (-0.05, 0.20, 0.10), (0.0, 0.0, 0.0)]
+    return stage.shown("joint", *stage.go(_rectangle(stage, targets, By.JOINTS)))
+
+
+def straight_motion(stage: Stage) -> Shown:
+    """Round a rectangle on straight lines, the hand turning on one side; its corners are the blend's close-up."""
+    stage.to_start()
+    targets = [(0.12, 0.0, 0.0), (0.12, 0.16, 0.0), (0.0, 0.16, 0.0), (0.0, 0.0, 0.0)]
+    return stage.shown("straight", *stage.go(_rectangle(stage, targets, By.LINE)))
+
+
+def belt(stage: Stage) -> Shown:
+    """A part on a belt that runs: read, followed, gripped, brought away."""
+    stage.to_start()
+    task = read_task(TASKS / "conveyor.toml")
+    begin_s = [0.0]
+
+    def now() -> Belt:
+        return Belt(BELT_M_S * (stage.robot.clock.now_s() - begin_s[0]), BELT_M_S)
+
+    def read(name: str) -> Floats:
+        begin_s[0] = stage.robot.clock.now_s()  # the part comes into the picture as it is read
+        stage.robot.track.clear()
+        return PART_ON_BELT
+
+    gripped: list[float] = []
+
+    def act(action: str) -> None:
+        q_rad, s_m = _newest(stage), now().s_m
+        part = task.graph.with_value("OBJ", PART_ON_BELT)
+        if action == "GRASP":
+            gripped.append(apart(stage.solver.flange(q_rad), part.solve("at part", "T6", s_m=s_m))[0])
+
+    ran = run_task(stage.gate, task, Around(stage.robot.joints, read, act, now, stage.robot.supervisor.check))
+    made, followed = ran.sweeps[0]
+    shown = stage.shown("belt", made, followed)
+    figures = {"hand from part when gripped, m": gripped[0]}
+    return Shown("belt", made, followed, shown.t_s, shown.q_rad, shown.corners, _belt, figures)
+
+
+def two_pins(stage: Stage) -> Shown:
+    """Teach by placing the arm, then the whole program; each transform that was taught is compared with the truth."""
+    stage.to_start()
+    task = read_task(TASKS / "two-pins.toml")
+    truth = task.graph
+    for name, T in PINS.items():
+        truth = truth.with_value(name, T)
+
+    def placed(at: str) -> Floats:
+        stage.go([Segment(at, By.JOINTS, truth.place(at))])
+        return stage.robot.joints()
+
+    graph = teach(task.graph, task.teach, stage.solver, placed)
+    stage.to_start()
+    stage.robot.track.clear()
+    at_action: list[tuple[str, Floats]] = []
+    around = Around(
+        stage.robot.joints,
+        act=lambda action: at_action.append((action, _newest(stage))),
+        watch=stage.robot.supervisor.check,
+    )
+    ran = run_task(stage.gate, Task(graph, task.program), around)
+    made, followed = ran.sweeps[0]
+    shown = stage.shown("two-pins", made, followed)
+    figures = _pin_figures(stage, graph, truth, at_action)
+    return Shown("two-pins", made, followed, shown.t_s, shown.q_rad, shown.corners, None, figures)
+
+
+def _pin_figures(
+    stage: Stage, graph: TaskGraph, truth: TaskGraph, at_action: list[tuple[str, Floats]]
+) -> Mapping[str, float]:
+    taught = max(apart(graph.value(name), T)[0] for name, T in PINS.items())
+    where = ("at pin", "in hole 1", "at pin", "in hole 2")
+    off = [
+        apart(stage.solver.flange(q), truth.solve(name, "T6"))[0] for (_, q), name in zip(at_action, where, strict=True)
+    ]
+    return {"taught transforms from the truth, m": taught, "hand from pin or hole at GRASP, RELEASE, m": max(off)}
+
+
+def _rectangle(stage: Stage, targets: list[tuple[float, float, float]], by: By) -> list[Segment]:
+    start = stage.solver.flange(START_RAD) @ TOOL
+    turns = [0.0, 0.4, 0.4, 0.0]
+    out: list[Segment] = []
+    for number, (shift, turn) in enumerate(zip(targets, turns, strict=False), start=1):
+        last = number == len(targets)
+        pos = start @ transform(shift, (0.0, 0.0, 0.0 if last else turn))
+        out.append(Segment(f"corner {number}", by, Place(f"corner {number}", pos, TOOL)))
+    return out
+
+
+def _newest(stage: Stage) -> Floats:
+    block = stage.robot.pump.latest()
+    if block is None:
+        return stage.robot.joints()
+    out: Floats = block.values["actual_q_rad"][-1]
+    return out
+
+
+def _belt(t_s: float) -> Belt:
+    return Belt(BELT_M_S * t_s, BELT_M_S)
+
+
+EXAMPLES: Mapping[str, Callable[[Stage], Shown]] = {
+    "joint": joint_motion,
+    "straight": straight_motion,
+    "belt": belt,
+    "two-pins": two_pins,
+}

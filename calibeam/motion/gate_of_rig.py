@@ -1,0 +1,73 @@
+"""The gate for a rig's arm: its kinematics, limits, cell and rates, all from the rig file and the identified model."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.motion.cell import Box, Cell, SlowArea
+from acquisition.motion.gate import Gate, SetPoints, Stream
+from acquisition.motion.gated_arm import GatedArm
+from acquisition.motion.inverse.closed_form import closed_form
+from acquisition.motion.inverse.solver import Solver
+from acquisition.motion.paths.segments import Pace
+from acquisition.motion.setpoints import solve_rate_hz
+from acquisition.recording.rig_schema import Rig
+from acquisition.streams import Pump
+from calibeam.motion.arm import motion_arm
+from calibrate.errors import DataError
+from calibrate.model_file import corrections, read_model
+from drivers.clock import Clock
+from drivers.device import Movable
+
+Floats = NDArray[np.float64]
+
+WAIT_S = 0.5  # for the first sample of a reader that was just started
+
+UR_STREAM_HZ = 500.0  # e-Series control cycle; the older series takes a set-point every fourth of these
+
+
+def solver_of(rig: Rig, model: Path | None = None) -> Solver:
+    """Inverse kinematics of the rig's arm as drawn, or as identified. DataError for a model of another arm."""
+    if model is None:
+        return Solver(motion_arm(rig), closed_form(motion_arm(rig)))
+    identified = read_model(model)
+    if identified.rig.name != rig.name:
+        raise DataError(f"{model}: this model is of rig '{identified.rig.name}', not of '{rig.name}'; take its own")
+    return Solver(motion_arm(rig, corrections(identified)), closed_form(motion_arm(rig)))
+
+
+def pace_of(rig: Rig, speed_share: float = 1.0) -> Pace:
+    """The [motion] of the rig, its speeds taken to a share."""
+    motion, ones = rig.motion, np.ones(rig.n_joints)
+    return Pace(
+        speed_share * motion.speed_rad_s * ones,
+        motion.acceleration_rad_s2 * ones,
+        speed_share * motion.line_speed_m_s,
+    )
+
+
+def cell_of(rig: Rig) -> Cell:
+    """Boxes of the rig; the laser counts as a point of the body."""
+    motion = rig.motion
+    slow = tuple(SlowArea(Box(b.name, b.lower_m, b.upper_m), b.speed_m_s) for b in motion.slow_area)
+    keep_out = tuple(Box(b.name, b.lower_m, b.upper_m) for b in motion.keep_out)
+    tool = tuple(point for point in (rig.tool.laser_origin_m, rig.tool.point_m) if point is not None)
+    return Cell(keep_out, slow, motion.clearance_m, tool)
+
+
+def gated_arm(arm: Movable, rig: Rig, robot: Pump) -> GatedArm:
+    """The controller behind the gate, for motions that it makes itself. DeviceStale where it tells no joints."""
+
+    def now() -> Floats:
+        block = robot.latest() or robot.wait(-np.inf, WAIT_S)[-1]
+        out: Floats = block.values["actual_q_rad"][-1]
+        return out
+
+    return GatedArm(arm, motion_arm(rig), cell_of(rig), now)
+
+
+def gate_of(rig: Rig, solver: Solver, arm: SetPoints, clock: Clock, speed_share: float = 1.0) -> Gate:
+    """Ready to plan and run."""
+    stream = Stream(hz=UR_STREAM_HZ, solve_hz=solve_rate_hz(rig.motion.structural_hz, UR_STREAM_HZ))
+    return Gate(solver, pace_of(rig, speed_share), cell_of(rig), arm, stream, clock)

@@ -1,0 +1,106 @@
+"""The controller alone, for motion by hand and for programs: read, watched, and streamed to; no detectors needed."""
+
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.motion.gate import SetPoints
+from acquisition.recording.errors import RigFileError
+from acquisition.recording.rig_schema import Rig
+from acquisition.streams import Pump
+from acquisition.supervisor import Supervisor
+from calibeam.recorded import uninterrupted
+from calibeam.robot import emulated_robot, robot_of
+from drivers.clock import Clock
+from drivers.device import Block, Movable
+from drivers.errors import DeviceError, DeviceRefused, DeviceStale
+
+Floats = NDArray[np.float64]
+
+WAIT_S = 0.5  # for a sample: the reader itself gives up after that
+SETTLED_RAD = 2e-5  # between two samples: ten counts of a joint encoder, and slower than 10 mrad/s
+SETTLE_TRIES = 500
+
+
+class StreamedArm(Movable, SetPoints, Protocol):
+    """A controller that takes set-points."""
+
+
+@dataclass
+class Track:
+    """What the controller said while it was read."""
+
+    blocks: list[Block] = field(default_factory=list[Block])
+
+    def clear(self) -> None:
+        self.blocks.clear()
+
+    def joints(self) -> tuple[Floats, Floats]:
+        """Device time (sample,) and readings (sample, joint)."""
+        blocks = list(self.blocks)
+        if not blocks:
+            return np.empty(0), np.empty((0, 0))
+        q_rad = np.concatenate([block.values["actual_q_rad"] for block in blocks])
+        return np.concatenate([block.device_s for block in blocks]), q_rad
+
+
+@dataclass(frozen=True)
+class StreamedRobot:
+    """A connected controller."""
+
+    arm: StreamedArm
+    pump: Pump
+    track: Track
+    supervisor: Supervisor
+    clock: Clock
+
+    def joints(self) -> Floats:
+        """Readings (joint,) once the arm rests. DeviceError; DeviceStale where it never does."""
+        before = self._newest()
+        for _ in range(SETTLE_TRIES):
+            now = self._newest()
+            if float(np.max(np.abs(now - before))) < SETTLED_RAD:
+                return now
+            before = now
+        raise DeviceStale("robot: the arm does not come to rest; look whether something pushes it")
+
+    def _newest(self) -> Floats:
+        self.supervisor.check()
+        blocks = self.pump.wait(self.clock.now_s(), WAIT_S)
+        out: Floats = blocks[-1].values["actual_q_rad"][-1]
+        return out
+
+
+@contextmanager
+def streamed_robot(rig: Rig, clock: Clock, emulated: Mapping[str, Any] | None = None) -> Generator[StreamedRobot]:
+    """The rig's controller, read and ready to move. At the end the arm is stopped and every line released.
+
+    RigFileError: no controller in the rig. DeviceRefused: one that takes no set-points; and every DeviceError.
+    """
+    device = rig.devices.robot
+    if device is None:
+        raise RigFileError(f"rig {rig.name}: no [devices.robot]; say how the controller is reached")
+    robot = robot_of(device if emulated is None else emulated_robot(device, emulated), clock)
+    arm = robot.arm()
+    if not hasattr(arm, "servo_joints"):
+        raise DeviceRefused(f"[devices.robot]: driver '{device.driver.value}' takes no set-points; use ur-rtde")
+    streamed: StreamedArm = arm  # pyright: ignore[reportAssignmentType] - asked for in the line above
+    supervisor, track = Supervisor(arm.stop, clock), Track()
+    pump = Pump(robot.reader, clock, track.blocks.append, supervisor.failed)
+    robot.reader.connect()
+    pump.start()
+    try:
+        try:
+            arm.connect()
+        except DeviceError:
+            supervisor.check()
+            raise
+        yield StreamedRobot(streamed, pump, track, supervisor, clock)
+    finally:
+        with uninterrupted():
+            arm.close()
+            pump.stop()

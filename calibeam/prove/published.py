@@ -1,0 +1,86 @@
+"""`python -m calibeam.prove.published proof.json README.md`: the table of a proof, between two marks of a text.
+
+So that the table is never typed, and always that of a file.
+"""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+
+from calibeam.prove.free_space_sums import by_instrument
+from calibeam.prove.record import CaseScore, ProofFile
+from calibeam.prove.tally import PLAIN, Line, at_once, by_enr, figures, in_streams, over_the_wire, plain, rivals
+from calibrate.errors import DataError
+from calibrate.report.quantities import length
+
+BEGIN, END = "<!-- proof: begin -->", "<!-- proof: end -->"
+
+
+def table_of(proof: ProofFile) -> str:
+    """Markdown. DataError for a proof of development: no figure of such a seed is for the public."""
+    if proof.development or proof.without:
+        why = f"seed {proof.seed} is one of development" if proof.development else "effects were taken out"
+        raise DataError(f"{why}; publish the table of a `calibeam prove --publish`")
+    cases = proof.cases
+    lines = [
+        f"Seed {proof.seed}, {len(cases)} sessions, {proof.wall_s / 60:.0f} minutes (`make prove`); brackets are 95 %.",
+        "",
+        *_findings(cases),
+        "",
+        *_rows(("doubt and proof", "measured", "wanted"), [(f.label, f.said, f.wanted or " ") for f in figures(cases)]),
+    ]
+    others = rivals(cases)
+    if others:
+        head = ("held-out gain, share of the oracle's", "median, p10")
+        lines += ["", *_rows(head, [(f.label, f.said) for f in others])]
+    free = by_instrument(cases)
+    if free:
+        head = ("free space against the truth, median", "cases", "geometry", "with what was found", "oracle")
+        found = [(f.label, str(f.cases), length(f.geometry_m), length(f.found_m), length(f.oracle_m)) for f in free]
+        lines += ["", *_rows(head, found)]
+    return "\n".join(lines) + "\n"
+
+
+def _findings(cases: Sequence[CaseScore]) -> list[str]:
+    """One effect by size, all plain ones together, several at once, and those over the wires."""
+    lines = [
+        *by_enr(cases),
+        plain(cases, f"all of {PLAIN:g} and more"),
+        at_once(cases, "three"),
+        at_once(cases, "eighteen"),
+        over_the_wire(cases),
+        in_streams(cases),
+    ]
+    head = ("hidden, effect over noise", "n", "located", "named", "named or among rivals", "others said, a case")
+    return _rows(head, [_cells(line) for line in lines if line.located.n])
+
+
+def _cells(line: Line) -> tuple[str, ...]:
+    return (line.label, str(line.located.n), *(share.brief for share in line.shares), f"{line.spurious:.2f}")
+
+
+def _rows(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    cells = [head, ["---"] * len(head), *rows]
+    return ["| " + " | ".join(row) + " |" for row in cells]
+
+
+def with_table(text: str, table: str, name: str) -> str:
+    """The text with the table between its marks. DataError where it has none."""
+    before, begin, rest = text.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        raise DataError(f"{name}: no lines {BEGIN} and {END}, between which the table goes; add them")
+    return f"{before}{BEGIN}\n{table}{END}{after}"
+
+
+def main(proof: Path, text: Path) -> None:
+    """Writes the table into the text."""
+    file = msgspec.json.decode(proof.read_bytes(), type=ProofFile)
+    old = text.read_text(encoding="utf-8")
+    text.write_text(with_table(old, table_of(file), text.name), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), Path(sys.argv[2]))

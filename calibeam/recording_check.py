@@ -1,0 +1,80 @@
+"""`calibeam check` of a recording, or of a folder of log segments: what is in it, and what is wrong with it."""
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from rich.console import Console
+
+from acquisition.recording.check import Finding, check
+from acquisition.recording.clock_model import ClockModel, ClockStatus, clock_model
+from acquisition.recording.read import read
+from acquisition.recording.recording import Recording
+from acquisition.recording.segments import segments
+from acquisition.recording.stream import Stream
+
+MOST_LINES = 20  # findings of one file told one by one; a script gets all of them with --json
+
+
+def check_recording(path: Path, *, as_json: bool = False) -> bool:
+    """Print what is in it and what was found; True when nothing is wrong. RecordingError when it cannot be read."""
+    files = segments(path) if path.is_dir() else []
+    good = True
+    for file in files or [path]:
+        recording = read(file)
+        findings = check(recording)
+        good = good and not findings
+        if as_json:
+            print(msgspec.json.encode(_as_json(recording, findings)).decode())
+        else:
+            Console(highlight=False, soft_wrap=True).print("\n".join(lines(recording, findings)), markup=False)
+    return good
+
+
+def lines(recording: Recording, findings: tuple[Finding, ...]) -> list[str]:
+    """For a person: the file, each stream with its rate and clock, each finding."""
+    told = [f"{recording.path}: {len(recording.samples)} settled samples, {len(recording.events)} events"]
+    told += [f"  {stream.name}: {_rate(stream)}; {_clock(stream)}" for stream in recording.streams.values()]
+    told += [f"  {finding.problem.value}: {finding.where}: {finding.says}" for finding in findings[:MOST_LINES]]
+    if len(findings) > MOST_LINES:
+        told.append(f"  and {len(findings) - MOST_LINES} findings more; --json tells all")
+    return told if findings else [*told, "  nothing is wrong with it"]
+
+
+def _rate(stream: Stream) -> str:
+    count = stream.host_s.size
+    span_s = float(stream.host_s[-1] - stream.host_s[0]) if count > 1 else 0.0
+    rate = f", {(count - 1) / span_s:.1f} a second over {span_s:.1f} s" if span_s > 0.0 else ""
+    return f"{count} samples{rate}"
+
+
+def _clock(stream: Stream) -> str:
+    model = clock_model(stream)
+    if model.status is not ClockStatus.FOUND:
+        return f"clock: {model.status.value}"
+    delays = f"arrive {_ms(model.delay_median_s)} late in the median, {_ms(model.delay_p99_s)} at 99 %"
+    wander = "" if model.wander_s is None else f", clock wanders {_ms(model.wander_s)}"
+    return f"clock {1e6 * ((model.rate or 1.0) - 1.0):+.1f} us/s against the host, {delays}{wander}"
+
+
+def _ms(seconds: float | None) -> str:
+    return "-" if seconds is None else f"{1e3 * seconds:.2f} ms"
+
+
+def _as_json(recording: Recording, findings: tuple[Finding, ...]) -> dict[str, Any]:
+    return {
+        "recording": str(recording.path),
+        "complete": recording.complete,
+        "samples": len(recording.samples),
+        "streams": {
+            stream.name: {"samples": stream.host_s.size, "gaps": len(stream.gaps), "clock": _model(clock_model(stream))}
+            for stream in recording.streams.values()
+        },
+        "findings": [
+            {"problem": finding.problem.value, "where": finding.where, "says": finding.says} for finding in findings
+        ],
+    }
+
+
+def _model(model: ClockModel) -> dict[str, Any]:
+    return msgspec.to_builtins(model) | {"status": model.status.name.lower()}

@@ -1,0 +1,70 @@
+"""Terms that have to go: not worth their cost, replaced or balanced by others, gone at the same pose, or mere noise."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from calibrate.diagnose.bench import Bench
+from calibrate.diagnose.null import Null, is_slow
+from calibrate.diagnose.returning import fading
+from calibrate.diagnose.score import gain_of
+from calibrate.diagnose.searching import ALPHA_FIRST, ALPHA_FURTHER, Search, null_at
+
+COLLINEAR = 0.05  # share of a term that the others leave: less is not a term of its own
+COLLINEAR_COST = 6.0  # of BIC that dropping such a term may cost
+CANCELS = 0.1  # square of the sum of a port's terms over the sum of their squares: less, and they are surrogates
+
+
+def tidied(at: Search) -> Search:
+    """Backward: without terms that cost more than they are worth, or that the others can nearly replace."""
+    while at.state.accepted:
+        worth = np.array([gain_of(gone, at.bench.sight) for gone in at.bench.gone])
+        allowed = np.where(at.bench.share < COLLINEAR, COLLINEAR_COST, 0.0)
+        over = np.where(at.bench.plausible, worth - allowed, -np.inf)
+        for i in (*surrogates(at.bench), *fading(at.bench)):
+            over[i] = min(over[i], -1.0)
+        worst = int(np.argmin(over))
+        if over[worst] > 0.0:
+            return at
+        at = without(at, worst)
+    return at
+
+
+def surrogates(bench: Bench) -> list[int]:
+    """Of every port whose terms all but cancel each other, the one that is worth least: no machine balances itself."""
+    accepted = bench.state.accepted
+    felt = np.stack([bench.behind(a) for a in accepted])
+    out: list[int] = []
+    for where in sorted({a.term.port.where for a in accepted}):
+        mine = [i for i, a in enumerate(accepted) if a.term.port.where == where]
+        if len(mine) > 1 and np.sum(felt[mine].sum(axis=0) ** 2) < CANCELS * np.sum(felt[mine] ** 2):
+            out.append(min(mine, key=lambda i: bench.gone[i].squares))
+    return out
+
+
+def without(at: Search, i: int) -> Search:
+    """Refitted without one accepted term, which is banned until the model is another."""
+    kept = [a for j, a in enumerate(at.state.accepted) if j != i]
+    gone = at.state.accepted[i].term.key
+    bench = Bench(at.state.refitted(kept))
+    return replace(at, bench=bench, banned=at.banned | {gone}, p={k: v for k, v in at.p.items() if k != gone})
+
+
+def confirmed(at: Search) -> Search:
+    """Each term against the null of the final residual; the least significant one goes first."""
+    while at.state.accepted:
+        null = null_at(at.bench, at.rng)
+        p = {a.term.key: p_of(at.bench, null, i) for i, a in enumerate(at.state.accepted)}
+        at = replace(at, p=p)
+        values = np.array([p[a.term.key] for a in at.state.accepted])
+        worst = int(np.argmax(values))
+        if values[worst] <= (ALPHA_FURTHER if len(values) > 1 else ALPHA_FIRST):
+            return at
+        at = without(at, worst)
+    return at
+
+
+def p_of(bench: Bench, null: Null, i: int) -> float:
+    """Family-wise probability of an accepted term's worth if there were nothing."""
+    gone, term = bench.gone[i], bench.state.accepted[i].term
+    return null.p_of_worth(is_slow(term), bench.sight, gone)

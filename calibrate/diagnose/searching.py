@@ -1,0 +1,59 @@
+"""The state of a search: a model on the bench, and what refits have said so far."""
+
+from dataclasses import dataclass, field, replace
+
+from numpy.random import Generator
+
+from calibrate.diagnose.bench import Bench
+from calibrate.diagnose.linearised import State
+from calibrate.diagnose.noise_law import noise_law
+from calibrate.diagnose.null import Null, null_of
+from calibrate.diagnose.visible import Menu
+from calibrate.effects.term import Term
+
+Key = tuple[object, ...]
+
+ALPHA_FIRST = 0.03  # of 5 % for a whole diagnosis: the rest is for what has no name
+ALPHA_FURTHER = 0.01
+# Of BIC: accepted for now without drawing a null; the last check draws one for all. Slow ones face a wander, too.
+SURE, SURE_SLOW = 60.0, 150.0
+BETTER = 0.5  # of BIC, for an exchange
+PLACE = "place"  # what variants that name one begin with
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """The search as it goes; every step gives another."""
+
+    bench: Bench
+    rng: Generator
+    banned: frozenset[Key] = field(default_factory=frozenset)  # refits have refused them
+    p: dict[Key, float] = field(default_factory=dict)  # family-wise, of every accepted term
+
+    @property
+    def state(self) -> State:
+        return self.bench.state
+
+    @property
+    def keys(self) -> frozenset[Key]:
+        return frozenset(a.term.key for a in self.state.accepted)
+
+    @property
+    def causes(self) -> frozenset[Key]:
+        """Of the accepted terms: one term for one cause, whatever its variant."""
+        return frozenset(cause_of(a.term) for a in self.state.accepted)
+
+    def at(self, bench: Bench) -> "Search":
+        """Banned terms have another chance as soon as the model is another."""
+        return replace(self, bench=bench, banned=frozenset())
+
+
+def cause_of(term: Term) -> Key:
+    """What a person would give one name: the key without the variant; each place may have been bumped by itself."""
+    return (*term.key[:-1], term.variant if term.variant.startswith(PLACE) else "")
+
+
+def null_at(bench: Bench, rng: Generator, menu: Menu | None = None) -> Null:
+    """Null of a state, from its own residual."""
+    law = noise_law(bench.state.rows, bench.sight, bench.state.drivers.t_s, rng)
+    return null_of(bench.menu if menu is None else menu, law, rng)

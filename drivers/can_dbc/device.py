@@ -1,0 +1,185 @@
+"""Plain encoders on CAN that send by themselves, described by a DBC file, as an instrument.
+
+Nothing is ever sent: a bus with another master is only listened to. The encoders are not synchronous; how old each
+reading was when the row was complete is a channel. One thread uses it at a time, except `close`.
+"""
+
+import math
+from collections.abc import Sequence
+
+import can
+import numpy as np
+
+from drivers.can_dbc.description import JointSignal
+from drivers.cia406.angle import SPEED_LIMIT_RAD_S, ContinuousAngle
+from drivers.cia406.bus_faults import BusFaults
+from drivers.cia406.network import lost_as_device_lost, shut_down
+from drivers.clock import Clock, SystemClock
+from drivers.device import Block, Channel
+from drivers.errors import DeviceLost, DeviceStale
+from drivers.transports.can_interfaces import OpenBus, opened
+
+SILENT_S = 0.5  # an encoder that sends nothing for so long is gone
+BATCH_S = 0.02  # rows gathered in one block; more only delays a reader
+
+
+class CanDbcEncoders:
+    """A `drivers.device.Device`. Channels: position_rad (joint,), NaN where none came; age_s (joint,); slip_rad
+    (joint,); bus_errors, error frames so far.
+
+    A row is complete when every encoder has sent, or when one sends again before the others did.
+    """
+
+    def __init__(
+        self,
+        open_bus: OpenBus,
+        joints: Sequence[JointSignal],
+        *,
+        name: str = "encoders",
+        clock: Clock | None = None,
+        speed_limit_rad_s: float = SPEED_LIMIT_RAD_S,
+        acceleration_limit_rad_s2: float = math.inf,
+    ) -> None:
+        """ValueError for no joints."""
+        if not joints:
+            raise ValueError(f"{name}: no signals; name one per joint")
+        self.name = name
+        self.joints = tuple(joints)
+        self.bad_frames = 0
+        self._open_bus = open_bus
+        self._clock: Clock = SystemClock() if clock is None else clock
+        self._limits = speed_limit_rad_s, acceleration_limit_rad_s2
+        self._bus: can.BusABC | None = None
+        self._faults = BusFaults(name)
+        self._angles = self._new_angles()
+        self._places: dict[tuple[int, bool], list[int]] = {}
+        for place, joint in enumerate(self.joints):
+            self._places.setdefault(joint.frame, []).append(place)
+        self._sequence = 0
+        self._row: dict[int, tuple[float, float]] = {}  # place -> angle, host time
+        self._heard_s: dict[int, float] = {}
+
+    def connect(self) -> None:
+        """Open the bus and hear every encoder once. DeviceLost (no bus), DeviceStale naming those that are silent."""
+        self.close()
+        self._bus = opened(self._open_bus, self.name)
+        self._angles = self._new_angles()
+        self._row.clear()
+        if self._sequence:
+            self._sequence += 1  # what passed between is not known to be nothing
+        try:
+            self._hear_all()
+        except BaseException:
+            self.close()
+            raise
+
+    def describe(self) -> tuple[Channel, ...]:
+        shape = (len(self.joints),)
+        count_rad = max(abs(joint.scale.unit_rad) for joint in self.joints)
+        return (
+            Channel("position_rad", "rad", shape, float("inf"), count_rad),
+            Channel("age_s", "s", shape),
+            Channel("slip_rad", "rad", shape),
+            Channel("bus_errors", ""),
+        )
+
+    def read(self, timeout_s: float) -> Block:
+        began_s = self._clock.now_s()
+        rows: list[tuple[int, float, dict[int, tuple[float, float]]]] = []
+        with lost_as_device_lost(self.name, "reading"):
+            while (left_s := began_s + timeout_s - self._clock.now_s()) > 0.0:
+                rows += self._take(self._receive(left_s))
+                if rows and self._clock.now_s() - began_s >= BATCH_S:
+                    break
+        self._check_silence()
+        if not rows:
+            raise DeviceStale(f"{self.name}: no encoder sent within {timeout_s:g} s; check power, bus and bitrate")
+        return self._block(rows)
+
+    def close(self) -> None:
+        bus, self._bus = self._bus, None
+        if bus is not None:
+            shut_down(bus)
+
+    # --- frames
+
+    def _hear_all(self) -> None:
+        until_s = self._clock.now_s() + 2.0 * SILENT_S
+        self._heard_s = {}
+        with lost_as_device_lost(self.name, "opening"):
+            while len(self._heard_s) < len(self.joints) and (left_s := until_s - self._clock.now_s()) > 0.0:
+                self._take(self._receive(left_s))
+        silent = [joint.name for place, joint in enumerate(self.joints) if place not in self._heard_s]
+        if silent:
+            raise DeviceStale(
+                f"{self.name}: nothing heard of {', '.join(silent)} within {2.0 * SILENT_S:g} s; "
+                "check power, bit rate, the bus termination, and that the DBC file is of these encoders"
+            )
+
+    def _receive(self, timeout_s: float) -> can.Message | None:
+        bus = self._bus
+        if bus is None:
+            raise DeviceLost(f"{self.name}: not connected; call connect() first")
+        try:
+            return bus.recv(min(max(timeout_s, 0.0), SILENT_S))
+        except (ValueError, IndexError):  # python-can's parser on a damaged line of a serial adapter
+            self.bad_frames += 1
+            return None
+
+    def _take(self, message: can.Message | None) -> list[tuple[int, float, dict[int, tuple[float, float]]]]:
+        """The row that this frame completes, if any."""
+        now_s = self._clock.now_s()
+        if message is None or message.is_remote_frame:
+            return []
+        if message.is_error_frame:
+            self._faults.take(message, now_s)
+            return []
+        places = self._places.get((message.arbitration_id, message.is_extended_id), [])
+        done = [self._finish(now_s)] if any(place in self._row for place in places) else []
+        data = bytes(message.data)
+        for place in places:
+            counts = self.joints[place].counts(data)
+            if counts is None:
+                self.bad_frames += 1
+                continue
+            angle_rad = self._angles[place].follow(counts, now_s) + self.joints[place].offset_rad
+            self._row[place] = angle_rad, now_s
+            self._heard_s[place] = now_s
+        if len(self._row) == len(self.joints):
+            done.append(self._finish(now_s))
+        return done
+
+    def _finish(self, now_s: float) -> tuple[int, float, dict[int, tuple[float, float]]]:
+        row, self._row = self._row, {}
+        self._sequence += 1
+        return self._sequence - 1, now_s, row
+
+    def _check_silence(self) -> None:
+        now_s = self._clock.now_s()
+        silent = [self.joints[place].name for place, heard_s in self._heard_s.items() if now_s - heard_s >= SILENT_S]
+        if silent:
+            self._heard_s = dict.fromkeys(self._heard_s, now_s)  # told once, and again after as long
+            raise DeviceStale(
+                f"{self.name}: {', '.join(silent)} sent nothing for {SILENT_S:g} s; "
+                "check its power, cable and termination"
+            )
+
+    def _block(self, rows: Sequence[tuple[int, float, dict[int, tuple[float, float]]]]) -> Block:
+        nothing = (math.nan, math.nan)
+        each = np.array([[row.get(place, nothing) for place in range(len(self.joints))] for _, _, row in rows])
+        host_s = np.array([done_s for _, done_s, _ in rows])
+        slips_rad = [angle.slip_rad for angle in self._angles]
+        return Block(
+            host_s=host_s,
+            device_s=np.nanmean(each[:, :, 1], axis=1),
+            sequence=np.array([sequence for sequence, _, _ in rows], dtype=np.int64),
+            values={
+                "position_rad": each[:, :, 0],
+                "age_s": host_s[:, None] - each[:, :, 1],
+                "slip_rad": np.tile(slips_rad, (len(rows), 1)),
+                "bus_errors": np.full(len(rows), self._faults.count, dtype=np.uint32),
+            },
+        )
+
+    def _new_angles(self) -> tuple[ContinuousAngle, ...]:
+        return tuple(ContinuousAngle(joint.scale, *self._limits) for joint in self.joints)

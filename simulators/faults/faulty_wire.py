@@ -1,0 +1,78 @@
+"""A wire with the faults of its device on it. Order on the line is kept: nothing overtakes what is held back.
+
+A wire may say what only its protocol knows, by two methods that are optional:
+
+    damaged(output) -> bytes        the same output with a wrong checksum or length (otherwise: one bit turned)
+    refusal(request) -> bytes|None  the error reply to these bytes; None: they are no request that could be refused
+"""
+
+from collections import deque
+
+from simulators.faults.fault import Output
+from simulators.faults.injector import Injector
+from simulators.wire import TICK_S, Wire
+
+UNPLUGGED_S = 0.1  # for how long a disconnected serial device is away; a TCP client may come back at once
+
+
+class FaultyWire:
+    """Wraps one wire of a device; without faults it passes everything on as it is."""
+
+    def __init__(self, wire: Wire, injector: Injector, port: str) -> None:
+        self.inner = wire
+        self._injector, self._port = injector, port
+        self._tick = 0
+        self._held: deque[tuple[int, bytes]] = deque()  # tick of its release, bytes
+        self._before = b""
+        self._away_until = -1  # tick; while it is not reached the line is cut
+
+    @property
+    def closing(self) -> bool:
+        """The host drops the client, or pulls the serial plug, while this is true."""
+        return self._tick < self._away_until or bool(getattr(self.inner, "closing", False))
+
+    def handle(self, data: bytes) -> bytes:
+        refused = self._injector.refuse(data, getattr(self.inner, "refusal", _no_reply), self._port)
+        self._send(self.inner.handle(data) if refused is None else refused)
+        return self._released()
+
+    def due(self) -> bytes:
+        self._tick += 1
+        data = self.inner.due()
+        if self._injector.quiet and not self._held:  # every tick of every line of a healthy device comes through here
+            self._before = data or self._before
+            return data
+        self._send(data)
+        return self._released()
+
+    def _send(self, data: bytes) -> None:
+        output = Output([(0, data)] if data else [], self._before, self._damaged)
+        self._injector.disturb(output, self._port)
+        self._before = output.data or self._before
+        if output.hang_up:
+            self._away_until = self._tick + round(UNPLUGGED_S / TICK_S)
+            self._held.clear()
+        earliest = self._held[-1][0] if self._held else 0
+        for held, part in output.parts:
+            earliest = max(earliest, self._tick + held)
+            self._held.append((earliest, part))
+
+    def _released(self) -> bytes:
+        out = bytearray()
+        while self._held and self._held[0][0] <= self._tick:
+            out += self._held.popleft()[1]
+        return bytes(out)
+
+    def _damaged(self, data: bytes) -> bytes:
+        known = getattr(self.inner, "damaged", None)
+        return turn_a_bit(data) if known is None else known(data)
+
+
+def turn_a_bit(data: bytes) -> bytes:
+    """One bit of the byte in the middle turned, without making a zero, which some protocols delimit frames with."""
+    at = len(data) // 2
+    return data[:at] + bytes((data[at] ^ 0x10 or data[at] ^ 0x20,)) + data[at + 1 :]
+
+
+def _no_reply(request: bytes) -> bytes | None:
+    return None

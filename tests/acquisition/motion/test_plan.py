@@ -1,0 +1,70 @@
+"""Plans keep within the limits of joints, areas and boxes, and refuse before anything moves."""
+
+import numpy as np
+import pytest
+
+from acquisition.motion.cell import Box, Cell, SlowArea
+from acquisition.motion.errors import RefusedMotionError
+from acquisition.motion.inverse.closed_form import closed_form
+from acquisition.motion.inverse.solver import Solver
+from acquisition.motion.paths.segments import By, Pace, Segment
+from acquisition.motion.plan import OVER, plan
+from acquisition.motion.rigid import transform
+from acquisition.motion.task.place import Place
+from tests.acquisition.motion.conftest import ur5e
+
+SOLVER = Solver(ur5e(1e-3), closed_form(ur5e()))
+HOME_RAD = np.array([0.3, -1.4, 1.6, -0.5, 1.3, 0.1])
+PACE = Pace(np.full(6, 0.8), np.full(6, 4.0))
+HOME = SOLVER.flange(HOME_RAD)
+OPEN = Cell()
+
+
+def to(*shift: float, turn=(0.0, 0.0, 0.0), by: By = By.LINE) -> Segment:
+    return Segment("there", by, Place("there", HOME @ transform(shift, turn), np.eye(4)))
+
+
+@pytest.mark.parametrize("by", [By.JOINTS, By.LINE])
+def test_speed_and_acceleration_stay_within_the_pace(by: By) -> None:
+    made = plan(
+        SOLVER, HOME_RAD, [to(0.2, -0.1, 0.05, turn=(0.4, 1.0, 0.8), by=by), to(0.0, 0.1, 0.0, by=by)], PACE, OPEN
+    )
+    speed, acceleration = made.rates()
+    assert (np.abs(speed) <= OVER * PACE.speed_rad_s).all()
+    assert (np.abs(acceleration) <= OVER * PACE.acceleration_rad_s2).all()
+
+
+def test_the_tool_is_slow_where_it_has_to_be() -> None:
+    x, y, z = HOME[:3, 3]
+    area = SlowArea(Box("fixture", (x - 0.5, y - 0.5, z - 0.5), (x + 0.5, y + 0.5, z + 0.5)), 0.05)
+    slow = plan(SOLVER, HOME_RAD, [to(0.2, 0.0, 0.0)], PACE, Cell(slow=(area,)))
+    free = plan(SOLVER, HOME_RAD, [to(0.2, 0.0, 0.0)], PACE, OPEN)
+    flange = SOLVER.arm.frames(slow.q_rad)[:, -1, :3, 3]
+    assert np.linalg.norm(np.gradient(flange, slow.t_s, axis=0), axis=1).max() <= 0.05 * OVER
+    assert slow.t_s[-1] > 2.0 * free.t_s[-1]
+
+
+def test_a_box_in_the_way_is_named() -> None:
+    x, y, z = (HOME @ transform((0.15, 0.0, 0.0)))[:3, 3]
+    box = Box("operator side", (x - 0.02, y - 0.02, z - 0.02), (x + 0.02, y + 0.02, z + 0.02))
+    with pytest.raises(RefusedMotionError, match=r"segment 1 'there' \(line\) at .* keep-out box 'operator side'"):
+        plan(SOLVER, HOME_RAD, [to(0.3, 0.0, 0.0)], PACE, Cell(keep_out=(box,)))
+
+
+def test_a_straight_line_through_a_singular_wrist_is_refused_with_its_joint() -> None:
+    singular_rad = HOME_RAD * np.array([1.0, 1.0, 1.0, 1.0, 0.0, 1.0])
+    beyond_rad = HOME_RAD * np.array([1.0, 1.0, 1.0, 1.0, -1.0, 1.0])
+    for target_rad in (singular_rad, beyond_rad):
+        segment = Segment("flip", By.LINE, Place("flip", SOLVER.flange(target_rad), np.eye(4)))
+        with pytest.raises(RefusedMotionError, match=r"segment 1 'flip' \(line\).*joint \d"):
+            plan(SOLVER, HOME_RAD, [segment], PACE, OPEN)
+
+
+def test_a_joint_that_would_leave_its_range_is_named() -> None:
+    edge_rad = HOME_RAD.copy()
+    edge_rad[5] = SOLVER.arm.upper_rad[5] - 0.1
+    segment = Segment(
+        "over", By.LINE, Place("over", SOLVER.flange(edge_rad) @ transform(rotation_rad=(0.0, 0.0, 0.4)), np.eye(4))
+    )
+    with pytest.raises(RefusedMotionError, match=r"segment 1 'over' \(line\).*joint 6 at .* leaves its range"):
+        plan(SOLVER, edge_rad, [segment], PACE, OPEN)

@@ -1,0 +1,25 @@
+"""Every state with every event: the whole table, so that a new state cannot be forgotten."""
+
+import pytest
+
+from acquisition.motion.states import OVER, Event, State, after
+
+S, E = State, Event
+CHANGES = {
+    **{(s, E.START): S.MOVING for s in OVER},
+    **{(s, E.HALT): S.HALTED for s in State},
+    **{(s, e): S.ENDING for s in (S.MOVING, S.PAUSING, S.HELD) for e in (E.ABORT, E.STOP)},
+    **{(s, E.FAULT): S.ABORTED for s in (S.MOVING, S.PAUSING, S.HELD, S.ENDING)},
+    **{(s, E.FINISHED): S.DONE for s in (S.MOVING, S.PAUSING, S.ENDING)},
+    **{(s, E.HOLD): S.HELD for s in (S.MOVING, S.PAUSING)},
+    **{(s, E.RESUME): S.MOVING for s in (S.PAUSING, S.HELD)},
+    (S.MOVING, E.PAUSE): S.PAUSING,
+    (S.PAUSING, E.PAUSE): S.HELD,
+    (S.PAUSING, E.RESTED): S.HELD,
+}
+
+
+@pytest.mark.parametrize("state", State)
+@pytest.mark.parametrize("event", Event)
+def test_what_follows(state: State, event: Event) -> None:
+    assert after(state, event) is CHANGES.get((state, event), state)

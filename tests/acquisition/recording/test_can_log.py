@@ -1,0 +1,193 @@
+"""CAN logs in and out through python-can: every frame comes back as it was, whatever its kind."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import can
+import numpy as np
+import pytest
+
+from acquisition.recording.can_frames import Frame, FrameFlag, block_of, channels, frames_of
+from acquisition.recording.can_log import SUFFIXES, export_can, import_can
+from acquisition.recording.can_message import frame_of
+from acquisition.recording.check import Problem, check
+from acquisition.recording.errors import RecordingError
+from acquisition.recording.read import read
+from acquisition.recording.recording import Recording
+from acquisition.recording.writer import RecordingWriter
+
+Open = Callable[..., RecordingWriter]
+START_S = 1_790_000_000.25  # in 2026
+
+
+def messages() -> list[can.Message]:
+    """A thousand frames of all the kinds that every format can hold."""
+    rng = np.random.default_rng(4)
+    made = []
+    for number in range(1000):
+        extended = bool(number % 3 == 0)
+        remote = number % 50 == 7
+        data = b"" if remote else rng.bytes(int(rng.integers(0, 9)))
+        made.append(
+            can.Message(
+                timestamp=START_S + number * 1e-3,
+                arbitration_id=int(rng.integers(0, 0x1FFFFFFF if extended else 0x7FF)),
+                is_extended_id=extended,
+                is_remote_frame=remote,
+                dlc=4 if remote else len(data),
+                data=data,
+                channel=0,
+            )
+        )
+    return made
+
+
+@pytest.fixture
+def record_frames(open_writer: Open) -> Callable[..., Recording]:
+    def made(heard: list[can.Message], width: int = 8, sent: bool = False) -> Recording:
+        frames = [frame_of(message, message.timestamp - START_S + 1000.0, sent=sent) for message in heard]
+        with open_writer(host_s0=1000.0) as writer:
+            block = block_of(frames, width)
+            stream = writer.stream("can", channels(width), viewer=())
+            stream.append(block.host_s, block.device_s, np.arange(len(frames)), block.values)
+        return read(writer.path)
+
+    return made
+
+
+def kinds(recording: Recording) -> list[tuple[int, int, int, bytes]]:
+    (stream,) = recording.streams.values()
+    return [(frame.can_id, frame.flags, frame.length, frame.data) for frame in frames_of(stream)]
+
+
+def written_in(suffix: str, kind: tuple[int, int, int, bytes]) -> tuple[int, int, int, bytes]:
+    """The frame as the format can hold it: python-can's candump writes no length for a remote frame."""
+    can_id, flags, length, data = kind
+    return can_id, flags, 0 if suffix == ".log" and flags & FrameFlag.REMOTE else length, data
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_frames_go_out_and_come_back_the_same(suffix: str, record_frames, tmp_path: Path, rig_source: str) -> None:
+    recording = record_frames(messages())
+    log = tmp_path / f"bus{suffix}"
+    assert export_can(recording, log) == 1000
+    done = import_can(log, tmp_path / "back.mcap", rig_text=rig_source, software="calibeam")
+    assert (done.frames, done.damage) == (1000, None)
+    back = read(tmp_path / "back.mcap")
+    assert back.complete
+    assert kinds(back) == [written_in(suffix, kind) for kind in kinds(recording)]
+    (stream,) = back.streams.values()
+    np.testing.assert_allclose(np.diff(stream.host_s), 1e-3, rtol=0.0, atol=2e-6)
+    assert check(back) == ()
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_logs_that_python_can_wrote_are_read_with_their_absolute_times(
+    suffix: str, tmp_path: Path, rig_source: str
+) -> None:
+    written = messages()
+    with can.Logger(tmp_path / f"bus{suffix}") as logger:
+        for message in written:
+            logger(message)
+    import_can(tmp_path / f"bus{suffix}", tmp_path / "back.mcap", rig_text=rig_source, software="calibeam")
+    back = read(tmp_path / "back.mcap")
+    (stream,) = back.streams.values()
+    assert [frame.data for frame in frames_of(stream)] == [bytes(message.data) for message in written]
+    np.testing.assert_allclose(stream.device_s, [m.timestamp for m in written], rtol=0.0, atol=1.5e-3)  # ASC: ms
+
+
+def test_what_python_can_reads_of_our_blf_is_what_was_heard(record_frames, tmp_path: Path) -> None:
+    heard = messages()
+    export_can(record_frames(heard), tmp_path / "bus.blf")
+    with can.BLFReader(tmp_path / "bus.blf") as reader:
+        found = list(reader)
+    assert [bytes(m.data) for m in found] == [bytes(m.data) for m in heard]
+    assert [m.arbitration_id for m in found] == [m.arbitration_id for m in heard]
+    assert all(m.is_rx for m in found)
+
+
+def test_sent_frames_are_told_from_heard_ones(record_frames, tmp_path: Path) -> None:
+    export_can(record_frames(messages()[:5], sent=True), tmp_path / "bus.blf")
+    with can.BLFReader(tmp_path / "bus.blf") as reader:
+        assert not any(message.is_rx for message in reader)
+
+
+def test_frames_of_can_fd_keep_all_their_bytes(record_frames, tmp_path: Path, rig_source: str) -> None:
+    data = bytes(range(64))
+    long = can.Message(timestamp=START_S, arbitration_id=5, is_fd=True, bitrate_switch=True, data=data, dlc=64)
+    export_can(record_frames([long], width=64), tmp_path / "bus.blf")
+    import_can(tmp_path / "bus.blf", tmp_path / "back.mcap", rig_text=rig_source, software="calibeam")
+    (stream,) = read(tmp_path / "back.mcap").streams.values()
+    (frame,) = frames_of(stream)
+    assert frame.data == data
+    assert frame.flags & FrameFlag.FD
+
+
+def test_a_long_frame_does_not_fit_into_a_classic_stream() -> None:
+    with pytest.raises(ValueError, match="12 bytes in a stream of 8"):
+        block_of([Frame(0.0, 0.0, 1, 0, 12, bytes(12))])
+
+
+def test_each_bus_of_a_file_gets_a_stream_of_its_own(tmp_path: Path, rig_source: str) -> None:
+    with can.Logger(tmp_path / "two.log") as logger:
+        for number in range(20):
+            name = "can0" if number % 2 else "can1"
+            logger(can.Message(timestamp=START_S + number, arbitration_id=number, channel=name, is_extended_id=False))
+    import_can(tmp_path / "two.log", tmp_path / "two.mcap", rig_text=rig_source, software="calibeam")
+    recording = read(tmp_path / "two.mcap")
+    assert {name: stream.host_s.size for name, stream in recording.streams.items()} == {"can-can0": 10, "can-can1": 10}
+    export_can(recording, tmp_path / "again.log")
+    with can.CanutilsLogReader(tmp_path / "again.log") as reader:
+        again = list(reader)
+    assert [m.arbitration_id for m in again] == list(range(20))
+    assert [m.channel for m in again[:2]] == ["can1", "can0"]
+
+
+def test_of_a_torn_log_what_came_before_is_kept_and_told(record_frames, tmp_path: Path, rig_source: str) -> None:
+    export_can(record_frames(messages()), tmp_path / "bus.csv")
+    text = (tmp_path / "bus.csv").read_text()
+    lines = text.splitlines()
+    (tmp_path / "bus.csv").write_text("\n".join([*lines[:401], "1790000000.65,0x1F"]))
+    done = import_can(tmp_path / "bus.csv", tmp_path / "torn.mcap", rig_text=rig_source, software="calibeam")
+    assert done.frames == 400
+    assert done.damage is not None
+    assert not read(tmp_path / "torn.mcap").complete
+
+
+def test_error_frames_are_kept_and_found(record_frames) -> None:
+    error = can.Message(timestamp=START_S, is_error_frame=True, arbitration_id=0x20000080 & 0x7FF, data=bytes(8), dlc=8)
+    recording = record_frames([*messages()[:3], error])
+    assert kinds(recording)[3][1] & FrameFlag.ERROR
+    assert Problem.ERROR_FRAMES in {finding.problem for finding in check(recording)}
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [
+        ("bus.xyz", "", "no CAN log format"),
+        ("bus.log", "", "no CAN frame in it"),
+        ("bus.blf", "not a BLF file, but longer than a header of one" * 5, "no CAN frame in it"),
+        ("missing.asc", None, "cannot read it"),
+    ],
+)
+def test_what_is_no_can_log_is_refused(
+    name: str, content: str | None, says: str, tmp_path: Path, rig_source: str
+) -> None:
+    if content is not None:
+        (tmp_path / name).write_text(content)
+    with pytest.raises(RecordingError, match=says):
+        import_can(tmp_path / name, tmp_path / "back.mcap", rig_text=rig_source, software="calibeam")
+    assert not (tmp_path / "back.mcap").exists()
+
+
+def test_a_recording_without_frames_says_how_to_get_some(open_writer: Open, tmp_path: Path) -> None:
+    writer = open_writer()
+    writer.close()
+    with pytest.raises(RecordingError, match=r"no raw CAN frames.*log encoders --raw"):
+        export_can(read(writer.path), tmp_path / "bus.blf")
+
+
+def test_nothing_is_overwritten(record_frames, tmp_path: Path) -> None:
+    (tmp_path / "bus.asc").write_text("precious")
+    with pytest.raises(RecordingError, match="nothing is overwritten"):
+        export_can(record_frames(messages()), tmp_path / "bus.asc")

@@ -1,0 +1,82 @@
+"""Every frame goes into the recording once, in order, from whichever thread it was heard."""
+
+import threading
+
+import can
+import numpy as np
+
+from acquisition.frame_log import BLOCK_S, FrameLog
+from acquisition.recording.can_frames import FrameFlag
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.s = 50.0
+
+    def now_s(self) -> float:
+        return self.s
+
+    def sleep_s(self, seconds: float) -> None:
+        self.s += seconds
+
+
+class Kept:
+    def __init__(self) -> None:
+        self.sequence: list[int] = []
+        self.ids: list[int] = []
+        self.flags: list[int] = []
+        self.host_s: list[float] = []
+        self.blocks = 0
+
+    def append(self, host_s, device_s, sequence, values) -> None:
+        self.blocks += 1
+        self.host_s += host_s.tolist()
+        self.sequence += sequence.tolist()
+        self.ids += values["can_id"].tolist()
+        self.flags += values["flags"].tolist()
+        assert values["data"].shape == (len(host_s), 8)
+
+
+def frame(number: int, **kind: bool) -> can.Message:
+    return can.Message(timestamp=5.0, arbitration_id=number, is_extended_id=False, data=bytes([number % 256]), **kind)
+
+
+def test_frames_wait_for_a_block_and_are_written_in_order() -> None:
+    clock, kept = Clock(), Kept()
+    log = FrameLog(kept, clock, 8)
+    for number in range(100):
+        log.hear(frame(number), number % 7 == 0)
+        clock.s += 0.001
+    written_by_itself = kept.blocks
+    log.flush()
+    assert 1 < written_by_itself <= 0.1 / BLOCK_S
+    assert kept.sequence == kept.ids == list(range(100))
+    assert [bool(flag & FrameFlag.SENT) for flag in kept.flags] == [number % 7 == 0 for number in range(100)]
+    np.testing.assert_allclose(np.diff(kept.host_s), 0.001)
+    assert log.count == 100
+
+
+def test_error_frames_are_counted() -> None:
+    log = FrameLog(Kept(), Clock(), 8)
+    log.hear(frame(1, is_error_frame=True), False)
+    log.hear(frame(2), False)
+    log.flush()
+    assert (log.count, log.errors) == (2, 1)
+
+
+def test_two_threads_lose_and_double_nothing() -> None:
+    kept = Kept()
+    log = FrameLog(kept, Clock(), 8)
+
+    def hear(first: int) -> None:
+        for number in range(first, first + 1000):
+            log.hear(frame(number % 0x7FF), False)
+            log.flush()
+
+    threads = [threading.Thread(target=hear, args=(first,)) for first in (0, 1000)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert kept.sequence == list(range(2000))
+    assert sorted(kept.ids) == sorted(number % 0x7FF for number in range(2000))

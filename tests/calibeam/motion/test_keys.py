@@ -1,0 +1,64 @@
+"""What Ctrl-C and words at the keyboard tell the gate."""
+
+import io
+
+import pytest
+
+from acquisition.motion.states import Event, State, after
+from calibeam.motion.keys import Keys
+
+
+class Told:
+    """A gate that keeps what it was told, and follows the table of states."""
+
+    def __init__(self, state: State) -> None:
+        self.state, self.told = state, []
+
+    def _tell(self, event: Event) -> None:
+        self.told.append(event.value)
+        self.state = after(self.state, event)
+
+    def pause(self) -> None:
+        self._tell(Event.PAUSE)
+
+    def resume(self) -> None:
+        self._tell(Event.RESUME)
+
+    def stop(self) -> None:
+        self._tell(Event.STOP)
+
+    def abort(self) -> None:
+        self._tell(Event.ABORT)
+
+    def halt(self) -> None:
+        self._tell(Event.HALT)
+
+
+def test_ctrl_c_pauses_then_holds_then_gives_up() -> None:
+    gate, out = Told(State.MOVING), io.StringIO()
+    keys = Keys(gate, io.StringIO(), out)  # type: ignore[arg-type]
+    for state in (State.PAUSING, State.HELD, State.ENDING):
+        keys.interrupted()
+        assert gate.state is state
+    assert gate.told == ["pause", "pause", "abort"]
+    assert "Ctrl-C again brakes now" in out.getvalue()
+
+
+@pytest.mark.parametrize(("word", "told"), [("r\n", "resume"), ("Stop", "stop"), ("a", "abort"), ("h", "halt")])
+def test_words(word: str, told: str) -> None:
+    gate = Told(State.HELD)
+    Keys(gate, io.StringIO(), io.StringIO()).word(word)  # type: ignore[arg-type]
+    assert gate.told == [told]
+
+
+def test_another_word_is_answered_with_those_there_are() -> None:
+    gate, out = Told(State.HELD), io.StringIO()
+    Keys(gate, io.StringIO(), out).word("what")  # type: ignore[arg-type]
+    assert gate.told == []
+    assert "r resume, s stop, a abort, h halt" in out.getvalue()
+
+
+def test_a_closed_terminal_gives_up() -> None:
+    gate = Told(State.MOVING)
+    Keys(gate, io.StringIO(), io.StringIO()).ended()  # type: ignore[arg-type]
+    assert gate.state is State.ENDING

@@ -1,0 +1,49 @@
+"""The public table is that of a file, goes between its marks, and never comes of a seed of development."""
+
+from collections.abc import Callable
+
+import pytest
+
+from calibeam.prove.published import BEGIN, END, table_of, with_table
+from calibeam.prove.record import SCHEMA, CaseScore, DefectScore, ProofFile
+from calibrate.errors import DataError
+
+Case = Callable[..., CaseScore]
+Found = Callable[..., DefectScore]
+
+
+@pytest.fixture
+def proof(case: Case, found: Found) -> Callable[..., ProofFile]:
+    def make(*, seed: int = 20261121, without: tuple[str, ...] = ()) -> ProofFile:
+        plain = case((found(enr=1.2),), oracle_free_space_m=0.9e-5)
+        wired = case((found(enr=2.5, named=False),), path="on wires")
+        return ProofFile(SCHEMA, "calibeam 1", seed, seed < 1000, "calibeam prove", "", 600.0, (plain, wired), without)
+
+    return make
+
+
+def test_every_figure_has_its_line(proof: Callable[..., ProofFile]) -> None:
+    table = table_of(proof()).replace("\u00a0", " ").replace("\u2011", "-")
+    assert "Seed 20261121, 2 sessions, 10 minutes" in table
+    assert "| all of 0.6 and more | 2 | 100 % (34-100) | 50 %" in table
+    assert "| of these, over the emulated wires | 1 | 100 % (21-100) | 0 %" in table
+    assert "| tracker | 1 | 30.0 µm | 10.0 µm | 9.00 µm |" in table
+    assert all(line.startswith("| ") for line in table.splitlines() if "---" in line)
+
+
+def test_development_is_not_for_the_public(proof: Callable[..., ProofFile]) -> None:
+    with pytest.raises(DataError, match="one of development"):
+        table_of(proof(seed=21))
+    with pytest.raises(DataError, match="taken out"):
+        table_of(proof(without=("backlash",)))
+
+
+def test_the_table_goes_between_its_marks_and_nothing_else_changes() -> None:
+    text = f"before\n{BEGIN}\nold\n{END}\nafter\n"
+    assert with_table(text, "new\n", "README.md") == f"before\n{BEGIN}\nnew\n{END}\nafter\n"
+    assert with_table(with_table(text, "new\n", ""), "newer\n", "") == f"before\n{BEGIN}\nnewer\n{END}\nafter\n"
+
+
+def test_a_text_without_marks_is_refused() -> None:
+    with pytest.raises(DataError, match=r"README.md: no lines <!-- proof: begin -->"):
+        with_table("no marks", "new\n", "README.md")

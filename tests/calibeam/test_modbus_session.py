@@ -1,0 +1,77 @@
+"""A session with an IRB 120 class arm behind a PLC: read, moved and stopped over Modbus."""
+
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+from rich.console import Console
+
+from acquisition.plan import PlanOptions
+from acquisition.recording.read import read
+from acquisition.recording.rig import load_rig, rig_text
+from acquisition.recording.writer import RecordingWriter
+from calibeam.emulation import Emulation
+from calibeam.recorded import progress_bar, record_session
+from calibeam.site import addresses_of, check_session, connected
+from drivers.clock import SystemClock
+from drivers.errors import DeviceRefused
+
+RIG = Path(__file__).parents[2] / "rigs" / "irb120-modbus.toml"
+SMALL = PlanOptions(centred=1, off_centre=1, repeats=1)
+
+
+@pytest.fixture
+def run_session(tmp_path):
+    """A session at one place, four times real time."""
+
+    def run():
+        rig = load_rig(RIG)
+        check_session(rig)
+        rig = msgspec.structs.replace(rig, placement_list=rig.placement_list[:1])
+        path, clock = tmp_path / "recording.mcap", SystemClock()
+        with (
+            Emulation(RIG, seed=5, time_scale=4.0) as emulation,
+            RecordingWriter(path, rig_text=rig_text(RIG), software="test", clock=clock) as writer,
+            connected(rig, addresses_of(rig, emulation.address, 4.0), writer, clock, emulation.place_fixture) as bench,
+        ):
+            record_session(bench, rig, writer, SMALL, clock, progress_bar(Console(quiet=True)))
+        return read(path)
+
+    return run
+
+
+def test_move_look_and_stop_on_the_bench(tmp_path) -> None:
+    """What a session does again and again, without its search and its fits."""
+    rig, clock = load_rig(RIG), SystemClock()
+    with (
+        Emulation(RIG, seed=5, time_scale=2.0) as emulation,
+        RecordingWriter(tmp_path / "r.mcap", rig_text=rig_text(RIG), software="test", clock=clock) as writer,
+        connected(rig, addresses_of(rig, emulation.address, 2.0), writer, clock, emulation.place_fixture) as bench,
+    ):
+        home_rad = np.array(rig.motion.home_rad)
+        bench.move(home_rad + 0.1)
+        look = bench.look(0.1)
+        assert look.q_rad == pytest.approx(home_rad + 0.1, abs=1e-4)
+        assert look.temperatures_degC["joint1"] > 10.0
+        emulation.ask("robot.protective_stop")
+        with pytest.raises(DeviceRefused, match="protective stop: clear the cause and unlock it at the controller"):
+            bench.move(home_rad)
+        bench.stop()
+        assert emulation.ask("robot.standing")
+    recording = read(tmp_path / "r.mcap")
+    assert set(recording.streams) == {"psd", "spots", "robot"}
+    assert np.all(np.diff(recording.streams["robot"].sequence) >= 1)
+
+
+@pytest.mark.endure
+@pytest.mark.timeout(900)
+def test_a_whole_session(run_session) -> None:
+    recording = run_session()
+    assert recording.complete
+    assert len(recording.samples) == 6
+    assert set(recording.streams) == {"psd", "spots", "robot"}
+    joints = recording.samples.joints()
+    assert np.ptp(joints, axis=0).max() > 0.2  # it went places
+    robot = recording.streams["robot"]
+    assert np.all(np.diff(robot.sequence) >= 1)

@@ -1,0 +1,65 @@
+"""`calibeam check` of recordings: what is in them, how their clocks run, what is wrong, the exit code."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from acquisition.recording.rig import rig_text
+from acquisition.recording.stream import Channel
+from acquisition.recording.writer import RecordingWriter
+from calibeam.cli import run
+
+RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
+
+
+class Standing:
+    def now_s(self) -> float:
+        return 1000.0
+
+
+@pytest.fixture
+def log_of(tmp_path: Path) -> Callable[..., Path]:
+    """A segment of a log: a stream of 2,000 samples of which some are left out, some at full scale."""
+
+    def made(name: str, left_out: int = 0, saturated: int = 0) -> Path:
+        folder = tmp_path / "log"
+        folder.mkdir(exist_ok=True)
+        number = np.delete(np.arange(2000), np.arange(500, 500 + left_out))
+        volts = np.where(np.arange(number.size) < saturated, 10.0, 1.0)
+        host_s = 1000.0 + (1.0 + 40e-6) * number * 1e-3 + 1e-4 * (number % 7)
+        with RecordingWriter(
+            folder / name, rig_text=rig_text(RIG), software="test", clock=Standing(), notes={"segment": "1"}
+        ) as writer:
+            writer.stream("psd", (Channel("sum_v", "V", full_scale=10.0),)).append(
+                host_s, number * 1e-3, number, {"sum_v": volts}
+            )
+        return folder / name
+
+    return made
+
+
+def test_a_good_recording_is_told_with_its_rate_and_clock(log_of, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["check", str(log_of("segment-0001.mcap"))]) == 0
+    said = capsys.readouterr().out
+    assert "psd: 2000 samples, 999.8 a second over 2.0 s; clock +40.0 us/s against the host" in said
+    assert "nothing is wrong with it" in said
+
+
+def test_gaps_and_saturation_fail_the_check(log_of, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["check", str(log_of("segment-0001.mcap", left_out=3, saturated=7))]) == 1
+    said = capsys.readouterr().out
+    assert "gap: stream psd: 3 samples missing" in said
+    assert "saturated: stream psd: sum_v at its full scale, 10 V, in 7 of 1997 samples, first at 0.000 s" in said
+
+
+def test_every_segment_of_a_folder_is_checked(log_of, capsys: pytest.CaptureFixture[str]) -> None:
+    log_of("segment-0001.mcap")
+    folder = log_of("segment-0002.mcap", left_out=1).parent
+    assert run(["check", str(folder), "--json"]) == 1
+    first, second = (msgspec.json.decode(line) for line in capsys.readouterr().out.splitlines())
+    assert first["findings"] == []
+    assert first["streams"]["psd"]["clock"]["status"] == "found"
+    assert [finding["problem"] for finding in second["findings"]] == ["gap"]

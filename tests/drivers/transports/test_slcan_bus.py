@@ -1,0 +1,118 @@
+"""The serial-line adapter that reads all that waits: the frames of python-can's own, however the bytes are split."""
+
+import os
+import tty
+from collections.abc import Iterator
+from contextlib import suppress
+
+import can
+import pytest
+
+from drivers.transports.slcan_bus import LONGEST_LINE, BlockSlcanBus
+
+LINES = (
+    b"t28140A0B0C0D\r"  # four bytes
+    b"z\r"  # an acknowledgement
+    b"t0800\r"  # no data
+    b"T1ABCDEF82FF00\r"  # 29 bits
+    b"r1234\r"  # remote
+    b"d1239" + b"AB" * 12 + b"\r"  # CAN FD, 12 bytes
+    b"t7FF80102030405060708\r"
+)  # fmt: skip
+FRAMES = [
+    (0x281, False, bytes.fromhex("0A0B0C0D")),
+    (0x080, False, b""),
+    (0x1ABCDEF8, True, bytes.fromhex("FF00")),
+    (0x123, False, b""),
+    (0x123, False, b"\xab" * 12),
+    (0x7FF, False, bytes(range(1, 9))),
+]
+
+
+class Adapter:
+    """The far end of a pseudo-terminal, on which the bus is opened."""
+
+    def __init__(self) -> None:
+        self._far, near = os.openpty()
+        tty.setraw(near)
+        self.bus = BlockSlcanBus(os.ttyname(near), bitrate=1_000_000, sleep_after_open=0.0)
+        os.close(near)
+
+    def says(self, data: bytes) -> None:
+        os.write(self._far, data)
+
+    def hears(self) -> bytes:
+        return os.read(self._far, 4096)
+
+    def is_unplugged(self) -> None:
+        os.close(self._far)
+        self._far = -1
+
+    def close(self) -> None:
+        with suppress(can.CanError, OSError):
+            self.bus.shutdown()
+        self.bus.serialPortOrig.close()
+        if self._far >= 0:
+            os.close(self._far)
+
+
+@pytest.fixture
+def adapter() -> Iterator[Adapter]:
+    made = Adapter()
+    yield made
+    made.close()
+
+
+def heard(bus: can.BusABC, count: int) -> list[tuple[int, bool, bytes]]:
+    found = [bus.recv(2.0) for _ in range(count)]
+    return [(m.arbitration_id, m.is_extended_id, bytes(m.data)) for m in found if m is not None]
+
+
+def test_all_kinds_of_frames_are_told_in_order(adapter: Adapter) -> None:
+    adapter.says(LINES)
+    assert heard(adapter.bus, len(FRAMES)) == FRAMES
+    assert adapter.bus.recv(0.0) is None
+
+
+@pytest.mark.parametrize("at", range(1, len(LINES), 5))
+def test_a_line_may_come_in_two_pieces(adapter: Adapter, at: int) -> None:
+    adapter.says(LINES[:at])
+    whole = LINES[:at].count(b"\r") - LINES[:at].count(b"z\r")
+    before = heard(adapter.bus, whole)
+    assert adapter.bus.recv(0.0) is None
+    adapter.says(LINES[at:])
+    assert before + heard(adapter.bus, len(FRAMES) - whole) == FRAMES
+
+
+def test_a_line_that_makes_no_sense_is_refused_as_python_can_does_and_the_next_is_read(adapter: Adapter) -> None:
+    adapter.says(b"t2814xyz\rt0800\r")
+    with pytest.raises(ValueError, match="hexadecimal"):
+        adapter.bus.recv(2.0)
+    assert heard(adapter.bus, 1) == [(0x080, False, b"")]
+
+
+def test_junk_without_an_end_does_not_fill_the_memory(adapter: Adapter) -> None:
+    for _ in range(10):
+        adapter.says(b"?" * 1000)
+        assert adapter.bus.recv(0.0) is None
+    assert len(adapter.bus._begun) <= LONGEST_LINE
+    adapter.says(b"\rt0800\r")
+    assert heard(adapter.bus, 1) == [(0x080, False, b"")]
+
+
+def test_filters_are_kept(adapter: Adapter) -> None:
+    adapter.bus.set_filters([{"can_id": 0x7FF, "can_mask": 0x7FF, "extended": False}])
+    adapter.says(LINES)
+    assert heard(adapter.bus, 1) == [FRAMES[-1]]
+
+
+def test_an_unplugged_adapter_raises_what_python_can_raises(adapter: Adapter) -> None:
+    adapter.is_unplugged()
+    with pytest.raises(can.CanOperationError):
+        adapter.bus.recv(2.0)
+
+
+def test_frames_are_sent_as_lines(adapter: Adapter) -> None:
+    adapter.hears()  # how the adapter was opened
+    adapter.bus.send(can.Message(arbitration_id=0x601, data=b"\x40\x00", is_extended_id=False))
+    assert adapter.hears() == b"t60124000\r"

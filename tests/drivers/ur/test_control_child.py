@@ -1,0 +1,102 @@
+"""The child's order of stops and calls, with a control object that only takes notes."""
+
+import socket
+
+import pytest
+
+from drivers.ur.control_child import ControlChild
+from drivers.ur.control_link import Alive, Call, Ended, Link, MoveJoints, Outcome, ServoJoints, Stop
+
+MOVE = MoveJoints([0.0] * 6, 1.0, 1.0)
+
+
+class Notes:
+    def __init__(self) -> None:
+        self.done: list[str] = []
+
+    def moveJ(self, q, speed, acceleration, asynchronous) -> bool:
+        self.done.append("move")
+        return True
+
+    def servoJ(self, *numbers) -> bool:
+        self.done.append("servo")
+        return True
+
+    def stopJ(self, a) -> None:
+        self.done.append("stop")
+
+    def servoStop(self, a) -> bool:
+        self.done.append("servo stop")
+        return True
+
+    def getAsyncOperationProgress(self) -> int:
+        return -1
+
+    def isConnected(self) -> bool:
+        return True
+
+    def isProgramRunning(self) -> bool:
+        return True
+
+    def kickWatchdog(self) -> bool:
+        return True
+
+
+class Child:
+    def __init__(self) -> None:
+        self.notes, self.silent = Notes(), False
+        near_calls, far_calls = socket.socketpair()
+        near_stops, far_stops = socket.socketpair()
+        self.calls, self.stops = Link(near_calls), Link(near_stops)
+        self._ends = (Link(far_calls), Link(far_stops))
+        self.child = ControlChild(self.notes, *self._ends, 1.0, lambda: 0.0, lambda: self.silent)
+
+    def turn(self) -> None:
+        """One turn of the child's loop: a stop goes before a call."""
+        self.child._take_stop(0.0)
+        request = self._ends[0].next_request(0.0)
+        if request is not None:
+            self._ends[0].send(self.child._obey(request))
+
+    def close(self) -> None:
+        for link in (self.calls, self.stops, *self._ends):
+            link.close()
+
+
+@pytest.fixture
+def child():
+    child = Child()
+    yield child
+    child.close()
+
+
+def test_a_call_that_was_sent_before_a_stop_does_not_begin_after_it(child) -> None:
+    child.calls.send(Call(1, MOVE))
+    child.stops.send(Stop(5.0, up_to=1))
+    child.turn()
+    assert child.notes.done == ["stop"]
+    assert child.calls.next_answer(1.0) == Ended(Outcome.STOPPED)
+
+
+def test_a_call_that_was_sent_after_the_stop_runs(child) -> None:
+    child.stops.send(Stop(5.0, up_to=1))
+    child.calls.send(Call(2, MOVE))
+    child.turn()
+    assert child.notes.done == ["stop", "move"]
+    assert child.calls.next_answer(1.0) == Ended(Outcome.DONE)
+
+
+def test_a_silent_controller_is_told_before_braking_which_may_wait_for_it(child) -> None:
+    child.silent = True
+    child.stops.send(Stop(5.0))
+    child.turn()
+    assert [child.stops.next_answer(1.0) for _ in range(2)] == [Alive(), Ended(Outcome.SILENT)]
+    assert child.notes.done == ["stop"]
+
+
+def test_no_motion_begins_at_a_silent_controller(child) -> None:
+    child.silent = True
+    child.calls.send(Call(1, ServoJoints([0.0] * 6, 0.002, 0.1, 300.0)))
+    child.turn()
+    assert child.calls.next_answer(1.0) == Ended(Outcome.SILENT)
+    assert child.notes.done == []
