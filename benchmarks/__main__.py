@@ -1,6 +1,7 @@
 """`make bench`: every benchmark, or those named: `python -m benchmarks centring zeros`."""
 
 import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -17,10 +18,12 @@ from benchmarks import (
     inverse,
     killed,
     log_cost,
+    plan_taken,
     real_diagnosis,
     rtde_jitter,
     speed,
     streams,
+    wired_streams,
     zeros,
 )
 
@@ -74,6 +77,19 @@ def run_real() -> None:
         print(row, flush=True)
 
 
+def run_plan_taken() -> None:
+    print("a plan of the poses that tell rivals apart, taken on the emulated world: BIC between them before and after")
+    with tempfile.TemporaryDirectory() as folder:
+        for row in plan_taken.lines(RIG, Path(folder), range(61, 67)):
+            print(row, flush=True)
+
+
+def run_wired_streams() -> None:
+    print("sessions over real wires with devices in trouble; needs a quiet machine")
+    for row in wired_streams.lines(RIG):
+        print(row, flush=True)
+
+
 def run_false_alarms() -> None:
     print("sessions with nothing hidden, five kinds in turn, as many of each noise: share in which something is found")
     for row in false_alarms.lines():
@@ -124,6 +140,8 @@ BENCHMARKS: dict[str, Callable[[], None]] = {
     "speed": run_speed,
     "false_alarms": run_false_alarms,
     "streams": run_streams,
+    "wired_streams": run_wired_streams,
+    "plan_taken": run_plan_taken,
     "real": run_real,
     "recording": run_recording,
     "log_cost": run_log_cost,

@@ -143,24 +143,25 @@ def _with_modbus(rig: Rig, emulators: Emulators) -> Subject:
 def _case(subject: Subject, kind: str, phase: str, count: int | None) -> Outcome:
     device = Guarded(subject.make())
     threads = threading.active_count()
-    begun: list[float] = []
+    times_s: list[float] = []  # when the fault came, and, where cleaning up takes its time, when the case had ended
 
     def inject() -> None:
         subject.emulators.inject(subject.injected, kind, count=count)
-        begun[:] = [time.monotonic()]
+        times_s[:] = [time.monotonic()]
 
     try:
-        ended = _PHASES[phase](subject, device, inject)
+        ended = _PHASES[phase](subject, device, inject, times_s)
     except EmulatorsError:
         ended = "no such fault"
     except DeviceError as error:
         ended = next(t.__name__ for t in type(error).__mro__ if t.__module__ == DeviceError.__module__)
     except Exception as error:  # what must not happen
         ended = f"UNDEFINED {type(error).__name__}: {error}"
-    took_s = time.monotonic() - begun[0] if begun else 0.0
+    times_s.append(time.monotonic())
+    took_s = times_s[1] - times_s[0] if len(times_s) > 1 else 0.0
     subject.emulators.clear()
     device.close()
-    if phase == "move" and begun and not _stands(subject.emulators):
+    if phase == "move" and took_s > 0.0 and not _stands(subject.emulators):
         ended = f"UNDEFINED: the arm moves ({ended})"
     if threading.active_count() > threads:
         ended = f"UNDEFINED: a thread is left ({ended})"
@@ -183,19 +184,19 @@ def _well_again(subject: Subject) -> None:
             device.close()
 
 
-def _connect(subject: Subject, device: Device, inject: Callable[[], None]) -> str:
+def _connect(subject: Subject, device: Device, inject: Callable[[], None], times_s: list[float]) -> str:
     inject()
     device.connect()
     return _in_order([device.read(READ_S)])
 
 
-def _idle(subject: Subject, device: Device, inject: Callable[[], None]) -> str:
+def _idle(subject: Subject, device: Device, inject: Callable[[], None], times_s: list[float]) -> str:
     device.connect()
     inject()
     return _in_order([device.read(READ_S)])
 
 
-def _stream(subject: Subject, device: Device, inject: Callable[[], None]) -> str:
+def _stream(subject: Subject, device: Device, inject: Callable[[], None], times_s: list[float]) -> str:
     device.connect()
     blocks = [device.read(READ_S)]
     inject()
@@ -205,7 +206,7 @@ def _stream(subject: Subject, device: Device, inject: Callable[[], None]) -> str
     return _in_order(blocks)
 
 
-def _move(subject: Subject, device: Device, inject: Callable[[], None]) -> str:
+def _move(subject: Subject, device: Device, inject: Callable[[], None], times_s: list[float]) -> str:
     """A move under a supervisor, as a session makes it; the fault comes when the arm is on its way."""
     inject()  # refused here, when there is no such fault, and not in the timer's thread
     subject.emulators.clear()
@@ -224,6 +225,8 @@ def _move(subject: Subject, device: Device, inject: Callable[[], None]) -> str:
             except DeviceError:
                 supervisor.check()
                 raise
+            finally:
+                times_s.append(time.monotonic())
         supervisor.check()
     finally:
         for timer in threading.enumerate():
@@ -235,7 +238,7 @@ def _move(subject: Subject, device: Device, inject: Callable[[], None]) -> str:
     return "good"
 
 
-def _close(subject: Subject, device: Device, inject: Callable[[], None]) -> str:
+def _close(subject: Subject, device: Device, inject: Callable[[], None], times_s: list[float]) -> str:
     device.connect()
     device.read(READ_S)
     inject()

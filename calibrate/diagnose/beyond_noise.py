@@ -1,7 +1,7 @@
 """Scatter far beyond what a tracker is believed to have: no noise of it, whatever statistics make of it.
 
-A session whose rows all scatter alike looks like a noisy instrument. Beliefs of rig files are wrong by up to eight times
-(mismatch study, lesson 14 of its second set), seldom by more, and a tracker's noise is certified.
+A session whose rows all scatter alike looks like a noisy instrument. Beliefs of rig files are wrong by up to eight
+times (mismatch study, lesson 14 of its second set), seldom by more, and a tracker's noise is certified.
 """
 
 from collections.abc import Sequence
@@ -23,8 +23,9 @@ HIDDEN = ("cmd_minus_q", "approach", "qd", "payload")  # drivers that make poses
 def beyond_noise(model: Fitted, missing: Sequence[Missing]) -> Unexplained | None:
     """What a tracker's positions scatter after all physics; None where it may be the noise that is believed."""
     session = model.session
-    if session.rig.noise.joint_rad is not None:
-        return None  # joints are said to scatter, too: how much of it is theirs, the fit has found
+    believed = session.rig.noise
+    if believed.position_m is None or believed.joint_rad is not None:
+        return None  # where joints are said to scatter, too, the fit has found how much of it is theirs
     for measured, scatter, rows in zip(session.measured, model.scatters, model.problem.rows, strict=True):
         if measured.name != POSITION or len(rows) == 0:
             continue

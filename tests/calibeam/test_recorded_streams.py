@@ -69,11 +69,3 @@ def test_a_swinging_column_and_a_clock_that_was_set(tmp_path):
     }
     clocks = {one["stream"]: one for one in file["streams"]["clocks"]}
     assert clocks["spots"]["offset_s"] == pytest.approx(20.0 - PSD_S, abs=1e-4)
-
-
-def test_an_arm_that_creeps_on_is_read_too_early(tmp_path):
-    """The session waits a second for readings to settle, then takes them all the same."""
-    told, _ = diagnosed(tmp_path, Trouble(creep_rad=3e-4, creep_s=0.9), Clocks())
-    early = told["not-settled", "time", "spots"]
-    assert size(early, "samples_count") > 10
-    assert size(early, "tau_s") == pytest.approx(0.9, rel=0.3)
