@@ -21,11 +21,9 @@ TIMESTAMP = "timestamp"  # s since the controller's start: the device clock, no 
 SIX = (6,)
 VARIABLES = (
     Variable("target_q", Channel("target_q_rad", "rad", SIX)),
-    Variable("target_qd", Channel("target_qd_rad_s", "rad/s", SIX)),
     Variable("actual_q", Channel("actual_q_rad", "rad", SIX)),
     Variable("actual_qd", Channel("actual_qd_rad_s", "rad/s", SIX)),
     Variable("actual_current", Channel("actual_current_a", "A", SIX)),
-    Variable("target_current", Channel("target_current_a", "A", SIX)),
     Variable("joint_temperatures", Channel("joint_temperature_degC", "degC", SIX)),
     Variable("robot_mode", Channel("robot_mode", "1")),
     Variable("safety_mode", Channel("safety_mode", "1")),
