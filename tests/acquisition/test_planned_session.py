@@ -65,9 +65,9 @@ def test_a_fixture_that_stands_elsewhere_is_found(rig, bench_of, plan):
     bench = bench_of(6)
     moved = tuple(
         dataclasses.replace(face, centre_m=(face.centre_m[0] + 0.025, *face.centre_m[1:]))
-        for face in bench.world._places[1]
+        for face in bench.world._faces_at[1]
     )
-    bench.world._places[1] = moved
+    bench.world._faces_at[1] = moved
     short = msgspec.structs.replace(plan, block=plan.block[:1])
     summary, kept = run(rig, bench, short)
     assert (len(summary.samples), summary.skipped) == (short.poses, 0)

@@ -156,9 +156,10 @@ def test_a_light_that_is_found_and_lost_at_once_ends_the_session_by_name(rig, be
 def test_a_fixture_bumped_in_mid_session_is_found_again(rig, bench_of) -> None:
     bench = bench_of(2)
     bumped = 9
-    bench.world._places[bumped] = tuple(
+    bench.world._places[bumped] = bench.world._places[1]
+    bench.world._faces_at[bumped] = tuple(
         dataclasses.replace(face, centre_m=(face.centre_m[0] + 0.015, *face.centre_m[1:]))
-        for face in bench.world._places[1]
+        for face in bench.world._faces_at[1]
     )
 
     class Bump(Kept):

@@ -71,7 +71,9 @@ def test_corrections_hold_much_of_what_masses_are_off_by(drivers):
 
 
 @pytest.mark.parametrize(
-    ("effect", "where"), [(JOINT, "joint2.angle"), (LINK, "link2.tilt"), (BASE, "base.pose")], ids=str
+    ("effect", "where"),
+    [(JOINT, "joint2.angle"), (LINK, "link2.tilt"), (BASE, "base.pose")],
+    ids=["joint", "link", "base"],
 )
 def test_springs_give_way_along_their_load_and_masses_are_not_off_by_much(drivers, effect, where):
     stated = weighed(drivers)
