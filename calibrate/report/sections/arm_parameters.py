@@ -4,7 +4,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from calibrate.default_belief import said_of
 from calibrate.identifiability import WEAK
+from calibrate.identification.session import holds_spots
 from calibrate.model_file import ModelFile, ModelParameter
 from calibrate.parameters import Parameter
 from calibrate.report.elements import Html, bullets, figure, folded, panels, section, table, tag
@@ -22,12 +24,20 @@ def parameters_chapter(evidence: SessionEvidence) -> Html:
     """Rank and unseen combinations, then numbers, then refusals."""
     model = evidence.model
     lead = f"Rank {model.rank} of {model.free}: what the data can see comes before any number. Fit: {model.says}."
+    lead += _unasked(evidence)
     known = [p for p in model.parameters if p.value is not None]
     refused = [p for p in model.parameters if p.value is None]
     content = [_rank(evidence), tag("h3", "Identified"), _numbers(evidence, known)]
     if refused:
         content += [tag("h3", "Refused"), tag("p", _about_refusals(), cls="lead"), _refusals(evidence, refused)]
     return section("parameters", TITLE, lead, *content)
+
+
+def _unasked(evidence: SessionEvidence) -> str:
+    """What a fit to spots believes of a rig that states no tolerance."""
+    rig, samples = evidence.recording.rig, evidence.recording.samples
+    said = said_of(rig) if holds_spots(samples) else None
+    return "" if said is None else f" The rig file has {said}."
 
 
 def _rank(evidence: SessionEvidence) -> Html:
