@@ -40,7 +40,7 @@ from drivers.transports.can_interfaces import OpenBus, opened
 
 MAX_SYNC_HZ = 1000.0  # six encoders fill half of a bus of 1 Mbit/s
 SILENT_S = 0.5  # a node that answers no SYNC for so long is gone
-HEARTBEAT_GOES_ON_S = 0.45  # a heartbeat this fresh is one of after the silence began
+HEARTBEAT_GOES_ON_S = 0.49  # of SILENT_S: a heartbeat this fresh is one of after the silence began
 BATCH_S = 0.02  # rows gathered in one block; more only delays a reader
 SYNC = can.Message(arbitration_id=objects.SYNC_ID, is_extended_id=False)
 NMT_START, NMT_PRE_OPERATIONAL = 0x01, 0x80
