@@ -20,7 +20,7 @@ RECORDING, TRUTH = "recording.mcap", "truth.json"
 RESULTS = (RECORDING, "model.json", "diagnosis.json", "report.html", TRUTH)
 
 
-def demo(*, out: Path = Path("out/demo"), rig: Path = RIG, seed: int = 1, time_scale: float = 7.0) -> None:
+def demo(*, out: Path = Path("out/demo"), rig: Path = RIG, seed: int = 1, time_scale: float = 6.5) -> None:
     """Emulated rig, whole session, report; then the concealed truth. Under a minute.
 
     Example: calibeam demo --out out/demo
