@@ -1,6 +1,6 @@
 """Steps that robust weights have swallowed: shots at a fixture that stood elsewhere for a while look like wild rows.
 
-Trusted again, they propose the step; whether it stays is for a robust refit and the null to say.
+Trusted again, they propose the step; it stays where a robust refit leaves no doubt.
 """
 
 from dataclasses import replace
@@ -8,7 +8,8 @@ from dataclasses import replace
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.growing import admissible
 from calibrate.diagnose.pruning import p_of
-from calibrate.diagnose.searching import ALPHA_FIRST, ALPHA_FURTHER, Search, null_at
+from calibrate.diagnose.score import gain_of
+from calibrate.diagnose.searching import SURE_SLOW, Search, null_at
 from calibrate.effects.term import Shape
 from calibrate.effects.time_laws import FEWEST_AFTER
 
@@ -26,7 +27,8 @@ def unswallowed(at: Search) -> Search | None:
     trial = Bench(at.state.refitted((*at.state.accepted, proposed)))
     if trial.bic >= at.bench.bic or not trial.plausible[-1]:
         return None
-    p = p_of(trial, null_at(trial, at.rng), len(trial.state.accepted) - 1)
-    if p > (ALPHA_FURTHER if at.state.accepted else ALPHA_FIRST):
+    # Picked for its wild rows, so the null, which has none, is no judge: heavy tails make such steps, too.
+    if gain_of(trial.gone[-1], trial.sight) < SURE_SLOW:
         return None
+    p = p_of(trial, null_at(trial, at.rng), len(trial.state.accepted) - 1)
     return replace(at.at(trial), p=at.p | {proposed.term.key: p})
