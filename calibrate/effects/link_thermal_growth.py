@@ -11,7 +11,7 @@ from calibrate.effects.ports import Place, Port
 from calibrate.effects.term import Inner, Missing, Shape, Term
 from calibrate.effects.time_laws import varies
 
-LIMIT_PER_K = 2.4e-4  # aluminium 24e-6; a thermometer far from the link sees a tenth of what the link does
+LIMIT_PER_K = 1e-4  # aluminium 24e-6; a thermometer far from the link sees less than the link does
 LIMIT_GROWTH = 3e-3  # relative, where time stands for temperature
 
 

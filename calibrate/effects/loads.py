@@ -19,9 +19,8 @@ Floats = NDArray[np.float64]
 Point = tuple[float, float, float]
 
 FIRST_MOMENT_M = 0.1  # a link's centre of mass is about this far from its frame: scales columns only
-# One sigma of stated masses and centres. Data sheets and drawings leave cables, grease and motors to the reader: masses
-# of one arm identified by several groups differ by a tenth to a fifth. Source: Gaz, Cognetti, Oliva, Robuffo Giordano,
-# De Luca, Dynamic identification of the Franka Emika Panda robot, IEEE RA-L 4(4), 2019, section IV (feasible sets).
+# One sigma of stated masses and centres: a judgement, no measurement. Data sheets and drawings leave cables, grease and
+# motors to the reader, so a stated mass is believed to about a seventh.
 MASS_SHARE = 0.15
 CENTRE_SHARE = 0.05  # of the longest link: 20 mm on a small arm
 TOOL_SHARE = 0.05  # of all stated mass, where the tool's own is not stated
