@@ -14,6 +14,7 @@ class Rule:
 
     holds: Callable[[str, str, str], bool]  # true port, said port, family
     reason: str
+    names: frozenset[str] = frozenset()  # of causes at these places that are as equal as the places
 
 
 def _all_links(true: str, said: str, family: str) -> bool:
@@ -29,6 +30,7 @@ RULES = (
     Rule(
         _one_stand,
         "one device watches the arm: the base moved one way or the device the other way is the same to every reading",
+        frozenset({"base-moved", "device-drift"}),
     ),
 )
 
@@ -38,3 +40,8 @@ def same_place(true: str, said: str, family: str) -> str | None:
     if true == said:
         return ""
     return next((rule.reason for rule in RULES if rule.holds(true, said, family)), None)
+
+
+def same_name(true: str, said: str, why: str) -> bool:
+    """Whether two names are those of one cause, to every reading; `why` as told by `same_place`."""
+    return true == said or any(rule.reason == why and {true, said} <= rule.names for rule in RULES)

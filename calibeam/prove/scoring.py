@@ -5,7 +5,7 @@ from pathlib import Path
 from acquisition.recording.read import read
 from calibeam.prove.concealing import Concealed
 from calibeam.prove.diagnosing import Answered
-from calibeam.prove.equivalent import same_place
+from calibeam.prove.equivalent import same_name, same_place
 from calibeam.prove.free_space import errors_m
 from calibeam.prove.layout import Layout
 from calibeam.prove.noise_floor import floor_m
@@ -16,6 +16,7 @@ from calibrate.diagnose.file import read_diagnosis
 from calibrate.diagnose.schema import DiagnosisFile, FindingRecord, NameRecord
 
 FAILED = "failed"
+TIED = 0.5  # of BIC: told as equal
 
 
 def score(layout: Layout, concealed: Concealed, answered: Answered, truth: Truth) -> CaseScore:
@@ -55,7 +56,7 @@ def score(layout: Layout, concealed: Concealed, answered: Answered, truth: Truth
 def _defect(defect: TrueDefect, file: DiagnosisFile | None, family: str) -> DefectScore:
     findings = () if file is None else file.findings
     there = [(f, why) for f in findings if (why := same_place(defect.port, f.where, family)) is not None]
-    named = [(f, why) for f, why in there if f.physics == defect.physics]
+    named = [(f, why) for f, why in there if f.physics == defect.physics or _as_good(f, defect, why)]
     rivals = [r for f in findings for r in f.rivals if _is(r, defect, family)]
     best, why = (named or there or [(None, "")])[0]
     return DefectScore(
@@ -72,6 +73,12 @@ def _defect(defect: TrueDefect, file: DiagnosisFile | None, family: str) -> Defe
         unknown_there=any(f.physics == UNKNOWN for f, _ in there),
         sizes=() if best is None or not named or why else _sizes(defect, best),  # another place, another quantity
     )
+
+
+def _as_good(finding: FindingRecord, defect: TrueDefect, why: str) -> bool:
+    """A name that no reading can tell from the true one, if the answer says itself that it could be that."""
+    tied = any(r.physics == defect.physics and r.margin < TIED for r in finding.rivals)
+    return same_name(defect.physics, finding.physics, why) and tied
 
 
 def _is(name: NameRecord, defect: TrueDefect, family: str) -> bool:
@@ -94,7 +101,8 @@ def _sizes(defect: TrueDefect, finding: FindingRecord) -> tuple[SizeScore, ...]:
 
 
 def _said(finding: FindingRecord, truth: Truth, family: str) -> Said:
-    there = [d for d in truth.defects if same_place(d.port, finding.where, family) is not None]
+    near = [(d, same_place(d.port, finding.where, family)) for d in truth.defects]
+    there = [(d, why) for d, why in near if why is not None]
     return Said(
         where=finding.where,
         depends_on=finding.depends_on,
@@ -102,7 +110,7 @@ def _said(finding: FindingRecord, truth: Truth, family: str) -> Said:
         confidence=finding.confidence,
         says=finding.says,
         placed=bool(there),
-        right=any(d.physics == finding.physics for d in there),
+        right=any(d.physics == finding.physics or _as_good(finding, d, why) for d, why in there),
     )
 
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from calibrate.diagnose.bench import Bench
+from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.rivals import Rival, rivals_of
 from calibrate.diagnose.searching import BETTER, Search
 from calibrate.effects.term import Term
@@ -44,15 +45,8 @@ def _exchanged(at: Search, rivals: Rivals) -> Search | None:
         class_ = [(0.0, own), *((r.margin, r.accepted) for r in mine if r.refitted)]
         class_ = [(margin + _price(at.bench, a.term), a) for margin, a in class_]
         least = min(margin for margin, _ in class_)
-        # A hair's breadth is no reason: where nothing tells names apart, the catalogue's order has chosen.
-        best = min(
-            (c for c in class_ if c[0] <= least + TIED),
-            key=lambda c: (
-                len(c[1].term.depends_on),
-                c[1].term.order or 1,
-                c[0] if c[1] is not own else c[0] - BETTER,
-            ),
-        )[1]
+        near = [c for c in class_ if c[0] <= least + TIED]
+        best = min(near, key=lambda c: (len(c[1].term.depends_on), c[1].term.order or 1, *_rank(at, c, least, own)))[1]
         if best is own:
             continue
         bench = Bench(at.state.refitted([best if j == i else a for j, a in enumerate(at.state.accepted)]))
@@ -60,6 +54,14 @@ def _exchanged(at: Search, rivals: Rivals) -> Search | None:
         if bench.bic + dearer <= at.bench.bic + TIED:
             return replace(at.at(bench), p=at.p | {best.term.key: at.p.get(own.term.key, 0.0)})
     return None
+
+
+def _rank(at: Search, candidate: tuple[float, Accepted], least: float, own: Accepted) -> tuple[float, int]:
+    """By margin; a hair's breadth is no reason: what nothing tells apart is named in the catalogue's order."""
+    margin, accepted = candidate
+    if margin <= least + BETTER:
+        return least, at.bench.menu.place_of(accepted.term)
+    return (margin - BETTER if accepted is own else margin), 0
 
 
 def _price(bench: Bench, term: Term) -> float:

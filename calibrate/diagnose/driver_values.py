@@ -98,15 +98,19 @@ def _last_direction(moves: Floats) -> Floats:
 
 
 def _temperatures(samples: Samples) -> dict[str, Floats]:
-    """Smoothed in the order of time."""
-    order = np.argsort(samples.column("t_s"), kind="stable")
+    """Smoothed in the order of time, but not across a pause: what cooled meanwhile is no noise."""
+    t = samples.column("t_s")
+    order = np.argsort(t, kind="stable")
     width = max(3.0, SMOOTHING * len(samples))
+    steps = np.diff(t[order])
+    pauses = 1 + np.flatnonzero(steps > width * np.median(steps)) if len(steps) else np.zeros(0, dtype=np.intp)
     out: dict[str, Floats] = {}
     for name in samples.names:
         if name.startswith("temp_") and name.endswith("_degC"):
             values = _filled(samples.column(name))
             smooth = np.empty_like(values)
-            smooth[order] = gaussian_filter1d(values[order], width, mode="nearest")
+            for run in np.split(order, pauses):
+                smooth[run] = gaussian_filter1d(values[run], width, mode="nearest")
             out[name.removeprefix("temp_").removesuffix("_degC")] = smooth
     return out
 

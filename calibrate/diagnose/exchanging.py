@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 
 from calibrate.diagnose.bench import Bench
-from calibrate.diagnose.growing import admissible, entry_of
+from calibrate.diagnose.growing import admissible
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.score import gain_of, removed, scores
 from calibrate.diagnose.searching import BETTER, Key, Search, cause_of
@@ -31,8 +31,7 @@ def swapped(at: Search) -> Search:
             found = scores(at.bench.menu, gone)
             proposed = admissible(at.bench, found, gone, least, frozenset(barred))
             if proposed is not None:
-                better = float(found.gain[entry_of(at.bench, found, proposed)]) - worth
-                best = (better, i, proposed)
+                best = (proposed.gain - worth, i, proposed.accepted)
         if best is None:
             return at
         _, i, proposed = best
@@ -60,7 +59,7 @@ def merged(at: Search) -> Search:
             least = max(worth + BETTER, best[0] + worth if best else -np.inf)
             proposed = admissible(at.bench, found, gone, least, barred)
             if proposed is not None:
-                best = (float(found.gain[entry_of(at.bench, found, proposed)]) - worth, group, proposed)
+                best = (proposed.gain - worth, group, proposed.accepted)
         if best is None:
             return at
         _, group, proposed = best

@@ -1,15 +1,27 @@
 """The next term: the best one that is significant, of a size that a machine could have, and confirmed by a refit."""
 
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
 from calibrate.diagnose.bench import Bench
-from calibrate.diagnose.line_search import refined
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.null import Null, is_slow
-from calibrate.diagnose.score import Removed, Scores
-from calibrate.diagnose.searching import ALPHA_FIRST, ALPHA_FURTHER, SURE, SURE_SLOW, Key, Search, cause_of, null_at
+from calibrate.diagnose.proposals import Proposal, proposals
+from calibrate.diagnose.score import Removed, Scores, orthonormal
+from calibrate.diagnose.searching import (
+    ALPHA_DRIFT,
+    ALPHA_FIRST,
+    ALPHA_FURTHER,
+    SURE,
+    SURE_SLOW,
+    Key,
+    Search,
+    cause_of,
+    null_at,
+)
+from calibrate.diagnose.visible import VISIBLE
 from calibrate.effects.term import Term
 
 AT_ONCE = 4  # sure ones that are accepted before a refit
@@ -18,19 +30,12 @@ PEERS = 8  # best entries that are looked at in turn for a plausible one
 
 def admissible(
     bench: Bench, found: Scores, without: Removed | None, least: float, barred: frozenset[Key]
-) -> Accepted | None:
-    """The best entry above a gain that is not barred and, inner values refined, of a size that a machine could have."""
-    seen: set[Key] = set()
-    for entry in np.argsort(-found.gain):
-        if found.gain[entry] <= least or len(seen) >= PEERS:
-            return None
-        term = bench.menu.terms[bench.menu.entries[entry].term]
-        if term.key in barred or cause_of(term) in barred or term.key in seen:
-            continue
-        seen.add(term.key)
-        proposed = refined(bench, term, bench.menu.entries[entry].inner, without)
-        if term.plausible(proposed.coefficients, proposed.inner, bench.noise_rad):
-            return proposed
+) -> Proposal | None:
+    """The best proposal above a gain that is not barred and of a size that a machine could have."""
+    for proposal in islice(proposals(bench, found, without, least, barred), PEERS):
+        accepted = proposal.accepted
+        if accepted.term.plausible(accepted.coefficients, accepted.inner, bench.noise_rad):
+            return proposal
     return None
 
 
@@ -45,21 +50,35 @@ def grown(at: Search) -> Search | None:
         proposed = admissible(at.bench, found, None, 0.0, barred)
         if proposed is None:
             return None
-        entry = entry_of(at.bench, found, proposed)
-        gain = float(found.gain[entry])
+        entry, coarse = proposed.entry, float(found.gain[proposed.entry])  # the null knows the grid, no finer values
         p = 0.0
-        if gain < _sure(proposed.term):
+        if coarse < _sure(proposed.term):
             null = null_at(at.bench, at.rng) if null is None else null
-            p = null.p(at.bench.menu, entry, gain)
-        if p > (ALPHA_FURTHER if at.state.accepted else ALPHA_FIRST):
+            p = _p_of(at.bench, proposed, null, coarse)
+        if p > _alpha(at, null, bool(slow[entry])):
             # The other family has its own null: a wander that hides a drift need not hide a harmonic.
             out |= slow if slow[entry] else ~slow
             continue
-        new = [proposed] if gain < _sure(proposed.term) else _sure_ones(at, proposed, barred)
+        sure = coarse >= _sure(proposed.term)
+        new = _sure_ones(at, proposed.accepted, barred) if sure else [proposed.accepted]
         bench = Bench(at.state.refitted((*at.state.accepted, *new)))
         if bench.bic < at.bench.bic and bench.plausible[-len(new) :].all():
             return replace(at.at(bench), p=at.p | {a.term.key: p for a in new})
         barred = barred | {proposed.term.key}
+
+
+def _p_of(bench: Bench, proposed: Proposal, null: Null, coarse: float) -> float:
+    own = proposed.accepted
+    columns = bench.sight.complement(bench.state.columns(own.term, own.inner).T).T
+    span = orthonormal(columns, VISIBLE).T
+    return null.p(bench.sight, is_slow(own.term), coarse, span, len(span) + len(own.inner))
+
+
+def _alpha(at: Search, null: Null | None, slow: bool) -> float:
+    """Where noise wanders, a drift has the whole 5 %: the null overstates the wander, and false drifts are rarer."""
+    if at.state.accepted:
+        return ALPHA_FURTHER
+    return ALPHA_DRIFT if slow and null is not None and null.law.wanders else ALPHA_FIRST
 
 
 def _sure(term: Term) -> float:
@@ -75,10 +94,5 @@ def _sure_ones(at: Search, first: Accepted, barred: frozenset[Key]) -> list[Acce
         proposed = admissible(bench, bench.scores, None, SURE_SLOW, barred)
         if proposed is None:
             break
-        out.append(proposed)
+        out.append(proposed.accepted)
     return out
-
-
-def entry_of(bench: Bench, found: Scores, proposed: Accepted) -> int:
-    mine = [i for i, e in enumerate(bench.menu.entries) if bench.menu.terms[e.term].key == proposed.term.key]
-    return mine[int(np.argmax(found.gain[mine]))]

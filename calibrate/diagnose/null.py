@@ -32,13 +32,15 @@ class Null:
     slow: Tail
     law: NoiseLaw
 
-    def p(self, menu: Menu, entry: int, gain: float) -> float:
-        """Family-wise probability that nothing at all gives an entry that gains so much."""
-        if not is_slow(menu.terms[menu.entries[entry].term]):
+    def p(self, sight: Sight, slow: bool, gain: float, span: Floats, cost: int) -> float:
+        """Family-wise probability that nothing at all gives a candidate that gains so much; its directions behind
+        geometry are span (k, row), `cost` parameters are paid for.
+        """
+        if not slow:
             return min(1.0, FAMILIES * self.fast.p(gain))
         if self.law.wanders:
-            gain = _beyond_wander(self.law, menu.sight.residual, directions(menu, entry), menu, entry)
-        return min(1.0, FAMILIES * self.slow.p(gain))
+            gain = _beyond_wander(self.law, sight.residual, span, cost, sight.data)
+        return self._of_slow(gain)
 
     def p_of_worth(self, slow: bool, sight: Sight, gone: Removed) -> float:
         """The same of what a model holds already: what comes back when it is taken out.
@@ -52,7 +54,11 @@ class Null:
         else:
             squares = float(part @ part)
             gain = float(bic_gain(np.array(squares), sight.rss + squares, np.array(gone.cost), sight.data))
-        return min(1.0, FAMILIES * (self.slow if slow else self.fast).p(gain))
+        return self._of_slow(gain) if slow else min(1.0, FAMILIES * self.fast.p(gain))
+
+    def _of_slow(self, gain: float) -> float:
+        """Against a wander the price of the second family is not asked for again: the law overstates the wander."""
+        return min(1.0, (1 if self.law.wanders else FAMILIES) * self.slow.p(gain))
 
 
 def is_slow(term: Term) -> bool:
@@ -91,11 +97,14 @@ def _slow_maxima(menu: Menu, law: NoiseLaw, left: Floats, gains: Floats, slow: B
     best = np.flatnonzero(slow)[np.argmax(gains[slow], axis=0)]
     spans = {int(entry): directions(menu, int(entry)) for entry in np.unique(best)}
     return np.array(
-        [_beyond_wander(law, left[:, d], spans[int(entry)], menu, int(entry)) for d, entry in enumerate(best)]
+        [
+            _beyond_wander(law, left[:, d], span, len(span) + int(menu.numbers[entry]), menu.sight.data)
+            for d, entry, span in ((d, entry, spans[int(entry)]) for d, entry in enumerate(best))
+        ]
     )
 
 
-def _beyond_wander(law: NoiseLaw, left: Floats, span: Floats, menu: Menu, entry: int) -> float:
-    """BIC gain of an entry with directions (k, row) if noise wanders, whatever way fits best with it and without."""
+def _beyond_wander(law: NoiseLaw, left: Floats, span: Floats, cost: int, data: int) -> float:
+    """BIC gain of directions (k, row) if noise wanders, whatever way fits best with them and without."""
     after = left - span.T @ (span @ left)
-    return law.gain(left, after) - (len(span) + menu.numbers[entry]) * float(np.log(menu.sight.data))
+    return law.gain(left, after) - cost * float(np.log(data))

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.causes import is_slow_cause
-from calibrate.diagnose.line_search import refined
 from calibrate.diagnose.linearised import Accepted
+from calibrate.diagnose.proposals import proposals
 from calibrate.diagnose.score import Removed, gain_of, scores
-from calibrate.diagnose.searching import cause_of
+from calibrate.diagnose.searching import Key, cause_of
 from calibrate.effects.term import Term
 
 Floats = NDArray[np.float64]
@@ -43,7 +43,7 @@ def rivals_of(bench: Bench, i: int) -> tuple[Rival, ...]:
     """Of accepted term i: all candidates within 6 BIC, nearest first; sizes that no machine has are none."""
     gone, own = bench.gone[i], bench.state.accepted[i].term
     refits = REFITS if len(bench.state.accepted) <= FEW and bench.state.samples <= LARGE else 0
-    near = _near(bench, gone, gain_of(gone, bench.sight), {cause_of(a.term) for a in bench.state.accepted})
+    near = _near(bench, gone, gain_of(gone, bench.sight), frozenset(cause_of(a.term) for a in bench.state.accepted))
     found = [_confirmed(bench, i, r) if rank < refits else r for rank, r in enumerate(near)]
     known = [r for r in found if r is not None and r.term.key != own.key]
     kept = [r for r in known if r.margin - _clock_price(bench, own, r.term) <= WITHIN]
@@ -67,22 +67,14 @@ def confidences(rivals: Sequence[Rival]) -> Floats:
     return weights / weights.sum()
 
 
-def _near(bench: Bench, gone: Removed, worth: float, taken: set[tuple[object, ...]]) -> list[Rival]:
-    found = scores(bench.menu, gone)
-    out: list[Rival] = []
-    seen: set[tuple[object, ...]] = set(taken)
-    for entry in np.argsort(-found.gain):
-        margin = worth - float(found.gain[entry])
-        if margin > NEAR or not np.isfinite(margin):
-            break
-        term = bench.menu.terms[bench.menu.entries[entry].term]
-        if cause_of(term) in seen:
-            continue
-        seen.add(cause_of(term))
-        proposed = refined(bench, term, bench.menu.entries[entry].inner, gone)
-        if term.plausible(proposed.coefficients, proposed.inner, bench.noise_rad):
-            out.append(Rival(proposed, margin, refitted=False))
-    return out
+def _near(bench: Bench, gone: Removed, worth: float, taken: frozenset[Key]) -> list[Rival]:
+    """One of every cause."""
+    out: dict[Key, Rival] = {}
+    for proposal in proposals(bench, scores(bench.menu, gone), gone, worth - NEAR, taken):
+        own = proposal.accepted
+        if own.term.plausible(own.coefficients, own.inner, bench.noise_rad):
+            out.setdefault(cause_of(own.term), Rival(own, worth - proposal.gain, refitted=False))
+    return list(out.values())
 
 
 def _confirmed(bench: Bench, i: int, rival: Rival) -> Rival | None:

@@ -14,6 +14,7 @@ from calibrate.effects.term import Term
 Key = tuple[object, ...]
 
 ALPHA_FIRST = 0.03  # of 5 % for a whole diagnosis: the rest is for what has no name
+ALPHA_DRIFT = 0.05  # of the first term against noise that wanders
 ALPHA_FURTHER = 0.01
 # Of BIC: accepted for now without drawing a null; the last check draws one for all. Slow ones face a wander, too.
 SURE, SURE_SLOW = 60.0, 150.0

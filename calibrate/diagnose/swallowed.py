@@ -24,7 +24,7 @@ def unswallowed(at: Search) -> Search | None:
     proposed = admissible(bench, bench.scores, None, 0.0, at.causes | at.banned)
     if proposed is None:
         return None
-    trial = Bench(at.state.refitted((*at.state.accepted, proposed)))
+    trial = Bench(at.state.refitted((*at.state.accepted, proposed.accepted)))
     if trial.bic >= at.bench.bic or not trial.plausible[-1]:
         return None
     # Picked for its wild rows, so the null, which has none, is no judge: heavy tails make such steps, too.

@@ -92,6 +92,10 @@ class Menu:
         """(entry,) inner parameters of each: estimated, hence paid for."""
         return np.array([len(entry.inner) for entry in self.entries], dtype=float)
 
+    def place_of(self, term: Term) -> int:
+        """Where a term stands in the menu; after all others if it is not in it."""
+        return next((i for i, known in enumerate(self.terms) if known.key == term.key), len(self.terms))
+
     def of_terms(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(entry,) from (term,)."""
         return chosen[[entry.term for entry in self.entries]] if self.entries else np.zeros(0, dtype=bool)
