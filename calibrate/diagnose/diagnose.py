@@ -18,6 +18,9 @@ from calibrate.effects.term import Missing
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
+POSES = "measure poses that separate them (calibeam diagnose --plan-out)"
+WITNESS = "alike at every pose to this instrument; watch either with a second one, or measure fixed marks again"
+
 
 def diagnose(state: State, rng: Generator, missing: Sequence[Missing] = ()) -> Diagnosis:
     """Of a state with geometry fitted and no terms; `missing`: what effects of the catalogue lack in this record."""
@@ -61,10 +64,8 @@ def _rejected(at: Search) -> tuple[Rejected, ...]:
 def _measure(findings: Sequence[Finding]) -> tuple[str, ...]:
     out: list[str] = []
     for finding in findings:
-        if finding.rivals:
-            others = ", ".join(f"{r.name.physics} at {r.name.where}" for r in finding.rivals)
-            out.append(
-                f"{finding.name.physics} at {finding.name.where} could also be {others}: "
-                "measure poses that separate them (calibeam diagnose --plan-out)"
-            )
+        for alike, remedy in ((False, POSES), (True, WITNESS)):
+            others = ", ".join(f"{r.name.physics} at {r.name.where}" for r in finding.rivals if r.alike is alike)
+            if others:
+                out.append(f"{finding.name.physics} at {finding.name.where} could also be {others}: {remedy}")
     return tuple(out)

@@ -44,6 +44,7 @@ class RivalName:
     confidence: float
     margin: float  # BIC by which the finding is better
     refitted: bool  # margin from a full refit, or linearised
+    alike: bool = False  # at every recorded pose, whatever the sizes: more of such poses will not tell
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.diagnosis import UNKNOWN, Finding, Named, RivalName
+from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.pulled_back import pulled_back
 from calibrate.diagnose.rivals import Rival, confidences
-from calibrate.diagnose.score import gain_of
+from calibrate.diagnose.score import gain_of, orthonormal
 from calibrate.diagnose.searching import Search
 from calibrate.diagnose.several_names import pieces
 from calibrate.diagnose.stated_sizes import sizes_of
@@ -19,6 +21,7 @@ from calibrate.effects.term import Term
 Floats = NDArray[np.float64]
 
 NOT_FINAL = 0.5  # of the confidence in a name that may be the rest of something else
+ALIKE = 1e-6  # sine between what two names can make of the readings
 LEFTOVER = 0.1  # of what an unknown cause explains: a curve may leave so much of a law that it only resembles
 
 
@@ -82,7 +85,7 @@ def _finding(at: Search, i: int, rivals: Sequence[Rival], predicts: float) -> Fi
         predicts=predicts,
         says=a.term.says(sizes),
         rivals=tuple(
-            _rival(r, float(b))
+            _rival(bench, a, r, float(b))
             for r, b, own in zip(rivals, belief[1:], same[1:], strict=True)
             if not own or (r.term.order, r.term.depends_on) != (a.term.order, a.term.depends_on)
         ),
@@ -90,8 +93,14 @@ def _finding(at: Search, i: int, rivals: Sequence[Rival], predicts: float) -> Fi
     )
 
 
-def _rival(rival: Rival, belief: float) -> RivalName:
-    return RivalName(named(rival.term), belief, rival.margin, rival.refitted)
+def _rival(bench: Bench, own: Accepted, rival: Rival, belief: float) -> RivalName:
+    alike = _alike(*(orthonormal(bench.state.columns(a.term, a.inner)) for a in (own, rival.accepted)))
+    return RivalName(named(rival.term), belief, rival.margin, rival.refitted, alike)
+
+
+def _alike(one: Floats, other: Floats) -> bool:
+    """Whether two orthonormal bases (row, rank) span the same."""
+    return one.shape == other.shape and bool(np.linalg.norm(other - one @ (one.T @ other)) < ALIKE)
 
 
 def _no_leftovers(names: Sequence[Finding], unknown: Sequence[Finding]) -> list[Finding]:

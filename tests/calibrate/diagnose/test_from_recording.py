@@ -78,3 +78,16 @@ def test_an_instrument_may_have_all_its_rows_held_out(tmp_path):
     unseen = fitted.select(rest[20:]).refitted(()).held_out(np.sort(np.concatenate([bars, rest[:20]])))
     assert [u.instrument for u in unseen] == ["seat"]
     assert np.all(np.isfinite(unseen[0].whitened))
+
+
+def test_a_bumped_tracker_may_as_well_be_a_moved_base_and_no_pose_tells(tmp_path):
+    wanted = {"family": "tracker", "seed": 9, "defects": ("bumped-device",), "enr": 1.5, "samples": 160}
+    recording = recording_of(tmp_path, **wanted)
+    found = diagnose_samples(recording.rig, recording.samples, np.random.default_rng(0)).physics.diagnosis
+    (finding,) = found.findings
+    assert (finding.name.physics, finding.name.where) == ("device-drift", "device.pose")
+    (other,) = (r for r in finding.rivals if r.name.physics == "base-moved")
+    assert other.alike
+    assert abs(other.margin) < 0.5
+    assert finding.confidence == pytest.approx(0.5, abs=0.1)
+    assert any("alike at every pose" in told for told in found.next)
