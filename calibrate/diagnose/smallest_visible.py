@@ -30,6 +30,7 @@ class Smallest:
     name: Named
     parameter: str  # with its unit
     value: float
+    plausible: bool  # False: no machine is so bad, so these poses do not show the cause at all
 
 
 def smallest_visible(bench: Bench) -> tuple[Smallest, ...]:
@@ -76,4 +77,6 @@ def _smallest(bench: Bench, i: int, coefficients: Floats | None) -> Smallest | N
     if not told:
         return None
     name, value = next(iter(told.items()))
-    return Smallest(named(term), name, value) if math.isfinite(value) else None
+    if not math.isfinite(value):
+        return None
+    return Smallest(named(term), name, value, term.plausible(coefficients, entry.inner, bench.noise_rad))

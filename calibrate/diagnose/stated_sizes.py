@@ -31,9 +31,16 @@ def sizes_of(bench: Bench, i: int) -> dict[str, Size]:
     alone = span @ (span.T @ np.concatenate(slopes, axis=1))
     covariance = sandwich(bench, alone) + _by_masses(bench, a, span, alone)
     m = len(a.coefficients)
-    inner_sigma = np.zeros(len(a.inner))
+    inner_sigma = np.array([_between_samples(bench, t) for t in a.inner])
     inner_sigma[smooth] = np.sqrt(np.maximum(np.diag(covariance)[m:], 0.0))
     return dict(a.term.sizes(a.coefficients, covariance[:m, :m], a.inner, inner_sigma))
+
+
+def _between_samples(bench: Bench, time_s: float) -> float:
+    """Sigma of a moment of which only the samples before and after it are known: equally likely in between."""
+    t = np.unique(bench.state.drivers.t_s)
+    after = int(np.searchsorted(t, time_s))
+    return float(t[after] - t[after - 1]) / 12.0**0.5 if 0 < after < len(t) else 0.0
 
 
 def sandwich(bench: Bench, columns: Floats) -> Floats:

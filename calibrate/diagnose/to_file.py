@@ -77,6 +77,7 @@ def _with_physics(physics: Physics, rig: RigRecord, blunders: tuple[BlunderRecor
     first, *others = [_unexplained(u, after_m) for u in said.unexplained] or [None]
     drivers, misfit, change = physics.geometry.drivers, said.lack_of_fit, physics.free_space
     bench, limits = Bench(physics.geometry), _limits(physics.model)
+    sizes = smallest_visible(bench)
     return DiagnosisFile(
         schema=SCHEMA,
         verdict=said.verdict.value,
@@ -99,8 +100,8 @@ def _with_physics(physics: Physics, rig: RigRecord, blunders: tuple[BlunderRecor
         if misfit is None
         else LackOfFitRecord(misfit.groups, misfit.ratio, misfit.p, misfit.significant),
         rejected=tuple(map(_rejected, said.rejected)),
-        invisible=tuple(map(_name, said.invisible)),
-        smallest=tuple(map(_smallest, smallest_visible(bench))),
+        invisible=tuple(map(_name, dict.fromkeys((*said.invisible, *(s.name for s in sizes if not s.plausible))))),
+        smallest=tuple(_smallest(s) for s in sizes if s.plausible),
         confusable=_confusable(bench),
         not_recorded=tuple(dict.fromkeys(NotRecorded(m.driver, m.column, m.physics) for m in said.missing)),
         derived=(DERIVED_APPROACH,) if drivers.approach_derived else (),
