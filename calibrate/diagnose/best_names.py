@@ -42,7 +42,7 @@ def _rivals(bench: Bench) -> Rivals:
 def _exchanged(at: Search, rivals: Rivals) -> Search | None:
     """With the first name exchanged that has a better one; None if there is none."""
     for i, (own, mine) in enumerate(zip(at.state.accepted, rivals, strict=True)):
-        class_ = [(0.0, own), *((r.margin, r.accepted) for r in mine if r.refitted)]
+        class_ = [(0.0, own), *((r.margin, r.accepted) for r in mine if r.refitted and r.plausible)]
         class_ = [(margin + _price(at.bench, a.term), a) for margin, a in class_]
         least = min(margin for margin, _ in class_)
         near = [c for c in class_ if c[0] <= least + TIED]

@@ -45,6 +45,7 @@ class RivalName:
     margin: float  # BIC by which the finding is better
     refitted: bool  # margin from a full refit, or linearised
     alike: bool = False  # at every recorded pose, whatever the sizes: more of such poses will not tell
+    plausible: bool = True  # False: it fits better, but only with a size that no machine has
 
 
 @dataclass(frozen=True)

@@ -95,7 +95,7 @@ def _finding(at: Search, i: int, rivals: Sequence[Rival], predicts: float) -> Fi
 
 def _rival(bench: Bench, own: Accepted, rival: Rival, belief: float) -> RivalName:
     alike = _alike(*(orthonormal(bench.state.columns(a.term, a.inner)) for a in (own, rival.accepted)))
-    return RivalName(named(rival.term), belief, rival.margin, rival.refitted, alike)
+    return RivalName(named(rival.term), belief, rival.margin, rival.refitted, alike, rival.plausible)
 
 
 def _alike(one: Floats, other: Floats) -> bool:

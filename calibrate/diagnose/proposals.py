@@ -17,6 +17,7 @@ from calibrate.diagnose.searching import Key, cause_of
 from calibrate.effects.term import Term
 
 REFINED = 6  # terms with inner values whose order is settled by their best values, not by those of the grid
+NEAR = 0.3  # of the best gain, or of the one to beat: what the grid shows less of, no inner value brings up to it
 EQUAL = 3  # decimals of BIC: what the readings cannot tell apart stays in the catalogue's order
 
 
@@ -38,7 +39,8 @@ def proposals(
 ) -> Iterator[Proposal]:
     """One of each key that is not barred, itself or by its cause, and gains more than `least`; the best first."""
     coarse = _best_entries(bench, found, barred)
-    inner = [entry for entry in coarse if bench.menu.entries[entry].inner.size][:REFINED]
+    worth = NEAR * max(least, float(found.gain[coarse[0]]) if coarse else 0.0)
+    inner = [e for e in coarse if bench.menu.entries[e].inner.size and found.gain[e] > worth][:REFINED]
     ready = {entry: _proposal(bench, found, without, entry) for entry in inner}
     gains = {entry: ready[entry].gain if entry in ready else float(found.gain[entry]) for entry in coarse}
     for entry in sorted(coarse, key=lambda e: -round(gains[e], EQUAL)):

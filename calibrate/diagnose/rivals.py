@@ -33,6 +33,7 @@ class Rival:
     accepted: Accepted
     margin: float  # BIC by which the finding is better; negative: the rival is
     refitted: bool  # margin from a full refit, or from the linear score
+    plausible: bool = True  # False: fits better, but is of a size that no machine has
 
     @property
     def term(self) -> Term:
@@ -40,7 +41,7 @@ class Rival:
 
 
 def rivals_of(bench: Bench, i: int) -> tuple[Rival, ...]:
-    """Of accepted term i: all candidates within 6 BIC, nearest first; sizes that no machine has are none."""
+    """Of accepted term i: all candidates within 6 BIC, nearest first; sizes that no machine has, only if better."""
     gone, own = bench.gone[i], bench.state.accepted[i].term
     refits = REFITS if len(bench.state.accepted) <= FEW and bench.state.samples <= LARGE else 0
     near = _near(bench, gone, gain_of(gone, bench.sight), frozenset(cause_of(a.term) for a in bench.state.accepted))
@@ -71,17 +72,18 @@ def _near(bench: Bench, gone: Removed, worth: float, taken: frozenset[Key]) -> l
     """One of every cause."""
     out: dict[Key, Rival] = {}
     for proposal in proposals(bench, scores(bench.menu, gone), gone, worth - NEAR, taken):
-        own = proposal.accepted
-        if own.term.plausible(own.coefficients, own.inner, bench.noise_rad):
-            out.setdefault(cause_of(own.term), Rival(own, worth - proposal.gain, refitted=False))
+        own, margin = proposal.accepted, worth - proposal.gain
+        plausible = own.term.plausible(own.coefficients, own.inner, bench.noise_rad)
+        if plausible or margin < 0.0:
+            out.setdefault(cause_of(own.term), Rival(own, margin, refitted=False, plausible=plausible))
     return list(out.values())
 
 
 def _confirmed(bench: Bench, i: int, rival: Rival) -> Rival | None:
-    """None where the refit takes it to a size that no machine has."""
+    """None where the refit takes it to a size that no machine has, unless it fits better."""
     accepted = [rival.accepted if j == i else a for j, a in enumerate(bench.state.accepted)]
     trial = Bench(bench.state.refitted(accepted))
     found = trial.state.accepted[i]
-    if not found.term.plausible(found.coefficients, found.inner, bench.noise_rad):
-        return None
-    return Rival(found, trial.bic - bench.bic, refitted=True)
+    plausible = found.term.plausible(found.coefficients, found.inner, bench.noise_rad)
+    margin = trial.bic - bench.bic
+    return Rival(found, margin, refitted=True, plausible=plausible) if plausible or margin < 0.0 else None

@@ -33,6 +33,7 @@ class RivalRecord(NameRecord, frozen=True):
 
     confidence: float
     margin: float
+    plausible: bool = True  # False: it fits better, but only with a size that no machine has
 
 
 class CurveRecord(Record, frozen=True):

@@ -141,7 +141,7 @@ def _finding(finding: Finding, plausible_to: float | None) -> FindingRecord:
 
 
 def _rival(rival: RivalName) -> RivalRecord:
-    return RivalRecord(*_words(rival.name), confidence=rival.confidence, margin=rival.margin)
+    return RivalRecord(*_words(rival.name), confidence=rival.confidence, margin=rival.margin, plausible=rival.plausible)
 
 
 def _curve(pulled: Pulled, where: str) -> CurveRecord:

@@ -13,7 +13,9 @@ from simulators.defects.defect import AnyDefect, Defect, size_of, with_size
 Floats = NDArray[np.float64]
 Watch = Callable[[Sequence[Defect]], Observed]  # the session with these defects, noise-free
 Whiten = Callable[[Floats], Floats]  # change of the readings (row, channel) in sigmas, flat
-FARTHEST = 12.0  # times the typical size: beyond, a mechanism would be found with the naked eye
+# Times the typical size: beyond, a mechanism would be found with the naked eye. Where a material sets a bound, the
+# mechanism states its own LARGEST.
+FARTHEST = 12.0
 INVISIBLE = 0.05  # effect over noise of the largest plausible size: geometry takes it all, and size does not matter
 STEPS = 3  # most effects are in proportion to their size; the rest need another try or two
 
@@ -42,7 +44,7 @@ class Scale:
 
         One that no plausible size would show keeps the size that it was drawn with.
         """
-        drawn, most = defect, FARTHEST * defect.TYPICAL
+        drawn, most = defect, float(getattr(defect, "LARGEST", FARTHEST * defect.TYPICAL))
         for _ in range(STEPS):
             found = self.enr([defect])
             if found <= 0.0 or not np.isfinite(found):

@@ -26,6 +26,7 @@ class WarmArm:
     PHYSICS: ClassVar[str] = "link-thermal-growth"
     SIZE: ClassVar[str] = "expansion_per_k"
     TYPICAL: ClassVar[float] = 23e-6
+    LARGEST: ClassVar[float] = 60e-6  # aluminium, and a thermometer that sees less than half of the warmth
     INSTRUMENTS: ClassVar[tuple[str, ...]] = ANY_INSTRUMENT
     HABIT: ClassVar[str] = ""
 

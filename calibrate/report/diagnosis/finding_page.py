@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from calibrate.diagnose.schema import DiagnosisFile, FindingRecord, SizeRecord
+from calibrate.diagnose.schema import DiagnosisFile, FindingRecord, RivalRecord, SizeRecord
 from calibrate.report.diagnosis.chain_figure import Link, chain_figure
 from calibrate.report.diagnosis.pulled_figure import pulled_figure
 from calibrate.report.diagnosis.units import unit_of
@@ -94,9 +94,13 @@ def _rivals(finding: FindingRecord, file: DiagnosisFile) -> Iterator[Html]:
         if finding.stream is None:
             yield tag("p", "No other cause of the catalogue comes near: within 6 BIC there is none.")
         return
-    rows = [(place_words(r), fixed(r.margin, 1), f"{r.confidence:.3f}") for r in finding.rivals]
+    rows = [(_rival_words(r), fixed(r.margin + 0.0, 1), f"{r.confidence:.3f}") for r in finding.rivals]
     caption = "What it could be instead, everything else refitted"
     yield table(("Rival", "BIC behind", "confidence"), rows, numeric=(1, 2), caption=caption)
     advice = [line for line in file.next if finding.where in line and finding.physics in line]
     if advice:
         yield tag("p", tag("b", "What to do: "), "; ".join(advice), ".")
+
+
+def _rival_words(rival: RivalRecord) -> str:
+    return place_words(rival) + ("" if rival.plausible else ": only with a size that no machine has")

@@ -111,7 +111,8 @@ def place_words(name: NameRecord) -> str:
 
 def rival_words(rival: RivalRecord) -> str:
     """With how far behind it is."""
-    return f"{place_words(rival)} (confidence {rival.confidence:.2g}, {rival.margin:.1f} BIC behind)"
+    size = "" if rival.plausible else "; it fits better, but only with a size that no machine has"
+    return f"{place_words(rival)} (confidence {rival.confidence:.2g}, {_behind(rival.margin)}{size})"
 
 
 def before_after(split: SplitRecord) -> tuple[str, str]:
@@ -151,3 +152,9 @@ def _clock_words(clock: ClockRecord) -> str:
     if clock.drift is None or clock.drift_sigma is None:
         return said
     return f"{said}, drift {1e6 * clock.drift:.2g} ± {1e6 * clock.drift_sigma:.2g} ppm"
+
+
+def _behind(margin: float) -> str:
+    """A rival's margin in words; what rounds to nothing is no margin."""
+    words = f"{abs(margin):.1f} BIC"
+    return "as good" if words == "0.0 BIC" else f"{words} {'behind' if margin > 0.0 else 'ahead'}"
