@@ -42,7 +42,7 @@ def flange_for(arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, 
     R = T_base_fixture[:3, :3]
     direction_base = R @ direction
     origin_base_m = R @ hit_m + T_base_fixture[:3, 3] - target.stand_off_m * direction_base
-    mount_origin_m, mount_direction = _mount(arm)
+    mount_origin_m, mount_direction = laser_in_flange(arm)
     world = _axes(direction_base, np.array([0.0, 0.0, 1.0]), target.roll_rad)
     flange = _axes(mount_direction, np.array([0.0, 0.0, 1.0]), 0.0)
     T = np.eye(4)
@@ -51,8 +51,8 @@ def flange_for(arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, 
     return T
 
 
-def _mount(arm: BelievedArm) -> tuple[Floats, Floats]:
-    """Laser origin and direction in the flange frame, read off the believed arm at its zero."""
+def laser_in_flange(arm: BelievedArm) -> tuple[Floats, Floats]:
+    """Laser origin (3,) m and direction (3,) in the flange frame, read off the believed arm at its zero."""
     q_rad = np.zeros(arm.lower_rad.size)
     T = arm.frames(q_rad)[-1]
     origin_m, direction = arm.beam(q_rad)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
+ROUNDING_M = 1e-6  # of a distance that stays the same
 LINK_POINTS = 8  # on every link, for its distance to a box: 5 cm apart on the longest link of a small arm
 
 
@@ -23,9 +24,10 @@ class Box:
     upper_m: tuple[float, float, float]
 
     def distance_m(self, points_m: Floats) -> Floats:
-        """(...) from points (..., 3) to the box, 0 inside."""
-        beyond = np.maximum(np.maximum(np.array(self.lower_m) - points_m, points_m - np.array(self.upper_m)), 0.0)
-        return np.asarray(np.linalg.norm(beyond, axis=-1))
+        """(...) from points (..., 3) to the box; inside it the depth, negative."""
+        beyond = np.maximum(np.array(self.lower_m) - points_m, points_m - np.array(self.upper_m))
+        outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=-1)
+        return np.asarray(outside + np.minimum(np.max(beyond, axis=-1), 0.0))
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,20 @@ class Cell:
     slow: Sequence[SlowArea] = ()
     clearance_m: float = 0.06  # half of the 120 mm that a UR5e's elbow is wide
     tool_m: Sequence[tuple[float, float, float]] = ()  # further points of the body, in the flange frame
+
+
+def entered(box: Box, points_m: Floats, clearance_m: float) -> tuple[int, float] | None:
+    """Where a body of points (sample, point, 3) along a way enters a box's clearance, and how near (m) it then comes.
+
+    None where it never does. An arm that stands too near already may leave, by a way on which it comes no nearer.
+    """
+    near_m = np.min(box.distance_m(points_m), axis=1)
+    clear = np.flatnonzero(near_m >= clearance_m)
+    leaves = int(clear[0]) if clear.size else len(near_m)
+    backwards = np.flatnonzero(np.diff(near_m[: leaves + 1]) < -ROUNDING_M) + 1
+    again = np.flatnonzero(near_m[leaves:] < clearance_m) + leaves
+    hits = [*backwards[:1].tolist(), *again[:1].tolist()]
+    return (min(hits), max(0.0, float(np.min(near_m[min(hits) :])))) if hits else None
 
 
 def body_points(frames: Floats, tool_m: Sequence[tuple[float, float, float]]) -> Floats:

@@ -51,6 +51,7 @@ class Stream:
     solve_hz: float = 100.0
     lookahead_s: float = 0.03  # URScript servoj: 0.03 to 0.2 s; the least smooths least
     gain: float = 2000.0  # URScript servoj: 100 to 2000; the stiffest follows best
+    lag_s: float = 0.0  # by which the arm follows its set-points, as measured by `calibeam motion`; 0: nobody has
     rested_s: float = 0.02  # after so long a silence the arm rests on the last set-point, and is set going from there
     late_s: float = 1.0  # a stream that was silent longer is given up
 
@@ -176,7 +177,7 @@ class Gate:
     def _follow(
         self, made: Plan, path: Followable, belt: BeltNow, act: Acting, watch: Callable[[], None], followed: Followed
     ) -> None:
-        points = LookAhead(path, self._stream.solve_hz, belt, made.start_rad)
+        points = LookAhead(path, self._stream.solve_hz, belt, made.start_rad, self._stream.lag_s)
         period_s, begin_s, cycle = 1.0 / self._stream.hz, self._clock.now_s(), 0
         acted, before_rad, speed_rad_s = 0, made.start_rad, np.zeros_like(made.start_rad)
         while self._state not in OVER:

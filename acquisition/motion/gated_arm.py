@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.motion.cell import Cell, body_points
+from acquisition.motion.cell import Cell, body_points, entered
 from acquisition.motion.errors import RefusedMotionError
 from acquisition.motion.inverse.kinematics import Kinematics
 from drivers.device import Movable
@@ -62,10 +62,9 @@ class GatedArm:
     def _check_boxes(self, frames: Floats) -> None:
         points = body_points(frames, self._cell.tool_m)
         for box in self._cell.keep_out:
-            near_m = float(np.min(box.distance_m(points)))
-            if near_m < self._cell.clearance_m:
+            if (hit := entered(box, points, self._cell.clearance_m)) is not None:
                 raise RefusedMotionError(
-                    f"the arm would come within {1e3 * near_m:.0f} mm of the keep-out box '{box.name}' (clearance "
+                    f"the arm would come within {1e3 * hit[1]:.0f} mm of the keep-out box '{box.name}' (clearance "
                     f"{1e3 * self._cell.clearance_m:.0f} mm) on its way; choose another pose, or correct the box"
                 )
 

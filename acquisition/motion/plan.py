@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.motion.cell import Cell, body_points
+from acquisition.motion.cell import Cell, body_points, entered
 from acquisition.motion.errors import RefusedMotionError
 from acquisition.motion.inverse.solver import Solver
 from acquisition.motion.paths.path import STANDING, Belt, Path
@@ -174,13 +174,11 @@ def _check_range(made: Plan) -> None:
 def _check_boxes(made: Plan, cell: Cell) -> None:
     points = body_points(made.solver.arm.frames(made.q_rad), cell.tool_m)
     for box in cell.keep_out:
-        near = np.min(box.distance_m(points), axis=1)
-        hits = np.flatnonzero(near < cell.clearance_m)
-        if hits.size:
-            k = int(hits[0])
+        if (hit := entered(box, points, cell.clearance_m)) is not None:
+            k, near_m = hit
             raise RefusedMotionError(
                 f"{made.name_of(int(made.segment[k]))} at {made.t_s[k]:.2f} s: the arm comes within "
-                f"{1e3 * near[k]:.0f} mm of the keep-out box '{box.name}' (clearance {1e3 * cell.clearance_m:.0f} mm); "
+                f"{1e3 * near_m:.0f} mm of the keep-out box '{box.name}' (clearance {1e3 * cell.clearance_m:.0f} mm); "
                 "move round it"
             )
 

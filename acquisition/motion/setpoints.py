@@ -41,11 +41,12 @@ class LookAhead:
     Path time runs by `scale`, which the caller may change.
     """
 
-    def __init__(self, path: Followable, solve_hz: float, belt: BeltNow, start_rad: Floats) -> None:
+    def __init__(self, path: Followable, solve_hz: float, belt: BeltNow, start_rad: Floats, lag_s: float = 0.0) -> None:
+        """`lag_s`: by which the arm follows its set-points; a belt is led by what it goes meanwhile."""
         self.path = path
         self.scale = 1.0
         self._path_s = 0.0  # path time of the solution after these
-        self._period_s, self._belt = 1.0 / solve_hz, belt
+        self._period_s, self._belt, self._lag_s = 1.0 / solve_hz, belt, lag_s
         self._behind_rad = self._ahead_rad = self._next_rad = start_rad
         self.reached_s = self._ahead_s = self._next_s = 0.0  # path times of the three
         self._interval = -1
@@ -71,9 +72,9 @@ class LookAhead:
         self.scale = 0.0
 
     def _solved(self) -> Floats:
-        """Two periods ahead of the belt that is read now."""
+        """Two periods ahead of the belt that is read now, and the arm's own lag."""
         belt = self._belt()
-        ahead = Belt(belt.s_m + belt.rate_m_s * 2.0 * self._period_s, belt.rate_m_s)
+        ahead = Belt(belt.s_m + belt.rate_m_s * (2.0 * self._period_s + self._lag_s), belt.rate_m_s)
         q_rad = self.path.at(self._path_s, ahead)
         self._path_s += self.scale * self._period_s
         return q_rad

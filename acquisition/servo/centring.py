@@ -1,6 +1,6 @@
 """The centring loop: look, ask the strategy, limit the step, move, recover a lost spot, end with a named status."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,10 @@ class Limits:
     cycle_m: float = 1e-4  # "near"
 
 
+GOOD, POOR = 0.5, 0.25  # shares of its promise that a step kept
+LEAST_TRUST_RAD = 1e-3  # feels right: less brings the spots nowhere within the steps of a run
+
+
 class Loop:
     """One run; the only owner of its trace."""
 
@@ -33,6 +37,8 @@ class Loop:
         self._bench, self._arm, self._strategy, self._limits = bench, arm, strategy, limits
         self._trace: list[Step] = []
         self._q_rad = np.empty(0)
+        self._trusted_rad = limits.step_rad  # largest joint step that may be taken now
+        self._losses = 0  # steps that led out of the light
 
     def run(self, q_rad: Floats, target_m: Floats) -> Centring:
         """Bring the spots to `target_m` (4,), starting where the arm stands at command `q_rad` (joint,)."""
@@ -54,27 +60,51 @@ class Loop:
             proposal = self._limited(self._strategy.propose(target_m))
             if not self._in_range(self._q_rad + proposal.step_rad):
                 return self._end(Status.JOINT_LIMIT, look)
+            losses = self._losses
             taken = self._take(proposal)
             if not _both_lit(taken):
                 return self._end(Status.SPOT_LOST, taken)
+            if 0 < self._losses == losses:
+                self._trust_again(proposal, (look.spots_m() - target_m, taken.spots_m() - target_m))
             look = taken if not proposal.stay else look
 
     def _take(self, proposal: Proposal) -> Look:
         """Move; while the light is lost, come back by half. The look is dark when that did not find it again: the
         spiral of the search is the caller's.
+
+        A step that lost the light has shown how little the strategy knows yet: the next one is at most half of what
+        of it kept the light, and longer only as steps keep their promise. `centring_cold` of the benchmarks counts
+        how often the light is lost again all the same.
         """
         step = proposal.step_rad
         look = self._see(self._q_rad + step, proposal.purpose)
+        lost = not _both_lit(look)
+        self._losses += lost
         for _ in range(self._limits.halvings):
             if _both_lit(look):
                 break
             step = step / 2.0
             look = self._see(self._q_rad + step, "go back")
         if _both_lit(look):
+            self._trusted_rad = 0.5 * _largest(step) if lost else self._trusted_rad
             self._strategy.learn(self._q_rad + step, look.spots_m())
             if not proposal.stay:
                 self._q_rad = self._q_rad + step
         return look
+
+    def _trust_again(self, taken: Proposal, errors_m: tuple[Floats, Floats]) -> None:
+        """A step that brought at least half of what it promised doubles the trust, a poor one halves it.
+
+        `errors_m` (4,) before and after. Source: J. Nocedal, S. Wright, Numerical Optimization, 2006, algorithm 4.1.
+        """
+        if taken.stay:
+            return
+        before_m, after_m = (float(np.linalg.norm(error_m)) for error_m in errors_m)
+        kept = (before_m - after_m) / (taken.promise * before_m)
+        if kept > GOOD:
+            self._trusted_rad = min(2.0 * self._trusted_rad, self._limits.step_rad)
+        elif kept < POOR:
+            self._trusted_rad = max(0.5 * self._trusted_rad, LEAST_TRUST_RAD)
 
     def _see(self, q_rad: Floats, purpose: str) -> Look:
         if purpose != "start":
@@ -84,10 +114,11 @@ class Loop:
         return look
 
     def _limited(self, proposal: Proposal) -> Proposal:
-        largest = float(np.max(np.abs(proposal.step_rad)))
-        if largest <= self._limits.step_rad:
+        largest_rad = _largest(proposal.step_rad)
+        if largest_rad <= self._trusted_rad:
             return proposal
-        return Proposal(proposal.step_rad * (self._limits.step_rad / largest), proposal.purpose, proposal.stay)
+        share = self._trusted_rad / largest_rad
+        return replace(proposal, step_rad=share * proposal.step_rad, promise=share * proposal.promise)
 
     def _in_range(self, q_rad: Floats) -> bool:
         return bool(np.all(q_rad >= self._arm.lower_rad) and np.all(q_rad <= self._arm.upper_rad))
@@ -101,6 +132,10 @@ def centre(
 ) -> Centring:
     """Bring both spots to `target_m` (4,) m; the arm stands at command `q_rad`. Never raises for lack of light."""
     return Loop(bench, arm, strategy, limits or Limits()).run(q_rad, target_m)
+
+
+def _largest(step_rad: Floats) -> float:
+    return float(np.max(np.abs(step_rad)))
 
 
 def _both_lit(look: Look) -> bool:

@@ -57,4 +57,4 @@ class FixedGuess:
     def propose(self, target_m: Floats) -> Proposal:
         error_m = target_m - self._spots_m
         full = correction(self._arm, self._optics, self._T, self._q_rad, error_m, self._spots_m, self._first)
-        return Proposal(self._gain * full, "correct")
+        return Proposal(self._gain * full, "correct", promise=self._gain)

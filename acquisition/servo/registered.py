@@ -56,7 +56,8 @@ class Registered:
     def propose(self, target_m: Floats) -> Proposal:
         q_rad, spots_m = self._q_rad[-1], self._spots_m[-1]
         step = correction(self._arm, self._optics, self.T_base_fixture, q_rad, target_m - spots_m, spots_m, self._first)
-        return Proposal(step if len(self._q_rad) > 1 else self._first_gain * step, "correct")
+        gain = 1.0 if len(self._q_rad) > 1 else self._first_gain
+        return Proposal(gain * step, "correct", promise=gain)
 
     def _onto_beam(self, T_guess: Floats, q_rad: Floats, spots_m: Floats) -> Floats:
         """The guess, turned and shifted as little as possible so that the measured beam lies on the believed one."""

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,3 +45,9 @@ class Centring:
     @property
     def steps(self) -> int:
         return len(self.trace) - 1
+
+    @property
+    def losses(self) -> int:
+        """How often a step led out of the light."""
+        lit = [bool(np.isfinite(step.spots_m).all()) for step in self.trace]
+        return sum(before and not after for before, after in pairwise(lit))

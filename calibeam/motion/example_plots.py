@@ -35,6 +35,7 @@ def numbers_of(shown: Shown, solver: Solver) -> dict[str, float]:
         "set-points": float(shown.followed.sent),
         "cycles missed": float(shown.followed.missed),
         "restarts": float(shown.followed.restarts),
+        "arm behind its set-points, s": shown.lag_s,
     }
     if not shown.plan.carried:
         track = figures.tips(solver, figures.fine(shown.plan)[1])

@@ -5,7 +5,7 @@ file's; a rig on site has its own tasks.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,7 @@ from acquisition.motion.run_task import Around, run_task, teach
 from acquisition.motion.task.graph import TaskGraph
 from acquisition.motion.task.place import Place
 from acquisition.motion.task.task_file import Task, read_task
+from calibeam.motion.lag import KeptSetPoints, lag_s
 from calibeam.motion.robot import StreamedRobot
 
 Floats = NDArray[np.float64]
@@ -53,6 +54,7 @@ class Shown:
     t_s: Floats
     q_rad: Floats
     corners: tuple[Floats, ...]  # (4, 4) of the tool at every target that stands
+    lag_s: float  # by which the arm followed its set-points
     belt: Callable[[float], Belt] | None = None  # by controller time since the sweep began
     figures: Mapping[str, float] | None = None
 
@@ -62,13 +64,19 @@ class Stage:
     """The robot with its gate."""
 
     robot: StreamedRobot
+    sent: KeptSetPoints
     gate: Gate
     solver: Solver
 
     def go(self, segments: list[Segment]) -> tuple[Plan, Followed]:
         made = self.gate.plan(self.robot.joints(), segments)
-        self.robot.track.clear()
+        self.clear()
         return made, self.gate.run(made, self.robot.joints(), watch=self.robot.supervisor.check)
+
+    def clear(self) -> None:
+        """Forget what was sent and heard so far."""
+        self.robot.track.clear()
+        self.sent.clear()
 
     def to_start(self) -> None:
         """By joints to where the examples begin."""
@@ -79,7 +87,8 @@ class Stage:
     def shown(self, name: str, made: Plan, followed: Followed) -> Shown:
         t_s, q_rad = self.robot.track.joints()
         corners = tuple(s.place.flange_at(0.0) @ s.place.tool for s in made.segments if s.place.coord is None)
-        return Shown(name, made, followed, t_s - t_s[0], q_rad, corners)
+        behind_s = lag_s(*self.sent.sent(), self.robot.track.host_s()[: len(q_rad)], q_rad)
+        return Shown(name, made, followed, t_s - t_s[0], q_rad, corners, behind_s)
 
 
 def joint_motion(stage: Stage) -> Shown:
@@ -107,7 +116,7 @@ def belt(stage: Stage) -> Shown:
 
     def read(name: str) -> Floats:
         begin_s[0] = stage.robot.clock.now_s()  # the part comes into the picture as it is read
-        stage.robot.track.clear()
+        stage.clear()
         return PART_ON_BELT
 
     gripped: list[float] = []
@@ -122,7 +131,7 @@ def belt(stage: Stage) -> Shown:
     made, followed = ran.sweeps[0]
     shown = stage.shown("belt", made, followed)
     figures = {"hand from part when gripped, m": gripped[0]}
-    return Shown("belt", made, followed, shown.t_s, shown.q_rad, shown.corners, _belt, figures)
+    return replace(shown, belt=_belt, figures=figures)
 
 
 def two_pins(stage: Stage) -> Shown:
@@ -139,7 +148,7 @@ def two_pins(stage: Stage) -> Shown:
 
     graph = teach(task.graph, task.teach, stage.solver, placed)
     stage.to_start()
-    stage.robot.track.clear()
+    stage.clear()
     at_action: list[tuple[str, Floats]] = []
     around = Around(
         stage.robot.joints,
@@ -150,7 +159,7 @@ def two_pins(stage: Stage) -> Shown:
     made, followed = ran.sweeps[0]
     shown = stage.shown("two-pins", made, followed)
     figures = _pin_figures(stage, graph, truth, at_action)
-    return Shown("two-pins", made, followed, shown.t_s, shown.q_rad, shown.corners, None, figures)
+    return replace(shown, figures=figures)
 
 
 def _pin_figures(

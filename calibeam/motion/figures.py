@@ -83,7 +83,7 @@ def draw_joints(figure: Figure, shown: Shown) -> None:
         speed.plot(t_s, np.degrees(np.gradient(q_rad[:, joint], t_s)), color=colour, linewidth=1.0)
     _transitions((position, speed), shown.plan)
     position.set(ylabel="deg", title="Joints: planned (thin), said by the controller (broad); transitions shaded")
-    position.legend(ncols=6)
+    figure.legend(*position.get_legend_handles_labels(), loc="outside lower center", ncols=6)
     speed.set(ylabel="deg/s, planned", xlabel="s")
 
 
@@ -108,9 +108,11 @@ def draw_blend(figure: Figure, shown: Shown, solver: Solver) -> None:
     near = np.abs(t_s - corner_s) < 2.0 * tacc_s
     close, *curves = figure.subplots(1, 4)
     said = tips(solver, thinned(shown.q_rad))
-    said = said[np.linalg.norm(said - corner, axis=1) < 1.2 * float(np.max(np.linalg.norm(tip[near] - corner, axis=1)))]
+    within = tip[np.abs(t_s - corner_s) < 1.1 * tacc_s]
+    extent_m = float(np.max(np.linalg.norm(within - corner, axis=1)))
+    said = said[np.linalg.norm(said - corner, axis=1) < extent_m]
     close.plot(1e3 * said[:, 0], 1e3 * said[:, 1], ".", color=ACTUAL, alpha=0.4, label="said by the controller")
-    close.plot(1e3 * tip[near, 0], 1e3 * tip[near, 1], color=PLANNED, label="planned")
+    close.plot(1e3 * within[:, 0], 1e3 * within[:, 1], color=PLANNED, label="planned")
     close.plot(1e3 * corner[0], 1e3 * corner[1], "+", color=TARGET, markersize=10, label="corner, missed by design")
     close.set(xlabel="x, mm", ylabel="y, mm", title="Blend close up", aspect="equal", adjustable="datalim")
     close.legend()
@@ -150,7 +152,7 @@ def draw_plan(figure: Figure, plan: Plan, solver: Solver) -> None:
         colour = list(PRINTED)[5 + joint % 6].value
         joints.plot(plan.t_s, np.degrees(plan.q_rad[:, joint]), color=colour, label=f"joint {joint + 1}")
     joints.set(xlabel="s", ylabel="deg", title="Joints")
-    joints.legend(ncols=2)
+    figure.legend(*joints.get_legend_handles_labels(), loc="outside lower center", ncols=6)
     _transitions((joints,), plan)
     flange = solver.arm.frames(plan.q_rad)[:, -1, :3, 3]
     for axes, (i, j), title in ((above, (0, 1), "Flange from above"), (side, (0, 2), "From the side")):

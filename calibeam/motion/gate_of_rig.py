@@ -69,5 +69,6 @@ def gated_arm(arm: Movable, rig: Rig, robot: Pump) -> GatedArm:
 
 def gate_of(rig: Rig, solver: Solver, arm: SetPoints, clock: Clock, speed_share: float = 1.0) -> Gate:
     """Ready to plan and run."""
-    stream = Stream(hz=UR_STREAM_HZ, solve_hz=solve_rate_hz(rig.motion.structural_hz, UR_STREAM_HZ))
+    solve_hz = solve_rate_hz(rig.motion.structural_hz, UR_STREAM_HZ)
+    stream = Stream(hz=UR_STREAM_HZ, solve_hz=solve_hz, lag_s=rig.motion.lag_s)
     return Gate(solver, pace_of(rig, speed_share), cell_of(rig), arm, stream, clock)

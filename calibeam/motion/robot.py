@@ -47,6 +47,10 @@ class Track:
         q_rad = np.concatenate([block.values["actual_q_rad"] for block in blocks])
         return np.concatenate([block.device_s for block in blocks]), q_rad
 
+    def host_s(self) -> Floats:
+        """Host time (sample,) of the same."""
+        return np.concatenate([block.host_s for block in list(self.blocks)])
+
 
 @dataclass(frozen=True)
 class StreamedRobot:

@@ -168,7 +168,7 @@ class CanDbcEncoders:
         nothing = (math.nan, math.nan)
         each = np.array([[row.get(place, nothing) for place in range(len(self.joints))] for _, _, row in rows])
         host_s = np.array([done_s for _, done_s, _ in rows])
-        slips_rad = [angle.slip_rad for angle in self._angles]
+        slips_rad = np.array([angle.slip_rad for angle in self._angles], dtype=np.float64)
         return Block(
             host_s=host_s,
             device_s=np.nanmean(each[:, :, 1], axis=1),

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from drivers.cia406.objects import Operating
 
@@ -54,9 +55,10 @@ class ContinuousAngle:
     """Unwraps one encoder's position. The first reading lies within half the range of zero.
 
     Step = ((new - old + R/2) mod R) - R/2, R the range in units. A step is motion when it is no faster than the speed
-    limit and, where an acceleration limit is given, no farther from the last speed v than a dt^2 + 2 |v| j allows, j
-    the scatter of the host's times. Any other is NaN. When READINGS_OF_A_SLIP of them in a row agree with each other
-    the position has slipped: it is told from there on, and the slip is kept.
+    limit (over j at least: a busy host takes in one go what came one after the other) and, where an acceleration limit
+    is given, no farther from the last speed v than a dt^2 + 2 |v| j allows, j the scatter of the host's times. Any
+    other is NaN. When READINGS_OF_A_SLIP of them in a row agree with each other the position has slipped: it is told
+    from there on, and the slip is kept.
     """
 
     def __init__(
@@ -68,7 +70,8 @@ class ContinuousAngle:
         self.jumps = 0
         self.wraps = 0
         self.slips: tuple[Slip, ...] = ()
-        self._scale = scale
+        self._range, self._half = scale.range_units, scale.range_units // 2
+        self._unit_rad, self._size_rad = scale.unit_rad, abs(scale.unit_rad)
         self._speed_limit_rad_s = speed_limit_rad_s
         self._acceleration_limit_rad_s2 = acceleration_limit_rad_s2
         self._last: _Reading | None = None
@@ -84,7 +87,7 @@ class ContinuousAngle:
         last = self._last
         if last is None:
             self._last = _Reading(self._step(position, 0), time_s, math.nan)
-            return self._last.units * self._scale.unit_rad
+            return self._last.units * self._unit_rad
         before = self._doubted[-1] if self._doubted else last
         if self._doubted and not self._is_motion(self._next(before, position, time_s), before):
             self._doubted.clear()
@@ -101,16 +104,16 @@ class ContinuousAngle:
     def _slipped(self, last: "_Reading", first: "_Reading", reading: "_Reading") -> float:
         rate = 0.0 if math.isnan(last.rate) else last.rate
         unmoved = last.units + rate * (first.time_s - last.time_s)
-        self.slips = (*self.slips, Slip(first.time_s, (first.units - unmoved) * self._scale.unit_rad))[-SLIPS_KEPT:]
+        self.slips = (*self.slips, Slip(first.time_s, (first.units - unmoved) * self._unit_rad))[-SLIPS_KEPT:]
         return self._accept(reading)
 
     def _accept(self, reading: "_Reading") -> float:
         last = self._last
         if last is not None:
-            self.wraps += abs(reading.units // self._scale.range_units - last.units // self._scale.range_units)
+            self.wraps += abs(reading.units // self._range - last.units // self._range)
         self._last = reading
         self._doubted.clear()
-        return reading.units * self._scale.unit_rad
+        return reading.units * self._unit_rad
 
     def _next(self, before: "_Reading", position: int, time_s: float) -> "_Reading":
         step = self._step(position, before.units)
@@ -118,10 +121,10 @@ class ContinuousAngle:
         return _Reading(before.units + step, time_s, step / elapsed_s if elapsed_s > 0.0 else before.rate)
 
     def _is_motion(self, reading: "_Reading", before: "_Reading") -> bool:
-        unit_rad = abs(self._scale.unit_rad)
+        unit_rad = self._size_rad
         elapsed_s = reading.time_s - before.time_s
         step = reading.units - before.units
-        if abs(step) * unit_rad > self._speed_limit_rad_s * elapsed_s + unit_rad:
+        if abs(step) * unit_rad > self._speed_limit_rad_s * max(elapsed_s, TIME_SCATTER_S) + unit_rad:
             return False
         if math.isinf(self._acceleration_limit_rad_s2) or math.isnan(before.rate):
             return True
@@ -130,12 +133,10 @@ class ContinuousAngle:
         return off_rad <= self._acceleration_limit_rad_s2 * elapsed_s**2 + scatter_rad + 2.0 * unit_rad
 
     def _step(self, position: int, old: int) -> int:
-        half = self._scale.range_units // 2
-        return (position - old + half) % self._scale.range_units - half
+        return (position - old + self._half) % self._range - self._half
 
 
-@dataclass(frozen=True)
-class _Reading:
+class _Reading(NamedTuple):  # and no dataclass: thousands a second are made of these
     """A position made continuous, and how fast it was moving then, in units a second; NaN: not known yet."""
 
     units: int

@@ -29,6 +29,7 @@ class EncoderIdentity:
     scale: Scale
     pdo_id: int  # CAN identifier of its TPDO2
     mapping: tuple[MappedObject, ...]
+    error_register: int  # 1001h when it was set up: not 0 while an emergency of before lasts
 
     @property
     def multi_turn(self) -> bool:
@@ -95,8 +96,9 @@ def configure(encoder: EncoderObjects) -> EncoderIdentity:
     pdo_id, mapping = _position_on_sync(encoder)
     encoder.write(objects.HEARTBEAT_MS, 0, HEARTBEAT_MS, 2)
     vendor, product, revision, serial_number = (_optional(encoder, objects.IDENTITY, sub) for sub in (1, 2, 3, 4))
+    errors = _optional(encoder, objects.ERROR_REGISTER, 0)
     return EncoderIdentity(
-        encoder.number, device_type, vendor, product, revision, serial_number, scale, pdo_id, mapping
+        encoder.number, device_type, vendor, product, revision, serial_number, scale, pdo_id, mapping, errors
     )
 
 

@@ -85,7 +85,11 @@ class SyncCycle:
 
     def answer(self, node: int, position_rad: float, now_s: float) -> tuple[Row, ...]:
         """Takes an answer that was awaited; all rows that are certain now, when it was the last missing."""
-        sync = next(sync for sync in self._under_way if node not in sync.answers)
+        for sync in self._under_way:  # the first that this node has not answered
+            if node not in sync.answers:
+                break
+        else:
+            return ()
         sync.answers[node] = math.nan if node in self._in_doubt else position_rad
         sync.arrived_s = now_s
         self._silent_since_s.pop(node, None)

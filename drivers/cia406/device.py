@@ -144,9 +144,13 @@ class Cia406Encoders:
                     break
                 self._keep_pace(now_s)
                 message = self._receive(min(self._cycle.wakes_s, deadline_s) - now_s)
-                self._take(message, watched=True)
                 if message is None:
+                    self._watch.check_heartbeats()
                     self._add(self._cycle.give_up(self._clock.now_s()))
+                    continue
+                now_s = self._clock.now_s()
+                self._watch.look(now_s)
+                self._take(message, now_s)
         if not self._rows:
             raise DeviceStale(
                 f"{self.name}: no encoder answered a SYNC within {timeout_s:g} s; check power, bus and bitrate"
@@ -255,29 +259,27 @@ class Cia406Encoders:
             self._bad_lines += 1
             return None
 
-    def _take(self, message: can.Message | None, *, watched: bool = False) -> None:
-        """One frame: a position, a heartbeat, an emergency, an error, or nothing of ours."""
-        if watched and message is None:
-            self._watch.check_heartbeats()
-        elif watched:
-            self._watch.look(self._clock.now_s())
-        if message is not None and message.is_error_frame:
-            self._faults.take(message, self._clock.now_s())
-        if message is None or message.is_extended_id or message.is_remote_frame or message.is_error_frame:
+    def _take(self, message: can.Message, now_s: float | None = None) -> None:
+        """One frame: a position, a heartbeat, an emergency, an error, or nothing of ours; heard now unless told."""
+        at_s = self._clock.now_s() if now_s is None else now_s
+        if message.is_error_frame:
+            self._faults.take(message, at_s)
+        if message.is_extended_id or message.is_remote_frame or message.is_error_frame:
             return
         place = self._node_of_pdo.get(message.arbitration_id)
         if self._operational and place is not None:
-            self._take_position(place, bytes(message.data))
+            self._take_position(place, bytes(message.data), at_s)
             return
-        self._watch.take(message.arbitration_id, bytes(message.data), self._clock.now_s())
+        self._watch.take(message.arbitration_id, bytes(message.data), at_s)
 
-    def _take_position(self, place: int, data: bytes) -> None:
+    def _take_position(self, place: int, data: bytes, now_s: float) -> None:
         units = extract(self.identities[place].mapping, data, objects.POSITION)
         if units is None:
             self._bad_lines += 1
         elif self._cycle.awaits(place):
-            now_s = self._clock.now_s()
-            self._add(self._cycle.answer(place, self._angles[place].follow(units, now_s), now_s))
+            rows = self._cycle.answer(place, self._angles[place].follow(units, now_s), now_s)
+            if rows:
+                self._add(rows)
 
     def _check_silence(self, now_s: float) -> None:
         silent = self._cycle.silent(SILENT_S, now_s)

@@ -75,6 +75,7 @@ class ModbusArm:
         self._ordering = threading.Lock()  # a stop falls before a command or after it, never between check and number
         self._stops = 0
         self._held = True
+        self._delivering = False  # another thread is writing a stop at this moment
         self._number = self._life = 0
         self._life_s, self._counted_s = life_s, -math.inf
 
@@ -140,11 +141,16 @@ class ModbusArm:
             self._put("command_number", self._number)
 
     def _give_up(self) -> None:
-        """Nobody knows whether the command arrived: a program that takes it late must find the stop set."""
-        with self._ordering:
-            self._held = True
-            with contextlib.suppress(DeviceError):
-                self._put("stop", 1)
+        """Nobody knows whether the command arrived: a program that takes it late must find the stop set.
+
+        On a dead line a stop takes more than a second to be found undeliverable: who is writing one already need not be
+        waited for, and does not lift it again, because the arm is held.
+        """
+        self._held = True
+        if self._delivering:
+            return
+        with self._ordering, contextlib.suppress(DeviceError):
+            self._put("stop", 1)
 
     def _await_arrival(self, limit_s: float) -> None:
         begin_s = self._clock.now_s()
@@ -171,7 +177,11 @@ class ModbusArm:
         with self._ordering:
             self._stops += 1
             self._held = self._held or hold
-            self._put_stop()
+            self._delivering = True
+            try:
+                self._put_stop()
+            finally:
+                self._delivering = False
         begin_s = self._clock.now_s()
         while self._answer()[0] is State.MOVING:
             if self._clock.now_s() - begin_s > STANDING_LIMIT_S:

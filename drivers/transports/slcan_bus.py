@@ -1,9 +1,11 @@
 """python-can's serial-line adapter, but reading all that waits at once.
 
 `can.interfaces.slcan` asks the operating system for every single byte: 22 calls a frame, so that six encoders at 500 Hz
-fill a core and answers are seen a millisecond late. Parsing, sending and opening stay python-can's.
+fill a core and answers are seen a millisecond late. And pyserial's reading and writing ask it twice more for each piece
+than is needed. Parsing and opening stay python-can's, and what a port does not take at once is left to pyserial.
 """
 
+import os
 import re
 import select
 import time
@@ -18,6 +20,7 @@ from can.interfaces.slcan import slcanBus
 _ACKNOWLEDGED = ("\r", "z\r", "Z\r")  # LAWICEL CANUSB manual, version 1.0D: command done, frame taken
 _LINE = re.compile(r"[^\r\a]*[\r\a]")
 _CLASSIC = re.compile(r"t([0-9A-Fa-f]{3})([0-8])([0-9A-Fa-f]*)\r")
+READ_BYTES = 4096  # what a port holds back
 LONGEST_LINE = 256  # a frame of CAN FD takes 139; a line without an end is junk, and may not fill the memory
 
 
@@ -43,7 +46,8 @@ class BlockSlcanBus(slcanBus):
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
         """As python-can's; a plain frame that waits is handed out without its detours."""
-        self._fill(timeout)
+        if not self._lines:
+            self._fill(timeout)
         if not self._lines:
             return None
         message = None if self._filters else _classic(self._lines[0])
@@ -74,13 +78,37 @@ class BlockSlcanBus(slcanBus):
     def _waiting(self, timeout_s: float | None) -> bytes:
         """All bytes that are there, waiting for the first; b"" when none came in time."""
         port = self.serialPortOrig
-        try:
-            descriptor: int = port.fileno()
-        except (OSError, AttributeError):  # io.UnsupportedOperation is an OSError
+        descriptor = self._descriptor()
+        if descriptor is None:
             return bytes(port.read(port.in_waiting or 1))
         if not select.select([descriptor], [], [], timeout_s)[0]:
             return b""
-        return bytes(port.read(port.in_waiting or 1))
+        try:
+            data = os.read(descriptor, READ_BYTES)
+        except BlockingIOError:  # somebody else has read it
+            return b""
+        if not data:
+            raise OSError("the port is ready and gives nothing: unplugged")
+        return data
+
+    def _write(self, string: str) -> None:
+        """Without waiting until the last bit has left, which says nothing of whether the adapter could send it."""
+        line = string.encode() + self.LINE_TERMINATOR
+        with error_check("Could not write to serial device"):
+            descriptor = self._descriptor()
+            taken = 0
+            if descriptor is not None:
+                with suppress(BlockingIOError):
+                    taken = os.write(descriptor, line)
+            if taken < len(line):
+                self.serialPortOrig.write(line[taken:])
+
+    def _descriptor(self) -> int | None:
+        """None where a port has none, or is closed."""
+        try:
+            return int(self.serialPortOrig.fileno())
+        except (OSError, AttributeError):  # io.UnsupportedOperation is an OSError
+            return None
 
     def _split(self, data: bytes) -> None:
         """Whole lines, with their ends, to `_lines`; acknowledgements say nothing that anybody waits for."""

@@ -2,7 +2,8 @@
 
 A run of data packages of one recipe is decoded in one go with a structured numpy type, because at several thousand
 packages a second a Python loop over them would cost more than everything else. Never allocates by a length that the
-wire names: at most one frame of 65535 bytes is held back.
+wire names: at most one frame of 65535 bytes is held back. RTDE has nothing to find the next frame by after a wrong
+length, and TCP damages none on the way: a length that its kind of frame cannot have ends the stream at once.
 Source: Universal Robots, "Real-Time Data Exchange (RTDE) Guide", protocol versions 1 and 2.
 """
 
@@ -46,7 +47,16 @@ class Kind(IntEnum):
     PAUSE = 80  # P
 
 
-KINDS = frozenset(Kind)
+LONGEST = {  # bytes of a whole frame
+    Kind.PROTOCOL_VERSION: 4,
+    Kind.CONTROLLER_VERSION: 19,
+    Kind.TEXT: 516,  # two texts of at most 255 bytes, their lengths, and a level
+    Kind.DATA: 65535,
+    Kind.OUTPUTS: 65535,
+    Kind.INPUTS: 65535,
+    Kind.START: 4,
+    Kind.PAUSE: 4,
+}
 
 
 @dataclass(frozen=True)
@@ -156,7 +166,7 @@ class RtdeCodec:
                 at += run.nbytes
                 continue
             size, kind = HEADER.unpack_from(buffer, at)
-            if size < HEADER.size or kind not in KINDS:
+            if self._impossible(size, kind, buffer, at):
                 self._junk = True
                 messages.append(Junk(self._offset + at, buffer[at : at + HEAD_SHOWN]))
                 return messages
@@ -167,6 +177,13 @@ class RtdeCodec:
         self._pending = buffer[at:]
         self._offset += at
         return messages
+
+    def _impossible(self, size: int, kind: int, buffer: bytes, at: int) -> bool:
+        """No frame of that kind has that size: so good ones behind a damaged length are not taken for its payload."""
+        if kind not in LONGEST or not HEADER.size <= size <= LONGEST[Kind(kind)]:
+            return True
+        ours = self._head[2:4] != b"" and buffer[at + 2 : at + 4] == self._head[2:4]
+        return ours and size != HEADER.unpack_from(self._head)[0]
 
     def _run_of_data(self, buffer: bytes, at: int) -> NDArray[Any] | None:
         """As many whole packages of the expected recipe as stand at `at`; None when there is none."""

@@ -95,6 +95,20 @@ def test_a_path_whose_speed_jumps_is_told() -> None:
     assert (found > SMOOTH).tolist() == [False, False, True]
 
 
+def test_a_path_without_its_transition_fails_the_same_judge(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The arm is thrown from one leg onto the next at the corner: what random programs are judged by must see it."""
+    corner = place_at((0.8, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), moving=False)
+    away = place_at((0.8, 0.8, 0.0), (0.2, 0.0, 0.0), (0.0, 0.0, 0.0), moving=False)
+    segments = [Segment("a", By.LINE, corner), Segment("b", By.LINE, away)]
+    made = run(segments)
+    moments = [made.corners_s[1] - made.tacc_s, made.corners_s[1] + made.tacc_s]
+    assert (jumps(forwards(Path(SOLVER, HOME_RAD, segments, PACE)), moments).max(axis=0) < SMOOTH).all()
+    monkeypatch.setattr(Path, "blending", lambda self, t_s: False)
+    found = jumps(forwards(Path(SOLVER, HOME_RAD, segments, PACE)), moments)
+    assert found[:, 0].max() > 100.0 * SMOOTH[0]
+    assert found[:, 1].max() > 100.0 * SMOOTH[1]
+
+
 def test_the_transition_of_straight_segments_is_the_quartic_of_the_source() -> None:
     A, B, C, tacc, T = np.array([0.3, -0.1]), np.array([0.5, 0.2]), np.array([0.1, 0.9]), 0.2, 1.3
     dC, dB, zero = C - B, A - B, np.zeros(2)

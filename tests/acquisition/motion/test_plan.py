@@ -51,6 +51,18 @@ def test_a_box_in_the_way_is_named() -> None:
         plan(SOLVER, HOME_RAD, [to(0.3, 0.0, 0.0)], PACE, Cell(keep_out=(box,)))
 
 
+def test_out_of_a_box_is_planned_and_back_into_it_is_refused() -> None:
+    x, y, z = HOME[:3, 3]
+    outwards = HOME[:3, :3] @ np.array([0.0, 0.0, 1.0])
+    middle = np.array([x, y, z]) + 0.05 * outwards
+    cell = Cell(keep_out=(Box("fixture", tuple(middle - 0.03), tuple(middle + 0.03)),))
+    away = plan(SOLVER, HOME_RAD, [to(0.0, 0.0, -0.15)], PACE, cell)
+    assert np.linalg.norm(SOLVER.flange(away.q_rad[-1])[:3, 3] - middle) > 0.15
+    back = [to(0.0, 0.0, -0.15), to(0.0, 0.0, 0.0)]
+    with pytest.raises(RefusedMotionError, match=r"segment 2 'there' \(line\) at .* keep-out box 'fixture'"):
+        plan(SOLVER, HOME_RAD, back, PACE, cell)
+
+
 def test_a_straight_line_through_a_singular_wrist_is_refused_with_its_joint() -> None:
     singular_rad = HOME_RAD * np.array([1.0, 1.0, 1.0, 1.0, 0.0, 1.0])
     beyond_rad = HOME_RAD * np.array([1.0, 1.0, 1.0, 1.0, -1.0, 1.0])

@@ -76,6 +76,24 @@ def test_a_belt_that_stops_dead_is_overshot_by_two_periods_of_its_way() -> None:
     assert abs(over_m[-1]) < 1e-6
 
 
+@pytest.mark.parametrize(("lag_s", "known"), [(0.03, True), (0.03, False)])
+def test_a_lag_of_the_arm_that_is_known_does_not_leave_it_behind_a_belt(lag_s: float, known: bool) -> None:
+    T = SOLVER.flange(POSTURE_RAD)
+    base = transform(T[:3, 3])
+    place = Place("part", inverse(base) @ T, np.eye(4), lambda s_m: transform((0.0, s_m, 0.0)) @ base, "CONV")
+    now = {"t_s": 0.0}
+    path = Path(SOLVER, POSTURE_RAD, [Segment("on belt", By.LINE, place)], PACE)
+    belt = lambda: Belt(V_M_S * now["t_s"], V_M_S)  # noqa: E731
+    points = LookAhead(path, SOLVE_HZ, belt, POSTURE_RAD, lag_s if known else 0.0)
+    sent = []
+    for n in range(int(2.5 * 500)):
+        now["t_s"] = n / 500.0
+        sent.append(points.at(now["t_s"]))
+    arm_rad = sent[-1 - round(lag_s * 500)]  # the arm stands where it was told to be lag_s ago
+    behind_m = V_M_S * now["t_s"] - (SOLVER.flange(arm_rad)[1, 3] - T[1, 3])
+    assert behind_m == pytest.approx(0.0 if known else V_M_S * lag_s, abs=1e-5)
+
+
 def test_solutions_come_ten_times_as_fast_as_the_structure_shakes() -> None:
     assert solve_rate_hz(10.0, 500.0) == 100.0
     assert solve_rate_hz(80.0, 500.0) == 500.0

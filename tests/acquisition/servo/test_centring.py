@@ -80,6 +80,19 @@ def test_a_step_that_loses_the_light_is_halved_until_it_is_back() -> None:
     assert np.isfinite(strategy.learned).all()  # a dark reading teaches nothing
 
 
+def test_after_a_loss_the_next_step_keeps_the_light() -> None:
+    """A strategy that knows nothing: every step of its own length leads across the whole face."""
+
+    class Wild(Stubborn):
+        def propose(self, target_m: np.ndarray) -> Proposal:
+            return Proposal(0.16 * np.roll(ONE, len(self.learned) % 2), "correct")
+
+    start = 0.05 * ONE
+    run = centre(Plane(start), Wide(), Wild(ONE), start, np.full(4, 1.0), Limits(max_steps=3))
+    assert [bool(np.isfinite(step.spots_m).all()) for step in run.trace] == [True, False, True, True]
+    assert run.losses == 1
+
+
 def test_a_light_that_does_not_come_back_is_said_and_the_last_look_is_dark() -> None:
     class Blown(Plane):
         def look(self, dwell_s: float) -> Look:
@@ -152,6 +165,7 @@ def test_law_8_with_a_guess_wrong_by_25_deg_converges_with_ripple(rig, plain_rig
 def test_centring_from_anywhere_keeps_its_promise(rig, plain_rig) -> None:
     """The benchmark in small: 16 random starts, fixture pose wrong by up to 80 deg and 50 mm, both orders."""
     runs = benchmark(rig, plain_rig, cases=16, seed=77, strategies=("registered (sessions use it)",))
+    assert max(run.losses for run in runs["registered (sessions use it)"]) <= 1
     steps = [run.steps for run in runs["registered (sessions use it)"] if run.status is Status.CENTRED]
     assert len(steps) >= 15
     assert np.median(steps) <= 6

@@ -118,3 +118,12 @@ def test_a_still_encoder_may_flicker_by_one_count_at_any_rate():
     angle = ContinuousAngle(MULTI_TURN, speed_limit_rad_s=0.0)
     angle.follow(5, 1.0)
     assert angle.follow(6, 1.0) == pytest.approx(6 * UNIT_RAD)
+
+
+def test_readings_that_a_busy_host_takes_in_one_go_are_motion() -> None:
+    """Sent every 10 ms by a shaft at 1 rad/s, heard 50 us apart after a pause."""
+    angle = ContinuousAngle(Scale(1 << 20, 1 << 32, True))
+    unit_rad = angle.follow(1, 0.0)
+    heard = [angle.follow(round(0.01 * number / unit_rad), 0.05 + 5e-5 * number) for number in range(1, 6)]
+    assert heard == pytest.approx([0.01 * number for number in range(1, 6)], abs=unit_rad)
+    assert angle.slips == ()

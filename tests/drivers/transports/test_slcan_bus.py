@@ -1,5 +1,6 @@
 """The serial-line adapter that reads all that waits: the frames of python-can's own, however the bytes are split."""
 
+import itertools
 import os
 import tty
 from collections.abc import Iterator
@@ -116,3 +117,22 @@ def test_frames_are_sent_as_lines(adapter: Adapter) -> None:
     adapter.hears()  # how the adapter was opened
     adapter.bus.send(can.Message(arbitration_id=0x601, data=b"\x40\x00", is_extended_id=False))
     assert adapter.hears() == b"t60124000\r"
+
+
+def send_while_it_takes(bus: can.BusABC, message: can.Message, sent: Iterator[int]) -> None:
+    """Counts the whole frames."""
+    while True:
+        bus.send(message, 0.05)
+        assert next(sent) < 10_000
+
+
+def test_an_adapter_that_takes_nothing_more_is_told_in_time_and_no_frame_is_torn(adapter: Adapter) -> None:
+    adapter.hears()  # how the adapter was opened
+    message, sent = can.Message(arbitration_id=0x281, data=bytes(8), is_extended_id=False), itertools.count()
+    with pytest.raises(can.CanOperationError, match="Could not write"):
+        send_while_it_takes(adapter.bus, message, sent)
+    taken = b""
+    whole = next(sent)
+    while taken.count(b"\r") < whole:
+        taken += adapter.hears()
+    assert taken.startswith(whole * b"t28180000000000000000\r")

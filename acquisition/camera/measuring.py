@@ -1,0 +1,142 @@
+"""How a camera is measured: a tour round the board for lens and mount, then a few poses with light for the beam."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.aiming.pose import BeamTarget, flange_for
+from acquisition.aiming.reach import reach
+from acquisition.bench import Bench
+from acquisition.camera.beam import Line, line_before, onto_beam
+from acquisition.camera.board import Board
+from acquisition.camera.calibration import Calibration, Status, View, calibrate_camera
+from acquisition.camera.eye import Eye
+from acquisition.camera.model import CameraFit, CameraModel, drawn
+from acquisition.camera.sight import Sight
+from acquisition.camera.tour import stops
+from acquisition.errors import SpotLostError, UnreachableError
+from acquisition.journal import Journal
+from acquisition.learner import Learner
+from acquisition.motion.rigid import transform
+from acquisition.navigator import Navigator
+from acquisition.recording.rig_schema import Camera
+
+Floats = NDArray[np.float64]
+
+CENTRES = (0.0, 0.0, 0.0, 0.0)
+STAND_OFF_M = 0.2  # of the laser from the first face
+ROLLS_RAD = (0.0, 0.4, -0.4)  # of the poses with light, each in both orders
+GLANCE_S = 0.01
+STEADY_S = 0.05  # of the spots that the beam is told by
+
+
+@dataclass(frozen=True)
+class Measured:
+    """`calibration.model` is of lens and mount alone; `model` is what to aim by, None unless the beam was found too."""
+
+    stops: int
+    views: int
+    calibration: Calibration
+    model: CameraModel | None = None
+    fit: CameraFit | None = None
+
+    @property
+    def says(self) -> str:
+        """One sentence for a person."""
+        fit = self.fit
+        if self.calibration.status is not Status.CALIBRATED:
+            return self.calibration.status.value
+        if fit is None or fit.beam_m is None or fit.beam_rad is None:
+            return "lens and mount were found, but no pose had light on both faces and the board in the picture"
+        return (
+            f"{self.views} views: corners fit to {fit.reprojection_px:.2f} px, the board stays to "
+            f"{1e3 * fit.board_m:.1f} mm and {1e3 * fit.board_rad:.0f} mrad (left by the arm's zeros); the beam before "
+            f"the camera, {fit.lit} poses with light, to {1e3 * fit.beam_m:.2f} mm and {1e3 * fit.beam_rad:.1f} mrad"
+        )
+
+
+class CameraMeasuring:
+    """One measurement; the only owner of where the arm stands meanwhile."""
+
+    def __init__(self, bench: Bench, learner: Learner, eye: Eye, camera: Camera, journal: Journal) -> None:
+        self._bench, self._learner, self._eye, self._journal = bench, learner, eye, journal
+        self._board, self._drawn = Board(camera.board), drawn(camera)
+        self._on_fixture = transform(camera.board.in_psd1.origin_m, camera.board.in_psd1.rotation_rad)
+        self._rng = np.random.default_rng(1)
+
+    def run(self, placement: int) -> Measured:
+        """Before the fixture at this place. UnreachableError where the board is not seen; NoLightError, DeviceError."""
+        q_rad, fixture = self._stand_before(self._learner.T_base_fixture(placement))
+        count, views = self._tour(q_rad, fixture)
+        calibration = calibrate_camera(views, self._drawn)
+        if calibration.model is None:
+            return Measured(count, len(views), calibration)
+        lines = self._lines(self._sight(calibration.model), placement)
+        if not lines or calibration.fit is None:
+            return Measured(count, len(views), calibration)
+        model, beam_rad, beam_m = onto_beam(calibration.model, lines, self._learner.arm)
+        fit = replace(calibration.fit, lit=len(lines), beam_m=beam_m, beam_rad=beam_rad)
+        return Measured(count, len(views), calibration, model, fit)
+
+    def _sight(self, model: CameraModel) -> Sight:
+        return Sight(self._eye, model, self._board, self._on_fixture)
+
+    def _stand_before(self, T_base_fixture: Floats) -> tuple[Floats, Floats]:
+        """Readings (joint,) where the board is seen, the present ones if possible, and the fixture as seen there."""
+        arm, sight, q_rad = self._learner.arm, self._sight(self._drawn), self._readings()
+        seen = sight.fixture(arm, q_rad, T_base_fixture)
+        if seen is None:
+            before = BeamTarget(1, CENTRES, STAND_OFF_M, 0.0)
+            self._bench.move(
+                reach(arm, flange_for(arm, self._learner.optics, T_base_fixture, before), q_rad, self._rng)
+            )
+            q_rad = self._readings()
+            seen = sight.fixture(arm, q_rad, T_base_fixture)
+        if seen is None:
+            raise UnreachableError(
+                "the camera does not see the board from here; check [camera] in_flange and light, or bring the arm in "
+                "front of the fixture (calibeam move, jog)"
+            )
+        return q_rad, seen
+
+    def _tour(self, q_rad: Floats, fixture: Floats) -> tuple[int, list[View]]:
+        """Stops that were made, and the views in which the board was seen."""
+        arm, count = self._learner.arm, 0
+        views: list[View] = []
+        for stop_rad in stops(arm, self._drawn, fixture @ self._on_fixture, self._board.radius_m, q_rad, self._rng):
+            try:
+                self._bench.move(stop_rad)
+            except UnreachableError:  # a keep-out box, or a joint's range
+                continue
+            count += 1
+            seen = self._board.find(self._eye.picture())
+            if seen is not None:
+                views.append(View(seen, arm.frames(self._readings())[-1]))
+        return count, views
+
+    def _lines(self, sight: Sight, placement: int) -> list[Line]:
+        """The beam before the camera at poses with light, both orders."""
+        navigator = Navigator(self._bench, self._learner, self._journal, self._readings(), 1, sight)
+        lines: list[Line] = []
+        for first in (1, 2):
+            navigator.find(placement, first, 0.0)
+            for roll_rad in ROLLS_RAD:
+                try:
+                    navigator.visit(BeamTarget(first, CENTRES, STAND_OFF_M, roll_rad), None)
+                except (SpotLostError, UnreachableError):
+                    continue
+                lines += self._line(sight, placement, first)
+        return lines
+
+    def _line(self, sight: Sight, placement: int, first: int) -> list[Line]:
+        """One, or none where the board is not in the picture or the light has gone."""
+        look = self._bench.look(STEADY_S)
+        arm = self._learner.arm
+        T = sight.before_camera(arm, look.q_rad, self._learner.T_base_fixture(placement))
+        if T is None or not all(look.lit(first)):
+            return []
+        return [line_before(T, *self._learner.optics.line(look.spots_m(), first))]
+
+    def _readings(self) -> Floats:
+        return self._bench.look(GLANCE_S).q_rad

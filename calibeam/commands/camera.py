@@ -1,0 +1,66 @@
+"""`calibeam camera`: lens, mount and beam of the camera on the flange, from a short tour round the board."""
+
+from pathlib import Path
+
+from rich.console import Console
+from rich.prompt import Confirm
+
+from acquisition.recording.errors import RigFileError
+from acquisition.recording.rig import load_rig, rig_text
+from calibeam.outcome import CheckFailed
+from calibeam.recorded import new_recording
+from calibeam.site import addresses_of, check_session, connected
+from drivers.clock import SystemClock
+
+
+def camera_command(
+    rig: Path, *, out: Path = Path("camera"), placement: int | None = None, time_scale: float = 1.0, yes: bool = False
+) -> None:
+    """Measure the camera: the arm goes round the board, then into the light in both orders. Clear the cell first.
+
+    Example: calibeam camera rigs/ur5e-dual-psd-camera.toml --out out/camera
+
+    The tour begins where the arm stands, if the camera sees the board from there, else in front of where the rig file
+    has the fixture. Name the file camera.json in [camera] calibration: sessions then aim by it.
+
+    Parameters
+    ----------
+    rig
+        The rig file; [camera] says how it is reached and how it is mounted, roughly.
+    out
+        Folder for camera.json and recording.mcap; nothing in it is overwritten.
+    placement
+        Where the fixture stands now; the first one of the rig file if not said.
+    time_scale
+        Of the emulators, if it is not 1.
+    yes
+        Do not ask before moving.
+
+    """
+    loaded, text, clock, console = load_rig(rig), rig_text(rig), SystemClock(), Console()
+    check_session(loaded)
+    if loaded.camera is None:
+        raise RigFileError(f"rig {loaded.name}: no [camera]; say how it is reached, and what board is on the fixture")
+    if not (yes or Confirm.ask("the arm will move round the fixture; is the cell clear", default=False)):
+        console.print("nothing was moved")
+        return
+    from acquisition.camera.measuring import CameraMeasuring
+    from acquisition.camera.model import write_model
+    from calibeam.camera import opened
+    from calibeam.journal import RecordingJournal
+    from calibeam.learner import FittedLearner
+    from calibeam.software import SOFTWARE
+
+    out.mkdir(parents=True, exist_ok=True)
+    with (
+        opened(loaded.camera, clock) as eye,
+        new_recording(out / "recording.mcap", text, clock, {"purpose": "camera"}) as writer,
+        connected(loaded, addresses_of(loaded, hurry=time_scale), writer, clock, lambda _: None) as bench,
+    ):
+        journal = RecordingJournal(writer, clock)
+        measuring = CameraMeasuring(bench, FittedLearner(loaded), eye, loaded.camera, journal)
+        measured = measuring.run(next(iter(loaded.placements)) if placement is None else placement)
+    if measured.model is None or measured.fit is None:
+        raise CheckFailed(f"{measured.views} of {measured.stops} views: {measured.says}; nothing was written")
+    write_model(out / "camera.json", measured.model, measured.fit, loaded.name, SOFTWARE)
+    console.print(f"{measured.says}; written to {out / 'camera.json'}", soft_wrap=True)

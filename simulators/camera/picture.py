@@ -1,0 +1,81 @@
+"""A picture of the board as the emulated camera takes it: ray by ray, then lens blur, uneven light and sensor noise.
+
+What it does not imitate: the fixture's body and the arm in front of the board, motion within the exposure, rolling
+shutter, defocus that depends on the distance, glare.
+"""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from simulators.camera.lens import slopes
+from simulators.camera.printed import printed
+from simulators.camera.true_camera import BoardDrawing, TrueCamera
+
+Floats = NDArray[np.float64]
+Grey = NDArray[np.uint8]
+Singles = NDArray[np.float32]
+
+BLACK_GREY, WHITE_GREY = 28.0, 205.0  # of ink and paper in a well exposed picture
+ROOM_GREY, CLUTTER_GREY = 90.0, 25.0  # what is behind the plate
+FALL_OFF = 0.25  # of the light from the middle to the corners
+NOISE_MARGIN_PX = 64
+
+
+class Renderer:
+    """Pictures of one camera and one board; `take` may run in a thread of its own."""
+
+    def __init__(self, camera: TrueCamera, board: BoardDrawing, seed: int) -> None:
+        self._camera = camera
+        self._right, self._down = slopes(camera)
+        plate, self._px_per_m = printed(board)
+        self._plates = [plate]
+        while min(self._plates[-1].shape) > 64:
+            half = (self._plates[-1].shape[1] // 2, self._plates[-1].shape[0] // 2)
+            self._plates.append(np.asarray(cv2.resize(self._plates[-1], half, interpolation=cv2.INTER_AREA), np.uint8))
+        rng = np.random.default_rng(np.random.SeedSequence([seed, 4]))
+        shape = (camera.height_px, camera.width_px)
+        rough = rng.normal(ROOM_GREY, CLUTTER_GREY, (shape[0] // 40 + 2, shape[1] // 40 + 2)).astype(np.float32)
+        self._room = np.asarray(cv2.resize(rough, shape[::-1], interpolation=cv2.INTER_CUBIC), dtype=np.float32)
+        self._light = (1.0 - FALL_OFF * (self._right**2 + self._down**2)).astype(np.float32)
+        extent = (shape[0] + NOISE_MARGIN_PX, shape[1] + NOISE_MARGIN_PX)
+        self._noise = rng.normal(0.0, camera.noise_grey, extent).astype(np.float32)
+        self._rng = rng
+
+    def take(self, T_camera_board: Floats | None) -> Grey:
+        """(height, width); None: no board anywhere. Board axes: x right, y up, z towards who reads it."""
+        picture: Singles = self._room.copy()
+        if T_camera_board is not None and _faces(T_camera_board):
+            self._draw(picture, T_camera_board)
+        picture *= self._light
+        if self._camera.blur_px > 0.0:
+            picture = np.asarray(cv2.GaussianBlur(picture, (0, 0), self._camera.blur_px), dtype=np.float32)
+        dy, dx = self._rng.integers(NOISE_MARGIN_PX, size=2)
+        picture = picture + self._noise[dy : dy + picture.shape[0], dx : dx + picture.shape[1]]
+        return np.clip(np.rint(picture), 0.0, 255.0).astype(np.uint8)
+
+    def _draw(self, picture: Singles, T: Floats) -> None:
+        """A ray r meets the board at u, v where u bx + v by + o is along r: three linear forms of r give both."""
+        forms = np.linalg.inv(np.column_stack([T[:3, 0], T[:3, 1], T[:3, 3]])).astype(np.float32)
+        a, b, c = (form[0] * self._right + form[1] * self._down + form[2] for form in forms)
+        ahead = c > 1e-6
+        depth = np.where(ahead, c, np.float32(1.0))
+        level = self._level(float(np.linalg.norm(T[:3, 3])))
+        plate = self._plates[level]
+        scale = self._px_per_m / 2.0**level
+        across = (a / depth * scale + 0.5 * (plate.shape[1] - 1)).astype(np.float32)
+        down = (-b / depth * scale + 0.5 * (plate.shape[0] - 1)).astype(np.float32)
+        seen = ahead & (across > 0) & (across < plate.shape[1] - 1) & (down > 0) & (down < plate.shape[0] - 1)
+        grey = cv2.remap(plate, across, down, cv2.INTER_LINEAR)
+        picture[seen] = BLACK_GREY + (WHITE_GREY - BLACK_GREY) / 255.0 * grey[seen].astype(np.float32)
+
+    def _level(self, distance_m: float) -> int:
+        """The plate whose pixels are about as large as the camera's, so that nothing shimmers."""
+        shrink = self._px_per_m * distance_m / self._camera.focal_px
+        return int(np.clip(np.floor(np.log2(max(shrink, 1.0))), 0, len(self._plates) - 1))
+
+
+def _faces(T_camera_board: Floats) -> bool:
+    """Whether the camera is in front of the board, and the board in front of the camera."""
+    origin_m, outwards = T_camera_board[:3, 3], T_camera_board[:3, 2]
+    return bool(origin_m[2] > 0.0 and origin_m @ outwards < 0.0)

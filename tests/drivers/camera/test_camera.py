@@ -1,0 +1,100 @@
+"""The camera driver on a real wire: pictures are of now, whatever the source; and how it ends when it cannot."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from acquisition.camera.board import Board
+from acquisition.recording.rig import load_rig
+from calibeam.emulation import Emulation
+from drivers.camera.device import Camera
+from drivers.clock import SystemClock
+from drivers.errors import DeviceError, DeviceLost, DeviceRefused
+
+RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd-camera.toml"
+SIZE = (960, 720)
+# Readings from which the emulated camera sees the board of seed 1: in front of the first place.
+SOURCES = ("image.jpg", "stream.mjpg")
+
+
+@pytest.fixture(scope="module")
+def emulation(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Emulation]:
+    """The arm powers on in front of the board: the rig's home is put there."""
+    rig = load_rig(RIG)
+    text = RIG.read_text().replace("home_rad = [0.3, -1.4, 1.6, -0.5, 0.5, 0.0]", f"home_rad = {before_the_board(rig)}")
+    path = tmp_path_factory.mktemp("rig") / "rig.toml"
+    path.write_text(text)
+    with Emulation(path, time_scale=4.0) as running:
+        yield running
+
+
+def before_the_board(rig) -> list[float]:
+    from acquisition.aiming.pose import BeamTarget, flange_for
+    from acquisition.aiming.reach import reach
+    from calibeam.learner import FittedLearner
+
+    learner = FittedLearner(rig)
+    goal = flange_for(
+        learner.arm, learner.optics, learner.T_base_fixture(1), BeamTarget(1, (0.0, 0.0, 0.0, 0.0), 0.2, 0.0)
+    )
+    return reach(learner.arm, goal, np.array(rig.motion.home_rad), np.random.default_rng(1)).tolist()
+
+
+def source(emulation: Emulation, kind: str) -> str:
+    return emulation.address["camera"]["source"].rsplit("/", 1)[0] + "/" + kind
+
+
+@pytest.mark.parametrize("kind", SOURCES)
+def test_an_unmodified_opencv_opens_it(emulation: Emulation, kind: str) -> None:
+    capture = cv2.VideoCapture(source(emulation, kind))
+    assert capture.isOpened()
+    good, frame = capture.read()
+    capture.release()
+    assert good
+    assert frame.shape == (720, 960, 3)
+
+
+@pytest.mark.parametrize("kind", SOURCES)
+def test_a_picture_is_of_now(emulation: Emulation, kind: str) -> None:
+    """The fixture is put away and back; every picture asked for afterwards shows it so."""
+    camera, board = Camera(source(emulation, kind), SIZE, SystemClock()), Board(load_rig(RIG).camera.board)
+    camera.connect()
+    try:
+        for placement in (1, 0, 1, 0, 1):
+            emulation.place_fixture(placement)
+            assert (board.find(camera.picture()) is not None) == (placement == 1)
+    finally:
+        camera.close()
+        camera.close()
+
+
+def test_pictures_of_another_size_are_refused(emulation: Emulation) -> None:
+    camera = Camera(source(emulation, "image.jpg"), (640, 480), SystemClock())
+    with pytest.raises(DeviceRefused, match="pictures of 960 x 720"):
+        camera.connect()
+
+
+@pytest.mark.parametrize("kind", ["image.jpg", "nothing.mjpg"])
+def test_a_camera_that_is_not_there_is_lost(kind: str) -> None:
+    with pytest.raises(DeviceLost, match="cannot be opened"):
+        Camera(f"http://127.0.0.1:9/{kind}", SIZE, SystemClock()).connect()
+
+
+def test_a_picture_in_a_file_is_a_camera_too(tmp_path: Path) -> None:
+    path = tmp_path / "still.png"
+    cv2.imwrite(str(path), np.full((720, 960), 77, np.uint8))
+    camera = Camera(str(path), SIZE, SystemClock())
+    camera.connect()
+    assert camera.picture().mean() == 77.0
+
+
+def test_a_camera_that_goes_is_said_to_be_lost(tmp_path: Path) -> None:
+    with Emulation(RIG) as short:
+        camera = Camera(source(short, "stream.mjpg"), SIZE, SystemClock())
+        camera.connect()
+    with pytest.raises(DeviceError, match="camera http"):
+        camera.picture()
+    camera.close()
