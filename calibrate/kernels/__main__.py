@@ -4,6 +4,7 @@ import sys
 
 import numpy as np
 
+from calibrate.kernels import perturbed
 from calibrate.kernels.ready import available, state_ready
 
 
@@ -25,6 +26,17 @@ def compile_all() -> None:
     motions = np.empty((0, 2, 0, 6)), np.empty((0, 0), dtype=np.intp), False
     spots, whitener, out = np.zeros((1, 4)), np.eye(4)[None].copy(), np.zeros((2, 4, 1))
     dual_psd_loops.rows(*arm, *beam, faces, *motions, group, whitener, spots, out)
+    _compile_error_simulation()
+
+
+def _compile_error_simulation() -> None:
+    """Through the typed face, so that the kinds of all arguments are those of every later call."""
+    tables = np.zeros((1, 3, perturbed.CELLS + 1))
+    one = np.zeros(1, dtype=np.int64)
+    drawn = perturbed.DrawnColumns(one + 1, np.zeros(1), np.ones(1), tables, one, np.zeros((0, 2), dtype=np.int64))
+    arm = perturbed.ArmAtPoses(np.tile(np.eye(4), (2, 1, 1)), np.zeros((1, 1)), np.zeros(3), one, one, np.ones((1, 1)))
+    perturbed.count_arms(arm, drawn, arm.nominal_m(), np.ones(1), 0, 1, 1)
+    perturbed.draw_block(drawn, 0, 1)
 
 
 def main() -> int:

@@ -1,0 +1,121 @@
+"""`calibeam design`: which poses to take and where, what they promise, and which causes they could tell apart."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import msgspec
+import numpy as np
+from cyclopts import Parameter, validators
+from rich.console import Console
+
+from acquisition.recording.pose_plan import write_pose_plan
+from acquisition.recording.rig import load_rig
+from acquisition.recording.rig_schema import Rig
+from calibeam.recorded import progress_bar
+from calibeam.software import SOFTWARE
+
+if TYPE_CHECKING:  # loaded when it is needed: it takes a second
+    from calibrate.pose_design.places import Places
+
+Count = Annotated[int, Parameter(validator=validators.Number(gte=1))]
+Progress = Callable[[str, int, int], None]
+
+PER_BLOCK, PER_GRID_PLACE = 120, 16  # candidates: of a place and order of the rig, and of a place of the grid
+DISTANCE_SIGMA_M = 20e-6  # of a distance between places, where the rig states none: docs/formats.md
+
+
+def design_command(
+    rig: Path,
+    *,
+    poses: Count = 60,
+    repeats: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 6,
+    criterion: str = "free-space",
+    places: int = 0,
+    candidates: Count = PER_BLOCK,
+    seed: int = 1,
+    out: Path = Path("plan.toml"),
+    report: Path | None = None,
+    json_: Annotated[bool, Parameter(name="--json")] = False,
+) -> None:
+    """Choose the poses of a session before it: reachable, clear, lit; the best of them, in an order that time forgives.
+
+    Prints the predicted error in free space, how many poses are enough, and which causes a diagnosis could find.
+
+    Example: calibeam design rigs/ur5e-dual-psd.toml --out plan.toml; calibeam session RIG --plan plan.toml
+
+    Parameters
+    ----------
+    rig
+        The rig file; its beliefs and its noise are taken at their word.
+    poses
+        Readings of the plan, repeats among them.
+    repeats
+        Poses that are taken again, every joint from the other side.
+    criterion
+        free-space (predicted error of the target over the workspace), d (determinant), o1 ... o5.
+    places
+        Also say how many places of the fixture are worth it, up to so many, where they would be, and whether distances
+        between them are needed. Takes a minute; the plan stays with the places of the rig.
+    candidates
+        For each place and order of the faces.
+    seed
+        Of everything that is drawn.
+    out
+        Where to write the plan: `calibeam session RIG --plan` takes it.
+    report
+        Where to write a page with the curve and the isolability matrix.
+    json_
+        Print the figures as one line of JSON, and nothing else.
+
+    """
+    from calibeam.pose_design.lines import print_design
+    from calibeam.pose_design.reachable import candidates_of
+    from calibrate.pose_design.design import Asked, design
+    from calibrate.pose_design.information import information_of
+    from calibrate.pose_design.record import record_of
+    from calibrate.pose_design.seen import seen_by
+
+    loaded, rng, console = load_rig(rig), np.random.default_rng(seed), Console()
+    with progress_bar(Console(stderr=True)) as bar:
+        tasks = {}
+
+        def progress(what: str, done: int, total: int) -> None:
+            if what not in tasks:
+                tasks[what] = bar.add_task(what, total=total)
+            bar.update(tasks[what], completed=done)
+
+        offered = candidates_of(loaded, candidates, rng, lambda done, total: progress("candidates", done, total))
+        found = information_of(loaded, offered, rng)
+        made = design(loaded, offered, found, Asked(poses, repeats, criterion, seed), progress)
+        seen = seen_by(loaded, offered, made.taken, rng)
+        spread = _places(loaded, poses, places, rng, progress) if places else ()
+    write_pose_plan(out, made.plan)
+    if report is not None:
+        from calibrate.report.pose_design.page import write_page_of
+
+        write_page_of(report, loaded, made, seen, spread, SOFTWARE)
+    if json_:
+        print(msgspec.json.encode(record_of(loaded, made, seen, spread, SOFTWARE)).decode())
+        return
+    print_design(console, loaded, made, seen, spread)
+    for line in (f"plan: {out}", "" if report is None else f"report: {report}"):
+        if line:
+            console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+def _places(rig: Rig, poses: int, most: int, rng: np.random.Generator, progress: Progress) -> "tuple[Places, ...]":
+    """Of the rig's own places and of a grid about them."""
+    from calibeam.pose_design.grid import with_grid
+    from calibeam.pose_design.reachable import candidates_of
+    from calibrate.errors import DataError
+    from calibrate.pose_design.information import information_of
+    from calibrate.pose_design.places import choose_places
+
+    if rig.fixture is None or not rig.placements:
+        raise DataError(f"rig {rig.name}: --places asks where a fixture should stand, and the rig has none")
+    wide = with_grid(rig)
+    offered = candidates_of(wide, PER_GRID_PLACE, rng, lambda done, total: progress("places", done, total))
+    found = information_of(wide, offered, rng)
+    sigma_m = min((d.sigma_m for d in rig.known_distances), default=DISTANCE_SIGMA_M)
+    return choose_places(found, offered, wide.placement_list, poses, sigma_m, most)

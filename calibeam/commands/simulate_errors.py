@@ -1,0 +1,93 @@
+"""`calibeam simulate-errors`: what errors of an arm make of its probe: budget, ranking, worst postures."""
+
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+from cyclopts import Parameter, validators
+from rich.console import Console
+
+from acquisition.recording.rig import load_rig
+from acquisition.recording.rig_schema import Rig
+from calibeam.error_lines import print_simulation
+from calibeam.recorded import progress_bar
+from calibeam.software import SOFTWARE
+from calibrate.error_simulation.machine import Machine, identified_machine, machine_of
+from calibrate.error_simulation.plan import NOTHING_STATED, read_error_plan
+from calibrate.error_simulation.stated import sources_of
+from calibrate.model_file import read_model
+
+Count = Annotated[int, Parameter(validator=validators.Number(gte=1))]
+
+
+def simulate_errors_command(
+    rig: Path,
+    *,
+    errors: Path | None = None,
+    only: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = (),
+    arms: Count = 1_000_000,
+    poses: Count = 10,
+    workers: Count = 1,
+    seed: int = 1,
+    out: Path | None = None,
+    json_: Annotated[bool, Parameter(name="--json")] = False,
+) -> None:
+    """Perturb an arm, singly and jointly, and say what the probe makes of it: linear, drawn, Sobol, worst postures.
+
+    Example: calibeam simulate-errors rigs/arm-cmm-reference.toml --errors rigs/errors/arm-cmm.toml --out out/errors
+
+    Parameters
+    ----------
+    rig
+        A rig file, or an identified model (model.json): its arm is then as identified.
+    errors
+        Which errors, by which law and how large (errors.toml); beside what the rig file believes.
+    only
+        Some of the errors, by name or shell pattern: "link2.*" "joint*.zero".
+    arms
+        Drawn at every pose. Memory does not grow with them.
+    poses
+        At which arms are drawn, all over the workspace.
+    workers
+        Threads that draw; the answer is the same with any number.
+    seed
+        Of everything that is drawn.
+    out
+        Folder for errors.json, errors.html and the figures as SVG; over what may be there.
+    json_
+        Print what stands in errors.json, on one line, and nothing else.
+
+    """
+    from calibrate.error_simulation.record import record_of
+    from calibrate.error_simulation.simulate import Asked, simulate
+
+    machine, loaded, identified = _machine(rig)
+    plan = NOTHING_STATED if errors is None else read_error_plan(errors)
+    sources = sources_of(machine, loaded, plan, only, identified=identified)
+    console, bar = Console(), progress_bar(Console(stderr=True))
+    with bar:
+        tasks = {}
+
+        def progress(what: str, done: int, total: int) -> None:
+            if what not in tasks:
+                tasks[what] = bar.add_task(what, total=total)
+            bar.update(tasks[what], completed=done)
+
+        found = simulate(machine, sources, Asked(arms, poses, seed, workers), progress)
+    if json_:
+        print(msgspec.json.encode(record_of(found, SOFTWARE)).decode())
+    else:
+        print_simulation(console, found)
+    if out is not None:
+        from calibeam.error_files import write_simulation
+
+        files = write_simulation(out, found)
+        if not json_:
+            console.print(f"written: {', '.join(map(str, files))}", markup=False, highlight=False, soft_wrap=True)
+
+
+def _machine(path: Path) -> tuple[Machine, Rig, bool]:
+    if path.suffix == ".json":
+        return *identified_machine(read_model(path)), True
+    rig = load_rig(path)
+    return machine_of(rig), rig, False

@@ -1,0 +1,110 @@
+"""Candidate poses of a rig: within the joint limits, clear of table and keep-out boxes, and with light on both faces.
+
+Before two detectors: random spots, stand-offs and rolls, by every branch of the inverse kinematics. For a device that
+measures positions: joint angles drawn evenly. Collisions are those of calibeam's motion (acquisition/motion/cell.py)
+and the table of a session (acquisition/aiming/reach.py); between its own links a cell of boxes knows none.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from acquisition.aiming.pose import BeamTarget, flange_for
+from acquisition.aiming.reach import clear_of_table
+from acquisition.motion.cell import body_points
+from acquisition.motion.inverse.solve import all_solutions
+from acquisition.plan import PlanOptions
+from acquisition.recording.rig_schema import Rig
+from calibeam.motion.gate_of_rig import cell_of, solver_of
+from calibrate.believed import BelievedRig
+from calibrate.believed_fixture import Light
+from calibrate.errors import DataError
+from calibrate.pose_design.candidates import Candidates
+from calibrate.rigid import transform
+
+Floats = NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+TRIES = 40  # targets for each pose that is wanted: of a place out of reach none ever lands
+BRANCHES = 2  # of one target, drawn at random
+TURN_RAD = np.pi  # angles of robots that may turn further are drawn within this: a second turn shows nothing new
+LOWEST_M = 0.05  # of a target that a tracker is to see, above the base plane
+
+
+def candidates_of(
+    rig: Rig, per_block: int, rng: Generator, progress: Progress = lambda done, total: None
+) -> Candidates:
+    """About `per_block` poses for each place and order. DataError for a rig without [fixture] or [device]."""
+    if rig.fixture is not None and rig.placements:
+        return _before_detectors(rig, per_block, rng, progress)
+    if rig.device is not None and rig.tool.point_m is not None:
+        return _before_device(rig, 6 * per_block, rng)
+    raise DataError(
+        f"rig {rig.name}: no [fixture] with a [[placement]], and no [device] with tool.point_m; a design needs to know "
+        "what will be measured"
+    )
+
+
+def _before_detectors(rig: Rig, per_block: int, rng: Generator, progress: Progress) -> Candidates:
+    believed, blocks = BelievedRig(rig), [(place, first) for place in rig.placements for first in (1, 2)]
+    q, spots, place_of, first_of = list[Floats](), list[Floats](), list[int](), list[int]()
+    for done, (place, first) in enumerate(blocks):
+        for pose, seen in _landed(rig, believed, place, first, per_block, rng):
+            q.append(pose)
+            spots.append(seen)
+            place_of.append(place)
+            first_of.append(first)
+        progress(done + 1, len(blocks))
+    if not q:
+        raise DataError(f"rig {rig.name}: no pose lights both faces at any place; check placements and the laser")
+    return Candidates(np.array(q), np.array(spots), np.array(place_of), np.array(first_of))
+
+
+def _landed(
+    rig: Rig, believed: BelievedRig, place: int, first: int, wanted: int, rng: Generator
+) -> list[tuple[Floats, Floats]]:
+    options, solver, half_m = PlanOptions(), solver_of(rig), believed.fixture.half_size_m
+    home, T = np.array(rig.motion.home_rad or np.zeros(rig.n_joints)), believed.T_base_psd1(place)
+    edge_m, out = options.face_share * half_m, list[tuple[Floats, Floats]]()
+    for _ in range(TRIES * wanted):
+        if len(out) >= wanted:
+            break
+        x1, y1, x2, y2 = rng.uniform(-edge_m, edge_m, 4).tolist()
+        stand_off, roll = float(rng.uniform(*options.stand_off_m)), float(rng.uniform(-np.pi, np.pi))
+        flange = flange_for(believed.arm, believed.fixture, T, BeamTarget(first, (x1, y1, x2, y2), stand_off, roll))
+        found = all_solutions(solver.arm, flange, home, solver.starts, rng)
+        for q_rad in rng.permutation(found)[:BRANCHES]:
+            seen = believed.expect(q_rad, place, first)
+            if seen.light is Light.BOTH_LIT and clear_of_table(believed.arm, q_rad) and _clear(rig, q_rad[None])[0]:
+                out.append((q_rad, seen.spots_m))
+    return out[:wanted]
+
+
+def _before_device(rig: Rig, wanted: int, rng: Generator) -> Candidates:
+    solver = solver_of(rig)
+    lower, upper = np.maximum(solver.arm.lower_rad, -TURN_RAD), np.minimum(solver.arm.upper_rad, TURN_RAD)
+    q = rng.uniform(lower, upper, (TRIES * wanted, rig.n_joints))
+    frames = solver.arm.frames(q)
+    tips = frames[:, -1, :3, :3] @ np.array(rig.tool.point_m) + frames[:, -1, :3, 3]
+    above = (frames[:, 2:, 2, 3].min(axis=1) > LOWEST_M) & (tips[:, 2] > LOWEST_M)
+    good = np.flatnonzero(above & _clear(rig, q))[:wanted]
+    nothing = np.zeros(len(good), dtype=np.int64)
+    if len(good) == 0:
+        raise DataError(f"rig {rig.name}: no pose is clear of table and keep-out boxes; check [motion]")
+    device = transform(rig.device.origin_m, rig.device.rotation_rad) if rig.device is not None else np.eye(4)
+    seen = (tips[good] - device[:3, 3]) @ device[:3, :3]
+    return Candidates(q[good], seen, nothing, nothing)
+
+
+def _clear(rig: Rig, q_rad: Floats) -> NDArray[np.bool_]:
+    """(pose,) whether the body keeps its clearance of every keep-out box."""
+    cell = cell_of(rig)
+    points = (
+        body_points(solver_of(rig).arm.frames(q_rad), cell.tool_m) if cell.keep_out else np.zeros((len(q_rad), 1, 3))
+    )
+    out = np.ones(len(q_rad), dtype=np.bool_)
+    for box in cell.keep_out:
+        out &= np.min(box.distance_m(points), axis=1) >= cell.clearance_m
+    return out

@@ -1,0 +1,102 @@
+"""The arm whose errors are simulated: fixed parts with turns between them, and the probe behind the last one.
+
+Any serial arm is one (calibrate/arms/serial.py), so that a robot's D-H table and the local product of exponentials of
+an arm CMM are perturbed in the same way: six errors behind every fixed part, one at every joint angle. Source: Huang
+Kui et al., error simulation of a flexible arm coordinate measuring machine, eq. 1 to 3.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from acquisition.recording.rig import parse_rig
+from acquisition.recording.rig_schema import ArmModel, Rig
+from calibrate.arms.catalogue import arm_of
+from calibrate.arms.serial import rotation_z
+from calibrate.converted_rig import rig_in_model
+from calibrate.errors import DataError
+from calibrate.kernels.perturbed import PER_PART
+from calibrate.model_file import ModelFile
+from calibrate.parameters import values_by_name
+from calibrate.rigid import cross
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Nominal or as identified; all arrays SI."""
+
+    name: str
+    fixed: Floats  # (joint + 1, 4, 4)
+    offset_rad: Floats  # (joint,) added to a reading
+    point_m: Floats  # (3,) in the flange
+    lower_rad: Floats  # (joint,)
+    upper_rad: Floats
+
+    @property
+    def n_joints(self) -> int:
+        return len(self.offset_rad)
+
+    def frames(self, q_rad: Floats) -> Floats:
+        """(pose, joint + 1, 4, 4) B_i behind fixed part i: joint i + 1 turns about its z, B_n is the flange."""
+        B = np.empty((len(q_rad), self.n_joints + 1, 4, 4))
+        B[:, 0] = self.fixed[0]
+        for i, angle in enumerate((q_rad + self.offset_rad).T):
+            B[:, i + 1] = B[:, i] @ rotation_z(angle) @ self.fixed[i + 1]
+        return B
+
+    def probe_m(self, q_rad: Floats) -> Floats:
+        """(pose, 3) in the base."""
+        T = self.frames(q_rad)[:, -1]
+        return T[:, :3, :3] @ self.point_m + T[:, :3, 3]
+
+    def by_slot(self, q_rad: Floats) -> Floats:
+        """(pose, 3, slot) derivative of the probe by every slot (calibrate/kernels/perturbed.py), at no error.
+
+        Shift c of part i moves it by the axis c of B_i, turn c by that axis x (p - o); an angle is a turn about z.
+        """
+        B = self.frames(q_rad)
+        lever = (B[:, -1, :3, :3] @ self.point_m + B[:, -1, :3, 3])[:, None] - B[..., :3, 3]  # (pose, part, 3)
+        axes = np.swapaxes(B[..., :3, :3], -1, -2)  # (pose, part, axis, 3)
+        turns = cross(axes, np.broadcast_to(lever[:, :, None], axes.shape))
+        by = np.concatenate([axes, turns, turns[:, :, 2:]], axis=2)  # (pose, part, 7, 3)
+        return np.swapaxes(by.reshape(len(q_rad), -1, 3), 1, 2)
+
+    def drawn_poses(self, count: int, rng: Generator) -> Floats:
+        """(pose, joint) readings, evenly between the limits."""
+        return rng.uniform(self.lower_rad, self.upper_rad, (count, self.n_joints))
+
+
+def slot(part: int, component: int) -> int:
+    """Number of a slot: components 0 to 5 of a fixed part, 6 for the angle of the joint behind it."""
+    return PER_PART * part + component
+
+
+def machine_of(
+    rig: Rig, values: Mapping[str, float] | None = None, about_tool_m: tuple[float, ...] | None = None
+) -> Machine:
+    """The rig's arm, with `values` of its parameters by name.
+
+    The probe is at `about_tool_m`, else at tool.point_m, else at the flange's origin; `values` of the tool correct it.
+    """
+    arm = arm_of(rig)
+    known = {p.name for p in arm.parameters}
+    theta = values_by_name(arm.parameters, {k: v for k, v in (values or {}).items() if k in known})
+    shift = [(values or {}).get(f"tool.{axis}", 0.0) for axis in ("x", "y", "z")]
+    point = np.array((about_tool_m or rig.tool.point_m or (0.0, 0.0, 0.0))[:3]) + shift
+    joints = rig.arm.joints
+    lower, upper = np.array([j.lower_rad for j in joints]), np.array([j.upper_rad for j in joints])
+    return Machine(rig.name, arm.fixed_parts(theta), arm.angle_offset_rad(theta), point, lower, upper)
+
+
+def identified_machine(model: ModelFile) -> tuple[Machine, Rig]:
+    """The arm of a model file as identified, and its rig. DataError for a file without its rig."""
+    if model.rig.text is None:
+        raise DataError(f"model of rig {model.rig.name}: the rig's text is not in the file; identify again")
+    rig = parse_rig(model.rig.text, f"rig.toml in the model of {model.rig.name}")
+    rig = rig_in_model(rig, ArmModel(model.arm_model))
+    return machine_of(rig, model.chain, model.about.get("tool")), rig

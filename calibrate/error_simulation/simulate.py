@@ -1,0 +1,110 @@
+"""The whole error simulation of an arm: linear and drawn side by side, shares, budget, every source alone, worst."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.error_simulation.linear import Linear, propagate
+from calibrate.error_simulation.machine import Machine
+from calibrate.error_simulation.monte_carlo import Drawn, draw_arms
+from calibrate.error_simulation.single import Single, each_alone
+from calibrate.error_simulation.sobol import SobolIndices, indices_of
+from calibrate.error_simulation.source import Source
+from calibrate.error_simulation.worst import Posture, worst_postures
+
+Floats = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+WIDE_POSES = 500  # of everything that needs no drawn arms: the rms over the workspace settles to about 2 %
+SOBOL_POSES = 6
+
+
+@dataclass(frozen=True)
+class Asked:
+    """How much to compute."""
+
+    arms: int = 1_000_000
+    poses: int = 10  # at which arms are drawn
+    seed: int = 1
+    workers: int = 1
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line of the budget."""
+
+    group: str
+    sources: int
+    rms_m: float  # over the workspace, of this group alone
+    share: float  # of the variance
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """`wide` are poses all over the workspace, `drawn_at` those at which arms were drawn."""
+
+    machine: Machine
+    sources: tuple[Source, ...]
+    asked: Asked
+    wide_rad: Floats  # (pose, joint)
+    wide: Linear
+    drawn_at_rad: Floats  # (pose, joint)
+    linear: Linear
+    drawn: Drawn
+    shares: SobolIndices
+    singles: tuple[Single, ...]
+    worst: tuple[Posture, ...]
+
+    @property
+    def budget(self) -> tuple[Line, ...]:
+        """By group, the largest first."""
+        out: list[Line] = []
+        alone, shares = self.wide.alone_m, self.wide.shares
+        for group in dict.fromkeys(source.group for source in self.sources):
+            mine = np.array([source.group == group for source in self.sources])
+            rms = float(np.sqrt(np.mean(_of(self.wide, mine).rms_m ** 2)))
+            out.append(Line(group, int(mine.sum()), rms, float(shares[mine].sum())))
+        return tuple(sorted(out, key=lambda line: -line.rms_m)) if len(alone) else ()
+
+    @property
+    def ranking(self) -> NDArray[np.intp]:
+        """(source,) by total index, then by what each does alone."""
+        return np.lexsort((-self.wide.alone_m, -np.round(self.shares.total, 6)))
+
+
+def _of(linear: Linear, mine: NDArray[np.bool_]) -> Linear:
+    return Linear(linear.mean_m[mine], linear.covariance_m2[mine])
+
+
+def simulate(
+    machine: Machine,
+    sources: Sequence[Source],
+    asked: Asked,
+    progress: Progress = lambda what, done, total: None,
+) -> Simulation:
+    """The same answer from the same `asked`, but for `workers`, which change nothing."""
+    rng_wide, rng_drawn, rng_worst = np.random.default_rng(asked.seed).spawn(3)
+    wide_rad, at_rad = machine.drawn_poses(WIDE_POSES, rng_wide), machine.drawn_poses(asked.poses, rng_drawn)
+    wide, linear = propagate(machine, sources, wide_rad), propagate(machine, sources, at_rad)
+    drawn = draw_arms(
+        machine,
+        sources,
+        at_rad,
+        asked.arms,
+        seed=asked.seed,
+        rms_m=linear.rms_m,
+        workers=asked.workers,
+        progress=lambda done, total: progress("drawn arms", done, total),
+    )
+    shares = indices_of(
+        machine,
+        sources,
+        wide_rad[:SOBOL_POSES],
+        seed=asked.seed,
+        progress=lambda done, total: progress("Sobol indices", done, total),
+    )
+    singles = each_alone(machine, sources, wide_rad[:100])
+    worst = worst_postures(machine, sources, rng_worst)
+    return Simulation(machine, tuple(sources), asked, wide_rad, wide, at_rad, linear, drawn, shares, singles, worst)

@@ -1,0 +1,60 @@
+"""Before measuring: which causes a plan could show, from which size on, and which it could not tell apart.
+
+The session of the plan is made up at the rig as drawn, with readings that scatter as the rig believes, and put on the
+bench of a diagnosis: what that would look for, and how large it had to be, does not depend on what is read.
+"""
+
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from acquisition.recording.rig_schema import Rig
+from calibrate.diagnose.bench import Bench
+from calibrate.diagnose.diagnosis import Named
+from calibrate.diagnose.findings import named
+from calibrate.diagnose.fitted import fit_geometry
+from calibrate.diagnose.isolability import Isolability, isolability
+from calibrate.diagnose.session import session_of
+from calibrate.diagnose.smallest_visible import Smallest, smallest_visible
+from calibrate.dual_psd_rig import believed_noise
+from calibrate.instruments import POSITION_BELIEVED_M
+from calibrate.pose_design.candidates import Candidates
+from calibrate.pose_design.plan_of import Taken
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a diagnosis of the plan's session could find."""
+
+    smallest: tuple[Smallest, ...]  # of every place and physics that the poses show
+    confusable: tuple[tuple[Named, Named, float], ...]  # pairs, and R2
+    invisible: tuple[Named, ...]  # what geometry would swallow
+    isolability: Isolability
+
+
+def seen_by(rig: Rig, candidates: Candidates, taken: Taken, rng: Generator) -> Seen:
+    """Of a plan's poses in their order, with their approaches and repeats. DataError where they are too few to fit."""
+    poses = candidates.take(taken.poses)
+    reading = poses.reading + rng.normal(0.0, _noise_m(rig, poses), poses.reading.shape)
+    samples = Candidates(poses.q_rad, reading, poses.placement, poses.first_psd).samples(taken.approach, taken.repeat)
+    bench = Bench(fit_geometry(session_of(_believed(rig), samples)))
+    told = isolability(bench.menu)
+    pairs = tuple((named(a), named(b), r2) for a, b, r2 in told.confusable())
+    invisible = tuple(dict.fromkeys(named(term) for term in bench.menu.invisible))
+    return Seen(smallest_visible(bench), pairs, invisible, told)
+
+
+def _noise_m(rig: Rig, poses: Candidates) -> float:
+    if poses.spots:
+        return believed_noise(rig).psd_m
+    return rig.noise.position_m or POSITION_BELIEVED_M
+
+
+def _believed(rig: Rig) -> Rig:
+    """Made-up readings have no joint noise; the fit finds what there is."""
+    return msgspec.structs.replace(rig, known_distances=())
