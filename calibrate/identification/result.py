@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from calibrate.blunders.finding import Blunder
 from calibrate.fit import Status
 from calibrate.identifiability import Identifiability
+from calibrate.identification.scale import scale_alarms
 from calibrate.observability import Observability
 from calibrate.parameters import Parameter
 from calibrate.uncertainty.bootstrap import Bootstrap
@@ -111,7 +112,7 @@ class Identification:
     @property
     def alarms(self) -> tuple[str, ...]:
         """Sentences about noise and model that a person must read before the numbers; none where all agrees."""
-        return alarms_of(self.stated_noise, self.repeats)
+        return alarms_of(self.stated_noise, self.repeats) + scale_alarms(i.name for i in self.instruments)
 
 
 def alarms_of(stated: StatedNoise, repeats: RepeatNoise | None) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.arms.belief import FREE
 from calibrate.arms.catalogue import arm_of
+from calibrate.arms.eccentric import with_discs
 from calibrate.blunders.shots import Shots
 from calibrate.chain import Chain
 from calibrate.default_belief import links_of
@@ -43,10 +44,11 @@ def instruments_for_fit(rig: Rig, samples: Samples, plan: FitPlan = DEFAULT) -> 
     """
     as_distance, as_lines = (i in plan.instruments for i in (InstrumentName.DISTANCE, InstrumentName.POINT))
     planned = samples_as_planned(samples, plan)
+    links = links_of(rig) if rig.tolerance is not None or holds_spots(planned) else FREE
     found = instruments_of(
         planned,
         rig,
-        arm=arm_of(rig, links_of(rig) if rig.tolerance is not None or holds_spots(planned) else FREE),
+        arm=with_discs(arm_of(rig, links), rig),
         positions=Positions.DISTANCE if as_distance else Positions.FRAME,
         spots=Spots.POINT if as_lines else Spots.REFLECTION,
     )

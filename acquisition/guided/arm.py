@@ -1,0 +1,23 @@
+"""What guidance needs to know of the arm, as believed; given in from outside, since kinematics is not acquisition's."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+class GuidedArm(Protocol):
+    """A measuring arm as believed."""
+
+    lower_rad: Floats  # (n,) of the readings
+    upper_rad: Floats
+
+    def tip_m(self, q_rad: Floats) -> Floats:
+        """(row, 3) middle of the probe's ball in the base, for readings (row, n)."""
+        ...
+
+    def postures(self, start_rad: Floats, point_m: Floats) -> Floats:
+        """Of starts (row, n) those brought to the point (3,) within the joints' ranges, (some, n)."""
+        ...

@@ -1,0 +1,69 @@
+"""`calibeam verify`: the figures of ISO 10360-12 and ASME B89.4.22 of an identified arm."""
+
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+from cyclopts import Parameter
+from rich.console import Console
+from rich.table import Table
+
+from acquisition.recording.read import read
+from calibeam.outcome import CheckFailed
+from calibeam.software import SOFTWARE
+from calibrate.model_file import read_model
+from calibrate.report.quantities import DASH, length
+from calibrate.report.verification_page import SAYS, write_verification_page
+from calibrate.verification.file import verification_file, write_verification
+from calibrate.verification.verify import Verification, verify
+
+
+def verify_command(
+    recording: Path,
+    *,
+    model: Path,
+    out: Path = Path("verification.json"),
+    report: Path = Path("verification.html"),
+    json_: Annotated[bool, Parameter(name="--json")] = False,
+) -> None:
+    """Judge a measuring arm by spheres, cones and bars against the permissible errors in the rig's [mpe].
+
+    Example: calibeam verify check/recording.mcap --model session/model.json
+    Exit code 1 when a figure is beyond its limit; the files are written all the same.
+
+    Parameters
+    ----------
+    recording
+        What `calibeam session RIG --verify` took: readings that the identification has not seen.
+    model
+        The model.json of the identified arm.
+    out
+        Where to write the figures as JSON.
+    report
+        Where to write the page.
+    json_
+        Print the JSON and nothing else.
+
+    """
+    source = read(recording)
+    found = verify(source, read_model(model))
+    file = verification_file(found, rig=source.rig.name, recording=recording.name, model=model.name, software=SOFTWARE)
+    write_verification(out, file)
+    report.parent.mkdir(parents=True, exist_ok=True)
+    write_verification_page(report, source, found, SOFTWARE)
+    if json_:
+        print(msgspec.json.encode(file).decode())
+    else:
+        _print(Console(), found, out, report)
+    if found.failed:
+        raise CheckFailed(found.sentence)
+
+
+def _print(console: Console, found: Verification, out: Path, report: Path) -> None:
+    table = Table("figure", "worst", "permitted", "", "taken")
+    for one in found.figures:
+        worst, limit = (DASH if value is None else length(value) for value in (one.value, one.permitted))
+        table.add_row(one.symbol, worst, limit, SAYS[one.judgement], f"{one.taken} of {one.asked}")
+    console.print(table)
+    console.print(found.sentence, highlight=False, markup=False)
+    console.print(f"figures: {out}; page: {report}", highlight=False, markup=False)

@@ -1,0 +1,144 @@
+"""A guided session that is recorded: connects the encoders, runs the plan, and whatever happens the file is whole."""
+
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from acquisition.guided.guide import Guide
+from acquisition.guided.plan import Visit
+from acquisition.guided.reading import Reading
+from acquisition.guided.session import GuidedSession, Summary
+from acquisition.guided.wired import WiredEncoderWatch
+from acquisition.recording.errors import RecordingError, RigFileError
+from acquisition.recording.rig_schema import EncodersDevice, Rig
+from acquisition.recording.stream import Channel, Event
+from acquisition.recording.writer import RecordingWriter
+from acquisition.streams import Pump
+from acquisition.supervisor import Supervisor
+from calibeam.encoders import VIEWED, emulated_encoders, encoder_driver, identities_of
+from calibeam.guided.arm import BelievedGuidedArm
+from calibeam.guided.judge import FittedJudge
+from calibeam.outcome import PartialResult
+from calibeam.recorded import Interrupted, uninterrupted
+from drivers.clock import Clock
+
+STREAM_MEMORY = 400  # blocks: some seconds, of which a dwell needs one
+
+
+@dataclass(frozen=True)
+class EncoderAddress:
+    """Where the encoders are. `hurry`: device seconds in one second of this program's clock; 1 on site."""
+
+    device: EncodersDevice
+    hurry: float = 1.0
+    emulated: bool = False
+
+
+def is_guided(rig: Rig) -> bool:
+    """Whether a session of this rig is one that a person's hand moves: artefacts to probe, encoders, and no robot."""
+    devices = rig.devices
+    probed = bool(rig.seat_list or rig.bar_position_list or rig.sphere_list)
+    return probed and devices.encoders is not None and devices.robot is None and devices.psd is None
+
+
+def encoder_address(
+    rig: Rig, announced: Mapping[str, Any] | None = None, hurry: float = 1.0, *, emulated: bool = False
+) -> EncoderAddress:
+    """The rig's encoders, or the same where emulators announced their adapter. RigFileError where there are none."""
+    device = rig.devices.encoders
+    if device is None:
+        raise RigFileError(f"rig {rig.name}: no [devices.encoders]; a measuring arm is read by its encoders")
+    if announced is not None:
+        return EncoderAddress(emulated_encoders(device, announced), hurry, emulated=True)
+    return EncoderAddress(device, hurry, emulated)
+
+
+@contextmanager
+def watching(address: EncoderAddress, writer: RecordingWriter, clock: Clock) -> Generator[WiredEncoderWatch]:
+    """The encoders connected and read into the recording until left; then the port is released."""
+    driver = encoder_driver(address.device, clock, emulated=address.emulated, hurry=address.hurry)
+    driver.connect()
+    supervisor = Supervisor(lambda: None, clock)  # nothing to stop: a person moves the arm
+
+    def failed(failure: Exception) -> None:
+        supervisor.failed(failure)
+        if not isinstance(failure, RecordingError):
+            writer.event(Event(clock.now_s(), "device failed", {"device": driver.name, "why": str(failure)}))
+
+    try:
+        channels = tuple(Channel(c.name, c.unit, c.shape, c.full_scale, c.resolution) for c in driver.describe())
+        stream = writer.stream(driver.name, channels, VIEWED)
+        writer.event(Event(clock.now_s(), "encoders", {"identities": identities_of(driver)}))
+        pump = Pump(
+            driver,
+            clock,
+            lambda block: stream.append(block.host_s, block.device_s, block.sequence, block.values),
+            failed,
+            memory=STREAM_MEMORY,
+        )
+    except BaseException:
+        driver.close()
+        raise
+    pump.start()
+    try:
+        yield WiredEncoderWatch(pump, supervisor, address.hurry)
+    finally:
+        with uninterrupted():
+            pump.stop()
+
+
+class RecordingJournal:
+    """Implements acquisition.guided.session.Journal."""
+
+    def __init__(self, writer: RecordingWriter, clock: Clock) -> None:
+        self._writer, self._clock = writer, clock
+
+    def readings(self, readings: Sequence[Reading]) -> None:
+        for reading in readings:
+            self._writer.sample(reading.row(), reading.host_s)
+
+    def event(self, kind: str, detail: Mapping[str, Any]) -> None:
+        self._writer.event(Event(self._clock.now_s(), kind, dict(detail)))
+
+
+def record_guided(
+    watch: WiredEncoderWatch,
+    rig: Rig,
+    guide: Guide,
+    plan: tuple[Visit, ...],
+    writer: RecordingWriter,
+    clock: Clock,
+    *,
+    seed: int = 1,
+    patience_s: float = np.inf,
+) -> Summary:
+    """Run the plan. PartialResult when it ended early: what was taken is kept."""
+    judge, journal = FittedJudge(rig), RecordingJournal(writer, clock)
+    rng = np.random.default_rng(seed)
+    session = GuidedSession(watch, BelievedGuidedArm(rig), guide, judge, journal, rng, patience_s=patience_s)
+    try:
+        summary = session.run(plan)
+    except Interrupted as why:
+        raise _ended_early(writer, clock, session, why) from why
+    detail = {"samples": len(summary.readings), "slips": summary.slips, "skipped": summary.skipped}
+    writer.event(Event(clock.now_s(), "end", detail))
+    return summary
+
+
+def _ended_early(writer: RecordingWriter, clock: Clock, session: GuidedSession, why: BaseException) -> PartialResult:
+    """Put what there is on the disk; a second Ctrl-C may not get in between."""
+    reason = "Ctrl-C" if isinstance(why, KeyboardInterrupt) else str(why)
+    with uninterrupted():
+        try:
+            writer.event(Event(clock.now_s(), "ended early", {"why": reason}))
+            writer.flush()
+        except RecordingError as error:
+            if str(error) != reason:
+                reason = f"{reason}; {error}"
+    kept = f"{session.taken} samples are kept in {writer.path}"
+    if session.taken:
+        kept += f"; `calibeam identify {writer.path}` says what they tell"
+    return PartialResult(f"{reason}; {kept}")

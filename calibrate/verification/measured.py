@@ -1,0 +1,94 @@
+"""What a recording holds to verify an arm by: the probe's places, by cone, sphere and bar."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.recording.rig_schema import Rig
+from acquisition.recording.samples import Samples
+from calibrate.errors import DataError
+from calibrate.predict import Predictor
+from calibrate.sensors.bar import bar_pairs
+
+Floats = NDArray[np.float64]
+SAME_PLACE_M = 0.05  # a bar set up again by hand is nearer to where it was than two positions are apart
+
+
+@dataclass(frozen=True, eq=False)
+class Length:
+    """One bar measured once."""
+
+    bar: int
+    position: int  # from 1, in order of first use
+    calibrated_m: float
+    measured_m: float
+
+    @property
+    def error_m(self) -> float:
+        """Measured less calibrated."""
+        return self.measured_m - self.calibrated_m
+
+    @property
+    def says(self) -> str:
+        return f"bar {self.bar}, position {self.position}"
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Places of the probe's ball (row, 3) m in the base, by the identified arm."""
+
+    rig: Rig
+    seats: Mapping[int, Floats]
+    touches: Mapping[tuple[int, int], Floats]  # sphere, series
+    lengths: tuple[Length, ...]
+
+
+def measured(samples: Samples, rig: Rig, predictor: Predictor) -> Measured:
+    """Sorted by artefact. DataError where there is none, or one that the rig does not know."""
+    tips_m = predictor.tip_m(samples.joints())
+    found = Measured(rig, _seats(samples, tips_m), _touches(samples, rig, tips_m), _lengths(samples, rig, tips_m))
+    if not (found.seats or found.touches or found.lengths):
+        raise DataError(
+            "samples: nothing to verify by; columns of it are seat, bar with bar_end, and sphere with series: "
+            "`calibeam session RIG --verify` takes them"
+        )
+    return found
+
+
+def _seats(samples: Samples, tips_m: Floats) -> dict[int, Floats]:
+    seat = samples.integers("seat", 0)
+    return {k: tips_m[seat == k] for k in sorted(set(seat.tolist()) - {0})}
+
+
+def _touches(samples: Samples, rig: Rig, tips_m: Floats) -> dict[tuple[int, int], Floats]:
+    if "sphere" not in samples:
+        return {}
+    sphere = np.nan_to_num(samples.column("sphere")).astype(np.int64)
+    series = np.nan_to_num(samples.column("series")).astype(np.int64) if "series" in samples else np.zeros_like(sphere)
+    unknown = set(sphere.tolist()) - {0} - set(rig.spheres)
+    if unknown:
+        raise DataError(f"samples: sphere {min(unknown)} is not in the rig; add a [[sphere]] with its diameter")
+    pairs = sorted({(s, k) for s, k in zip(sphere.tolist(), series.tolist(), strict=True) if s})
+    return {(s, k): tips_m[(sphere == s) & (series == k)] for s, k in pairs}
+
+
+def _lengths(samples: Samples, rig: Rig, tips_m: Floats) -> tuple[Length, ...]:
+    bar = samples.integers("bar", 0)
+    rows = np.flatnonzero(bar)
+    if len(rows) == 0:
+        return ()
+    ends = samples.columns["bar_end"][rows]
+    out: list[Length] = []
+    middles: list[tuple[int, Floats]] = []
+    for a, b in bar_pairs(rows, bar[rows], ends):
+        number = int(bar[a])
+        middle = 0.5 * (tips_m[a] + tips_m[b])
+        apart = [float(np.linalg.norm(middle - m)) if n == number else np.inf for n, m in middles]
+        if not apart or min(apart) > SAME_PLACE_M:
+            middles.append((number, middle))
+            apart.append(0.0)
+        measured_m = float(np.linalg.norm(tips_m[b] - tips_m[a]))
+        out.append(Length(number, int(np.argmin(apart)) + 1, rig.bars[number].length_m, measured_m))
+    return tuple(out)

@@ -1,0 +1,147 @@
+"""What an emulated measuring arm truly is: drawn once from the seed, frozen, written only outside of any recording.
+
+Every kind of deviation has a random stream of its own: switching one off leaves the others as they were.
+"""
+
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from simulators.defects.rigid import moved
+from simulators.hand.rig import Emulation, HandRig, Part, Vector
+from simulators.world.errors import WorldError
+
+Floats = NDArray[np.float64]
+SCHEMA = 1
+KIND = "hand-held-arm"
+LINES = 256  # groups of graduation lines a turn: a head looks at some hundred lines at a time and averages them
+CYCLES = (-3, -2, -1, 2, 3)  # error motions of an axis a turn, see simulators/defects/worn_bearing.py
+
+
+class TrueDisc(msgspec.Struct, frozen=True):
+    """One encoder: its centre off the shaft, seen from the disc, and the angle that each group of lines adds."""
+
+    eccentricity_m: float
+    bearing_rad: float
+    graduation_rad: tuple[float, ...]
+
+
+class TrueAxis(msgspec.Struct, frozen=True):
+    """How one axis leans while it turns."""
+
+    lean_rad: float
+    cycles: int
+    bearing_rad: float
+
+
+class TruePoint(msgspec.Struct, frozen=True):
+    """The middle of a cone or a sphere, in the base."""
+
+    id: int
+    origin_m: Vector
+
+
+class TrueBar(msgspec.Struct, frozen=True):
+    """A bar in one of its positions: the middles of both ends, in the base."""
+
+    id: int
+    bar: int
+    a_m: Vector
+    b_m: Vector
+
+
+class HandTruth(msgspec.Struct, frozen=True):
+    """The concealed arm. True joint angle = shaft angle + joint zero; the encoders see shafts."""
+
+    seed: int
+    parts: tuple[Part, ...]
+    joint_zero_rad: tuple[float, ...]
+    discs: tuple[TrueDisc, ...]
+    axes: tuple[TrueAxis, ...]
+    tool_point_m: Vector
+    seats: tuple[TruePoint, ...]
+    bars: tuple[TrueBar, ...]
+    spheres: tuple[TruePoint, ...]
+    encoder_noise_rad: float
+    kind: str = KIND
+    schema: int = SCHEMA
+
+
+def draw_hand_truth(rig: HandRig, seed: int) -> HandTruth:
+    """The truth that belongs to a rig and a seed; the same two always give the same. WorldError for a seed below 0."""
+    if seed < 0:
+        raise WorldError(f"seed {seed}; give a whole number from 0 on")
+    part, zero, disc, axis, place = (np.random.default_rng(s) for s in np.random.SeedSequence([seed, 6]).spawn(5))
+    sigma, n = rig.emulation, len(rig.arm.joint)
+    drawn = (*rig.arm.joint, rig.arm.flange)
+    return HandTruth(
+        seed=seed,
+        parts=tuple(_made(one, sigma, part) for one in drawn),
+        joint_zero_rad=tuple((sigma.joint_zero_max_rad * zero.uniform(-1.0, 1.0, n)).tolist()),
+        discs=tuple(_disc(sigma, disc) for _ in range(n)),
+        axes=tuple(_axis(sigma, axis) for _ in range(n)),
+        tool_point_m=rig.tool.point_m,
+        seats=tuple(TruePoint(s.id, _off(s.origin_m, sigma, place)) for s in rig.seat),
+        bars=_bars(rig, place),
+        spheres=tuple(TruePoint(s.id, _off(s.origin_m, sigma, place)) for s in rig.sphere),
+        encoder_noise_rad=sigma.encoder_noise_rad,
+    )
+
+
+def _made(drawn: Part, sigma: Emulation, rng: np.random.Generator) -> Part:
+    """The drawn part with a small motion behind it: six errors a link."""
+    nominal = moved(np.array(drawn.origin_m), np.array(drawn.rotation_rad))
+    off = moved(sigma.length_sigma_m * rng.standard_normal(3), sigma.angle_sigma_rad * rng.standard_normal(3))
+    true = nominal @ off
+    return Part(vector(true[:3, 3]), vector(Rotation.from_matrix(true[:3, :3]).as_rotvec()))
+
+
+def _disc(sigma: Emulation, rng: np.random.Generator) -> TrueDisc:
+    x_m, y_m = sigma.disc_eccentricity_m * rng.standard_normal(2)
+    lines_rad = sigma.graduation_rad * rng.standard_normal(LINES)
+    return TrueDisc(float(np.hypot(x_m, y_m)), float(np.arctan2(y_m, x_m)), tuple(lines_rad.tolist()))
+
+
+def _axis(sigma: Emulation, rng: np.random.Generator) -> TrueAxis:
+    lean_rad = abs(sigma.axis_wobble_rad * rng.standard_normal())
+    return TrueAxis(float(lean_rad), int(rng.choice(CYCLES)), float(rng.uniform(-np.pi, np.pi)))
+
+
+def _off(believed_m: Vector, sigma: Emulation, rng: np.random.Generator) -> Vector:
+    return vector(np.array(believed_m) + sigma.artefact_sigma_m * rng.standard_normal(3))
+
+
+def _bars(rig: HandRig, rng: np.random.Generator) -> tuple[TrueBar, ...]:
+    """Set up by hand: off by the artefacts' sigma in place, and by as much at the ends in direction."""
+    out: list[TrueBar] = []
+    for position in rig.bar_position:
+        length_m = next(bar.length_m for bar in rig.bar if bar.id == position.bar)
+        middle_m = np.array(_off(position.middle_m, rig.emulation, rng))
+        along = np.array(position.direction) / np.linalg.norm(position.direction)
+        along = along + 2.0 * rig.emulation.artefact_sigma_m / length_m * rng.standard_normal(3)
+        half_m = 0.5 * length_m * along / np.linalg.norm(along)
+        out.append(TrueBar(position.id, position.bar, vector(middle_m - half_m), vector(middle_m + half_m)))
+    return tuple(out)
+
+
+def vector(values: Floats) -> Vector:
+    """Three numbers as a record holds them."""
+    x, y, z = (float(value) for value in values)
+    return (x, y, z)
+
+
+def write_hand_truth(truth: HandTruth, path: Path) -> None:
+    """Writes the truth as JSON, SI names with their units; folders are made."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(msgspec.json.format(msgspec.json.encode(truth), indent=1) + b"\n")
+
+
+def read_hand_truth(path: Path) -> HandTruth:
+    """The truth that `write_hand_truth` left. WorldError when the file is not one."""
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=HandTruth)
+    except msgspec.DecodeError as error:
+        raise WorldError(f"{path}: no truth of a hand-held arm: {error}; emulate with --truth") from error
