@@ -12,7 +12,6 @@ from calibeam.prove.scenario import DRAWS, WIRED_DRAWS, Mix, Scenario, scenario,
 from calibeam.prove.seal import fingerprint, new_key, sealed
 from calibeam.prove.streamed import conceal_streams, told
 from calibeam.prove.unseen_file import write_asked
-from calibeam.prove.wired import conceal_on_wires
 from simulators.conceal.belief import rig_document
 from simulators.conceal.case import Case, conceal
 from simulators.conceal.reveal import truth_document
@@ -82,6 +81,9 @@ def _drawn(order: _Order) -> tuple[Scenario, Case, int]:
     for attempt in range(WIRED_DRAWS if order.wired else DRAWS):
         try:
             if order.wired:
+                # what a session over wires needs, devices' libraries and all, is a second of each process that has none
+                from calibeam.prove.wired import conceal_on_wires
+
                 drawn = wired_scenario(order.seed, order.number, attempt)
                 return drawn, conceal_on_wires(drawn.wanted, order.layout.recorded(drawn.name)), attempt
             drawn = scenario(order.mix, order.seed, order.number, attempt)

@@ -17,7 +17,8 @@ PLAIN = 0.6  # effect over noise
 SINGLE = ("one", "disturbed", "outside", "streams")
 NOTHING = "nothing"
 FAILED = "failed"
-LAST = (UNKNOWN, NOTHING, FAILED)
+ELSEWHERE = "right name, elsewhere"
+LAST = (UNKNOWN, NOTHING, ELSEWHERE, FAILED)
 CELL_IN = 0.27
 MARGIN_IN = 2.2
 
@@ -44,7 +45,8 @@ def _said(case: CaseScore) -> str:
         return FAILED
     if not case.said:
         return UNKNOWN if case.unexplained else NOTHING
-    return case.said[0].physics
+    first = case.said[0].physics
+    return ELSEWHERE if case.defects and first == case.defects[0].physics else first
 
 
 def _ordered(words: set[str]) -> list[str]:
@@ -70,6 +72,11 @@ def confusion_figure(cases: Sequence[CaseScore]) -> Html:
         axes.set(xlim=(-0.5, len(said) - 0.5), ylim=(len(hidden) - 0.5, -0.5), xlabel="said", ylabel="hidden")
         axes.set_xticks(range(len(said)), said, rotation=90, fontsize=8.0)
         axes.set_yticks(range(len(hidden)), hidden, fontsize=8.0)
+        for i in range(1, len(hidden)):  # lines between the cells, to read a far one by
+            axes.axhline(i - 0.5, color=Tone.FAINT.value, linewidth=0.6, zorder=0.5)
+        for j in range(1, len(said)):
+            axes.axvline(j - 0.5, color=Tone.FAINT.value, linewidth=0.6, zorder=0.5)
+        axes.tick_params(length=0.0)
 
     says = f"Hidden against said physics: {right} of {int(counts.sum())} on the diagonal."
     width, height = MARGIN_IN + CELL_IN * len(said), MARGIN_IN + CELL_IN * len(hidden)

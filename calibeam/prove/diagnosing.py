@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 from queue import SimpleQueue
 
 from calibeam.prove.layout import Layout
@@ -30,23 +31,25 @@ def bare_environment(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 class Blind:
-    """One diagnosing process. Owner of the child; `close` ends it."""
+    """One diagnosing process, at work in a folder that holds answers only. Owner of the child; `close` ends it."""
 
-    def __init__(self, without: Sequence[str] = ()) -> None:
+    def __init__(self, folder: Path, without: Sequence[str] = ()) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
         self._child = subprocess.Popen(  # noqa: S603 - our own interpreter; the names are checked against the catalogue
             [sys.executable, "-m", "calibeam.prove.blind", *without],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
             env=bare_environment(os.environ),
+            cwd=folder,
         )
 
     def answer(self, layout: Layout, name: str) -> Answered:
         """Waits for one diagnosis."""
         order = {
-            "recording": str(layout.recording(name)),
-            "asked": str(layout.asked(name)),
-            "out": str(layout.answer(name)),
+            "recording": str(layout.recording(name).absolute()),
+            "asked": str(layout.asked(name).absolute()),
+            "out": str(layout.answer(name).absolute()),
         }
         stdin, stdout = self._child.stdin, self._child.stdout
         if stdin is None or stdout is None:
@@ -58,6 +61,10 @@ class Blind:
             return Answered(name, 0.0, f"the diagnosing process ended with code {self._child.wait()}")
         said = json.loads(line)
         return Answered(name, said["cpu_s"], said["error"])
+
+    @property
+    def pid(self) -> int:
+        return self._child.pid
 
     @property
     def alive(self) -> bool:
@@ -76,14 +83,14 @@ def diagnose_cases(layout: Layout, names: Sequence[str], jobs: int, without: Seq
     """In order of names; one process for each job, each taking a case at a time; `without` some physics, by name."""
     idle: SimpleQueue[Blind] = SimpleQueue()
     for _ in range(jobs):
-        idle.put(Blind(without))
+        idle.put(Blind(layout.answers, without))
 
     def one(name: str) -> Answered:
         blind = idle.get()
         try:
             if not blind.alive:
                 blind.close()
-                blind = Blind(without)
+                blind = Blind(layout.answers, without)
             return blind.answer(layout, name)
         finally:
             idle.put(blind)

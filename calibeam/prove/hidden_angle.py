@@ -32,8 +32,9 @@ class HiddenAngle:
     joint: int  # from 1
     poses: int
     rms_rad: float | None  # inferred less recorded; None where no pose feels the joint
-    expected_rad: float | None  # from what the model misses of unseen samples, and how the joint is felt
+    expected_rad: float | None  # from what the model misses at other unseen poses, and how the joint is felt
     unfelt: int  # poses at which the target stands next to the joint's axis: left out
+    misses: tuple[float, ...] = ()  # inferred less recorded over the doubt stated of that pose, in order of poses
 
 
 def hidden_angles(recording: Recording) -> tuple[HiddenAngle, ...]:
@@ -41,24 +42,39 @@ def hidden_angles(recording: Recording) -> tuple[HiddenAngle, ...]:
     state = fit_geometry(session_of(recording.rig, recording.samples))
     samples = np.unique(state.rows.sample[state.rows.data])
     test = splits_of(state.drivers, samples, np.random.default_rng(SEED))[0].unseen[0]
-    known = state.select(np.setdiff1d(samples, test)).refitted(())
-    return tuple(_hidden(known, test, joint) for joint in range(known.session.arm.n_joints))
+    told = np.setdiff1d(samples, test)
+    tried = splits_of(state.drivers, told, np.random.default_rng(SEED))[0].unseen[0]
+    misfit = _misfit(state.select(np.setdiff1d(told, tried)).refitted(()), tried)
+    known = state.select(told).refitted(())
+    return tuple(_hidden(known, test, joint, misfit) for joint in range(known.session.arm.n_joints))
 
 
-def _hidden(state: Fitted, test: Ints, joint: int) -> HiddenAngle:
+def _at(state: Fitted, samples: Ints) -> tuple[Chain, Floats, Floats, Floats]:
+    """The first instrument at these samples: chain, values of its parameters, what it saw, joint readings."""
     measured = state.session.measured[0]
     chain = measured.problem.chain
     if not isinstance(chain, Chain):
         raise DataError("the first instrument of this session sees pairs of poses; hide an angle from another one")
-    rows = np.flatnonzero(np.isin(measured.sample_rows[:, -1], test))
-    chain = chain.select(rows)
+    rows = np.flatnonzero(np.isin(measured.sample_rows[:, -1], samples))
     values = state.session.weighting.unweighted.of_block(0, state.geometry)
-    observed, q_rad = measured.problem.observed[rows], measured.problem.q_rad[rows]
+    return chain.select(rows), values, measured.problem.observed[rows], measured.problem.q_rad[rows]
+
+
+def _misfit(state: Fitted, unseen: Ints) -> float:
+    """Rms of what a model misses at poses that it was not fitted to, all their columns known."""
+    chain, values, observed, q_rad = _at(state, unseen)
+    return float(np.sqrt(np.mean((observed - chain.expect(values, q_rad)) ** 2)))
+
+
+def _hidden(state: Fitted, test: Ints, joint: int, misfit: float) -> HiddenAngle:
+    """`misfit`: known from other poses, for the doubt of an angle may not hang on the angle that is hidden."""
+    chain, values, observed, q_rad = _at(state, test)
     limits = state.session.rig.arm.joints[joint]
     found = _inferred(chain, values, observed, q_rad, joint, (limits.lower_rad, limits.upper_rad))
     away = np.angle(np.exp(1j * (found - q_rad[:, joint])))
-    felt = np.linalg.norm(chain.by_joint(values, q_rad)[:, :, joint], axis=1)
-    misfit = float(np.sqrt(np.mean((observed - chain.expect(values, q_rad)) ** 2)))
+    inferred_rad = q_rad.copy()
+    inferred_rad[:, joint] = found
+    felt = np.linalg.norm(chain.by_joint(values, inferred_rad)[:, :, joint], axis=1)
     sure = FAINT_RAD * felt > misfit
     return HiddenAngle(
         joint + 1,
@@ -66,6 +82,7 @@ def _hidden(state: Fitted, test: Ints, joint: int) -> HiddenAngle:
         float(np.sqrt(np.mean(away[sure] ** 2))) if sure.any() else None,
         misfit * float(np.sqrt(np.mean(felt[sure] ** -2.0))) if sure.any() else None,
         int(np.sum(~sure)),
+        tuple((away[sure] * felt[sure] / misfit).tolist()),
     )
 
 

@@ -25,9 +25,14 @@ class Layout:
         """Poses that nobody measured: where will the tool be?"""
         return self.out / "asked" / f"{name}.csv"
 
+    @property
+    def answers(self) -> Path:
+        """Where the diagnosing process is at work."""
+        return self.out / "answers"
+
     def answer(self, name: str) -> Path:
         """What the diagnosing process writes."""
-        return self.out / "answers" / name
+        return self.answers / name
 
     def seal(self, name: str) -> Path:
         """The truth, unreadable."""

@@ -38,7 +38,7 @@ def _lines(title: str, lines: Sequence[Line]) -> Table:
     for line in lines:
         if line.located.n:
             shares = (share.brief for share in line.shares)
-            table.add_row(line.label, str(line.located.n), *shares, f"{line.spurious:.2f}")
+            table.add_row(line.label, str(line.located.n), *shares, line.others)
     return table
 
 

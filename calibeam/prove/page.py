@@ -6,13 +6,15 @@ from pathlib import Path
 from calibeam.prove.confusion import confusion_figure
 from calibeam.prove.free_space_sums import by_instrument
 from calibeam.prove.record import CaseScore, ProofFile
-from calibeam.prove.story import faults, hidden_words, said_words
-from calibeam.prove.tally import Figure, Line, at_once, by, by_effect, by_enr, by_fault, figures, rivals
+from calibeam.prove.story import faults, hidden_briefly, hidden_words, said_words
+from calibeam.prove.summary import summary
+from calibeam.prove.tally import NONE, Figure, Line, at_once, by, by_effect, by_enr, by_fault, figures, rivals
 from calibrate.report.elements import Html, bullets, figure, folded, section, table, tag
 from calibrate.report.page import page, write_page
 from calibrate.report.quantities import DASH, length
 
 CONTENTS = {
+    "short": "In short",
     "sums": "What was found",
     "doubt": "Doubt and proof",
     "confusion": "What is taken for what",
@@ -31,7 +33,15 @@ def write_proof_page(path: Path, proof: ProofFile) -> Path:
 def proof_html(proof: ProofFile) -> str:
     """The page as text."""
     cases = proof.cases
-    chapters = [_sums(cases), _doubt(cases), _confusion(cases), _others(cases), _stories(cases), _repeat(proof)]
+    chapters = [
+        _short(cases),
+        _sums(cases),
+        _doubt(cases),
+        _confusion(cases),
+        _others(cases),
+        _stories(cases),
+        _repeat(proof),
+    ]
     kept = [(anchor, chapter) for anchor, chapter in zip(CONTENTS, chapters, strict=True) if chapter]
     return page(
         "The concealed proof",
@@ -52,6 +62,11 @@ def _masthead(proof: ProofFile) -> Html:
     )
 
 
+def _short(cases: Sequence[CaseScore]) -> Html:
+    lead = "What a reader in a hurry should know; the chapters below hold each figure, and each case."
+    return section("short", CONTENTS["short"], lead, bullets(summary(cases)))
+
+
 def _sums(cases: Sequence[CaseScore]) -> Html:
     lead = (
         "Mechanisms that share no formula with the catalogue bent each world; the diagnosis saw the recording only. "
@@ -62,18 +77,18 @@ def _sums(cases: Sequence[CaseScore]) -> Html:
         "sums",
         CONTENTS["sums"],
         lead,
-        _lines("One effect, by its size over the noise after geometry", by_enr(cases)),
-        _lines("By instrument, effects of 0.6 times the noise and more", by(cases, lambda c: c.family)),
-        _lines("The same, by the way that the recording came", by(cases, lambda c: c.path)),
-        _lines("Several at once", several),
-        _lines("Faults of motion, stamps and second encoders, found in streams", by_fault(cases)),
-        _lines("By mechanism, effects of 0.6 times the noise and more", by_effect(cases)),
+        *_lines("One effect, by its size over the noise after geometry", by_enr(cases)),
+        *_lines("By instrument, effects of 0.6 times the noise and more", by(cases, lambda c: c.family)),
+        *_lines("The same, by the way that the recording came", by(cases, lambda c: c.path)),
+        *_lines("Several at once", several),
+        *_lines("Faults of motion, stamps and second encoders, found in streams", by_fault(cases)),
+        *_lines("By mechanism, effects of 0.6 times the noise and more", by_effect(cases)),
     )
 
 
 def _doubt(cases: Sequence[CaseScore]) -> Html:
     lead = "What is said where nothing is to be said, how sizes and errors hold against the truth."
-    said = _figures(("", "measured", "wanted"), figures(cases))
+    said = _figures(("", "measured", "wanted"), [f for f in figures(cases) if f.said != NONE])
     return section("doubt", CONTENTS["doubt"], lead, said, *_free_space(cases))
 
 
@@ -128,9 +143,12 @@ def _stories(cases: Sequence[CaseScore]) -> Html:
 def _story(case: CaseScore) -> Html:
     wrong = faults(case)
     way = "" if case.path == "in process" else f" {case.path}"
-    what = f"{case.kind}, {case.family}{way}, {case.samples} samples"
-    title = f"{case.name} · {what} · {'; '.join(wrong) or 'as it should be'}"
-    lines = [f"Hidden: {hidden_words(case)}.", f"Said: {said_words(case)}."]
+    title = f"{case.name} · {hidden_briefly(case)} · {'; '.join(wrong) or 'as it should be'}"
+    lines = [
+        f"{case.kind}, {case.family}{way}, {case.samples} samples.",
+        f"Hidden: {hidden_words(case)}.",
+        f"Said: {said_words(case)}.",
+    ]
     lines += [s.says for s in case.said]
     lines.append(
         f"Unseen samples: {_m(case.held_out_before_m)} with geometry alone, {_m(case.held_out_after_m)} with what was "
@@ -161,13 +179,14 @@ def _repeat(proof: ProofFile) -> Html:
     )
 
 
-def _lines(caption: str, lines: Sequence[Line]) -> Html:
+def _lines(caption: str, lines: Sequence[Line]) -> list[Html]:
+    """Nothing where no case was of that kind."""
     rows = [
-        (line.label, str(line.located.n), *(share.brief for share in line.shares), f"{line.spurious:.2f}")
+        (line.label, str(line.located.n), *(share.brief for share in line.shares), line.others)
         for line in lines
         if line.located.n
     ]
-    return table(HEAD, rows, numeric=(1, 5), caption=caption)
+    return [table(HEAD, rows, numeric=(1, 5), caption=caption)] if rows else []
 
 
 def _figures(head: Sequence[str], found: Sequence[Figure]) -> Html:

@@ -19,10 +19,12 @@ BEGIN, END = "<!-- proof: begin -->", "<!-- proof: end -->"
 
 
 def table_of(proof: ProofFile) -> str:
-    """Markdown. DataError for a proof of development: no figure of such a seed is for the public."""
+    """Markdown. DataError for a proof that was not made to be published: no figure of it is for the public."""
     if proof.development or proof.without:
         why = f"seed {proof.seed} is one of development" if proof.development else "effects were taken out"
         raise DataError(f"{why}; publish the table of a `calibeam prove --publish`")
+    if "--publish" not in proof.command.split():
+        raise DataError("this proof was not made to be published; make it with `make prove`")
     cases = proof.cases
     lines = [
         f"Seed {proof.seed}, {len(cases)} sessions, {proof.wall_s / 60:.0f} minutes (`make prove`); brackets are 95 %.",
@@ -58,7 +60,7 @@ def _findings(cases: Sequence[CaseScore]) -> list[str]:
 
 
 def _cells(line: Line) -> tuple[str, ...]:
-    return (line.label, str(line.located.n), *(share.brief for share in line.shares), f"{line.spurious:.2f}")
+    return (line.label, str(line.located.n), *(share.brief for share in line.shares), line.others)
 
 
 def _rows(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

@@ -35,6 +35,7 @@ class RealScore(msgspec.Struct, frozen=True):
     diagnosis: DiagnosisFile | None
     angles: tuple[HiddenAngle, ...]
     columns: tuple[HiddenColumn, ...]
+    blind: DiagnosisFile | None = None  # without the room's temperature; None where the file has none
 
 
 def real_sets(data: Path) -> tuple[Path, ...]:
@@ -89,7 +90,8 @@ def _scored(layout: Layout, name: str, recording: Recording, answers: Mapping[st
     file = read_diagnosis(layout.answer(name) / "diagnosis.json")
     write_diagnosis_report(layout.out / f"{name}.html", recording, file)
     columns: tuple[HiddenColumn, ...] = ()
+    blind: DiagnosisFile | None = None
     if name + BLIND in answers and not answers[name + BLIND].error:
         blind = read_diagnosis(layout.answer(name + BLIND) / "diagnosis.json")
         columns = against_hidden(blind, recording.samples, ROOM)
-    return RealScore(name, len(recording.samples), "", file, hidden_angles(recording), columns)
+    return RealScore(name, len(recording.samples), "", file, hidden_angles(recording), columns, blind)

@@ -55,6 +55,11 @@ class Said(Record, frozen=True):
     placed: bool  # something was hidden there
     right: bool  # this physics, there
 
+    @property
+    def misnamed(self) -> bool:
+        """A name of physics, believed, for what was not hidden there."""
+        return self.physics != UNKNOWN and self.confidence >= CONFIDENT and not self.right
+
 
 class BaselineScore(Record, frozen=True):
     """Another method on the same unseen samples; 1: all that the oracle removes, 0: none."""
@@ -99,12 +104,13 @@ class CaseScore(Record, frozen=True):
 
     @property
     def alarmed(self) -> bool:
-        return bool(self.said)
+        """Something is claimed: a finding, or structure without one, which counts as said where something is hidden."""
+        return bool(self.said) or self.unexplained
 
     @property
     def misnamed(self) -> bool:
-        """A name of physics, believed, for what was not hidden there."""
-        return any(s.physics != UNKNOWN and s.confidence >= CONFIDENT and not s.right for s in self.said)
+        """At least one such name."""
+        return any(s.misnamed for s in self.said)
 
 
 class ProofFile(Record, frozen=True):

@@ -1,6 +1,10 @@
 """Scores one case: what was said against what was hidden."""
 
+from collections.abc import Sequence
 from pathlib import Path
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from acquisition.recording.read import read
 from calibeam.prove.concealing import Concealed
@@ -23,7 +27,8 @@ def score(layout: Layout, concealed: Concealed, answered: Answered, truth: Truth
     """Of an opened seal and an answer; a diagnosis that did not end has said nothing."""
     drawn, wanted = concealed.scenario, concealed.scenario.wanted
     file = None if answered.error else read_diagnosis(layout.answer(drawn.name) / "diagnosis.json")
-    defects = tuple(_defect(d, file, wanted.family) for d in truth.defects)
+    own = _own(truth.defects, () if file is None else file.findings, wanted.family)
+    defects = tuple(_defect(d, findings, wanted.family) for d, findings in zip(truth.defects, own, strict=True))
     before_m, after_m = _free_space(layout.answer(drawn.name), truth)
     return CaseScore(
         name=drawn.name,
@@ -53,8 +58,34 @@ def score(layout: Layout, concealed: Concealed, answered: Answered, truth: Truth
     )
 
 
-def _defect(defect: TrueDefect, file: DiagnosisFile | None, family: str) -> DefectScore:
-    findings = () if file is None else file.findings
+def _own(
+    defects: Sequence[TrueDefect], findings: Sequence[FindingRecord], family: str
+) -> list[tuple[FindingRecord, ...]]:
+    """For each defect the findings that may count for it: those that are not worth more to another one.
+
+    A name is that of one cause. `unknown` may stand for several at its place: a diagnosis does not part those.
+    """
+    worth = np.array([[_worth(d, f, family) for f in findings] for d in defects]).reshape(len(defects), len(findings))
+    rows, columns = linear_sum_assignment(worth, maximize=True)
+    owner = {int(c): int(r) for r, c in zip(rows, columns, strict=True) if worth[r, c] > 0.0}
+    return [
+        tuple(f for c, f in enumerate(findings) if f.physics == UNKNOWN or owner.get(c, row) == row)
+        for row in range(len(defects))
+    ]
+
+
+def _worth(defect: TrueDefect, finding: FindingRecord, family: str) -> float:
+    """Named, by its own driver, before named, before located."""
+    why = same_place(defect.port, finding.where, family)
+    if why is None:
+        return 0.0
+    if finding.physics != defect.physics and not _as_good(finding, defect, why):
+        return 1.0
+    return 20.0 if _same_driver(defect, finding) else 10.0
+
+
+def _defect(defect: TrueDefect, findings: Sequence[FindingRecord], family: str) -> DefectScore:
+    """Of the findings that may count for it."""
     there = [(f, why) for f in findings if (why := same_place(defect.port, f.where, family)) is not None]
     named = [(f, why) for f, why in there if f.physics == defect.physics or _as_good(f, defect, why)]
     rivals = [r for f in findings for r in f.rivals if _is(r, defect, family)]

@@ -14,6 +14,18 @@ def hidden_words(case: CaseScore) -> str:
     return ", ".join(each) + kept
 
 
+def hidden_briefly(case: CaseScore) -> str:
+    """The same for a heading: what, where, and how large the largest."""
+    match case.defects:
+        case ():
+            return f"nothing, {case.noise} noise"
+        case (only,):
+            kept = ", its column withheld" if case.withheld else ""
+            return f"{only.mechanism} at {only.port}, {only.enr:.2g} x noise{kept}"
+        case several:
+            return f"{len(several)} causes"
+
+
 def said_words(case: CaseScore) -> str:
     """Verdict and findings."""
     if not case.said:
@@ -28,8 +40,8 @@ def faults(case: CaseScore) -> list[str]:
         return [f"failed: {case.error}"]
     out: list[str] = []
     if not case.defects:
-        return out + (["false alarm"] if case.said else [])
-    out += [f"misnamed with confidence: {s.physics} at {s.where}" for s in case.said if _misnamed(case, s.physics)]
+        return out + (["false alarm"] if case.alarmed else [])
+    out += [f"misnamed with confidence: {s.physics} at {s.where}" for s in case.said if s.misnamed]
     if case.kind == "withheld":
         return out + ([] if case.asks_for else ["does not say what is missing"])
     for d in case.defects:
@@ -42,7 +54,3 @@ def faults(case: CaseScore) -> list[str]:
         elif d.physics != UNKNOWN and not d.named:
             out.append(f"{d.mechanism} not named" + (", a rival" if d.among_rivals else ""))
     return out
-
-
-def _misnamed(case: CaseScore, physics: str) -> bool:
-    return case.misnamed and physics != UNKNOWN and all(s.physics != physics or not s.right for s in case.said)

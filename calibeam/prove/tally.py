@@ -8,11 +8,12 @@ import numpy as np
 
 from calibeam.prove.free_space_sums import shares_of_oracle
 from calibeam.prove.interval import Share, share
-from calibeam.prove.record import DIAGNOSIS, CaseScore, DefectScore
+from calibeam.prove.record import DIAGNOSIS, UNKNOWN, CaseScore, DefectScore
 
 BINS = (0.0, 0.15, 0.3, 0.6, 1.0, 2.0, 5.0, np.inf)  # effect over noise
 PLAIN = 0.6  # effect over noise from which a cause has to be found and named
 SINGLE = ("one", "disturbed")
+NONE = "-"  # no case of that kind
 
 
 @dataclass(frozen=True)
@@ -23,11 +24,15 @@ class Line:
     located: Share
     named: Share
     among_rivals: Share
-    spurious: float  # findings beyond one for each hidden cause, a case
+    spurious: float | None  # findings beyond one for each hidden cause, a case; None: of causes, not of cases
 
     @property
     def shares(self) -> tuple[Share, Share, Share]:
         return (self.located, self.named, self.among_rivals)
+
+    @property
+    def others(self) -> str:
+        return NONE if self.spurious is None else f"{self.spurious:.2f}"
 
 
 @dataclass(frozen=True)
@@ -73,7 +78,7 @@ def by_effect(cases: Sequence[CaseScore]) -> list[Line]:
     for word in words:
         hits = [d for c in kept for d in c.defects if d.mechanism == word and d.enr >= PLAIN]
         if hits:
-            out.append(_of(word, hits, 0.0))
+            out.append(_of(word, hits, None))
     return out
 
 
@@ -99,7 +104,7 @@ def figures(cases: Sequence[CaseScore]) -> list[Figure]:
     null = [c for c in cases if c.kind == "none"]
     outside = [c for c in cases if c.kind == "outside" and all(d.enr >= PLAIN for d in c.defects)]
     withheld = [c for c in cases if c.kind == "withheld" and all(d.enr >= PLAIN for d in c.defects)]
-    faint = [c for c in cases if c.kind in SINGLE and 0.15 <= _enr(c) < 0.3 and c.said]
+    faint = [s for c in cases if c.kind in SINGLE and 0.15 <= _enr(c) < 0.3 for s in c.said if s.physics != UNKNOWN]
     sizes = [s for c in cases for d in c.defects for s in d.sizes]
     out = [
         Figure(f"false alarms, {noise} noise", str(share(c.alarmed for c in null if c.noise == noise)), wanted)
@@ -109,7 +114,7 @@ def figures(cases: Sequence[CaseScore]) -> list[Figure]:
     out.append(Figure("false alarms, healthy streams", str(share(c.alarmed for c in healthy)), "none"))
     return [
         *out,
-        Figure("faint (0.15 - 0.3): what is named is right", str(share(not c.misnamed for c in faint)), "all"),
+        Figure("faint (0.15 - 0.3): what is named is right", str(share(s.right for s in faint)), "all"),
         Figure("outside: place right", str(share(c.defects[0].located for c in outside)), ">= 90 %"),
         Figure("outside: said to be unknown", str(share(_said_unknown(c) for c in outside)), ">= 90 %"),
         Figure("outside: misnamed with confidence", str(share(c.misnamed for c in outside)), "<= 5 %"),
@@ -155,7 +160,8 @@ def _gains(label: str, gains: Sequence[float | None]) -> Figure:
 
 
 def _said_unknown(case: CaseScore) -> bool:
-    return case.unexplained or all(d.unknown_there for d in case.defects)
+    """And nothing else believed beside it."""
+    return not case.misnamed and (case.unexplained or all(d.unknown_there for d in case.defects))
 
 
 def _line(label: str, cases: Sequence[CaseScore]) -> Line:
@@ -163,7 +169,7 @@ def _line(label: str, cases: Sequence[CaseScore]) -> Line:
     return _of(label, [d for c in cases for d in c.defects], float(np.mean(spurious)) if spurious else 0.0)
 
 
-def _of(label: str, defects: Sequence[DefectScore], spurious: float) -> Line:
+def _of(label: str, defects: Sequence[DefectScore], spurious: float | None) -> Line:
     return Line(
         label,
         share(d.located for d in defects),
@@ -179,6 +185,6 @@ def _enr(case: CaseScore) -> float:
 
 def _percentiles(values: Sequence[float], *which: float) -> str:
     if not values:
-        return "-"
+        return NONE
     low, high = np.percentile(values, which or (50, 90))
     return f"{low:.3g}, {high:.3g} (n {len(values)})"

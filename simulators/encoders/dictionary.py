@@ -34,6 +34,8 @@ class NodeDictionary:
         self.entries = dict(_entries(node_id, eds_path))
         self._values = {address: entry.default for address, entry in self.entries.items()}
         self._stored: dict[Address, bytes] = {}
+        self._numbers: dict[Address, int] = {}  # of values that are not live, as `number` has read them
+        self.changes = 0  # counts every change of a value, so that what follows from values need not be worked out anew
         self._read_hooks: dict[Address, Callable[[], int]] = {}
         self._write_hooks: dict[Address, Callable[[int], None]] = {}
 
@@ -66,6 +68,7 @@ class NodeDictionary:
         if accept is not None:
             accept(number)
         self._values[index, subindex] = data
+        self._changed()
 
     def data(self, index: int, subindex: int = 0) -> bytes:
         """The present value as it goes over the wire, little endian."""
@@ -76,12 +79,21 @@ class NodeDictionary:
         return self._values[index, subindex]
 
     def number(self, index: int, subindex: int = 0) -> int:
-        return int.from_bytes(self.data(index, subindex), "little", signed=self.entries[index, subindex].signed)
+        """Decoded once: a node looks at its settings every cycle, and they hardly ever change."""
+        address = index, subindex
+        known = self._numbers.get(address)
+        if known is not None:
+            return known
+        number = int.from_bytes(self.data(index, subindex), "little", signed=self.entries[address].signed)
+        if address not in self._read_hooks:
+            self._numbers[address] = number
+        return number
 
     def put(self, index: int, subindex: int, number: int) -> None:
         """Sets a value from inside: no access right, limit or hook is asked."""
         entry = self.entries[index, subindex]
         self._values[index, subindex] = number.to_bytes(entry.size or 0, "little", signed=entry.signed)
+        self._changed()
 
     def store(self) -> None:
         """What 1010h does: the writable values survive the next reset."""
@@ -94,6 +106,11 @@ class NodeDictionary:
     def reset(self) -> None:
         """Values as after power-on: defaults, with what was stored."""
         self._values = {address: entry.default for address, entry in self.entries.items()} | self._stored
+        self._changed()
+
+    def _changed(self) -> None:
+        self._numbers.clear()
+        self.changes += 1
 
     def _entry(self, index: int, subindex: int) -> Entry:
         entry = self.entries.get((index, subindex))

@@ -28,6 +28,8 @@ class TransmitPdo:
         self._mapping = 0x1A00 + number - 1
         self._syncs = 0
         self._next_event_s: float | None = None
+        self._known = -1  # change of the dictionary up to which the next line holds
+        self._period_s = 0.0  # of the event timer; 0: nothing is sent by time
         dictionary.on_write(self._communication, 1, self._accept_cob_id)
         dictionary.on_write(self._communication, 2, self._accept_type)
         dictionary.on_write(self._communication, 5, self._accept_timer)
@@ -53,14 +55,20 @@ class TransmitPdo:
 
     def on_time(self, now_s: float) -> CanFrame | None:
         """The frame, when the event timer of an event-driven PDO has run off."""
-        period_s = self._dictionary.number(self._communication, 5) * 1e-3
-        if self._type not in EVENT_TYPES or not self._valid or period_s == 0.0:
+        if self._known != self._dictionary.changes:
+            self._known, self._period_s = self._dictionary.changes, self._event_period_s()
+        period_s = self._period_s
+        if period_s == 0.0:
             return None
         if self._next_event_s is None or self._next_event_s > now_s + TIMER_SLACK_S:
             self._next_event_s = now_s + period_s if self._next_event_s is None else self._next_event_s
             return None
         self._next_event_s = max(self._next_event_s + period_s, now_s)
         return self._frame()
+
+    def _event_period_s(self) -> float:
+        timed = self._type in EVENT_TYPES and self._valid
+        return self._dictionary.number(self._communication, 5) * 1e-3 if timed else 0.0
 
     @property
     def _type(self) -> int:

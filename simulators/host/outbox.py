@@ -23,6 +23,20 @@ class Outbox:
     def empty(self) -> bool:
         return not self._waiting
 
+    def takes_stream(self) -> bool:
+        """False, and counted, while too much waits: what would be streamed now need not even be made."""
+        if len(self._waiting) <= STREAM_LIMIT_BYTES:
+            return True
+        self.flush()
+        if len(self._waiting) <= STREAM_LIMIT_BYTES:
+            return True
+        self.dropped += 1
+        return False
+
+    def gather(self, data: bytes) -> None:
+        """Streamed output for the next `flush`, where `takes_stream` has said yes."""
+        self._waiting += data
+
     def stream(self, data: bytes) -> None:
         """Output that may be lost. Raises what `write` raises, except for "not now"."""
         self._offer(data, STREAM_LIMIT_BYTES)

@@ -107,10 +107,14 @@ class SerialLine:
             self._detach()
 
     def _detach(self) -> None:
-        """The client has gone: what it left unread must not greet the next one."""
+        """The client has gone: what it left unread must not greet the next one.
+
+        What came from clients is not flushed: the hang-up is told after its last byte, so that anything there now is
+        the next client's, who may have been quick.
+        """
         if self.attached:
             self._outbox.clear()
-            termios.tcflush(self.fd, termios.TCIOFLUSH)
+            termios.tcflush(self.fd, termios.TCOFLUSH)
         self.attached = False
 
 

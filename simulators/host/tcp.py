@@ -35,11 +35,26 @@ class Connection:
             return
         self._exchange(lambda: self.wire.handle(data), self._answer)
 
-    def send_due(self) -> None:
-        """Sends what became due; called once a tick."""
-        self._exchange(self.wire.due, self._outbox.stream)
+    def gather_due(self) -> None:
+        """Takes what became due; called once a tick. Of a client that does not read, the wire is not even asked."""
+        if self.alive and self._takes_stream():
+            self._exchange(self.wire.due, self._outbox.gather)
+
+    def send(self) -> None:
+        """Sends what was gathered."""
+        try:
+            self._outbox.flush()
+        except OSError:
+            self.alive = False
         if getattr(self.wire, "closing", False) and self._outbox.empty:
             self.alive = False
+
+    def _takes_stream(self) -> bool:
+        try:
+            return self._outbox.takes_stream()
+        except OSError:
+            self.alive = False
+            return False
 
     def _exchange(self, ask: Callable[[], bytes], offer: Callable[[bytes], object]) -> None:
         try:

@@ -17,11 +17,13 @@ def stuff(content: bytes) -> bytes:
     for number, segment in enumerate(segments):
         last = number == len(segments) - 1
         while len(segment) >= LONGEST_RUN:
-            out += bytes((LONGEST_RUN + 1,)) + segment[:LONGEST_RUN]
+            out.append(LONGEST_RUN + 1)
+            out += segment[:LONGEST_RUN]
             segment = segment[LONGEST_RUN:]
             if last and not segment:
                 return bytes(out)  # the run ended with the content: no zero is implied
-        out += bytes((len(segment) + 1,)) + segment
+        out.append(len(segment) + 1)
+        out += segment
     return bytes(out)
 
 

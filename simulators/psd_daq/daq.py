@@ -62,8 +62,7 @@ class PsdDaqBox:
         self._sequence = 0
         self._samples_per_frame = 1
         self._waiting_ns: list[int] = []
-        self._waiting_pa: list[NDArray[np.int32]] = []
-        self._waiting_flags: list[NDArray[np.uint16]] = []
+        self._waiting_a: list[NDArray[np.float64]] = []  # converted a frame at a time
 
     # --- requests
 
@@ -130,28 +129,22 @@ class PsdDaqBox:
             return
         times_ns = [self._next_ns + i * self._period_ns for i in range(count)]
         self._next_ns += count * self._period_ns
-        self._convert(times_ns)
+        times_s = np.minimum(np.array(times_ns) * 1e-9, self._world.time_s)
+        self._waiting_ns += times_ns
+        self._waiting_a += list(self._world.photocurrents_a(times_s))
         while len(self._waiting_ns) >= self._samples_per_frame:
             self._send_frame()
-
-    def _convert(self, times_ns: list[int]) -> None:
-        times_s = np.minimum(np.array(times_ns) * 1e-9, self._world.time_s)
-        current_pa = np.rint(self._world.photocurrents_a(times_s) * 1e12)
-        clipped_pa = np.clip(current_pa, -FULL_SCALE_PA, FULL_SCALE_PA).astype(np.int32)
-        self._waiting_ns += times_ns
-        self._waiting_pa += list(clipped_pa)
-        self._waiting_flags += list(_flags(clipped_pa))
 
     def _send_frame(self) -> None:
         n = self._samples_per_frame
         first_ns, last_ns = self._waiting_ns[0], self._waiting_ns[n - 1]
-        currents, flags = np.array(self._waiting_pa[:n]), np.array(self._waiting_flags[:n])
+        current_pa = _converted_pa(np.array(self._waiting_a[:n]))
         temperature = self._world.psd_temperature_degC
         ahead_us = round((self.clock.tells(first_ns * 1e-9) - first_ns * 1e-9) * 1e6)
         stamp_us = max(0, first_ns // 1000 + ahead_us)
-        encoded = frames.data(self._sequence, stamp_us, self._period_ns, temperature, currents, flags)
+        encoded = frames.data(self._sequence, stamp_us, self._period_ns, temperature, current_pa, _flags(current_pa))
         self._sequence += n
-        del self._waiting_ns[:n], self._waiting_pa[:n], self._waiting_flags[:n]
+        del self._waiting_ns[:n], self._waiting_a[:n]
         if self.silent:
             return
         if self.damaged_frames > 0:
@@ -161,8 +154,12 @@ class PsdDaqBox:
 
     def _forget(self) -> None:
         self._waiting_ns.clear()
-        self._waiting_pa.clear()
-        self._waiting_flags.clear()
+        self._waiting_a.clear()
+
+
+def _converted_pa(current_a: NDArray[np.float64]) -> NDArray[np.int32]:
+    """Whole picoamperes, which end at full scale; same shape."""
+    return np.clip(np.rint(current_a * 1e12), -FULL_SCALE_PA, FULL_SCALE_PA).astype(np.int32)
 
 
 def _flags(current_pa: NDArray[np.int32]) -> NDArray[np.uint16]:

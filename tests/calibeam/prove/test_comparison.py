@@ -1,5 +1,6 @@
 """After the reveal: an oracle, other methods, and columns hidden on purpose, on one session with one effect."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,19 +11,22 @@ import pytest
 from acquisition.recording.read import read
 from calibeam.prove.baselines.features import features
 from calibeam.prove.comparison import GEOMETRY, compare
-from calibeam.prove.hidden_angle import hidden_angles
+from calibeam.prove.hidden_angle import SEED, hidden_angles
 from calibeam.prove.oracle import fold_of, oracle_terms
 from calibeam.prove.truth import Truth, truth_of
 from calibeam.prove.unseen_file import write_asked
 from calibeam.prove.unseen_poses import tool_at
+from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.diagnosis import Verdict
 from calibrate.diagnose.file import write_diagnosis
 from calibrate.diagnose.fitted import Fitted, fit_geometry
+from calibrate.diagnose.folds import splits_of
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.diagnose.session import session_of
+from calibrate.diagnose.stated_sizes import sizes_of
 from simulators.conceal.case import conceal
 from simulators.conceal.reveal import truth_document
-from simulators.conceal.wanted import Wanted
+from simulators.conceal.wanted import Family, Wanted
 from simulators.conceal.write import write_case
 
 WANTED = Wanted("tracker", seed=41, defects=("encoder-eccentricity",), enr=3.0, samples=200)
@@ -78,6 +82,31 @@ def test_a_diagnosis_that_finds_nothing_gains_nothing(
     assert gains["diagnosis"] == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("family", "mechanism"),
+    [
+        ("tracker", "wrong-gear-ratio"),
+        ("tracker", "coupled-wrist"),
+        ("tracker", "unsettled"),
+        ("dual-psd", "psd-gain"),
+        ("dual-psd", "psd-pincushion"),
+    ],
+)
+def test_the_true_size_has_the_name_and_the_sign_of_the_stated_one(
+    family: Family, mechanism: str, tmp_path: Path
+) -> None:
+    """Else it would never be held against it: what is stated of the true term, fitted to plain data, is the truth."""
+    case = conceal(Wanted(family, seed=47, defects=(mechanism,), enr=6.0, samples=160))
+    write_case(case, tmp_path)
+    source = read(tmp_path / "recording")
+    state = fit_geometry(session_of(source.rig, source.samples))
+    terms = oracle_terms(state, truth_of(msgspec.json.encode(truth_document(case))).defects, family)
+    assert terms is not None
+    stated = sizes_of(Bench(state.refitted(terms)), 0)
+    for name, true in case.hidden[0].defect.figures.items():
+        assert abs(stated[name].value - true) < max(4.0 * stated[name].sigma, 0.1 * abs(true))
+
+
 def test_learners_are_not_given_the_answer(state: Fitted) -> None:
     """No feature is a reading as measured, nor follows the misfit by itself."""
     fold = fold_of(state, 1)
@@ -92,6 +121,23 @@ def test_a_hidden_angle_is_inferred_as_well_as_stated(folder: Path) -> None:
     for hidden in hidden_angles(read(folder)):
         if hidden.rms_rad is not None and hidden.expected_rad is not None:
             assert hidden.rms_rad < 2.0 * hidden.expected_rad
+
+
+def test_the_doubt_of_a_hidden_angle_does_not_hang_on_the_angle(folder: Path) -> None:
+    """A joint column that is wrong where it is hidden changes what is missed, and not the doubt stated before."""
+    recording = read(folder)
+    state = fit_geometry(session_of(recording.rig, recording.samples))
+    samples = np.unique(state.rows.sample[state.rows.data])
+    test = splits_of(state.drivers, samples, np.random.default_rng(SEED))[0].unseen[0]
+    wrong = dict(recording.samples.columns) | {"q2_rad": recording.samples.column("q2_rad").copy()}
+    wrong["q2_rad"][test] += 2e-3
+    samples_off = replace(recording.samples, columns=wrong)
+    fair, off = (hidden_angles(replace(recording, samples=s))[1] for s in (recording.samples, samples_off))
+    assert fair.rms_rad is not None
+    assert off.rms_rad is not None
+    assert fair.expected_rad is not None
+    assert off.rms_rad > 1.5e-3 > 3.0 * fair.rms_rad
+    assert off.expected_rad == pytest.approx(fair.expected_rad, rel=0.2)
 
 
 def test_unseen_poses_of_geometry_alone_are_those_of_the_arm(state: Fitted) -> None:

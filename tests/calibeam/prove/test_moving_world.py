@@ -26,6 +26,7 @@ RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
 @pytest.mark.parametrize("mechanism", ["soft-joint", "encoder-eccentricity"])
 def test_the_spots_of_a_session_are_those_of_the_fast_path_within_noise(mechanism: str, tmp_path: Path) -> None:
     rig, clock = load_rig(RIG), SystemClock()
+    assert rig.fixture is not None
     wanted = Wanted("dual-psd", seed=31, defects=(mechanism,), enr=5.0, samples=16, places=1)
     wired = draw_wired(wanted, tomllib.loads(RIG.read_text()))
     hidden = [one.defect for one in wired.hidden]

@@ -14,10 +14,12 @@ Found = Callable[..., DefectScore]
 
 @pytest.fixture
 def proof(case: Case, found: Found) -> Callable[..., ProofFile]:
-    def make(*, seed: int = 20261121, without: tuple[str, ...] = ()) -> ProofFile:
+    def make(
+        *, seed: int = 20261121, without: tuple[str, ...] = (), command: str = "calibeam prove --publish"
+    ) -> ProofFile:
         plain = case((found(enr=1.2),), oracle_free_space_m=0.9e-5)
         wired = case((found(enr=2.5, named=False),), path="on wires")
-        return ProofFile(SCHEMA, "calibeam 1", seed, seed < 1000, "calibeam prove", "", 600.0, (plain, wired), without)
+        return ProofFile(SCHEMA, "calibeam 1", seed, seed < 1000, command, "", 600.0, (plain, wired), without)
 
     return make
 
@@ -36,6 +38,8 @@ def test_development_is_not_for_the_public(proof: Callable[..., ProofFile]) -> N
         table_of(proof(seed=21))
     with pytest.raises(DataError, match="taken out"):
         table_of(proof(without=("backlash",)))
+    with pytest.raises(DataError, match="not made to be published"):
+        table_of(proof(command="calibeam prove --kind one --enr 3 8"))
 
 
 def test_the_table_goes_between_its_marks_and_nothing_else_changes() -> None:

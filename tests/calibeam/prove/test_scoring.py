@@ -130,6 +130,29 @@ def test_each_of_several_causes_needs_a_finding_of_its_own(scored: Scored, defec
     assert [d.named for d in case.defects] == [True, False]
 
 
+def test_a_name_is_that_of_one_cause_at_its_place(scored: Scored, defect: MakeDefect) -> None:
+    two = (defect("backlash"), defect("encoder-eccentricity"))
+    case = scored(two, _finding("joint2.angle", "encoder-eccentricity"))
+    assert [(d.located, d.named) for d in case.defects] == [(False, False), (True, True)]
+
+
+def test_unknown_may_stand_for_two_causes_at_its_place(scored: Scored, defect: MakeDefect) -> None:
+    two = (defect("backlash"), defect("encoder-eccentricity"))
+    case = scored(two, _finding("joint2.angle", "unknown"))
+    assert [(d.located, d.named) for d in case.defects] == [(True, False), (True, False)]
+
+
+def test_of_two_causes_alike_the_one_whose_driver_is_said_is_named(scored: Scored, defect: MakeDefect) -> None:
+    two = (defect("joint-coupling", drivers=("q4",)), defect("joint-coupling", drivers=("q5",)))
+    case = scored(two, _finding("joint2.angle", "joint-coupling", depends_on="q5"))
+    assert [d.named for d in case.defects] == [False, True]
+
+
+def test_all_findings_count_for_a_single_cause(scored: Scored, defect: MakeDefect) -> None:
+    case = scored((defect(),), _finding("joint2.angle", "backlash"), _finding("joint2.angle", "encoder-eccentricity"))
+    assert case.defects[0].named
+
+
 def test_unknown_at_its_place_is_right_for_what_no_catalogue_lists(scored: Scored, defect: MakeDefect) -> None:
     case = scored((defect("unknown"),), _finding("joint2.angle", "unknown"))
     assert case.kind == "outside"

@@ -4,11 +4,11 @@ from collections.abc import Callable
 
 import pytest
 
-from calibeam.prove.confusion import confusion
+from calibeam.prove.confusion import ELSEWHERE, confusion
 from calibeam.prove.interval import Share, share
 from calibeam.prove.record import CaseScore, DefectScore, Said, SizeScore
 from calibeam.prove.story import faults
-from calibeam.prove.tally import by_enr, figures
+from calibeam.prove.tally import by_effect, by_enr, figures, plain
 
 Case = Callable[..., CaseScore]
 Found = Callable[..., DefectScore]
@@ -34,11 +34,37 @@ def test_causes_count_in_their_bin(case: Case, found: Found) -> None:
     assert (lines["2 - 5"].named.k, lines["2 - 5"].located.k) == (0, 1)
 
 
+def test_what_else_was_said_is_counted_by_case_and_not_by_mechanism(case: Case, found: Found) -> None:
+    cases = [case((found(),), (_said(right=True), _said("reading-lag")))]
+    assert plain(cases, "").others == "1.00"
+    assert [line.others for line in by_effect(cases)] == ["-"]
+
+
 def test_a_finding_in_mere_noise_is_a_false_alarm(case: Case) -> None:
     table = {f.label: f.said for f in figures([case(), case(said=(_said(),))])}
     assert table["false alarms, white noise"].startswith("50\u00a0% ")
     assert faults(case(said=(_said(),)))
     assert not faults(case())
+
+
+def test_structure_that_is_claimed_in_mere_noise_is_a_false_alarm(case: Case) -> None:
+    claimed = case(unexplained=True)
+    assert claimed.alarmed
+    assert faults(claimed) == ["false alarm"]
+
+
+def test_of_faint_causes_each_name_has_to_be_right_however_doubtful(case: Case, found: Found) -> None:
+    faint = found(enr=0.2)
+    cases = [case((faint,), (_said(confidence=0.4), _said(right=True), _said("unknown")))]
+    table = {f.label: f.said for f in figures(cases)}
+    assert table["faint (0.15 - 0.3): what is named is right"].startswith("50\u00a0% ")
+
+
+def test_a_name_that_is_believed_is_not_said_to_be_unknown(case: Case, found: Found) -> None:
+    outside = found(physics="unknown", named=False)
+    for said, share_said in (((), "100\u00a0% "), ((_said(),), "0\u00a0% ")):
+        table = {f.label: f.said for f in figures([case((outside,), said, kind="outside", unexplained=True)])}
+        assert table["outside: said to be unknown"].startswith(share_said)
 
 
 def test_a_confident_name_for_what_no_catalogue_lists_is_a_fault(case: Case, found: Found) -> None:
@@ -56,6 +82,13 @@ def test_a_faint_cause_need_not_be_found(case: Case, found: Found) -> None:
 def test_a_stated_size_has_to_hold() -> None:
     assert SizeScore("play_rad", 1e-4, 1.1e-4, 0.6e-5).inside
     assert not SizeScore("play_rad", 1e-4, 1.3e-4, 1e-5).inside
+
+
+def test_the_right_name_at_another_place_is_not_on_the_diagonal(case: Case, found: Found) -> None:
+    hidden, said, counts = confusion([case((found(located=False, named=False),), (_said("backlash"),))])
+    assert hidden == ["backlash"]
+    assert counts[0, said.index("backlash")] == 0
+    assert counts[0, said.index(ELSEWHERE)] == 1
 
 
 def test_the_confusion_matrix_has_right_answers_on_its_diagonal(case: Case, found: Found) -> None:
