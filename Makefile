@@ -23,7 +23,8 @@ demo: $(READY)
 
 test: $(READY) $(CLIENTS)/.ready
 	$(BIN)/python -m pytest -m "not endure and not wired" -n 2 --dist loadfile
-	$(BIN)/python -m pytest -m "wired and not endure"
+	$(BIN)/python -m pytest -m "wired and not alone and not endure" -n 2 --dist loadfile
+	$(BIN)/python -m pytest -m "alone and not endure"
 
 # What takes too long for every day: a million mutated inputs a codec, a hundred plugs pulled, and more of the same.
 endure: $(READY)

@@ -10,10 +10,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.aiming.by_camera import Aim, Aimed
 from acquisition.aiming.pose import BeamTarget, between, flange_for
 from acquisition.aiming.reach import reach
 from acquisition.aiming.search import Found, Search
 from acquisition.bench import Bench
+from acquisition.camera.sight import Sight
 from acquisition.errors import NoLightError, SpotLostError, UnreachableError
 from acquisition.journal import Journal
 from acquisition.learner import Learner
@@ -42,8 +44,17 @@ class LitPose:
 class Navigator:
     """Owns where the arm stands (as commanded), which way its joints last moved, and where this block had light."""
 
-    def __init__(self, bench: Bench, learner: Learner, journal: Journal, home_rad: Floats, seed: int) -> None:
-        self._bench, self._learner, self._journal = bench, learner, journal
+    def __init__(
+        self,
+        bench: Bench,
+        learner: Learner,
+        journal: Journal,
+        home_rad: Floats,
+        seed: int,
+        sight: Sight | None = None,
+    ) -> None:
+        """`sight`: a camera that sees the fixture; without one, light is searched around the nominal rig's aim."""
+        self._bench, self._learner, self._journal, self._sight = bench, learner, journal, sight
         self._rng = np.random.default_rng(seed)
         self._lit: list[LitPose] = []
         self._placement = 0
@@ -56,9 +67,9 @@ class Navigator:
         self._note(q_rad)
 
     def find(self, placement: int, first: int, roll_rad: float) -> None:
-        """Begin a block: aim by what is believed, search if that misses, come near the centres. NoLightError."""
+        """Begin a block: aim by what is seen or believed, else search, come near the centres. NoLightError."""
         self._placement = placement
-        T = self._learner.T_base_fixture(placement)
+        T = self._seen(self._learner.T_base_fixture(placement))
         target = BeamTarget(first, (0.0, 0.0, 0.0, 0.0), FINDING_STAND_OFF_M, roll_rad)
         self.move(self._reach(T, target, self.q_rad))
         self._stand_in_light(target, T)
@@ -69,8 +80,10 @@ class Navigator:
         NoLightError where there is none.
         """
         self._placement = placement
-        target = BeamTarget(first, spots_m, FINDING_STAND_OFF_M, 0.0)
-        self._stand_in_light(target, self._learner.T_base_fixture(placement))
+        target, T = BeamTarget(first, spots_m, FINDING_STAND_OFF_M, 0.0), self._learner.T_base_fixture(placement)
+        if self._dark(first):
+            self._search(first, T)
+        self._stand_in_light(target, T)
         return self.q_rad
 
     def visit(self, target: BeamTarget, limits: Limits | None) -> Centring:
@@ -84,20 +97,23 @@ class Navigator:
             return self._centre(target, self._land(target), limits or NEAR)
         except (SpotLostError, UnreachableError):
             self.move(back.q_rad)
-            if not all(self._bench.look(GLANCE_S).lit(target.first)):  # the fixture was moved, or the laser is off
+            if self._dark(target.first):  # the fixture was moved, or the laser is off
                 self._stand_in_light(back.target, back.T_base_fixture)
             raise
 
     def _stand_in_light(self, target: BeamTarget, T: Floats) -> None:
-        """Search around where the arm stands if it is dark there, come near the centres, and forget older lit poses.
+        """Aim by camera or search if it is dark there, come near the centres, and forget older lit poses.
 
         NoLightError when nothing is found, or when it is lost at once: then no lit pose is left to go back to.
         """
-        if not all(self._bench.look(GLANCE_S).lit(target.first)):
-            self._search(target.first, T)
+        aimed, fixture = target, T
+        if self._dark(target.first) and self._sight is not None:
+            aimed, fixture = self._aim(self._sight, target, T)
+        if self._dark(target.first):
+            self._search(target.first, fixture)
         self._lit = []
         try:
-            self._centre(target, T, NEAR)
+            self._centre(aimed, fixture, NEAR)
         except SpotLostError as lost:
             raise NoLightError(
                 f"place {self._placement}, PSD {target.first} first: light was found, but {lost}; "
@@ -136,6 +152,21 @@ class Navigator:
             raise SpotLostError(f"the light was lost while centring: {run.status.value}")
         self._lit.append(LitPose(target, self.q_rad, strategy.T_base_fixture))
         return run
+
+    def _dark(self, first: int) -> bool:
+        return not all(self._bench.look(GLANCE_S).lit(first))
+
+    def _seen(self, T: Floats) -> Floats:
+        """The fixture as the camera sees it from here; as believed where it does not, or where there is none."""
+        seen = None if self._sight is None else self._sight.fixture(self._learner.arm, self.q_rad, T)
+        return T if seen is None else seen
+
+    def _aim(self, sight: Sight, target: BeamTarget, T: Floats) -> tuple[BeamTarget, Floats]:
+        """By camera, from where the arm stands; the target with the roll it could have, and the fixture as seen."""
+        aim = Aim(self._bench, sight, self._learner.arm, self._learner.optics).run(target, self.q_rad, T, self._rng)
+        self._note(aim.q_rad)
+        self._journal.event("aim", {"aimed": aim.aimed.name, "motions": aim.motions})
+        return (target, T) if aim.aimed is Aimed.UNSEEN else (aim.target, aim.T_base_fixture)
 
     def _search(self, first: int, T: Floats) -> None:
         result = Search(self._bench, self._learner.arm, self._learner.optics, T, first).run(self.q_rad)

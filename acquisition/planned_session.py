@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from acquisition.aiming.reach import clear_of_table
 from acquisition.bench import Bench
+from acquisition.camera.sight import Sight
 from acquisition.errors import AcquisitionError, NoLightError, SpotLostError, UnreachableError
 from acquisition.journal import Journal
 from acquisition.learner import Learner
@@ -47,9 +48,10 @@ class PlannedSession:
         home_rad: Floats,
         *,
         progress: Progress = lambda done, total, text: None,
+        sight: Sight | None = None,
     ) -> None:
         self._bench, self._learner, self._journal, self._options = bench, learner, journal, options
-        self._navigator = Navigator(bench, learner, journal, home_rad, options.seed)
+        self._navigator = Navigator(bench, learner, journal, home_rad, options.seed, sight)
         self._progress = progress
         self._samples: list[Sample] = []
         self._skipped = 0
@@ -85,7 +87,7 @@ class PlannedSession:
         look = self._bench.look(self._options.dwell_s)
         if not usable(look):
             return self._skip(placement, "no light, or saturated, when read")
-        sample = Sample(look, placement, first, self._navigator.approach.copy(), None, centred=False)
+        sample = Sample(look, placement, first, self._navigator.approach.copy(), pose.repeat, centred=False)
         self._samples.append(sample)
         self._journal.sample(sample)
         return None

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.bench import Bench, Look
+from acquisition.camera.sight import Sight
 from acquisition.errors import SpotLostError, UnreachableError
 from acquisition.journal import Journal
 from acquisition.learner import Learner
@@ -45,9 +46,10 @@ class Session:
         *,
         limits: Limits | None = None,
         progress: Progress = lambda done, total, text: None,
+        sight: Sight | None = None,
     ) -> None:
         self._bench, self._learner, self._journal, self._options = bench, learner, journal, options
-        self._navigator = Navigator(bench, learner, journal, home_rad, options.seed)
+        self._navigator = Navigator(bench, learner, journal, home_rad, options.seed, sight)
         self._limits, self._progress = limits or Limits(), progress
         self._samples: list[Sample] = []
         self._steps: list[int] = []

@@ -1,5 +1,6 @@
 """`make bench`: every benchmark, or those named: `python -m benchmarks centring zeros`."""
 
+import math
 import sys
 import tempfile
 from collections.abc import Callable
@@ -11,13 +12,18 @@ from benchmarks import (
     can_frames,
     centring,
     centring_plot,
+    centring_wires,
+    coarse_aim,
     coverage,
     damaged,
+    designed_poses,
     device_faults,
+    error_simulation,
     false_alarms,
     inverse,
     killed,
     log_cost,
+    measuring_arm,
     plan_taken,
     real_diagnosis,
     rtde_jitter,
@@ -28,6 +34,16 @@ from benchmarks import (
 )
 
 RIG = Path(__file__).parents[1] / "rigs" / "ur5e-dual-psd.toml"
+CAMERA_RIG = RIG.with_name("ur5e-dual-psd-camera.toml")
+
+
+def run_centring_cold() -> None:
+    rig, plain = load_rig(RIG), plain_rig(rig_text(RIG), str(RIG))
+    cold = (centring.SESSIONS,)
+    print("centring from 500 random cold starts, fixture pose wrong by up to 90 deg and 50 mm, orders alternating")
+    print("\n".join(centring.lines(centring.run(rig, plain, 500, 21_000, cold, math.radians(90.0)))))
+    print("from 200, wrong by up to 45 deg")
+    print("\n".join(centring.lines(centring.run(rig, plain, 200, 22_000, cold, math.radians(45.0)))))
 
 
 def run_centring() -> None:
@@ -35,9 +51,21 @@ def run_centring() -> None:
     print("centring from 100 random starts, fixture pose wrong by up to 80 deg and 50 mm, orders alternating")
     runs = centring.run(rig, plain)
     print("\n".join(centring.lines(runs)))
-    centring_plot.write_plot(RIG.parents[1] / "out" / "centring.svg", runs)
-    print("steps to 5 um drawn in out/centring.svg")
+    centring_plot.write_plot(RIG.parents[1] / "docs" / "figures" / "centring.svg", runs)
+    print("steps to 5 um drawn in docs/figures/centring.svg")
     print("\n".join(centring.search_lines(centring.run_search(rig, plain))))
+
+
+def run_centring_wires() -> None:
+    print("centring on wires at 500 Hz, real time; needs a quiet machine")
+    for row in centring_wires.lines(RIG):
+        print(row, flush=True)
+
+
+def run_coarse_aim() -> None:
+    print("coarse aim by camera, 200 random starts with the board in view, 50 worlds, orders alternating")
+    for row in coarse_aim.lines(CAMERA_RIG):
+        print(row, flush=True)
 
 
 def run_zeros() -> None:
@@ -82,6 +110,18 @@ def run_plan_taken() -> None:
     with tempfile.TemporaryDirectory() as folder:
         for row in plan_taken.lines(RIG, Path(folder), range(61, 67)):
             print(row, flush=True)
+
+
+def run_designed_poses() -> None:
+    print("60 designed poses beside 60 random ones on the emulated rig: true error of the beam in free space")
+    for row in designed_poses.lines(RIG, range(1, 21)):
+        print(row, flush=True)
+
+
+def run_errors() -> None:
+    print("a million perturbed arms")
+    for row in error_simulation.lines(RIG.parent):
+        print(row, flush=True)
 
 
 def run_wired_streams() -> None:
@@ -131,8 +171,22 @@ def run_log_cost() -> None:
         print(row, flush=True)
 
 
+def run_measuring_arm() -> None:
+    print(
+        "a measuring arm from cones and bars by an emulated hand, judged on fresh readings against its encoders' noise"
+    )
+    outcomes: list[measuring_arm.Outcome] = []
+    for outcome in measuring_arm.run(RIG.with_name("arm-cmm-reference.toml"), range(1, 9)):
+        outcomes.append(outcome)
+        print(measuring_arm.line(outcome), flush=True)
+    print(measuring_arm.summary_line(outcomes))
+
+
 BENCHMARKS: dict[str, Callable[[], None]] = {
     "centring": run_centring,
+    "centring_cold": run_centring_cold,
+    "centring_wires": run_centring_wires,
+    "coarse_aim": run_coarse_aim,
     "inverse": run_inverse,
     "zeros": run_zeros,
     "coverage": run_coverage,
@@ -142,7 +196,10 @@ BENCHMARKS: dict[str, Callable[[], None]] = {
     "streams": run_streams,
     "wired_streams": run_wired_streams,
     "plan_taken": run_plan_taken,
+    "errors": run_errors,
+    "designed_poses": run_designed_poses,
     "real": run_real,
+    "measuring-arm": run_measuring_arm,
     "recording": run_recording,
     "log_cost": run_log_cost,
     "faults": run_faults,

@@ -1,15 +1,18 @@
 """Every fault kind at every device in every phase: each case must end in a defined state within LIMIT_S.
 
+`python -m benchmarks faults`: PSD box, CAN encoders, RTDE and Modbus controller, and a pair of KPA101.
+
 Defined are: the call returned and what it returned is in order, or a DeviceError was raised; and an arm that was moving
 stands. A kind that a device cannot have (a clock step where no time is sent) is refused by the emulator, and counted
 apart. What the faults do is in docs/protocols/faults.md.
 """
 
+import tempfile
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,22 +21,28 @@ import numpy as np
 
 from acquisition.guarded import Guarded
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig_schema import PsdDriver, Rig, RobotDriver
 from acquisition.streams import Pump
 from acquisition.supervisor import Supervisor
 from calibeam.encoders import emulated_encoders, encoder_driver
 from calibeam.psd import emulated_psd, psd_driver
 from calibeam.robot import emulated_robot, robot_of
-from drivers.clock import SystemClock
+from drivers.clock import Clock, SystemClock
 from drivers.device import Block, Device, Movable
 from drivers.errors import DeviceError
 from simulators.faults.injector import KINDS
 from simulators.process import Emulators, EmulatorsError
 
 RIGS = Path(__file__).parents[1] / "rigs"
+DEVICES = {  # a shipped rig, and those of its devices that are tried on it
+    "ur5e-dual-psd.toml": ("psd", "can", "rtde"),
+    "irb120-modbus.toml": ("modbus",),
+    "ur5e-dual-kpa101.toml": ("kpa101",),
+}
 LIMIT_S = 2.0
 WATCHED_S = 0.6  # of a stream under a fault that it survives
 READ_S = 0.5  # what a pump waits for a sample
+INJECTED = {"psd": "psd", "kpa101": "psd", "can": "can", "rtde": "robot", "modbus": "robot"}  # the emulators' names
 PHASES = ("connect", "idle", "stream", "move", "close")
 SPEED_RAD_S, ACCELERATION_RAD_S2 = 1.0, 5.0
 WAY_RAD = 0.4  # half a second
@@ -66,10 +75,26 @@ class Outcome:
         return not self.ended.startswith("UNDEFINED") and self.took_s < LIMIT_S
 
 
-def subjects(cleaning: ExitStack) -> list[Subject]:
-    """PSD box, CAN encoders, RTDE and Modbus controller, each of emulators that run until `cleaning` ends."""
-    ur, modbus = (_started(RIGS / name, cleaning) for name in ("ur5e-dual-psd.toml", "irb120-modbus.toml"))
-    return [*_with_ur(*ur), _with_modbus(*modbus)]
+@contextmanager
+def subjects(rig_name: str) -> Generator[dict[str, Subject]]:
+    """The devices of DEVICES on that rig, by name, and their emulators for as long as this lasts."""
+    path, clock = RIGS / rig_name, SystemClock()
+    rig, plain = load_rig(path), plain_rig(rig_text(path), str(path))
+    with tempfile.TemporaryDirectory() as links:  # an unplugged device comes back under the name of its link
+        devices = plain["devices"]
+        for table, key in (("psd", "port"), ("encoders", "channel")):
+            if key in devices.get(table, {}):
+                devices[table][key] = f"{links}/{table}"
+        if "ports" in devices.get("psd", {}):
+            devices["psd"]["ports"] = [f"{links}/psd{unit}" for unit in (1, 2)]
+        with Emulators(plain) as emulators:
+            makers = _makers(rig, emulators.address, clock)
+            arm = _arm(rig, emulators.address, clock)
+            home_rad = np.array(rig.motion.home_rad)
+            yield {
+                name: Subject(name, INJECTED[name], makers[name], arm, home_rad, emulators)
+                for name in DEVICES[rig_name]
+            }
 
 
 def run(
@@ -84,13 +109,15 @@ def run(
 
 def lines() -> Iterator[str]:
     """The table of all cases, as they end."""
-    with ExitStack() as cleaning:
-        outcomes: list[Outcome] = []
-        for outcome in run(subjects(cleaning)):
-            outcomes.append(outcome)
-            if not outcome.defined:
-                yield f"{outcome.device} {outcome.kind} {outcome.phase}: {outcome.ended} after {outcome.took_s:.2f} s"
-        yield from summary(outcomes)
+    outcomes: list[Outcome] = []
+    for rig_name in DEVICES:
+        with subjects(rig_name) as found:
+            for outcome in run(list(found.values())):
+                outcomes.append(outcome)
+                if not outcome.defined:
+                    case = f"{outcome.device} {outcome.kind} {outcome.phase}"
+                    yield f"{case}: {outcome.ended} after {outcome.took_s:.2f} s"
+    yield from summary(outcomes)
 
 
 def summary(outcomes: Sequence[Outcome]) -> Iterator[str]:
@@ -102,42 +129,26 @@ def summary(outcomes: Sequence[Outcome]) -> Iterator[str]:
     yield f"slowest: {slowest.device} {slowest.kind} {slowest.phase} {slowest.took_s:.2f} s"
 
 
-def _started(path: Path, cleaning: ExitStack) -> tuple[Rig, Emulators]:
-    rig, plain = load_rig(path), plain_rig(rig_text(path), str(path))
-    links = cleaning.enter_context(_Folder())
-    for device in ("psd", "encoders"):
-        if device in plain["devices"]:
-            key = "port" if device == "psd" else "channel"
-            plain["devices"][device][key] = str(links / device)
-    return rig, cleaning.enter_context(Emulators(plain))
+def _makers(rig: Rig, where: Mapping[str, Any], clock: Clock) -> dict[str, Callable[[], Device]]:
+    """How to make the driver of every device that the rig has, by its name in DEVICES."""
+    makers: dict[str, Callable[[], Device]] = {}
+    psd, encoders = rig.devices.psd, rig.devices.encoders
+    if psd is not None:
+        given = emulated_psd(psd, where["psd"])
+        name = "kpa101" if psd.driver is PsdDriver.KPA101 else "psd"
+        makers[name] = lambda: psd_driver(given, rig, clock)
+    if encoders is not None:
+        bus = emulated_encoders(encoders, where["can"])
+        makers["can"] = lambda: encoder_driver(bus, clock)
+    robot = emulated_robot(_given(rig.devices.robot), where["robot"])
+    name = "modbus" if robot.driver is RobotDriver.MODBUS else "rtde"
+    makers[name] = lambda: robot_of(robot, clock).reader
+    return makers
 
 
-def _with_ur(rig: Rig, emulators: Emulators) -> Iterator[Subject]:
-    clock, where = SystemClock(), emulators.address
-    psd, encoders = emulated_psd(_given(rig.devices.psd), where["psd"]), rig.devices.encoders
-    bus = emulated_encoders(_given(encoders), where["can"])
+def _arm(rig: Rig, where: Mapping[str, Any], clock: Clock) -> Callable[[], Movable]:
     device = emulated_robot(_given(rig.devices.robot), where["robot"])
-
-    def arm() -> Movable:
-        return robot_of(device, clock).arm()
-
-    home_rad = np.array(rig.motion.home_rad)
-    yield Subject("psd", "psd", lambda: psd_driver(psd, rig, clock), arm, home_rad, emulators)
-    yield Subject("can", "can", lambda: encoder_driver(bus, clock), arm, home_rad, emulators)
-    yield Subject("rtde", "robot", lambda: robot_of(device, clock).reader, arm, home_rad, emulators)
-
-
-def _with_modbus(rig: Rig, emulators: Emulators) -> Subject:
-    clock = SystemClock()
-    device = emulated_robot(_given(rig.devices.robot), emulators.address["robot"])
-    return Subject(
-        "modbus",
-        "robot",
-        lambda: robot_of(device, clock).reader,
-        lambda: robot_of(device, clock).arm(),
-        np.array(rig.motion.home_rad),
-        emulators,
-    )
+    return lambda: robot_of(device, clock).arm()
 
 
 def _case(subject: Subject, kind: str, phase: str, count: int | None) -> Outcome:
@@ -155,6 +166,8 @@ def _case(subject: Subject, kind: str, phase: str, count: int | None) -> Outcome
         ended = "no such fault"
     except DeviceError as error:
         ended = next(t.__name__ for t in type(error).__mro__ if t.__module__ == DeviceError.__module__)
+        if not times_s:
+            ended = f"UNDEFINED: {ended} before the fault came: {error}"
     except Exception as error:  # what must not happen
         ended = f"UNDEFINED {type(error).__name__}: {error}"
     times_s.append(time.monotonic())
@@ -273,16 +286,3 @@ def _given(device: Any) -> Any:
     if device is None:
         raise ValueError("the rig lacks this device")
     return device
-
-
-class _Folder:
-    """A temporary one for the links, so that an unplugged device comes back under its name."""
-
-    def __enter__(self) -> Path:
-        import tempfile
-
-        self._folder = tempfile.TemporaryDirectory()
-        return Path(self._folder.name)
-
-    def __exit__(self, *error: object) -> None:
-        self._folder.cleanup()

@@ -7,10 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.errors import AcquisitionError
 from acquisition.guarded import one_error_tree
 from acquisition.psd_view import psd_window
-from acquisition.recording.rig_schema import Rig, RobotDriver
+from acquisition.recording.errors import RigFileError
+from acquisition.recording.rig_schema import Camera, Rig, RobotDriver
+from calibeam.camera import camera_sight
 from calibeam.encoders import encoder_driver, identities_of
+from calibeam.listened import bus_trouble, noise, pace, uneven_layers
 from calibeam.psd import psd_driver, psd_view
 from calibeam.robot import robot_of
 from drivers.clock import Clock
@@ -20,9 +24,9 @@ from drivers.psd_daq.messages import Flag
 from drivers.ur.dashboard import UrDashboard
 from drivers.ur.reader import UrReader
 
+PICTURES = 3  # of the camera
 READ_S = 1.0  # host time that a device is listened to
 FIRST_SAMPLE_S = 1.0
-LEAST_RATE = 0.9  # of the rate asked for; below this samples are lost or the device cannot keep up
 NAMES = ("psd", "encoders", "robot")
 
 
@@ -57,6 +61,11 @@ def check_devices(rig: Rig, clock: Clock) -> Iterator[DeviceCheck]:
                 yield checks[name](rig, clock)
         except DeviceError as error:
             yield DeviceCheck(name, wrong=str(error))
+    if rig.camera is not None:
+        try:
+            yield _camera(rig, rig.camera, clock)
+        except (AcquisitionError, RigFileError, DeviceError) as error:
+            yield DeviceCheck("camera", wrong=str(error))
 
 
 @contextmanager
@@ -73,6 +82,16 @@ def _listened(device: Device, clock: Clock) -> Generator[list[Block]]:
         device.close()
 
 
+def _camera(rig: Rig, camera: Camera, clock: Clock) -> DeviceCheck:
+    with camera_sight(rig, clock) as sight, one_error_tree("camera", "checking"):
+        begin_s = clock.now_s()
+        seen = sum(sight is not None and sight.sees_board() for _ in range(PICTURES))
+        rate_hz = PICTURES / (clock.now_s() - begin_s)
+    board = f"board in {seen} of {PICTURES} pictures" if seen else "board not in the picture from here"
+    what = f"{camera.width_px} x {camera.height_px} from {camera.source}"
+    return DeviceCheck("camera", what, rate_hz=rate_hz, noise=board)
+
+
 def _psd(rig: Rig, clock: Clock) -> DeviceCheck:
     device = rig.devices.psd
     assert device is not None  # noqa: S101 - asked by check_devices
@@ -82,12 +101,14 @@ def _psd(rig: Rig, clock: Clock) -> DeviceCheck:
         window = psd_window(blocks)
         spots_m = psd_view(psd, device).each(window)
     dark = [k + 1 for k in (0, 1) if np.isnan(spots_m[:, 2 * k]).mean() > 0.5]
-    noise = "no light on either face" if len(dark) == 2 else f"noise {1e6 * _noise(spots_m):.2f} um a sample"
-    rate_hz, wrong = _pace(blocks, device.rate_hz)
+    told = "no light on either face" if len(dark) == 2 else f"noise {1e6 * noise(spots_m):.2f} um a sample"
+    rate_hz, wrong = pace(blocks, device.rate_hz)
     if (window.flags & (Flag.PSD1_SATURATED | Flag.PSD2_SATURATED)).any():
         wrong = wrong or "a face is saturated: lessen the laser's power or the gain"
+    if identity is not None:
+        wrong = wrong or uneven_layers(identity.faces, [k + 1 not in dark for k in (0, 1)], window.current_a)
     what = "" if identity is None else f"{identity.model} {identity.serial_number}"
-    return DeviceCheck("psd", what, "" if identity is None else identity.firmware, rate_hz, noise, wrong)
+    return DeviceCheck("psd", what, "" if identity is None else identity.firmware, rate_hz, told, wrong)
 
 
 def _encoders(rig: Rig, clock: Clock) -> DeviceCheck:
@@ -97,7 +118,9 @@ def _encoders(rig: Rig, clock: Clock) -> DeviceCheck:
     with _listened(driver, clock) as blocks:
         q_rad = np.concatenate([block.values["position_rad"] for block in blocks])
         identities = identities_of(driver)
-    rate_hz, wrong = _pace(blocks, device.sync_hz)
+    rate_hz, wrong = pace(blocks, device.sync_hz)
+    registers = {int(identity["node"]): int(identity["error_register"]) for identity in identities}
+    wrong = wrong or bus_trouble(blocks[-1], registers)
     mute = [k + 1 for k in range(q_rad.shape[1]) if np.isnan(q_rad[:, k]).all()]
     if mute:
         wrong = f"encoders of joints {mute} do not answer: check their node numbers, power and cable"
@@ -105,7 +128,7 @@ def _encoders(rig: Rig, clock: Clock) -> DeviceCheck:
     what = f"{q_rad.shape[1]} encoders on {device.interface} {device.channel}"
     what += f" (serial numbers {numbers})" if numbers else ""
     firmware = "/".join(sorted({f"{identity.get('revision', 0):#x}" for identity in identities}))
-    return DeviceCheck("encoders", what, firmware, rate_hz, f"noise {1e6 * _noise(q_rad):.2f} urad", wrong)
+    return DeviceCheck("encoders", what, firmware, rate_hz, f"noise {1e6 * noise(q_rad):.2f} urad", wrong)
 
 
 def _robot(rig: Rig, clock: Clock) -> DeviceCheck:
@@ -114,7 +137,7 @@ def _robot(rig: Rig, clock: Clock) -> DeviceCheck:
     robot = robot_of(device, clock)
     with _listened(robot.reader, clock) as blocks:
         q_rad = np.concatenate([block.values["actual_q_rad"] for block in blocks])
-    rate_hz, wrong = _pace(blocks, device.rate_hz)
+    rate_hz, wrong = pace(blocks, device.rate_hz)
     what, firmware = f"Modbus controller with {len(device.registers)} registers in the map", ""
     if device.driver is RobotDriver.UR_RTDE and isinstance(robot.reader, UrReader) and device.host is not None:
         version = robot.reader.version
@@ -125,7 +148,7 @@ def _robot(rig: Rig, clock: Clock) -> DeviceCheck:
         robot.arm().close()  # DeviceRefused when the map cannot move it
         wrong = _stopped(blocks[-1]) or wrong
     wrong = wrong or _misplaced(rig, q_rad[-1])
-    return DeviceCheck("robot", what, firmware, rate_hz, f"noise {1e6 * _noise(q_rad):.2f} urad", wrong)
+    return DeviceCheck("robot", what, firmware, rate_hz, f"noise {1e6 * noise(q_rad):.2f} urad", wrong)
 
 
 def _ur(host: str) -> tuple[str, str]:
@@ -160,25 +183,3 @@ def _misplaced(rig: Rig, q_rad: NDArray[np.float64]) -> str:
                 f"{joint.upper_rad:.3f}: correct the range, the unit or the register map"
             )
     return ""
-
-
-def _pace(blocks: list[Block], wanted_hz: float) -> tuple[float, str]:
-    """Samples a second of the device's clock, and what is wrong with them."""
-    device_s = np.concatenate([block.device_s for block in blocks])
-    sequence = np.concatenate([block.sequence for block in blocks])
-    span_s = float(device_s[-1] - device_s[0])
-    if len(device_s) < 2 or span_s <= 0.0:
-        return 0.0, "its clock stands still: restart it"
-    rate_hz = (len(device_s) - 1) / span_s
-    lost = int((np.diff(sequence) - 1).clip(0).sum())
-    if rate_hz < LEAST_RATE * wanted_hz:
-        lines = f"{lost} samples were lost on the way" if lost else "it cannot keep up"
-        return rate_hz, f"{wanted_hz:.0f} Hz are asked for, {lines}: lower the rate in the rig file, or free the line"
-    return rate_hz, ""
-
-
-def _noise(values: NDArray[np.float64]) -> float:
-    """One sigma of the noisiest column from neighbouring samples (von Neumann 1941); slow motion does not count."""
-    steps = np.diff(values, axis=0)
-    steps = steps[np.isfinite(steps).all(axis=1)] if np.isfinite(steps).all(axis=1).any() else np.nan_to_num(steps)
-    return float(np.sqrt(0.5 * (steps**2).mean(axis=0)).max()) if len(steps) else 0.0

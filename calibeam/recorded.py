@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from acquisition.bench import Bench
+from acquisition.camera.sight import Sight
 from acquisition.errors import AcquisitionError
 from acquisition.plan import PlanOptions
 from acquisition.planned_session import PlannedSession
@@ -62,8 +63,9 @@ def record_session(
     clock: Clock,
     bar: Progress,
     plan: PosePlan | None = None,
+    sight: Sight | None = None,
 ) -> Summary:
-    """Take every place of the rig, or the poses of a plan, told by `bar`.
+    """Take every place of the rig, or the poses of a plan, told by `bar`; with a camera the light is aimed at by it.
 
     PartialResult when it ended early: the arm stands, samples are kept.
 
@@ -80,10 +82,10 @@ def record_session(
         limits = Limits(step_rad=rig.motion.step_limit_rad)
         session: Session | PlannedSession
         if plan is None:
-            session = Session(bench, learner, journal, options, home_rad, limits=limits, progress=tell)
+            session = Session(bench, learner, journal, options, home_rad, limits=limits, progress=tell, sight=sight)
             run = partial(session.run, tuple(rig.placements))
         else:
-            session = PlannedSession(bench, learner, journal, options, home_rad, progress=tell)
+            session = PlannedSession(bench, learner, journal, options, home_rad, progress=tell, sight=sight)
             run = partial(session.run, plan)
         try:
             summary = run()

@@ -13,6 +13,7 @@ from acquisition.recording.rig import parse_rig
 from acquisition.recording.rig_schema import ArmModel, Rig
 from acquisition.recording.samples import Samples
 from calibrate.arms.catalogue import arm_of
+from calibrate.arms.eccentric import with_discs
 from calibrate.arms.model import KinematicModel
 from calibrate.converted_rig import rig_in_model
 from calibrate.dual_psd_rig import dual_psd_chain
@@ -79,7 +80,7 @@ class Predictor:
 
     @cached_property
     def _arm(self) -> KinematicModel:
-        return arm_of(self.rig)
+        return with_discs(arm_of(self.rig), self.rig)
 
     @cached_property
     def _target(self) -> Target:

@@ -12,6 +12,7 @@ from typing import Any
 from simulators.faults.injector import Injector
 from simulators.faults.light import DisturbedLight
 from simulators.faults.verbs import with_faults
+from simulators.hand.world import HandWorld
 from simulators.host.errors import HostError
 from simulators.host.loop import Host
 from simulators.wire import Bench, SerialPort, TcpPort
@@ -31,17 +32,18 @@ class EmulatedDevices:
     psd: Bench | None
     encoders: Bench | None
     robot: Bench | None
+    camera: Bench | None = None
     injectors: Mapping[str, Injector] = field(default_factory=dict[str, Injector])  # by the announcement's names
 
     @property
     def benches(self) -> list[Bench]:
-        return [bench for bench in (self.psd, self.encoders, self.robot) if bench is not None]
+        return [bench for bench in (self.psd, self.encoders, self.robot, self.camera) if bench is not None]
 
 
-def build_devices(world: World, rig: Mapping[str, Any], robot_host: str | None) -> EmulatedDevices:
+def build_devices(world: World | HandWorld, rig: Mapping[str, Any], robot_host: str | None) -> EmulatedDevices:
     """The benches of a rig; `robot_host` goes before the one in [devices.robot]. HostError when there is none."""
     wanted: Mapping[str, Any] = rig.get("devices", {})
-    light = DisturbedLight(world)
+    light = None if isinstance(world, HandWorld) else DisturbedLight(world)
     psd = _build(PSDS[wanted["psd"].get("driver", PSD_DAQ)], light, rig) if "psd" in wanted else None
     encoders = _build("encoders", world, rig) if "encoders" in wanted else None
     robot = _robot(world, rig, wanted["robot"], robot_host) if "robot" in wanted else None
@@ -52,10 +54,13 @@ def build_devices(world: World, rig: Mapping[str, Any], robot_host: str | None) 
     }
     benches = {name: bench for name, (bench, _) in faulty.items()}
     injectors = {name: injector for name, (_, injector) in faulty.items()}
-    return EmulatedDevices(benches.get("psd"), benches.get("can"), benches.get("robot"), injectors)
+    camera = _build("camera", world, rig, world.truth.seed) if "camera" in rig else None
+    return EmulatedDevices(benches.get("psd"), benches.get("can"), benches.get("robot"), camera, injectors)
 
 
-def _robot(world: World, rig: Mapping[str, Any], device: Mapping[str, Any], robot_host: str | None) -> Bench:
+def _robot(
+    world: World | HandWorld, rig: Mapping[str, Any], device: Mapping[str, Any], robot_host: str | None
+) -> Bench:
     host = robot_host or device.get("host")
     if host is None and "serial_port" not in device:
         raise HostError('rig file: devices.robot has no host; give one, for example host = "127.0.0.2"')
@@ -76,7 +81,7 @@ def with_robot_on(devices: EmulatedDevices, robot_host: str) -> EmulatedDevices:
 
 
 def without_links(devices: EmulatedDevices) -> EmulatedDevices:
-    """The same devices with serial ports that only the announcement names."""
+    """The same devices with ports that only the announcement names."""
 
     def unlinked(bench: Bench | None) -> Bench | None:
         if bench is None:
@@ -84,8 +89,16 @@ def without_links(devices: EmulatedDevices) -> EmulatedDevices:
         ports = [replace(port, link=None) if isinstance(port, SerialPort) else port for port in bench.ports]
         return replace(bench, ports=ports)
 
+    camera = devices.camera
+    if camera is not None:
+        ports = [replace(port, port=0) if isinstance(port, TcpPort) else port for port in camera.ports]
+        camera = replace(camera, ports=ports)
     return replace(
-        devices, psd=unlinked(devices.psd), encoders=unlinked(devices.encoders), robot=unlinked(devices.robot)
+        devices,
+        psd=unlinked(devices.psd),
+        encoders=unlinked(devices.encoders),
+        robot=unlinked(devices.robot),
+        camera=camera,
     )
 
 
@@ -122,6 +135,8 @@ def addresses(host: Host, devices: EmulatedDevices, rig: Mapping[str, Any]) -> d
         }
     if devices.robot is not None:
         found["robot"] = _robot_address(host, devices.robot, rig["devices"]["robot"].get("driver", UR))
+    if devices.camera is not None:
+        found["camera"] = {"source": _source(*host.tcp_address(devices.camera.ports[0].name))}
     control_host, control_port = host.tcp_address("control")
     found["control"] = {"host": control_host, "port": control_port}
     return found
@@ -136,6 +151,11 @@ def _robot_address(host: Host, robot: Bench, driver: str) -> dict[str, Any]:
         return {"host": sockets[0].host}
     address, number = host.tcp_address(sockets[0].name)
     return {"host": address, "port": number}
+
+
+def _source(host: str, port: int) -> str:
+    """What opens the emulated camera; its module is loaded only where there is one."""
+    return importlib.import_module("simulators.camera.emulator").url(host, port)
 
 
 def _serial_name(bench: Bench) -> str:

@@ -30,9 +30,7 @@ from simulators.host.errors import HostError, PortBusy
 from simulators.host.loop import Host
 from simulators.host.side_channel import Control, side_channel
 from simulators.wire import Bench
-from simulators.world.rig import read_rig
-from simulators.world.truth import write_truth
-from simulators.world.world import World
+from simulators.world_of_rig import EmulatedWorld, world_of
 
 AUTO = "auto"
 AUTO_HOSTS = tuple(f"127.0.0.{x}" for x in range(2, 255))  # Linux answers on all of 127/8; elsewhere name 127.0.0.1
@@ -71,11 +69,10 @@ def serve(rig: Mapping[str, Any], options: ServeOptions, announce: Callable[[Ann
     Must run in the main thread, for only that takes signals. Raises WorldError for a rig that cannot be emulated,
     WrittenError for mechanisms that cannot be read, PortBusy and HostError for ports that cannot be opened.
     """
-    time_scale = _time_scale(rig, options)
-    hidden = defects_of(options.hidden)
-    world = World.from_rig(rig, seed=options.seed, q_rad=rig.get("motion", {}).get("home_rad"), hidden=hidden)
+    world = world_of(rig, options.seed, defects_of(options.hidden))
+    time_scale = _time_scale(world, options)
     auto = options.robot_host == AUTO
-    devices = build_devices(world, rig, AUTO_HOSTS[0] if auto else options.robot_host)
+    devices = build_devices(world.physics, rig, AUTO_HOSTS[0] if auto else options.robot_host)
     if not options.links:
         devices = without_links(devices)
     if not options.expose:
@@ -83,7 +80,7 @@ def serve(rig: Mapping[str, Any], options: ServeOptions, announce: Callable[[Ann
     token = None if is_loopback(options.control_host) else secrets.token_urlsafe(24)
     control = Control(options.control_host, token)
     if options.truth_path is not None:
-        write_truth(world.truth, options.truth_path)
+        world.write_truth(options.truth_path)
     with _stop_on_signals() as stop:
         robot_hosts = AUTO_HOSTS if auto and devices.robot is not None else (None,)
         host, devices = _open_host(devices, world, time_scale, robot_hosts, control)
@@ -99,15 +96,19 @@ def serve(rig: Mapping[str, Any], options: ServeOptions, announce: Callable[[Ann
             host.close()
 
 
-def _time_scale(rig: Mapping[str, Any], options: ServeOptions) -> float:
-    time_scale = read_rig(rig).emulation.time_scale if options.time_scale is None else options.time_scale
+def _time_scale(world: EmulatedWorld, options: ServeOptions) -> float:
+    time_scale = world.time_scale if options.time_scale is None else options.time_scale
     if not (math.isfinite(time_scale) and time_scale > 0.0):
         raise HostError(f"time scale {time_scale!r}; give emulated seconds per real second, above 0")
     return time_scale
 
 
 def _open_host(
-    devices: EmulatedDevices, world: World, time_scale: float, robot_hosts: Sequence[str | None], control: Control
+    devices: EmulatedDevices,
+    world: EmulatedWorld,
+    time_scale: float,
+    robot_hosts: Sequence[str | None],
+    control: Control,
 ) -> tuple[Host, EmulatedDevices]:
     """Opens all ports, the robot's on the first of `robot_hosts` that is free (None: where it was built for).
 
@@ -123,16 +124,13 @@ def _open_host(
     raise HostError(f"robot: no address from {robot_hosts[0]} to {robot_hosts[-1]} is free; stop some emulators")
 
 
-def _start_host(devices: EmulatedDevices, world: World, time_scale: float, control: Control) -> Host:
-    def place(id: int) -> None:  # noqa: A002 - the verb's argument is called id
-        world.place_fixture(id)
-
+def _start_host(devices: EmulatedDevices, world: EmulatedWorld, time_scale: float, control: Control) -> Host:
     def pace() -> dict[str, float]:
         return {"ticks": host.ticks, "stalls": host.pace.stalls, "lost_s": host.pace.lost_s}
 
     verbs: dict[str, Callable[..., Any]] = {
-        "fixture.place": place,
-        "world.time": lambda: world.time_s,
+        **world.verbs,
+        "world.time": lambda: world.physics.time_s,
         "host.pace": pace,
         **fault_verbs(devices.injectors),
     }
@@ -142,7 +140,7 @@ def _start_host(devices: EmulatedDevices, world: World, time_scale: float, contr
         instruments=[instrument for bench in devices.benches for instrument in bench.instruments],
         ports=[*(port for bench in devices.benches for port in bench.ports), side_channel(verbs, control)],
     )
-    host = Host(bench, world, time_scale=time_scale)
+    host = Host(bench, world.physics, time_scale=time_scale)
     return host
 
 

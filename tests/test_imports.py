@@ -16,6 +16,16 @@ def test_the_import_contracts_hold() -> None:
     assert result.returncode == 0, result.stdout
 
 
+def test_a_command_loads_no_library_of_another() -> None:
+    """Emulators start as a command of their own, in every demo and many tests."""
+    script = (
+        "import sys, calibeam.cli, calibeam.commands.emulate, simulators.serve\n"
+        "print([name for name in ('scipy.stats', 'scipy.signal', 'matplotlib', 'numba') if name in sys.modules])"
+    )
+    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)
+    assert result.stdout.strip() == "[]"
+
+
 def test_calibrate_loads_no_library_of_a_wire() -> None:
     """A fit runs where no port, bus or socket library is installed."""
     script = (

@@ -15,6 +15,7 @@ from acquisition.recording.rig_lines import KeyPath, key_lines, line_of
 from acquisition.recording.rig_schema import Rig
 
 Way = Annotated[int, Meta(ge=-1, le=1)]
+Group = Annotated[int, Meta(ge=1)]
 Spots = tuple[float, float, float, float]
 
 
@@ -24,6 +25,7 @@ class PlannedPose(Struct, frozen=True, forbid_unknown_fields=True):
     q_rad: tuple[float, ...]  # readings, one a joint
     approach: tuple[Way, ...] = ()  # the way each joint comes; 0 or absent: as it falls
     spots_m: Spots | None = None  # psd1 x, y, psd2 x, y
+    repeat: Group | None = None  # poses of one number are one pose, taken again
 
 
 class PlannedBlock(Struct, frozen=True, forbid_unknown_fields=True):
@@ -126,6 +128,8 @@ def _lines(plan: PosePlan) -> Iterator[str]:
                 yield f"approach = {_row(pose.approach)}"
             if pose.spots_m is not None:
                 yield f"spots_m = {_row(pose.spots_m)}"
+            if pose.repeat is not None:
+                yield f"repeat = {pose.repeat}"
 
 
 def _row(values: Iterable[float]) -> str:

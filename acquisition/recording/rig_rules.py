@@ -6,6 +6,7 @@ Every rule yields faults as (key path, what is wrong and what to do); the reader
 import math
 from collections.abc import Iterator
 
+from acquisition.recording.rig_artefacts import artefact_faults
 from acquisition.recording.rig_instruments import instrument_faults
 from acquisition.recording.rig_lines import KeyPath
 from acquisition.recording.rig_robot import robot_faults
@@ -23,7 +24,7 @@ def faults(rig: Rig) -> Iterator[Fault]:
         yield from _joint_faults(("arm", "joint", index), joint, rig.arm.model)
     yield from _laser_faults(rig)
     yield from _placement_faults(rig)
-    yield from _twice(("bar",), tuple(bar.id for bar in rig.bar_list))
+    yield from artefact_faults(rig)
     yield from _tolerance_faults(rig)
     yield from instrument_faults(rig)
     yield from robot_faults(rig)
@@ -86,6 +87,11 @@ def _laser_faults(rig: Rig) -> Iterator[Fault]:
 
 
 def _placement_faults(rig: Rig) -> Iterator[Fault]:
+    if rig.camera is not None and rig.fixture is None:
+        yield (
+            ("camera", "board"),
+            "[camera.board] says where the board is on the fixture, but there is no [fixture]; add it",
+        )
     yield from _twice(("placement",), tuple(placement.id for placement in rig.placement_list))
     if rig.placement_list and rig.fixture is None:
         yield ("placement",), "[[placement]] says where the fixture stood, but there is no [fixture]; add it"

@@ -68,6 +68,7 @@ class Tool(Struct, frozen=True, forbid_unknown_fields=True):
     point_m: Vector | None = None
     laser_origin_m: Vector | None = None
     laser_direction: Vector | None = None
+    probe_diameter_m: NotNegative | None = None  # of the ball whose centre is `point_m`
 
 
 class Fixture(Struct, frozen=True, forbid_unknown_fields=True):
@@ -100,6 +101,43 @@ class Bar(Struct, frozen=True, forbid_unknown_fields=True):
     length_m: Positive
 
 
+class BarPosition(Struct, frozen=True, forbid_unknown_fields=True):
+    """One way in which a bar is set up; end a lies against `direction` (of any length but 0) from the middle."""
+
+    id: Identity
+    bar: Identity
+    middle_m: Vector
+    direction: Vector
+
+
+class Seat(Struct, frozen=True, forbid_unknown_fields=True):
+    """A cone for the probe's ball, about where it stands."""
+
+    id: Identity
+    origin_m: Vector
+
+
+class Sphere(Struct, frozen=True, forbid_unknown_fields=True):
+    """A calibrated sphere, about where its centre is."""
+
+    id: Identity
+    origin_m: Vector
+    diameter_m: Positive
+
+
+class PermissibleErrors(Struct, frozen=True, forbid_unknown_fields=True):
+    """Maximum permissible errors as the maker or the user states them; None: not stated, so nothing is judged."""
+
+    p_form_m: Positive | None = None
+    p_size_m: Positive | None = None
+    l_dia_m: Positive | None = None
+    e_uni_m: Positive | None = None  # of E_Uni = e_uni_m + e_uni_per_m * length
+    e_uni_per_m: NotNegative = 0.0
+    effective_diameter_m: Positive | None = None  # ASME B89.4.22: greatest deviation
+    single_point_m: Positive | None = None  # ASME B89.4.22: two standard deviations
+    volumetric_m: Positive | None = None  # ASME B89.4.22: greatest deviation
+
+
 class Noise(Struct, frozen=True, forbid_unknown_fields=True):
     """One sigma as believed: a start value only. None: nothing is believed."""
 
@@ -120,6 +158,7 @@ class Tolerance(Struct, frozen=True, forbid_unknown_fields=True):
     psd2_rad: Positive | None = None
     device_m: Positive | None = None  # of [device] in the base, with device_rad
     device_rad: Positive | None = None
+    eccentricity_rad: Positive | None = None  # of what an encoder's disc off its axis does to a reading; None: centred
 
 
 class PsdDriver(enum.Enum):
@@ -238,6 +277,33 @@ class Devices(Struct, frozen=True, forbid_unknown_fields=True):
     robot: RobotDevice | None = None
 
 
+class CameraBoard(Struct, frozen=True, forbid_unknown_fields=True):
+    """Square markers of one dictionary, printed in reading order, on the fixture.
+
+    Its frame: origin in the middle of the markers, x right and y up as printed, z towards who reads it.
+    """
+
+    side_m: Positive  # of the black square of one marker
+    gap_m: Positive  # of white between two
+    in_psd1: Pose
+    columns: Identity = 2
+    rows: Identity = 2
+    first_id: Annotated[int, Meta(ge=0)] = 0
+    dictionary: Literal["aruco-4x4-50", "apriltag-36h11"] = "aruco-4x4-50"
+
+
+class Camera(Struct, frozen=True, forbid_unknown_fields=True):
+    """The camera on the flange for coarse aim, roughly as mounted; `calibration` is what sessions go by."""
+
+    source: Annotated[int, Meta(ge=0)] | Word  # number of a video device, URL, or path of a picture or film
+    width_px: Annotated[int, Meta(ge=16)]
+    height_px: Annotated[int, Meta(ge=16)]
+    view_rad: Annotated[float, Meta(gt=0.0, lt=3.0)]  # across the width, as the data sheet says
+    in_flange: Pose  # x right in the picture, y down, z where it looks
+    board: CameraBoard
+    calibration: Word | None = None  # file of `calibeam camera`
+
+
 class MotionBox(Struct, frozen=True, forbid_unknown_fields=True):
     """A box along the axes of the base that no part of the arm may enter."""
 
@@ -264,6 +330,7 @@ class Motion(Struct, frozen=True, forbid_unknown_fields=True):
     home_rad: tuple[float, ...] | None = None  # joint readings clear of everything, where a session starts
     line_speed_m_s: Positive = 0.25  # of the tool on straight lines: ISO 10218-1, reduced speed
     structural_hz: Positive = 10.0  # lowest resonance of the arm; feels right for 1 m of reach until it is measured
+    lag_s: NotNegative = 0.0  # by which the arm follows streamed set-points (`calibeam motion`); 0: not measured
     clearance_m: NotNegative = 0.06  # half the width of the arm's links, kept between their middle and every keep_out
     keep_out: tuple[MotionBox, ...] = ()
     slow_area: tuple[SlowBox, ...] = ()
@@ -283,6 +350,25 @@ EMULATION_KEYS = (
     "joint_repeatability_rad",
     "psd_noise_m",
     "laser_power_w",
+    "camera_origin_sigma_m",
+    "camera_rotation_sigma_rad",
+    "camera_focal_sigma",
+    "camera_centre_sigma_px",
+    "camera_barrel",
+    "camera_blur_px",
+    "camera_noise_grey",
+    "board_origin_sigma_m",
+    "board_rotation_sigma_rad",
+    "disc_eccentricity_m",
+    "graduation_rad",
+    "encoder_noise_rad",
+    "axis_wobble_rad",
+    "contact_m",
+    "tremor_rad",
+    "slip_share",
+    "artefact_sigma_m",
+    "hand_force_n",
+    "joint_compliance_rad_nm",
 )
 
 
@@ -298,9 +384,14 @@ class Rig(Struct, frozen=True, forbid_unknown_fields=True):
     device: Pose | None = None  # measuring device of position and wire observations, in the base frame
     known_distances: tuple[KnownDistance, ...] = field(name="known_distance", default=())
     bar_list: tuple[Bar, ...] = field(name="bar", default=())
+    bar_position_list: tuple[BarPosition, ...] = field(name="bar_position", default=())
+    seat_list: tuple[Seat, ...] = field(name="seat", default=())
+    sphere_list: tuple[Sphere, ...] = field(name="sphere", default=())
+    mpe: PermissibleErrors = PermissibleErrors()
     noise: Noise = Noise()
     tolerance: Tolerance | None = None
     devices: Devices = Devices()
+    camera: Camera | None = None
     motion: Motion = Motion()
     emulation: Mapping[str, float] | None = None
 
@@ -317,3 +408,18 @@ class Rig(Struct, frozen=True, forbid_unknown_fields=True):
     def bars(self) -> Mapping[int, Bar]:
         """By id, in the order of the file."""
         return {bar.id: bar for bar in self.bar_list}
+
+    @property
+    def seats(self) -> Mapping[int, Seat]:
+        """By id, in the order of the file."""
+        return {seat.id: seat for seat in self.seat_list}
+
+    @property
+    def bar_positions(self) -> Mapping[int, BarPosition]:
+        """By id, in the order of the file."""
+        return {position.id: position for position in self.bar_position_list}
+
+    @property
+    def spheres(self) -> Mapping[int, Sphere]:
+        """By id, in the order of the file."""
+        return {sphere.id: sphere for sphere in self.sphere_list}

@@ -18,6 +18,7 @@ def check_command(what: Path, *, json_: Annotated[bool, Parameter(name="--json")
     """Try every device of a rig file and print one line each; the arm does not move. Or check a recording.
 
     Example: calibeam check rigs/ur5e-dual-psd.toml
+
     Example: calibeam check session-1/recording.mcap
 
     Each line says what the device is, its firmware, rate and noise, and else what is wrong and what to do. A recording

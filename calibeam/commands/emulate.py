@@ -25,8 +25,11 @@ def emulate(
     """Emulate every device of a rig file on real wires, and stay up until Ctrl-C.
 
     Example: calibeam emulate rigs/ur5e-dual-psd.toml
-    Trouble on their wires: {"do": "fault.inject", "with": {"device": "psd", "kind": "silence", "count": 100}} as one
-    line to the address "control"; the kinds stand in docs/protocols/faults.md.
+
+    It prints where each device listens. Trouble on their wires is asked for by one line of JSON to the address
+    "control", for example by nc 127.0.0.1 PORT; the kinds stand in docs/protocols/faults.md:
+
+    {"do": "fault.inject", "with": {"device": "psd", "kind": "silence", "count": 100}}
 
     Parameters
     ----------

@@ -41,6 +41,7 @@ def motion_command(
     from calibeam.motion.example_plots import numbers_of, plot
     from calibeam.motion.examples import EXAMPLES, Stage
     from calibeam.motion.gate_of_rig import gate_of, solver_of
+    from calibeam.motion.lag import KeptSetPoints
     from calibeam.motion.robot import streamed_robot
 
     strangers = sorted(set(only) - EXAMPLES.keys())
@@ -50,7 +51,8 @@ def motion_command(
     out.mkdir(parents=True, exist_ok=True)
     solver, told = solver_of(loaded), dict[str, dict[str, float]]()
     with Emulation(rig) as emulation, streamed_robot(loaded, clock, emulation.address["robot"]) as robot:
-        stage = Stage(robot, gate_of(loaded, solver, robot.arm, clock), solver)
+        sent = KeptSetPoints(robot.arm, clock)
+        stage = Stage(robot, sent, gate_of(loaded, solver, sent, clock), solver)
         for name in only or EXAMPLES:
             shown = EXAMPLES[name](stage)
             plot(shown, solver, out)

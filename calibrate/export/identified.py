@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from acquisition.recording.rig_schema import Rig
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.convert import corrected_parts
+from calibrate.arms.eccentric import COSINE, SINE
 from calibrate.errors import DataError
 
 Floats = NDArray[np.float64]
@@ -32,6 +33,12 @@ class IdentifiedArm:
 def identified_arm(rig: Rig, corrections: Mapping[str, float]) -> IdentifiedArm:
     """Takes what belongs to arm and tool point; DataError for a joint or link that this arm does not have."""
     known = {p.name for p in arm_of(rig).parameters}
+    discs = [name for name, value in corrections.items() if name.endswith((SINE, COSINE)) and value != 0.0]
+    if discs:
+        raise DataError(
+            f"rig {rig.name}: {discs[0]} is not zero, and no other program's arm knows of encoder discs off their"
+            ' shafts; identify with hold = ["joint*.disc_*"], or predict with calibeam'
+        )
     for name in corrections:
         if name.startswith(("joint", "link")) and name not in known:
             raise DataError(

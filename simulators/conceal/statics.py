@@ -23,6 +23,7 @@ def weigh(arm: Arm, frames: Frames, foot: Floats, payload_kg: Floats, payload_co
     first_m = arm.tool_kg * (flange_turn @ arm.tool_com_m + flange_m) + payload_kg[:, np.newaxis] * (
         flange_turn @ payload_com_m + flange_m
     )
+    by_gravity = np.cross(np.eye(3), arm.gravity_m_s2)  # v @ by_gravity is v x g
     moment = np.empty((rows, n + 1, 3))
     force = np.empty((rows, n + 1, 3))
     for link in range(n, -1, -1):
@@ -32,11 +33,11 @@ def weigh(arm: Arm, frames: Frames, foot: Floats, payload_kg: Floats, payload_co
             start_m, axes = origin_m[:, link - 1], turn[:, link - 1]
         else:
             start_m, axes = foot[:, :3, 3], foot[:, :3, :3]
-        about_start = np.cross(first_m - beyond_kg[:, np.newaxis] * start_m, arm.gravity_m_s2)
+        about_start = (first_m - beyond_kg[:, np.newaxis] * start_m) @ by_gravity
         moment[:, link] = np.einsum("rji,rj->ri", axes, about_start)
         force[:, link] = np.einsum("rji,rj->ri", axes, beyond_kg[:, np.newaxis] * arm.gravity_m_s2)
     carried_m = (flange_turn @ payload_com_m + flange_m)[:, np.newaxis] - origin_m
-    carried_n = payload_kg[:, np.newaxis, np.newaxis] * arm.gravity_m_s2
-    payload_torque_nm = np.einsum("rni,rni->rn", np.cross(carried_m, carried_n), turn[..., 2])
+    carried_nm = payload_kg[:, np.newaxis, np.newaxis] * (carried_m @ by_gravity)
+    payload_torque_nm = np.einsum("rni,rni->rn", carried_nm, turn[..., 2])
     down = arm.gravity_m_s2 / max(float(np.linalg.norm(arm.gravity_m_s2)), 1e-12)
     return Load(moment[:, 1:, 2].copy(), payload_torque_nm, moment, force, np.einsum("rji,j->ri", flange_turn, down))

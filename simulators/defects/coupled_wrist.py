@@ -47,7 +47,7 @@ class CoupledWrist:
 
     @property
     def figures(self) -> Mapping[str, float]:
-        return {"slope": self.share}
+        return {"coupling_rad_per_rad": self.share}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:

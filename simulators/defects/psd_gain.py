@@ -43,7 +43,7 @@ class WrongGain:
 
     @property
     def figures(self) -> Mapping[str, float]:
-        return {"gain_x": self.excess * self.x_share, "gain_y": self.excess}
+        return {"gain_x_error_share": self.excess * self.x_share, "gain_y_error_share": self.excess}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:

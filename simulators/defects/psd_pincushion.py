@@ -47,7 +47,7 @@ class Pincushion:
 
     @property
     def figures(self) -> Mapping[str, float]:
-        return {"cubic": self.distortion}
+        return {"edge_share": self.distortion}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:

@@ -46,7 +46,7 @@ class Unsettled:
 
     @property
     def figures(self) -> Mapping[str, float]:
-        return {"slope": self.left}
+        return {"left_share": self.left}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:

@@ -45,7 +45,7 @@ class WrongRatio:
 
     @property
     def figures(self) -> Mapping[str, float]:
-        return {"slope": self.excess}
+        return {"scale_error_rad_per_rad": self.excess}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:

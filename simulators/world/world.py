@@ -184,6 +184,16 @@ class World:
             return self._faces_at[self._placement]
         return place_faces(self._fixture, fixture_at(self._places[self._placement], self._hidden.fixture))
 
+    def T_base_psd1(self) -> Floats | None:
+        """Where PSD 1 stands, (4, 4), as whoever looks at the fixture sees it; None without a fixture."""
+        face = None if self._faces is None else self._faces[0]
+        if face is None:
+            return None
+        pose = np.eye(4)
+        pose[:3, :3] = np.column_stack([face.axis_x, face.axis_y, face.normal])
+        pose[:3, 3] = face.centre_m
+        return pose
+
     # --- taps on the truth, for tests
 
     def beam(self) -> Ray:

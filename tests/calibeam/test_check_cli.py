@@ -60,6 +60,15 @@ def test_what_is_wrong_is_named_with_its_remedy(site, capsys) -> None:
     assert "safety is PROTECTIVE_STOP: clear the cause and unlock on the pendant" in found["robot"]["wrong"]
 
 
+def test_an_encoder_whose_emergency_is_older_than_the_check(site, capsys) -> None:
+    path, emulators = site
+    emulators.ask("encoders.emergency", node=4, code=0x7320)
+    code, found = checked(path, capsys)
+    emulators.ask("encoders.emergency", node=4, code=0)
+    assert code == 1
+    assert "node 4 is at fault, error register 21h" in found["encoders"]["wrong"]
+
+
 def test_a_device_that_is_not_there(site, tmp_path, capsys) -> None:
     path, _ = site
     wrong = tmp_path / "rig.toml"

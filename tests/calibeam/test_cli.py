@@ -44,7 +44,9 @@ def session_of(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Callable[[
 
 def test_help_is_good_and_an_unknown_command_is_usage(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["--help"]) == 0
-    assert "identify" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "identify" in said
+    assert "Emulated rig, whole session, report" in said  # of commands that are loaded when they are called
     assert run(["calibrateeverything"]) == 2
 
 

@@ -96,8 +96,9 @@ def test_rows_without_a_partner_are_told(sessions, tmp_path):
 
 
 def test_other_motions_are_refused(sessions, tmp_path, capsys):
-    away = rewritten(sessions[1], tmp_path / "away", lambda columns: {**columns, "q1_rad": columns["q1_rad"] + 1.0})
-    assert run(["compare", str(sessions[1]), str(away), "--out", str(tmp_path / "c.json")]) == 1
+    write_case(conceal(Wanted("dual-psd", seed=8, defects=(), enr=1.0, samples=160, places=3)), tmp_path / "away")
+    other = str(tmp_path / "away" / "recording")
+    assert run(["compare", str(sessions[1]), other, "--out", str(tmp_path / "c.json")]) == 1
     assert "same motion" in capsys.readouterr().err
 
 

@@ -62,7 +62,7 @@ def off_the_world_m(samples: Sequence[Sample]) -> np.ndarray:
     return np.array(rows)
 
 
-@pytest.mark.parametrize("path", ["in process", "wires at 3 x", "wires at 8 x"])
+@pytest.mark.parametrize("path", ["in process", pytest.param("wires at 3 x", marks=pytest.mark.endure), "wires at 8 x"])
 def test_spots_are_those_of_the_world_to_its_repeatability(path: str, tmp_path: Path) -> None:
     samples = in_process(tmp_path) if path == "in process" else on_wires(float(path.split()[2]), tmp_path)
     assert len(samples) == 10

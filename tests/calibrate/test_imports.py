@@ -6,7 +6,14 @@ import sys
 FORBIDDEN = ("serial", "can", "canopen", "rtde_control", "rtde_receive", "drivers", "simulators", "mujoco", "calibeam")
 # Each costs 0.1 to 0.4 s of every start, and none is needed before there is something to draw or a batch to run.
 SLOW = ("scipy.stats", "scipy.optimize", "scipy.interpolate", "scipy.ndimage", "numba", "llvmlite", "matplotlib")
-LATER = ("calibrate.report", "calibrate.diagnose", "calibrate.effects")  # stages after the fit, loaded by their command
+# stages before and after the fit, loaded by their command
+LATER = (
+    "calibrate.report",
+    "calibrate.diagnose",
+    "calibrate.effects",
+    "calibrate.error_simulation",
+    "calibrate.pose_design",
+)
 MOST_MODULES = 850  # 692 with CPython 3.11, of which 144 are numpy and 175 scipy; scipy.stats alone would add 300
 PROGRAM = """
 import pkgutil, sys, importlib, calibrate

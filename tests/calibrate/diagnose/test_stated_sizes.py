@@ -5,7 +5,8 @@ import pytest
 
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.fitted import fit_geometry
-from calibrate.diagnose.line_search import refined
+from calibrate.diagnose.line_search import refined, telling_times
+from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.session import session_of
 from calibrate.diagnose.stated_sizes import sandwich, sizes_of
 from calibrate.effects.loads import states_masses
@@ -31,6 +32,23 @@ def test_the_sandwich_covers_under_heavy_tails_as_under_white_noise(world, noise
         (found,) = sizes_of(with_play(world, np.random.default_rng(seed), noise, size), 0).values()
         inside += abs(found.value - size) <= 1.96 * found.sigma
     assert 0.89 <= inside / 120 <= 0.99
+
+
+def test_only_samples_in_a_moved_seat_can_tell_when_it_moved(tmp_path):
+    """Seat 2 was touched in the first and the last third only: when it slid in between, nobody can know better."""
+    rec = recording_of(tmp_path, family="cones", seed=72, samples=160, places=4)
+    t_s, seat = rec.samples.column("t_s"), rec.samples.integers("seat", -1)
+    third = (t_s.max() - t_s.min()) / 3.0
+    rows = (seat != 2) | (np.abs(t_s - t_s.min() - 1.5 * third) > 0.5 * third)
+    bench = Bench(fit_geometry(session_of(rec.rig, rec.samples.take(rows))))
+    t_s, seat = t_s[rows], seat[rows]
+    term = next(t for t in bench.menu.terms if t.physics == "seat-moved" and t.variant == "seat 2")
+    mine = np.unique(t_s[seat == 2])
+    gap = int(np.argmax(np.diff(mine)))
+    accepted = Accepted(term, np.full(3, 1e-4), np.array([(mine[gap] + mine[gap + 1]) / 2.0]))
+    assert np.array_equal(telling_times(bench, term, accepted.inner), mine)
+    size = sizes_of(Bench(bench.state.refitted([accepted])), 0)["time_s"]
+    assert size.sigma == pytest.approx((mine[gap + 1] - mine[gap]) / np.sqrt(12.0))
 
 
 def test_a_column_twice_as_long_has_half_the_sigma(world):

@@ -22,6 +22,8 @@ from calibrate.effects.words import plain
         ("delay_s", 0.004, 2e-4, "4 ± 0.2 ms"),
         ("phase_rad", 0.5235987755982988, 0.017453292519943295, "30 ± 1°"),
         ("knee_nm", 14.0, 1.0, "14 ± 1 Nm"),
+        ("growth_share", 5.68e-4, 4.09e-4, "568 ± 409 ppm"),
+        ("time_s", 12345.0, 99.7, "12345 ± 100 s"),
     ],
 )
 def test_the_unit_fits_the_size(name, value, sigma, words):

@@ -4,9 +4,7 @@ import json
 import os
 import socket
 import struct
-import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 import serial
@@ -116,17 +114,3 @@ def test_a_side_channel_beyond_loopback_wants_its_token(rig) -> None:
                 answer = json.loads(line.makefile().readline())
             assert not answer["ok"]
             assert "token" in answer["error"]
-
-
-def test_no_shell_no_pickle_no_evaluation_behind_any_wire() -> None:
-    """What comes over a wire or from a file is data: nothing in these folders could turn it into code."""
-    root = Path(__file__).parents[3]
-    words = r"\b(eval|exec)\(|import pickle|pickle\.load|shell=True|os\.system|yaml\.load|marshal"
-    found = subprocess.run(
-        ["grep", "-rnE", words, "--include=*.py"]
-        + [str(root / folder) for folder in ("drivers", "simulators", "acquisition", "calibeam")],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert found.stdout == ""

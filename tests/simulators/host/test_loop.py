@@ -36,6 +36,18 @@ def test_a_stall_of_the_machine_makes_emulated_time_lag_and_not_jump(stage):
     assert on.host.pace.stalls == 1
 
 
+def test_a_late_host_catches_up_four_ticks_a_turn(stage):
+    on = stage()
+    on.turns(1)
+    on.now_s += 6.5 * TICK_S
+    ticks = []
+    for _ in range(3):
+        on.host.turn(0.0)
+        ticks.append(on.host.ticks)
+    assert ticks == [5, 7, 7]
+    assert on.host.pace.stalls == 0
+
+
 def test_world_that_ran_before_goes_on_from_its_time(stage):
     on = stage(start_s=5 * TICK_S)
     on.turns()

@@ -51,3 +51,14 @@ def test_answers_are_kept_when_the_stream_is_not_and_refused_in_the_end():
     assert outbox.answer(b"yes")
     assert outbox.answer(bytes(ANSWER_LIMIT_BYTES))
     assert not outbox.answer(b"one too many")
+
+
+def test_while_too_much_waits_nothing_need_be_made_for_the_stream():
+    pipe = Pipe(0)
+    outbox = Outbox(pipe.write)
+    assert outbox.takes_stream()
+    outbox.stream(bytes(STREAM_LIMIT_BYTES + 1))
+    assert not outbox.takes_stream()
+    assert outbox.dropped == 1
+    pipe.room = STREAM_LIMIT_BYTES + 1
+    assert outbox.takes_stream()

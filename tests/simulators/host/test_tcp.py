@@ -6,7 +6,7 @@ import socket
 import pytest
 
 from simulators.host.errors import HostError, PortBusy
-from simulators.wire import TcpPort
+from simulators.wire import TICK_S, TcpPort
 
 
 class Site:
@@ -125,6 +125,47 @@ def test_slow_reader_loses_whole_packages(stage, echo, connect):
     assert {len(package) for package in packages} <= {999, 4}
     assert len(packages) < 20000
     assert packages[0].startswith(b"000000")
+
+
+def test_what_a_late_host_gathers_comes_whole_and_in_order(stage, echo, connect):
+    class Counting(echo):
+        asked = 0
+
+        def due(self) -> bytes:
+            self.asked += 1
+            return b"%03d;" % self.asked
+
+    site = Site(Counting)
+    on = stage(site.port)
+    client = connect(on)
+    on.until(lambda: client.read() != b"")
+    on.now_s = on.host.pace.next_s + 6.5 * TICK_S
+    for _ in range(3):
+        on.host.turn(0.0)
+    asked = site.given[0].asked
+    on.until(lambda: client.read().count(b";") >= asked)
+    numbers = [int(number) for number in client.received.split(b";")[:-1]]
+    assert numbers == list(range(1, len(numbers) + 1))
+
+
+def test_the_wire_of_a_client_that_never_reads_is_not_asked(stage, echo, connect):
+    class Streaming(echo):
+        asked = 0
+
+        def due(self) -> bytes:
+            self.asked += 1
+            return bytes(10_000)
+
+    site = Site(Streaming)
+    on = stage(site.port)
+    client = connect(on)
+    client.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    on.until(lambda: len(site.given) == 1)
+    on.turns(2000)  # 20 MB: more than any kernel keeps
+    asked = site.given[0].asked
+    on.turns(100)
+    assert site.given[0].asked == asked < 2000
+    on.until(lambda: client.read() and site.given[0].asked > asked)
 
 
 def drained(on) -> bool:

@@ -32,6 +32,8 @@ DOUBLES = [
     "collision_detection_ratio",
     "euromap67_24V_voltage",
     "euromap67_24V_current",
+    "actual_robot_energy_consumed",
+    "actual_robot_braking_energy_dissipated",
     "output_double_register_0",
     "output_double_register_47",
     "input_double_register_0",
@@ -57,14 +59,23 @@ SIXES = [
     "actual_joint_voltage",
     "ft_raw_wrench",
     "payload_inertia",
+    "actual_current_as_torque",
+    "actual_TCP_acceleration",
+    "target_TCP_acceleration",
+    "target_base_acceleration",
+    "target_base_wrench",
+    "wrench_calc_from_currents",
 ]
-THREES = ["actual_tool_accelerometer", "elbow_position", "elbow_velocity", "payload_cog"]
+THREES = ["actual_tool_accelerometer", "elbow_position", "elbow_velocity", "payload_cog", "target_gravity"]
 OTHERS = {
     "INT32": "robot_mode safety_mode safety_status tool_output_voltage encoder0_raw encoder1_raw "
+    "time_scale_source "
     "output_int_register_0 output_int_register_47 input_int_register_24",
     "UINT32": "runtime_state robot_status_bits safety_status_bits analog_io_types tool_mode tool_analog_input_types "
-    "euromap67_input_bits euromap67_output_bits output_bit_registers0_to_31 output_bit_registers32_to_63",
-    "UINT64": "actual_digital_input_bits actual_digital_output_bits",
+    "script_control_line euromap67_input_bits euromap67_output_bits output_bit_registers0_to_31 "
+    "output_bit_registers32_to_63",
+    "UINT64": "actual_digital_input_bits actual_digital_output_bits actual_configurable_digital_input_bits "
+    "actual_configurable_digital_output_bits control_step",
     "BOOL": "output_bit_register_64 output_bit_register_127 input_bit_register_64",
     "UINT8": "tool_output_mode tool_digital_output0_mode tool_digital_output1_mode",
     "VECTOR6INT32": "joint_mode",

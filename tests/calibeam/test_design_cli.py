@@ -1,0 +1,61 @@
+"""`calibeam design` and `calibeam simulate-errors` as a script sees them."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from acquisition.recording.pose_plan import read_pose_plan
+from acquisition.recording.rig import load_rig
+from calibeam.cli import run
+
+RIGS = Path(__file__).parents[2] / "rigs"
+ROBOT, ARM = RIGS / "ur5e-dual-psd.toml", RIGS / "arm-cmm-reference.toml"
+
+
+def test_a_design_leaves_a_plan_a_page_and_figures(tmp_path, capsys):
+    plan, page = tmp_path / "plan.toml", tmp_path / "design.html"
+    options = ["--poses", "24", "--repeats", "3", "--candidates", "8", "--out", str(plan), "--report", str(page)]
+    assert run(["design", str(ROBOT), *options, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert read_pose_plan(plan, load_rig(ROBOT)).poses == 24
+    assert told["free_space_m"] < told["random_free_space_m"]
+    assert told["smallest"][0]["value"] > 0.0
+    assert len(told["isolability"]["r2"]) == len(told["isolability"]["terms"])
+    assert "Design of a session" in page.read_text(encoding="utf-8")
+
+
+def test_a_design_says_what_it_promises(tmp_path, capsys):
+    options = ["--poses", "20", "--repeats", "2", "--candidates", "6", "--out", str(tmp_path / "plan.toml")]
+    assert run(["design", str(ROBOT), *options]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "predicted error in free space (the beam" in said
+    assert "causes that a diagnosis of this plan would find" in said
+
+
+def test_errors_of_the_reference_arm_leave_a_folder(tmp_path, capsys):
+    errors = ["--errors", str(RIGS / "errors" / "arm-cmm.toml"), "--arms", "20000", "--poses", "3"]
+    errors += ["--only", "link*.x", "joint*.zero", "joint3.*", "heat.arm"]
+    assert run(["simulate-errors", str(ARM), *errors, "--out", str(tmp_path)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "worst posture" in said
+    told = json.loads((tmp_path / "errors.json").read_text())
+    for pose in told["poses"]:
+        assert pose["drawn_rms_m"] == pytest.approx(pose["linear_rms_m"], rel=0.02)
+    assert sum(line["share"] for line in told["budget"]) == pytest.approx(1.0)
+    assert {path.suffix for path in tmp_path.iterdir()} == {".json", ".html", ".svg"}
+
+
+def test_a_robot_is_simulated_the_same_with_any_number_of_workers(capsys):
+    told = []
+    for workers in ("1", "2"):
+        options = ["--only", "link2.*", "joint*.zero", "--arms", "40000", "--poses", "2", "--workers", workers]
+        assert run(["simulate-errors", str(ROBOT), *options, "--json"]) == 0
+        told.append(json.loads(capsys.readouterr().out))
+    assert told[0] == told[1]
+    assert len(told[0]["sources"]) == 12
+
+
+def test_errors_without_a_size_are_refused(capsys):
+    assert run(["simulate-errors", str(ROBOT), "--only", "heat.*"]) == 1
+    assert "no error to simulate" in " ".join(capsys.readouterr().err.split())

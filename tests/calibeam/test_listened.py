@@ -1,0 +1,50 @@
+"""What a second of samples tells of a device."""
+
+import numpy as np
+import pytest
+
+from calibeam.listened import bus_trouble, noise, pace, uneven_layers
+from drivers.device import Block
+from drivers.psd_daq.messages import FaceIdentity
+from drivers.psd_faces import FaceKind
+
+FACES = tuple(FaceIdentity(FaceKind.DUO_LATERAL, 0.02) for _ in range(2))
+
+
+def block(step: int = 1, **values: np.ndarray) -> Block:
+    number = np.arange(0, 100, step)
+    return Block(0.01 * number, 0.01 * number, number, values)
+
+
+def test_the_pace_of_a_stream_and_what_was_lost_on_its_way() -> None:
+    assert pace([block()], 100.0) == (pytest.approx(100.0), "")
+    rate_hz, wrong = pace([block(step=2)], 100.0)
+    assert rate_hz == pytest.approx(50.0)
+    assert wrong.startswith("100 Hz are asked for, 49 samples were lost on the way: lower the rate")
+
+
+def test_noise_is_that_of_the_noisiest_column_whatever_it_moves() -> None:
+    rng = np.random.default_rng(1)
+    drifting = np.linspace(0.0, 1.0, 4000)[:, None] + rng.normal(0.0, [0.01, 0.03], (4000, 2))
+    assert noise(drifting) == pytest.approx(0.03, rel=0.05)
+
+
+@pytest.mark.parametrize(("share", "wrong"), [(1.0, ""), (0.99, ""), (0.9, "face 2 differ by 11 %")])
+def test_layers_of_a_face_that_do_not_carry_the_same_current(share: float, wrong: str) -> None:
+    current_a = np.tile(1e-5 * np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, share, share]), (50, 1))
+    found = uneven_layers(FACES, (True, True), current_a)
+    assert wrong in found
+    assert bool(found) == bool(wrong)
+
+
+def test_a_dark_face_is_not_asked() -> None:
+    assert uneven_layers(FACES, (True, False), np.tile([1.0, 1.0, 1.0, 1.0, 0.0, 1e-3, 0.0, 0.0], (50, 1))) == ""
+
+
+def test_encoders_and_bus_in_trouble() -> None:
+    calm = {"emergency_code": np.zeros((1, 2), dtype=np.uint16), "bus_errors": np.zeros(1, dtype=np.uint32)}
+    assert bus_trouble(Block(*np.zeros((3, 1)), calm), {1: 0, 2: 0}) == ""
+    told = Block(*np.zeros((3, 1)), calm | {"emergency_code": np.array([[0, 0x7320]])})
+    assert "joint 2 tells emergency 7320h, position error" in bus_trouble(told, {})
+    assert "node 2 is at fault, error register 81h" in bus_trouble(Block(*np.zeros((3, 1)), calm), {1: 0, 2: 0x81})
+    assert "3 error frames" in bus_trouble(Block(*np.zeros((3, 1)), calm | {"bus_errors": np.array([3])}), {})

@@ -1,0 +1,65 @@
+"""Laws of an error: moments, what is drawn of them, and what is refused."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from calibrate.error_simulation.columns import columns_of
+from calibrate.error_simulation.law import Law
+from calibrate.error_simulation.source import Source, Term
+from calibrate.errors import DataError
+from calibrate.kernels.perturbed import draw_block
+
+LAWS = [
+    Law("normal", 2.0, 1.0),
+    Law("uniform", 2.0, 1.0),
+    Law("constant", 2.0, 1.0),
+    Law("rayleigh", 2.0),
+    Law("laplace", 0.5, -1.0),
+    Law("triang", 3.0, 0.0, (0.2,)),
+    Law("t", 1.0, 0.0, (6.0,)),
+    Law("weibull_min", 1.0, 0.0, (1.5,)),
+]
+
+
+def drawn(law):
+    columns = columns_of([Source("one", "group", "m", law, (Term(0),))])
+    own = columns.of_source[0, 0]
+    return np.concatenate([draw_block(columns.drawn, 128 * i, seed=3)[:, own] for i in range(800)])
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+def test_what_is_drawn_has_the_moments_of_the_law(law):
+    x = drawn(law)
+    sigma = np.sqrt(law.variance)
+    assert abs(x.mean() - law.mean) < 5.0 * sigma / np.sqrt(len(x)) + 1e-12
+    assert x.std() == pytest.approx(sigma, rel=0.02, abs=1e-12)
+
+
+@pytest.mark.parametrize("law", [law for law in LAWS if law.name != "constant"], ids=lambda law: law.name)
+def test_what_is_drawn_follows_the_law(law):
+    shares = np.linspace(0.01, 0.99, 99)
+    below = np.searchsorted(np.sort(drawn(law)), law.quantiles(shares)) / 102_400
+    assert np.max(np.abs(below - shares)) < 0.008
+
+
+def test_tails_of_a_table_are_the_laws_own():
+    table = Law("norm", 1.0).table()
+    assert table[1, 1] == pytest.approx(stats.norm.ppf(1.0 / 1024**2))
+    assert table[2, -2] == pytest.approx(-stats.norm.ppf(1.0 / 1024**2), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("law", "says"),
+    [
+        (("cauchy", 1.0), "no variance"),
+        (("gauss", 1.0), "no continuous law"),
+        (("unifrom", 1.0), "did you mean 'uniform'"),
+        (("normal", -1.0), "not negative"),
+        (("triang", 1.0), "give its shape"),
+        (("normal", 1.0, 0.0, (1.0,)), "has no shape"),
+    ],
+)
+def test_what_is_no_law_of_an_error_is_refused(law, says):
+    with pytest.raises(DataError, match=says):
+        Law(*law)
