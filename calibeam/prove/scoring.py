@@ -28,7 +28,8 @@ def score(layout: Layout, concealed: Concealed, answered: Answered, truth: Truth
     drawn, wanted = concealed.scenario, concealed.scenario.wanted
     file = None if answered.error else read_diagnosis(layout.answer(drawn.name) / "diagnosis.json")
     own = _own(truth.defects, () if file is None else file.findings, wanted.family)
-    defects = tuple(_defect(d, findings, wanted.family) for d, findings in zip(truth.defects, own, strict=True))
+    left = _left_over(file)
+    defects = tuple(_defect(d, findings, left, wanted.family) for d, findings in zip(truth.defects, own, strict=True))
     before_m, after_m = _free_space(layout.answer(drawn.name), truth)
     return CaseScore(
         name=drawn.name,
@@ -84,8 +85,16 @@ def _worth(defect: TrueDefect, finding: FindingRecord, family: str) -> float:
     return 20.0 if _same_driver(defect, finding) else 10.0
 
 
-def _defect(defect: TrueDefect, findings: Sequence[FindingRecord], family: str) -> DefectScore:
-    """Of the findings that may count for it."""
+def _left_over(file: DiagnosisFile | None) -> tuple[str, ...]:
+    """Places of what was said to be unexplained."""
+    if file is None:
+        return ()
+    return tuple(u.where for u in (file.unexplained, *file.also_unexplained) if u is not None)
+
+
+def _defect(defect: TrueDefect, findings: Sequence[FindingRecord], left: Sequence[str], family: str) -> DefectScore:
+    """Of the findings that may count for it; a cause of no catalogue may as well be `left` unexplained at its place."""
+    unexplained = defect.physics == UNKNOWN and any(same_place(defect.port, w, family) is not None for w in left)
     there = [(f, why) for f in findings if (why := same_place(defect.port, f.where, family)) is not None]
     named = [(f, why) for f, why in there if f.physics == defect.physics or _as_good(f, defect, why)]
     rivals = [r for f in findings for r in f.rivals if _is(r, defect, family)]
@@ -96,12 +105,12 @@ def _defect(defect: TrueDefect, findings: Sequence[FindingRecord], family: str) 
         port=defect.port,
         depends_on=defect.drivers,
         enr=defect.enr,
-        located=bool(there),
+        located=bool(there) or unexplained,
         equivalent=why,
         named=bool(named),
         driver=any(_same_driver(defect, f) for f, _ in named),
         among_rivals=bool(named or rivals),
-        unknown_there=any(f.physics == UNKNOWN for f, _ in there),
+        unknown_there=unexplained or any(f.physics == UNKNOWN for f, _ in there),
         sizes=() if best is None or not named or why else _sizes(defect, best),  # another place, another quantity
     )
 

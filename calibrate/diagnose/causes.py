@@ -29,8 +29,9 @@ def cause(drivers: Drivers, name: str) -> Floats:
     table = by_joint.get(stem)
     if number and table is not None:
         return table[:, int(number) - 1]
-    if name.startswith("temp_"):
-        return drivers.temperatures_degC[name.removeprefix("temp_")]
+    temperature = drivers.temperatures_degC.get(name.removeprefix("temp_")) if name.startswith("temp_") else None
+    if temperature is not None:
+        return temperature
     single = {"t": drivers.t_s, "payload": drivers.payload_kg}
     if drivers.psd_sum_v is not None:
         single |= {"psd1_sum": drivers.psd_sum_v[:, 0], "psd2_sum": drivers.psd_sum_v[:, 1]}

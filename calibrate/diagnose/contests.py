@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.diagnosis import Diagnosis, Named
+from calibrate.diagnose.drifts import parted_by_time
 from calibrate.diagnose.elsewhere import Elsewhere, NewPoses, elsewhere
 from calibrate.diagnose.findings import named
 from calibrate.diagnose.fitted import Fitted
@@ -96,6 +97,8 @@ def _rivals(state: Fitted, diagnosis: Diagnosis) -> Sequence[tuple[int, Accepted
     for finding in diagnosis.findings:
         at = [i for i, a in enumerate(state.accepted) if named(a.term) == finding.name]
         for rival in finding.rivals if at else ():
+            if parted_by_time(finding.name, rival.name):
+                continue
             found = rival_named(state, at[0], rival.name)
             if found is not None:
                 out.append((at[0], found))

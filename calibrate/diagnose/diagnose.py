@@ -6,7 +6,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from calibrate.diagnose.diagnosis import Diagnosis, Finding, Rejected
+from calibrate.diagnose.advice import to_measure
+from calibrate.diagnose.diagnosis import Diagnosis, Rejected
 from calibrate.diagnose.doubt import doubted
 from calibrate.diagnose.findings import named
 from calibrate.diagnose.linearised import State
@@ -17,9 +18,6 @@ from calibrate.effects.term import Missing
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-
-POSES = "measure poses that separate them (calibeam diagnose --plan-out)"
-WITNESS = "alike at every pose to this instrument; watch either with a second one, or measure fixed marks again"
 
 
 def diagnose(state: State, rng: Generator, missing: Sequence[Missing] = ()) -> Diagnosis:
@@ -39,7 +37,7 @@ def diagnose(state: State, rng: Generator, missing: Sequence[Missing] = ()) -> D
         rejected=_rejected(at),
         invisible=tuple(dict.fromkeys(named(term) for term in at.bench.menu.invisible)),
         missing=tuple(missing),
-        next=(*_measure(found.findings), *found.next),
+        next=(*to_measure(found.findings), *found.next),
         model=at.state,
     )
 
@@ -59,13 +57,3 @@ def _rejected(at: Search) -> tuple[Rejected, ...]:
             why = "not beyond what searching through noise finds"
         best[term.physics] = Rejected(named(term), gain, why)
     return tuple(best.values())
-
-
-def _measure(findings: Sequence[Finding]) -> tuple[str, ...]:
-    out: list[str] = []
-    for finding in findings:
-        for alike, remedy in ((False, POSES), (True, WITNESS)):
-            others = ", ".join(f"{r.name.physics} at {r.name.where}" for r in finding.rivals if r.alike is alike)
-            if others:
-                out.append(f"{finding.name.physics} at {finding.name.where} could also be {others}: {remedy}")
-    return tuple(out)

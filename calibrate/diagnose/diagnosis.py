@@ -35,6 +35,13 @@ class Named:
     order: int | None
     physics: str
 
+    def beside(self, other: "Named") -> str:
+        """In words; with the driver where place and physics are those of the other name."""
+        words = f"{self.physics} at {self.where}"
+        if (self.physics, self.where) != (other.physics, other.where):
+            return words
+        return f"{words} by {' and '.join(self.depends_on)}"
+
 
 @dataclass(frozen=True)
 class RivalName:

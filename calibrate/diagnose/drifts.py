@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from calibrate.diagnose.causes import is_slow_cause
-from calibrate.diagnose.diagnosis import UNKNOWN, Finding, Unexplained
+from calibrate.diagnose.diagnosis import UNKNOWN, Finding, Named, Unexplained
 from calibrate.effects.term import Missing, Shape
 
 SMOOTH = (Shape.EXPONENTIAL.value, Shape.LINEAR.value, Shape.SMOOTH.value)  # a step is no matter of warmth
@@ -26,6 +26,11 @@ def suspects(finding: Finding, missing: Sequence[Missing]) -> tuple[Missing, ...
     if name.physics == UNKNOWN and all(map(is_slow_cause, name.depends_on)):
         out += [m for m in missing if m.driver == LOAD][:1]
     return tuple(out)
+
+
+def parted_by_time(one: Named, other: Named) -> bool:
+    """Whether two names differ in what they follow along the session only: no pose tells them apart."""
+    return one.where == other.where and all(map(is_slow_cause, (*one.depends_on, *other.depends_on)))
 
 
 def doubtful(finding: Finding) -> Finding:

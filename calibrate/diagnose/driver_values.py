@@ -35,7 +35,7 @@ def drivers_of(session: Session, frames: Floats, expected: Mapping[str, Floats],
     """
     samples, n = session.samples, session.arm.n_joints
     q = samples.joints()
-    moves = np.diff(q, axis=0, prepend=q[:1])
+    moves, direction = _moves(q, samples.column("t_s"))
     recorded = _per_joint(samples, "approach", "", n)
     commanded = samples.commanded()
     return Drivers(
@@ -44,13 +44,13 @@ def drivers_of(session: Session, frames: Floats, expected: Mapping[str, Floats],
         t_s=samples.column("t_s"),
         frames=frames,
         readouts={m.name: _readout(m, expected[m.name], own[m.name], frames) for m in session.measured},
-        approach=_last_direction(moves) if recorded is None else recorded,
+        approach=direction if recorded is None else recorded,
         approach_derived=recorded is None,
         last_move_rad=moves,
         qd_rad_s=_per_joint(samples, "qd", "_rad_s", n),
-        cmd_minus_q_rad=None if commanded is None else np.nan_to_num(commanded - q),
+        cmd_minus_q_rad=None if commanded is None or np.isnan(commanded).all() else np.nan_to_num(commanded - q),
         temperatures_degC=_temperatures(samples),
-        payload_kg=np.nan_to_num(samples.column("payload_kg")) if "payload_kg" in samples else None,
+        payload_kg=np.nan_to_num(samples.column("payload_kg")) if _recorded(samples, "payload_kg") else None,
         payload_com_m=_stacked(samples, ("payload_com_x_m", "payload_com_y_m", "payload_com_z_m")),
         psd_sum_v=_stacked(samples, ("psd1_sum_v", "psd2_sum_v")),
         extra=_extra(samples, n),
@@ -83,22 +83,29 @@ def _readout(measured: Measured, expected: Floats, own: Floats, frames: Floats) 
 def _per_joint(samples: Samples, stem: str, unit: str, n: int) -> Floats | None:
     """(sample, joint); None where no joint has the column, zero for a joint that lacks it."""
     names = per_joint(stem, unit, n)
-    if not any(name in samples for name in names):
+    if not any(_recorded(samples, name) for name in names):
         return None
     zero = np.zeros(len(samples))
     return np.stack([np.nan_to_num(samples.column(c)) if c in samples else zero for c in names], axis=1)
 
 
-def _last_direction(moves: Floats) -> Floats:
-    """(sample, joint) sign of the last move that was one."""
-    out = np.where(np.abs(moves) > MOVED_RAD, np.sign(moves), 0.0)
-    for row in range(1, len(out)):
-        out[row] = np.where(out[row] == 0.0, out[row - 1], out[row])
-    return out
+def _moves(q_rad: Floats, t_s: Floats) -> tuple[Floats, Floats]:
+    """(sample, joint) move from the sample before in time, and the sign of the last move that was one."""
+    order = np.argsort(t_s, kind="stable")
+    in_time = np.diff(q_rad[order], axis=0, prepend=q_rad[order[:1]])
+    signs = np.where(np.abs(in_time) > MOVED_RAD, np.sign(in_time), 0.0)
+    for row in range(1, len(signs)):
+        signs[row] = np.where(signs[row] == 0.0, signs[row - 1], signs[row])
+    moves, direction = np.empty_like(in_time), np.empty_like(signs)
+    moves[order], direction[order] = in_time, signs
+    return moves, direction
 
 
 def _temperatures(samples: Samples) -> dict[str, Floats]:
-    """Smoothed in the order of time, but not across a pause: what cooled meanwhile is no noise."""
+    """Smoothed in the order of time, but not across a pause: what cooled meanwhile is no noise.
+
+    A thermometer that is read now and then says between two readings what they say.
+    """
     t = samples.column("t_s")
     order = np.argsort(t, kind="stable")
     width = max(3.0, SMOOTHING * len(samples))
@@ -106,8 +113,10 @@ def _temperatures(samples: Samples) -> dict[str, Floats]:
     pauses = 1 + np.flatnonzero(steps > width * np.median(steps)) if len(steps) else np.zeros(0, dtype=np.intp)
     out: dict[str, Floats] = {}
     for name in samples.names:
-        if name.startswith("temp_") and name.endswith("_degC"):
-            values = _filled(samples.column(name))
+        if _is_temperature(name) and _recorded(samples, name):
+            read = samples.column(name)
+            known = order[np.isfinite(read[order])]
+            values = np.interp(t, t[known], read[known])
             smooth = np.empty_like(values)
             for run in np.split(order, pauses):
                 smooth[run] = gaussian_filter1d(values[run], width, mode="nearest")
@@ -115,8 +124,17 @@ def _temperatures(samples: Samples) -> dict[str, Floats]:
     return out
 
 
+def _is_temperature(name: str) -> bool:
+    return name.startswith("temp_") and name.endswith("_degC")
+
+
+def _recorded(samples: Samples, name: str) -> bool:
+    """Whether a column says anything: an empty one was not recorded, whatever its heading."""
+    return name in samples and bool(np.isfinite(samples.column(name)).any())
+
+
 def _stacked(samples: Samples, names: tuple[str, ...]) -> Floats | None:
-    if not all(name in samples for name in names):
+    if not all(_recorded(samples, name) for name in names):
         return None
     return np.stack([_filled(samples.column(name)) for name in names], axis=1)
 
@@ -125,7 +143,7 @@ def _extra(samples: Samples, n: int) -> dict[str, Floats]:
     """Numeric columns that the format does not name and that vary."""
     out: dict[str, Floats] = {}
     for name in samples.names:
-        if name in NAMED or name.endswith("_sigma_m") or name.startswith("temp_") or joint_of(name) is not None:
+        if name in NAMED or name.endswith("_sigma_m") or _is_temperature(name) or joint_of(name) is not None:
             continue
         values = samples.column(name)
         if np.isfinite(values).any() and np.ptp(values[np.isfinite(values)]) > 0.0:

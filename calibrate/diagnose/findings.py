@@ -94,7 +94,10 @@ def _finding(at: Search, i: int, rivals: Sequence[Rival], predicts: float) -> Fi
 
 
 def _rival(bench: Bench, own: Accepted, rival: Rival, belief: float) -> RivalName:
-    alike = _alike(*(orthonormal(bench.state.columns(a.term, a.inner)) for a in (own, rival.accepted)))
+    other = rival.accepted
+    inner = own.inner if other.term.inner == own.term.inner else other.inner  # both were fitted, hence not quite equal
+    pair = ((own.term, own.inner), (other.term, inner))
+    alike = _alike(*(orthonormal(bench.state.columns(term, values)) for term, values in pair))
     return RivalName(named(rival.term), belief, rival.margin, rival.refitted, alike, rival.plausible)
 
 

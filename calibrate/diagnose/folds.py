@@ -26,7 +26,7 @@ class Split:
 
 def splits_of(drivers: Drivers, samples: Ints, rng: Generator) -> tuple[Split, ...]:
     """Those that a session allows."""
-    found = [Split("random", (samples[np.isin(units(drivers)[samples], _some(drivers, samples, rng))],))]
+    found = [Split("random", _at_random(drivers, samples, rng))]
     place = places(drivers)[samples]
     folds = [samples[place == p] for p in np.unique(place[place >= 0])]
     folds = sorted((fold for fold in folds if len(fold) >= FEWEST), key=len, reverse=True)[:MOST]
@@ -34,7 +34,13 @@ def splits_of(drivers: Drivers, samples: Ints, rng: Generator) -> tuple[Split, .
         found.append(Split("place", tuple(folds)))
     order = samples[np.argsort(drivers.t_s[samples], kind="stable")]
     found.append(Split("last block", (np.sort(order[len(order) - max(1, round(SHARE * len(order))) :]),)))
-    return tuple(split for split in found if all(FEWEST <= len(f) <= len(samples) - FEWEST for f in split.unseen))
+    return tuple(split for split in found if _proves(split, len(samples)))
+
+
+def _proves(split: Split, samples: int) -> bool:
+    """Whether it leaves enough out, and enough to fit."""
+    left_out = [len(fold) for fold in split.unseen]
+    return sum(left_out) >= FEWEST and max(left_out) <= samples - FEWEST
 
 
 def units(drivers: Drivers) -> Ints:
@@ -60,6 +66,12 @@ def k_folds(labels: Ints, k: int, rng: Generator) -> Sequence[Ints]:
     return [np.flatnonzero(np.isin(labels, part)) for part in np.array_split(names, k)]
 
 
-def _some(drivers: Drivers, samples: Ints, rng: Generator) -> Ints:
-    names = rng.permutation(np.unique(units(drivers)[samples]))
-    return names[: max(1, round(SHARE * len(names)))]
+def _at_random(drivers: Drivers, samples: Ints, rng: Generator) -> tuple[Ints, ...]:
+    """A share of the samples; of a small session several in turn, until there are enough for a proof."""
+    labels = units(drivers)[samples]
+    names = rng.permutation(np.unique(labels))
+    some = max(1, round(SHARE * len(names)))
+    out: list[Ints] = []
+    while len(out) * some < len(names) and sum(map(len, out)) < FEWEST:
+        out.append(samples[np.isin(labels, names[len(out) * some :][:some])])
+    return tuple(out)

@@ -62,7 +62,8 @@ def free_space_change(before: Fitted, after: Fitted, rng: Generator) -> FreeSpac
     truth = perturbed_frames(session.arm, after.geometry[:n_arm], q_rad, by)[:, -1]
     alone = perturbed_frames(session.arm, before.geometry[:n_arm], q_rad, nothing)[:, -1]
     point_m = _target_m(after)
-    doubt = _doubt(after, truth, point_m, np.concatenate([arm, *slopes], axis=2), [*range(n_arm), *columns])
+    # At the poses of the twists: frames that nobody knows would else be taken out a little askew, and they are far off.
+    doubt = _doubt(after, frames[:, -1], point_m, np.concatenate([arm, *slopes], axis=2), [*range(n_arm), *columns])
     missed = _missed(alone, truth, point_m)
     return FreeSpaceChange(float(np.sqrt(missed + doubt)), float(np.sqrt(doubt)), POSES)
 

@@ -26,7 +26,8 @@ def refined(bench: Bench, term: Term, inner: Floats, without: Removed | None = N
     best = inner.copy()
     for _ in range(SWEEPS if len(term.inner) > 1 else min(len(term.inner), 1)):
         for j, spec in enumerate(term.inner):
-            best[j] = _best_of_one(_explains(bench, term, best, j, without), spec, best[j], bench)
+            times = telling_times(bench, term, best) if spec.discrete else np.zeros(0)
+            best[j] = _best_of_one(_explains(bench, term, best, j, without), spec, best[j], times)
     return Accepted(term, solved(bench, term, best, without)[0], best)
 
 
@@ -55,15 +56,22 @@ def _explains(bench: Bench, term: Term, inner: Floats, j: int, without: Removed 
     return squares
 
 
-def _best_of_one(squares: Callable[[float], float], spec: Inner, value: float, bench: Bench) -> float:
-    """Between the neighbours of a value on the grid."""
+def telling_times(bench: Bench, term: Term, inner: Floats) -> Floats:
+    """(time,) of the samples that can tell when a step was: those that would feel it, had it always been there."""
+    always = np.where([spec.discrete for spec in term.inner], -np.inf, inner)
+    felt = np.any(term.basis(bench.state.drivers, always) != 0.0, axis=(1, 2))
+    return np.unique(bench.state.drivers.t_s[felt])
+
+
+def _best_of_one(squares: Callable[[float], float], spec: Inner, value: float, times: Floats) -> float:
+    """Between the neighbours of a value on the grid; a step between two of the `times` that can tell."""
     grid = np.array([spec.lower, *spec.grid, spec.upper])
     below, above = grid[grid < value], grid[grid > value]
     low, high = (float(below.max()) if len(below) else value), (float(above.min()) if len(above) else value)
     if high <= low:
         return value
     if spec.discrete:
-        return _best_of(squares, [value, *_between_samples(bench, low, high)])
+        return _best_of(squares, [value, *_between(times, low, high)])
 
     def left(x: float) -> float:
         return -squares(x)
@@ -76,8 +84,7 @@ def _best_of(squares: Callable[[float], float], values: Sequence[float]) -> floa
     return max(values, key=squares)
 
 
-def _between_samples(bench: Bench, low: float, high: float) -> list[float]:
-    """Times between neighbouring samples: all that a step can be told by."""
-    t = np.unique(bench.state.drivers.t_s)
-    middle = (t[1:] + t[:-1]) / 2.0
+def _between(times: Floats, low: float, high: float) -> list[float]:
+    """Middles of neighbouring times from low to high."""
+    middle = (times[1:] + times[:-1]) / 2.0
     return [float(x) for x in middle[(middle > low) & (middle < high)]]

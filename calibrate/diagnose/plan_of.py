@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
 from calibrate.diagnose.contests import NextPoses
-from calibrate.diagnose.diagnosis import Named
 from calibrate.diagnose.fitted import Fitted
 
 Floats = NDArray[np.float64]
@@ -61,10 +60,6 @@ def _short_way(q_rad: Floats) -> list[int]:
 
 
 def _purpose(found: NextPoses) -> tuple[str, ...]:
-    told = [f"tells {_words(a)} from {_words(b)}" for a, b in dict.fromkeys(found.pairs)]
+    told = [f"tells {a.beside(b)} from {b.beside(a)}" for a, b in dict.fromkeys(found.pairs)]
     margin = f"margin to expect of the closest pair: {found.before:.0f} BIC before, {found.after:.0f} with these poses"
     return (*told, margin)
-
-
-def _words(name: Named) -> str:
-    return f"{name.physics} at {name.where}"

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.diagnose.bench import Bench
+from calibrate.diagnose.line_search import telling_times
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.noise_law import curvature_of
 from calibrate.effects.drivers import Drivers
@@ -17,6 +18,8 @@ from calibrate.effects.term import Size, Term
 Floats = NDArray[np.float64]
 
 LEVERAGE = 0.9  # rows that the model follows closer say nothing about the noise
+TOLD = 1e-10  # of the largest eigenvalue of unit columns: combinations below are not told by the data
+PART = 1e-3  # of a value in such a combination, for the value itself not to be told
 INNER_STEP = 1e-3  # of the range of an inner parameter, for its difference quotient
 WEIGHT = ("gravity_torque", "overturning_moment", "payload")  # drivers that follow from masses
 
@@ -31,21 +34,20 @@ def sizes_of(bench: Bench, i: int) -> dict[str, Size]:
     alone = span @ (span.T @ np.concatenate(slopes, axis=1))
     covariance = sandwich(bench, alone) + _by_masses(bench, a, span, alone)
     m = len(a.coefficients)
-    inner_sigma = np.array([_between_samples(bench, t) for t in a.inner])
+    inner_sigma = np.array([_between_samples(telling_times(bench, a.term, a.inner), t) for t in a.inner])
     inner_sigma[smooth] = np.sqrt(np.maximum(np.diag(covariance)[m:], 0.0))
     return dict(a.term.sizes(a.coefficients, covariance[:m, :m], a.inner, inner_sigma))
 
 
-def _between_samples(bench: Bench, time_s: float) -> float:
-    """Sigma of a moment of which only the samples before and after it are known: equally likely in between."""
-    t = np.unique(bench.state.drivers.t_s)
+def _between_samples(t: Floats, time_s: float) -> float:
+    """Sigma of a moment of which only the times t before and after it are known: equally likely in between."""
     after = int(np.searchsorted(t, time_s))
     return float(t[after] - t[after - 1]) / 12.0**0.5 if 0 < after < len(t) else 0.0
 
 
 def sandwich(bench: Bench, columns: Floats) -> Floats:
     """(m, m) covariance of values with columns (row, m) that nothing else can stand in for, by what the residuals
-    really scatter.
+    really scatter; an infinite variance where the data do not tell the value.
 
     Weights follow the residuals, so least squares under them is too sure of itself. Source: Huber, The behavior of
     maximum likelihood estimates under nonstandard conditions, Proc. 5th Berkeley Symp. 1, 1967 (the sandwich), whole
@@ -59,9 +61,14 @@ def sandwich(bench: Bench, columns: Floats) -> Floats:
     _, group = np.unique(rows.group[data], return_inverse=True)
     each = np.zeros((int(group.max()) + 1, columns.shape[1]))
     np.add.at(each, group, met[data])
-    inverse = np.linalg.pinv(unit.T @ unit * curvature_of(rows), rcond=1e-10, hermitian=True)
+    w, V = np.linalg.eigh(unit.T @ unit * curvature_of(rows))
+    told = w > TOLD * max(float(w.max(initial=0.0)), 1e-300)
+    inverse = (V[:, told] / w[told]) @ V[:, told].T
     found = inverse @ (each.T @ each + unit[~data].T @ unit[~data]) @ inverse
-    return np.asarray(found / np.outer(size, size), dtype=np.float64)
+    covariance = np.asarray(found / np.outer(size, size), dtype=np.float64)
+    untold = np.any(np.abs(V[:, ~told]) > PART, axis=1)
+    covariance[untold, untold] = np.inf
+    return covariance
 
 
 def _by_masses(bench: Bench, a: Accepted, span: Floats, alone: Floats) -> Floats:

@@ -38,6 +38,7 @@ from calibrate.diagnose.schema import (
 from calibrate.diagnose.smallest_visible import Smallest, smallest_visible
 from calibrate.effects.catalogue import EFFECTS
 from calibrate.effects.form import Form
+from calibrate.effects.term import Size
 
 Floats = NDArray[np.float64]
 
@@ -124,9 +125,7 @@ def _limits(model: Fitted) -> dict[Named, float]:
 def _finding(finding: Finding, plausible_to: float | None) -> FindingRecord:
     return FindingRecord(
         *_words(finding.name),
-        parameters={
-            name: SizeRecord(_number(size.value), _number(size.sigma)) for name, size in finding.parameters.items()
-        },
+        parameters={name: _size(size) for name, size in finding.parameters.items()},
         share=finding.share,
         confidence=finding.confidence,
         says=finding.says,
@@ -191,6 +190,12 @@ def _name(name: Named) -> NameRecord:
 
 def _words(name: Named) -> tuple[str, str, str, int | None, str]:
     return name.where, ",".join(name.depends_on), name.shape, name.order, name.physics
+
+
+def _size(size: Size) -> SizeRecord:
+    """No number for what the data do not tell."""
+    sigma = _number(size.sigma)
+    return SizeRecord(None if sigma is None else _number(size.value), sigma)
 
 
 def _numbers(values: Floats) -> tuple[float | None, ...]:

@@ -80,8 +80,9 @@ def _polar(names: tuple[str, ...], values: Floats, covariance: Floats) -> dict[s
     a, b = values
     amplitude = float(np.hypot(a, b))
     by = np.array([[a, b], [-b / max(amplitude, 1e-300), a / max(amplitude, 1e-300)]]) / max(amplitude, 1e-300)
-    sigma = np.sqrt(np.maximum(np.diag(by @ covariance @ by.T), 0.0))
+    told = bool(np.isfinite(np.diag(covariance)).all())
+    sigma = np.sqrt(np.maximum(np.diag(by @ covariance @ by.T), 0.0)) if told else np.full(2, np.inf)
     return {
         names[0]: Size(amplitude, float(sigma[0])),
-        names[1]: Size(float(np.arctan2(b, a)), float(min(sigma[1], np.pi))),
+        names[1]: Size(float(np.arctan2(b, a)), float(min(sigma[1], np.pi)) if told else np.inf),
     }

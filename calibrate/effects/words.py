@@ -1,6 +1,10 @@
 """Sizes as an engineer reads them: "68 ± 2 µrad per Nm". The unit comes from the end of the name."""
 
+import math
+
 from calibrate.effects.term import Size
+
+NOT_TOLD = "(not told by these data)"
 
 # Ending of a name, with (from this size on, factor, unit), largest first. The first ending that fits is taken.
 Steps = tuple[tuple[float, float, str], ...]
@@ -27,10 +31,17 @@ UNITS: tuple[tuple[str, Steps], ...] = (
 
 
 def plain(name: str, size: Size) -> str:
-    """Value, doubt and unit of a size with its unit in its name: 68 ± 2 µrad per Nm."""
+    """Value, doubt and unit of a size with its unit in its name: 68 ± 2 µrad per Nm. No number without a doubt."""
+    if not math.isfinite(size.sigma):
+        return NOT_TOLD
     for ending, steps in UNITS:
         if name.endswith(ending):
             scale, unit = next((s, u) for least, s, u in steps if abs(size.value) >= least)
             space = "" if unit in ("°", "%") else " "
-            return f"{scale * size.value:.4g} ± {scale * size.sigma:.2g}{space}{unit}"
-    return f"{size.value:.4g} ± {size.sigma:.2g}"
+            return f"{_digits(scale * size.value, 4)} ± {_digits(scale * size.sigma, 2)}{space}{unit}"
+    return f"{_digits(size.value, 4)} ± {_digits(size.sigma, 2)}"
+
+
+def _digits(value: float, count: int) -> str:
+    """So many significant ones, and the whole number where it has more: 409, not 4.1e+02."""
+    return f"{value:.{count}g}" if abs(value) < 10.0**count - 0.5 else f"{value:.0f}"

@@ -14,7 +14,14 @@ from calibeam.prove.scenario import Scenario
 from calibeam.prove.scoring import score
 from calibeam.prove.truth import Exact, FreeSpace, TrueDefect, TrueNoise, Truth
 from calibrate.diagnose.file import write_diagnosis
-from calibrate.diagnose.schema import DiagnosisFile, FindingRecord, NotRecorded, RivalRecord, SizeRecord
+from calibrate.diagnose.schema import (
+    DiagnosisFile,
+    FindingRecord,
+    NotRecorded,
+    RivalRecord,
+    SizeRecord,
+    UnexplainedRecord,
+)
 from simulators.conceal.wanted import Wanted
 
 NAME = "case-0000"
@@ -53,14 +60,13 @@ def scored(tmp_path: Path) -> Scored:
     ) -> CaseScore:
         layout = Layout(tmp_path)
         exact = _write_recording(layout.recording(NAME))
-        fields: dict[str, object] = {"verdict": "mismatch" if findings else "consistent"} | more
+        fields: dict[str, object] = {"verdict": "mismatch" if findings else "consistent", "unexplained": None} | more
         file = DiagnosisFile(
             schema=1,
             noise_floor_m=NOISE_M,
             rms_before_m=5e-5,
             rms_after_m=1e-5,
             findings=findings,
-            unexplained=None,
             next=(),
             **fields,  # type: ignore[arg-type]
         )
@@ -158,6 +164,15 @@ def test_unknown_at_its_place_is_right_for_what_no_catalogue_lists(scored: Score
     assert case.kind == "outside"
     assert case.defects[0].unknown_there
     assert not case.misnamed
+
+
+@pytest.mark.parametrize(("physics", "located"), [("unknown", True), ("backlash", False)])
+def test_only_what_no_catalogue_lists_may_be_left_unexplained_at_its_place(
+    scored: Scored, defect: MakeDefect, physics: str, located: bool
+) -> None:
+    there = UnexplainedRecord("joint2.angle", "cmd_minus_q", 1e-5, 0.2, 1e-6, "scatter")
+    case = scored((defect(physics),), unexplained=there)
+    assert case.defects[0].located is located
 
 
 def test_a_missing_column_has_to_be_named_in_doubt(scored: Scored, defect: MakeDefect) -> None:

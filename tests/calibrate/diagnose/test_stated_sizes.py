@@ -10,6 +10,8 @@ from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.session import session_of
 from calibrate.diagnose.stated_sizes import sandwich, sizes_of
 from calibrate.effects.loads import states_masses
+from calibrate.effects.term import Size
+from calibrate.effects.words import plain
 
 from .concealed import recording_of
 
@@ -73,3 +75,17 @@ def test_a_compliance_is_no_better_known_than_the_masses(tmp_path):
     by_scatter = sandwich(best, span @ (span.T @ best.state.columns(term, np.zeros(0))))
     assert size.sigma > np.sqrt(by_scatter[0, 0])
     assert 0.02 * abs(size.value) < size.sigma < 0.4 * abs(size.value)
+
+
+def test_a_value_that_the_data_do_not_tell_has_no_sigma_that_pretends_it(world):
+    rng = np.random.default_rng(7)
+    bench = Bench(world.session(rng))
+    seen = rng.standard_normal(len(bench.state.rows.residual))
+    told, one, other = np.diag(sandwich(bench, np.stack([rng.permutation(seen), seen, 2.0 * seen], axis=1)))
+    assert np.isfinite(told)
+    assert told > 0.0
+    assert np.isinf([one, other]).all()
+
+
+def test_a_size_without_a_sigma_is_not_told_in_words_or_file():
+    assert "not told" in plain("shift_x_m", Size(1e-5, np.inf))
