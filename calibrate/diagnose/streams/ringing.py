@@ -123,11 +123,15 @@ def _joint(sure: list[tuple[Stand, float, Swing, float]], levers: Levers | None)
     explained, total = 0.0, 0.0
     for _, at_s, one, _ in sure:
         lever = levers(at_s) / one.amplitude_sigma[:, None]
+        if not lever.any():  # the model cannot say what is read there: between two places, say
+            continue
         amplitude = one.amplitude / one.amplitude_sigma
         size = np.linalg.norm(lever, axis=0)
         unit = lever / np.where(size > 0.0, size, 1.0)
         explained = explained + np.abs(unit.T @ amplitude) ** 2
         total += float(np.sum(np.abs(amplitude) ** 2))
+    if not total:
+        return None, ()
     share = np.asarray(explained) / total
     best = int(np.argmax(share))
     if share[best] < CLEAR:
