@@ -74,11 +74,13 @@ class ModbusLine:
         self._address, self._unit = address, unit
         self._turn = threading.Lock()
         self._client: Client | None = None
+        self._closed = False  # by its owner: a late request must not open it again, for nobody would close it
 
     def connect(self) -> None:
         """DeviceLost when nobody is there. The first request shows whether it speaks Modbus."""
         with self._turn:
             self._close()
+            self._closed = False
             self._opened()
 
     def read(self, table: str, address: int, count: int) -> list[int]:
@@ -101,11 +103,14 @@ class ModbusLine:
     def close(self) -> None:
         """Safe in every state and more than once."""
         with self._turn:
+            self._closed = True
             self._close()
 
     def _opened(self) -> Client:
         if self._client is not None:
             return self._client
+        if self._closed:
+            raise DeviceLost(f"{self.place}: closed; connect again")
         client = self._new_client()
         if not client.connect():
             client.close()

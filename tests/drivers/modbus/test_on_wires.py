@@ -51,6 +51,14 @@ def test_a_move_blocks_until_the_arm_has_arrived(cell, arm) -> None:
     assert joints_of(cell, arm) == pytest.approx(HOME + 0.2, abs=1e-4)
 
 
+def test_a_closed_line_is_not_opened_again_by_a_late_request(cell, arm) -> None:
+    arm.close()
+    with pytest.raises(DeviceLost, match="closed; connect again"):
+        arm.move_joints(HOME, 2.0, 10.0)
+    arm.connect()
+    arm.move_joints(HOME, 2.0, 10.0)
+
+
 def read_until_it_fails(reader) -> None:
     for _ in range(200):
         reader.read(1.0)
