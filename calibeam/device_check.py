@@ -11,7 +11,7 @@ from acquisition.errors import AcquisitionError
 from acquisition.guarded import one_error_tree
 from acquisition.psd_view import psd_window
 from acquisition.recording.errors import RigFileError
-from acquisition.recording.rig_schema import Camera, Rig, RobotDriver
+from acquisition.recording.rig_schema import Camera, EncoderDriver, Rig, RobotDriver
 from calibeam.camera import camera_sight
 from calibeam.encoders import encoder_driver, identities_of
 from calibeam.listened import bus_trouble, noise, pace, uneven_layers
@@ -118,7 +118,8 @@ def _encoders(rig: Rig, clock: Clock) -> DeviceCheck:
     with _listened(driver, clock) as blocks:
         q_rad = np.concatenate([block.values["position_rad"] for block in blocks])
         identities = identities_of(driver)
-    rate_hz, wrong = pace(blocks, device.sync_hz)
+    asked_hz = device.sync_hz if device.driver is EncoderDriver.CIA406 else 0.0  # others send at a pace of their own
+    rate_hz, wrong = pace(blocks, asked_hz)
     registers = {int(identity["node"]): int(identity["error_register"]) for identity in identities}
     wrong = wrong or bus_trouble(blocks[-1], registers)
     mute = [k + 1 for k in range(q_rad.shape[1]) if np.isnan(q_rad[:, k]).all()]

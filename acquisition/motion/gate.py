@@ -32,7 +32,7 @@ Acting = Callable[[str], None]
 
 HALTED = "the motion was halted; the arm was stopped through its controller"
 PIPELINE = 4  # solutions that are made before the set-points come to them: the path must rest so long for an action
-ELSEWHERE_RAD = 0.01  # an arm further from where its plan begins was moved meanwhile
+ELSEWHERE_RAD = 1e-3  # an arm further from where its plan begins was moved meanwhile
 
 
 class SetPoints(Protocol):
@@ -136,12 +136,15 @@ class Gate:
         halted, or set-points too late. DeviceError of the arm.
         """
         self._check(made, now_rad)
-        path = made.path() if made.carried else SolvedPath(made.path(), 1.0 / self._stream.solve_hz)
         self._tell(Event.START)
         followed = Followed()
         try:
+            # Solving takes a while: whatever is said meanwhile counts, for the motion has begun.
+            path = made.path() if made.carried else SolvedPath(made.path(), 1.0 / self._stream.solve_hz)
             self._follow(made, path, belt, act, watch, followed)
-            if self._state is not State.HALTED:
+            if self._halted():
+                self._arm.stop()  # once more: a set-point may have crossed the halt on its way
+            else:
                 self._arm.servo_stop(self._brake_rad_s2)
         except BaseException as error:  # also Ctrl-C, and in the middle of the clean-up
             self._tell(Event.FAULT)
@@ -187,6 +190,9 @@ class Gate:
                 return
             self._ramp(points, period_s)
             late_s = self._wait(begin_s + cycle * period_s, cycle, followed)
+            watch()  # again: most of a cycle is spent waiting, and nothing may be sent after a halt
+            if self._halted():
+                return
             begin_s += late_s
             if late_s > self._stream.rested_s:
                 points.restart((cycle - 1) * period_s)
@@ -221,6 +227,8 @@ class Gate:
                 return
             t_s = min(k * period_s, total_s)
             begin_s += self._wait(begin_s + (cycle + k - 1) * period_s, cycle + k - 1, followed)
+            if self._halted():
+                return
             self._send(q_rad + speed_rad_s * (t_s - 0.5 * t_s**2 / total_s), followed)
         with self._lock:
             if self._state is State.ENDING:

@@ -75,6 +75,7 @@ def teach(graph: TaskGraph, steps: Sequence[Teach], solver: Solver, placed: Call
 
 def run_task(gate: Gate, task: Task, around: Around) -> Ran:
     """The whole program. TaskError, RefusedMotionError before a sweep; InterruptedMotionError, DeviceError in one."""
+    task.graph.check()
     ran = Ran(task.graph)
     steps: Sequence[Step] = task.program
     plain = list(unrolled(tuple(steps)))

@@ -88,9 +88,9 @@ def design_command(
         offered = candidates_of(loaded, candidates, rng, lambda done, total: progress("candidates", done, total))
         found = information_of(loaded, offered, rng)
         made = design(loaded, offered, found, Asked(poses, repeats, criterion, seed), progress)
+        write_pose_plan(out, made.plan)  # before anything else can go wrong
         seen = seen_by(loaded, offered, made.taken, rng)
         spread = _places(loaded, poses, places, rng, progress) if places else ()
-    write_pose_plan(out, made.plan)
     if report is not None:
         from calibrate.report.pose_design.page import write_page_of
 

@@ -1,5 +1,6 @@
 """`calibeam log`: a device recorded for as long as it takes, without a session."""
 
+import math
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -58,8 +59,8 @@ def encoders(
         Print one line of JSON at the end, and nothing else.
 
     """
-    if rotate_mb <= 0.0 or rotate_min <= 0.0:
-        raise DeviceRefused(f"--rotate-mb {rotate_mb:g}, --rotate-min {rotate_min:g}: give numbers above 0")
+    if not (0.0 < rotate_mb < math.inf and 0.0 < rotate_min < math.inf):
+        raise DeviceRefused(f"--rotate-mb {rotate_mb:g}, --rotate-min {rotate_min:g}: give finite numbers above 0")
     loaded, clock = load_rig(rig), SystemClock()
     device = loaded.devices.encoders
     if device is None:

@@ -23,6 +23,7 @@ from drivers.psd_kpa101.selfcheck import CheckStatus, UnitCheck, check_unit
 Floats = NDArray[np.float64]
 READ_S = 1.0
 COLUMNS = ("x_m", "y_m")
+RIG_DIFFERS = "the rig says"
 
 
 @dataclass(frozen=True)
@@ -66,11 +67,16 @@ def psd_check_command(rig: Path, *, points: Path, unit: int = 1, out: Path | Non
         seen = collect(psd, face, unit, place_m, _ask_person if wait else _say_nothing)
     finally:
         psd.close()
+    told: list[str] = []
     if seen.counts is not None:
-        for line in unit_lines(check_unit(place_m, seen.counts, face.metres_per_ratio), device, unit):
+        told = unit_lines(check_unit(place_m, seen.counts, face.metres_per_ratio), device, unit)
+        for line in told:
             print(line)
     fit = fit_error_map(place_m, seen.shown_m, 0.5 * face.length_m)
     print(map_line(fit))
+    if out is not None and any(RIG_DIFFERS in line for line in told):
+        # A map of spots that the rig mirrors or scales would do so a second time once the rig is put right.
+        raise SamplesError(f"{out}: not written; correct {rig} first, then measure the map again")
     if out is not None and fit.map is not None:
         fit.map.save(out)
         print(f"{out}: written; name it in error_maps of [devices.psd]")
@@ -102,14 +108,14 @@ def unit_lines(check: UnitCheck, device: PsdDevice, unit: int) -> list[str]:
         ("x_signs", check.x.sign, device.x_signs[unit - 1]),
         ("y_signs", check.y.sign, device.y_signs[unit - 1]),
     ):
-        verdict = "as in the rig" if measured == said else f"the rig says {said}: correct {name}"
+        verdict = "as in the rig" if measured == said else f"{RIG_DIFFERS} {said}: correct {name}"
         lines.append(f"unit {unit}: {name} {measured}, {verdict}")
     scale = check.sum_full_scale_v
     if scale is not None:
         value_v, sigma_v = scale
         said_v = device.sum_full_scale_v[unit - 1]
         near = abs(value_v - said_v) <= max(3.0 * sigma_v, 0.05 * said_v)  # the rest is the map's gain
-        verdict = "as in the rig" if near else f"the rig says {said_v:g}: correct sum_full_scale_v"
+        verdict = "as in the rig" if near else f"{RIG_DIFFERS} {said_v:g}: correct sum_full_scale_v"
         lines.append(f"unit {unit}: sum_full_scale_v {value_v:.4g} ± {sigma_v:.2g}, {verdict}")
     return lines
 

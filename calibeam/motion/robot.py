@@ -93,7 +93,7 @@ def streamed_robot(rig: Rig, clock: Clock, emulated: Mapping[str, Any] | None = 
     if not hasattr(arm, "servo_joints"):
         raise DeviceRefused(f"[devices.robot]: driver '{device.driver.value}' takes no set-points; use ur-rtde")
     streamed: StreamedArm = arm  # pyright: ignore[reportAssignmentType] - asked for in the line above
-    supervisor, track = Supervisor(arm.stop, clock), Track()
+    supervisor, track = Supervisor(arm.hold, clock), Track()
     pump = Pump(robot.reader, clock, track.blocks.append, supervisor.failed)
     robot.reader.connect()
     pump.start()

@@ -88,7 +88,8 @@ def _once(
     found = sobol_indices(func={"f_A": f_A[moving], "f_B": f_B[moving], "f_AB": f_AB[:, moving]}, n=points)
     variance = np.var(np.concatenate([f_A[moving], f_B[moving]], axis=1), axis=1)
     weight = variance / variance.sum()
-    return weight @ np.atleast_2d(found.first_order), weight @ np.atleast_2d(found.total_order)
+    shape = len(weight), len(sources)  # scipy drops axes of one
+    return weight @ np.reshape(found.first_order, shape), weight @ np.reshape(found.total_order, shape)
 
 
 def _values(sources: Sequence[Source], columns: Columns, shares: Floats) -> Floats:

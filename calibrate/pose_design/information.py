@@ -81,7 +81,7 @@ def information_of(rig: Rig, candidates: Candidates, rng: Generator) -> Informat
     J = weighting.problem(found.start).jacobian(found.start)[:, free] * size
     k = candidates.reading.shape[1]
     order = np.concatenate([m.sample_rows[:, -1] for m in weighting.measured])
-    rows = np.empty((len(candidates), k, len(free)))
+    rows = np.zeros((len(candidates), k, len(free)))
     rows[order] = J[: len(order) * k].reshape(len(order), k, -1)
     target = target_of(rig, arm_of(rig), every, found.start, rng)
     by_target, by_scale = target.by[:, free] * size, target.by_scale[free] * size

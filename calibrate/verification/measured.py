@@ -79,6 +79,11 @@ def _lengths(samples: Samples, rig: Rig, tips_m: Floats) -> tuple[Length, ...]:
     rows = np.flatnonzero(bar)
     if len(rows) == 0:
         return ()
+    if "bar_end" not in samples:
+        raise DataError("samples: bars without bar_end; say which end (a or b) each reading is of")
+    unknown = set(bar[rows].tolist()) - set(rig.bars)
+    if unknown:
+        raise DataError(f"samples: bar {min(unknown)} is not in the rig; add a [[bar]] with its length")
     ends = samples.columns["bar_end"][rows]
     out: list[Length] = []
     middles: list[tuple[int, Floats]] = []

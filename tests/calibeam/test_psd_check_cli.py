@@ -96,8 +96,11 @@ def test_a_rig_with_the_wrong_sign_is_corrected(bench, places, tmp_path, monkeyp
     wrong.write_text(
         RIG.read_text().replace("x_signs = [-1, -1]", "x_signs = [1, -1]").replace("[10.0, 10.0]", "[40.0, 10.0]")
     )
-    assert run(["psd-check", str(wrong), "--points", str(places), "--unit", "1"]) == 0
-    text = capsys.readouterr().out
+    made = tmp_path / "map.json"
+    assert run(["psd-check", str(wrong), "--points", str(places), "--unit", "1", "--out", str(made)]) == 1
+    text, error = capsys.readouterr()
+    assert "first, then measure the map again" in " ".join(error.split())
+    assert not made.exists()
     assert "unit 1: x_signs -1, the rig says 1: correct x_signs" in text
     assert "the rig says 40: correct sum_full_scale_v" in text
 

@@ -6,6 +6,7 @@ was, re-expressed in the coordinates of the new leg: 2POS1 = COORD2(s)^-1 COORD1
 Source: R. Paul, Robot Manipulators, 1981, ch. 5.6 to 5.9.
 """
 
+import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -183,7 +184,7 @@ class Path:
         way_m, _ = apart(start, place.pos)
         time_s = max(
             way_m / self._pace.line_speed_m_s,
-            max(drive.theta_rad, abs(drive.phi_rad)) / self._pace.line_turn_rad_s,
+            math.hypot(drive.theta_rad, drive.phi_rad) / self._pace.line_turn_rad_s,
             segment.time_s,
         )
         return LineLeg(self._solver, place, start, drive, max(segment.slower * time_s, 2.0 * self._tacc_s))

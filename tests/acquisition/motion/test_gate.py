@@ -194,6 +194,24 @@ def test_halt_reaches_the_arm_in_every_state() -> None:
     assert len(arm.q_rad) == 31
 
 
+def test_nothing_is_sent_after_a_halt_that_comes_while_a_set_point_waits_for_its_time() -> None:
+    arm, clock = Arm(), JumpingClock()
+    gate = gate_of(arm, clock)
+    sent_at_halt: list[int] = []
+
+    def sleep(seconds: float) -> None:
+        clock.t_s += seconds
+        if len(arm.q_rad) == 30 and not sent_at_halt:
+            sent_at_halt.append(len(arm.q_rad))
+            gate.halt()
+
+    clock.sleep_s = sleep  # type: ignore[method-assign]
+    with pytest.raises(InterruptedMotionError, match="halted"):
+        gate.run(gate.plan(HOME_RAD, there(0.1, 0.05, 0.0)), HOME_RAD)
+    assert len(arm.q_rad) == sent_at_halt[0]
+    assert set(arm.stops) == {"stop"}
+
+
 def test_a_set_point_that_is_refused_after_a_halt_is_the_halt() -> None:
     def halted(n: int) -> None:
         if n == 30:

@@ -72,6 +72,13 @@ def test_sobol_indices_of_small_errors_are_the_linear_shares(machine, poses, eve
     assert np.all(found.total_sigma < 0.01)
 
 
+def test_all_of_the_spread_is_that_of_a_single_error(machine, poses, stated):
+    sources = stated({"what": ("joint2.zero",), "scale_rad": 1e-4})
+    found = indices_of(machine, sources, poses[:3], seed=1, points=256, scrambles=4)
+    np.testing.assert_allclose(found.first, [1.0], atol=0.03)
+    np.testing.assert_allclose(found.total, [1.0], atol=0.01)
+
+
 def test_errors_that_act_together_have_larger_total_than_first_indices(machine, poses, stated):
     sources = stated({"what": ("joint2.zero", "joint4.zero"), "scale_rad": 1.0})
     found = indices_of(machine, sources, poses[:3], seed=1, points=1024, scrambles=4)
