@@ -3,6 +3,8 @@
 Needs no device any more.
 """
 
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 
 from rich.console import Console
@@ -21,13 +23,20 @@ from calibrate.errors import DataError
 
 def conclude(recording_path: Path, console: Console) -> Identified:
     """Model, diagnosis, report into the recording's folder. PartialResult when that cannot be done."""
-    try:
+    with recording_kept(recording_path):
         return _concluded(recording_path, console)
+
+
+@contextmanager
+def recording_kept(recording_path: Path) -> Generator[None]:
+    """Whatever ends what follows a recording, the recording is whole: PartialResult says so and how to go on."""
+    try:
+        yield
     except (KeyboardInterrupt, DataError, OSError) as why:
         reason = "Ctrl-C" if isinstance(why, KeyboardInterrupt) else str(why)
         raise PartialResult(
             f"{reason}; the recording is whole: {recording_path}; "
-            f"`calibeam identify`, `diagnose` and `report` go on from there"
+            "`calibeam identify`, `diagnose` and `report` go on from there"
         ) from why
 
 
@@ -36,13 +45,13 @@ def _concluded(recording_path: Path, console: Console) -> Identified:
     identified = identify_recording(recording)
     write_identified(identified, recording, folder / "model.json")
     print_identified(console, identified)
-    diagnosis = _diagnosed(recording, folder / "diagnosis.json", console)
+    diagnosis = diagnosed(recording, folder / "diagnosis.json", console)
     write_zero_report(identified, folder / "report.html", diagnosis)
     console.print(f"report: {folder / 'report.html'}", markup=False)
     return identified
 
 
-def _diagnosed(recording: Recording, path: Path, console: Console) -> DiagnosisFile | None:
+def diagnosed(recording: Recording, path: Path, console: Console) -> DiagnosisFile | None:
     """None, and said, where there is too little to diagnose: what was identified stands all the same."""
     try:
         file = diagnosed_to(recording, None, path)

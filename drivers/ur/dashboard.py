@@ -6,6 +6,8 @@ PolyScope X has no dashboard server.
 """
 
 import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from drivers.clock import Clock, SystemClock
@@ -110,21 +112,32 @@ class _Lines:
         self._pending = b""
 
     def ask(self, text: str) -> str:
-        self._line.sendall(f"{text}\n".encode())
+        with _hanging_up_said():
+            self._line.sendall(f"{text}\n".encode())
         return self.next()
 
     def next(self) -> str:
         """TimeoutError, ConnectionError; a line without an end counts as silence."""
         while b"\n" not in self._pending and len(self._pending) < MAX_LINE_BYTES:
             self._line.settimeout(max(1e-3, self._deadline_s - self._clock.now_s()))
-            data = self._line.recv(MAX_LINE_BYTES)
-            if not data:
-                raise ConnectionResetError("the controller closed the connection")
+            with _hanging_up_said():
+                data = self._line.recv(MAX_LINE_BYTES)
+                if not data:
+                    raise ConnectionResetError
             if self._clock.now_s() > self._deadline_s:
                 raise TimeoutError
             self._pending += data
         first, _, self._pending = self._pending.partition(b"\n")
         return first.decode("ascii", errors="replace").strip()
+
+
+@contextmanager
+def _hanging_up_said() -> Iterator[None]:
+    """A peer that hangs up is seen as an end, a reset or a broken pipe, by the hair of a moment: one sentence for all."""
+    try:
+        yield
+    except ConnectionError as error:
+        raise ConnectionResetError("the controller closed the connection") from error
 
 
 def _after_colon(reply: str) -> str:

@@ -18,6 +18,7 @@ from acquisition.recording.rig import plain_rig, rig_text
 from simulators.devices import build_devices
 from simulators.host.side_channel import SideChannelWire
 from simulators.wire import TICK_S, SerialPort
+from tests.mutated import mutated
 
 RIGS = Path(__file__).parents[2] / "rigs"
 MOST_KEPT = 1 << 21  # bytes of a line: an uploaded program of 1 MiB is the longest that any protocol here has
@@ -193,26 +194,6 @@ class Line:
         if self._port is None:
             return SideChannelWire(self._verbs)
         return self._port.wire if isinstance(self._port, SerialPort) else self._port.accept()
-
-
-def mutated(rng: np.random.Generator, requests: tuple[bytes, ...]) -> bytes:
-    data = bytearray(b"".join(requests[rng.integers(len(requests))] for _ in range(rng.integers(1, 4))))
-    for _ in range(rng.integers(1, 5)):
-        at, many = int(rng.integers(0, len(data) + 1)), int(rng.integers(1, 9))
-        match int(rng.integers(6)):
-            case 0 if at < len(data):
-                data[at] ^= 1 << int(rng.integers(8))
-            case 1:
-                data[at : at + many] = rng.bytes(many)
-            case 2:
-                del data[at : at + many]
-            case 3:
-                data[at:at] = rng.bytes(many)
-            case 4:
-                data[at : at + 2] = b"\xff\xff"
-            case _:
-                del data[at:]
-    return bytes(data)
 
 
 def under_fire(name: str, count: int, seed: int) -> None:

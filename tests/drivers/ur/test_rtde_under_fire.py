@@ -22,6 +22,7 @@ from drivers.ur.rtde_codec import (
     TextMessage,
     Unknown,
 )
+from tests.mutated import mutated
 
 DECLARED = (
     ControllerVersion, Data, Junk, OutputsAnswer, PauseAnswer, ProtocolAnswer, StartAnswer, TextMessage, Unknown
@@ -61,33 +62,12 @@ def stamps(messages: list) -> list[float]:
     return [stamp for m in messages if isinstance(m, Data) for stamp in m.packages["timestamp"].tolist()]
 
 
-def mutated(rng: np.random.Generator) -> bytes:
-    """Some good frames, then one to four changes of bytes, of which many hit a length."""
-    data = bytearray(b"".join(GOOD[rng.integers(len(GOOD))] for _ in range(rng.integers(1, 4))))
-    for _ in range(rng.integers(1, 5)):
-        at, many = int(rng.integers(0, len(data) + 1)), int(rng.integers(1, 9))
-        match int(rng.integers(6)):
-            case 0 if at < len(data):
-                data[at] ^= 1 << int(rng.integers(8))
-            case 1:
-                data[at : at + many] = rng.bytes(many)
-            case 2:
-                del data[at : at + many]
-            case 3:
-                data[at:at] = rng.bytes(many)
-            case 4:
-                data[at : at + 2] = b"\xff\xff"
-            case _:
-                del data[at:]
-    return bytes(data)
-
-
 def under_fire(count: int, seed: int) -> int:
     """How often the stream had to be given up."""
     rng = np.random.default_rng(seed)
     codec, ended = negotiated(), 0
     for _ in range(count):
-        data = mutated(rng)
+        data = mutated(rng, GOOD)
         cut = int(rng.integers(0, len(data) + 1))
         messages = codec.feed(data[:cut]) + codec.feed(data[cut:])
         assert all(isinstance(message, DECLARED) for message in messages), data.hex()
