@@ -133,7 +133,7 @@ class _Lines:
 
 @contextmanager
 def _hanging_up_said() -> Iterator[None]:
-    """A peer that hangs up is seen as an end, a reset or a broken pipe, by the hair of a moment: one sentence for all."""
+    """A peer that hangs up is seen as an end, a reset or a broken pipe, by a hair: one sentence for all."""
     try:
         yield
     except ConnectionError as error:
