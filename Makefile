@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 BENCH := .venv-bench
 CLIENTS := .venv-clients
 
-.PHONY: setup demo test clients endure lint prove prove-table mutate bench pins clean
+.PHONY: setup demo test clients endure lint docs prove prove-table mutate bench pins clean
 
 setup: $(READY)
 
@@ -23,8 +23,8 @@ demo: $(READY)
 
 test: $(READY) $(CLIENTS)/.ready
 	$(BIN)/python -m pytest -m "not endure and not wired" -n 2 --dist loadfile
-	$(BIN)/python -m pytest -m "wired and not alone and not endure" -n 2 --dist loadfile
-	$(BIN)/python -m pytest -m "alone and not endure"
+	$(BIN)/python -m pytest -m "wired and not endure" -n 2 --dist loadfile tests/drivers tests/simulators
+	$(BIN)/python -m pytest -m "wired and not endure" tests/calibeam
 
 # What takes too long for every day: a million mutated inputs a codec, a hundred plugs pulled, and more of the same.
 endure: $(READY)
@@ -44,6 +44,10 @@ lint: $(READY)
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports
 	$(BIN)/pyright
+
+# The pages in out/site, links checked; nothing is fetched by whoever reads them.
+docs: $(READY)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --clean
 
 # The concealed proof, with the libraries that it is compared with: see docs/proof.md. A quarter of an hour on two cores; CASES=150: ten minutes.
 prove: $(BENCH)/.ready

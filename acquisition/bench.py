@@ -37,6 +37,7 @@ class Look:
     temperatures_degC: dict[str, float]
     settled: bool
     window_s: tuple[float, float] | None = None  # first and last PSD sample in it, by the box's clock
+    settle_s: float | None = None  # from the moment of looking until the readings had settled; None: not known
 
     def spots_m(self) -> Floats:
         """psd1 x, y, psd2 x, y (4,), NaN where dark."""

@@ -15,3 +15,7 @@ class NoLightError(AcquisitionError):
 
 class UnreachableError(AcquisitionError):
     """No joint position puts the beam where it was asked to be."""
+
+
+class StoppedError(AcquisitionError):
+    """A person said stop; the arm is held, and what was recorded is kept."""

@@ -1,15 +1,17 @@
 """Every CAN frame into the recording, in blocks: what a tap on the bus hears, from whichever thread."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import can
 import numpy as np
 from numpy.typing import ArrayLike
 
-from acquisition.recording.can_frames import block_of
+from acquisition.recording.can_frames import CLASSIC_BYTES, FD_BYTES, FD_STREAM, STREAM, Frame, block_of, channels
 from acquisition.recording.can_message import frame_of
+from acquisition.recording.errors import RecordingError
+from acquisition.recording.stream import Channel
 from drivers.clock import Clock
 
 BLOCK_S = 0.02  # as long as the encoder driver gathers rows: more would only lengthen what a kill loses
@@ -23,36 +25,77 @@ class FrameStream(Protocol):
     ) -> None: ...
 
 
-class FrameLog:
-    """`hear` is a tap. Frames wait BLOCK_S at most while others follow; `flush` writes the last of a quiet bus."""
+class Streams(Protocol):
+    """A recording, or one that rotates."""
 
-    def __init__(self, stream: FrameStream, clock: Clock, width: int) -> None:
+    def stream(self, name: str, channels: tuple[Channel, ...], viewer: tuple[str, ...] | None = None) -> FrameStream:
+        """Declare a stream."""
+        ...
+
+
+class FrameLog:
+    """`hear` is a tap. Frames wait BLOCK_S at most while others follow; `flush` writes the last of a quiet bus.
+
+    Frames of CAN FD that are longer than a classic one get a stream of their own, declared when the first comes.
+    """
+
+    def __init__(self, recording: Streams, clock: Clock) -> None:
         self.count = 0  # frames heard so far
         self.errors = 0  # error frames among them
-        self._stream, self._width = stream, width
+        self._recording = recording
+        self._classic = _Counted(recording.stream(STREAM, channels(CLASSIC_BYTES), viewer=()), CLASSIC_BYTES)
+        self._long: _Counted | None = None
         self._now_s: Callable[[], float] = clock.now_s
         self._turn = threading.Lock()
         self._heard: list[tuple[can.Message, float, bool]] = []
+        self._failure: RecordingError | None = None
 
     def hear(self, message: can.Message, sent: bool) -> None:
-        """RecordingError when the recording failed: the driver above ends with it."""
+        """Never raises, for what a tap raises looks to a driver like a fault of the bus; `flush` does."""
         now_s = self._now_s()
         with self._turn:
             self._heard.append((message, now_s, sent))  # a frame is made of it later: here every microsecond counts
             if now_s - self._heard[0][1] >= BLOCK_S:
-                self._write()
+                try:
+                    self._write()
+                except RecordingError as failure:
+                    self._failure = self._failure or failure
 
     def flush(self) -> None:
-        """Whatever waits, now."""
+        """Whatever waits, now. RecordingError when the recording failed, now or at an earlier frame."""
         with self._turn:
             self._write()
+            if self._failure is not None:
+                raise self._failure
 
     def _write(self) -> None:
-        if not self._heard:
+        heard, self._heard = self._heard, []
+        if not heard:
             return
-        frames = [frame_of(message, host_s, sent=sent) for message, host_s, sent in self._heard]
-        self.errors += sum(message.is_error_frame for message, _, _ in self._heard)
-        self._heard = []
+        frames = [frame_of(message, host_s, sent=sent) for message, host_s, sent in heard]
+        self.count += len(frames)
+        self.errors += sum(message.is_error_frame for message, _, _ in heard)
+        long = [frame for frame in frames if len(frame.data) > CLASSIC_BYTES]
+        if long:
+            self._write_long(long)
+            frames = [frame for frame in frames if len(frame.data) <= CLASSIC_BYTES]
+        self._classic.append(frames)
+
+    def _write_long(self, frames: Sequence[Frame]) -> None:
+        if self._long is None:
+            self._long = _Counted(self._recording.stream(FD_STREAM, channels(FD_BYTES), viewer=()), FD_BYTES)
+        self._long.append(frames)
+
+
+class _Counted:
+    """A stream of frames up to `width` bytes, numbered as they come."""
+
+    def __init__(self, stream: FrameStream, width: int) -> None:
+        self._stream, self._width, self._next = stream, width, 0
+
+    def append(self, frames: Sequence[Frame]) -> None:
+        if not frames:
+            return
         block = block_of(frames, self._width)
-        first, self.count = self.count, self.count + len(frames)
-        self._stream.append(block.host_s, block.device_s, np.arange(first, self.count), block.values)
+        first, self._next = self._next, self._next + len(frames)
+        self._stream.append(block.host_s, block.device_s, np.arange(first, self._next), block.values)

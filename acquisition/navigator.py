@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.aiming.by_camera import Aim, Aimed
+from acquisition.aiming.by_camera import OTHER_ROLLS_RAD, Aim, Aimed
 from acquisition.aiming.pose import BeamTarget, between, flange_for
 from acquisition.aiming.reach import reach
 from acquisition.aiming.search import Found, Search
@@ -67,12 +67,17 @@ class Navigator:
         self._note(q_rad)
 
     def find(self, placement: int, first: int, roll_rad: float) -> None:
-        """Begin a block: aim by what is seen or believed, else search, come near the centres. NoLightError."""
+        """Begin a block: aim by what is seen or believed, else search, come near the centres.
+
+        NoLightError; UnreachableError where the arm can stand before the faces in no roll.
+        """
         self._placement = placement
         T = self._seen(self._learner.T_base_fixture(placement))
         target = BeamTarget(first, (0.0, 0.0, 0.0, 0.0), FINDING_STAND_OFF_M, roll_rad)
-        self.move(self._reach(T, target, self.q_rad))
-        self._stand_in_light(target, T)
+        try:
+            self._stand_in_light(self._stand_before(target, T), T)
+        except UnreachableError as why:
+            raise UnreachableError(f"place {placement}, PSD {first} first: {why}") from why
 
     def find_near(self, placement: int, first: int, spots_m: tuple[float, float, float, float]) -> Floats:
         """Search the light around where the arm stands, bring it near these spots; joint readings (joint,) there.
@@ -100,6 +105,19 @@ class Navigator:
             if self._dark(target.first):  # the fixture was moved, or the laser is off
                 self._stand_in_light(back.target, back.T_base_fixture)
             raise
+
+    def _stand_before(self, target: BeamTarget, T: Floats) -> BeamTarget:
+        """The target with the first roll, from its own on, in which the arm can stand so and come there."""
+        refused: UnreachableError | None = None
+        for other_rad in OTHER_ROLLS_RAD:
+            rolled = replace(target, roll_rad=target.roll_rad + other_rad)
+            try:
+                self.move(self._reach(T, rolled, self.q_rad))
+            except UnreachableError as why:  # no such posture, or the way there is not free
+                refused = refused or why
+                continue
+            return rolled
+        raise UnreachableError(f"none of {len(OTHER_ROLLS_RAD)} rolls will do, of which the first: {refused}")
 
     def _stand_in_light(self, target: BeamTarget, T: Floats) -> None:
         """Aim by camera or search if it is dark there, come near the centres, and forget older lit poses.

@@ -12,6 +12,16 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class PoseKey:
+    """Which pose of which plan a sample is: told in the journal, so that a session can be gone on with."""
+
+    placement: int
+    first: int
+    index: int  # of the visits of a place and order, or of a plan of poses
+    again: int = 0  # 1: taken again, 2: and from the other side
+
+
+@dataclass(frozen=True)
 class Visit:
     """One pose to take. `centred` asks for the servo down to its tolerance; else lit faces are enough."""
 
@@ -19,6 +29,10 @@ class Visit:
     target: BeamTarget
     centred: bool
     repeat: int | None = None  # group of poses that are taken again later
+    index: int = 0  # among those of its place and order
+
+    def key(self, again: int = 0) -> PoseKey:
+        return PoseKey(self.placement, self.target.first, self.index, again)
 
 
 @dataclass(frozen=True)
@@ -46,6 +60,11 @@ class Block:
     placement: int
     first: int
     visits: tuple[Visit, ...] = field(default_factory=tuple)
+
+    def pose_keys(self) -> list[PoseKey]:
+        """Everything that is to be taken, repeats last."""
+        again = [visit.key(k) for visit in self.visits if visit.repeat is not None for k in (1, 2)]
+        return [*(visit.key() for visit in self.visits), *again]
 
 
 def blocks(placements: tuple[int, ...], half_size_m: float, options: PlanOptions) -> Iterator[Block]:
@@ -75,7 +94,7 @@ def _visits(
         target = BeamTarget(first, (x1, y1, x2, y2), float(stand_offs[k]), float(rolls[k]))
         group = again.get(k)
         repeat = None if group is None else 1 + group + options.repeats * (2 * placement + first - 3)
-        yield Visit(placement, target, centred, repeat)
+        yield Visit(placement, target, centred, repeat, k)
 
 
 def _out_and_back(rolls_rad: Floats) -> Floats:

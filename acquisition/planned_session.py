@@ -1,6 +1,6 @@
 """A session of explicit joint poses: go there, from the asked-for side, and read; where it is dark, find the light."""
 
-from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,16 +9,20 @@ from acquisition.aiming.reach import clear_of_table
 from acquisition.bench import Bench
 from acquisition.camera.sight import Sight
 from acquisition.errors import AcquisitionError, NoLightError, SpotLostError, UnreachableError
-from acquisition.journal import Journal
+from acquisition.journal import Journal, key_detail
 from acquisition.learner import Learner
 from acquisition.navigator import GLANCE_S, Navigator
-from acquisition.plan import PlanOptions
+from acquisition.plan import PlanOptions, PoseKey
+from acquisition.progress import Phase, Progress, Tell, silent
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
+from acquisition.reined_bench import ReinedBench
+from acquisition.reins import EndedEarlyError, Reins
 from acquisition.sample import Sample
-from acquisition.session import Summary, usable
+from acquisition.session import NOTHING, Summary, Taken, usable
+from acquisition.session_states import Event
+from acquisition.stepping import Stepping
 
 Floats = NDArray[np.float64]
-Progress = Callable[[int, int, str], None]
 
 
 def check_planned(plan: PosePlan) -> None:
@@ -37,7 +41,10 @@ def check_planned(plan: PosePlan) -> None:
 
 
 class PlannedSession:
-    """Runs a plan on a bench; the only owner of what was taken. Stopping the arm after an error is the caller's."""
+    """Runs a plan on a bench; the only owner of what was taken. Stopping the arm after an error is the caller's.
+
+    `earlier`: what other parts of this session have taken; it is not taken again.
+    """
 
     def __init__(
         self,
@@ -47,12 +54,17 @@ class PlannedSession:
         options: PlanOptions,
         home_rad: Floats,
         *,
-        progress: Progress = lambda done, total, text: None,
+        tell: Tell = silent,
         sight: Sight | None = None,
+        reins: Reins | None = None,
+        earlier: Taken = NOTHING,
     ) -> None:
-        self._bench, self._learner, self._journal, self._options = bench, learner, journal, options
-        self._navigator = Navigator(bench, learner, journal, home_rad, options.seed, sight)
-        self._progress = progress
+        self._reins = reins or Reins(bench.stop)
+        self._bench = ReinedBench(bench, self._reins)
+        self._learner, self._journal, self._options = learner, journal, options
+        self._navigator = Navigator(self._bench, learner, journal, home_rad, options.seed, sight)
+        self._stepping = Stepping(self._reins, self._bench, self._navigator, lambda: None)
+        self._tell, self._earlier = tell, {key.index: sample for key, sample in earlier.items()}
         self._samples: list[Sample] = []
         self._skipped = 0
 
@@ -61,25 +73,39 @@ class PlannedSession:
         """Samples so far, also after the session was cut short."""
         return len(self._samples)
 
-    def run(self, plan: PosePlan) -> Summary:
-        """Take every block. DeviceError, RecordingError end it; a pose that is dark or out of reach is skipped."""
+    def run(self, plan: PosePlan, standing: int | None = None) -> Summary:
+        """Take every block. DeviceError, RecordingError end it; a pose that is dark or out of reach is skipped.
+
+        `standing`: the place where the fixture is already.
+        """
         check_planned(plan)
-        self._navigator.move(self._navigator.q_rad)
-        standing: int | None = None
-        for block in plan.block:
-            placement = block.placement or 0
-            if placement != standing:
-                self._bench.place_fixture(placement)
-                self._journal.event("placement", {"id": placement})
-                standing = placement
-            for pose in block.pose:
-                self._progress(len(self._samples), plan.poses, f"place {placement}, PSD {block.first_psd} first")
-                self._take(block, pose, placement)
-        self._progress(len(self._samples), plan.poses, "done")
+        self._reins.tell(Event.START)
+        try:
+            self._stepping.step(lambda: self._navigator.move(self._navigator.q_rad))
+            index = 0
+            for block in plan.block:
+                poses = list(enumerate(block.pose, start=index))
+                index += len(poses)
+                left = [(number, pose) for number, pose in poses if number not in self._earlier]
+                if left and block.placement != standing:
+                    standing = self._place(plan, block)
+                for number, pose in left:
+                    self._say(plan, block, Phase.COLLECT)
+                    self._stepping.step(partial(self._take, block, pose, number))
+        except EndedEarlyError:
+            self._journal.event("ended by a person", {"samples": self.taken})
+        self._reins.finish()
         return Summary(tuple(self._samples), (), self._skipped)
 
-    def _take(self, block: PlannedBlock, pose: PlannedPose, placement: int) -> None:
-        first = block.first_psd or 1
+    def _place(self, plan: PosePlan, block: PlannedBlock) -> int:
+        placement = block.placement or 0
+        self._say(plan, block, Phase.PLACE)
+        self._bench.place_fixture(placement)
+        self._journal.event("placement", {"id": placement})
+        return placement
+
+    def _take(self, block: PlannedBlock, pose: PlannedPose, number: int) -> None:
+        placement, first = block.placement or 0, block.first_psd or 1
         try:
             self._go(pose, placement, first)
         except (UnreachableError, SpotLostError, NoLightError) as why:
@@ -90,6 +116,7 @@ class PlannedSession:
         sample = Sample(look, placement, first, self._navigator.approach.copy(), pose.repeat, centred=False)
         self._samples.append(sample)
         self._journal.sample(sample)
+        self._journal.event("sample", key_detail(PoseKey(placement, first, number), look))
         return None
 
     def _go(self, pose: PlannedPose, placement: int, first: int) -> None:
@@ -114,3 +141,7 @@ class PlannedSession:
     def _skip(self, placement: int, why: str) -> None:
         self._journal.event("skipped", {"placement": placement, "why": why})
         self._skipped += 1
+
+    def _say(self, plan: PosePlan, block: PlannedBlock, phase: Phase) -> None:
+        done = len(self._earlier) + len(self._samples)
+        self._tell(Progress(phase, done, plan.poses, self._skipped, block.placement or 0, block.first_psd or 1))

@@ -5,6 +5,7 @@ A session does not use it: there a lost device stops the arm, and a person decid
 
 import threading
 from collections.abc import Callable
+from itertools import zip_longest
 
 from drivers.clock import Clock
 from drivers.device import Block, Channel, Device
@@ -26,8 +27,12 @@ class Reopening:
         lost: Callable[[DeviceError, float], None],
         back: Callable[[float, float], None],
         retry_s: float = RETRY_S,
+        who: Callable[[], tuple[str, ...]] = tuple,
     ) -> None:
+        """`who`: which instruments are connected, where they can say so; they must say the same after every outage."""
         self.name = device.name
+        self._who = who
+        self._were: tuple[str, ...] = ()
         self._retry_s = retry_s
         self._device, self._clock, self._lost, self._back = device, clock, lost, back
         self._closing = threading.Event()
@@ -36,7 +41,7 @@ class Reopening:
     def connect(self) -> None:
         """The first time it must be there: DeviceError as the device says."""
         self._device.connect()
-        self._declared = self._device.describe()
+        self._declared, self._were = self._device.describe(), self._who()
 
     def describe(self) -> tuple[Channel, ...]:
         return self._declared
@@ -74,9 +79,11 @@ class Reopening:
         raise why
 
     def _check_same(self) -> None:
-        now = self._device.describe()
-        if now != self._declared:
+        now = (*self._who(), *map(str, self._device.describe()))
+        were = (*self._were, *map(str, self._declared))
+        if now != were:
+            changed = [f"{one} instead of {other}" for one, other in zip_longest(now, were) if one != other]
             raise DeviceRefused(
-                f"{self.name}: came back as another device, {now} instead of {self._declared}; attach the one before, "
+                f"{self.name}: came back as another device, {', '.join(changed)}; attach the one before, "
                 "or begin a new log"
             )

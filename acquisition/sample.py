@@ -1,5 +1,6 @@
 """A settled sample as one row of the session-folder format."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,6 +38,42 @@ class Sample:
         row |= _numbered("qd", "_rad_s", look.qd_rad_s)
         row |= {"settled": int(look.settled), "centred": int(self.centred)}
         return row | {f"temp_{where}_degC": value for where, value in look.temperatures_degC.items()}
+
+
+def sample_of(row: Mapping[str, Cell], n_joints: int) -> Sample:
+    """The sample that an earlier part of a session kept as this row; what a row does not hold is missing or empty."""
+
+    def joints(name: str, unit: str) -> Floats:
+        return np.array([_number(row.get(f"{name}{i}{unit}")) for i in range(1, n_joints + 1)])
+
+    q_rad, encoder_rad, placement = joints("q", "_rad"), joints("enc", "_rad"), row.get("placement")
+    look = Look(
+        host_s=np.nan,
+        t_s=_number(row["t_s"]),
+        q_rad=q_rad,
+        qd_rad_s=joints("qd", "_rad_s"),
+        cmd_rad=joints("cmd", "_rad"),
+        encoder_rad=encoder_rad if np.isfinite(encoder_rad).any() else None,
+        psd1=_spot_of(row, "psd1"),
+        psd2=_spot_of(row, "psd2"),
+        temperatures_degC={},
+        settled=bool(row.get("settled", 1)),
+    )
+    approach = np.nan_to_num(joints("approach", "")).astype(np.int64)
+    repeat = row.get("repeat")
+    first, number = int(_number(row.get("first_psd"))), int(_number(placement))
+    return Sample(look, number, first, approach, None if repeat is None else int(repeat), bool(row.get("centred")))
+
+
+def _number(cell: Cell) -> float:
+    return np.nan if cell is None or isinstance(cell, str) else float(cell)
+
+
+def _spot_of(row: Mapping[str, Cell], face: str) -> Spot:
+    x_m, y_m, sum_v, sigma_x_m, sigma_y_m = (
+        _number(row.get(f"{face}_{name}")) for name in ("x_m", "y_m", "sum_v", "x_sigma_m", "y_sigma_m")
+    )
+    return Spot(x_m, y_m, sum_v, sigma_x_m, sigma_y_m, lit=bool(np.isfinite(x_m)))
 
 
 def _numbered(name: str, unit: str, values: Floats) -> dict[str, Cell]:

@@ -42,6 +42,15 @@ class Supervisor:
             with suppress(DeviceError):
                 self._hold_arm()
 
+    def stop(self, why: Exception) -> None:
+        """A person says so, from any thread and in every state: the arm is held, whatever was before.
+
+        DeviceError when the stop cannot be delivered; the session ends all the same, at its next step.
+        """
+        with self._lock:
+            self.failure = self.failure or why
+        self._hold_arm()
+
     def check(self) -> None:
         """Raise the first failure, if there was one."""
         if self.failure is not None:

@@ -1,7 +1,7 @@
 """The bench on real wires: PSD box, encoders and controller read by pumps, the arm moved by its control process."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,7 +85,8 @@ class WiredBench:
             window = psd_window(blocks).between(begin_s, np.inf)
             stretch = stretch_to_average(window.device_s, self.view.each(window), dwell_s, self.rule)
             if stretch is not None:
-                return self._summed(window.between(stretch.from_s, stretch.to_s), settled=stretch.settled)
+                look = self._summed(window.between(stretch.from_s, stretch.to_s), settled=stretch.settled)
+                return replace(look, settle_s=stretch.from_s - begin_s if stretch.settled else None)
 
     def _psd_time(self, host_s: float) -> float:
         """What the PSD box's clock showed, or later, at `host_s`: earlier samples may be of before the motion ended.

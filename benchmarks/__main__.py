@@ -1,4 +1,4 @@
-"""`make bench`: every benchmark, or those named: `python -m benchmarks centring zeros`."""
+"""`make bench`: every benchmark, or those named: `python -m benchmarks centring zeros`; some in slices (slices.py)."""
 
 import math
 import sys
@@ -20,13 +20,18 @@ from benchmarks import (
     device_faults,
     error_simulation,
     false_alarms,
+    fleet,
     inverse,
     killed,
+    live,
+    live_endured,
+    live_picture,
     log_cost,
     measuring_arm,
     plan_taken,
     real_diagnosis,
     rtde_jitter,
+    slices,
     speed,
     streams,
     wired_streams,
@@ -34,6 +39,7 @@ from benchmarks import (
 )
 
 RIG = Path(__file__).parents[1] / "rigs" / "ur5e-dual-psd.toml"
+ARM_RIG = RIG.with_name("arm-cmm-reference.toml")
 CAMERA_RIG = RIG.with_name("ur5e-dual-psd-camera.toml")
 
 
@@ -41,9 +47,9 @@ def run_centring_cold() -> None:
     rig, plain = load_rig(RIG), plain_rig(rig_text(RIG), str(RIG))
     cold = (centring.SESSIONS,)
     print("centring from 500 random cold starts, fixture pose wrong by up to 90 deg and 50 mm, orders alternating")
-    print("\n".join(centring.lines(centring.run(rig, plain, 500, 21_000, cold, math.radians(90.0)))))
+    print("\n".join(centring.lines(centring.run(rig, plain, range(500), 21_000, cold, math.radians(90.0)))))
     print("from 200, wrong by up to 45 deg")
-    print("\n".join(centring.lines(centring.run(rig, plain, 200, 22_000, cold, math.radians(45.0)))))
+    print("\n".join(centring.lines(centring.run(rig, plain, range(200), 22_000, cold, math.radians(45.0)))))
 
 
 def run_centring() -> None:
@@ -112,9 +118,9 @@ def run_plan_taken() -> None:
             print(row, flush=True)
 
 
-def run_designed_poses() -> None:
+def run_designed_poses(seeds: range | None = None) -> None:
     print("60 designed poses beside 60 random ones on the emulated rig: true error of the beam in free space")
-    for row in designed_poses.lines(RIG, range(1, 21)):
+    for row in designed_poses.lines(RIG, seeds or range(1, 21), anew=seeds is None):
         print(row, flush=True)
 
 
@@ -136,6 +142,19 @@ def run_false_alarms() -> None:
         print(row, flush=True)
 
 
+def run_fleet() -> None:
+    print("a fleet of emulated robots: time of `calibeam batch` over files, workers, engines")
+    with tempfile.TemporaryDirectory() as folder:
+        for row in fleet.lines(Path(folder)):
+            print(row, flush=True)
+
+
+def run_fleet_drift() -> None:
+    print("fleets in which nothing drifts, or one zero does: what is said")
+    for row in (*fleet.false_drift_lines(), *fleet.told_drift_lines()):
+        print(row, flush=True)
+
+
 def run_inverse() -> None:
     print("inverse kinematics in batch")
     for row in inverse.lines(RIG):
@@ -146,6 +165,21 @@ def run_faults() -> None:
     print("13 fault kinds at 4 devices in 5 phases: each must end in a defined state within 2 s")
     for row in device_faults.lines():
         print(row, flush=True)
+
+
+def run_live() -> None:
+    print("the live page's own thread, devices at 1000, 500 and 100 Hz")
+    print("\n".join(cost.line for cost in live.run(load_rig(RIG))))
+
+
+def run_live_endured() -> None:
+    print(f"a live page open for {live_endured.MINUTES:g} min: {live_endured.watched(load_rig(RIG)).line}")
+
+
+def run_live_picture() -> None:
+    path = RIG.parents[1] / "docs" / "figures" / "live.png"
+    live_picture.write_picture(load_rig(RIG), path)
+    print(f"drawn in {path}")
 
 
 def run_rtde() -> None:
@@ -171,15 +205,20 @@ def run_log_cost() -> None:
         print(row, flush=True)
 
 
-def run_measuring_arm() -> None:
+def run_measuring_arm(seeds: range | None = None) -> None:
     print(
         "a measuring arm from cones and bars by an emulated hand, judged on fresh readings against its encoders' noise"
     )
-    outcomes: list[measuring_arm.Outcome] = []
-    for outcome in measuring_arm.run(RIG.with_name("arm-cmm-reference.toml"), range(1, 9)):
-        outcomes.append(outcome)
-        print(measuring_arm.line(outcome), flush=True)
-    print(measuring_arm.summary_line(outcomes))
+    asked, anew = seeds or range(1, 13), seeds is None
+    for row in measuring_arm.lines(ARM_RIG, asked, "measuring-arm", anew=anew):
+        print(row, flush=True)
+
+
+def run_perfect_bearings(seeds: range | None = None) -> None:
+    print("the same arms with perfect bearings: axes that neither lean nor run out")
+    asked, anew, perfect = seeds or range(1, 4), seeds is None, measuring_arm.PERFECT_BEARINGS
+    for row in measuring_arm.lines(ARM_RIG, asked, "measuring-arm-bearings", anew=anew, **perfect):
+        print(row, flush=True)
 
 
 BENCHMARKS: dict[str, Callable[[], None]] = {
@@ -193,6 +232,8 @@ BENCHMARKS: dict[str, Callable[[], None]] = {
     "blunders": run_blunders,
     "speed": run_speed,
     "false_alarms": run_false_alarms,
+    "fleet": run_fleet,
+    "fleet_drift": run_fleet_drift,
     "streams": run_streams,
     "wired_streams": run_wired_streams,
     "plan_taken": run_plan_taken,
@@ -200,22 +241,44 @@ BENCHMARKS: dict[str, Callable[[], None]] = {
     "designed_poses": run_designed_poses,
     "real": run_real,
     "measuring-arm": run_measuring_arm,
+    "measuring-arm-bearings": run_perfect_bearings,
     "recording": run_recording,
     "log_cost": run_log_cost,
     "faults": run_faults,
+    "live": run_live,
+    "live_endured": run_live_endured,
+    "live_picture": run_live_picture,
     "rtde": run_rtde,
     "rtde-minute": run_rtde_minute,
 }
 
 
-def main(names: list[str]) -> int:
+SEEDED: dict[str, Callable[[range], None]] = {
+    "designed_poses": run_designed_poses,
+    "measuring-arm": run_measuring_arm,
+    "measuring-arm-bearings": run_perfect_bearings,
+}
+
+
+def main(words: list[str]) -> int:
+    try:
+        names, seeds = slices.asked(words)
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 2
     unknown = [name for name in names if name not in BENCHMARKS]
     if unknown:
         print(f"no benchmark named {', '.join(unknown)}; there are {', '.join(BENCHMARKS)}", file=sys.stderr)
         return 2
+    if seeds is not None and not (names and set(names) <= set(SEEDED)):
+        print(f"--seeds belongs to {', '.join(SEEDED)}", file=sys.stderr)
+        return 2
     for name in names or BENCHMARKS:
         print(f"--- {name}")
-        BENCHMARKS[name]()
+        if seeds is not None:
+            SEEDED[name](seeds)
+        else:
+            BENCHMARKS[name]()
     return 0
 
 

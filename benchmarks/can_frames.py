@@ -8,14 +8,14 @@ import tempfile
 import threading
 import time
 import tty
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import can
 import numpy as np
 
 from acquisition.frame_log import FrameLog
-from acquisition.recording.can_frames import CLASSIC_BYTES, DATA, STREAM, channels
+from acquisition.recording.can_frames import DATA, STREAM
 from acquisition.recording.read import read
 from acquisition.recording.rig import rig_text
 from acquisition.recording.writer import RecordingWriter
@@ -59,11 +59,13 @@ def _slcan(rig: Path, path: Path, count: int) -> str:
     return f"slcan: {_verdict(path, count)}; {count / took_s:.0f} frames/s, logger {_per(cpu_s, count)}"
 
 
-def _logged(rig: Path, path: Path, interface: str, channel: str, count: int, begin) -> tuple[float, float]:
+def _logged(
+    rig: Path, path: Path, interface: str, channel: str, count: int, begin: Callable[[], object]
+) -> tuple[float, float]:
     """Seconds from the first frame to the last, and processor seconds of this process meanwhile."""
     clock = SystemClock()
     with RecordingWriter(path, rig_text=rig_text(rig), software="benchmark", clock=clock) as writer:
-        log = FrameLog(writer.stream(STREAM, channels(), viewer=()), clock, CLASSIC_BYTES)
+        log = FrameLog(writer, clock)
         with tapped(bus_opener(interface, channel, 1_000_000), log.hear)() as bus:
             begin()
             heard = 0

@@ -5,7 +5,7 @@ said) and 50 mm; both spots start somewhere on the faces, orders alternate. Ever
 too.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -59,16 +59,18 @@ class Start:
 def run(
     rig: Rig,
     plain_rig: Mapping[str, Any],
-    cases: int = 100,
+    cases: Sequence[int] = range(100),
     seed: int = 20_000,
     strategies: tuple[str, ...] = tuple(name for name, _ in STRATEGIES),
     turn_rad: float = TURN_RAD,
 ) -> dict[str, list[Centring]]:
-    """Runs of the named strategies, all if not said, from the same `cases` starts; the guess is off by up to this."""
-    rng = np.random.default_rng(seed)
+    """Runs of the named strategies, all if not said, from the same starts; the guess is off by up to `turn_rad`.
+
+    `cases`: numbers of the starts. Each has its own draw, so that a run in parts has the starts of one in a piece.
+    """
     runs: dict[str, list[Centring]] = {name: [] for name in strategies}
-    for case in range(cases):
-        start = random_start(rig, plain_rig, case, rng, turn_rad)
+    for case in cases:
+        start = random_start(rig, plain_rig, case, np.random.default_rng((seed, case)), turn_rad)
         for name, make in STRATEGIES:
             if name not in strategies:
                 continue

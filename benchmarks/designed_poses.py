@@ -6,7 +6,7 @@ space, over poses drawn evenly between the joint limits, base frame at its best.
 """
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,9 +19,10 @@ from acquisition.planned_session import PlannedSession
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
-from acquisition.recording.rig import load_rig, plain_rig, rig_text
+from acquisition.recording.rig import load_rig, plain_rig, rig_sha256, rig_text
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.writer import RecordingWriter
+from benchmarks.slices import Slices
 from calibeam.any_session import Planned, identify_session
 from calibeam.direct import direct_bench
 from calibeam.journal import RecordingJournal
@@ -122,15 +123,15 @@ def _found(recording: Recording, q_rad: Floats) -> Beam:
 
 def _true(truth: Truth, q_rad: Floats) -> FreeSpace:
     """The true beam; the true angle is the reading and the joint's zero (simulators/world/truth.py)."""
-    T = np.broadcast_to(np.eye(4), (len(q_rad), 4, 4))
+    frames = np.broadcast_to(np.eye(4), (len(q_rad), 4, 4))
     for link, q, zero in zip(truth.links, q_rad.T, truth.joint_zero_rad, strict=True):
         angle = (q + zero + link.theta_offset_rad)[:, None]
         turn = _frames(Rotation.from_euler("z", angle), [0.0, 0.0, 0.0])
         tail = Rotation.from_euler("XY", [link.alpha_rad, link.beta_rad])
-        T = T @ turn @ _frames(tail, [link.a_m, 0.0, link.d_m])
-    T = T @ _frames(Rotation.from_rotvec(truth.flange.rotation_rad), list(truth.flange.origin_m))
-    origin = T[:, :3, :3] @ np.array(truth.laser_origin_m) + T[:, :3, 3]
-    direction = T[:, :3, :3] @ np.array(truth.laser_direction)
+        frames = frames @ turn @ _frames(tail, [link.a_m, 0.0, link.d_m])
+    frames = frames @ _frames(Rotation.from_rotvec(truth.flange.rotation_rad), list(truth.flange.origin_m))
+    origin = frames[:, :3, :3] @ np.array(truth.laser_origin_m) + frames[:, :3, 3]
+    direction = frames[:, :3, :3] @ np.array(truth.laser_direction)
     return FreeSpace(beam_origin_m=origin.tolist(), beam_direction=direction.tolist())
 
 
@@ -145,18 +146,32 @@ def plan_without_proofs() -> Planned:
     return Planned(FitPlan(schema=1, share=0.0))
 
 
-def lines(rig_file: Path, seeds: range) -> Iterator[str]:
-    results: list[Compared] = []
+def lines(rig_file: Path, seeds: range, *, anew: bool = True) -> Iterator[str]:
+    """All seeds, then what the criteria promise; not `anew`: these seeds beside those of earlier slices."""
+    kept = Slices("designed-poses", Compared, rig_sha256(rig_text(rig_file)))
+    if anew:
+        kept.forget()
     for one in run(rig_file, seeds):
-        results.append(one)
+        kept.keep(one.seed, one)
         yield (
             f"seed {one.seed:2d}: designed {1e6 * one.designed_m:6.1f} um ({one.designed_taken} poses), random "
             f"{1e6 * one.random_m:6.1f} um ({one.random_taken}), ratio {one.designed_m / one.random_m:.2f}"
         )
+    yield summary_line(kept.rows())
+    if anew:
+        yield from predicted(rig_file)
+
+
+def summary_line(results: Sequence[Compared]) -> str:
+    """Medians, rms and ratios over the truths; an error is nearly one normal number times what the plan promises."""
     a, b = (np.array([getattr(r, name) for r in results]) for name in ("designed_m", "random_m"))
-    yield (
+    return (
         f"median over {len(results)} truths: designed {1e6 * np.median(a):.1f} um, random {1e6 * np.median(b):.1f} um, "
         f"ratio of the medians {np.median(a) / np.median(b):.2f}, median ratio {np.median(a / b):.2f}, "
-        f"designed better in {int(np.sum(a < b))}"
+        f"designed better in {int(np.sum(a < b))}; rms {1e6 * _rms(a):.1f} um and {1e6 * _rms(b):.1f} um, ratio "
+        f"{_rms(a) / _rms(b):.2f}; worst {1e6 * a.max():.1f} um and {1e6 * b.max():.1f} um"
     )
-    yield from predicted(rig_file)
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))

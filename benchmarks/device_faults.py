@@ -21,7 +21,8 @@ import numpy as np
 
 from acquisition.guarded import Guarded
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from acquisition.recording.rig_schema import PsdDriver, Rig, RobotDriver
+from acquisition.recording.rig_devices import PsdDriver, RobotDriver
+from acquisition.recording.rig_schema import Rig
 from acquisition.streams import Pump
 from acquisition.supervisor import Supervisor
 from calibeam.encoders import emulated_encoders, encoder_driver
@@ -42,6 +43,7 @@ DEVICES = {  # a shipped rig, and those of its devices that are tried on it
 LIMIT_S = 2.0
 WATCHED_S = 0.6  # of a stream under a fault that it survives
 READ_S = 0.5  # what a pump waits for a sample
+READY_S = 10.0  # for a healthy device to stream: emulators on a busy machine have been seen to stand for half a second
 INJECTED = {"psd": "psd", "kpa101": "psd", "can": "can", "rtde": "robot", "modbus": "robot"}  # the emulators' names
 PHASES = ("connect", "idle", "stream", "move", "close")
 SPEED_RAD_S, ACCELERATION_RAD_S2 = 1.0, 5.0
@@ -184,17 +186,24 @@ def _case(subject: Subject, kind: str, phase: str, count: int | None) -> Outcome
 
 def _well_again(subject: Subject) -> None:
     """Until the device can be reached as before: one that was unplugged comes back after a tenth of a second."""
-    end_s = time.monotonic() + 3.0
+    device = subject.make()
+    try:
+        streaming(device)
+    finally:
+        device.close()
+
+
+def streaming(device: Device) -> Block:
+    """Connected, and its first samples. What a stalled emulator does to it before any fault is no case of ours."""
+    end_s = time.monotonic() + READY_S
     while True:
-        device = subject.make()
         try:
             device.connect()
-            return
+            return device.read(READ_S)
         except DeviceError:
+            device.close()
             if time.monotonic() > end_s:
                 raise
-        finally:
-            device.close()
 
 
 def _connect(subject: Subject, device: Device, inject: Callable[[], None], times_s: list[float]) -> str:
@@ -204,14 +213,13 @@ def _connect(subject: Subject, device: Device, inject: Callable[[], None], times
 
 
 def _idle(subject: Subject, device: Device, inject: Callable[[], None], times_s: list[float]) -> str:
-    device.connect()
+    streaming(device)
     inject()
     return _in_order([device.read(READ_S)])
 
 
 def _stream(subject: Subject, device: Device, inject: Callable[[], None], times_s: list[float]) -> str:
-    device.connect()
-    blocks = [device.read(READ_S)]
+    blocks = [streaming(device)]
     inject()
     end_s = time.monotonic() + WATCHED_S
     while time.monotonic() < end_s:
@@ -226,7 +234,7 @@ def _move(subject: Subject, device: Device, inject: Callable[[], None], times_s:
     arm = subject.arm()
     supervisor = Supervisor(arm.hold)
     pump = Pump(device, SystemClock(), lambda block: None, supervisor.failed)
-    device.connect()
+    streaming(device)
     try:
         arm.connect()
         arm.move_joints(subject.home_rad, SPEED_RAD_S, ACCELERATION_RAD_S2)
@@ -252,8 +260,7 @@ def _move(subject: Subject, device: Device, inject: Callable[[], None], times_s:
 
 
 def _close(subject: Subject, device: Device, inject: Callable[[], None], times_s: list[float]) -> str:
-    device.connect()
-    device.read(READ_S)
+    streaming(device)
     inject()
     device.close()
     return "good"

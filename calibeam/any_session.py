@@ -3,9 +3,11 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from acquisition.recording.columns import POSITION, SPOTS
+from acquisition.recording.fingerprint import readings_sha256
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import rig_sha256
 from acquisition.recording.rig_schema import Rig
@@ -57,7 +59,8 @@ def write_session_model(
     text, rig = recording.rig_text, recording.rig
     told = Planned() if planned is None else planned
     arm_model = (told.plan.model or rig.arm.model).value
-    model = record_of(result, RigIdentity(rig.name, rig_sha256(text), text), arm_model, told.text)
+    identity, readings = RigIdentity(rig.name, rig_sha256(text), text), readings_sha256(recording.samples)
+    model = msgspec.structs.replace(record_of(result, identity, arm_model, told.text), readings_sha256=readings)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_model(path, model)
     return model

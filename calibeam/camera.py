@@ -45,7 +45,7 @@ def opened(camera: Camera, clock: Clock, emulated: Mapping[str, Any] | None = No
     from drivers.camera.device import Camera as CameraDevice
 
     source = camera.source if emulated is None else str(emulated["source"])
-    device = CameraDevice(source, (camera.width_px, camera.height_px), clock)
+    device = CameraDevice(source, (camera.width_px, camera.height_px), clock, camera.latency_s)
     device.connect()
     try:
         yield device

@@ -67,9 +67,13 @@ COMMANDS = {
     "jog": "jog:jog_command",
     "motion": "motion:motion_command",
     "camera": "camera:camera_command",
+    "live": "live:live_command",
     "export": "export:export_command",
     "import": "export:import_command",
     "recover": "recover:recover_command",
+    "batch": "batch:batch_command",
+    "layouts": "layouts:layouts_command",
+    "completion": "completion:completion_command",
 }
 for name, place in COMMANDS.items():
     app.command(f"calibeam.commands.{place}", name=name)

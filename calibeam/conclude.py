@@ -22,7 +22,10 @@ from calibrate.errors import DataError
 
 
 def conclude(recording_path: Path, console: Console) -> Identified:
-    """Model, diagnosis, report into the recording's folder. PartialResult when that cannot be done."""
+    """Model, diagnosis, report into the recording's folder, which may be given for all its parts.
+
+    PartialResult when that cannot be done.
+    """
     with recording_kept(recording_path):
         return _concluded(recording_path, console)
 
@@ -41,7 +44,7 @@ def recording_kept(recording_path: Path) -> Generator[None]:
 
 
 def _concluded(recording_path: Path, console: Console) -> Identified:
-    recording, folder = read(recording_path), recording_path.parent
+    recording, folder = read(recording_path), _folder_of(recording_path)
     identified = identify_recording(recording)
     write_identified(identified, recording, folder / "model.json")
     print_identified(console, identified)
@@ -49,6 +52,11 @@ def _concluded(recording_path: Path, console: Console) -> Identified:
     write_zero_report(identified, folder / "report.html", diagnosis)
     console.print(f"report: {folder / 'report.html'}", markup=False)
     return identified
+
+
+def _folder_of(recording_path: Path) -> Path:
+    """Results stand beside the recording, or among the parts of one."""
+    return recording_path if recording_path.is_dir() else recording_path.parent
 
 
 def diagnosed(recording: Recording, path: Path, console: Console) -> DiagnosisFile | None:

@@ -1,5 +1,6 @@
 """Encoder logging: decoded positions and raw frames, for days, until stopped; a lost bus is attached again."""
 
+import gc
 import signal
 import threading
 from collections.abc import Callable, Generator, Mapping
@@ -9,21 +10,24 @@ from functools import partial
 from pathlib import Path
 from types import FrameType
 
+import can
+
 from acquisition.frame_log import FrameLog
-from acquisition.recording.can_frames import CLASSIC_BYTES, STREAM, channels
-from acquisition.recording.rig_schema import EncodersDevice
+from acquisition.guarded import Guarded
+from acquisition.recording.rig_devices import EncodersDevice
 from acquisition.recording.segments import Rotation, SegmentedRecording, SegmentStream
 from acquisition.recording.stream import Channel, Gap
 from acquisition.recording.writer import RecordingWriter
 from acquisition.reopening import Reopening
 from acquisition.streams import Pump
-from calibeam.encoders import VIEWED, encoder_driver, identities_of
+from calibeam.encoders import VIEWED, encoder_driver, identities_of, names_of
 from calibeam.recorded import ENDING, uninterrupted
 from calibeam.software import SOFTWARE
 from drivers.clock import Clock
 from drivers.device import Block
 from drivers.errors import DeviceError
 
+YOUNG = 20_000  # objects made and not yet gone, before Python looks for cycles: a block has less than a thousand
 LOOK_S = 0.1  # how often the log looks after itself: the last frames of a quiet bus wait no longer for the disk
 
 
@@ -45,13 +49,15 @@ class EncoderLog:
     def __init__(
         self, device: EncodersDevice, rig_text: str, folder: Path, clock: Clock, rotation: Rotation, *, raw: bool
     ) -> None:
-        """RecordingError when the folder or the first segment cannot be made."""
+        """DeviceRefused for a driver that cannot be made; RecordingError when folder or first segment cannot be."""
         self._clock = clock
+        self._frames: FrameLog | None = None
+        self._driver = encoder_driver(device, clock, self._hear if raw else None)
+        who = partial(names_of, self._driver)
+        self._device = Reopening(Guarded(self._driver), clock, self._lost, self._back, who=who)
         begin = partial(_begin, rig_text=rig_text, clock=clock)
         self._recording = SegmentedRecording(folder, begin, clock, rotation)
-        self._frames = self._frame_log() if raw else None
-        self._driver = encoder_driver(device, clock, self._frames.hear if self._frames else None)
-        self._device = Reopening(self._driver, clock, self._lost, self._back)
+        self._frames = FrameLog(self._recording, clock) if raw else None
         self._stream: SegmentStream | None = None
         self.since_s: float | None = None  # host time from which it runs
         self._rows = self._outages = 0
@@ -73,7 +79,7 @@ class EncoderLog:
     def run(self, stopped: Callable[[], bool], tell: Callable[[State], None]) -> None:
         """DeviceError when the encoders are not there at the start, and then nothing is left behind; RecordingError."""
         pump = self._start()
-        with _asked_to_end() as asked:
+        with _asked_to_end() as asked, _rarely_looking_for_cycles():
             try:
                 while not (asked.is_set() or stopped()) and pump.failure is None:
                     self._clock.sleep_s(LOOK_S)
@@ -95,8 +101,7 @@ class EncoderLog:
         except BaseException:
             with uninterrupted():
                 self._device.close()
-                self._recording.close(complete=False)
-                self._recording.writer.path.unlink()
+                self._recording.discard()
             raise
         self._recording.event("encoders", {"identities": identities_of(self._driver)})
         pump = Pump(self._device, self._clock, self._keep, lambda failure: None, memory=1)
@@ -119,8 +124,9 @@ class EncoderLog:
         finally:
             self._recording.close(complete)
 
-    def _frame_log(self) -> FrameLog:
-        return FrameLog(self._recording.stream(STREAM, channels(), viewer=()), self._clock, CLASSIC_BYTES)
+    def _hear(self, message: can.Message, sent: bool) -> None:
+        assert self._frames is not None  # noqa: S101 - made before the bus is opened
+        self._frames.hear(message, sent)
 
     def _keep(self, block: Block) -> None:
         assert self._stream is not None  # noqa: S101 - made before the pump starts
@@ -153,6 +159,17 @@ def _asked_to_end() -> Generator[threading.Event]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+@contextmanager
+def _rarely_looking_for_cycles() -> Generator[None]:
+    """Frames and rows are gone within a block and hold no cycles; looking among them was a tenth of the whole work."""
+    before = gc.get_threshold()
+    gc.set_threshold(YOUNG, *before[1:])
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
 
 
 def _begin(path: Path, notes: Mapping[str, str], *, rig_text: str, clock: Clock) -> RecordingWriter:

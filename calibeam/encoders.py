@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 from msgspec import structs
 
-from acquisition.recording.rig_schema import EncoderDriver, EncodersDevice
+from acquisition.recording.rig_devices import EncoderDriver, EncodersDevice
 from drivers.can_dbc.description import joint_signals
 from drivers.can_dbc.device import CanDbcEncoders
 from drivers.cia406.device import Cia406Encoders
@@ -64,6 +64,17 @@ def emulated_encoders(device: EncodersDevice, announced: Mapping[str, Any]) -> E
         bitrate=announced["bitrate"],
         serial_number=None,
         options={},
+    )
+
+
+def names_of(driver: Device) -> tuple[str, ...]:
+    """Which encoders are connected, for a comparison with those of before; none for those that cannot say so."""
+    if not isinstance(driver, Cia406Encoders):
+        return ()
+    return tuple(
+        f"node {each.node} of vendor {each.vendor:#x}, product {each.product:#x}, serial number {each.serial_number}, "
+        f"{each.scale.unit_rad:.6g} rad a count, range {each.scale.range_units}"
+        for each in driver.identities
     )
 
 

@@ -23,6 +23,8 @@ def print_simulation(console: Console, s: Simulation) -> None:
     _print_budget(console, s)
     _print_poses(console, s)
     _print_ranking(console, s)
+    if not s.worst:
+        console.print("no worst posture: none of these errors moves the probe", highlight=False, markup=False)
     for p in s.worst:
         joints = ", ".join(f"{np.degrees(q):.0f}" for q in p.q_rad)
         console.print(f"worst posture: {length(p.rms_m)} rms at ({joints}) deg", highlight=False, markup=False)
@@ -54,7 +56,10 @@ def _print_poses(console: Console, s: Simulation) -> None:
 
 
 def _print_ranking(console: Console, s: Simulation) -> None:
-    title = f"the {min(SHOWN, len(s.sources))} most important errors: shares of the variance"
+    title = (
+        f"the {min(SHOWN, len(s.sources))} most important errors: shares of the variance, linear over "
+        f"{len(s.wide_rad)} poses, Sobol indices over {s.shares.poses} of them"
+    )
     table = _table(title, "error", "alone, rms", "linear", "first order", "total")
     for i in s.ranking[:SHOWN]:
         table.add_row(

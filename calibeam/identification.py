@@ -19,7 +19,7 @@ from calibrate.identification.evidence_record import evidence_fields
 from calibrate.identification.record import left_out
 from calibrate.identification.result import Identification
 from calibrate.identification.spots import proved, without_blunders
-from calibrate.model_file import RigIdentity, model_of, write_model
+from calibrate.model_file import ModelFile, RigIdentity, model_of, write_model
 from calibrate.observations import Observations
 from calibrate.read_samples import observations
 from calibrate.zeros.identify import identify
@@ -65,14 +65,19 @@ def identify_recording(recording: Recording) -> Identified:
 
 def write_identified(identified: Identified, recording: Recording, path: Path) -> None:
     """model.json of the full model."""
-    identity = RigIdentity(recording.rig.name, rig_sha256(recording.rig_text), recording.rig_text)
     path.parent.mkdir(parents=True, exist_ok=True)
+    write_model(path, identified_model(identified, recording))
+
+
+def identified_model(identified: Identified, recording: Recording) -> ModelFile:
+    """The full model as model.json says it."""
+    identity = RigIdentity(recording.rig.name, rig_sha256(recording.rig_text), recording.rig_text)
     model = model_of(identified.zeros, identity, recording.rig.arm.model.value)
     model = msgspec.structs.replace(model, blunders=tuple(left_out(b) for b in identified.blunders))
-    if identified.proved is not None:
-        proofs = evidence_fields(identified.proved.evidence)
-        model = msgspec.structs.replace(model, alarms=identified.proved.alarms, **proofs)
-    write_model(path, model)
+    if identified.proved is None:
+        return model
+    proofs = evidence_fields(identified.proved.evidence)
+    return msgspec.structs.replace(model, alarms=identified.proved.alarms, **proofs)
 
 
 def _four_poses(rig: Rig, data: Observations) -> PointConstraintResult | None:

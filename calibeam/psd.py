@@ -7,7 +7,8 @@ from typing import Any, Protocol
 from msgspec import structs
 
 from acquisition.psd_view import PsdView
-from acquisition.recording.rig_schema import PsdDevice, PsdDriver, Rig
+from acquisition.recording.rig_devices import PsdDevice, PsdDriver
+from acquisition.recording.rig_schema import Rig
 from drivers.clock import Clock
 from drivers.device import Device
 from drivers.errors import DeviceRefused

@@ -1,21 +1,24 @@
 """A session that is recorded: runs the plan, and whatever happens the arm is stopped and the file is whole."""
 
 import signal
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from types import FrameType
+from typing import Protocol, TypeVar
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import Progress as Bar
 
 from acquisition.bench import Bench
 from acquisition.camera.sight import Sight
 from acquisition.errors import AcquisitionError
 from acquisition.plan import PlanOptions
 from acquisition.planned_session import PlannedSession
+from acquisition.progress import Progress
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.read import read
@@ -31,6 +34,8 @@ from calibeam.outcome import PartialResult
 from calibeam.software import SOFTWARE
 from drivers.clock import Clock
 from drivers.errors import DeviceError
+
+Result = TypeVar("Result")
 
 Interrupted = (DeviceError, AcquisitionError, RecordingError, EmulationError, KeyboardInterrupt)
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # all of them end a session as Ctrl-C does, see calibeam.cli
@@ -55,48 +60,69 @@ def new_recording(path: Path, rig_text: str, clock: Clock, notes: Mapping[str, s
         writer.close()
 
 
+class Counted(Protocol):
+    """A session that says how much it has taken, also after it was cut short."""
+
+    @property
+    def taken(self) -> int: ...
+
+
 def record_session(
     bench: Bench,
     rig: Rig,
     writer: RecordingWriter,
     options: PlanOptions,
     clock: Clock,
-    bar: Progress,
+    bar: Bar,
     plan: PosePlan | None = None,
     sight: Sight | None = None,
 ) -> Summary:
     """Take every place of the rig, or the poses of a plan, told by `bar`; with a camera the light is aimed at by it.
 
-    PartialResult when it ended early: the arm stands, samples are kept.
-
-    Whoever asks a person for something meanwhile stops the bar first, and starts it again.
+    PartialResult when it ended early: the arm stands, samples are kept. Nobody is asked, and nothing can be paused:
+    calibeam/session/run.py.
     """
     home_rad = np.array(rig.motion.home_rad)  # there is one: check_session
     with bar:
         task = bar.add_task("collecting", total=None)
 
-        def tell(done: int, total: int, text: str) -> None:
-            bar.update(task, completed=done, total=total, description=text)
+        def tell(now: Progress) -> None:
+            text = f"place {now.placement}, PSD {now.first} first: {now.phase.value}"
+            bar.update(task, completed=now.done, total=now.total, description=text)
 
         learner, journal = FittedLearner(rig), RecordingJournal(writer, clock)
-        limits = Limits(step_rad=rig.motion.step_limit_rad)
-        session: Session | PlannedSession
         if plan is None:
-            session = Session(bench, learner, journal, options, home_rad, limits=limits, progress=tell, sight=sight)
-            run = partial(session.run, tuple(rig.placements))
+            limits = Limits(step_rad=rig.motion.step_limit_rad)
+            session = Session(bench, learner, journal, options, home_rad, limits=limits, tell=tell, sight=sight)
+            summary = kept(bench, writer, clock, session, partial(session.run, tuple(rig.placements)))
         else:
-            session = PlannedSession(bench, learner, journal, options, home_rad, progress=tell, sight=sight)
-            run = partial(session.run, plan)
-        try:
-            summary = run()
-        except Interrupted as why:
-            raise _ended_early(bench, writer, clock, session, why) from why
-    writer.event(Event(clock.now_s(), "end", {"samples": len(summary.samples), "skipped": summary.skipped}))
+            planned = PlannedSession(bench, learner, journal, options, home_rad, tell=tell, sight=sight)
+            summary = kept(bench, writer, clock, planned, partial(planned.run, plan))
+        bar.update(task, completed=len(summary.samples))
+    end_event(writer, clock, summary)
     return summary
 
 
+def end_event(writer: RecordingWriter, clock: Clock, summary: Summary) -> None:
+    """The session came to its end."""
+    writer.event(Event(clock.now_s(), "end", {"samples": len(summary.samples), "skipped": summary.skipped}))
+
+
+def kept(bench: Bench, writer: RecordingWriter, clock: Clock, session: Counted, run: Callable[[], Result]) -> Result:
+    """What `run` gives. PartialResult when it ended early: the arm stands, what was taken is on the disk."""
+    try:
+        return run()
+    except Interrupted as why:
+        while True:
+            try:
+                ended = _ended_early(bench, writer, clock, session, why)
+            except KeyboardInterrupt:  # in the moment before it is shut out: the arm has to be stopped all the same
+                continue
+            raise ended from why
+
+
 def _ended_early(
-    bench: Bench, writer: RecordingWriter, clock: Clock, session: Session | PlannedSession, why: BaseException
+    bench: Bench, writer: RecordingWriter, clock: Clock, session: Counted, why: BaseException
 ) -> PartialResult:
     """Stop the arm, put what there is on the disk; a second Ctrl-C may not get in between.
 
@@ -114,10 +140,10 @@ def _ended_early(
             writer.flush()
         except RecordingError as error:
             also.append(str(error))
-    kept = f"{session.taken} samples are kept in {writer.path}"
+    told = f"{session.taken} samples are kept in {writer.path}"
     if session.taken:
-        kept += f"; `calibeam identify {writer.path}` says what they tell"
-    return PartialResult("; ".join([reason, *dict.fromkeys(also), kept]))
+        told += f"; `calibeam identify {writer.path}` says what they tell"
+    return PartialResult("; ".join([reason, *dict.fromkeys(also), told]))
 
 
 @contextmanager
@@ -135,9 +161,9 @@ def uninterrupted() -> Generator[None, None, None]:
             signal.signal(number, handler)
 
 
-def progress_bar(console: Console) -> Progress:
+def progress_bar(console: Console) -> Bar:
     """Samples taken and planned, what is being done, time gone and left."""
-    return Progress(
+    return Bar(
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
 from rich.console import Console
 
 from acquisition.recording.check import Finding, check
@@ -11,8 +12,9 @@ from acquisition.recording.clock_model import ClockModel, ClockStatus, clock_mod
 from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
 from acquisition.recording.segments import segments
-from acquisition.recording.stream import Stream
+from acquisition.recording.stream import Floats, Stream
 
+SAME_S = 1.0  # longer than any driver keeps a sample
 MOST_LINES = 20  # findings of one file told one by one; a script gets all of them with --json
 
 
@@ -49,12 +51,25 @@ def _rate(stream: Stream) -> str:
 
 
 def _clock(stream: Stream) -> str:
+    if (late_s := _after_host_stamps(stream)) is not None:
+        median_s, p99_s = np.quantile(late_s, [0.5, 0.99])
+        return f"stamped by the host's clock, arrive {_ms(median_s)} later in the median, {_ms(p99_s)} at 99 %"
     model = clock_model(stream)
     if model.status is not ClockStatus.FOUND:
         return f"clock: {model.status.value}"
     delays = f"arrive {_ms(model.delay_median_s)} late in the median, {_ms(model.delay_p99_s)} at 99 %"
     wander = "" if model.wander_s is None else f", clock wanders {_ms(model.wander_s)}"
     return f"clock {1e6 * ((model.rate or 1.0) - 1.0):+.1f} us/s against the host, {delays}{wander}"
+
+
+def _after_host_stamps(stream: Stream) -> Floats | None:
+    """How long after its stamp each sample came, where the driver stamps for a device that has no clock.
+
+    No clock of a device shows the host's time since it was started to SAME_S.
+    """
+    late_s = stream.host_s - stream.device_s
+    stamped = late_s.size > 0 and bool(np.isfinite(late_s).all())
+    return late_s if stamped and late_s.min() >= 0.0 and late_s.max() < SAME_S else None
 
 
 def _ms(seconds: float | None) -> str:

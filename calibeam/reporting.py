@@ -5,48 +5,83 @@ from pathlib import Path
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import rig_sha256
 from calibeam.any_session import asks_for_zeros, identify_session
-from calibeam.identification import Identified, identify_recording
+from calibeam.identification import Identified, identified_model, identify_recording
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.errors import DataError
 from calibrate.identification.evidence_record import evidence_fields
 from calibrate.identification.record import record_of
 from calibrate.model_file import ModelFile, RigIdentity
-from calibrate.report.session_report import write_session_report
-from calibrate.report.zero_report import write_report
+from calibrate.report.answers import Answers
+from calibrate.report.drift.drift import Calibration, drift_of
+from calibrate.report.evidence import evidence
+from calibrate.report.page import write_page
+from calibrate.report.session_evidence import session_evidence
+from calibrate.report.session_report import session_answers, session_page
+from calibrate.report.session_workspace import session_arm
+from calibrate.report.zero_report import ZeroSession, zero_answers, zero_page
+from calibrate.report.zero_workspace import zero_arm
 
 ZEROS_ONLY = "joint_believed_rad"  # a noise that only the method for spots alone writes: not with a plan
 SAME = 1e-3  # of the rms: what two machines may differ by
+NOW = "now"
 
 
 def write_any_report(
-    recording: Recording, model: ModelFile | None, path: Path, diagnosis: DiagnosisFile | None = None
-) -> None:
-    """The report at `path`; without a model the recording is identified anew, without a plan. A diagnosis adds pages.
+    recording: Recording,
+    model: ModelFile | None,
+    path: Path,
+    diagnosis: DiagnosisFile | None = None,
+    *,
+    against: Calibration | None = None,
+    interactive: bool = False,
+) -> Answers:
+    """The report at `path`; without a model the recording is identified anew, without a plan. Returns its first screen.
 
-    DataError where the recording holds nothing to fit, the model is not of it, or the file cannot be written.
+    A diagnosis adds pages, an earlier calibration of the same arm (`against`) a chapter on what has changed since,
+    `interactive` figures that can be turned. DataError where the recording holds nothing to fit, the model is not of
+    it, the other calibration cannot be compared, or the file cannot be written.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     if asks_for_zeros(recording.rig, recording.samples) and (model is None or ZEROS_ONLY in model.noise):
         identified = identify_recording(recording)
         if model is not None:
             _refuse_other(model, identified, recording)
-        write_zero_report(identified, path, diagnosis)
-    else:
-        write_session_report(path, recording, _identified(recording) if model is None else model, diagnosis)
+        return _zero_report(identified, path, diagnosis, against, interactive=interactive)
+    known = session_evidence(recording, _identified(recording) if model is None else model)
+    drift = None
+    if against is not None:
+        drift = drift_of(Calibration(NOW, known.model, recording, diagnosis), against, session_arm(known))
+    write_page(path, session_page(known, diagnosis, drift, interactive=interactive))
+    return session_answers(known, drift)
 
 
 def write_zero_report(identified: Identified, path: Path, diagnosis: DiagnosisFile | None = None) -> None:
     """The report of joint zeros, with the pages of a diagnosis where there is one."""
-    write_report(
-        path,
-        identified.used,
-        identified.zeros,
-        point_constraint=identified.four_poses,
-        left_out=[blunder.says for blunder in identified.blunders],
-        proved=None if identified.proved is None else evidence_fields(identified.proved.evidence),
-        alarms=() if identified.proved is None else identified.proved.alarms,
-        diagnosis=diagnosis,
+    _zero_report(identified, path, diagnosis, None, interactive=False)
+
+
+def _zero_report(
+    identified: Identified,
+    path: Path,
+    diagnosis: DiagnosisFile | None,
+    against: Calibration | None,
+    *,
+    interactive: bool,
+) -> Answers:
+    proved = identified.proved
+    session = ZeroSession(
+        evidence(identified.used, identified.zeros, "reported"),
+        identified.four_poses,
+        left_out=tuple(blunder.says for blunder in identified.blunders),
+        proved=None if proved is None else evidence_fields(proved.evidence),
+        alarms=() if proved is None else proved.alarms,
     )
+    drift = None
+    if against is not None:
+        now = Calibration(NOW, identified_model(identified, identified.used), identified.used, diagnosis)
+        drift = drift_of(now, against, zero_arm(session.evidence, session.proved))
+    write_page(path, zero_page(session, diagnosis, drift, interactive=interactive))
+    return zero_answers(session, drift)
 
 
 def _identified(recording: Recording) -> ModelFile:

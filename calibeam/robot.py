@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 
 from acquisition.recording.errors import RigFileError
-from acquisition.recording.rig_schema import RobotDevice, RobotDriver
+from acquisition.recording.rig_devices import RobotDevice, RobotDriver
 from drivers.clock import Clock
 from drivers.device import Device, Movable
 from drivers.errors import DeviceRefused
@@ -37,7 +37,7 @@ def robot_of(device: RobotDevice, clock: Clock, hurry: float = 1.0) -> Robot:
 
 def emulated_robot(device: RobotDevice, where: Mapping[str, Any]) -> RobotDevice:
     """The same controller where emulators announced it: "host" and "port", or "serial_port"."""
-    found = {"host": None, "port": None, "serial_port": None, **where}
+    found = {"host": None, "port": None, "serial_port": None, "serial_number": None, **where}
     return msgspec.structs.replace(device, **found)
 
 
@@ -50,8 +50,8 @@ def _ur(device: RobotDevice, clock: Clock, hurry: float) -> Robot:
 
 
 def _modbus(device: RobotDevice, clock: Clock, hurry: float) -> Robot:
-    if device.serial_port is not None:
-        address = RtuAddress(device.serial_port, device.baud)
+    if device.is_rtu:
+        address = RtuAddress(device.serial_port, device.baud, device.parity, device.stop_bits, device.serial_number)
     else:
         address = TcpAddress(_given(device.host, "host"), MODBUS_PORT if device.port is None else device.port)
     try:
@@ -66,7 +66,7 @@ def _modbus(device: RobotDevice, clock: Clock, hurry: float) -> Robot:
         raise DeviceRefused(f"[devices.robot] of the rig file: {error}") from error
     line = ModbusLine(address, device.unit)
     # An RTU line has one master: reader and arm share it. Over TCP a stop must not wait behind a poll.
-    arm_line = line if device.serial_port is not None else ModbusLine(address, device.unit)
+    arm_line = line if device.is_rtu else ModbusLine(address, device.unit)
     reader = ModbusReader(line, registers, device.rate_hz, clock=clock)
     return Robot(reader, lambda: _arm(arm_line, registers, clock, hurry))
 

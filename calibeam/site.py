@@ -4,12 +4,15 @@ import itertools
 from collections.abc import Callable, Generator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
+from acquisition.errors import StoppedError
 from acquisition.guarded import Guarded
 from acquisition.psd_view import PsdView, psd_window
 from acquisition.recording.errors import RecordingError, RigFileError
-from acquisition.recording.rig_schema import EncodersDevice, PsdDevice, Rig, RobotDevice
+from acquisition.recording.rig_devices import EncodersDevice, PsdDevice, RobotDevice
+from acquisition.recording.rig_schema import Rig
 from acquisition.recording.stream import Channel, Event
 from acquisition.recording.writer import RecordingWriter
 from acquisition.streams import Pump
@@ -17,6 +20,7 @@ from acquisition.supervisor import Supervisor
 from acquisition.wired import Pumps, Speeds, WiredBench
 from calibeam.encoders import emulated_encoders, encoder_driver
 from calibeam.identification import check_identifiable
+from calibeam.live.feed import PAGE_STOP, SILENT, Feed
 from calibeam.motion.gate_of_rig import gated_arm
 from calibeam.psd import PsdInstrument, emulated_psd, psd_driver, psd_view
 from calibeam.recorded import uninterrupted
@@ -43,6 +47,16 @@ class Addresses:
     encoders: EncodersDevice | None
     hurry: float = 1.0
     emulated: bool = False
+
+
+@dataclass(frozen=True)
+class Kept:
+    """Where what the devices say goes."""
+
+    writer: RecordingWriter
+    clock: Clock
+    supervisor: Supervisor
+    feed: Feed
 
 
 def check_session(rig: Rig) -> None:
@@ -73,21 +87,28 @@ def addresses_of(rig: Rig, emulated: Mapping[str, Any] | None = None, hurry: flo
 
 @contextmanager
 def connected(
-    rig: Rig, addresses: Addresses, writer: RecordingWriter, clock: Clock, place: Callable[[int], None]
+    rig: Rig,
+    addresses: Addresses,
+    writer: RecordingWriter,
+    clock: Clock,
+    place: Callable[[int], None],
+    feed: Feed = SILENT,
 ) -> Generator[WiredBench]:
     """The bench on wires, its readers running. At the end the arm is stopped and every port released."""
     with ExitStack() as cleaning:
         robot = robot_of(addresses.robot, clock, addresses.hurry)
         arm = robot.arm()
         supervisor = Supervisor(arm.hold, clock)
+        cleaning.callback(feed.stops_by, None)
+        feed.stops_by(partial(supervisor.stop, StoppedError(PAGE_STOP)))  # while connecting, too
         psd = psd_driver(addresses.psd, rig, clock, addresses.hurry)
+        kept = Kept(writer, clock, supervisor, feed)
         pumps = Pumps(
-            psd=cleaning.enter_context(
-                _pumped(psd, writer, clock, supervisor, _spots_beside(psd, addresses.psd, writer))
-            ),
-            robot=cleaning.enter_context(_pumped(robot.reader, writer, clock, supervisor)),
-            encoders=_encoders(addresses, writer, clock, supervisor, cleaning),
+            psd=cleaning.enter_context(_pumped(psd, kept, _spots_beside(psd, addresses.psd, writer))),
+            robot=cleaning.enter_context(_pumped(robot.reader, kept)),
+            encoders=_encoders(addresses, kept, cleaning),
         )
+        feed.sees(psd_view(psd, addresses.psd))
         cleaning.callback(_released, arm)
         try:
             arm.connect()
@@ -104,14 +125,12 @@ def _released(arm: Movable) -> None:
         arm.close()
 
 
-def _encoders(
-    addresses: Addresses, writer: RecordingWriter, clock: Clock, supervisor: Supervisor, cleaning: ExitStack
-) -> Pump | None:
+def _encoders(addresses: Addresses, kept: Kept, cleaning: ExitStack) -> Pump | None:
     device = addresses.encoders
     if device is None:
         return None
-    driver = encoder_driver(device, clock, emulated=addresses.emulated, hurry=addresses.hurry)
-    return cleaning.enter_context(_pumped(driver, writer, clock, supervisor))
+    driver = encoder_driver(device, kept.clock, emulated=addresses.emulated, hurry=addresses.hurry)
+    return cleaning.enter_context(_pumped(driver, kept))
 
 
 def _spots_beside(psd: PsdInstrument, device: PsdDevice, writer: RecordingWriter) -> Callable[[Block], None]:
@@ -137,33 +156,29 @@ def newest_s(pump: Pump) -> float | None:
 
 
 @contextmanager
-def _pumped(
-    device: Device,
-    writer: RecordingWriter,
-    clock: Clock,
-    supervisor: Supervisor,
-    beside: Callable[[Block], None] = lambda block: None,
-) -> Generator[Pump]:
-    """The device connected, its blocks going into the recording until left, and to `beside`."""
+def _pumped(device: Device, kept: Kept, beside: Callable[[Block], None] = lambda block: None) -> Generator[Pump]:
+    """The device connected, its blocks going into the recording until left, to the live page and to `beside`."""
 
     def keep(block: Block) -> None:
         stream.append(block.host_s, block.device_s, block.sequence, block.values)
+        kept.feed.heard(device.name, block)
         beside(block)
 
     def failed(failure: Exception) -> None:
-        supervisor.failed(failure)
+        kept.supervisor.failed(failure)
+        kept.feed.lost(device.name, str(failure))
         with suppress(RecordingError):  # it may be the recording itself that failed
-            writer.event(Event(clock.now_s(), "device failed", {"device": device.name, "why": str(failure)}))
+            kept.writer.event(Event(kept.clock.now_s(), "device failed", {"device": device.name, "why": str(failure)}))
 
     guarded = Guarded(device)
-    pump = Pump(guarded, clock, keep, failed)
+    pump = Pump(guarded, kept.clock, keep, failed)
     try:
         guarded.connect()
         channels = tuple(Channel(c.name, c.unit, c.shape, c.full_scale, c.resolution) for c in device.describe())
         viewed = tuple(name for name in VIEWED[device.name] if name in {channel.name for channel in channels})
-        stream = writer.stream(device.name, channels, viewed)
+        stream = kept.writer.stream(device.name, channels, viewed)
         pump.start()
-        with supervisor.watching(device.name, lambda: newest_s(pump)):
+        with kept.supervisor.watching(device.name, lambda: newest_s(pump)):
             yield pump
     finally:
         with uninterrupted():

@@ -40,6 +40,7 @@ class BelievedRig:
         pair, half_size_m = sensor.T_psd1_psd2(phi), sensor.fixture.half_size_m
         self.arm = BelievedArm(rig, corrections)
         self.fixture = BelievedFixture(pair, half_size_m)
+        self.T_psd1_psd2 = pair
         self._gain = phi[4:8]
         self._poses = {int(k): sensor.T_base_psd1(phi, int(k)) for k in ids}
         self._views = {
@@ -74,10 +75,7 @@ class BelievedRig:
 
     def expect(self, q_rad: Floats, placement: int, first_psd: int) -> Expected:
         """Spots and their derivative. DataError for an unknown placement or order."""
-        view = self._views.get((placement, first_psd))
-        if view is None:
-            self.T_base_psd1(placement)
-            raise DataError(f"first_psd {first_psd}: the beam strikes PSD 1 or PSD 2 first; give 1 or 2")
+        view = self._view(placement, first_psd)
         T = self.arm.frames(q_rad)
         origin, direction = self.arm.beam_from(T[-1])
         hit = view.strike(origin, direction)
@@ -89,3 +87,15 @@ class BelievedRig:
     def spots(self, q_rad: Floats, placement: int, first_psd: int) -> Floats:
         """(4,) m, as in `expect`."""
         return self.expect(q_rad, placement, first_psd).spots_m
+
+    def struck(self, T_base_flange: Floats, placement: int, first_psd: int) -> tuple[Floats, Light]:
+        """Spots (4,) m and where the beam goes, as in `expect`, of a flange pose (4, 4): five times as fast."""
+        hit = self._view(placement, first_psd).strike(*self.arm.beam_from(T_base_flange))
+        return hit.spots_m * self._gain, hit.light
+
+    def _view(self, placement: int, first_psd: int) -> FixtureView:
+        view = self._views.get((placement, first_psd))
+        if view is None:
+            self.T_base_psd1(placement)
+            raise DataError(f"first_psd {first_psd}: the beam strikes PSD 1 or PSD 2 first; give 1 or 2")
+        return view

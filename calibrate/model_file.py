@@ -152,6 +152,7 @@ class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     free_space: FreeSpaceRecord | None = None
     bootstrap: BootstrapRecord | None = None
     plan: str | None = None
+    readings_sha256: str | None = None  # which readings it was made of (acquisition/recording/fingerprint.py)
 
 
 def model_of(result: ZeroResult, rig: RigIdentity, arm_model: str) -> ModelFile:

@@ -62,7 +62,7 @@ def _robot(
     world: World | HandWorld, rig: Mapping[str, Any], device: Mapping[str, Any], robot_host: str | None
 ) -> Bench:
     host = robot_host or device.get("host")
-    if host is None and "serial_port" not in device:
+    if host is None and not {"serial_port", "serial_number"} & device.keys():
         raise HostError('rig file: devices.robot has no host; give one, for example host = "127.0.0.2"')
     return _build(ROBOTS[device.get("driver", UR)], world, rig, host)
 

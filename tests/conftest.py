@@ -9,12 +9,16 @@ import calibeam  # noqa: F401 - sets the thread count before numpy is loaded
 
 HERE = Path(__file__).parent
 # Several processes talk in real time here: beside hard work they starve, and rightly say that a device is silent. Two
-# files at a time leave each other room enough, for most of their time is waiting, but for those of ALONE: whole
-# sessions, whose emulators, readers and servo want both cores.
-ALONE = "calibeam"
+# files of drivers and simulators at a time leave each other room enough, for most of their time is waiting; those of
+# calibeam are whole sessions, whose emulators, readers and servo want both cores. The Makefile names these folders.
 WIRED = (
+    "calibeam/fleet/test_engine.py",
     "calibeam/guided/test_wired_guided.py",
+    "calibeam/live/test_browser.py",
+    "calibeam/live/test_page.py",
+    "calibeam/live/test_wired_live.py",
     "calibeam/prove/test_wired.py",
+    "calibeam/session/test_wired_pause.py",
     "calibeam/test_camera_cli.py",
     "calibeam/test_check_cli.py",
     "calibeam/test_cli.py",
@@ -38,12 +42,10 @@ WIRED = (
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
-        for mark in marks_of(item.path):
-            item.add_marker(mark)
+        if on_wires(item.path):
+            item.add_marker("wired")
 
 
 @cache
-def marks_of(path: Path) -> tuple[str, ...]:
-    if not any(path.is_relative_to(HERE / wired) for wired in WIRED):
-        return ()
-    return ("wired", "alone") if path.is_relative_to(HERE / ALONE) else ("wired",)
+def on_wires(path: Path) -> bool:
+    return any(path.is_relative_to(HERE / wired) for wired in WIRED)

@@ -21,6 +21,7 @@ METHODS = {
     ("yaml", "load"),
 }
 KEYWORDS = {"shell", "allow_pickle"}
+NAMES_A_SHELL = "generate_completion"  # of cyclopts: for which shell, not by which
 
 
 def forbidden(tree: ast.AST) -> Iterator[str]:
@@ -34,11 +35,16 @@ def forbidden(tree: ast.AST) -> Iterator[str]:
                 yield name
             case ast.Call(func=ast.Attribute(value=ast.Name(id=module), attr=name)) if (module, name) in METHODS:
                 yield f"{module}.{name}"
-            case ast.keyword(arg=str(name), value=value) if name in KEYWORDS:
-                if not (isinstance(value, ast.Constant) and value.value is False):
-                    yield f"{name}="
+            case ast.Call(func=ast.Attribute(attr=name)) if name == NAMES_A_SHELL:
+                pass
+            case ast.Call(keywords=keywords):
+                yield from (f"{k.arg}=" for k in keywords if k.arg in KEYWORDS and not _is_false(k.value))
             case _:
                 pass
+
+
+def _is_false(value: ast.expr) -> bool:
+    return isinstance(value, ast.Constant) and value.value is False
 
 
 @pytest.mark.parametrize("folder", FOLDERS)

@@ -60,26 +60,29 @@ class Aim:
             if found is None and seen_rad is None:
                 return CameraAim(Aimed.UNSEEN, target, q_rad, fixture, self._motions)
             if found is None:  # the way led the board out of the picture: half of it back
-                q_rad = self._go(0.5 * (q_rad + np.asarray(seen_rad)))
+                try:
+                    q_rad = self._go(0.5 * (q_rad + np.asarray(seen_rad)))
+                except UnreachableError:  # a box in between: the search begins from where it stands
+                    return CameraAim(Aimed.DARK, target, q_rad, fixture, self._motions)
                 continue
             fixture, seen_rad = found, q_rad
-            stance = self._stance(target, q_rad, fixture, rng)
+            stance = self._stand(target, q_rad, fixture, rng)
             if stance is None:
                 return CameraAim(Aimed.UNREACHABLE, target, q_rad, fixture, self._motions)
-            target, q_rad = stance[0], self._go(stance[1])
+            target, q_rad = stance
             if all(self._bench.look(GLANCE_S).lit(target.first)):
                 return CameraAim(Aimed.LIT, target, q_rad, fixture, self._motions)
         return CameraAim(Aimed.DARK, target, q_rad, fixture, self._motions)
 
-    def _stance(
+    def _stand(
         self, target: BeamTarget, q_rad: Floats, T: Floats, rng: np.random.Generator
     ) -> tuple[BeamTarget, Floats] | None:
-        """The target with the first roll in which the arm can stand so, and its joint readings."""
+        """The target with the first roll in which the arm can stand so and come there, and its joint readings."""
         for other_rad in OTHER_ROLLS_RAD:
             rolled = replace(target, roll_rad=target.roll_rad + other_rad)
             try:
-                return rolled, reach(self._arm, flange_for(self._arm, self._optics, T, rolled), q_rad, rng)
-            except UnreachableError:
+                return rolled, self._go(reach(self._arm, flange_for(self._arm, self._optics, T, rolled), q_rad, rng))
+            except UnreachableError:  # no such posture, or the way there is not free
                 continue
         return None
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from acquisition.believed import BelievedArm, FixtureOptics, spots_by_joints
 from acquisition.bench import Bench, Look
+from acquisition.errors import UnreachableError
 
 Floats = NDArray[np.float64]
 
@@ -90,7 +91,11 @@ class Search:
             q_next = displaced(q_rad, offset)
             if np.any(q_next < self._arm.lower_rad) or np.any(q_next > self._arm.upper_rad):
                 continue
-            at, look = q_next, self._go(q_next)
+            try:
+                look = self._go(q_next)
+            except UnreachableError:  # a box is there: the light may be elsewhere
+                continue
+            at = q_next
             if look.lit(self._first)[face]:
                 break
         return at, look
@@ -106,7 +111,10 @@ class Search:
             keep_direction = self._arm.beam_jacobian(q_rad)[3:]
             wanted = np.concatenate([-spot_m, np.zeros(3)])
             q_next = q_rad + np.linalg.lstsq(np.vstack([J, keep_direction]), wanted, rcond=1e-6)[0]
-            seen = self._go(q_next)
+            try:
+                seen = self._go(q_next)
+            except UnreachableError:
+                break
             if not seen.lit(self._first)[0]:
                 break
             q_rad, look = q_next, seen

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from acquisition.errors import AcquisitionError
 from acquisition.motion.rigid import rotation_vector, transform
-from acquisition.recording.rig_schema import Camera, Pose, Vector
+from acquisition.recording.rig_schema import Camera, Pose
+from acquisition.recording.rig_values import Vector
 
 Floats = NDArray[np.float64]
 

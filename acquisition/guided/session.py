@@ -11,6 +11,7 @@ from acquisition.guided.arm import GuidedArm
 from acquisition.guided.coverage import Coverage
 from acquisition.guided.guide import Guide, Progress, Request
 from acquisition.guided.judge import Judge
+from acquisition.guided.novelty import nothing_new
 from acquisition.guided.plan import Visit, readings_of
 from acquisition.guided.reading import Reading
 from acquisition.guided.stillness import Motion, StillRule
@@ -122,7 +123,7 @@ class GuidedSession:
             now_s = float(window.t_s[-1])
             asked_s = now_s if asked_s is None else asked_s
             motion = self.rule.judge(self.arm, window)
-            place = self._place(target, window) if motion is Motion.STILL else motion.value
+            place = self._place(target, visit, window) if motion is Motion.STILL else motion.value
             if place is None:
                 return self._accepted(target, window)
             if now_s - told_s >= TELL_S:
@@ -131,13 +132,15 @@ class GuidedSession:
             if now_s - asked_s > self.patience_s:
                 return None
 
-    def _place(self, target: Target, window: Window) -> str | None:
-        """What is wrong with a still probe's place; None: nothing."""
+    def _place(self, target: Target, visit: Visit, window: Window) -> str | None:
+        """What is wrong with a still probe's place; None: nothing. A plan of postures may ask for one twice."""
         mean_rad = window.last(self.rule.dwell_s).q_rad.mean(axis=0)
         if self._last_rad is not None and np.abs(mean_rad - self._last_rad).max() < ANEW_RAD:
             return "taken; go on to the next posture"
         away_m = float(np.linalg.norm(self.arm.tip_m(mean_rad[np.newaxis])[0] - np.array(target.point_m)))
-        return f"still, but {1e3 * away_m:.0f} mm from {target.says}" if away_m > NEAR_M else None
+        if away_m > NEAR_M:
+            return f"still, but {1e3 * away_m:.0f} mm from {target.says}"
+        return None if visit.posture_rad is not None else nothing_new(self.arm, target, mean_rad, self._taken)
 
     def _accepted(self, target: Target, window: Window) -> Reading:
         held = window.last(self.rule.dwell_s)

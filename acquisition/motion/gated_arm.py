@@ -60,12 +60,13 @@ class GatedArm:
             )
 
     def _check_boxes(self, frames: Floats) -> None:
-        points = body_points(frames, self._cell.tool_m)
+        points = body_points(frames, self._cell.tool_m, self._cell.com_m)
         for box in self._cell.keep_out:
             if (hit := entered(box, points, self._cell.clearance_m)) is not None:
                 raise RefusedMotionError(
-                    f"the arm would come within {1e3 * hit[1]:.0f} mm of the keep-out box '{box.name}' (clearance "
-                    f"{1e3 * self._cell.clearance_m:.0f} mm) on its way; choose another pose, or correct the box"
+                    f"the middle of a link, or the tool, would come within {1e3 * hit[1]:.0f} mm of the keep-out box "
+                    f"'{box.name}' (clearance {1e3 * self._cell.clearance_m:.0f} mm) on its way; choose another pose, "
+                    "or correct the box"
                 )
 
     def _speed_share(self, frames: Floats, way_rad: Floats, speed_rad_s: float) -> float:

@@ -13,12 +13,13 @@ from acquisition.motion.cell import Cell, body_points, entered
 from acquisition.motion.errors import RefusedMotionError
 from acquisition.motion.inverse.solver import Solver
 from acquisition.motion.paths.path import STANDING, Belt, Path
-from acquisition.motion.paths.segments import Pace, Segment
+from acquisition.motion.paths.segments import By, Pace, Segment
 
 Floats = NDArray[np.float64]
 BeltAt = Callable[[float], Belt]  # as it is expected at a time of the path
 
 SAMPLE_S = 0.02  # a twentieth of a transition, and 5 mm of way at reduced speed
+GRIP_EVERY = 5  # samples, a tenth of a second: the grip changes with the posture, slowly
 LEAST_GRIP = 0.02  # singular value: 1 rad/s of a joint then moves the tool no faster than 20 mrad/s somehow
 SLOWEST = 50.0  # a segment that had to be slowed down more than this goes through a singular posture
 ROUNDS = 6
@@ -38,7 +39,7 @@ class Plan:
     q_rad: Floats  # (sample, joint)
     segment: NDArray[np.int64]  # (sample,) index
     corners_s: tuple[float, ...]
-    actions: tuple[tuple[float, str], ...]
+    rests: tuple[tuple[float, str], ...]  # when, and for which action
     ends_rad: tuple[Floats | None, ...]  # of segments by joints, for the solutions on the way
 
     def path(self) -> Path:
@@ -77,8 +78,7 @@ def plan(
             break
         slowed = tuple(replace(s, slower=s.slower * float(f)) for s, f in zip(slowed, factors, strict=True))
         if any(s.slower > SLOWEST for s in slowed):
-            made = replace(made, segments=slowed)  # refused below, by its name
-            break
+            break  # refused below
         made = _gone_through(solver, start_rad, slowed, pace, belt)
     _check_grip(made)
     _check_range(made)
@@ -109,53 +109,62 @@ def _gone_through(solver: Solver, start_rad: Floats, segments: tuple[Segment, ..
         np.array(q_rad),
         np.array(index),
         tuple(path.corners_s),
-        tuple(path.actions),
+        tuple(path.rests),
         tuple(path.ends_rad),
     )
 
 
-def _too_fast(made: Plan, cell: Cell) -> Floats:
-    """(segment,) by what each must be slowed; a transition counts for both segments that it joins."""
+def _shares(made: Plan, cell: Cell) -> list[tuple[str, Floats]]:
+    """What is limited, in words, and what share of its limit it takes (sample,)."""
     speed, acceleration = made.rates()
-    worst = np.max(np.abs(speed) / made.pace.speed_rad_s, axis=1)
-    worst = np.maximum(worst, np.max(np.abs(acceleration) / made.pace.acceleration_rad_s2, axis=1))
-    worst = np.maximum(worst, _too_fast_here(made, cell))
-    factors = np.ones(len(made.segments))
-    tacc_s = made.pace.tacc_s
-    for i in range(len(factors)):
-        last_s = made.corners_s[i + 1] + tacc_s
-        here = (made.t_s >= made.corners_s[i] - tacc_s) & (made.t_s <= last_s)
-        factors[i] = max(1.0, float(np.max(worst[here])))
-    return factors
+    out = [
+        (f"{what} of joint {joint + 1}", np.abs(rate[:, joint]) / limit[joint])
+        for what, rate, limit in (
+            ("the speed", speed, made.pace.speed_rad_s),
+            ("the acceleration", acceleration, made.pace.acceleration_rad_s2),
+        )
+        for joint in range(speed.shape[1])
+    ]
+    return out + (_shares_of_areas(made, cell) if cell.slow else [])
 
 
-def _tool_speed(made: Plan, cell: Cell) -> tuple[Floats, Floats]:
-    """Points of wrist, flange and tool (sample, point, 3) and their speeds (sample, point) m/s."""
-    frames = made.solver.arm.frames(made.q_rad)
-    points = body_points(frames[:, -3:], cell.tool_m)
-    return points, np.linalg.norm(np.gradient(points, made.t_s, axis=0), axis=2)
-
-
-def _too_fast_here(made: Plan, cell: Cell) -> Floats:
-    """(sample,) tool speed by the cap of the areas it is in."""
-    worst = np.zeros(len(made.t_s))
-    if not cell.slow:
-        return worst
-    points, speed = _tool_speed(made, cell)
+def _shares_of_areas(made: Plan, cell: Cell) -> list[tuple[str, Floats]]:
+    """Of wrist, flange and tool in each slow area, or in it by the next sample."""
+    points = body_points(made.solver.arm.frames(made.q_rad)[:, -3:], cell.tool_m)
+    speed_m_s = np.linalg.norm(np.gradient(points, made.t_s, axis=0), axis=2)
+    out: list[tuple[str, Floats]] = []
     for area in cell.slow:
-        inside = area.box.distance_m(points) <= 0.0
-        worst = np.maximum(worst, np.max(np.where(inside, speed, 0.0), axis=1) / area.speed_m_s)
-    return worst
+        inside = area.box.distance_m(points) <= speed_m_s * SAMPLE_S
+        fastest_m_s = np.max(np.where(inside, speed_m_s, 0.0), axis=1)
+        out.append((f"the speed of the tool in the area '{area.box.name}'", fastest_m_s / area.speed_m_s))
+    return out
+
+
+def _of_segment(made: Plan, i: int) -> NDArray[np.bool_]:
+    """(sample,) of a segment; a transition counts for both segments that it joins."""
+    tacc_s = made.pace.tacc_s
+    return (made.t_s >= made.corners_s[i] - tacc_s) & (made.t_s <= made.corners_s[i + 1] + tacc_s)
+
+
+def _too_fast(made: Plan, cell: Cell) -> Floats:
+    """(segment,) by what each must be slowed, at least 1."""
+    worst = np.max([share for _, share in _shares(made, cell)], axis=0)
+    return np.array([max(1.0, float(np.max(worst[_of_segment(made, i)]))) for i in range(len(made.segments))])
 
 
 def _check_grip(made: Plan) -> None:
-    for k in range(0, len(made.t_s), 5):  # every tenth of a second: the grip changes with the posture, slowly
+    """Of segments by joints none is needed; the joint that has lost it is the one named."""
+    joint_wise = np.array([segment.by is By.JOINTS for segment in made.segments])
+    index = np.minimum(made.segment, len(made.segments) - 1)
+    moves = np.any(made.q_rad != made.start_rad, axis=1)
+    for k in np.flatnonzero(moves & ~joint_wise[index])[::GRIP_EVERY]:
         joint, worth = made.solver.weakest(made.q_rad[k])
-        moves = np.any(made.q_rad[k] != made.start_rad)
-        if worth < LEAST_GRIP and moves and made.segments[_clipped(made, k)].by.value != "joint":
+        if worth < LEAST_GRIP:
+            stands = made.segments[index[k]].by is By.STAND
             raise RefusedMotionError(
-                f"{made.name_of(int(made.segment[k]))} at {made.t_s[k]:.2f} s: joint {joint} is near-singular (least "
-                f"singular value {worth:.4f}, limit {LEAST_GRIP}); go there by joints, or move the target"
+                f"{made.name_of(int(index[k]))} at {made.t_s[k]:.2f} s: near-singular, joint {joint} hardly moves the "
+                f"flange (least singular value {worth:.4f}, limit {LEAST_GRIP}); "
+                + ("stand elsewhere" if stands else "go there by joints, or move the target")
             )
 
 
@@ -172,31 +181,27 @@ def _check_range(made: Plan) -> None:
 
 
 def _check_boxes(made: Plan, cell: Cell) -> None:
-    points = body_points(made.solver.arm.frames(made.q_rad), cell.tool_m)
+    points = body_points(made.solver.arm.frames(made.q_rad), cell.tool_m, cell.com_m)
     for box in cell.keep_out:
         if (hit := entered(box, points, cell.clearance_m)) is not None:
             k, near_m = hit
             raise RefusedMotionError(
-                f"{made.name_of(int(made.segment[k]))} at {made.t_s[k]:.2f} s: the arm comes within "
-                f"{1e3 * near_m:.0f} mm of the keep-out box '{box.name}' (clearance {1e3 * cell.clearance_m:.0f} mm); "
-                "move round it"
+                f"{made.name_of(int(made.segment[k]))} at {made.t_s[k]:.2f} s: the middle of a link, or the "
+                f"tool, comes within {1e3 * near_m:.0f} mm of the keep-out box '{box.name}' (clearance "
+                f"{1e3 * cell.clearance_m:.0f} mm); move round it"
             )
 
 
 def _check_rates(made: Plan, cell: Cell) -> None:
-    if any(s.slower > SLOWEST for s in made.segments) or np.any(_too_fast(made, cell) > OVER):
-        factors = np.array([s.slower for s in made.segments])
-        i = int(np.argmax(factors))
-        here = (made.t_s >= made.corners_s[i] - made.pace.tacc_s) & (
-            made.t_s <= made.corners_s[i + 1] + made.pace.tacc_s
-        )
-        speed, _ = made.rates()
-        joint = int(np.argmax(np.max(np.abs(speed[here]) / made.pace.speed_rad_s, axis=0)))
-        raise RefusedMotionError(
-            f"{made.name_of(i)}: joint {joint + 1} would have to be {factors[i]:.1f} times slower than planned to stay "
-            "within its limits; a singular posture is near: go there by joints, or move the target"
-        )
-
-
-def _clipped(made: Plan, k: int) -> int:
-    return min(int(made.segment[k]), len(made.segments) - 1)
+    left = _too_fast(made, cell)
+    if np.all(left <= OVER):
+        return
+    i = int(np.argmax(left))
+    here = np.flatnonzero(_of_segment(made, i))
+    what, share = max(_shares(made, cell), key=lambda named: float(np.max(named[1][here])))
+    k = int(here[np.argmax(share[here])])
+    raise RefusedMotionError(
+        f"{made.name_of(i)} at {made.t_s[k]:.2f} s: {what} is {share[k]:.1f} times its limit, even with the segment "
+        f"{made.segments[i].slower:.1f} times slower than asked (at most {SLOWEST:.0f}); a singular posture is near: "
+        "go there by joints, or move the target"
+    )

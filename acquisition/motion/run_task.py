@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.motion.errors import TaskError
-from acquisition.motion.gate import Followed, Gate
+from acquisition.motion.following import Followed
+from acquisition.motion.gate import Gate
 from acquisition.motion.inverse.solver import Solver
 from acquisition.motion.paths.path import STANDING, Belt
 from acquisition.motion.plan import Plan
@@ -26,6 +27,10 @@ class Hand(Protocol):
 
     def grasp(self) -> None: ...
     def release(self) -> None: ...
+
+
+def undrawn(made: Plan) -> None:
+    """For who draws no plans."""
 
 
 def no_hand(action: str) -> None:
@@ -46,6 +51,7 @@ class Around:
     act: Callable[[str], None] = no_hand  # GRASP, RELEASE
     belt: BeltNow = lambda: STANDING
     watch: Callable[[], None] = lambda: None
+    planned: Callable[[Plan], None] = undrawn  # each sweep, before the arm moves: to draw it, or to ask
 
 
 @dataclass
@@ -84,6 +90,7 @@ def run_task(gate: Gate, task: Task, around: Around) -> Ran:
         if segments:
             now_rad = around.joints()
             made = gate.plan(now_rad, segments, _expected(around.belt()))
+            around.planned(made)
             followed = gate.run(made, around.joints(), around.belt, around.act, around.watch)
             ran.sweeps.append((made, followed))
         if count < len(plain):

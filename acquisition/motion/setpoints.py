@@ -6,6 +6,7 @@ distance R by y^2 / (8 R). Source: R. Paul, Robot Manipulators, 1981, ch. 5 (rat
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -23,8 +24,16 @@ class Followable(Protocol):
     @property
     def ends_s(self) -> float: ...
     @property
-    def actions(self) -> list[tuple[float, str]]: ...
+    def rests(self) -> list[tuple[float, str]]: ...
     def at(self, t_s: float, belt: Belt) -> Floats: ...
+
+
+@dataclass(frozen=True)
+class OnPath:
+    """Where on its path a set-point is: path time, and how fast that runs (1: as planned)."""
+
+    t_s: float
+    rate: float
 
 
 PER_STRUCTURAL = 10.0  # solutions per period of the lowest structural resonance: steps then excite none
@@ -62,14 +71,22 @@ class LookAhead:
         share = t_s / self._period_s - self._interval
         return self._behind_rad + (self._ahead_rad - self._behind_rad) * share
 
+    def on_path(self, t_s: float) -> OnPath:
+        """Of the set-point of stream time t, the last one that was asked for."""
+        way_s = self._ahead_s - self.reached_s
+        return OnPath(self.reached_s + way_s * self._share(t_s), way_s / self._period_s)
+
     def restart(self, t_s: float) -> None:
         """The arm has come to rest on the set-point of stream time t: the path goes on from there, from standing."""
-        share = min(1.0, t_s / self._period_s - self._interval)
-        here_rad = self._behind_rad + (self._ahead_rad - self._behind_rad) * share
-        here_s = self.reached_s + (self._ahead_s - self.reached_s) * share
+        here_rad = self._behind_rad + (self._ahead_rad - self._behind_rad) * self._share(t_s)
+        here_s = self.on_path(t_s).t_s
         self._behind_rad = self._ahead_rad = self._next_rad = here_rad
         self.reached_s = self._ahead_s = self._next_s = self._path_s = here_s
         self.scale = 0.0
+
+    def _share(self, t_s: float) -> float:
+        """Of the way from the solution behind to the one ahead, at the end of which a set-point may already be."""
+        return min(1.0, t_s / self._period_s - self._interval)
 
     def _solved(self) -> Floats:
         """Two periods ahead of the belt that is read now, and the arm's own lag."""

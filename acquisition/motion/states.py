@@ -1,7 +1,7 @@
 """What a motion can be doing, what can happen to it, and what it then does: one table, words as in bluesky.
 
-pause: at the next rest of the path; pause again within PAUSE_AGAIN_S: hold at once. resume goes on. abort: brake, clean
-up, end as aborted. stop: brake, clean up, end as a success. halt: stop the arm, no clean-up.
+pause: at the next rest of the path; the gate makes a second one within PAUSE_AGAIN_S a hold. resume goes on.
+abort: brake, clean up, end as aborted. stop: brake, clean up, end as a success. halt: stop the arm, no clean-up.
 Source of the words and keys: bluesky, "Interrupting" (first Ctrl-C: pause at the next checkpoint; second within 10 s:
 pause now).
 """
@@ -52,7 +52,6 @@ _TABLE: dict[State, dict[Event, State]] = {
     State.MOVING: {**_UNDER_WAY, Event.PAUSE: State.PAUSING, Event.HOLD: State.HELD, Event.FINISHED: State.DONE},
     State.PAUSING: {
         **_UNDER_WAY,
-        Event.PAUSE: State.HELD,
         Event.HOLD: State.HELD,
         Event.RESUME: State.MOVING,
         Event.RESTED: State.HELD,

@@ -5,7 +5,8 @@
 """
 
 import enum
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.stream import Channel, Floats, Stream
 
-STREAM = "can"
+STREAM, FD_STREAM = "can", "can-fd"  # in a log: frames up to 8 bytes; longer ones, counted by themselves
 CLASSIC_BYTES, FD_BYTES = 8, 64  # ISO 11898-1: longest payload of a frame
 CHANNELS_NOTE = "can_channels"  # note of an import, JSON: stream -> the channel of the file it came from
 CAN_ID, FLAGS, LENGTH, DATA = "can_id", "flags", "length", "data"
@@ -63,13 +64,14 @@ def block_of(frames: Sequence[Frame], width: int = CLASSIC_BYTES) -> FrameBlock:
     if longest > width:
         raise ValueError(f"a CAN frame of {longest} bytes in a stream of {width}; open the stream for CAN FD")
     payload = b"".join(frame.data.ljust(width, b"\0") for frame in frames)
+    host_s, device_s, can_id, flags, length, _ = zip(*frames, strict=True) if frames else ((),) * 6
     return FrameBlock(
-        np.array([frame.host_s for frame in frames]),
-        np.array([frame.device_s for frame in frames]),
+        np.array(host_s, dtype=np.float64),
+        np.array(device_s, dtype=np.float64),
         {
-            CAN_ID: np.array([frame.can_id for frame in frames], dtype=np.int64),
-            FLAGS: np.array([frame.flags for frame in frames], dtype=np.int64),
-            LENGTH: np.array([frame.length for frame in frames], dtype=np.int64),
+            CAN_ID: np.array(can_id, dtype=np.int64),
+            FLAGS: np.array(flags, dtype=np.int64),
+            LENGTH: np.array(length, dtype=np.int64),
             DATA: np.frombuffer(payload, dtype=np.uint8).reshape(-1, width).astype(np.int64),
         },
     )
@@ -88,3 +90,14 @@ def frames_of(stream: Stream) -> Iterator[Frame]:
     for at, (host_s, device_s, can_id, flags, length) in enumerate(rows):
         data = b"" if int(flags) & FrameFlag.REMOTE else payloads[at, : int(length)].tobytes()
         yield Frame(host_s, device_s, int(can_id), int(flags), int(length), data)
+
+
+def stream_names(buses: Iterable[int | str | None]) -> dict[str, int | str | None]:
+    """The stream of each channel of a file: letters, digits and - only, numbered where two would have one name."""
+    named: dict[str, int | str | None] = {}
+    for channel in buses:
+        plain = STREAM if channel is None else f"{STREAM}-{re.sub(r'[^A-Za-z0-9]+', '-', str(channel))}"
+        taken = {name.lower() for name in named}  # case does not tell files apart on every disk
+        names = (plain, *(f"{plain}-{number}" for number in range(2, len(named) + 3)))
+        named[next(name for name in names if name.lower() not in taken)] = channel
+    return named

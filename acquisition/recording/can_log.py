@@ -1,12 +1,12 @@
 """CAN frames in and out: BLF (Vector), ASC, CSV and candump files through python-can, from and to recordings.
 
 A file's channels become streams: `can`, or `can-<channel>` where it names them. Absolute times are kept: a frame's
-host time counts from the first frame, whose date is the recording's start. Formats that need a data base or another
+host time counts from the first frame, whose date is the recording's start. Where a recording has lost its date, times
+in the file count from its first frame. Formats that need a data base or another
 package (.db, .mf4) are not taken: python-can's .db writer loses frames when it is stopped.
 """
 
 import math
-import re
 import struct
 import zlib
 from collections.abc import Callable, Iterator, Mapping
@@ -27,12 +27,12 @@ from acquisition.recording.can_frames import (
     CHANNELS_NOTE,
     CLASSIC_BYTES,
     FD_BYTES,
-    STREAM,
     Frame,
     block_of,
     channels,
     frames_of,
     is_frames,
+    stream_names,
 )
 from acquisition.recording.can_message import frame_of, message_of
 from acquisition.recording.errors import RecordingError
@@ -40,6 +40,7 @@ from acquisition.recording.recording import Recording
 from acquisition.recording.stream_writer import StreamWriter
 from acquisition.recording.writer import RecordingWriter
 
+LATEST_S = 253_402_300_799.0  # since 1970: the end of the year 9999, beyond which no date can be written
 BLOCK = 10_000  # frames at a time into the recording
 MALFORMED = (  # what python-can's readers raise on lines and bytes that make no sense
     BLFParseError,
@@ -140,6 +141,8 @@ def _messages(recording: Recording) -> Iterator[can.Message]:
         )
     named: dict[str, int | str | None] = msgspec.json.decode(recording.notes.get(CHANNELS_NOTE, "{}"))
     start_s = _since_1970(recording.started_utc) - recording.host_s0
+    if not math.isfinite(start_s):
+        start_s = -min(float(stream.host_s[0]) for stream in streams if stream.host_s.size)
     rows: list[tuple[float, int | str | None, Frame]] = []
     for stream in streams:
         channel = named.get(stream.name)
@@ -174,6 +177,8 @@ class _Log:
             # opened here: python-can leaves a file open whose beginning it does not know
             with self._path.open(self._mode) as file, self._open(file) as messages:
                 for message in messages:
+                    if not 0.0 <= message.timestamp <= LATEST_S:
+                        raise ValueError(f"time stamp {message.timestamp}")
                     yield message
                     count += 1
         except OSError as error:
@@ -193,14 +198,14 @@ class _Survey:
 
 def _surveyed(source: Path) -> _Survey:
     log = _Log(source)
-    start_s, longest, named = math.nan, 0, dict[str, int | str | None]()
+    start_s, longest, buses = math.nan, 0, dict[int | str | None, None]()  # in the order of their first frames
     for message in log:
         start_s = message.timestamp if math.isnan(start_s) else start_s
         longest = max(longest, len(message.data))
-        named[stream_name(_bus(message))] = _bus(message)
-    if not named:
+        buses.setdefault(_bus(message))
+    if not buses:
         raise RecordingError(f"{source}: no CAN frame in it ({log.damage or 'it is empty'}); check the file")
-    return _Survey(start_s, FD_BYTES if longest > CLASSIC_BYTES else CLASSIC_BYTES, named)
+    return _Survey(start_s, FD_BYTES if longest > CLASSIC_BYTES else CLASSIC_BYTES, stream_names(buses))
 
 
 class _Inlet:
@@ -230,13 +235,6 @@ def _bus(message: can.Message) -> int | str | None:
     """The channel of a file that a message came on; python-can allows bonded ones, which get one name together."""
     channel = message.channel
     return channel if channel is None or isinstance(channel, int | str) else "-".join(map(str, channel))
-
-
-def stream_name(channel: int | str | None) -> str:
-    """The stream of a file's channel: letters, digits and - only."""
-    if channel is None:
-        return STREAM
-    return f"{STREAM}-{re.sub(r'[^A-Za-z0-9]+', '-', str(channel))}"
 
 
 def _since_1970(started_utc: str) -> float:

@@ -24,14 +24,12 @@ _flagged = attrgetter(*(name for name, _ in _FLAGS))  # in one call: nearly all 
 
 def frame_of(message: can.Message, host_s: float, *, sent: bool) -> Frame:
     """A frame as it was heard, or sent, at host time `host_s`."""
-    flags = _SENT if sent else 0
-    if any(_flagged(message)):
-        for name, flag in _FLAGS:
-            if getattr(message, name):
-                flags |= flag
+    flags, data = _SENT if sent else 0, message.data
+    if True in _flagged(message):
+        flags |= sum(flag for name, flag in _FLAGS if getattr(message, name))
+        data = b"" if message.is_remote_frame else data
     stamp_s = math.nan if sent or not message.timestamp else message.timestamp
-    data = b"" if message.is_remote_frame else bytes(message.data)
-    return Frame(host_s, stamp_s, message.arbitration_id, flags, message.dlc, data)
+    return Frame(host_s, stamp_s, message.arbitration_id, flags, message.dlc, bytes(data))
 
 
 def message_of(frame: Frame, time_s: float, channel: int | str | None) -> can.Message:

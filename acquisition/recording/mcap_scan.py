@@ -2,7 +2,7 @@
 
 Reads from the front, because the index at the end is missing when a session was killed. Layout of the records:
 https://mcap.dev/spec. A batch whose checksum is wrong is left out and told; the batches after it are still
-read, also where the length of a record is damaged and the next batch must be searched for.
+read, also where the length of a record is damaged and the next batch must be searched for, or the disk gives no bytes.
 """
 
 import struct
@@ -18,8 +18,9 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.mcap_search import next_batch
 
-# What the parser raises on bytes that make no sense; CRC errors are ValueErrors.
+# What the parser raises on bytes that make no sense; CRC errors are ValueErrors. OSError: the disk refuses to read.
 DAMAGE = (
+    OSError,
     McapError,
     ValueError,
     struct.error,
@@ -107,6 +108,8 @@ def _check_magic(path: Path, start: bytes, size: int) -> None:
 
 
 def _says(error: BaseException) -> str:
+    if isinstance(error, OSError):
+        return f"the disk cannot read it ({error.strerror or error})"
     if isinstance(error, EndOfFile | struct.error):  # the parser's words for a record that is shorter than it says
         return "the file ends too early"
     return str(error) or type(error).__name__

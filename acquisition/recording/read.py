@@ -1,4 +1,4 @@
-"""Opens a recording: one file, whole or torn off at any byte, or a session folder."""
+"""Opens a recording: one file, whole or torn off at any byte, a session of several parts, or a session folder."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -7,7 +7,7 @@ import msgspec
 from mcap.records import Header
 
 from acquisition.recording.errors import RecordingError
-from acquisition.recording.folder import read_folder
+from acquisition.recording.folder import RIG, read_folder
 from acquisition.recording.layout import (
     END_METADATA,
     FORMAT_VERSION,
@@ -19,6 +19,7 @@ from acquisition.recording.layout import (
 )
 from acquisition.recording.mcap_content import Content
 from acquisition.recording.mcap_scan import Scan
+from acquisition.recording.parts import joined, parts
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import parse_rig, rig_sha256
 from acquisition.recording.rig_schema import Rig
@@ -29,10 +30,15 @@ from acquisition.recording.samples import Samples
 def read(path: Path | str) -> Recording:
     """A recording or a session folder. Of a torn or damaged file every complete batch, with `complete` False.
 
+    A folder with recording.mcap and no rig.toml is all parts of that session together (parts.py).
+
     RecordingError when it is neither, or torn before the rig; RigFileError and SamplesError for what a folder holds.
     """
     path = Path(path)
-    return read_folder(path) if path.is_dir() else _read_mcap(path)
+    if not path.is_dir():
+        return _read_mcap(path)
+    files = [] if (path / RIG).is_file() else parts(path)
+    return joined([_read_mcap(file) for file in files], path) if files else read_folder(path)
 
 
 def _read_mcap(path: Path) -> Recording:

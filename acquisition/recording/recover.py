@@ -5,10 +5,12 @@ in the new file, which stays an incomplete session for ever.
 """
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
+from google.protobuf.message import DecodeError
 from mcap.records import Channel, Header, Message, Metadata, Schema
 
 from acquisition.recording.errors import RecordingError
@@ -58,10 +60,14 @@ def recover(source: Path, path: Path, rig_text: str | None = None) -> Recovery:
         damage = (*scan.damage, *copy.faults(first.library))
         whole = scan.whole and copy.ended and not damage
         copy.finish(source.name, damage, whole=whole)
-    except OSError as error:
-        copy.file.give_up()
+    except BaseException as error:
+        with suppress(OSError):
+            copy.file.give_up()
         path.unlink(missing_ok=True)
-        raise RecordingError(f"{path}: cannot write the recording ({error.strerror}); choose another place") from error
+        if isinstance(error, OSError):  # of writing: what cannot be read is damage
+            says = f"{path}: cannot write the recording ({error.strerror}); choose another place"
+            raise RecordingError(says) from error
+        raise
     _check_readable(source, path)
     return Recovery(copy.messages, damage, whole)
 
@@ -87,7 +93,7 @@ class _Copy:
         self._names: set[str] = set()  # metadata records written
         self._kinds: dict[int, MessageType] = {}
         self._topics: dict[int, int] = {}  # number in the old file -> in the new one
-        self._lost_records = self._lost_messages = 0
+        self._lost_records = self._lost_descriptions = self._lost_messages = 0
         self._unsaved = 0
         if rig_text is not None:
             self._metadata(RIG_METADATA, {"text": rig_text, "sha256": rig_sha256(rig_text)})
@@ -96,7 +102,7 @@ class _Copy:
         if isinstance(record, Metadata):
             self._take_metadata(record)
         elif isinstance(record, Schema):
-            self._kinds[record.id] = embedded_type(record.name, record.data)
+            self._take_description(record)
         elif isinstance(record, Channel) and record.schema_id in self._kinds:
             self._topics[record.id] = self.file.topic(record.topic, self._kinds[record.schema_id], record.metadata)
         elif isinstance(record, Message):
@@ -110,6 +116,8 @@ class _Copy:
             self._metadata(RECORDING_METADATA, about)
         if self._lost_records:
             yield f"{self._lost_records} metadata records do not fit their checksum and were left out"
+        if self._lost_descriptions:
+            yield f"{self._lost_descriptions} descriptions of messages make no sense and were left out"
         if self._lost_messages:
             yield f"{self._lost_messages} messages of which the description is lost were left out"
 
@@ -131,6 +139,12 @@ class _Copy:
             self.ended, self._complete = True, values.get("complete") == "true"
         elif record.name != RIG_METADATA or RIG_METADATA not in self._names:
             self._metadata(record.name, values)
+
+    def _take_description(self, record: Schema) -> None:
+        try:
+            self._kinds[record.id] = embedded_type(record.name, record.data)
+        except (DecodeError, TypeError, KeyError):
+            self._lost_descriptions += 1
 
     def _take_message(self, record: Message) -> None:
         topic = self._topics.get(record.channel_id)

@@ -19,8 +19,11 @@ from acquisition.recording.rig_schema import EMULATION_KEYS, ArmModel, Rig
 
 
 def load_rig(path: Path | str) -> Rig:
-    """The rig of a file. RigFileError naming file, line, key, value and remedy."""
-    return parse_rig(rig_text(path), str(path))
+    """The rig of a file. RigFileError naming file, line, key, value and remedy.
+
+    Files that it names for its devices (`dbc`, `error_maps`) are looked for from its own folder on.
+    """
+    return _with_files_from(Path(path).parent, parse_rig(rig_text(path), str(path)))
 
 
 def rig_text(path: Path | str) -> str:
@@ -119,6 +122,17 @@ def _completed(rig: Rig) -> Rig:
         unit = beam if length == 1.0 else tuple(component / length for component in beam)
         rig = replace(rig, tool=replace(rig.tool, laser_direction=unit))
     return rig
+
+
+def _with_files_from(folder: Path, rig: Rig) -> Rig:
+    replace = msgspec.structs.replace
+    psd, encoders = rig.devices.psd, rig.devices.encoders
+    if psd is not None and psd.error_maps is not None:
+        one, other = (str(folder / file) if file else "" for file in psd.error_maps)
+        psd = replace(psd, error_maps=(one, other))
+    if encoders is not None and encoders.dbc is not None:
+        encoders = replace(encoders, dbc=str(folder / encoders.dbc))
+    return replace(rig, devices=replace(rig.devices, psd=psd, encoders=encoders))
 
 
 def _fault(name: str, lines: Mapping[KeyPath, int], path: KeyPath, says: str) -> RigFileError:

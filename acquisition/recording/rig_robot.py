@@ -2,8 +2,9 @@
 
 from collections.abc import Iterator
 
+from acquisition.recording.rig_devices import RobotDevice, RobotDriver
 from acquisition.recording.rig_lines import KeyPath
-from acquisition.recording.rig_schema import Rig, RobotDevice, RobotDriver
+from acquisition.recording.rig_schema import Rig
 
 PATH: KeyPath = ("devices", "robot")
 FASTEST_POLL_HZ = 500.0
@@ -20,16 +21,20 @@ def robot_faults(rig: Rig) -> Iterator[tuple[KeyPath, str]]:
 def _ur_faults(robot: RobotDevice) -> Iterator[tuple[KeyPath, str]]:
     if robot.host is None:
         yield PATH, "[devices.robot] needs the key 'host', the controller's address"
-    for key in ("port", "serial_port", "register"):
+    for key in ("port", "serial_port", "serial_number", "register"):
         if getattr(robot, "registers" if key == "register" else key) not in (None, ()):
             yield (*PATH, key), f'\'{key}\' belongs to driver "modbus", the driver here is "ur-rtde"; delete it'
 
 
 def _modbus_faults(robot: RobotDevice) -> Iterator[tuple[KeyPath, str]]:
-    if (robot.host is None) == (robot.serial_port is None):
-        yield PATH, "[devices.robot] needs either 'host' (Modbus TCP) or 'serial_port' (RTU), and one only"
-    if robot.serial_port is not None and robot.port is not None:
-        yield (*PATH, "port"), "'port' is the number of a TCP port; a line at 'serial_port' has none: delete it"
+    if [robot.host, robot.serial_port, robot.serial_number].count(None) != 2:
+        yield (
+            PATH,
+            "[devices.robot] needs either 'host' (Modbus TCP) or 'serial_port' or 'serial_number' (RTU, by path or by "
+            "the adapter's USB), and one only",
+        )
+    if robot.is_rtu and robot.port is not None:
+        yield (*PATH, "port"), "'port' is the number of a TCP port; a serial line has none: delete it"
     if not robot.registers:
         yield PATH, "[devices.robot] has no register map: add [[devices.robot.register]], see docs/protocols/modbus.md"
     if robot.rate_hz > FASTEST_POLL_HZ:

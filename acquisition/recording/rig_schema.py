@@ -10,13 +10,8 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct, field
 
-Vector = tuple[float, float, float]
-Positive = Annotated[float, Meta(gt=0.0)]
-NotNegative = Annotated[float, Meta(ge=0.0)]
-Identity = Annotated[int, Meta(ge=1)]
-RegisterAddress = Annotated[int, Meta(ge=0, le=65535)]  # Modbus Application Protocol V1.1b3, section 4.4
-Word = Annotated[str, Meta(min_length=1)]
-ZERO: Vector = (0.0, 0.0, 0.0)
+from acquisition.recording.rig_devices import Devices
+from acquisition.recording.rig_values import ZERO, Identity, NotNegative, Positive, Vector, Word
 
 
 class ArmModel(enum.Enum):
@@ -58,6 +53,7 @@ class Arm(Struct, frozen=True, forbid_unknown_fields=True):
     joints: Annotated[tuple[Joint, ...], Meta(min_length=1)] = field(name="joint")
     gravity_m_s2: Vector = (0.0, 0.0, -9.81)  # an arm that stands on its feet
     flange: Pose = Pose()
+    serial_number: Word | None = None  # of the maker's plate: tells two arms of one kind apart
 
 
 class Tool(Struct, frozen=True, forbid_unknown_fields=True):
@@ -161,122 +157,6 @@ class Tolerance(Struct, frozen=True, forbid_unknown_fields=True):
     eccentricity_rad: Positive | None = None  # of what an encoder's disc off its axis does to a reading; None: centred
 
 
-class PsdDriver(enum.Enum):
-    """Detector electronics that can be read."""
-
-    PSD_DAQ = "psd-daq"
-    KPA101 = "kpa101"
-
-
-class PsdHead(enum.Enum):
-    """Detector heads that a KPA101 takes."""
-
-    PIN_CUSHION = "pin-cushion"
-    QUADRANT = "quadrant"
-
-
-class EncoderDriver(enum.Enum):
-    """Encoder profiles that can be read."""
-
-    CIA406 = "cia406"
-    CAN_DBC = "can-dbc"
-
-
-class RobotDriver(enum.Enum):
-    """Controllers that can be driven."""
-
-    UR_RTDE = "ur-rtde"
-    MODBUS = "modbus"
-
-
-class RegisterType(enum.Enum):
-    """How a number stands in 16-bit registers."""
-
-    INT16 = "int16"
-    UINT16 = "uint16"
-    INT32 = "int32"
-    UINT32 = "uint32"
-    FLOAT32 = "float32"
-    FLOAT64 = "float64"
-
-
-class PsdDevice(Struct, frozen=True, forbid_unknown_fields=True):
-    """The detectors' serial line, by path or by USB serial number; of a pair of KPA101 two lines, unit 1 first.
-
-    Keys of two numbers are for unit 1 and 2, and from `head` on for KPA101 only: docs/protocols/kpa101.md.
-    """
-
-    driver: PsdDriver
-    port: Word | None = None
-    serial_number: Word | None = None
-    rate_hz: Positive = 1000.0  # where the 2 um of a PSD are stated
-    ports: tuple[Word, Word] | None = None
-    serial_numbers: tuple[Word, Word] | None = None
-    error_maps: tuple[str, str] | None = None  # files of both faces, "" for none
-    spot_radius_m: Positive | None = None  # at 1/e^2; only a quadrant face needs it
-    head: PsdHead = PsdHead.PIN_CUSHION
-    length_m: Positive | None = None  # resistance length; None: twice fixture.half_size_m
-    x_signs: tuple[Literal[-1, 1], Literal[-1, 1]] = (-1, -1)
-    y_signs: tuple[Literal[-1, 1], Literal[-1, 1]] = (1, 1)
-    sum_full_scale_v: tuple[Positive, Positive] = (10.0, 10.0)  # at 65535 counts
-    transimpedance_v_a: Positive = 1e5  # Thorlabs PDP90A; it places no spot
-
-
-class EncodersDevice(Struct, frozen=True, forbid_unknown_fields=True):
-    """The encoders' CAN bus; `interface` and `channel` are python-can's words; a node, or signal, per joint, in order.
-
-    `serial_number` of a serial adapter's USB plug stands in place of `channel`, which changes with the plug.
-    """
-
-    driver: EncoderDriver
-    interface: Word
-    channel: str = ""  # empty: by serial number
-    nodes: tuple[Annotated[int, Meta(ge=1, le=127)], ...] = ()  # CiA 301, 7.2: node-IDs 1 to 127
-    bitrate: Identity = 1_000_000
-    sync_hz: Positive = 200.0
-    serial_number: Word | None = None
-    options: Mapping[str, bool | int | float | str] = {}  # further words of python-can for this interface
-    dbc: Word | None = None  # file that describes plain encoders
-    signals: tuple[Word, ...] = ()  # "Message.Signal" of the DBC file
-    units_per_turn: Positive | None = None  # for signals whose unit is no angle
-    acceleration_limit_rad_s2: Positive | None = None  # beyond it a step is a slip, not motion
-
-
-class RobotRegister(Struct, frozen=True, forbid_unknown_fields=True):
-    """One entry of a Modbus register map; SI value = scale * number. Names: `docs/protocols/modbus.md`."""
-
-    name: Word
-    address: RegisterAddress
-    type: RegisterType
-    count: Identity = 1
-    scale: float = 1.0
-    word_order: Literal["big", "little"] = "big"  # which word of a longer number comes first
-    table: Literal["holding", "input"] = "holding"
-    turns_address: RegisterAddress | None = None  # first of the counts of whole turns that belong to angles
-
-
-class RobotDevice(Struct, frozen=True, forbid_unknown_fields=True):
-    """The controller's address and the rate of its stream; the keys from `port` on are for Modbus only."""
-
-    driver: RobotDriver
-    host: Word | None = None
-    rate_hz: Positive = 500.0  # e-Series control cycle
-    port: Annotated[int, Meta(ge=0, le=65535)] | None = None  # of Modbus TCP, 502 when not given
-    serial_port: Word | None = None  # Modbus RTU instead of TCP
-    baud: Identity = 115_200
-    unit: Annotated[int, Meta(ge=0, le=255)] = 1
-    read_across: Annotated[int, Meta(ge=0, le=123)] = 0  # registers outside the map that may be read in one go
-    registers: tuple[RobotRegister, ...] = field(name="register", default=())
-
-
-class Devices(Struct, frozen=True, forbid_unknown_fields=True):
-    """How each instrument is reached; one that is not named is not there."""
-
-    psd: PsdDevice | None = None
-    encoders: EncodersDevice | None = None
-    robot: RobotDevice | None = None
-
-
 class CameraBoard(Struct, frozen=True, forbid_unknown_fields=True):
     """Square markers of one dictionary, printed in reading order, on the fixture.
 
@@ -302,6 +182,7 @@ class Camera(Struct, frozen=True, forbid_unknown_fields=True):
     in_flange: Pose  # x right in the picture, y down, z where it looks
     board: CameraBoard
     calibration: Word | None = None  # file of `calibeam camera`
+    latency_s: NotNegative = 0.2  # from exposure to program at most: four frames at 30 Hz
 
 
 class MotionBox(Struct, frozen=True, forbid_unknown_fields=True):
@@ -336,6 +217,12 @@ class Motion(Struct, frozen=True, forbid_unknown_fields=True):
     slow_area: tuple[SlowBox, ...] = ()
 
 
+class Live(Struct, frozen=True, forbid_unknown_fields=True):
+    """What the live page may do to a session beside its STOP."""
+
+    stop_without_page_s: Positive | None = None  # no page answers for so long: as STOP; None: pages come and go
+
+
 # Keys of [emulation]; the section belongs to the emulators, which read it themselves from the same file.
 EMULATION_KEYS = (
     "seed",
@@ -363,6 +250,8 @@ EMULATION_KEYS = (
     "graduation_rad",
     "encoder_noise_rad",
     "axis_wobble_rad",
+    "radial_runout_m",
+    "axial_runout_m",
     "contact_m",
     "tremor_rad",
     "slip_share",
@@ -393,6 +282,7 @@ class Rig(Struct, frozen=True, forbid_unknown_fields=True):
     devices: Devices = Devices()
     camera: Camera | None = None
     motion: Motion = Motion()
+    live: Live = Live()
     emulation: Mapping[str, float] | None = None
 
     @property

@@ -7,6 +7,7 @@ ended, killed or cut off from power goes on in a new segment: what is there is n
 import re
 import threading
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -73,6 +74,7 @@ class SegmentedRecording:
         self._begin, self._clock, self._rotation = begin, clock, rotation or Rotation()
         self._turn = threading.Lock()
         self._streams: list[SegmentStream] = []
+        self._made_folder = not folder.exists()
         self.writer = self._next(_made(folder))
 
     def stream(self, name: str, channels: tuple[Channel, ...], viewer: tuple[str, ...] | None = None) -> SegmentStream:
@@ -106,6 +108,15 @@ class SegmentedRecording:
     def close(self, complete: bool = True) -> None:
         """As `RecordingWriter.close`."""
         self.writer.close(complete)
+
+    def discard(self) -> None:
+        """As if it had never been begun: the open segment goes, and the folder if it was made for it."""
+        with suppress(RecordingError):  # why it could not be ended no longer matters
+            self.writer.close(complete=False)
+        self.writer.path.unlink(missing_ok=True)
+        if self._made_folder:
+            with suppress(OSError):  # something else is in it by now
+                self.folder.rmdir()
 
     def _next(self, before: Path | None) -> RecordingWriter:
         there = segments(self.folder)

@@ -13,6 +13,7 @@ from acquisition.recording.stream_encoder import Piece
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _STREAM_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+LARGEST = np.iinfo(np.int64).max
 _RESERVED = ("host_s", "device_s", "sequence")
 
 
@@ -71,20 +72,20 @@ class StreamWriter:
     def _values(self, channel: Channel, values: Mapping[str, ArrayLike]) -> NDArray[Any]:
         if channel.name not in values:
             raise ValueError(f"stream '{self.name}': channel '{channel.name}' was declared but is not in the block")
-        array = np.array(values[channel.name], ndmin=1)
-        if array.dtype.kind == "u" and array.size and array.max() > np.iinfo(np.int64).max:
+        array = np.asarray(values[channel.name])
+        if array.dtype == np.uint64 and array.size and array.max() > LARGEST:
             raise ValueError(
                 f"stream '{self.name}': channel '{channel.name}' holds {array.max()}, beyond 64 bits with sign"
             )
         if array.dtype.kind not in "iubf":
             raise ValueError(f"stream '{self.name}': channel '{channel.name}' holds {array.dtype}, not numbers")
-        return array.astype(np.float64 if array.dtype.kind == "f" else np.int64, copy=False)
+        return np.array(array, dtype=np.float64 if array.dtype.kind == "f" else np.int64, ndmin=1)
 
     def _check(self, piece: Piece, values: Mapping[str, ArrayLike]) -> None:
-        if surplus := set(values) - {channel.name for channel in self.channels}:
+        if len(values) > len(self.channels):  # those that are declared are all there
+            surplus = set(values) - {channel.name for channel in self.channels}
             raise ValueError(f"stream '{self.name}': channel '{min(surplus)}' was not declared; declare it first")
-        shapes = {"device_s": piece.device_s.shape, "sequence": piece.sequence.shape}
-        for name, shape in shapes.items():
+        for name, shape in (("device_s", piece.device_s.shape), ("sequence", piece.sequence.shape)):
             if shape != piece.host_s.shape:
                 raise ValueError(f"stream '{self.name}': {name} has shape {shape}, host_s {piece.host_s.shape}")
         for channel in self.channels:
@@ -106,6 +107,10 @@ class StreamWriter:
 
     def _gaps(self, piece: Piece) -> list[Gap]:
         sequence, host_s = piece.sequence, piece.host_s
+        follows = self._last is None or 0 <= sequence[0] - self._last[0] <= 1
+        steps = sequence[1:] - sequence[:-1]
+        if follows and not ((steps > 1) | (steps < 0)).any():
+            return []
         if self._last is not None:
             sequence = np.concatenate([[self._last[0]], sequence])
             host_s = np.concatenate([[self._last[1]], host_s])

@@ -97,7 +97,7 @@ class Loop:
 
         `errors_m` (4,) before and after. Source: J. Nocedal, S. Wright, Numerical Optimization, 2006, algorithm 4.1.
         """
-        if taken.stay:
+        if taken.stay or taken.promise == 0.0:
             return
         before_m, after_m = (float(np.linalg.norm(error_m)) for error_m in errors_m)
         kept = (before_m - after_m) / (taken.promise * before_m)

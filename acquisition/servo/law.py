@@ -26,17 +26,30 @@ def correction(
     error_m: Floats,
     spots_m: Floats,
     first: int,
+    rank: int = 4,
 ) -> Floats:
-    """The joint step (joint,) that removes the spot error (4,) m by law (8) with gain 1."""
+    """The joint step (joint,) that removes the spot error (4,) m by law (8) with gain 1.
+
+    Of a lower `rank` it leaves out what the arm can do least.
+    """
     hit_m, direction = optics.line(spots_m, first)
-    origin_base_m, _ = arm.beam(q_rad)
     R = T_base_fixture[:3, :3]
-    origin_m = R.T @ (origin_base_m - T_base_fixture[:3, 3])
-    stand_off_m = float(np.clip((hit_m - origin_m) @ direction, *STAND_OFF_RANGE_M))
+    stand_off_m = stand_off(arm, optics, T_base_fixture, q_rad, spots_m, first)
     beam_jacobian = arm.beam_jacobian(q_rad)
     robot = np.vstack([R.T @ beam_jacobian[:3], R.T @ beam_jacobian[3:]])
     sensor = optics.spots_by_beam(hit_m - stand_off_m * direction, direction, first)
-    return np.linalg.pinv(sensor @ robot) @ error_m
+    left, sizes, right = np.linalg.svd(sensor @ robot, full_matrices=False)
+    return right[:rank].T @ ((left[:, :rank].T @ error_m) / sizes[:rank])
+
+
+def stand_off(
+    arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, q_rad: Floats, spots_m: Floats, first: int
+) -> float:
+    """From the laser to the first face along the beam (m), as believed, within what can be."""
+    hit_m, direction = optics.line(spots_m, first)
+    origin_base_m, _ = arm.beam(q_rad)
+    origin_m = T_base_fixture[:3, :3].T @ (origin_base_m - T_base_fixture[:3, 3])
+    return float(np.clip((hit_m - origin_m) @ direction, *STAND_OFF_RANGE_M))
 
 
 class FixedGuess:

@@ -31,7 +31,6 @@ class Measured:
         self._directions = np.empty((0, 0))  # (joint, 4)
         self._columns: list[Floats] = []
         self._jacobian = np.empty((4, 0))  # beam coordinates by amounts along the directions
-        self._probe = 0.0
         self._centre_hit_m, self._centre_direction = optics.line(np.zeros(4), first)
 
     def learn(self, q_rad: Floats, spots_m: Floats) -> None:
@@ -39,7 +38,8 @@ class Measured:
         if self._base_q.size == 0:
             self._plan_probes(q_rad)
         elif len(self._columns) < 4:
-            self._columns.append((coordinates - self._base_c) / self._probe)
+            made = float(self._directions[:, len(self._columns)] @ (q_rad - self._base_q))  # the loop may shorten it
+            self._columns.append((coordinates - self._base_c) / made)
             if len(self._columns) == 4:
                 self._jacobian = np.stack(self._columns, axis=1)
             return  # a probe: the base stays
@@ -53,8 +53,8 @@ class Measured:
     def propose(self, target_m: Floats) -> Proposal:
         if len(self._columns) < 4:
             k = len(self._columns)
-            self._probe = min(PROBE_SPOT_M / self._gains[k], PROBE_LIMIT_RAD)
-            return Proposal(self._probe * self._directions[:, k], "probe", stay=True)
+            probe_rad = min(PROBE_SPOT_M / self._gains[k], PROBE_LIMIT_RAD)
+            return Proposal(probe_rad * self._directions[:, k], "probe", stay=True)
         wanted = self._beam_coordinates(target_m) - self._base_c
         amounts = np.asarray(np.linalg.lstsq(self._jacobian, wanted, rcond=None)[0], dtype=np.float64)
         return Proposal(self._directions @ amounts, "correct")

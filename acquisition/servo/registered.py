@@ -13,7 +13,8 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from acquisition.believed import BelievedArm, FixtureOptics, spots_at
-from acquisition.servo.law import STAND_OFF_RANGE_M, correction
+from acquisition.servo.grip import LEAST_GRIP, ROLLED_RAD, grip, rolled
+from acquisition.servo.law import STAND_OFF_RANGE_M, correction, stand_off
 from acquisition.servo.strategy import Proposal
 
 Floats = NDArray[np.float64]
@@ -54,10 +55,17 @@ class Registered:
             self.T_base_fixture = self._turn_and_slide(self.T_base_fixture)
 
     def propose(self, target_m: Floats) -> Proposal:
-        q_rad, spots_m = self._q_rad[-1], self._spots_m[-1]
-        step = correction(self._arm, self._optics, self.T_base_fixture, q_rad, target_m - spots_m, spots_m, self._first)
+        q_rad, spots_m, T = self._q_rad[-1], self._spots_m[-1], self.T_base_fixture
+        given = (self._arm, self._optics, T, q_rad, target_m - spots_m, spots_m, self._first)
         gain = 1.0 if len(self._q_rad) > 1 else self._first_gain
-        return Proposal(gain * step, "correct", promise=gain)
+        step = gain * correction(*given)
+        stand_off_m = stand_off(self._arm, self._optics, T, q_rad, spots_m, self._first)
+        shortened = step * min(1.0, ROLLED_RAD / float(np.max(np.abs(step))))
+        if grip(self._arm, q_rad + shortened, stand_off_m) < LEAST_GRIP:
+            roll = rolled(self._arm, q_rad, stand_off_m)
+            if float(np.max(np.abs(roll))) > 0.0:
+                return Proposal(roll + gain * correction(*given, rank=3), "roll", promise=0.0)
+        return Proposal(step, "correct", promise=gain)
 
     def _onto_beam(self, T_guess: Floats, q_rad: Floats, spots_m: Floats) -> Floats:
         """The guess, turned and shifted as little as possible so that the measured beam lies on the believed one."""

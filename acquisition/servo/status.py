@@ -30,7 +30,7 @@ class Step:
 
     q_rad: Floats  # (joint,) commanded
     spots_m: Floats  # (4,) NaN where dark
-    purpose: str  # "start", "probe", "correct", "go back"
+    purpose: str  # "start", "probe", "correct", "roll", "go back"
 
 
 @dataclass(frozen=True)

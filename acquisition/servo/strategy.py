@@ -15,7 +15,7 @@ class Proposal:
 
     step_rad: Floats
     purpose: str
-    promise: float = 1.0  # share of the distance to the target that it is meant to remove
+    promise: float = 1.0  # share of the distance to the target that it is meant to remove; 0: it is for something else
     stay: bool = False  # a probe: the next proposal starts from where the probe started
 
 

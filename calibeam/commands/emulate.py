@@ -77,8 +77,12 @@ def _print_json(where: dict[str, dict[str, Any]]) -> None:
 
 def _print_table(where: dict[str, dict[str, Any]]) -> None:
     for device, address in where.items():
-        print(f"{device:8s}", "  ".join(f"{key} {value}" for key, value in address.items()), flush=True)
+        print(f"{device:8s}", "  ".join(f"{key} {_words(value)}" for key, value in address.items()), flush=True)
     print("ready; Ctrl-C ends the emulators", flush=True)
     if "control" in where:
         control = f"{where['control']['host']}:{where['control']['port']}"
         print(f"a session on them: calibeam session RIG.toml --control {control} --out session-1", flush=True)
+
+
+def _words(value: Any) -> str:
+    return " and ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)

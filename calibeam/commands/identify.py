@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
+import msgspec
 from cyclopts import Parameter, validators
 from rich.console import Console
 
@@ -13,6 +14,7 @@ from calibeam.identification import identify_recording, write_identified
 from calibeam.session_table import print_identification
 from calibeam.terminal import print_identified, print_unasked
 from calibrate.export.export import ExportForm, export_model
+from calibrate.fit import Status
 from calibrate.identification.planned import rig_as_planned, samples_as_planned
 from calibrate.identification.session import holds_spots
 from calibrate.model_file import corrections, read_model
@@ -36,6 +38,7 @@ def identify_command(
     bootstrap: Annotated[int, Parameter(validator=validators.Number(gte=0))] | None = None,
     out: Path = Path("model.json"),
     export: tuple[ExportForm, ...] = (),
+    json: bool = False,
 ) -> None:
     """Identify the arm: blunders of the file, rank and what cannot be determined first, then numbers with their sigma.
 
@@ -57,17 +60,27 @@ def identify_command(
     export
         Also write the arm for another program, beside the model: urdf, dh-csv, ur-kinematics, ur-calibration, json,
         matlab.
+    json
+        Print the model as it stands in the file, on one line, and nothing else.
 
     """
     planned = Planned.read(plan)
     with naming(recording):
-        _identify(recording, planned, bootstrap, out, export)
+        status = _identify(Console(quiet=json), recording, planned, bootstrap, out, export)
+    if json:
+        print(msgspec.json.encode(read_model(out)).decode())
+    tell_unfinished(status, out)
 
 
 def _identify(
-    recording: Path, planned: Planned, bootstrap: int | None, out: Path, export: tuple[ExportForm, ...]
-) -> None:
-    source, console = read(recording), Console()
+    console: Console,
+    recording: Path,
+    planned: Planned,
+    bootstrap: int | None,
+    out: Path,
+    export: tuple[ExportForm, ...],
+) -> Status:
+    source = read(recording)
     if asks_for_zeros(source.rig, source.samples) and planned.text is None and not bootstrap:
         identified = identify_recording(source)
         status = identified.zeros.status
@@ -87,4 +100,4 @@ def _identify(
         beside = out.with_name(out.stem + SUFFIX[form])
         export_model(beside, rig_as_planned(source.rig, planned.plan), corrections(read_model(out)), form)
         console.print(f"{form.value}: {beside}", markup=False)
-    tell_unfinished(status, out)
+    return status

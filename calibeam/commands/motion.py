@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from acquisition.motion.errors import TaskError
+from acquisition.motion.plan import Plan
 from acquisition.recording.rig import load_rig
 from calibeam.commands.demo import RIG
 from calibeam.emulation import Emulation
@@ -24,6 +25,8 @@ def motion_command(
 ) -> None:
     """Run the motion examples on an emulated controller: joints, straight lines, blend, belt, two pins with teaching.
 
+    Each leaves its plan as drawn before the arm moved (plan-NAME.svg), and what the controller then said beside it.
+
     Example: calibeam motion --out out/motion
 
     Parameters
@@ -38,9 +41,10 @@ def motion_command(
         Print the figures as one line of JSON.
 
     """
+    from calibeam.motion.by_hand import draw_plan_file
     from calibeam.motion.example_plots import numbers_of, plot
     from calibeam.motion.examples import EXAMPLES, Stage
-    from calibeam.motion.gate_of_rig import gate_of, solver_of
+    from calibeam.motion.gate_of_rig import cell_of, gate_of, solver_of
     from calibeam.motion.lag import KeptSetPoints
     from calibeam.motion.robot import streamed_robot
 
@@ -50,9 +54,13 @@ def motion_command(
     loaded, clock = load_rig(rig), SystemClock()
     out.mkdir(parents=True, exist_ok=True)
     solver, told = solver_of(loaded), dict[str, dict[str, float]]()
+
+    def draw(name: str, made: Plan) -> None:
+        draw_plan_file(made, cell_of(loaded), out / f"plan-{name}.svg")
+
     with Emulation(rig) as emulation, streamed_robot(loaded, clock, emulation.address["robot"]) as robot:
         sent = KeptSetPoints(robot.arm, clock)
-        stage = Stage(robot, sent, gate_of(loaded, solver, sent, clock), solver)
+        stage = Stage(robot, sent, gate_of(loaded, solver, sent, clock), solver, draw)
         for name in only or EXAMPLES:
             shown = EXAMPLES[name](stage)
             plot(shown, solver, out)

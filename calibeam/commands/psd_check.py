@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from acquisition.psd_view import psd_window
 from acquisition.recording.errors import SamplesError
 from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import PsdDevice
+from acquisition.recording.rig_devices import PsdDevice
 from calibeam.psd import PsdInstrument, psd_driver
 from drivers.clock import SystemClock
 from drivers.device import Block
 from drivers.errors import DeviceRefused
 from drivers.psd_error_map import MapFit, MapStatus, fit_error_map
 from drivers.psd_faces import Face
+from drivers.psd_kpa101.pair import counts_of
 from drivers.psd_kpa101.selfcheck import CheckStatus, UnitCheck, check_unit
 
 Floats = NDArray[np.float64]
@@ -93,9 +94,9 @@ def collect(psd: PsdInstrument, face: Face, unit: int, place_m: Floats, ready: C
         if not np.isfinite([mean.x_m, mean.y_m]).all():
             raise DeviceRefused(f"{psd.name}: no light on face {unit} at place {number}; leave that place out")
         shown.append((mean.x_m, mean.y_m))
-        if "counts" in blocks[0].values:
-            each = np.concatenate([block.values["counts"] for block in blocks])
-            counts.append(each[:, 3 * unit - 3 : 3 * unit].mean(axis=0))
+        each = [sent for block in blocks if (sent := counts_of(block.values, unit)) is not None]
+        if each:
+            counts.append(np.concatenate(each).mean(axis=0))
     return Seen(np.array(shown), np.array(counts) if counts else None)
 
 

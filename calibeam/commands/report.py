@@ -1,22 +1,37 @@
-"""`calibeam report`: (re)write the report of a recording."""
+"""`calibeam report`: (re)write the report of a recording, alone or against an earlier calibration of the same arm."""
 
 from pathlib import Path
 
+import msgspec
+
 from acquisition.recording.read import read
+from calibeam.earlier import earlier_calibration
+from calibeam.ending import naming
 from calibeam.reporting import write_any_report
+from calibeam.summary_record import summary_of
+from calibeam.verdict_line import verdict_words
 from calibrate.diagnose.file import read_diagnosis
 from calibrate.model_file import read_model
 
 
 def report_command(
-    recording: Path, *, model: Path | None = None, diagnosis: Path | None = None, out: Path = Path("report.html")
+    recording: Path,
+    *,
+    model: Path | None = None,
+    diagnosis: Path | None = None,
+    against: Path | None = None,
+    interactive: bool = False,
+    out: Path = Path("report.html"),
+    json: bool = False,
 ) -> None:
-    """Write one self-contained HTML file: how good the arm is now, errors before and after, numbers with their doubt.
+    """Write one self-contained HTML file: how good the arm is now, whether to trust it, what to do; then the detail.
 
     Of the dual PSD alone: rig, spots, centring, residuals, joint zeros. Of any other session: errors by instrument,
-    proof on unseen rows, what was identified and what was refused and why.
+    proof on unseen rows, what was identified and what was refused and why. How to read it: docs/report.md.
 
     Example: calibeam report out/demo/recording.mcap --out report.html
+
+    Example: calibeam report now/recording.mcap --against last-year/model.json
 
     Parameters
     ----------
@@ -26,10 +41,24 @@ def report_command(
         The model.json of this recording; without it the recording is identified anew.
     diagnosis
         The diagnosis.json of this recording: its pages are added.
+    against
+        An earlier calibration of the same arm: its model.json, the folder that a session left (model.json, and
+        diagnosis.json if there is one), or a recording. A chapter says what has changed since.
+    interactive
+        Add figures that can be turned and asked; the file grows by five megabytes and still needs no other.
     out
         The HTML file to write.
+    json
+        Print the first screen as one line of JSON, and nothing else.
 
     """
     known = None if model is None else read_model(model)
-    write_any_report(read(recording), known, out, None if diagnosis is None else read_diagnosis(diagnosis))
-    print(f"report: {out}")
+    found = None if diagnosis is None else read_diagnosis(diagnosis)
+    earlier = None if against is None else earlier_calibration(against)
+    with naming(recording):
+        answers = write_any_report(read(recording), known, out, found, against=earlier, interactive=interactive)
+    if json:
+        print(msgspec.json.encode(summary_of(answers, out)).decode())
+        return
+    for line in (*verdict_words(answers), f"report: {out}"):
+        print(line)

@@ -1,28 +1,33 @@
 """`calibeam session`: the whole job on site, or on emulators that were started beside it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from cyclopts import Parameter
 from rich.console import Console
-from rich.progress import Progress
-from rich.prompt import Prompt
 
 from acquisition.errors import AcquisitionError
 from acquisition.guided.plan import GuidedOptions, planned_visits
 from acquisition.plan import PlanOptions
-from acquisition.planned_session import check_planned
+from acquisition.recording.errors import RecordingError
+from acquisition.recording.parts import parts
 from acquisition.recording.pose_plan import read_pose_plan
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.rig_schema import Rig
-from calibeam.camera import camera_sight
-from calibeam.conclude import conclude
 from calibeam.emulation import ask_emulators
 from calibeam.guided.recorded import encoder_address, is_guided
 from calibeam.guided.run import plan_of, run_guided
-from calibeam.recorded import new_recording, progress_bar, record_session
-from calibeam.site import addresses_of, check_session, connected
+from calibeam.live.feed import SILENT, Feed
+from calibeam.session.earlier import Earlier, earlier_of
+from calibeam.session.job import Job, with_place
+from calibeam.session.keys import keyboard
+from calibeam.session.places import new_place, with_places
+from calibeam.session.run import run_session
+from calibeam.site import addresses_of, check_session
 from drivers.clock import SystemClock
 
 
@@ -32,15 +37,25 @@ def session(
     out: Path = Path("session"),
     plan: Path | None = None,
     seed: int = 1,
+    continue_: Annotated[bool, Parameter(name="--continue")] = False,
+    stands: bool = False,
+    place: Annotated[tuple[float, float, float, float] | None, Parameter(negative="")] = None,
+    accuracy_um: float = 20.0,
+    yes: bool = False,
+    live: bool = False,
+    live_host: str = "127.0.0.1",
+    live_port: int = 8765,
+    live_token: str | None = None,
     control: str | None = None,
     time_scale: float = 1.0,
     postures: int = GuidedOptions.postures,
     lengths: int = GuidedOptions.lengths,
     verify: bool = False,
 ) -> None:
-    """Connect, aim, centre, collect, record, identify, diagnose, report. The arm moves: clear the cell first.
+    """Check devices, draw the plan, ask, then aim, centre, collect, record, identify, diagnose, report.
 
     Example: calibeam session rigs/ur5e-dual-psd.toml --out session-1
+    The arm moves: clear the cell first. SPACE or Ctrl-C pauses, r resumes, s finishes, a aborts, h halts.
     Of a measuring arm a person moves the probe, and is guided: rigs/arm-cmm-reference.toml.
 
     Parameters
@@ -48,11 +63,30 @@ def session(
     rig
         The rig file; [devices] says how each device is reached.
     out
-        Folder for recording.mcap, model.json, diagnosis.json and report.html; nothing in it is overwritten.
+        Folder for recording.mcap, session.log, the drawing of the plan, model.json, diagnosis.json and report.html;
+        nothing in it is overwritten.
     plan
         A plan of joint poses, as `calibeam diagnose --plan-out` writes it: these are taken, and no others.
     seed
         Of the poses of a session without a plan.
+    continue_
+        Go on with the session in this folder, in a further recording beside the first.
+    stands
+        With --continue: the fixture has not been touched since. Else it is asked, or counts as moved.
+    place
+        A further place of the fixture: X Y Z of PSD 1 in the base (m), and its turn about z (degrees).
+    accuracy_um
+        Predicted error of the beam in free space that is good enough: how many more poses it takes is told.
+    yes
+        Ask nothing: the cell is clear, the arm may move.
+    live
+        Also a page for browsers, with spots, arm, devices and a STOP (no safety stop).
+    live_host
+        Address of the page; anywhere but on loopback it wants a token.
+    live_port
+        Port of the page; 0 takes any that is free.
+    live_token
+        Word without which the page is not shown; made at random where one is needed.
     control
         Side channel of emulators, HOST:PORT as `calibeam emulate` prints it: the emulated fixture, or hand, is moved
         through it, instead of asking a person.
@@ -66,28 +100,68 @@ def session(
         Of a measuring arm: take what `calibeam verify` judges by, instead of what the arm is identified from.
 
     """
-    console, clock = Console(), SystemClock()
+    console = Console()
     loaded, text = load_rig(rig), rig_text(rig)
+    _check_verify(loaded, plan, verify=verify)
     if is_guided(loaded):
         options = GuidedOptions(postures, lengths, seed)
         return _guided(loaded, text, out, plan, options, control, time_scale, console, verify=verify)
     check_session(loaded)
     poses = None if plan is None else read_pose_plan(plan, loaded)
-    if poses is not None:
-        check_planned(poses)
-    addresses, recording = addresses_of(loaded, hurry=time_scale), out / "recording.mcap"
-    out.mkdir(parents=True, exist_ok=True)
-    bar = progress_bar(console)
-    place = _asking(loaded, bar) if control is None else _through(*_host_and_port(control))
-    with (
-        new_recording(recording, text, clock, {"plan_seed": str(seed)}) as writer,
-        camera_sight(loaded, clock) as sight,
-        connected(loaded, addresses, writer, clock, place) as bench,
-    ):
-        summary = record_session(bench, loaded, writer, PlanOptions(seed=seed), clock, bar, poses, sight)
-    console.print(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {recording}")
-    conclude(recording, console)
+    there = keyboard() is not None
+    job = Job(
+        loaded,
+        text,
+        out,
+        addresses_of(loaded, hurry=time_scale),
+        PlanOptions(seed=seed),
+        poses,
+        "" if plan is None else plan.read_text(encoding="utf-8"),
+        accuracy_um * 1e-6,
+        None if control is None else _through(*_host_and_port(control)),
+    )
+    earlier = _earlier(job, go_on=continue_, place=place)
+    agrees = yes or (control is not None and not there)
+    with _page(loaded, PageAsked(live, live_host, live_port, live_token), console) as feed:
+        run_session(job, console, earlier, feed, there=there, agrees=agrees, stands=stands)
     return None
+
+
+@dataclass(frozen=True)
+class PageAsked:
+    """Whether there is a live page, and where."""
+
+    wanted: bool
+    host: str
+    port: int
+    token: str | None
+
+
+@contextmanager
+def _page(rig: Rig, asked: PageAsked, console: Console) -> Generator[Feed]:
+    if not asked.wanted:
+        yield SILENT
+        return
+    from calibeam.live.page import PageAddress, live_page  # the server takes half a second to load
+
+    with live_page(rig, SystemClock(), PageAddress(asked.host, asked.port, asked.token)) as page:
+        console.print(f"live page: {page.url}", highlight=False, markup=False, soft_wrap=True)
+        yield page.feed
+
+
+def _earlier(job: Job, *, go_on: bool, place: tuple[float, float, float, float] | None) -> Earlier:
+    """What was taken already. RecordingError where a session is in the folder and nobody wants to go on with it."""
+    if not go_on and parts(job.out):
+        raise RecordingError(
+            f"{job.out}: holds a session already, and nothing is overwritten; go on with it by --continue, or choose "
+            "another --out"
+        )
+    earlier = earlier_of(job.out, job.rig) if go_on else Earlier()
+    if place is None:
+        return earlier
+    if job.plan is not None:
+        raise AcquisitionError("--place with --plan: a plan names its places itself; give one of them")
+    return with_place(earlier, new_place(with_places(job.rig, job.text, earlier.added)[0], place))
 
 
 def _guided(
@@ -110,27 +184,19 @@ def _guided(
     run_guided(rig, text, out, address, visits, console, seed=options.seed, ask=ask, conclude=not verify)
 
 
+def _check_verify(rig: Rig, plan: Path | None, *, verify: bool) -> None:
+    """AcquisitionError where --verify cannot be meant."""
+    if verify and not is_guided(rig):
+        raise AcquisitionError(f"rig {rig.name}: --verify is of a measuring arm that a hand moves; leave it out")
+    if verify and plan is not None:
+        raise AcquisitionError(
+            f"--plan {plan} with --verify: the standards say which readings a verification takes, a plan those that an "
+            "arm is identified from; give one of them"
+        )
+
+
 def _asked(host: str, port: int, verb: str, /, **arguments: Any) -> Any:
     return ask_emulators(host, port, verb, arguments)
-
-
-def _asking(rig: Rig, bar: Progress) -> Callable[[int], None]:
-    """Has a person place the fixture; the bar, which would write over the question, waits."""
-
-    def ask_for(placement: int) -> None:
-        where = ", ".join(f"{value:.3f}" for value in rig.placements[placement].psd1_in_base.origin_m)
-        bar.stop()
-        try:
-            Prompt.ask(f"put the fixture at place {placement} (PSD 1 near {where} m in the base), then press Enter")
-        except EOFError as end:
-            raise AcquisitionError(
-                f"place {placement}: nobody can be asked to put the fixture there, standard input is closed; "
-                "run the session in a terminal"
-            ) from end
-        finally:
-            bar.start()
-
-    return ask_for
 
 
 def _through(host: str, port: int) -> Callable[[int], None]:

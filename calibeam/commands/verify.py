@@ -66,4 +66,6 @@ def _print(console: Console, found: Verification, out: Path, report: Path) -> No
         table.add_row(one.symbol, worst, limit, SAYS[one.judgement], f"{one.taken} of {one.asked}")
     console.print(table)
     console.print(found.sentence, highlight=False, markup=False)
+    for line in found.left_out:
+        console.print(line, highlight=False, markup=False)
     console.print(f"figures: {out}; page: {report}", highlight=False, markup=False)

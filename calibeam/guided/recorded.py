@@ -13,7 +13,8 @@ from acquisition.guided.reading import Reading
 from acquisition.guided.session import GuidedSession, Summary
 from acquisition.guided.wired import WiredEncoderWatch
 from acquisition.recording.errors import RecordingError, RigFileError
-from acquisition.recording.rig_schema import EncodersDevice, Rig
+from acquisition.recording.rig_devices import EncodersDevice
+from acquisition.recording.rig_schema import Rig
 from acquisition.recording.stream import Channel, Event
 from acquisition.recording.writer import RecordingWriter
 from acquisition.streams import Pump
@@ -123,8 +124,8 @@ def record_guided(
         summary = session.run(plan)
     except Interrupted as why:
         raise _ended_early(writer, clock, session, why) from why
-    detail = {"samples": len(summary.readings), "slips": summary.slips, "skipped": summary.skipped}
-    writer.event(Event(clock.now_s(), "end", detail))
+    counts = {"slips": summary.slips, "doubted": summary.doubted, "skipped": summary.skipped}
+    writer.event(Event(clock.now_s(), "end", {"samples": len(summary.readings), **counts}))
     return summary
 
 

@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.prompt import Confirm
 
+from acquisition.motion.cell import Cell
 from acquisition.motion.gate import Gate
 from acquisition.motion.inverse.solver import Solver
 from acquisition.motion.paths.segments import Segment
 from acquisition.motion.plan import Plan
 from acquisition.recording.rig_schema import Rig
-from calibeam.motion.gate_of_rig import gate_of, solver_of
+from calibeam.motion.gate_of_rig import cell_of, gate_of, solver_of
 from calibeam.motion.keys import keys_of
 from calibeam.motion.robot import streamed_robot
 from drivers.clock import SystemClock
@@ -43,7 +44,7 @@ def move_by_hand(rig: Rig, model: Path | None, asked: Asked, agreement: Agreemen
         gate = gate_of(rig, solver, robot.arm, clock, agreement.speed_share)
         now_rad = robot.joints()
         made = gate.plan(now_rad, asked(solver, now_rad))
-        _draw(made, solver, agreement.plan_file)
+        draw_plan_file(made, cell_of(rig), agreement.plan_file)
         console.print(_said(made, agreement.plan_file), soft_wrap=True)
         if agreement.dry or not (agreement.yes or Confirm.ask("move", default=False)):
             console.print("nothing was moved")
@@ -75,8 +76,9 @@ def _said(made: Plan, plan_file: Path) -> str:
     )
 
 
-def _draw(made: Plan, solver: Solver, path: Path) -> None:
+def draw_plan_file(made: Plan, cell: Cell, path: Path) -> None:
+    """A plan that was not driven yet, as SVG."""
     from calibeam.motion import figures  # matplotlib takes a second to load
 
     path.parent.mkdir(parents=True, exist_ok=True)
-    figures.write_figure(path, 12.0, 4.0, lambda figure: figures.draw_plan(figure, made, solver))
+    figures.write_figure(path, 12.0, 4.0, lambda figure: figures.draw_plan(figure, made, made.solver, cell))

@@ -6,12 +6,14 @@ file's; a rig on site has its own tasks.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.motion.gate import Followed, Gate
+from acquisition.motion.following import Followed
+from acquisition.motion.gate import Gate
 from acquisition.motion.inverse.solver import Solver
 from acquisition.motion.paths.path import Belt
 from acquisition.motion.paths.segments import By, Segment
@@ -67,9 +69,12 @@ class Stage:
     sent: KeptSetPoints
     gate: Gate
     solver: Solver
+    draw: Callable[[str, Plan], None] = lambda name, made: None  # before the arm moves, the plan of an example
 
-    def go(self, segments: list[Segment]) -> tuple[Plan, Followed]:
+    def go(self, segments: list[Segment], draw_as: str = "") -> tuple[Plan, Followed]:
         made = self.gate.plan(self.robot.joints(), segments)
+        if draw_as:
+            self.draw(draw_as, made)
         self.clear()
         return made, self.gate.run(made, self.robot.joints(), watch=self.robot.supervisor.check)
 
@@ -95,14 +100,14 @@ def joint_motion(stage: Stage) -> Shown:
     """Through two corners by joints, and back."""
     stage.to_start()
     targets = [(0.10, 0.15, -0.05), (-0.05, 0.20, 0.10), (0.0, 0.0, 0.0)]
-    return stage.shown("joint", *stage.go(_rectangle(stage, targets, By.JOINTS)))
+    return stage.shown("joint", *stage.go(_rectangle(stage, targets, By.JOINTS), "joint"))
 
 
 def straight_motion(stage: Stage) -> Shown:
     """Round a rectangle on straight lines, the hand turning on one side; its corners are the blend's close-up."""
     stage.to_start()
     targets = [(0.12, 0.0, 0.0), (0.12, 0.16, 0.0), (0.0, 0.16, 0.0), (0.0, 0.0, 0.0)]
-    return stage.shown("straight", *stage.go(_rectangle(stage, targets, By.LINE)))
+    return stage.shown("straight", *stage.go(_rectangle(stage, targets, By.LINE), "straight"))
 
 
 def belt(stage: Stage) -> Shown:
@@ -127,7 +132,8 @@ def belt(stage: Stage) -> Shown:
         if action == "GRASP":
             gripped.append(apart(stage.solver.flange(q_rad), part.solve("at part", "T6", s_m=s_m))[0])
 
-    ran = run_task(stage.gate, task, Around(stage.robot.joints, read, act, now, stage.robot.supervisor.check))
+    watch, planned = stage.robot.supervisor.check, partial(stage.draw, "belt")
+    ran = run_task(stage.gate, task, Around(stage.robot.joints, read, act, now, watch, planned))
     made, followed = ran.sweeps[0]
     shown = stage.shown("belt", made, followed)
     figures = {"hand from part when gripped, m": gripped[0]}
@@ -154,6 +160,7 @@ def two_pins(stage: Stage) -> Shown:
         stage.robot.joints,
         act=lambda action: at_action.append((action, _newest(stage))),
         watch=stage.robot.supervisor.check,
+        planned=partial(stage.draw, "two-pins"),
     )
     ran = run_task(stage.gate, Task(graph, task.program), around)
     made, followed = ran.sweeps[0]

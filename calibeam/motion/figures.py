@@ -8,9 +8,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from acquisition.motion.cell import Cell
 from acquisition.motion.inverse.solver import Solver
 from acquisition.motion.paths.solved import SolvedPath
 from acquisition.motion.plan import Plan
+from calibeam.motion.cell_figure import PRINTED, draw_cell
 from calibeam.motion.examples import TOOL, Shown
 from calibrate.report.svg import house_style
 from calibrate.report.tones import Tone
@@ -19,11 +21,6 @@ Floats = NDArray[np.float64]
 
 FINE_S = 0.005  # between points of a plan that is drawn, or compared with
 DRAWN = 1500  # points of a curve, more shows nothing more
-PRINTED = {
-    Tone.INK: "#111111", Tone.SOFT: "#555555", Tone.FAINT: "#dddddd", Tone.PAPER: "#ffffff", Tone.BEAM: "#cc3311",
-    Tone.PLACE_1: "#0072b2", Tone.PLACE_2: "#e69f00", Tone.PLACE_3: "#009e73", Tone.PLACE_4: "#cc79a7",
-    Tone.PLACE_5: "#56b4e9", Tone.PLACE_6: "#d55e00",
-}  # fmt: skip
 PLANNED, ACTUAL, TARGET = Tone.PLACE_1.value, Tone.PLACE_6.value, Tone.INK.value
 
 
@@ -145,8 +142,8 @@ def draw_belt(figure: Figure, shown: Shown, solver: Solver) -> None:
     above.set(xlabel="y, m", ylabel="z, m", title="From the side", aspect="equal", adjustable="datalim")
 
 
-def draw_plan(figure: Figure, plan: Plan, solver: Solver) -> None:
-    """A dry run: joints over time within their ranges, and the flange from above and from the side."""
+def draw_plan(figure: Figure, plan: Plan, solver: Solver, cell: Cell) -> None:
+    """A dry run: joints over time, and the flange from above and from the side, among the boxes of the cell."""
     joints, above, side = figure.subplots(1, 3)
     for joint in range(plan.q_rad.shape[1]):
         colour = list(PRINTED)[5 + joint % 6].value
@@ -160,6 +157,8 @@ def draw_plan(figure: Figure, plan: Plan, solver: Solver) -> None:
         axes.plot(flange[0, i], flange[0, j], "o", color=PLANNED, label="begins")
         axes.plot(flange[-1, i], flange[-1, j], "s", color=ACTUAL, label="ends")
         axes.set(xlabel=f"{'xyz'[i]}, m", ylabel=f"{'xyz'[j]}, m", title=title, aspect="equal", adjustable="datalim")
+        axes.margins(0.15)
+        draw_cell(axes, cell, (i, j), flange)
     above.legend()
 
 

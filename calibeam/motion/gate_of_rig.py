@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.motion.cell import Box, Cell, SlowArea
-from acquisition.motion.gate import Gate, SetPoints, Stream
+from acquisition.motion.following import SetPoints, Stream
+from acquisition.motion.gate import Gate
 from acquisition.motion.gated_arm import GatedArm
 from acquisition.motion.inverse.closed_form import closed_form
 from acquisition.motion.inverse.solver import Solver
 from acquisition.motion.paths.segments import Pace
 from acquisition.motion.setpoints import solve_rate_hz
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig_schema import ArmModel, Rig
 from acquisition.streams import Pump
 from calibeam.motion.arm import motion_arm
 from calibrate.errors import DataError
@@ -44,16 +45,19 @@ def pace_of(rig: Rig, speed_share: float = 1.0) -> Pace:
         speed_share * motion.speed_rad_s * ones,
         motion.acceleration_rad_s2 * ones,
         speed_share * motion.line_speed_m_s,
+        speed_share * Pace.line_turn_rad_s,
     )
 
 
 def cell_of(rig: Rig) -> Cell:
-    """Boxes of the rig; the laser counts as a point of the body."""
+    """Boxes of the rig; the laser and the probe count as points of the body."""
     motion = rig.motion
     slow = tuple(SlowArea(Box(b.name, b.lower_m, b.upper_m), b.speed_m_s) for b in motion.slow_area)
     keep_out = tuple(Box(b.name, b.lower_m, b.upper_m) for b in motion.keep_out)
     tool = tuple(point for point in (rig.tool.laser_origin_m, rig.tool.point_m) if point is not None)
-    return Cell(keep_out, slow, motion.clearance_m, tool)
+    # Denavit and Hartenberg's link frames are those of the kinematics; other notations' stand at the link's start.
+    com = tuple(joint.com_m for joint in rig.arm.joints[:-1]) if rig.arm.model is ArmModel.DH else ()
+    return Cell(keep_out, slow, motion.clearance_m, tool, com)
 
 
 def gated_arm(arm: Movable, rig: Rig, robot: Pump) -> GatedArm:

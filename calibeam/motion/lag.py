@@ -18,7 +18,7 @@ LEAST_SPEED_RAD_S = 0.02  # of a joint, where it is judged: slower ones say noth
 
 @dataclass
 class KeptSetPoints:
-    """A controller's streaming half that remembers what it was sent. Implements acquisition.motion.gate.SetPoints."""
+    """Implements acquisition.motion.following.SetPoints on a controller, and remembers what that was sent."""
 
     arm: StreamedArm
     clock: Clock

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.motion.gate import SetPoints
+from acquisition.motion.following import SetPoints
 from acquisition.recording.errors import RigFileError
 from acquisition.recording.rig_schema import Rig
 from acquisition.streams import Pump

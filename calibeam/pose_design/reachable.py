@@ -36,11 +36,19 @@ LOWEST_M = 0.05  # of a target that a tracker is to see, above the base plane
 def candidates_of(
     rig: Rig, per_block: int, rng: Generator, progress: Progress = lambda done, total: None
 ) -> Candidates:
-    """About `per_block` poses for each place and order. DataError for a rig without [fixture] or [device]."""
+    """About `per_block` poses for each place and order. DataError for a rig without [fixture] or [device].
+
+    A hand-held arm has no design: what it is asked for comes from where its joints have been (guided/coverage.py).
+    """
     if rig.fixture is not None and rig.placements:
         return _before_detectors(rig, per_block, rng, progress)
     if rig.device is not None and rig.tool.point_m is not None:
         return _before_device(rig, 6 * per_block, rng)
+    if rig.seat_list or rig.bar_position_list:
+        raise DataError(
+            f"rig {rig.name}: poses are designed for [fixture] and [device], not for cones and bars; a `calibeam "
+            "session` of a measuring arm needs no plan: it asks for the posture that the readings so far lack most"
+        )
     raise DataError(
         f"rig {rig.name}: no [fixture] with a [[placement]], and no [device] with tool.point_m; a design needs to know "
         "what will be measured"
@@ -102,7 +110,9 @@ def _clear(rig: Rig, q_rad: Floats) -> NDArray[np.bool_]:
     """(pose,) whether the body keeps its clearance of every keep-out box."""
     cell = cell_of(rig)
     points = (
-        body_points(solver_of(rig).arm.frames(q_rad), cell.tool_m) if cell.keep_out else np.zeros((len(q_rad), 1, 3))
+        body_points(solver_of(rig).arm.frames(q_rad), cell.tool_m, cell.com_m)
+        if cell.keep_out
+        else np.zeros((len(q_rad), 1, 3))
     )
     out = np.ones(len(q_rad), dtype=np.bool_)
     for box in cell.keep_out:

@@ -13,6 +13,7 @@ from calibrate.error_simulation.machine import Machine
 from calibrate.error_simulation.source import Source
 
 Floats = NDArray[np.float64]
+ROUNDING_M = 1e-15  # of a probe some metres away: what moves it by less moves it not at all
 
 
 @dataclass(frozen=True)

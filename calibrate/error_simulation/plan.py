@@ -27,9 +27,9 @@ class SourceEntry(Struct, frozen=True, forbid_unknown_fields=True):
     scale_m: NotNegative | None = None
     scale_rad: NotNegative | None = None
     scale_k: NotNegative | None = None
-    loc_m: float = 0.0
-    loc_rad: float = 0.0
-    loc_k: float = 0.0
+    loc_m: float | None = None
+    loc_rad: float | None = None
+    loc_k: float | None = None
     order: Positive | None = None  # of waves, cycles a turn
 
     def law_in(self, unit: str) -> Law:
@@ -38,7 +38,7 @@ class SourceEntry(Struct, frozen=True, forbid_unknown_fields=True):
         scale, loc = getattr(self, f"scale{suffix}"), getattr(self, f"loc{suffix}")
         if scale is None:
             raise DataError(f"source {', '.join(self.what)}: no scale{suffix}, but this error is in {unit}; give it")
-        return Law(self.law, scale, loc, self.shape)
+        return Law(self.law, scale, loc or 0.0, self.shape)
 
 
 class ErrorPlan(Struct, frozen=True, forbid_unknown_fields=True):
@@ -81,6 +81,9 @@ def _contradictions(plan: ErrorPlan) -> Iterator[tuple[KeyPath, str]]:
         if len(stated) != 1:
             yield ("source", i), "a source wants one of scale_m, scale_rad, scale_k; give the one of its unit"
             continue
+        for suffix in SUFFIX.values():
+            if suffix != stated[0] and getattr(entry, f"loc{suffix}") is not None:
+                yield ("source", i, f"loc{suffix}"), f"loc{suffix} beside scale{stated[0]}; give loc{stated[0]}"
         try:
             entry.law_in(next(unit for unit, s in SUFFIX.items() if s == stated[0]))
         except DataError as error:

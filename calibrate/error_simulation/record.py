@@ -28,6 +28,7 @@ def record_of(simulation: Simulation, software: str) -> dict[str, Any]:
             "max_m": float(s.wide.rms_m.max()),
         },
         "poses": [_pose(s, i) for i in range(len(s.drawn_at_rad))],
+        "sobol_poses": s.shares.poses,
         "budget": [
             {"group": line.group, "sources": line.sources, "rms_m": line.rms_m, "share": line.share}
             for line in s.budget

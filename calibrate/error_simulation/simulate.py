@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.error_simulation.linear import Linear, propagate
+from calibrate.error_simulation.linear import ROUNDING_M, Linear, propagate
 from calibrate.error_simulation.machine import Machine
 from calibrate.error_simulation.monte_carlo import Drawn, draw_arms
 from calibrate.error_simulation.single import Single, each_alone
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 WIDE_POSES = 500  # of everything that needs no drawn arms: the rms over the workspace settles to about 2 %
-SOBOL_POSES = 6
+SOBOL_POSES = 6  # of the wide ones, for the indices: some 200 evaluations a source each
 
 
 @dataclass(frozen=True)
@@ -56,6 +56,11 @@ class Simulation:
     shares: SobolIndices
     singles: tuple[Single, ...]
     worst: tuple[Posture, ...]
+
+    @property
+    def moves(self) -> bool:
+        """Whether the errors move the probe anywhere."""
+        return bool(self.wide.rms_m.max() > ROUNDING_M)
 
     @property
     def budget(self) -> tuple[Line, ...]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.stats import qmc, sobol_indices
 
 from calibrate.error_simulation.columns import Columns, arm_at, columns_of
+from calibrate.error_simulation.linear import ROUNDING_M
 from calibrate.error_simulation.machine import Machine
 from calibrate.error_simulation.source import Source
 from calibrate.kernels.perturbed import ArmAtPoses, probe_errors
@@ -27,8 +28,9 @@ OPEN = 2.0**-40  # shares are kept off 0 and 1, where a quantile is infinite
 
 @dataclass(frozen=True)
 class SobolIndices:
-    """One each source; sigma is that of the mean over the scrambles."""
+    """One each source; sigma is that of the mean over the scrambles. All zero where nothing moves the probe."""
 
+    poses: int  # that they were worked out over, all together
     first: Floats
     first_sigma: Floats
     total: Floats
@@ -56,6 +58,7 @@ def indices_of(
     first, total = (np.stack(values) for values in zip(*each, strict=True))
     spread = np.sqrt(max(scrambles - 1, 1) * scrambles)
     return SobolIndices(
+        len(q_rad),
         first.mean(axis=0),
         np.sqrt(np.sum((first - first.mean(axis=0)) ** 2, axis=0)) / spread,
         total.mean(axis=0),
@@ -84,7 +87,9 @@ def _once(
         mixed, mine = A.copy(), own[own >= 0]
         mixed[:, mine] = B[:, mine]
         f_AB[i] = errors(mixed)
-    moving = np.ptp(f_A, axis=1) > 0.0  # a component that nothing moves has no shares
+    moving = np.ptp(f_A, axis=1) > ROUNDING_M  # a component that nothing moves has no shares
+    if not moving.any():
+        return np.zeros(len(sources)), np.zeros(len(sources))
     found = sobol_indices(func={"f_A": f_A[moving], "f_B": f_B[moving], "f_AB": f_AB[:, moving]}, n=points)
     variance = np.var(np.concatenate([f_A[moving], f_B[moving]], axis=1), axis=1)
     weight = variance / variance.sum()

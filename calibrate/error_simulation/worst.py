@@ -12,7 +12,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from calibrate.error_simulation.linear import propagate
+from calibrate.error_simulation.linear import ROUNDING_M, propagate
 from calibrate.error_simulation.machine import Machine
 from calibrate.error_simulation.source import Source
 
@@ -37,9 +37,11 @@ class Posture:
 def worst_postures(
     machine: Machine, sources: Sequence[Source], rng: Generator, count: int = 5, drawn: int = DRAWN
 ) -> tuple[Posture, ...]:
-    """The worst first."""
+    """The worst first; none where nothing moves the probe, for then all postures are alike."""
     q_rad = machine.drawn_poses(drawn, rng)
     rms = propagate(machine, sources, q_rad).rms_m
+    if rms.max() <= ROUNDING_M:
+        return ()
     tops: list[tuple[float, Floats]] = []
     for start in q_rad[np.argsort(-rms)[:CLIMBED]]:
         tops.append(_climbed(machine, sources, start))

@@ -1,7 +1,7 @@
 """Before measuring: which causes a plan could show, from which size on, and which it could not tell apart.
 
-The session of the plan is made up at the rig as drawn, with readings that scatter as the rig believes, and put on the
-bench of a diagnosis: what that would look for, and how large it had to be, does not depend on what is read.
+The session of the plan is made up at the rig as drawn, with angles and readings that scatter as the rig believes, and
+put on the bench of a diagnosis: what that would look for, and how large it had to be, does not depend on what is read.
 """
 
 from dataclasses import dataclass
@@ -41,8 +41,9 @@ def seen_by(rig: Rig, candidates: Candidates, taken: Taken, rng: Generator) -> S
     """Of a plan's poses in their order, with their approaches and repeats. DataError where they are too few to fit."""
     poses = candidates.take(taken.poses)
     reading = poses.reading + rng.normal(0.0, _noise_m(rig, poses), poses.reading.shape)
-    samples = Candidates(poses.q_rad, reading, poses.placement, poses.first_psd).samples(taken.approach, taken.repeat)
-    bench = Bench(fit_geometry(session_of(_believed(rig), samples)))
+    q_rad = poses.q_rad + rng.normal(0.0, believed_noise(rig).joint_rad, poses.q_rad.shape)
+    samples = Candidates(q_rad, reading, poses.placement, poses.first_psd).samples(taken.approach, taken.repeat)
+    bench = Bench(fit_geometry(session_of(_without_distances(rig), samples)))
     told = isolability(bench.menu)
     pairs = tuple((named(a), named(b), r2) for a, b, r2 in told.confusable())
     invisible = tuple(dict.fromkeys(named(term) for term in bench.menu.invisible))
@@ -55,6 +56,6 @@ def _noise_m(rig: Rig, poses: Candidates) -> float:
     return rig.noise.position_m or POSITION_BELIEVED_M
 
 
-def _believed(rig: Rig) -> Rig:
-    """Made-up readings have no joint noise; the fit finds what there is."""
+def _without_distances(rig: Rig) -> Rig:
+    """A diagnosis looks at readings alone; a distance as believed would agree with the drawing and say nothing."""
     return msgspec.structs.replace(rig, known_distances=())

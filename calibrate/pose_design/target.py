@@ -16,7 +16,6 @@ from calibrate.arms.model import KinematicModel
 from calibrate.dual_psd_rig import laser_of
 from calibrate.parameters import Parameter, index_of
 from calibrate.rigid import cross_matrix
-from calibrate.sensors.laser import N_PARAMETERS
 
 Floats = NDArray[np.float64]
 
@@ -44,7 +43,7 @@ def target_of(
     own = [column[p.name] for p in arm.parameters]
     theta = start[own]
     T, twists = arm.flange(theta, q), arm.twists(theta, q)
-    points, across, extra = _points(rig, T, column)
+    points, across, extra = _points(rig, T, column, start)
     by = np.zeros((len(points), 3, len(column)))
     reps = len(points) // len(q)
     twists = np.tile(twists, (reps, 1, 1))
@@ -62,7 +61,7 @@ def _says(rig: Rig) -> str:
     return "the flange's origin"
 
 
-def _points(rig: Rig, T: Floats, column: dict[str, int]) -> tuple[Floats, Floats, dict[int, Floats]]:
+def _points(rig: Rig, T: Floats, column: dict[str, int], start: Floats) -> tuple[Floats, Floats, dict[int, Floats]]:
     """Points (point, 3), projections (point, 3, 3) of what counts, and their motion by unknowns that are no arm's."""
     R, n = T[:, :3, :3], len(T)
     if rig.tool.point_m is not None or rig.tool.laser_origin_m is None:
@@ -70,9 +69,10 @@ def _points(rig: Rig, T: Floats, column: dict[str, int]) -> tuple[Floats, Floats
         tool = {column[name]: R[:, :, i] for i, name in enumerate(TOOL) if name in column}
         return R @ point + T[:, :3, 3], np.broadcast_to(np.eye(3), (n, 3, 3)), tool
     mount = laser_of(rig)
-    beam = mount.beam(np.zeros(N_PARAMETERS), T)
+    beam = mount.beam(start[[column[p.name] for p in mount.parameters]], T)
+    direction = beam.direction / np.linalg.norm(beam.direction, axis=1, keepdims=True)
     points = np.concatenate([beam.origin_m + s * beam.direction for s in ALONG_M])
-    across = np.eye(3) - beam.direction[:, :, None] * beam.direction[:, None, :]
+    across = np.eye(3) - direction[:, :, None] * direction[:, None, :]
     moves: dict[int, Floats] = {}
     for name, axis in (("u", mount.u), ("v", mount.v)):
         shift = R @ axis

@@ -10,7 +10,7 @@ from calibrate.report.centring_traces import Trace
 from calibrate.report.elements import Html
 from calibrate.report.quantities import length, stated
 from calibrate.report.svg import drawn, log_axis
-from calibrate.report.tones import Tone, tone_of
+from calibrate.report.tones import Tone, place_mark, tone_of
 
 FLOOR_M = 1e-8  # an error of exactly zero has no place on a log axis
 DRAWN = 120  # traces in one picture; of more, every n-th
@@ -31,8 +31,10 @@ def step_counts(runs: Sequence[Trace], tolerance_m: float, name: str) -> Html:
 def _paint_courses(figure: Figure, runs: Sequence[Trace], tolerance_m: float, places: Sequence[int]) -> None:
     axes = figure.add_subplot()
     for run in runs[:: -(-len(runs) // DRAWN)]:
-        tone = tone_of(places.index(run.placement)) if run.placement in places else Tone.SOFT
-        axes.plot(np.maximum(run.error_m, FLOOR_M), "o-", color=tone.value, lw=1.0, ms=2.8, alpha=0.55)
+        number = places.index(run.placement) if run.placement in places else None
+        tone, mark = (Tone.SOFT, {}) if number is None else (tone_of(number), place_mark(number))
+        shown = np.maximum(run.error_m, FLOOR_M)
+        axes.plot(shown, "o-", color=tone.value, lw=1.0, ms=3.4, alpha=0.6, **mark)  # pyright: ignore[reportArgumentType]
     axes.axhline(tolerance_m, color=Tone.INK.value, lw=1.2, linestyle=(0, (4, 3)))
     axes.annotate(
         f"wanted: {stated(tolerance_m)}",
@@ -41,7 +43,7 @@ def _paint_courses(figure: Figure, runs: Sequence[Trace], tolerance_m: float, pl
         xytext=(0, 4),
         textcoords="offset points",
         ha="right",
-        fontsize=9,
+        fontsize=10,
     )
     seen = np.concatenate([[tolerance_m], *(run.error_m[np.isfinite(run.error_m)] for run in runs)])
     log_axis(axes, "y", np.maximum(seen, FLOOR_M).tolist(), lambda value: length(value, 1))
@@ -54,7 +56,7 @@ def _paint_counts(figure: Figure, runs: Sequence[Trace]) -> None:
     steps = np.array([run.steps for run in runs])
     counts = np.bincount(steps)
     bars = axes.bar(np.arange(len(counts)), counts, width=0.72, color=Tone.SOFT.value)
-    axes.bar_label(bars, labels=[str(c) if c else "" for c in counts], padding=2, fontsize=9)
+    axes.bar_label(bars, labels=[str(c) if c else "" for c in counts], padding=2, fontsize=10)
     axes.margins(y=0.12)
     axes.grid(visible=False)
     axes.spines["left"].set_visible(False)

@@ -4,12 +4,19 @@ from collections.abc import Sequence
 
 from calibrate.report.elements import Html, tag
 from calibrate.report.quantities import TIED
-from calibrate.report.tones import tone_of
+from calibrate.report.tones import fill_of, tone_of
+
+OPPOSITE = {"left": "right", "right": "left", "bottom": "top", "top": "bottom"}
 
 
 def patch(number: int, name: str) -> Html:
-    """The colour of the n-th placement, from 0, in front of a name."""
-    return tag("span", tag("span", "", cls="key", style=f"background: {tone_of(number).css}"), name, cls="place")
+    """Colour and fill of the marks of the n-th placement, from 0, in front of a name."""
+    colour, fill = tone_of(number).css, fill_of(number)
+    paint = {"none": "none", "full": colour}.get(
+        fill, f"linear-gradient(to {OPPOSITE.get(fill, fill)}, {colour} 50%, transparent 50%)"
+    )
+    key = tag("span", "", cls="key", style=f"background: {paint}; border-color: {colour}")
+    return tag("span", key, name, cls="place")
 
 
 def place_name(place: int) -> str:

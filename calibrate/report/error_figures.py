@@ -18,6 +18,7 @@ Floats = NDArray[np.float64]
 MOST_POINTS = 1200  # of a scatter: beyond, the page grows and the eye sees no more
 BINS = 28
 COLUMNS = 4
+STROKES = ("-", "--", ":", "-.")  # beside the colours
 AXES = {3: ("x", "y", "z"), 4: ("PSD 1 x", "PSD 1 y", "PSD 2 x", "PSD 2 y"), 1: ("length",)}
 
 
@@ -29,15 +30,18 @@ def errors(readings: Readings) -> Html:
 
 def _paint_errors(figure: Figure, readings: Readings) -> None:
     axes = figure.add_subplot()
-    sets = (("arm as drawn", readings.error_before, Tone.PLACE_2), ("identified", readings.error_after, Tone.PLACE_1))
-    sizes = np.concatenate([values[values > 0.0] for _, values, _ in sets])
+    sets = (
+        ("as drawn", readings.error_before, Tone.PLACE_2, "////"),
+        ("identified", readings.error_after, Tone.PLACE_1, ""),
+    )
+    sizes = np.concatenate([values[values > 0.0] for _, values, _, _ in sets])
     if len(sizes) == 0:
         axes.set_axis_off()
         return
     edges = np.geomspace(max(sizes.min(), 1e-4 * np.median(sizes)), sizes.max() * 1.001, BINS)
-    for label, values, tone in sets:
+    for label, values, tone, hatch in sets:
         rms = readings.says(float(np.sqrt(np.mean(values**2))))
-        axes.hist(values, bins=edges.tolist(), color=tone.value, alpha=0.6, label=f"{label}: {rms} rms")
+        axes.hist(values, bins=edges.tolist(), color=tone.value, alpha=0.6, hatch=hatch, label=f"{label}: {rms} rms")
     axes.set(ylabel="readings", title=f"{readings.title}: error")
     log_axis(axes, "x", [float(edges[0]), float(edges[-1])], lambda value: readings.says(value, 1))
     axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.14), ncols=2, borderaxespad=0.0)
@@ -54,9 +58,12 @@ def _paint_by_sample(figure: Figure, readings: Readings) -> None:
     shown = thinned(len(readings.rows))
     number = readings.rows[shown, 0] + 1
     before, after = readings.error_before[shown], readings.error_after[shown]
-    for values, tone, label in ((before, Tone.PLACE_2, "arm as drawn"), (after, Tone.PLACE_1, "identified")):
+    for values, tone, mark, label in (
+        (before, Tone.PLACE_2, "+", "as drawn"),
+        (after, Tone.PLACE_1, ".", "identified"),
+    ):
         some = values > 0.0
-        axes.plot(number[some], values[some], "o", ms=2.2, mew=0, color=tone.value, alpha=0.65, label=label)
+        axes.plot(number[some], values[some], mark, ms=3.4, mew=0.7, color=tone.value, alpha=0.65, label=label)
     sizes = np.concatenate([before, after])
     sizes = sizes[sizes > 0.0]
     if len(sizes):
@@ -64,6 +71,7 @@ def _paint_by_sample(figure: Figure, readings: Readings) -> None:
             axes, "y", [float(np.quantile(sizes, 0.002)), float(sizes.max())], lambda value: readings.says(value, 1)
         )
     axes.set(xlabel="sample", title="Error in the order of the session")
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.2), ncols=2, borderaxespad=0.0)
 
 
 def thinned(n: int) -> NDArray[np.intp]:
@@ -94,7 +102,7 @@ def _paint_along(figure: Figure, readings: Readings, found: Sequence[Pattern]) -
             axes.fill_between(
                 middle, *(scale * (p.mean[:, k] + s * p.sigma[:, k]) for s in (-2.0, 2.0)), color=tone, alpha=0.18, lw=0
             )
-            axes.plot(middle, scale * p.mean[:, k], "-", color=tone, lw=1.3, label=name)
+            axes.plot(middle, scale * p.mean[:, k], STROKES[k % len(STROKES)], color=tone, lw=1.3, label=name)
         where = f"{p.factor} (°)" if p.factor.startswith("J") else p.factor
         axes.set(title=f"{where}: F = {fixed(p.f, 1)}{', clear' if p.clear else ''}")
     for axes in grid[len(found) :]:
@@ -102,7 +110,7 @@ def _paint_along(figure: Figure, readings: Readings, found: Sequence[Pattern]) -
     for axes in grid[::COLUMNS]:
         axes.set_ylabel(f"mean residual ({unit})")
     if len(names) > 1:
-        grid[0].legend(loc="best", ncols=len(names), handlelength=1.0, columnspacing=0.8, fontsize=8)
+        grid[0].legend(loc="best", ncols=len(names), handlelength=1.4, columnspacing=0.8, fontsize=10)
 
 
 def _unit(reach: float, unit: str) -> tuple[float, str]:

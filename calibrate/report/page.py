@@ -1,5 +1,8 @@
 """One HTML file that needs nothing else, on a screen, a phone or on paper: the shell that every report shares."""
 
+import base64
+import hashlib
+import re
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -11,14 +14,25 @@ from calibrate.report.elements import Html, join, tag
 POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 
 
-def page(title: str, masthead: Html, contents: Mapping[str, str], chapters: Sequence[Html], software: str) -> Html:
-    """The whole document; `contents` are headings by the anchor of their chapter."""
+def page(
+    title: str,
+    masthead: Html,
+    contents: Mapping[str, str],
+    chapters: Sequence[Html],
+    software: str,
+    *,
+    scripts: bool = False,
+) -> Html:
+    """The whole document; `contents` are headings by the anchor of their chapter. `scripts`: those of chapters may run.
+
+    Each script is allowed by its own hash, so that still nothing runs that a file slipped in.
+    """
     style = Html(files("calibrate.report").joinpath("report.css").read_text(encoding="utf-8"))
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag("meta", http_equiv="Content-Security-Policy", content=POLICY),
+        tag("meta", http_equiv="Content-Security-Policy", content=POLICY + _allowed(chapters) if scripts else POLICY),
         tag("title", title),
         tag("style", style),
     )
@@ -27,6 +41,14 @@ def page(title: str, masthead: Html, contents: Mapping[str, str], chapters: Sequ
     footer = tag("footer", f"Written by {software}. This file needs no network and no other file.")
     body = tag("body", tag("main", masthead, nav, *chapters, footer))
     return join(Html("<!doctype html>\n"), tag("html", head, body, lang="en"), Html("\n"))
+
+
+def _allowed(chapters: Sequence[Html]) -> str:
+    """The part of the policy for the scripts of these chapters; pictures that they make of themselves may be saved."""
+    found = [script for chapter in chapters for script in re.findall(r"<script>(.*?)</script>", chapter, re.DOTALL)]
+    digests = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in found)
+    listed = " ".join(f"'sha256-{digest}'" for digest in digests)
+    return f"; script-src {listed}; img-src data: blob:"
 
 
 def write_page(path: Path | str, text: str) -> Path:

@@ -31,17 +31,17 @@ def _paint_spectrum(figure: Figure, s: Floats, rank: int, with_drawing: bool) ->
     drawing[rank:] = False
     data = ~drawing
     data[rank:] = False
-    for rows, tone, filled, label in (
-        (data, Tone.PLACE_1, True, "known from the data"),
-        (drawing, Tone.PLACE_5, True, "known from the drawing"),
-        (number > rank, Tone.BEAM, False, "not known"),
+    for rows, tone, mark, filled, label in (
+        (data, Tone.PLACE_1, "o", True, "known from the data"),
+        (drawing, Tone.PLACE_5, "s", True, "known from the drawing"),
+        (number > rank, Tone.BEAM, "o", False, "not known"),
     ):
         if rows.any():
             face = tone.value if filled else "none"
             text = f"{label}: {int(rows.sum())}"
-            axes.plot(number[rows], shown[rows], "o", ms=5, mfc=face, mec=tone.value, mew=1.4, label=text)
+            axes.plot(number[rows], shown[rows], mark, ms=5, mfc=face, mec=tone.value, mew=1.4, label=text)
     axes.axhline(WEAK, color=Tone.INK.value, lw=1.1, linestyle=(0, (4, 3)))
-    axes.annotate("worse than a guess", (1.0, WEAK), (2, -11), textcoords="offset points", fontsize=9)
+    axes.annotate("worse than a guess", (1.0, WEAK), (2, -11), textcoords="offset points", fontsize=10)
     axes.yaxis.set_major_formatter(FuncFormatter(_power))
     axes.set(xlabel="combination of parameters", title="Plausible size over sigma, of each combination")
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 0.08))

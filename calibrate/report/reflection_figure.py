@@ -84,7 +84,7 @@ def _beam(axes: Axes, path_mm: Floats, first_psd: int, style: dict[str, float]) 
             "", 0.62 * b + 0.38 * a, 0.5 * (a + b), arrowprops={"arrowstyle": "-|>", "color": tone.value, "lw": 1.2}
         )
     words = f"PSD {first_psd} first"
-    axes.annotate(words, path_mm[0], (6, 0), textcoords="offset points", color=tone.value, fontsize=9, va="center")
+    axes.annotate(words, path_mm[0], (6, 0), textcoords="offset points", color=tone.value, fontsize=10, va="center")
 
 
 def _face(axes: Axes, T: Floats, number: int, half_m: float, origin_m: Floats, view: Floats) -> None:
@@ -104,4 +104,4 @@ def _scale_bar(axes: Axes) -> None:
     """20 mm at the lower left, below everything drawn."""
     left, bottom = axes.get_xlim()[0], axes.get_ylim()[0]
     axes.plot([left, left + 20.0], [bottom, bottom], color=Tone.SOFT.value, lw=2.0)
-    axes.text(left + 10.0, bottom - 1.5, "20 mm", ha="center", va="top", fontsize=9, color=Tone.SOFT.value)
+    axes.text(left + 10.0, bottom - 1.5, "20 mm", ha="center", va="top", fontsize=10, color=Tone.SOFT.value)

@@ -10,7 +10,7 @@ from scipy.special import betaincinv, ndtri
 from calibrate.observations import Observations
 from calibrate.report.elements import Html
 from calibrate.report.svg import drawn
-from calibrate.report.tones import Tone, tone_of
+from calibrate.report.tones import Tone, place_mark
 
 Floats = NDArray[np.float64]
 
@@ -47,10 +47,9 @@ def _paint(
                     number[rows],
                     residual_m[rows, k] * scale,
                     marker,
-                    ms=3.6,
-                    mfc="none",
+                    ms=3.8,
                     mew=1.0,
-                    mec=tone_of(i).value,
+                    **place_mark(i),  # pyright: ignore[reportArgumentType]
                 )
         axes.set(ylim=(-limit, limit), ylabel=f"{COORDINATES[k]} ({unit})")
         axes.grid(visible=False)

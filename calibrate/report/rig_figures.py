@@ -21,7 +21,7 @@ ABOVE_RAD = math.radians(90.0)
 TRIAD_M = 0.12
 STAND_M = 0.075  # radius of the base ring, of the picture only
 APART_M = 0.3  # two fixtures this far apart in the picture do not hide each other
-WIDTH_IN = 5.0
+WIDTH_IN = 4.8
 
 
 def oblique(scene: Scene) -> Html:
@@ -126,7 +126,7 @@ def _base(axes: Axes, view: Floats, level_m: float) -> None:
                 name,
                 ha="center",
                 va="center",
-                fontsize=9,
+                fontsize=10,
                 color=Tone.SOFT.value,
             )
 
@@ -136,9 +136,9 @@ def _arm(axes: Axes, arm: StandingArm, view: Floats, tone: Tone, *, leading: boo
     if leading:
         _line(axes, bones, Tone.INK, 5.5, solid_capstyle="round")
         _line(axes, bones, Tone.PAPER, 2.6, solid_capstyle="round")
-        axes.plot(*joints.T, "o", ms=10, mfc=Tone.PAPER.value, mec=Tone.INK.value, mew=1.3, zorder=3)
+        axes.plot(*joints.T, "o", ms=13, mfc=Tone.PAPER.value, mec=Tone.INK.value, mew=1.3, zorder=3)
         for number, (x, y) in enumerate(joints, start=1):
-            axes.text(x, y, str(number), ha="center", va="center_baseline", fontsize=7, zorder=4)
+            axes.text(x, y, str(number), ha="center", va="center_baseline", fontsize=10, zorder=4)
     else:
         _line(axes, bones, tone, 2.2, alpha=0.45, solid_capstyle="round")
     _line(axes, arm.beam_m @ view, Tone.BEAM, 1.6 if leading else 1.1, zorder=5)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.recording import Recording
+from calibrate.arms.model import KinematicModel
 from calibrate.errors import DataError
 from calibrate.fit import solve
 from calibrate.joint_problem import JointProblem
@@ -77,6 +78,10 @@ class SessionEvidence:
     model: ModelFile
     readings: tuple[Readings, ...]
     parameters: tuple[Parameter, ...]
+    problem: JointProblem  # weighted by the noise found
+    arm: KinematicModel
+    drawn: Floats  # (param,) the arm as drawn, frames and target where they fit best
+    theta: Floats  # (param,) as identified
 
     @cached_property
     def rows(self) -> Indices:
@@ -107,7 +112,8 @@ def session_evidence(recording: Recording, model: ModelFile) -> SessionEvidence:
             f"report: the model says {length(model.rms_after_m)} rms, but misses the {model.instruments[0]} rows of "
             f"{recording.path.name} by {length(rms)}; give the model of this recording, or identify it again"
         )
-    return SessionEvidence(recording, model, readings, problem.parameters)
+    arm = weighting.measured[0].problem.chain.model
+    return SessionEvidence(recording, model, readings, problem.parameters, problem, arm, before, theta)
 
 
 def _places_only(weighting: Weighting, problem: JointProblem, model: ModelFile, theta: Floats) -> Floats:

@@ -1,44 +1,75 @@
-"""Writes the report of any session: positions, wire, cones, bars, poses, spots, alone or together."""
+"""The report of any session as one page: positions, wire, cones, bars, poses, spots, alone or together."""
 
-from pathlib import Path
+from collections.abc import Iterator
+from dataclasses import replace
 
-from acquisition.recording.recording import Recording
 from calibrate.diagnose.schema import DiagnosisFile
-from calibrate.model_file import ModelFile
+from calibrate.report.answers import Answers
 from calibrate.report.diagnosis.page import inserted
-from calibrate.report.page import page, write_page
-from calibrate.report.sections import arm_data, arm_errors, arm_parameters, arm_proofs, arm_summary, provenance
-from calibrate.report.session_evidence import session_evidence
+from calibrate.report.drift.chapter import TITLE as DRIFT
+from calibrate.report.drift.chapter import drift_chapter
+from calibrate.report.drift.drift import Drift
+from calibrate.report.drift.words import sentence
+from calibrate.report.elements import Html
+from calibrate.report.interactive.chapter import TITLE as INTERACTIVE
+from calibrate.report.interactive.chapter import interactive_chapter
+from calibrate.report.interactive.session_figures import session_figures
+from calibrate.report.page import page
+from calibrate.report.sections import (
+    arm_data,
+    arm_errors,
+    arm_parameters,
+    arm_proofs,
+    arm_summary,
+    provenance,
+    workspace,
+)
+from calibrate.report.session_evidence import SessionEvidence
+from calibrate.report.session_workspace import NOT_IN_SPACE, session_arm, session_measured
 
-CONTENTS = {
-    "errors": arm_errors.TITLE,
-    "proofs": arm_proofs.TITLE,
-    "parameters": arm_parameters.TITLE,
-    "data": arm_data.TITLE,
-    "provenance": provenance.TITLE,
-}
 
-
-def write_session_report(
-    path: Path | str, recording: Recording, model: ModelFile, diagnosis: DiagnosisFile | None = None
-) -> Path:
-    """One HTML file at `path`, over what may be there; returns it. `diagnosis` adds its pages.
-
-    DataError where the model was not made from this recording, or the file cannot be written.
-    """
-    return write_page(path, session_report_html(recording, model, diagnosis))
-
-
-def session_report_html(recording: Recording, model: ModelFile, diagnosis: DiagnosisFile | None = None) -> str:
-    """The page as text."""
-    known = session_evidence(recording, model)
-    chapters = (
-        arm_summary.summary(known),
-        arm_errors.errors_chapter(known),
-        arm_proofs.proofs_chapter(known),
-        arm_parameters.parameters_chapter(known),
-        arm_data.data_chapter(known),
-        provenance.provenance(recording, model.poses, "took part in the fit", model.software),
+def session_page(
+    known: SessionEvidence,
+    diagnosis: DiagnosisFile | None = None,
+    drift: Drift | None = None,
+    *,
+    interactive: bool = False,
+) -> str:
+    """The page as text; `drift` adds its chapter, `interactive` figures that can be turned."""
+    recording, model = known.recording, known.model
+    chapters = dict(_chapters(known, drift, interactive=interactive))
+    contents, parts = inserted(
+        {anchor: title for anchor, (title, _) in chapters.items()},
+        tuple(chapter for _, chapter in chapters.values()),
+        diagnosis,
+        recording.rig,
     )
-    contents, chapters = inserted(CONTENTS, chapters, diagnosis, recording.rig)
-    return page(f"The arm {recording.rig.name}", arm_summary.masthead(known), contents, chapters, model.software)
+    first = arm_summary.summary(session_answers(known, drift), known)
+    title, head = f"The arm {recording.rig.name}", arm_summary.masthead(known)
+    return page(title, head, contents, (first, *parts), model.software, scripts=interactive)
+
+
+def session_answers(known: SessionEvidence, drift: Drift | None = None) -> Answers:
+    """The first screen."""
+    answers = arm_summary.answers(known)
+    return answers if drift is None else replace(answers, drift=sentence(drift), warnings=drift.warnings)
+
+
+def _chapters(
+    known: SessionEvidence, drift: Drift | None, *, interactive: bool
+) -> Iterator[tuple[str, tuple[str, Html]]]:
+    """Anchor, heading, content."""
+    recording, model = known.recording, known.model
+    if drift is not None:
+        yield "drift", (DRIFT, drift_chapter(drift))
+    arm = session_arm(known)
+    measured = None if isinstance(arm, str) else session_measured(known, arm)
+    yield "workspace", (workspace.TITLE, workspace.workspace(arm, measured, NOT_IN_SPACE))
+    if interactive:
+        yield "interactive", (INTERACTIVE, interactive_chapter(session_figures(known)))
+    yield "errors", (arm_errors.TITLE, arm_errors.errors_chapter(known))
+    yield "proofs", (arm_proofs.TITLE, arm_proofs.proofs_chapter(known))
+    yield "parameters", (arm_parameters.TITLE, arm_parameters.parameters_chapter(known))
+    yield "data", (arm_data.TITLE, arm_data.data_chapter(known))
+    made = provenance.provenance(recording, model.poses, "took part in the fit", model.software)
+    yield "provenance", (provenance.TITLE, made)

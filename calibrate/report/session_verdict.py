@@ -11,7 +11,7 @@ from calibrate.report.model_tests import Repeated, Scatter, proofs, repeated, sc
 from calibrate.report.patterns import Pattern, patterns
 from calibrate.report.quantities import significant
 from calibrate.report.session_evidence import SessionEvidence
-from calibrate.report.verdict import NOISIER, WORSE_UNSEEN, Trust, Verdict
+from calibrate.report.verdict import AGAIN, NOISIER, WORSE_UNSEEN, Doubt, Trust, Verdict
 from calibrate.uncertainty.chi_square import Alarm
 
 MANY_LEFT_OUT = 0.05  # of the rows: beyond, it is worth asking what went wrong while measuring
@@ -29,8 +29,6 @@ NOUNS = {
     "bar": "bar lengths",
 }
 
-Doubt = tuple[str, str]  # what speaks against trust, and what to do about it
-
 
 def session_verdict(evidence: SessionEvidence) -> Verdict:
     """From model and recording; the thresholds are those at the top of this file and of verdict.py."""
@@ -39,8 +37,7 @@ def session_verdict(evidence: SessionEvidence) -> Verdict:
     reasons = tuple(says for says, _ in doubts)
     advice = tuple(dict.fromkeys((*(do for _, do in doubts if do), *_harmless(scatter(model)))))
     if model.status in FAILED:
-        again = "Measure again, with more and more different poses."
-        return Verdict(Trust.NONE, f"No usable model: {model.says}.", reasons, (again, *advice))
+        return Verdict(Trust.NONE, f"No usable model: {model.says}.", reasons, (AGAIN, *advice))
     first = next(iter(proofs(model)), None)
     if first is not None and first.rms_after > NO_BETTER * first.rms_before:
         keep = "Keep the drawing; find out what is wrong with arm, instrument or poses, and measure again."

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from calibrate.observations import Observations
 from calibrate.report.elements import Html
 from calibrate.report.svg import drawn
-from calibrate.report.tones import Tone, tone_of
+from calibrate.report.tones import Tone, place_mark
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +33,8 @@ def _paint(figure: Figure, data: Observations, psd: int, half_size_m: float, pla
     for number, place in enumerate(places):
         for direct, marker in ((True, "o"), (False, "^")):
             rows = (data.placement == place) & ((data.first_psd == psd) == direct)
-            axes.plot(*spots_mm[rows].T, marker, ms=5.5, mfc="none", mec=tone_of(number).value, mew=1.3, clip_on=False)
+            style = place_mark(number)
+            axes.plot(*spots_mm[rows].T, marker, ms=5.5, mew=1.3, clip_on=False, **style)  # pyright: ignore[reportArgumentType]
     for spine in axes.spines.values():
         spine.set_visible(False)
     axes.set(xlim=(-1.06 * half_mm, 1.06 * half_mm), ylim=(-1.06 * half_mm, 1.06 * half_mm))

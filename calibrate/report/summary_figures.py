@@ -38,7 +38,7 @@ def _paint_doubts(figure: Figure, zeros: Sequence[JointZero]) -> None:
                 (0.01, row),
                 xycoords=("axes fraction", "data"),
                 va="center",
-                fontsize=9,
+                fontsize=10,
                 color=Tone.SOFT.value,
             )
     axes.set_yticks(range(len(zeros)), [f"J{z.joint}" for z in zeros])
@@ -65,12 +65,12 @@ def _paint_explained(figure: Figure, sizes: Sequence[tuple[str, float]], floor_m
     axes = figure.add_subplot()
     axes.axvline(floor_m, color=Tone.INK.value, lw=1.2, linestyle=(0, (4, 3)), zorder=1)
     floor = f"noise floor {length(floor_m)}"
-    axes.annotate(floor, (floor_m, len(sizes) - 0.5), (5, 4), textcoords="offset points", fontsize=9)
+    axes.annotate(floor, (floor_m, len(sizes) - 0.5), (5, 4), textcoords="offset points", fontsize=10)
     for row, (_, rms_m) in enumerate(sizes):
         axes.plot([floor_m, rms_m], [row, row], color=Tone.SOFT.value, lw=1.6, zorder=1)
         axes.plot(rms_m, row, "o", ms=8, color=Tone.PLACE_1.value)
         side, shift = ("right", -8) if rms_m > 30.0 * floor_m else ("left", 8)
-        axes.annotate(length(rms_m), (rms_m, row), (shift, 5), textcoords="offset points", fontsize=9, ha=side)
+        axes.annotate(length(rms_m), (rms_m, row), (shift, 5), textcoords="offset points", fontsize=10, ha=side)
     axes.set_yticks(range(len(sizes)), [name for name, _ in sizes])
     axes.tick_params(axis="y", length=0, colors=Tone.INK.value)
     axes.set_ylim(len(sizes) - 0.35, -0.6)

@@ -5,6 +5,9 @@ tell apart; on dark paper lighter ones of the same hues stand for them (report.c
 """
 
 from enum import Enum
+from typing import Literal
+
+Fill = Literal["none", "full", "left", "right", "bottom", "top"]
 
 
 class Tone(Enum):
@@ -28,7 +31,19 @@ class Tone(Enum):
         return f"var(--{self.name.lower().replace('_', '-')})"
 
 
+FILLS: tuple[Fill, ...] = ("none", "full", "left", "right", "bottom", "top")  # of marks, beside the colours
 PLACES = (Tone.PLACE_1, Tone.PLACE_2, Tone.PLACE_3, Tone.PLACE_4, Tone.PLACE_5, Tone.PLACE_6)
+
+
+def place_mark(number: int) -> dict[str, str]:
+    """Colour and fill of the marks of the n-th placement, from 0, as matplotlib's plot takes them."""
+    tone, fill = tone_of(number).value, fill_of(number)
+    return {"mec": tone, "mfc": "none" if fill == "none" else tone, "mfcalt": Tone.PAPER.value, "fillstyle": fill}
+
+
+def fill_of(number: int) -> Fill:
+    """How the marks of the n-th placement are filled, from 0; they come round again with the colours."""
+    return FILLS[number % len(FILLS)]
 
 
 def tone_of(number: int) -> Tone:

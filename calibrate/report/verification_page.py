@@ -72,6 +72,7 @@ def _verdict(found: Verification) -> Html:
     reasons += [f"{one.symbol}: {one.judgement.value}" for one in found.figures if one not in found.judged]
     short = [one for one in found.judged if not one.complete]
     reasons += [f"{one.symbol}: {one.taken} of the {one.asked} measurements of the whole test" for one in short]
+    reasons += found.left_out
     return tag(
         "div", tag("strong", found.sentence), *([bullets(reasons)] if reasons else []), cls=f"verdict {trust.value}"
     )

@@ -1,15 +1,22 @@
-"""Writes the report of a dual-PSD session: one HTML file that needs nothing else, on a screen, a phone or on paper."""
+"""The report of a dual-PSD session: one page that needs nothing else, on a screen, a phone or on paper."""
 
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
-from acquisition.recording.recording import Recording
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.identification.evidence_record import EvidenceFields
-from calibrate.read_samples import Angles
+from calibrate.report.answers import Answers
 from calibrate.report.diagnosis.page import inserted
-from calibrate.report.evidence import evidence
-from calibrate.report.page import page, write_page
+from calibrate.report.drift.chapter import TITLE as DRIFT
+from calibrate.report.drift.chapter import drift_chapter
+from calibrate.report.drift.drift import Drift
+from calibrate.report.drift.words import sentence
+from calibrate.report.elements import Html
+from calibrate.report.evidence import Evidence
+from calibrate.report.interactive.chapter import TITLE as INTERACTIVE
+from calibrate.report.interactive.chapter import interactive_chapter
+from calibrate.report.interactive.zero_figures import zero_figures
+from calibrate.report.page import page
 from calibrate.report.sections import (
     centring,
     point,
@@ -20,84 +27,80 @@ from calibrate.report.sections import (
     spots,
     summary,
     unseen,
+    workspace,
     zeros,
 )
+from calibrate.report.zero_workspace import zero_arm
 from calibrate.zeros.point_constraint import PointConstraintResult
-from calibrate.zeros.result import ZeroResult
 
-CONTENTS = {
-    "rig": rig.TITLE,
-    "spots": spots.TITLE,
-    "centring": centring.TITLE,
-    "residuals": residuals.TITLE,
-    "zeros": zeros.TITLE,
-    "point": point.TITLE,
-    "proofs": proofs.TITLE,
-    "unseen": unseen.TITLE,
-    "provenance": provenance.TITLE,
-}
+NOT_IN_SPACE = "No measured errors are drawn: spots say how the beam fell, not where the tool is."
+NOT_ASKED = "it was not asked for"
 
 
-def write_report(
-    path: Path | str,
-    recording: Recording,
-    result: ZeroResult,
-    *,
-    point_constraint: PointConstraintResult | None = None,
-    why_no_point_constraint: str = "it was not asked for",
-    angles: Angles = "reported",
-    left_out: Sequence[str] = (),
-    proved: EvidenceFields | None = None,
-    alarms: Sequence[str] = (),
+@dataclass(frozen=True)
+class ZeroSession:
+    """All that is known of a dual-PSD session."""
+
+    evidence: Evidence
+    point_constraint: PointConstraintResult | None = None
+    why_no_point_constraint: str = NOT_ASKED
+    left_out: tuple[str, ...] = ()  # sentences, each naming rows that were recorded but not fitted
+    proved: EvidenceFields | None = None  # None where nothing was
+    alarms: tuple[str, ...] = ()  # what to read before the numbers
+
+
+def zero_page(
+    session: ZeroSession,
     diagnosis: DiagnosisFile | None = None,
-) -> Path:
-    """One HTML file at `path`, over what may be there; returns it.
-
-    `left_out` are sentences, each naming rows that were recorded but not fitted; `proved` is None where nothing was;
-    `alarms` are what to read before the numbers;
-    `diagnosis` adds its pages.
-    `result` must come from `recording` with these `angles`. DataError if it does not, or the file cannot be written.
-    """
-    text = report_html(
-        recording,
-        result,
-        point_constraint=point_constraint,
-        why_no_point_constraint=why_no_point_constraint,
-        angles=angles,
-        left_out=left_out,
-        proved=proved,
-        alarms=alarms,
-        diagnosis=diagnosis,
-    )
-    return write_page(path, text)
-
-
-def report_html(
-    recording: Recording,
-    result: ZeroResult,
+    drift: Drift | None = None,
     *,
-    point_constraint: PointConstraintResult | None = None,
-    why_no_point_constraint: str = "it was not asked for",
-    angles: Angles = "reported",
-    left_out: Sequence[str] = (),
-    proved: EvidenceFields | None = None,
-    alarms: Sequence[str] = (),
-    diagnosis: DiagnosisFile | None = None,
+    interactive: bool = False,
 ) -> str:
-    """The page as text; arguments as in `write_report`."""
-    known = evidence(recording, result, angles)
-    chapters = (
-        summary.summary(known),
-        rig.rig(known),
-        spots.spots(known),
-        centring.centring(known),
-        residuals.residuals(known),
-        zeros.zeros(known),
-        point.point(point_constraint, result.zeros, why_no_point_constraint),
-        *([] if proved is None else [proofs.proofs(proved, alarms)]),
-        unseen.unseen(known, left_out),
-        provenance.provenance(recording, result.n_poses, "with both spots", f"{result.software}, {result.steps} steps"),
+    """The page as text; `drift` adds its chapter, `interactive` figures that can be turned."""
+    known = session.evidence
+    rig_file, software = known.recording.rig, known.result.software
+    chapters = dict(_chapters(session, drift, interactive=interactive))
+    contents, parts = inserted(
+        {anchor: title for anchor, (title, _) in chapters.items()},
+        tuple(chapter for _, chapter in chapters.values()),
+        diagnosis,
+        rig_file,
     )
-    contents = {anchor: title for anchor, title in CONTENTS.items() if anchor != "proofs" or proved is not None}
-    contents, chapters = inserted(contents, chapters, diagnosis, recording.rig)
-    return page(f"Joint zeros of {recording.rig.name}", summary.masthead(known), contents, chapters, result.software)
+    first = summary.summary(zero_answers(session, drift), known)
+    title, head = f"Joint zeros of {rig_file.name}", summary.masthead(known)
+    return page(title, head, contents, (first, *parts), software, scripts=interactive)
+
+
+def zero_answers(session: ZeroSession, drift: Drift | None = None) -> Answers:
+    """The first screen."""
+    answers = summary.answers(session.evidence, session.proved)
+    return answers if drift is None else replace(answers, drift=sentence(drift), warnings=drift.warnings)
+
+
+def _chapters(
+    session: ZeroSession, drift: Drift | None, *, interactive: bool
+) -> Iterator[tuple[str, tuple[str, Html]]]:
+    """Anchor, heading, content."""
+    known = session.evidence
+    result = known.result
+    if drift is not None:
+        yield "drift", (DRIFT, drift_chapter(drift))
+    pictures = workspace.workspace(zero_arm(known, session.proved), None, NOT_IN_SPACE)
+    yield "workspace", (workspace.TITLE, pictures)
+    if interactive:
+        yield "interactive", (INTERACTIVE, interactive_chapter(zero_figures(known)))
+    yield "rig", (rig.TITLE, rig.rig(known))
+    yield "spots", (spots.TITLE, spots.spots(known))
+    yield "centring", (centring.TITLE, centring.centring(known))
+    yield "residuals", (residuals.TITLE, residuals.residuals(known))
+    yield "zeros", (zeros.TITLE, zeros.zeros(known))
+    beside = point.point(session.point_constraint, result.zeros, session.why_no_point_constraint)
+    yield "point", (point.TITLE, beside)
+    if session.proved is not None:
+        yield "proofs", (proofs.TITLE, proofs.proofs(session.proved, session.alarms))
+    yield "unseen", (unseen.TITLE, unseen.unseen(known, session.left_out))
+    by = f"{result.software}, {result.steps} steps"
+    yield (
+        "provenance",
+        (provenance.TITLE, provenance.provenance(known.recording, result.n_poses, "with both spots", by)),
+    )

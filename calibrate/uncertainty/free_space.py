@@ -10,6 +10,7 @@ Bundle Adjustment, LNCS 1883, 2000, ch. 9.
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import Protocol
 
 import numpy as np
 from numpy.random import Generator
@@ -18,13 +19,23 @@ from numpy.typing import NDArray
 from calibrate.arms.model import KinematicModel
 from calibrate.fit import Fit
 from calibrate.identifiability import Identifiability
-from calibrate.parameters import index_of
+from calibrate.parameters import Parameter, index_of
 from calibrate.rigid import cross_matrix
 
 Floats = NDArray[np.float64]
 
 FELT_M = 1e-7  # rms over the workspace, for an unseen combination of plausible size: below, it does not matter
 TOOL = ("tool.x", "tool.y", "tool.z")
+
+
+class Valued(Protocol):
+    """Parameters and their values: a fit, or what a model.json holds of one."""
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]: ...
+
+    @property
+    def theta(self) -> Floats: ...
 
 
 class FreeSpaceStatus(Enum):
@@ -85,7 +96,7 @@ def free_space_error(
     if not np.all(np.isfinite(fit.covariance)):
         return FreeSpaceError(FreeSpaceStatus.NO_COVARIANCE, None, None, None)
     q_rad = rng.uniform(workspace.lower_rad, workspace.upper_rad, (workspace.poses, model.n_joints))
-    points_m, by_parameter = _target_by_parameter(model, fit, workspace.point_m, q_rad)
+    points_m, by_parameter = target_by_parameter(model, fit, workspace.point_m, q_rad)
     J = without_rigid_motion(points_m, by_parameter)
     column = index_of(fit.parameters)
     unseen = np.sum((J[..., [column[n] for n in seen.names]] @ seen.unseen) ** 2, axis=1)  # (pose, k) m^2
@@ -97,7 +108,7 @@ def free_space_error(
     known = np.maximum(np.einsum("nip,pq,niq->n", J, fit.covariance, J, optimize=True), 0.0)
     variance = known + guessed
     if scatter != NO_SCATTER:
-        variance = variance + _of_scatter(model, fit, points_m, q_rad, scatter)
+        variance = variance + variance_of_scatter(model, fit, points_m, q_rad, scatter)
     sigma = np.sqrt(variance)
     mean, p95, worst = float(sigma.mean()), float(np.percentile(sigma, 95.0)), float(sigma.max())
     rms = float(np.sqrt(np.mean(variance)))
@@ -118,7 +129,9 @@ def without_rigid_motion(points_m: Floats, by_parameter: Floats) -> Floats:
     return (flat - Q @ (Q.T @ flat)).reshape(n, 3, params)
 
 
-def _of_scatter(model: KinematicModel, fit: Fit, points_m: Floats, q_rad: Floats, scatter: Scatter) -> Floats:
+def variance_of_scatter(
+    model: KinematicModel, fit: Valued, points_m: Floats, q_rad: Floats, scatter: Scatter
+) -> Floats:
     """(pose,) variance of the target, three axes together."""
     column = index_of(fit.parameters)
     twists = model.joint_twists(fit.theta[[column[p.name] for p in model.parameters]], q_rad)
@@ -126,7 +139,7 @@ def _of_scatter(model: KinematicModel, fit: Fit, points_m: Floats, q_rad: Floats
     return scatter.joint_rad**2 * np.sum(by_joint**2, axis=(1, 2)) + 3.0 * scatter.target_m**2
 
 
-def _target_by_parameter(model: KinematicModel, fit: Fit, point_m: Floats, q_rad: Floats) -> tuple[Floats, Floats]:
+def target_by_parameter(model: KinematicModel, fit: Valued, point_m: Floats, q_rad: Floats) -> tuple[Floats, Floats]:
     """Target in the base (pose, 3) and its derivative by all parameters of the fit (pose, 3, param)."""
     column = index_of(fit.parameters)
     own = [column[p.name] for p in model.parameters]

@@ -50,6 +50,7 @@ class VerificationFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     conforms: bool | None  # None: nothing was judged
     says: str
     figures: tuple[FigureRecord, ...]
+    left_out: tuple[str, ...] = ()
 
 
 def verification_file(found: Verification, *, rig: str, recording: str, model: str, software: str) -> VerificationFile:
@@ -67,6 +68,7 @@ def verification_file(found: Verification, *, rig: str, recording: str, model: s
         conforms,
         found.sentence,
         figures,
+        found.left_out,
     )
 
 

@@ -11,9 +11,10 @@ from acquisition.recording.samples import Samples
 from calibrate.errors import DataError
 from calibrate.predict import Predictor
 from calibrate.sensors.bar import bar_pairs
+from calibrate.verification.sphere import LEAST, fitted_sphere
 
 Floats = NDArray[np.float64]
-SAME_PLACE_M = 0.05  # a bar set up again by hand is nearer to where it was than two positions are apart
+SAME_PLACE_M = 0.05  # of both ends: a bar set up again by hand is nearer to where it was than two positions are apart
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,16 +44,18 @@ class Measured:
     seats: Mapping[int, Floats]
     touches: Mapping[tuple[int, int], Floats]  # sphere, series
     lengths: tuple[Length, ...]
+    left_out: tuple[str, ...] = ()  # series of touches that show no sphere, and why
 
 
 def measured(samples: Samples, rig: Rig, predictor: Predictor) -> Measured:
     """Sorted by artefact. DataError where there is none, or one that the rig does not know."""
     tips_m = predictor.tip_m(samples.joints())
-    found = Measured(rig, _seats(samples, tips_m), _touches(samples, rig, tips_m), _lengths(samples, rig, tips_m))
+    touches, left_out = _round(_touches(samples, rig, tips_m))
+    found = Measured(rig, _seats(samples, tips_m), touches, _lengths(samples, rig, tips_m), left_out)
     if not (found.seats or found.touches or found.lengths):
         raise DataError(
             "samples: nothing to verify by; columns of it are seat, bar with bar_end, and sphere with series: "
-            "`calibeam session RIG --verify` takes them"
+            "`calibeam session RIG --verify` takes them" + "".join(f"; {why}" for why in left_out)
         )
     return found
 
@@ -74,6 +77,21 @@ def _touches(samples: Samples, rig: Rig, tips_m: Floats) -> dict[tuple[int, int]
     return {(s, k): tips_m[(sphere == s) & (series == k)] for s, k in pairs}
 
 
+def _round(
+    touches: Mapping[tuple[int, int], Floats],
+) -> tuple[dict[tuple[int, int], Floats], tuple[str, ...]]:
+    """Series without those that are touches enough and yet show no sphere, and sentences of these."""
+    good, bad = dict(touches), list[str]()
+    for (sphere, series), touches_m in touches.items():
+        try:
+            if len(touches_m) >= LEAST:
+                fitted_sphere(touches_m)
+        except DataError as error:
+            del good[sphere, series]
+            bad.append(f"sphere {sphere}, series {series} left out: {error}")
+    return good, tuple(bad)
+
+
 def _lengths(samples: Samples, rig: Rig, tips_m: Floats) -> tuple[Length, ...]:
     bar = samples.integers("bar", 0)
     rows = np.flatnonzero(bar)
@@ -86,14 +104,20 @@ def _lengths(samples: Samples, rig: Rig, tips_m: Floats) -> tuple[Length, ...]:
         raise DataError(f"samples: bar {min(unknown)} is not in the rig; add a [[bar]] with its length")
     ends = samples.columns["bar_end"][rows]
     out: list[Length] = []
-    middles: list[tuple[int, Floats]] = []
+    stood: list[tuple[int, Floats]] = []
     for a, b in bar_pairs(rows, bar[rows], ends):
         number = int(bar[a])
-        middle = 0.5 * (tips_m[a] + tips_m[b])
-        apart = [float(np.linalg.norm(middle - m)) if n == number else np.inf for n, m in middles]
+        ends_m = tips_m[[a, b]]
+        apart = [_apart_m(ends_m, other_m) if n == number else np.inf for n, other_m in stood]
         if not apart or min(apart) > SAME_PLACE_M:
-            middles.append((number, middle))
+            stood.append((number, ends_m))
             apart.append(0.0)
         measured_m = float(np.linalg.norm(tips_m[b] - tips_m[a]))
         out.append(Length(number, int(np.argmin(apart)) + 1, rig.bars[number].length_m, measured_m))
     return tuple(out)
+
+
+def _apart_m(ends_m: Floats, other_m: Floats) -> float:
+    """Of the end that is farther from where it was; a bar put there the other way round stands in the same place."""
+    ways = (other_m, other_m[::-1])
+    return min(float(np.linalg.norm(ends_m - way, axis=1).max()) for way in ways)

@@ -10,6 +10,7 @@ from calibrate.errors import DataError
 
 Floats = NDArray[np.float64]
 LEAST = 5  # points: four determine a sphere, and a fifth says something of its error
+FLAT = 0.02  # thickness of the points over their width: the radius is then off by some hundred times their errors
 INSIDE = 1e-12  # relative: rounding, when a point lies on the sphere
 
 
@@ -31,10 +32,11 @@ def fitted_sphere(points_m: Floats) -> Sphere:
         raise DataError(f"a sphere of {len(points_m)} points: touch it {LEAST} times or more, all round")
     middle = points_m.mean(axis=0)
     p = points_m - middle
+    extents_m = np.linalg.svd(p, compute_uv=False)
+    if extents_m[-1] <= FLAT * extents_m[0]:
+        raise DataError("the touches lie in one plane and show no sphere; touch it all round")
     design = np.column_stack([2.0 * p, np.ones(len(p))])
-    found, _, rank, _ = np.linalg.lstsq(design, np.sum(p**2, axis=1), rcond=1e-9)
-    if rank < design.shape[1]:
-        raise DataError("the points touched lie in one plane and show no sphere; touch it all round")
+    found = np.linalg.lstsq(design, np.sum(p**2, axis=1), rcond=None)[0]
     start = np.append(found[:3], np.sqrt(max(found[3] + found[:3] @ found[:3], 0.0)))
 
     def beside(x: Floats) -> Floats:

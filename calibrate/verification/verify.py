@@ -9,6 +9,7 @@ from calibrate.predict import Predictor
 from calibrate.verification import b89_4_22, iso10360_12
 from calibrate.verification.figure import Figure, Judgement
 from calibrate.verification.measured import Measured, measured
+from calibrate.verification.model_fits import refuse_wrong_model
 
 STANDARDS: tuple[Callable[[Measured], tuple[Figure, ...]], ...] = (iso10360_12.figures, b89_4_22.figures)
 
@@ -19,6 +20,7 @@ class Verification:
 
     figures: tuple[Figure, ...]
     samples: int
+    left_out: tuple[str, ...] = ()  # series of touches that show no sphere, and why
 
     @property
     def failed(self) -> tuple[Figure, ...]:
@@ -41,11 +43,14 @@ class Verification:
             )
         parts = [figure.symbol for figure in self.judged if not figure.complete]
         rest = f" Part of the test only, with fewer measurements than it asks for: {', '.join(parts)}." if parts else ""
+        rest += " Series were left out." if self.left_out else ""
         return f"Conforms in all {len(self.judged)} figures that were judged.{rest}"
 
 
 def verify(recording: Recording, model: ModelFile) -> Verification:
-    """DataError where the recording holds nothing to verify by, or the model has no rig."""
+    """DataError where the recording holds nothing to verify by, or the model is of another arm or of these readings."""
+    refuse_wrong_model(recording, model)
     found = measured(recording.samples, recording.rig, Predictor.of(model))
     iso10360_12.refuse_without_probe(found)
-    return Verification(tuple(f for figures in STANDARDS for f in figures(found)), len(recording.samples))
+    figures = tuple(f for figures in STANDARDS for f in figures(found))
+    return Verification(figures, len(recording.samples), found.left_out)

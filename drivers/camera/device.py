@@ -21,8 +21,6 @@ Grey = NDArray[np.uint8]
 OPEN_MS = 5000
 FRAME_MS = 2000
 PICTURES = (".jpg", ".jpeg", ".png", ".bmp")
-# From the exposure to the program: a USB camera holds up to four frames at 30 Hz, a network camera about as long.
-LATENCY_S = 0.2
 WAIT_S = 3.0  # for a frame of now
 
 
@@ -31,8 +29,11 @@ class Camera:
 
     name = "camera"
 
-    def __init__(self, source: int | str, size_px: tuple[int, int], clock: Clock, latency_s: float = LATENCY_S) -> None:
-        """`size_px`: width and height that are asked for, and that every picture must have."""
+    def __init__(self, source: int | str, size_px: tuple[int, int], clock: Clock, latency_s: float) -> None:
+        """`size_px`: width and height that are asked for, and that every picture must have.
+
+        `latency_s`: from the exposure to the program, at most; what arrives sooner after a question is of before it.
+        """
         self._source, self._size_px, self._clock, self._latency_s = source, size_px, clock, latency_s
         self._capture: cv2.VideoCapture | None = None
         self._news = threading.Condition()

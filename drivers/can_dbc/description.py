@@ -92,13 +92,20 @@ def _scale(signal: Signal, units_per_turn: float | None) -> Scale:
         raise ValueError(f"unit {signal.unit or ''!r} is no angle; give units_per_turn in the rig file")
     if count_rad <= 0.0:
         raise ValueError(f"one count is {count_rad} rad")
-    return Scale(math.tau / count_rad, _range(signal), float(signal.scale) > 0.0)
+    units_per_turn = math.tau / count_rad
+    return Scale(units_per_turn, _range(signal, units_per_turn), float(signal.scale) > 0.0)
 
 
-def _range(signal: Signal) -> int:
-    """Counts after which the signal begins anew: its stated ends when they are inside its bits, else its bits."""
+def _range(signal: Signal, units_per_turn: float) -> int:
+    """Counts after which the signal begins anew: its stated ends when they are inside its bits, else its bits.
+
+    Both ends are values that it takes, unless they are whole turns apart: then they are one place of the disc, so that
+    "[0|360]" in degrees is what "[0|359.9]" with a count of 0.1 is.
+    """
     bits = 1 << signal.length
     if signal.minimum is None or signal.maximum is None or signal.maximum <= signal.minimum:
         return bits
-    stated = round(float(signal.maximum - signal.minimum) / abs(float(signal.scale))) + 1
-    return min(stated, bits)
+    steps = float(signal.maximum - signal.minimum) / abs(float(signal.scale))
+    turns = round(steps / units_per_turn)
+    whole_turns = turns > 0 and abs(steps - turns * units_per_turn) < 0.5
+    return min(round(steps) + (0 if whole_turns else 1), bits)

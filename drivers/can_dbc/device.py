@@ -5,7 +5,8 @@ reading was when the row was complete is a channel. One thread uses it at a time
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import can
 import numpy as np
@@ -23,11 +24,23 @@ SILENT_S = 0.5  # an encoder that sends nothing for so long is gone
 BATCH_S = 0.02  # rows gathered in one block; more only delays a reader
 
 
+@dataclass(frozen=True)
+class _Row:
+    """One reading of each encoder, and the state of things at that time."""
+
+    sequence: int
+    done_s: float
+    readings: Mapping[int, tuple[float, float]]  # place -> angle, host time
+    slip_rad: tuple[float, ...]
+    bus_errors: int
+
+
 class CanDbcEncoders:
     """A `drivers.device.Device`. Channels: position_rad (joint,), NaN where none came; age_s (joint,); slip_rad
     (joint,); bus_errors, error frames so far.
 
-    A row is complete when every encoder has sent, or when one sends again before the others did.
+    A row is complete when every encoder has sent, or when one sends again before the others did. Rows from before a
+    failure come with the next read.
     """
 
     def __init__(
@@ -58,6 +71,7 @@ class CanDbcEncoders:
         self._sequence = 0
         self._row: dict[int, tuple[float, float]] = {}  # place -> angle, host time
         self._heard_s: dict[int, float] = {}
+        self._rows: list[_Row] = []
 
     def connect(self) -> None:
         """Open the bus and hear every encoder once. DeviceLost (no bus), DeviceStale naming those that are silent."""
@@ -85,15 +99,15 @@ class CanDbcEncoders:
 
     def read(self, timeout_s: float) -> Block:
         began_s = self._clock.now_s()
-        rows: list[tuple[int, float, dict[int, tuple[float, float]]]] = []
         with lost_as_device_lost(self.name, "reading"):
             while (left_s := began_s + timeout_s - self._clock.now_s()) > 0.0:
-                rows += self._take(self._receive(left_s))
-                if rows and self._clock.now_s() - began_s >= BATCH_S:
+                self._take(self._receive(left_s))
+                if self._rows and self._clock.now_s() - began_s >= BATCH_S:
                     break
         self._check_silence()
-        if not rows:
+        if not self._rows:
             raise DeviceStale(f"{self.name}: no encoder sent within {timeout_s:g} s; check power, bus and bitrate")
+        rows, self._rows = self._rows, []
         return self._block(rows)
 
     def close(self) -> None:
@@ -105,10 +119,11 @@ class CanDbcEncoders:
 
     def _hear_all(self) -> None:
         until_s = self._clock.now_s() + 2.0 * SILENT_S
-        self._heard_s = {}
+        self._heard_s, before = {}, len(self._rows)
         with lost_as_device_lost(self.name, "opening"):
             while len(self._heard_s) < len(self.joints) and (left_s := until_s - self._clock.now_s()) > 0.0:
                 self._take(self._receive(left_s))
+        del self._rows[before:]  # of encoders that were not all there yet
         silent = [joint.name for place, joint in enumerate(self.joints) if place not in self._heard_s]
         if silent:
             raise DeviceStale(
@@ -126,16 +141,17 @@ class CanDbcEncoders:
             self.bad_frames += 1
             return None
 
-    def _take(self, message: can.Message | None) -> list[tuple[int, float, dict[int, tuple[float, float]]]]:
-        """The row that this frame completes, if any."""
+    def _take(self, message: can.Message | None) -> None:
+        """A frame, which may complete a row."""
         now_s = self._clock.now_s()
         if message is None or message.is_remote_frame:
-            return []
+            return
         if message.is_error_frame:
             self._faults.take(message, now_s)
-            return []
+            return
         places = self._places.get((message.arbitration_id, message.is_extended_id), [])
-        done = [self._finish(now_s)] if any(place in self._row for place in places) else []
+        if any(place in self._row for place in places):
+            self._finish(now_s)
         data = bytes(message.data)
         for place in places:
             counts = self.joints[place].counts(data)
@@ -146,13 +162,13 @@ class CanDbcEncoders:
             self._row[place] = angle_rad, now_s
             self._heard_s[place] = now_s
         if len(self._row) == len(self.joints):
-            done.append(self._finish(now_s))
-        return done
+            self._finish(now_s)
 
-    def _finish(self, now_s: float) -> tuple[int, float, dict[int, tuple[float, float]]]:
-        row, self._row = self._row, {}
+    def _finish(self, now_s: float) -> None:
+        readings, self._row = self._row, {}
+        slips_rad = tuple(angle.slip_rad for angle in self._angles)
+        self._rows.append(_Row(self._sequence, now_s, readings, slips_rad, self._faults.count))
         self._sequence += 1
-        return self._sequence - 1, now_s, row
 
     def _check_silence(self) -> None:
         now_s = self._clock.now_s()
@@ -164,20 +180,19 @@ class CanDbcEncoders:
                 "check its power, cable and termination"
             )
 
-    def _block(self, rows: Sequence[tuple[int, float, dict[int, tuple[float, float]]]]) -> Block:
+    def _block(self, rows: Sequence[_Row]) -> Block:
         nothing = (math.nan, math.nan)
-        each = np.array([[row.get(place, nothing) for place in range(len(self.joints))] for _, _, row in rows])
-        host_s = np.array([done_s for _, done_s, _ in rows])
-        slips_rad = np.array([angle.slip_rad for angle in self._angles], dtype=np.float64)
+        each = np.array([[row.readings.get(place, nothing) for place in range(len(self.joints))] for row in rows])
+        host_s = np.array([row.done_s for row in rows])
         return Block(
             host_s=host_s,
             device_s=np.nanmean(each[:, :, 1], axis=1),
-            sequence=np.array([sequence for sequence, _, _ in rows], dtype=np.int64),
+            sequence=np.array([row.sequence for row in rows], dtype=np.int64),
             values={
                 "position_rad": each[:, :, 0],
                 "age_s": host_s[:, None] - each[:, :, 1],
-                "slip_rad": np.tile(slips_rad, (len(rows), 1)),
-                "bus_errors": np.full(len(rows), self._faults.count, dtype=np.uint32),
+                "slip_rad": np.array([row.slip_rad for row in rows], dtype=np.float64),
+                "bus_errors": np.array([row.bus_errors for row in rows], dtype=np.uint32),
             },
         )
 

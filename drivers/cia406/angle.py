@@ -70,6 +70,7 @@ class ContinuousAngle:
         self.jumps = 0
         self.wraps = 0
         self.slips: tuple[Slip, ...] = ()
+        self.slip_rad = 0.0  # all slips together
         self._range, self._half = scale.range_units, scale.range_units // 2
         self._unit_rad, self._size_rad = scale.unit_rad, abs(scale.unit_rad)
         self._speed_limit_rad_s = speed_limit_rad_s
@@ -77,26 +78,27 @@ class ContinuousAngle:
         self._last: _Reading | None = None
         self._doubted: list[_Reading] = []
 
-    @property
-    def slip_rad(self) -> float:
-        """All slips together."""
-        return sum(slip.size_rad for slip in self.slips)
-
     def follow(self, position: int, time_s: float) -> float:
         """Angle in rad for a position read at `time_s`, or NaN."""
         last = self._last
         if last is None:
             self._last = _Reading(self._step(position, 0), time_s, math.nan)
             return self._last.units * self._unit_rad
-        before = self._doubted[-1] if self._doubted else last
-        if self._doubted and not self._is_motion(self._next(before, position, time_s), before):
+        if self._doubted:
+            before = self._doubted[-1]
+            reading = self._next(before, position, time_s)
+            if self._is_motion(reading, before):
+                return self._doubt(reading, last)
             self._doubted.clear()
-            before = last
-        reading = self._next(before, position, time_s)
-        if not self._doubted and self._is_motion(reading, last):
+        reading = self._next(last, position, time_s)
+        if self._is_motion(reading, last):
             return self._accept(reading)
+        return self._doubt(_Reading(reading.units, time_s, last.rate), last)
+
+    def _doubt(self, reading: "_Reading", last: "_Reading") -> float:
+        """NaN, or the angle after a slip when enough readings agree."""
         self.jumps += 1
-        self._doubted.append(reading if self._doubted else _Reading(reading.units, time_s, last.rate))
+        self._doubted.append(reading)
         if len(self._doubted) < READINGS_OF_A_SLIP:
             return math.nan
         return self._slipped(last, self._doubted[0], reading)
@@ -104,7 +106,9 @@ class ContinuousAngle:
     def _slipped(self, last: "_Reading", first: "_Reading", reading: "_Reading") -> float:
         rate = 0.0 if math.isnan(last.rate) else last.rate
         unmoved = last.units + rate * (first.time_s - last.time_s)
-        self.slips = (*self.slips, Slip(first.time_s, (first.units - unmoved) * self._unit_rad))[-SLIPS_KEPT:]
+        slip = Slip(first.time_s, (first.units - unmoved) * self._unit_rad)
+        self.slips = (*self.slips, slip)[-SLIPS_KEPT:]
+        self.slip_rad += slip.size_rad
         return self._accept(reading)
 
     def _accept(self, reading: "_Reading") -> float:

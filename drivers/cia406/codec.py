@@ -36,13 +36,25 @@ def mapped_object(word: int) -> MappedObject:
     return MappedObject(word >> 16, word >> 8 & 0xFF, word & 0xFF)
 
 
-def extract(mapping: Sequence[MappedObject], data: bytes, index: int) -> int | None:
-    """The unsigned value of object `index` in a PDO; None when the frame is shorter than its mapping says."""
-    number = int.from_bytes(data, "little")
+class MappedNumber:
+    """Where an object stands in a PDO: `bits` from bit `at` on, counted from the lowest of the first byte."""
+
+    def __init__(self, at: int, bits: int) -> None:
+        self._at, self._mask, self._least_bits = at, (1 << bits) - 1, at + bits
+
+    def read(self, data: bytes | bytearray) -> int | None:
+        """Its unsigned value; None when the frame is shorter than its mapping says."""
+        if 8 * len(data) < self._least_bits:
+            return None
+        return int.from_bytes(data, "little") >> self._at & self._mask
+
+
+def mapped_number(mapping: Sequence[MappedObject], index: int) -> MappedNumber | None:
+    """Object `index` of a PDO; None when it is not mapped."""
     at = 0
     for entry in mapping:
         if entry.index == index:
-            return None if at + entry.bits > 8 * len(data) else number >> at & (1 << entry.bits) - 1
+            return MappedNumber(at, entry.bits)
         at += entry.bits
     return None
 

@@ -51,20 +51,13 @@ class SyncCycle:
         self._answered: list[_Sync] = []  # by all, but since the last moment at which nothing was under way
         self._busy_since_s = start_s
         self._in_doubt: set[int] = set()  # an answer of theirs may be to an earlier SYNC
+        self.wakes_s = start_s  # when something is to be done without any frame coming: give up, or the next SYNC
 
     def sequence_at(self, now_s: float) -> int:
         """Number of the first deadline after `now_s`, for a schedule that goes on after this one; 0 if it sent none."""
         if self._next == 0:
             return self._first
         return self._first + max(self._next, math.ceil((now_s - self._start_s) / self._period_s))
-
-    @property
-    def wakes_s(self) -> float:
-        """When something is to be done without any frame coming: give up, or send the next SYNC."""
-        if not self._under_way:
-            return self._due_s
-        gives_up_s = self._under_way[0].sent_s + ANSWER_LIMIT_S
-        return min(gives_up_s, self._due_s) if self._has_room else gives_up_s
 
     def sync_due(self, now_s: float) -> bool:
         return now_s >= self._due_s and (not self._under_way or self._has_room)
@@ -76,6 +69,7 @@ class SyncCycle:
         number = max(self._next, math.floor((now_s - self._start_s) / self._period_s))
         self._next = number + 1
         self._under_way.append(_Sync(number, now_s, now_s))
+        self._plan()
 
     def awaits(self, node: int) -> bool:
         """True when an answer of this node belongs to a SYNC under way; else it is counted as late."""
@@ -93,9 +87,14 @@ class SyncCycle:
         sync.answers[node] = math.nan if node in self._in_doubt else position_rad
         sync.arrived_s = now_s
         self._silent_since_s.pop(node, None)
+        if len(self._under_way[0].answers) < self._nodes:
+            return ()
         while self._under_way and len(self._under_way[0].answers) == self._nodes:
             self._answered.append(self._under_way.popleft())
-        return () if self._under_way else self._close(set())
+        if not self._under_way:
+            return self._close(set())
+        self._plan()
+        return ()
 
     def give_up(self, now_s: float) -> tuple[Row, ...]:
         """Ends the wait for answers, if it was too long; the rows that hold any position.
@@ -140,4 +139,13 @@ class SyncCycle:
             )
             if not all(math.isnan(position_rad) for position_rad in positions):
                 rows.append(Row(self._first + sync.number, sync.sent_s, sync.arrived_s, positions))
+        self._plan()
         return tuple(rows)
+
+    def _plan(self) -> None:
+        """Kept, not asked for: it is looked at with every frame, and changes with few."""
+        if not self._under_way:
+            self.wakes_s = self._due_s
+            return
+        gives_up_s = self._under_way[0].sent_s + ANSWER_LIMIT_S
+        self.wakes_s = min(gives_up_s, self._due_s) if self._has_room else gives_up_s

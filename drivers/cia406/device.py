@@ -5,7 +5,6 @@ One thread uses it at a time, except `close`. `read` sends the SYNCs; while nobo
 
 import math
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import can
 import canopen
@@ -13,13 +12,11 @@ import canopen
 from drivers.cia406 import objects
 from drivers.cia406.angle import SPEED_LIMIT_RAD_S, ContinuousAngle, Slip
 from drivers.cia406.bus_faults import BusFault, BusFaults
-from drivers.cia406.codec import Emergency, extract
+from drivers.cia406.codec import Emergency, MappedNumber, mapped_number
 from drivers.cia406.configuration import (
     HEARTBEAT_MS,
     EncoderIdentity,
     EncoderObjects,
-    check_profile,
-    configure,
     preset,
     set_direction,
 )
@@ -31,6 +28,7 @@ from drivers.cia406.network import (
     lost_as_device_lost,
     shut_down,
 )
+from drivers.cia406.nodes import NMT_PRE_OPERATIONAL, NMT_START, configured, nmt
 from drivers.cia406.rows import WatchedRow, to_block
 from drivers.cia406.watch import NodeWatch
 from drivers.clock import Clock, SystemClock
@@ -43,7 +41,6 @@ SILENT_S = 0.5  # a node that answers no SYNC for so long is gone
 HEARTBEAT_GOES_ON_S = 0.49  # of SILENT_S: a heartbeat this fresh is one of after the silence began
 BATCH_S = 0.02  # rows gathered in one block; more only delays a reader
 SYNC = can.Message(arbitration_id=objects.SYNC_ID, is_extended_id=False)
-NMT_START, NMT_PRE_OPERATIONAL = 0x01, 0x80
 
 
 class Cia406Encoders:
@@ -83,6 +80,7 @@ class Cia406Encoders:
         self._operational = False
         self._cycle = SyncCycle(len(self.nodes), self._period_s, 0.0, 0)
         self._angles: tuple[ContinuousAngle, ...] = ()
+        self._positions: tuple[MappedNumber, ...] = ()
         self._node_of_pdo: dict[int, int] = {}  # CAN identifier to place in `nodes`
         self._watch = NodeWatch(name, self.nodes, HEARTBEAT_MS * 1e-3 * patience)
         self._faults = BusFaults(name)
@@ -136,19 +134,20 @@ class Cia406Encoders:
         )
 
     def read(self, timeout_s: float) -> Block:
-        deadline_s = self._clock.now_s() + timeout_s
+        now_s = self._clock.now_s()
+        deadline_s = now_s + timeout_s
         with lost_as_device_lost(self.name, "reading"):
             while len(self._rows) < self._batch:
-                now_s = self._clock.now_s()
                 if now_s >= deadline_s:
                     break
-                self._keep_pace(now_s)
+                if now_s >= self._cycle.wakes_s:
+                    self._keep_pace(now_s)
                 message = self._receive(min(self._cycle.wakes_s, deadline_s) - now_s)
+                now_s = self._clock.now_s()
                 if message is None:
                     self._watch.check_heartbeats()
-                    self._add(self._cycle.give_up(self._clock.now_s()))
+                    self._add(self._cycle.give_up(now_s))
                     continue
-                now_s = self._clock.now_s()
                 self._watch.look(now_s)
                 self._take(message, now_s)
         if not self._rows:
@@ -174,7 +173,7 @@ class Cia406Encoders:
         try:
             with lost_as_device_lost(self.name, "closing"):
                 for node in self.nodes:
-                    bus.send(_nmt(NMT_PRE_OPERATIONAL, node), SEND_LIMIT_S)
+                    bus.send(nmt(NMT_PRE_OPERATIONAL, node), SEND_LIMIT_S)
         except DeviceLost:
             pass  # nobody is left to be told
         finally:
@@ -205,10 +204,11 @@ class Cia406Encoders:
         self._stop_taking()
         self._watch.forget_codes()
         with listening(network, bus, self._take):
-            self.identities = self._configured(network)
+            self.identities = configured(self.name, network, self.nodes)
             for node in self.nodes:
-                bus.send(_nmt(NMT_START, node), SEND_LIMIT_S)
+                bus.send(nmt(NMT_START, node), SEND_LIMIT_S)
         self._angles = tuple(ContinuousAngle(i.scale, *self._limits) for i in self.identities)
+        self._positions = tuple(self._position_of(identity) for identity in self.identities)
         self._node_of_pdo = {identity.pdo_id: place for place, identity in enumerate(self.identities)}
         if len(self._node_of_pdo) < len(self.nodes):
             raise DeviceRefused(f"{self.name}: two encoders send TPDO2 under one identifier; correct their 1801h:01")
@@ -217,32 +217,16 @@ class Cia406Encoders:
         self._operational = True
         self._watch.set_operational(True, start_s)
 
+    def _position_of(self, identity: EncoderIdentity) -> MappedNumber:
+        number = mapped_number(identity.mapping, objects.POSITION)
+        if number is None:
+            raise DeviceRefused(f"{self.name}: encoder {identity.node} keeps its position (6004h) out of 1A01h")
+        return number
+
     def _stop_taking(self) -> None:
         """Positions, heartbeats and boot-ups mean nothing until the set-up is done; emergencies do."""
         self._operational = False
         self._watch.set_operational(False, self._clock.now_s())
-
-    def _configured(self, network: canopen.Network) -> tuple[EncoderIdentity, ...]:
-        """All missing nodes are named in one error, not one after the other.
-
-        The nodes are asked side by side, a thread each until all are done: one after the other six take six times as
-        long, which with a slow adapter is more than a second.
-        """
-        encoders: list[EncoderObjects] = []
-        for node in self.nodes:
-            remote = network.add_node(canopen.RemoteNode(node, canopen.ObjectDictionary()))
-            remote.nmt.send_command(NMT_PRE_OPERATIONAL)
-            encoders.append(EncoderObjects(self.name, node, remote))
-        with ThreadPoolExecutor(len(encoders)) as side_by_side:
-            answered = list(side_by_side.map(_answers, encoders))
-        missing = [encoder.number for encoder, there in zip(encoders, answered, strict=True) if not there]
-        if missing:
-            raise DeviceStale(
-                f"{self.name}: no answer from encoder node {', '.join(map(str, missing))} of {len(self.nodes)}; "
-                "check power, node numbers, bit rate and bus termination"
-            )
-        with ThreadPoolExecutor(len(encoders)) as side_by_side:
-            return tuple(side_by_side.map(configure, encoders))
 
     # --- streaming
 
@@ -254,7 +238,7 @@ class Cia406Encoders:
 
     def _receive(self, timeout_s: float) -> can.Message | None:
         try:
-            return self._connected().recv(max(timeout_s, 0.0))
+            return (self._bus or self._connected()).recv(timeout_s if timeout_s > 0.0 else 0.0)
         except (ValueError, IndexError):  # python-can's parser on a damaged line of a serial adapter
             self._bad_lines += 1
             return None
@@ -268,12 +252,12 @@ class Cia406Encoders:
             return
         place = self._node_of_pdo.get(message.arbitration_id)
         if self._operational and place is not None:
-            self._take_position(place, bytes(message.data), at_s)
+            self._take_position(place, message.data, at_s)
             return
         self._watch.take(message.arbitration_id, bytes(message.data), at_s)
 
-    def _take_position(self, place: int, data: bytes, now_s: float) -> None:
-        units = extract(self.identities[place].mapping, data, objects.POSITION)
+    def _take_position(self, place: int, data: bytes | bytearray, now_s: float) -> None:
+        units = self._positions[place].read(data)
         if units is None:
             self._bad_lines += 1
         elif self._cycle.awaits(place):
@@ -303,21 +287,8 @@ class Cia406Encoders:
         return bus
 
 
-def _answers(encoder: EncoderObjects) -> bool:
-    """Whether the node is there; DeviceRefused when it is no encoder."""
-    try:
-        check_profile(encoder)
-    except DeviceStale:
-        return False
-    return True
-
-
 def _check(name: str, nodes: Sequence[int], sync_hz: float) -> None:
     if not 1.0 <= sync_hz <= MAX_SYNC_HZ:
         raise ValueError(f"{name}: sync_hz {sync_hz!r}; give 1 to {MAX_SYNC_HZ:g}")
     if not nodes or len(set(nodes)) != len(nodes) or not all(1 <= node <= 127 for node in nodes):
         raise ValueError(f"{name}: nodes {list(nodes)}; give different numbers from 1 to 127")
-
-
-def _nmt(command: int, node: int) -> can.Message:
-    return can.Message(arbitration_id=0, data=[command, node], is_extended_id=False)

@@ -16,6 +16,7 @@ from drivers.errors import DeviceError, DeviceLost
 
 SEND_LIMIT_S = 0.5  # an adapter that takes no frame for so long has stopped
 LISTEN_S = 0.02  # how soon the listening thread of the set-up ends when told
+STOP_S = 5.0  # for its end, on a busy host: two readers of one bus would each get half of the frames
 GONE = (can.CanError, SerialException, OSError)
 
 
@@ -85,4 +86,4 @@ def listening(network: canopen.Network, bus: can.BusABC, take: Callable[[can.Mes
             raise can.CanOperationError(str(listener.error)) from outcome
         raise
     finally:
-        notifier.stop(10 * LISTEN_S)
+        notifier.stop(STOP_S)

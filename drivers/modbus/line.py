@@ -17,6 +17,7 @@ from pymodbus.exceptions import ConnectionException, ModbusException
 
 from drivers.errors import DeviceError, DeviceLost, DeviceRefused, DeviceStale
 from drivers.modbus.register import INPUT
+from drivers.transports.serial_port import find_port
 
 TIMEOUT_S = 0.25  # of one try; controllers answer within their cycle, some milliseconds; a line of 9600 baud in 0.1 s
 RETRIES = 2
@@ -30,6 +31,7 @@ EXCEPTIONS = {  # Modbus Application Protocol V1.1b3, section 7
     10: "gateway path unavailable",
     11: "gateway target does not respond",
 }
+PARITIES = {"none": serial.PARITY_NONE, "even": serial.PARITY_EVEN, "odd": serial.PARITY_ODD}
 GONE = (ConnectionException, serial.SerialException, OSError)
 logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # it logs what is raised below as well
 
@@ -47,13 +49,23 @@ class TcpAddress:
 
 @dataclass(frozen=True)
 class RtuAddress:
-    """A Modbus RTU line; 8 data bits, no parity, 1 stop bit."""
+    """A Modbus RTU line; 8 data bits. `serial_number` of the adapter's USB plug stands in place of its path.
 
-    serial_port: str
+    The specification's own is even parity and 1 stop bit, or none and 2 (Modbus over Serial Line V1.02, 2.5.1).
+    """
+
+    serial_port: str | None = None
     baud: int = 115_200
+    parity: str = "none"
+    stop_bits: int = 1
+    serial_number: str | None = None
 
     def __str__(self) -> str:
-        return self.serial_port
+        return self.serial_port or f"the adapter {self.serial_number}"
+
+    def port(self) -> str:
+        """Its path at this moment. DeviceLost when no plug has the serial number."""
+        return self.serial_port if self.serial_port is not None else find_port(self.serial_number or "")
 
 
 class Client(Protocol):
@@ -124,8 +136,15 @@ class ModbusLine:
         match self._address:
             case TcpAddress(host, port):
                 return ModbusTcpClient(host, port=port, timeout=TIMEOUT_S, retries=RETRIES)
-            case RtuAddress(port, baud):
-                return ModbusSerialClient(port, baudrate=baud, timeout=TIMEOUT_S, retries=RETRIES)
+            case RtuAddress() as rtu:
+                return ModbusSerialClient(
+                    rtu.port(),
+                    baudrate=rtu.baud,
+                    parity=PARITIES[rtu.parity],
+                    stopbits=rtu.stop_bits,
+                    timeout=TIMEOUT_S,
+                    retries=RETRIES,
+                )
 
     def _checked(self, answer: Any, what: str) -> Any:
         if answer.isError():
@@ -156,7 +175,7 @@ class ModbusLine:
             self._close()
             raise DeviceStale(
                 f"{self.place}: {what}: no good answer in {RETRIES + 1} tries of {TIMEOUT_S:.3g} s ({error}); "
-                "check unit number, baud rate and cable"
+                "check unit number, baud rate, parity and cable"
             ) from error
 
     def _close(self) -> None:

@@ -5,8 +5,9 @@ read `round_trip_s` apart at most. One thread uses it at a time, except `close`.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from drivers.device import Block, Channel
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale, WireError
 from drivers.psd_daq.messages import FaceIdentity, Identity
 from drivers.psd_faces import FaceKind
-from drivers.psd_kpa101.messages import FULL_COUNT, FULL_SCALE_V, Info, Readings
+from drivers.psd_kpa101.messages import FULL_COUNT, FULL_SCALE_V, FULL_SUM_COUNT, Info, Readings
 from drivers.psd_kpa101.unit import Kpa101Unit
 from drivers.psd_kpa101.wiring import HEADS, Wiring, currents, flags
 from drivers.transports.transport import Transport
@@ -25,6 +26,7 @@ BAUD = 115_200
 MIN_RATE_HZ, MAX_RATE_HZ = 1.0, 400.0  # a question and its answer are 24 bytes: 480 a second fill the line
 REPLY_S = 0.1  # as long as 48 readings take: a reply that late is given up
 BATCH_S = 0.02  # rows gathered in one block; more only delays a reader
+DIFFERENCES, SUMS = "difference_counts", "sum_counts"
 OpenLine = Callable[[], Transport]
 
 
@@ -53,10 +55,12 @@ class _Row:
 
 
 class Kpa101Pair:
-    """A `drivers.device.Device`. Channels: photocurrent_a (8,), flags, counts (6,), round_trip_s (2,).
+    """A `drivers.device.Device`. Channels: photocurrent_a (8,), flags, difference_counts (4,), sum_counts (2,),
+    round_trip_s (2,).
 
-    `counts` are x, y, sum of unit 1, then of unit 2, as sent; `photocurrent_a` are corner currents with the same
-    differences and sum, four for each face (see `wiring`), so that all that reads a DAQ box reads a pair of units.
+    Counts are as sent: x, y of unit 1, then of unit 2; each unit's sum, which has a scale of its own. `photocurrent_a`
+    are corner currents with the same differences and sum, four for each face (see `wiring`), so that all that reads a
+    DAQ box reads a pair of units.
     """
 
     def __init__(
@@ -113,7 +117,8 @@ class Kpa101Pair:
         return (
             Channel("photocurrent_a", "A", (8,), FULL_SCALE_V / transimpedance_v_a, count_a),
             Channel("flags", ""),
-            Channel("counts", "", (6,), float(FULL_COUNT), 1.0),
+            Channel(DIFFERENCES, "", (4,), float(FULL_COUNT), 1.0),
+            Channel(SUMS, "", (2,), float(FULL_SUM_COUNT), 1.0),
             Channel("round_trip_s", "s", (2,)),
         )
 
@@ -175,7 +180,8 @@ class Kpa101Pair:
             values={
                 "photocurrent_a": np.concatenate(current_a, axis=1),
                 "flags": both_flags,
-                "counts": counts.reshape(-1, 6).astype(np.int32),
+                DIFFERENCES: counts[:, :, :2].reshape(-1, 4).astype(np.int32),
+                SUMS: counts[:, :, 2].astype(np.int32),
                 "round_trip_s": np.array([row.round_trip_s for row in rows]),
             },
         )
@@ -218,3 +224,11 @@ class Kpa101Pair:
         return DeviceStale(
             f"{self.name}: no reading of both units within {timeout_s:g} s; check power and cables of both"
         )
+
+
+def counts_of(values: Mapping[str, NDArray[Any]], unit: int) -> NDArray[np.int64] | None:
+    """x, y, sum (sample, 3) of unit 1 or 2 as sent, from the values of a block; None when it is of no KPA101."""
+    if DIFFERENCES not in values:
+        return None
+    pair = values[DIFFERENCES][:, 2 * unit - 2 : 2 * unit]
+    return np.column_stack([pair, values[SUMS][:, unit - 1]]).astype(np.int64)

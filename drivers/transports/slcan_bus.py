@@ -17,10 +17,10 @@ import can
 from can.exceptions import error_check
 from can.interfaces.slcan import slcanBus
 
-_ACKNOWLEDGED = ("\r", "z\r", "Z\r")  # LAWICEL CANUSB manual, version 1.0D: command done, frame taken
-_LINE = re.compile(r"[^\r\a]*[\r\a]")
-_CLASSIC = re.compile(r"t([0-9A-Fa-f]{3})([0-8])([0-9A-Fa-f]*)\r")
+_ACKNOWLEDGED = ("", "z", "Z")  # LAWICEL CANUSB manual, version 1.0D: command done, frame taken
+_CLASSIC = re.compile(r"t([0-9A-Fa-f]{3})([0-8])([0-9A-Fa-f]*)")
 READ_BYTES = 4096  # what a port holds back
+NO_STAMP = 0.0  # such adapters send none; python-can puts the time of this program there, which is no adapter's
 LONGEST_LINE = 256  # a frame of CAN FD takes 139; a line without an end is junk, and may not fill the memory
 
 
@@ -51,9 +51,12 @@ class BlockSlcanBus(slcanBus):
         if not self._lines:
             return None
         message = None if self._filters else _classic(self._lines[0])
-        if message is None:  # a rarer kind, or junk: python-can's own parser decides
-            return super().recv(timeout)
-        self._lines.popleft()
+        if message is not None:
+            self._lines.popleft()
+            return message
+        message = super().recv(timeout)  # a rarer kind, or junk: python-can's own parser decides
+        if message is not None:
+            message.timestamp = NO_STAMP
         return message
 
     def flush(self) -> None:
@@ -61,9 +64,17 @@ class BlockSlcanBus(slcanBus):
         self._lines.clear()
         self._begun = ""
 
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        """As python-can's; a plain frame is written without its detours."""
+        if msg.is_extended_id or msg.is_remote_frame or msg.is_fd:
+            super().send(msg, timeout)
+        else:
+            self._put(b"t%03X%d%s\r" % (msg.arbitration_id, msg.dlc, msg.data.hex().upper().encode()), timeout)
+
     def _read(self, timeout: float | None) -> str | None:
+        """A line with its end, as python-can wants it."""
         self._fill(timeout)
-        return self._lines.popleft() if self._lines else None
+        return f"{self._lines.popleft()}\r" if self._lines else None
 
     def _fill(self, timeout: float | None) -> None:
         """Wait for a whole line, unless one is there."""
@@ -92,16 +103,26 @@ class BlockSlcanBus(slcanBus):
         return data
 
     def _write(self, string: str) -> None:
+        self._put(string.encode() + self.LINE_TERMINATOR, self.serialPortOrig.write_timeout)
+
+    def _put(self, line: bytes, timeout: float | None) -> None:
         """Without waiting until the last bit has left, which says nothing of whether the adapter could send it."""
-        line = string.encode() + self.LINE_TERMINATOR
-        with error_check("Could not write to serial device"):
+        try:
             descriptor = self._descriptor()
+            taken = 0 if descriptor is None else os.write(descriptor, line)
+        except BlockingIOError:
             taken = 0
-            if descriptor is not None:
-                with suppress(BlockingIOError):
-                    taken = os.write(descriptor, line)
-            if taken < len(line):
-                self.serialPortOrig.write(line[taken:])
+        except OSError as error:
+            raise can.CanOperationError("Could not write to serial device") from error
+        if taken < len(line):
+            self._put_rest(line[taken:], timeout)
+
+    def _put_rest(self, rest: bytes, timeout: float | None) -> None:
+        port = self.serialPortOrig
+        with error_check("Could not write to serial device"):
+            if port.write_timeout != timeout:
+                port.write_timeout = timeout
+            port.write(rest)
 
     def _descriptor(self) -> int | None:
         """None where a port has none, or is closed."""
@@ -111,20 +132,19 @@ class BlockSlcanBus(slcanBus):
             return None
 
     def _split(self, data: bytes) -> None:
-        """Whole lines, with their ends, to `_lines`; acknowledgements say nothing that anybody waits for."""
-        text = self._begun + data.decode("latin-1")
-        end = 0
-        for found in _LINE.finditer(text):
-            end = found.end()
-            if found[0] not in _ACKNOWLEDGED:
-                self._lines.append(found[0])
-        self._begun = text[end : end + LONGEST_LINE]
+        """Whole lines to `_lines`; acknowledgements and refusals say nothing that anybody waits for."""
+        *lines, begun = (self._begun + data.decode("latin-1")).replace("\a", "\r").split("\r")
+        self._lines.extend([line for line in lines if line not in _ACKNOWLEDGED])
+        self._begun = begun[:LONGEST_LINE]
 
 
 def _classic(line: str) -> can.Message | None:
     """A data frame with an identifier of 11 bits, "tIIILDD..", which nearly all are; None for all else."""
     found = _CLASSIC.fullmatch(line)
-    if found is None or len(found[3]) != 2 * int(found[2]):
+    if found is None:
         return None
-    data = bytes.fromhex(found[3])
-    return can.Message(time.time(), int(found[1], 16), False, dlc=len(data), data=data)
+    number, length, digits = found.groups()
+    size = int(length)
+    if len(digits) != 2 * size:
+        return None
+    return can.Message(NO_STAMP, int(number, 16), False, dlc=size, data=bytearray.fromhex(digits))

@@ -24,7 +24,7 @@ class Setting:
     most: float
 
 
-@dataclass
+@dataclass(eq=False)  # two of the same kind are two
 class Fault:
     """An active fault. `left`: strikes until it clears itself, None for ever."""
 

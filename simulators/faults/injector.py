@@ -96,7 +96,7 @@ class Injector:
 
     def _end(self, fault: Fault) -> None:
         if fault.kind in STATE_KINDS:
-            STATE_KINDS[fault.kind].end(self._target)
+            STATE_KINDS[fault.kind].end(self._target, fault)
 
 
 def _checked(kind: str, given: Mapping[str, Any], known: Mapping[str, Setting]) -> dict[str, float]:

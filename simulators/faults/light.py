@@ -3,7 +3,8 @@
 What it does not imitate: a spot that leaves the face slowly, or one face alone.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Hashable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -20,15 +21,23 @@ class LitWorld(Protocol):
 
 
 class DisturbedLight:
-    """A world as the PSD electronics see it."""
+    """A world as the PSD electronics see it. Several disturbances multiply; each is mended by itself."""
 
     def __init__(self, world: LitWorld) -> None:
         self._world = world
-        self.gain = 1.0  # of the laser's power; 0 is a spot that has left both faces
+        self._gains: dict[Hashable, float] = {}  # whose -> of the laser's power
+
+    def disturb(self, whose: Hashable, gain: float) -> None:
+        """`gain` of the laser's power; 0 is a spot that has left both faces."""
+        self._gains[whose] = gain
+
+    def mend(self, whose: Hashable) -> None:
+        """As if that one had not been."""
+        self._gains.pop(whose, None)
 
     def photocurrents_a(self, times_s: Sequence[float] | Floats) -> Floats:
         """(sample, 8) A, as the world's `photocurrents_a`."""
-        return self.gain * self._world.photocurrents_a(times_s)
+        return math.prod(self._gains.values()) * self._world.photocurrents_a(times_s)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._world, name)

@@ -14,7 +14,7 @@ class StateFault:
 
     name: str
     begin: Callable[[Target, Fault, float], None]
-    end: Callable[[Target], None]
+    end: Callable[[Target, Fault], None]
     settings: Mapping[str, Setting] = field(default_factory=dict[str, Setting])
 
 
@@ -31,23 +31,23 @@ def _light_of(target: Target) -> DisturbedLight:
 
 
 def _disturb_clock(target: Target, fault: Fault, t_s: float) -> None:
-    _clock_of(target).disturb(fault.settings["step_s"], fault.settings["drift"], t_s)
+    _clock_of(target).disturb(fault, fault.settings["step_s"], fault.settings["drift"], t_s)
 
 
-def _mend_clock(target: Target) -> None:
-    _clock_of(target).mend()
+def _mend_clock(target: Target, fault: Fault) -> None:
+    _clock_of(target).mend(fault)
 
 
 def _blind(target: Target, fault: Fault, t_s: float) -> None:
-    _light_of(target).gain = BLINDING_GAIN
+    _light_of(target).disturb(fault, BLINDING_GAIN)
 
 
 def _spot_off(target: Target, fault: Fault, t_s: float) -> None:
-    _light_of(target).gain = 0.0
+    _light_of(target).disturb(fault, 0.0)
 
 
-def _mend_light(target: Target) -> None:
-    _light_of(target).gain = 1.0
+def _mend_light(target: Target, fault: Fault) -> None:
+    _light_of(target).mend(fault)
 
 
 STATE_FAULTS = (

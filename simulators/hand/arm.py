@@ -5,14 +5,13 @@ hand's force turns it beyond (the structure between disc and link gives way: com
 Does not imitate: weight (measuring arms are balanced), bending tubes, heat.
 """
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 
 from simulators.conceal.kinematics import Arm, Frames, forward, jacobian
 from simulators.defects.encoder_disc import RADIUS_M
-from simulators.defects.rigid import moved, turned
+from simulators.defects.rigid import moved
+from simulators.hand.bearings import Bearings
 from simulators.hand.rig import HandRig
 from simulators.hand.truth import HandTruth
 
@@ -43,9 +42,7 @@ class TrueArm:
             gravity_m_s2=np.zeros(3),
         )
         self._tool_m = np.array(truth.tool_point_m)
-        self._lean_rad = np.array([axis.lean_rad for axis in truth.axes])
-        self._rate = np.array([axis.cycles - 1 for axis in truth.axes])
-        self._towards_rad = np.array([axis.bearing_rad for axis in truth.axes])
+        self._bearings = Bearings(truth.axes, truth.runouts)
         self._eccentric_m = np.array([disc.eccentricity_m for disc in truth.discs])
         self._bearing_rad = np.array([disc.bearing_rad for disc in truth.discs])
         self._lines_rad = np.array([disc.graduation_rad for disc in truth.discs])
@@ -96,10 +93,10 @@ class TrueArm:
 
     def _frames(self, shaft_rad: Floats) -> Frames:
         joint_rad = shaft_rad + self._arm.zero_rad
-        frames = forward(self._arm, joint_rad, links=self._leaning(joint_rad))
+        frames = forward(self._arm, joint_rad, links=self._bearings.motions(joint_rad))
         for _ in range(BALANCE_STEPS if self._yields_rad_n > 0.0 else 0):
             extra_rad = self._yielding_rad(frames)
-            frames = forward(self._arm, joint_rad + extra_rad, links=self._leaning(joint_rad + extra_rad))
+            frames = forward(self._arm, joint_rad + extra_rad, links=self._bearings.motions(joint_rad + extra_rad))
         return frames
 
     def _yielding_rad(self, frames: Frames) -> Floats:
@@ -108,12 +105,3 @@ class TrueArm:
         push = np.broadcast_to(frames.flange[:, np.newaxis, :3, 2], levers_m.shape)
         moment = np.cross(levers_m, push)
         return self._yields_rad_n * np.einsum("rnk,rnk->rn", frames.turning[:, :, :3, 2], moment)
-
-    def _leaning(self, joint_rad: Floats) -> Mapping[int, Floats]:
-        """Motions by link: joint i's axis leans at the start of the link behind it (defects/worn_bearing.py)."""
-        if not self._lean_rad.any():
-            return {}
-        towards_rad = self._rate * joint_rad + self._towards_rad
-        lean = np.stack((np.cos(towards_rad), np.sin(towards_rad), np.zeros_like(towards_rad)), axis=2)
-        motion = turned(self._lean_rad[:, np.newaxis] * lean)
-        return {index + 1: motion[:, index] for index in range(self.n_joints)}

@@ -18,7 +18,8 @@ Floats = NDArray[np.float64]
 SCHEMA = 1
 KIND = "hand-held-arm"
 LINES = 256  # groups of graduation lines a turn: a head looks at some hundred lines at a time and averages them
-CYCLES = (-3, -2, -1, 2, 3)  # error motions of an axis a turn, see simulators/defects/worn_bearing.py
+CYCLES = (-3, -2, -1, 2, 3)  # error motions of an axis a turn, see simulators/hand/bearings.py
+AXIAL_CYCLES = (1, 2, 3)
 
 
 class TrueDisc(msgspec.Struct, frozen=True):
@@ -35,6 +36,17 @@ class TrueAxis(msgspec.Struct, frozen=True):
     lean_rad: float
     cycles: int
     bearing_rad: float
+
+
+class TrueRunout(msgspec.Struct, frozen=True):
+    """How far one axis stands aside, and goes to and fro along itself, while it turns."""
+
+    radial_m: float
+    radial_cycles: int
+    radial_bearing_rad: float
+    axial_m: float
+    axial_cycles: int
+    axial_bearing_rad: float
 
 
 class TruePoint(msgspec.Struct, frozen=True):
@@ -61,6 +73,7 @@ class HandTruth(msgspec.Struct, frozen=True):
     joint_zero_rad: tuple[float, ...]
     discs: tuple[TrueDisc, ...]
     axes: tuple[TrueAxis, ...]
+    runouts: tuple[TrueRunout, ...]
     tool_point_m: Vector
     seats: tuple[TruePoint, ...]
     bars: tuple[TrueBar, ...]
@@ -74,7 +87,8 @@ def draw_hand_truth(rig: HandRig, seed: int) -> HandTruth:
     """The truth that belongs to a rig and a seed; the same two always give the same. WorldError for a seed below 0."""
     if seed < 0:
         raise WorldError(f"seed {seed}; give a whole number from 0 on")
-    part, zero, disc, axis, place = (np.random.default_rng(s) for s in np.random.SeedSequence([seed, 6]).spawn(5))
+    streams = np.random.SeedSequence([seed, 6]).spawn(6)
+    part, zero, disc, axis, place, runout = (np.random.default_rng(s) for s in streams)
     sigma, n = rig.emulation, len(rig.arm.joint)
     drawn = (*rig.arm.joint, rig.arm.flange)
     return HandTruth(
@@ -83,6 +97,7 @@ def draw_hand_truth(rig: HandRig, seed: int) -> HandTruth:
         joint_zero_rad=tuple((sigma.joint_zero_max_rad * zero.uniform(-1.0, 1.0, n)).tolist()),
         discs=tuple(_disc(sigma, disc) for _ in range(n)),
         axes=tuple(_axis(sigma, axis) for _ in range(n)),
+        runouts=tuple(_runout(sigma, runout) for _ in range(n)),
         tool_point_m=rig.tool.point_m,
         seats=tuple(TruePoint(s.id, _off(s.origin_m, sigma, place)) for s in rig.seat),
         bars=_bars(rig, place),
@@ -108,6 +123,20 @@ def _disc(sigma: Emulation, rng: np.random.Generator) -> TrueDisc:
 def _axis(sigma: Emulation, rng: np.random.Generator) -> TrueAxis:
     lean_rad = abs(sigma.axis_wobble_rad * rng.standard_normal())
     return TrueAxis(float(lean_rad), int(rng.choice(CYCLES)), float(rng.uniform(-np.pi, np.pi)))
+
+
+def _runout(sigma: Emulation, rng: np.random.Generator) -> TrueRunout:
+    radial_m, axial_m = (abs(float(x)) for x in rng.standard_normal(2))
+    radial_rad, axial_rad = (float(x) for x in rng.uniform(-np.pi, np.pi, 2))
+    radial_cycles, axial_cycles = int(rng.choice(CYCLES)), int(rng.choice(AXIAL_CYCLES))
+    return TrueRunout(
+        sigma.radial_runout_m * radial_m,
+        radial_cycles,
+        radial_rad,
+        sigma.axial_runout_m * axial_m,
+        axial_cycles,
+        axial_rad,
+    )
 
 
 def _off(believed_m: Vector, sigma: Emulation, rng: np.random.Generator) -> Vector:

@@ -77,13 +77,13 @@ class ModbusController:
 
 
 def build(world: ArmWorld, rig: Mapping[str, Any], host: str | None, *, unlock_delay_s: float = 0.0) -> Bench:
-    """Modbus TCP on `host`, or RTU when the rig names a serial port. ValueError when the rig's arm is none to drive."""
+    """Modbus TCP on `host`, or RTU when the rig names a serial line. ValueError when the rig's arm is none to drive."""
     device = rig["devices"]["robot"]
     payload_kg = float(rig.get("tool", {}).get("mass_kg", 0.0))
     controller = ModbusController(arm_controller(world, rig, unlock_delay_s=unlock_delay_s), device, payload_kg)
-    if "serial_port" in device:
+    if "serial_port" in device or "serial_number" in device:
         wire = RtuWire(controller.memory, int(device.get("unit", 1)), lambda: controller.silent)
-        port = SerialPort("modbus", wire, str(device["serial_port"]))
+        port = SerialPort("modbus", wire, device.get("serial_port"))
     else:
         number = int(device.get("port", DEFAULT_PORT))
         port = TcpPort("modbus", str(host), number, controller.accept, controller.closed)

@@ -4,9 +4,11 @@ import threading
 
 import can
 import numpy as np
+import pytest
 
 from acquisition.frame_log import BLOCK_S, FrameLog
 from acquisition.recording.can_frames import FrameFlag
+from acquisition.recording.errors import RecordingError
 
 
 class Clock:
@@ -21,7 +23,10 @@ class Clock:
 
 
 class Kept:
-    def __init__(self) -> None:
+    """One stream of a recording."""
+
+    def __init__(self, width: int = 8) -> None:
+        self.width = width
         self.sequence: list[int] = []
         self.ids: list[int] = []
         self.flags: list[int] = []
@@ -34,16 +39,33 @@ class Kept:
         self.sequence += sequence.tolist()
         self.ids += values["can_id"].tolist()
         self.flags += values["flags"].tolist()
-        assert values["data"].shape == (len(host_s), 8)
+        assert values["data"].shape == (len(host_s), self.width)
+
+
+class Recorded:
+    """A recording; on a full disk it takes nothing."""
+
+    def __init__(self) -> None:
+        self.streams: dict[str, Kept] = {}
+
+    def stream(self, name, channels, viewer=None) -> Kept:
+        self.streams[name] = Kept(channels[-1].shape[0])
+        return self.streams[name]
+
+
+@pytest.fixture
+def recorded() -> Recorded:
+    return Recorded()
 
 
 def frame(number: int, **kind: bool) -> can.Message:
     return can.Message(timestamp=5.0, arbitration_id=number, is_extended_id=False, data=bytes([number % 256]), **kind)
 
 
-def test_frames_wait_for_a_block_and_are_written_in_order() -> None:
-    clock, kept = Clock(), Kept()
-    log = FrameLog(kept, clock, 8)
+def test_frames_wait_for_a_block_and_are_written_in_order(recorded) -> None:
+    clock = Clock()
+    log = FrameLog(recorded, clock)
+    kept = recorded.streams["can"]
     for number in range(100):
         log.hear(frame(number), number % 7 == 0)
         clock.s += 0.001
@@ -56,17 +78,44 @@ def test_frames_wait_for_a_block_and_are_written_in_order() -> None:
     assert log.count == 100
 
 
-def test_error_frames_are_counted() -> None:
-    log = FrameLog(Kept(), Clock(), 8)
+def test_long_frames_of_can_fd_stand_beside_the_others_and_cost_none_of_them(recorded) -> None:
+    log = FrameLog(recorded, Clock())
+    for number in range(6):
+        log.hear(frame(number), False)
+        log.hear(can.Message(arbitration_id=number, is_fd=True, data=bytes(12), dlc=12), False)
+    log.flush()
+    assert (recorded.streams["can"].ids, recorded.streams["can-fd"].ids) == ([*range(6)], [*range(6)])
+    assert recorded.streams["can-fd"].sequence == [*range(6)]
+    assert recorded.streams["can-fd"].width == 64
+    assert log.count == 12
+
+
+def test_a_recording_that_failed_is_told_by_flush_and_not_to_the_bus(recorded) -> None:
+    clock = Clock()
+    log = FrameLog(recorded, clock)
+
+    def refuse(*_: object) -> None:
+        raise RecordingError("disk full")
+
+    recorded.streams["can"].append = refuse
+    log.hear(frame(1), False)
+    clock.s += 1.0
+    log.hear(frame(2), False)
+    with pytest.raises(RecordingError, match="disk full"):
+        log.flush()
+
+
+def test_error_frames_are_counted(recorded) -> None:
+    log = FrameLog(recorded, Clock())
     log.hear(frame(1, is_error_frame=True), False)
     log.hear(frame(2), False)
     log.flush()
     assert (log.count, log.errors) == (2, 1)
 
 
-def test_two_threads_lose_and_double_nothing() -> None:
-    kept = Kept()
-    log = FrameLog(kept, Clock(), 8)
+def test_two_threads_lose_and_double_nothing(recorded) -> None:
+    log = FrameLog(recorded, Clock())
+    kept = recorded.streams["can"]
 
     def hear(first: int) -> None:
         for number in range(first, first + 1000):

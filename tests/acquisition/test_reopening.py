@@ -21,6 +21,7 @@ class Scripted:
     def __init__(self, reads: list[object], connects: list[object] | None = None) -> None:
         self._reads, self._connects = list(reads), list(connects or [])
         self.channels = (ANGLE,)
+        self.serial_number = ""
         self.tried = threading.Event()
         self.closed = 0
 
@@ -31,6 +32,8 @@ class Scripted:
             raise what
         if isinstance(what, Channel):
             self.channels = (what,)
+        if isinstance(what, str):
+            self.serial_number = what
 
     def describe(self) -> tuple[Channel, ...]:
         return self.channels
@@ -58,6 +61,7 @@ class Told:
             lambda why, _: self.lost.append(str(why)),
             lambda from_s, to_s: self.back.append((from_s, to_s)),
             retry_s=0.0,
+            who=lambda: (device.serial_number,),
         )
         reopening.connect()
         return reopening
@@ -82,6 +86,12 @@ def test_at_the_start_it_must_be_there() -> None:
 def test_another_device_in_its_place_is_refused() -> None:
     device = Told().attach(Scripted([DeviceLost("unplugged")], [None, Channel("position_rad", "rad", (3,))]))
     with pytest.raises(DeviceRefused, match="came back as another device"):
+        device.read(0.1)
+
+
+def test_another_one_of_the_same_type_is_refused() -> None:
+    device = Told().attach(Scripted([DeviceLost("unplugged")], ["number 17", "number 18"]))
+    with pytest.raises(DeviceRefused, match="another device, number 18 instead of number 17"):
         device.read(0.1)
 
 

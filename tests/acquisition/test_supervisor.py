@@ -5,6 +5,7 @@ import threading
 import numpy as np
 import pytest
 
+from acquisition.errors import StoppedError
 from acquisition.guarded import Guarded
 from acquisition.supervisor import Supervisor
 from drivers.errors import DeviceError, DeviceLost, DeviceRefused, DeviceStale, WireError
@@ -44,6 +45,28 @@ def test_an_arm_that_takes_no_stop_is_no_news_to_the_reader_thread() -> None:
     supervisor = Supervisor(refuse)
     supervisor.failed(DeviceStale("psd: silent"))
     with pytest.raises(DeviceStale):
+        supervisor.check()
+
+
+def test_a_person_holds_the_arm_whatever_was_before() -> None:
+    held: list[int] = []
+    supervisor = Supervisor(lambda: held.append(1))
+    supervisor.stop(StoppedError("STOP"))
+    with pytest.raises(StoppedError):
+        supervisor.check()
+    supervisor.failed(DeviceLost("psd: gone"))
+    supervisor.stop(StoppedError("STOP again"))
+    assert held == [1, 1]
+
+
+def test_a_stop_that_cannot_be_delivered_is_told_and_ends_the_session_all_the_same() -> None:
+    def refuse() -> None:
+        raise DeviceLost("no way to the controller")
+
+    supervisor = Supervisor(refuse)
+    with pytest.raises(DeviceLost):
+        supervisor.stop(StoppedError("STOP"))
+    with pytest.raises(StoppedError):
         supervisor.check()
 
 

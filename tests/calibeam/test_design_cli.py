@@ -56,6 +56,18 @@ def test_a_robot_is_simulated_the_same_with_any_number_of_workers(capsys):
     assert len(told[0]["sources"]) == 12
 
 
+def test_an_error_that_moves_nothing_has_no_worst_posture_and_no_share(tmp_path, capsys):
+    """The reference arm's ball is the origin of its last frame: a turn of that frame does nothing."""
+    options = ["--only", "link6.roll", "--arms", "1000", "--poses", "2", "--out", str(tmp_path)]
+    assert run(["simulate-errors", str(ARM), *options]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "no worst posture: none of these errors moves the probe" in said
+    assert "Sobol indices over 6 of them" in said
+    told = json.loads((tmp_path / "errors.json").read_text())
+    assert (told["worst"], told["sobol_poses"]) == ([], 6)
+    assert (told["sources"][0]["share_first"], told["sources"][0]["share_total"]) == (0.0, 0.0)
+
+
 def test_errors_without_a_size_are_refused(capsys):
     assert run(["simulate-errors", str(ROBOT), "--only", "heat.*"]) == 1
     assert "no error to simulate" in " ".join(capsys.readouterr().err.split())

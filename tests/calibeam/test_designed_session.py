@@ -3,41 +3,42 @@
 from pathlib import Path
 
 import numpy as np
+from rich.console import Console
 
 from acquisition.plan import PlanOptions
-from acquisition.planned_session import PlannedSession
-from acquisition.recording.pose_plan import PosePlan
+from acquisition.recording.pose_plan import PosePlan, read_pose_plan, write_pose_plan
+from acquisition.recording.read import read
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
+from acquisition.recording.samples import Samples
+from acquisition.recording.writer import RecordingWriter
 from calibeam.direct import direct_bench
-from calibeam.learner import FittedLearner
 from calibeam.pose_design.reachable import candidates_of
+from calibeam.recorded import progress_bar, record_session
 from calibrate.pose_design.plan_of import blocks_of, plan_of, taken
+from drivers.clock import SystemClock
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
 
 
-class Silent:
-    def event(self, name: str, data: object) -> None:
-        pass
-
-    def sample(self, sample: object) -> None:
-        pass
-
-
-def test_a_repeated_pose_reaches_the_samples_as_one():
+def test_a_repeated_pose_reaches_the_recording_as_one(tmp_path):
+    """As `calibeam design` writes the plan and `calibeam session --plan` reads and takes it; without wires."""
     rig = load_rig(RIG)
     candidates = candidates_of(rig, 2, np.random.default_rng(1))
     first_place = np.flatnonzero(candidates.placement == 1)
     in_time = np.concatenate(blocks_of(candidates, first_place))
     plan = plan_of(rig.name, candidates, taken(candidates, in_time, 1, np.random.default_rng(2)), ())
-    summary = _session(rig, plan)
-    assert (len(summary.samples), summary.skipped) == (5, 0)
-    twice = [sample for sample in summary.samples if sample.repeat == 1]
+    write_pose_plan(tmp_path / "plan.toml", plan)
+    samples = _session(rig, read_pose_plan(tmp_path / "plan.toml", rig), tmp_path / "r.mcap")
+    assert len(samples) == 5
+    twice = np.flatnonzero(samples.integers("repeat", 0) == 1)
     assert len(twice) == 2
-    assert np.all(twice[0].approach == -twice[1].approach)
-    assert twice[0].row()["repeat"] == 1
+    approach = np.array([samples.column(f"approach{i}")[twice] for i in range(1, 7)])
+    np.testing.assert_array_equal(approach[:, 0], -approach[:, 1])
 
 
-def _session(rig, plan: PosePlan):
-    bench = direct_bench(rig, plain_rig(rig_text(RIG), str(RIG)), seed=4)
-    return PlannedSession(bench, FittedLearner(rig), Silent(), PlanOptions(), np.array(rig.motion.home_rad)).run(plan)
+def _session(rig, plan: PosePlan, path: Path) -> Samples:
+    bench, clock = direct_bench(rig, plain_rig(rig_text(RIG), str(RIG)), seed=4), SystemClock()
+    with RecordingWriter(path, rig_text=rig_text(RIG), software="test", clock=clock) as writer:
+        summary = record_session(bench, rig, writer, PlanOptions(), clock, progress_bar(Console(quiet=True)), plan)
+    assert summary.skipped == 0
+    return read(path).samples

@@ -92,9 +92,10 @@ def test_a_session_folder_becomes_a_model_that_predicts_unseen_poses_by_itself(f
     np.testing.assert_allclose(residual, found - seen, atol=1e-12)
 
 
-def test_samples_without_observations_are_predicted_too(folder, tmp_path):
+def test_samples_without_observations_are_predicted_too(folder, tmp_path, capsys):
     model, out = tmp_path / "model.json", tmp_path / "predicted.csv"
-    assert run(["identify", str(folder), "--out", str(model)]) == 0
+    assert run(["identify", str(folder), "--out", str(model), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == json.loads(model.read_text())  # one line for scripts
     write_samples(tmp_path / "new.csv", np.zeros((4, 5)))
     assert run(["predict", str(model), str(tmp_path / "new.csv"), "--out", str(out)]) == 0
     assert [list(row) for row in rows(out)] == [["t_s", "x_m", "y_m", "z_m"]] * 4

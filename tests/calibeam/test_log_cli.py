@@ -1,5 +1,6 @@
 """Encoder logging over a real wire: what is kept, how it ends, how it goes on."""
 
+import dataclasses
 import errno
 import math
 import os
@@ -12,6 +13,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
+from msgspec import structs
 
 from acquisition.recording import mcap_file
 from acquisition.recording.can_frames import FrameFlag, frames_of
@@ -20,10 +22,17 @@ from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import parse_rig
 from acquisition.recording.segments import Rotation, segments
+from calibeam import encoder_log
 from calibeam.cli import run
 from calibeam.encoder_log import EncoderLog, State
+from calibeam.encoders import names_of
+from drivers.cia406.angle import Scale
+from drivers.cia406.configuration import EncoderIdentity
+from drivers.cia406.device import Cia406Encoders
 from drivers.clock import SystemClock
-from drivers.errors import DeviceStale
+from drivers.device import Block, Channel
+from drivers.errors import DeviceRefused, DeviceStale
+from drivers.transports.can_interfaces import bus_opener
 from simulators.encoders.emulator import build
 from simulators.host.loop import Host
 
@@ -191,7 +200,58 @@ def test_encoders_that_are_not_there_leave_nothing_behind(new_log, bus: Bus, tmp
         bus.verbs["encoders.silence"](node)
     with pytest.raises(DeviceStale, match="no answer from encoder node 1, 2"):
         until(new_log(), lambda state: False)
-    assert segments(tmp_path / "log") == []
+    assert not (tmp_path / "log").exists()
+
+
+def test_a_driver_that_cannot_be_made_leaves_nothing_behind(tmp_path: Path) -> None:
+    device = parse_rig(RIG.read_text(), "rig").devices.encoders
+    too_fast = structs.replace(device, sync_hz=5000.0)
+    with pytest.raises(DeviceRefused, match="sync_hz"):
+        EncoderLog(too_fast, RIG.read_text(), tmp_path / "log", SystemClock(), Rotation(), raw=True)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_encoders_are_told_apart_by_their_serial_numbers() -> None:
+    driver = Cia406Encoders(bus_opener("virtual", "none", 1_000_000), [1])
+    one = EncoderIdentity(1, 0x20196, 5, 6, 1, 17, Scale(4096, 4096, True), 0x281, (), 0)
+    driver.identities = (one,)
+    before = names_of(driver)
+    driver.identities = (dataclasses.replace(one, error_register=1),)  # the same one, which has had a fault meanwhile
+    assert names_of(driver) == before
+    driver.identities = (dataclasses.replace(one, serial_number=18),)
+    assert names_of(driver) != before
+
+
+class Odd:
+    """Encoders of a library that once raises what nobody foresaw."""
+
+    name = "encoders"
+
+    def __init__(self) -> None:
+        self._reads = 0
+
+    def connect(self) -> None: ...
+
+    def close(self) -> None: ...
+
+    def describe(self) -> tuple[Channel, ...]:
+        return (Channel("position_rad", "rad", (6,)),)
+
+    def read(self, timeout_s: float) -> Block:
+        self._reads += 1
+        if self._reads == 2:
+            raise KeyError("1A01h")
+        number = np.array([self._reads])
+        return Block(number * 1.0, number * 1.0, number, {"position_rad": np.zeros((1, 6))})
+
+
+def test_what_a_library_raises_unforeseen_is_an_outage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(encoder_log, "encoder_driver", lambda *_: Odd())
+    device = parse_rig(RIG.read_text(), "rig").devices.encoders
+    log = EncoderLog(device, RIG.read_text(), tmp_path / "log", SystemClock(), Rotation(), raw=False)
+    until(log, lambda state: state.outages > 0 and state.away is None)
+    (lost,) = [event for event in only(tmp_path / "log").events if event.kind == "device lost"]
+    assert "KeyError: '1A01h'" in lost.detail["why"]
 
 
 def test_the_command_logs_exports_imports_recovers(

@@ -82,3 +82,5 @@ def test_the_examples_leave_plots_and_figures(tmp_path: Path) -> None:
     told = json.loads((tmp_path / "motion.json").read_text())
     assert told["joint"]["hand off its planned track at most, m"] < 3e-3  # the controller smooths over 30 ms
     assert (tmp_path / "joint.svg").stat().st_size > 10_000
+    drawn_s, said_s = ((tmp_path / name).stat().st_mtime for name in ("plan-joint.svg", "joint.svg"))
+    assert drawn_s < said_s  # the plan is drawn before the arm moves

@@ -24,7 +24,7 @@ class Standing:
 def log_of(tmp_path: Path) -> Callable[..., Path]:
     """A segment of a log: a stream of 2,000 samples of which some are left out, some at full scale."""
 
-    def made(name: str, left_out: int = 0, saturated: int = 0) -> Path:
+    def made(name: str, left_out: int = 0, saturated: int = 0, clock_s: float = 0.0) -> Path:
         folder = tmp_path / "log"
         folder.mkdir(exist_ok=True)
         number = np.delete(np.arange(2000), np.arange(500, 500 + left_out))
@@ -34,7 +34,7 @@ def log_of(tmp_path: Path) -> Callable[..., Path]:
             folder / name, rig_text=rig_text(RIG), software="test", clock=Standing(), notes={"segment": "1"}
         ) as writer:
             writer.stream("psd", (Channel("sum_v", "V", full_scale=10.0),)).append(
-                host_s, number * 1e-3, number, {"sum_v": volts}
+                host_s, clock_s + number * 1e-3, number, {"sum_v": volts}
             )
         return folder / name
 
@@ -46,6 +46,11 @@ def test_a_good_recording_is_told_with_its_rate_and_clock(log_of, capsys: pytest
     said = capsys.readouterr().out
     assert "psd: 2000 samples, 999.8 a second over 2.0 s; clock +40.0 us/s against the host" in said
     assert "nothing is wrong with it" in said
+
+
+def test_a_clock_that_is_the_hosts_own_is_not_compared_with_it(log_of, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["check", str(log_of("segment-0001.mcap", clock_s=999.999))]) == 0
+    assert "stamped by the host's clock, arrive 1.34 ms later in the median" in capsys.readouterr().out
 
 
 def test_gaps_and_saturation_fail_the_check(log_of, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,12 +1,14 @@
 """`report`: a page for a recording of any instruments, else one sentence with the right exit code."""
 
 import csv
+import json
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from calibeam.cli import run
+from calibeam.earlier import earlier_calibration
 
 RIG = """schema = 1
 name = "five-joints"
@@ -58,20 +60,15 @@ def folder(tmp_path):
     return write_folder(tmp_path / "session", 3)
 
 
-def test_a_session_of_positions_gets_its_report(folder, tmp_path, capsys):
-    out = tmp_path / "deep" / "report.html"
-    assert run(["report", str(folder), "--out", str(out)]) == 0
-    assert f"report: {out}" in capsys.readouterr().out
-    assert "misses positions that the fit has not seen by" in out.read_text()
-
-
-def test_the_report_of_a_model_is_that_of_its_own_numbers(folder, tmp_path):
-    model, out = tmp_path / "model.json", tmp_path / "report.html"
+def test_a_session_of_positions_gets_its_report_and_its_model_the_same_one(folder, tmp_path, capsys):
+    model, out, anew = tmp_path / "model.json", tmp_path / "report.html", tmp_path / "deep" / "report.html"
     assert run(["identify", str(folder), "--out", str(model)]) == 0
     assert run(["report", str(folder), "--model", str(model), "--out", str(out)]) == 0
-    anew = tmp_path / "anew.html"
+    capsys.readouterr()
     assert run(["report", str(folder), "--out", str(anew)]) == 0
+    assert f"report: {anew}" in capsys.readouterr().out
     assert out.read_text() == anew.read_text()
+    assert "misses positions that the fit has not seen by" in out.read_text()
 
 
 def test_a_model_by_a_plan_is_read_by_its_plan(folder, tmp_path):
@@ -109,3 +106,40 @@ def test_the_model_of_another_session_is_refused(folder, tmp_path, capsys):
     assert run(["identify", str(other), "--out", str(model)]) == 0
     assert run(["report", str(folder), "--model", str(model), "--out", str(tmp_path / "report.html")]) == 1
     assert "give the model of this recording" in capsys.readouterr().err
+
+
+def test_a_script_reads_verdict_numbers_and_drift_on_one_line(folder, tmp_path, capsys):
+    """Against the folder of a session, which here is the same one."""
+    session, out = tmp_path / "last-year", tmp_path / "report.html"
+    assert run(["identify", str(folder), "--out", str(session / "model.json")]) == 0
+    capsys.readouterr()
+    known = ["--model", str(session / "model.json")]
+    assert run(["report", str(folder), *known, "--against", str(session), "--out", str(out), "--json"]) == 0
+    (line,) = capsys.readouterr().out.splitlines()
+    told = json.loads(line)
+    assert (told["kind"], told["report"]) == ("calibeam-report", str(out))
+    assert told["trust"] in ("yes", "with care", "no")
+    assert told["numbers"]["now"]["value"] < 0.2 * told["numbers"]["as_drawn"]["value"]
+    assert "no drift shows" in told["drift"]
+    assert told["verdict"] in out.read_text()
+    assert 'href="#drift"' in out.read_text()
+
+
+def test_an_earlier_calibration_is_a_model_a_folder_or_a_recording(folder, tmp_path):
+    model = tmp_path / "last-year" / "model.json"
+    assert run(["identify", str(folder), "--out", str(model)]) == 0
+    by_file, by_folder, by_recording = (earlier_calibration(path) for path in (model, model.parent, folder))
+    assert by_file.model == by_folder.model
+    assert by_recording.model.chain == by_file.model.chain
+    assert (by_file.recording, by_folder.recording) == (None, None)
+    assert by_recording.recording is not None
+
+
+def test_an_arm_of_other_joints_is_not_compared(folder, tmp_path, capsys):
+    model = tmp_path / "model.json"
+    assert run(["identify", str(folder), "--out", str(model)]) == 0
+    told = json.loads(model.read_text())
+    told["rig"]["text"] = told["rig"]["text"].replace(JOINT.format(a=0.4, alpha=0.0, d=0.0), "", 1)
+    model.write_text(json.dumps(told))
+    assert run(["report", str(folder), "--against", str(model), "--out", str(tmp_path / "r.html")]) == 1
+    assert "an arm with 4 joints, this one has 5" in capsys.readouterr().err

@@ -3,9 +3,12 @@
 import json
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
+from acquisition.recording.fingerprint import readings_sha256
+from acquisition.recording.read import read
 from acquisition.recording.rig import load_rig, rig_sha256, rig_text
 from calibeam.cli import run
 from calibeam.guided.arm import BelievedGuidedArm
@@ -80,6 +83,21 @@ def test_an_arm_beyond_a_limit_fails_by_exit_code_and_all_is_written(tmp_path: P
     assert "DOES NOT CONFORM" in page
     assert "src=" not in page
     assert 'href="http' not in page
+
+
+def test_a_model_of_another_arm_or_of_these_very_readings_is_refused(tmp_path: Path, capsys) -> None:
+    folder, path = session(tmp_path / "good", 0.0), tmp_path / "model.json"
+    own, text = perfect_model(), rig_text(RIG_FILE)
+    drawn = own.rig.text.replace("origin_m = [0.0, 0.0, 0.475]", "origin_m = [0.0, 0.0, 0.476]")
+    for wrong, says in (
+        (msgspec.structs.replace(own, rig=RigIdentity("other-arm", "", text)), "give the model of this arm"),
+        (msgspec.structs.replace(own, rig=RigIdentity(RIG.name, "", drawn)), "joint 6 of the model's rig file is not"),
+        (msgspec.structs.replace(own, readings_sha256=readings_sha256(read(folder).samples)), "these very readings"),
+    ):
+        write_model(path, wrong)
+        assert run(["verify", str(folder), "--model", str(path), "--out", str(tmp_path / "v.json")]) == 1
+        assert says in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "v.json").exists()
 
 
 def test_json_is_one_object_and_nothing_else(tmp_path: Path, model: Path, capsys) -> None:

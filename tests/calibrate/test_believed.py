@@ -37,6 +37,9 @@ def test_expected_spots_and_joint_derivative_are_those_of_the_fit(corrected):
         expected = believed.expect(q, int(place), int(first))
         np.testing.assert_allclose(expected.spots_m, spots[i], atol=1e-14)
         np.testing.assert_allclose(expected.by_joint, by_joint[i], atol=1e-12)
+        spots_m, light = believed.struck(believed.flange(q), int(place), int(first))
+        np.testing.assert_array_equal(spots_m, expected.spots_m)
+        assert light is expected.light
 
 
 def test_nominal_rig_follows_the_ray_and_lights_both_faces(rig, sessions, ur5e_exact):

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from drivers.can_dbc.description import joint_signals
-from drivers.cia406.codec import emergency, extract, heartbeat_state, mapped_object
+from drivers.cia406.codec import emergency, heartbeat_state, mapped_number, mapped_object
 from drivers.psd_daq.codec import PsdDaqCodec, frame
 from drivers.psd_daq.messages import BadFrame, MessageType
 from drivers.psd_kpa101.codec import Kpa101Codec
@@ -207,7 +207,9 @@ def frames_under_fire(count: int, seed: int) -> None:
         mapping = [mapped_object(int(word)) for word in rng.integers(0, 1 << 32, rng.integers(0, 5))]
         mapping[0:0] = [mapped_object(0x6503 << 16 | int(rng.integers(0, 64)))] if rng.random() < 0.5 else []
         mapping.append(mapped_object(0x6004 << 16 | 32))
-        found = extract(mapping, data, 0x6004)
+        number = mapped_number(mapping, 0x6004)
+        assert number is not None
+        found = number.read(data)
         assert found is None or 0 <= found < 1 << 32
         assert (emergency(0.0, 1, data) is None) == (len(data) != 8)
         assert heartbeat_state(data) is None or len(data) == 1

@@ -63,7 +63,7 @@ class Path:
         self._blend: Blend | None = None
         self._q_rad = start_rad
         self.corners_s: list[float] = []  # of every leg begun so far
-        self.actions: list[tuple[float, str]] = []  # when the arm rests for an action
+        self.rests: list[tuple[float, str]] = []  # when the arm has come to rest on its way, and for which action
         self.ends_rad: list[Floats | None] = []  # of every leg begun by joints
         self._expected_rad = expected_rad
 
@@ -131,8 +131,8 @@ class Path:
         self._leg, self._leg_corner_s, self._corner_s = leg, corner_s, corner_s + leg.duration_s
         self.corners_s.append(corner_s)
         self.ends_rad.append(leg.end_rad if isinstance(leg, JointLeg) else None)
-        if segment.action:
-            self.actions.append((end_s, segment.action))
+        if segment.by is By.STAND and self._begun < len(self._segments):
+            self.rests.append((end_s, segment.action))
 
     def _leg_to(self, segment: Segment, from_rad: Floats, belt: Belt) -> Leg:
         """From the corner, where the arm would stand at `from_rad`, with the belt as it is there."""

@@ -18,7 +18,7 @@ class SolvedPath:
         while len(solved) * period_s < path.ends_s + period_s:
             solved.append(path.at(len(solved) * period_s))
         self._q_rad = np.array(solved)
-        self.ends_s, self.actions = path.ends_s, path.actions
+        self.ends_s, self.rests = path.ends_s, path.rests
 
     def at(self, t_s: float, belt: Belt = STANDING) -> Floats:
         """Joint readings (joint,) at time t; at the end it stays."""

@@ -84,10 +84,8 @@ class TaskGraph:
         """The position as T6 TOOL = COORD(s) POS. TaskError where it is not determined."""
         equation = self._position(position)
         self.solve(position, ARM)  # tells what is missing
-        side = equation.left if any(t.name == ARM for t in equation.left) else equation.right
-        behind = side[[t.name for t in side].index(ARM) + 1 :]
-        wanted = (*equation.equal_to(ARM), *behind)  # T6 TOOL
-        wanted = _reduced(wanted)
+        behind = _behind_arm(equation)
+        wanted = _reduced((*equation.equal_to(ARM), *behind))  # T6 TOOL
         last = max((i for i, t in enumerate(wanted) if self._source(t.name).moves), default=-1)
         carrying, still = wanted[: last + 1], product(wanted[last + 1 :], self.value)
         tool = product(behind, self.value)
@@ -159,6 +157,15 @@ def _sure(source: Source) -> Floats:
     if T is None:
         raise TaskError("a transform that was counted as known is not")
     return T
+
+
+def _behind_arm(equation: Equation) -> tuple[Term, ...]:
+    """TOOL: what follows T6 on its side of the equation. With T6^-1 the side stands turned round: TOOL^-1 T6^-1."""
+    side = equation.left if any(t.name == ARM for t in equation.left) else equation.right
+    index = [t.name for t in side].index(ARM)
+    if side[index].inverted:
+        return tuple(t.turned_round for t in reversed(side[:index]))
+    return side[index + 1 :]
 
 
 def _reduced(terms: tuple[Term, ...]) -> tuple[Term, ...]:

@@ -42,7 +42,7 @@ def chain_figure(name: str, where: str, chain: Sequence[Link]) -> Html:
     """With the link of the port `where` marked."""
     says = f"the chain from base to reading, {where} marked"
     rows = -(-len(chain) // _per_row(len(chain)))
-    return drawn(f"chain-{name}", says, 5.6, 0.25 + 0.62 * rows, lambda figure: _paint(figure, where, chain))
+    return drawn(f"chain-{name}", says, 4.8, 0.25 + 0.62 * rows, lambda figure: _paint(figure, where, chain))
 
 
 def _per_row(links: int) -> int:
@@ -73,6 +73,6 @@ def _box(axes: Axes, x: float, y: float, name: str, port: str | None) -> None:
     )
     axes.add_patch(shape)
     colour = Tone.BEAM.value if port is not None else Tone.INK.value
-    axes.text(x, y + (0.09 if port else 0.0), name, ha="center", va="center", fontsize=9, color=colour)
+    axes.text(x, y + (0.09 if port else 0.0), name, ha="center", va="center", fontsize=10, color=colour)
     if port:
-        axes.text(x, y - 0.12, port, ha="center", va="center", fontsize=7.5, color=colour)
+        axes.text(x, y - 0.12, port, ha="center", va="center", fontsize=10, color=colour)

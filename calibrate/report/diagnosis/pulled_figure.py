@@ -20,7 +20,7 @@ LINE_LEVELS = 6  # different driver values: below, the curve is a few levels and
 def pulled_figure(name: str, curve: CurveRecord, *, single: bool) -> Html:
     """`single`: the cause depends on the drawn driver alone, so that its curve is a line."""
     says = f"residual without this cause, pulled back to its place, against {curve.driver}, with the fitted curve"
-    return drawn(f"pulled-{name}", says, 5.6, 3.6, lambda figure: _paint(figure, curve, single=single))
+    return drawn(f"pulled-{name}", says, 4.8, 3.3, lambda figure: _paint(figure, curve, single=single))
 
 
 def _paint(figure: Figure, curve: CurveRecord, *, single: bool) -> None:

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from calibrate.error_simulation.linear import ROUNDING_M
 from calibrate.error_simulation.simulate import Simulation
 from calibrate.error_simulation.single import Single
 from calibrate.kernels.perturbed import BINS
@@ -15,7 +16,7 @@ from calibrate.report.svg import log_axis
 from calibrate.report.tones import PLACES, Tone
 
 SCALES = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "K": (1.0, "K")}
-STYLES = ("-", "--", ":")
+STYLES = {"-": "solid", "--": "dashed", ":": "dotted"}
 RANKED = 20
 COLUMNS = ("x", "y", "z", "roll", "pitch", "yaw", "zero")
 
@@ -33,7 +34,11 @@ class Picture:
 
     def painter(self, simulation: Simulation) -> Callable[[Figure], None]:
         """What draws it onto a figure."""
-        return lambda figure: self.paint(figure, simulation)
+        return (lambda figure: self.paint(figure, simulation)) if simulation.moves else _paint_nothing
+
+
+def _paint_nothing(figure: Figure) -> None:
+    figure.text(0.5, 0.5, "none of these errors moves the probe", ha="center", va="center")
 
 
 def _paint_alone(figure: Figure, s: Simulation) -> None:
@@ -47,19 +52,21 @@ def _paint_alone(figure: Figure, s: Simulation) -> None:
 
 
 def _curves(axes: Axes, group: str, singles: Sequence[Single]) -> None:
+    """Places by colour, what is off there by style; of one place alone, what is off by colour."""
     scale, unit = SCALES[singles[0].unit]
-    places = list(dict.fromkeys(one.name.partition(".")[0] for one in singles))
-    words = list(dict.fromkeys(one.name.partition(".")[2] for one in singles))
-    tones = (*PLACES, Tone.INK)
-    for one in singles:
-        place, _, word = one.name.partition(".")
-        number, at = places.index(place), words.index(word)
-        label, tone = (place if at == 0 else None), tones[number % len(tones)].value
-        axes.plot(scale * one.value, 1e3 * one.rms_m, STYLES[at % len(STYLES)], color=tone, label=label, lw=1.2)
-    lines = f": {', '.join(f'{style} {word}' for style, word in zip(STYLES, words, strict=False))}"
+    split = [(place, word) for place, _, word in (one.name.partition(".") for one in singles)]
+    if len({place for place, _ in split}) == 1:
+        split = [(word, "") for _, word in split]
+    places, words = list(dict.fromkeys(p for p, _ in split)), list(dict.fromkeys(w for _, w in split))
+    tones, styles = (*PLACES, Tone.INK), list(STYLES)
+    for one, (place, word) in zip(singles, split, strict=True):
+        tone, style = tones[places.index(place) % len(tones)].value, styles[words.index(word) % len(styles)]
+        label = place if word == words[0] else None
+        axes.plot(scale * one.value, 1e3 * one.rms_m, style, color=tone, label=label, lw=1.2)
+    lines = f": {', '.join(f'{word} {STYLES[style]}' for style, word in zip(styles, words, strict=False))}"
     largest = max(float(one.rms_m.max()) for one in singles)
     axes.set(title=group, xlabel=f"error ({unit}){lines if len(words) > 1 else ''}", ylabel="probe, rms (mm)")
-    axes.set_ylim(0.0, 1.35e3 * largest)
+    axes.set_ylim(0.0, 1.35e3 * largest if largest > ROUNDING_M else 1.0)
     axes.xaxis.set_major_locator(MaxNLocator(5))
     axes.legend(loc="upper center", ncols=4, fontsize=7, handlelength=1.0, columnspacing=0.8)
 
@@ -84,7 +91,7 @@ def _paint_gains(figure: Figure, s: Simulation) -> None:
                                   alpha=0.05 + 0.55 * share, lw=0)  # fmt: skip
                 axes.text(column, part, f"{value:.2f}", ha="center", va="center", fontsize=9)
     axes.set(xlim=(-0.5, len(COLUMNS) - 0.5), ylim=(parts - 0.5, -0.5))
-    axes.set_xticks(range(len(COLUMNS)), COLUMNS)
+    axes.set_xticks(range(len(COLUMNS)), [*COLUMNS[:-1], "zero of the joint behind"])
     axes.set_yticks(range(parts), [f"link {i}" for i in range(parts)])
     axes.set_title("probe error by unit of each error (mm per mm, mm per mrad)")
 
@@ -137,10 +144,12 @@ def _paint_budget(figure: Figure, s: Simulation) -> None:
     axes, budget = figure.subplots(), s.budget
     y = np.arange(len(budget))
     value = np.array([1e3 * line.rms_m for line in budget])
+    shown = value[value > 1e3 * ROUNDING_M]
     axes.barh(y, value, 0.7, color=Tone.PLACE_1.value)
     for i, line in enumerate(budget):
-        axes.text(value[i] * 1.08, i, f"{value[i]:.3g} mm, {100.0 * line.share:.2g} %", va="center", fontsize=9)
-    log_axis(axes, "x", [float(value.min()), 8.0 * float(value.max())], lambda x: f"{x:g}")
+        says = f"{value[i]:.3g} mm, {100.0 * line.share:.2g} %"
+        axes.text(max(value[i], shown.min()) * 1.08, i, says, va="center", fontsize=9)
+    log_axis(axes, "x", [float(shown.min()), 8.0 * float(shown.max())], lambda x: f"{x:g}")
     axes.set_xlabel("probe error over the workspace, this group alone, rms (mm)")
     axes.set_yticks(y, [f"{line.group} ({line.sources})" for line in budget])
     axes.invert_yaxis()
@@ -151,7 +160,7 @@ PICTURES = (
             "error when it acts alone; the share is of the variance of all together.", _paint_budget),
     Picture("alone", 10.6, 6.4, "curves of the probe error over the size of each error alone", "Each error alone, from "
             "minus to plus three of its sizes: rms of the probe error over 100 poses of the workspace, by the arm "
-            "itself.", _paint_alone),
+            "itself. Lines that cover each other do the same.", _paint_alone),
     Picture("gains", 7.4, 4.0, "table of the probe error by unit of each link and joint error", "Gain of every error "
             "of links and joint zeros: rms over the workspace of how far the probe goes for one unit.", _paint_gains),
     Picture("side-by-side", 10.0, 3.6, "bars of linear and drawn errors at some poses, and a histogram", "Linear "

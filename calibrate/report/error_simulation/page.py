@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from calibrate.error_simulation.linear import ROUNDING_M
 from calibrate.error_simulation.record import SHARE
 from calibrate.error_simulation.simulate import Simulation
 from calibrate.report.elements import Html, figure, section, table, tag
@@ -34,11 +35,12 @@ def write_page_of(path: Path, simulation: Simulation, software: str) -> Path:
 
 def _tiles(s: Simulation) -> Html:
     rms = float(np.sqrt(np.mean(s.wide.rms_m**2)))
-    apart = float(np.max(np.abs(s.drawn.rms_m / s.linear.rms_m - 1.0)))
+    moved = s.linear.rms_m > ROUNDING_M
+    apart = float(np.max(np.abs(s.drawn.rms_m[moved] / s.linear.rms_m[moved] - 1.0), initial=0.0))
     return tag(
         "div",
         tile("Probe error", length(rms), "rms over the workspace, three axes together"),
-        tile("Worst posture", length(s.worst[0].rms_m), "rms, by linear propagation"),
+        tile("Worst posture", length(s.worst[0].rms_m if s.worst else 0.0), "rms, by linear propagation"),
         tile("Largest source", s.sources[s.ranking[0]].name, f"{100.0 * s.shares.total[s.ranking[0]]:.1f} % in total"),
         tile("Linear against drawn", f"{100.0 * apart:.2f} %", "largest difference of an rms"),
         cls="tiles",
@@ -93,7 +95,10 @@ def _ranking(s: Simulation) -> Html:
         for i in s.ranking
     ]
     head = ("error", "law, scale", "alone, rms", "linear", "first order", "total")
-    lead = "All errors, the most important first. Where total and first order differ, errors act together."
+    lead = (
+        "All errors, the most important first. Where total and first order differ, errors act together. Linear shares "
+        f"are over {len(s.wide_rad)} poses of the workspace, Sobol indices over {s.shares.poses} of these."
+    )
     listing = table(head, rows, numeric=range(2, 6))
     return section("ranking", CONTENTS["ranking"], lead, _picture("shares", s), listing)
 
@@ -111,5 +116,7 @@ def _worst(s: Simulation) -> Html:
         )
         for p in s.worst
     ]
+    if not s.worst:
+        return section("worst", CONTENTS["worst"], "None of these errors moves the probe in any posture.")
     lead = "Tops of the error over the joint ranges; postures of the same error are told once."
     return section("worst", CONTENTS["worst"], lead, table(("rms", "joints", "probe in the base (m)"), rows))

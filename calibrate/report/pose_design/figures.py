@@ -9,7 +9,7 @@ from calibrate.report.elements import Html
 from calibrate.report.svg import drawn, log_axis
 from calibrate.report.tones import PLACES, Tone
 
-SHOWN_MM = 50.0  # of the curve: fewer poses than parameters say nothing
+SHOWN_MM = 1.0  # of the curve: beyond, there are fewer readings than unknowns, and beliefs alone speak
 
 
 def curve_figure(made: Design) -> Html:
@@ -78,5 +78,6 @@ def paint_isolability(figure: Figure, seen: Seen) -> None:
             if share >= 0.5:
                 axes.text(b, a, f"{100.0 * share:.0f}", ha="center", va="center", fontsize=7)
     axes.set(xlim=(-0.5, len(names) - 0.5), ylim=(len(names) - 0.5, -0.5))
+    axes.set(xlabel="by so much (%) could this cause explain it", ylabel="signal of this cause")
     axes.set_xticks(range(len(names)), names, rotation=90, fontsize=8)
     axes.set_yticks(range(len(names)), names, fontsize=8)

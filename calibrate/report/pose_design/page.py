@@ -54,7 +54,7 @@ def _plan(made: Design) -> Html:
     order = made.in_time
     lead = (
         f"Of a steady drift of laser, joints or fixture geometry would absorb {100.0 * order.absorbed:.0f} %; in the "
-        f"order of shortest ways it were {100.0 * order.absorbed_before:.0f} %."
+        f"order of shortest ways it would be {100.0 * order.absorbed_before:.0f} %."
     )
     return section(
         "plan", CONTENTS["plan"], lead, figure(joints_figure(made), "Joint angles in the order of the plan.")
@@ -95,6 +95,7 @@ def _causes(seen: Seen) -> Html:
         figure(isolability_figure(seen), caption),
         tag("h3", "Could not be told apart"),
         bullets(alike or ["nothing"]),
+        *([tag("h3", "Not shown at all"), bullets([_name(one) for one in seen.invisible])] if seen.invisible else []),
         tag("h3", "Found from this size on, 19 times out of 20"),
         table(("cause", "at", "size"), rows),
     )

@@ -5,14 +5,15 @@ from math import degrees
 import numpy as np
 
 from calibrate.model_file import ModelParameter
-from calibrate.report.elements import Html, bullets, figure, panels, table, tag
+from calibrate.report.answers import Answers, Number, first_screen
+from calibrate.report.anywhere import anywhere
+from calibrate.report.elements import Html, figure, panels, table, tag
 from calibrate.report.error_figures import by_sample, errors
 from calibrate.report.model_tests import proofs
 from calibrate.report.quantities import aligned, decimals_of, fixed, significant
 from calibrate.report.reasons import reason_among
 from calibrate.report.session_evidence import SAID, Readings, SessionEvidence
 from calibrate.report.session_verdict import session_verdict
-from calibrate.report.tiles import tile
 
 
 def masthead(evidence: SessionEvidence) -> Html:
@@ -30,42 +31,43 @@ def masthead(evidence: SessionEvidence) -> Html:
     )
 
 
-def summary(evidence: SessionEvidence) -> Html:
+def summary(said: Answers, evidence: SessionEvidence) -> Html:
     """What a person must know before anything else."""
     first = evidence.readings[0]
     pictures = panels(
         figure(errors(first), "Every reading, before and after, on a logarithmic axis."),
         figure(by_sample(first), "The same in the order of the file: a drift or a knock would show here."),
     )
-    return tag("div", _verdict(evidence), _tiles(evidence), pictures, *_zeros(evidence), id="summary")
+    return tag("div", first_screen(said), pictures, *_zeros(evidence), id="summary")
 
 
-def _verdict(evidence: SessionEvidence) -> Html:
-    judged = session_verdict(evidence)
-    content = [tag("strong", judged.sentence)]
-    if judged.reasons:
-        content.append(bullets(judged.reasons))
-    if judged.advice:
-        content += [tag("p", tag("b", "What to do")), bullets(judged.advice)]
-    return tag("div", *content, cls=f"verdict {judged.trust.value}")
-
-
-def _tiles(evidence: SessionEvidence) -> Html:
+def answers(evidence: SessionEvidence) -> Answers:
+    """How good, whether to trust it, what to do."""
     model, first = evidence.model, evidence.readings[0]
-    before, after = (_rms(values) for values in (first.error_before, first.error_after))
-    tiles = [
-        tile("As drawn", first.says(before), f"rms of {_what(first)}, arm and frames where they fit best"),
-        tile("Identified", first.says(after), f"rms, {significant(before / after)} times better" if after else "rms"),
-    ]
-    tiles += [
-        tile("Unseen rows", first.says(p.rms_after), f"rms on {p.observations} readings: {p.split}")
-        for p in proofs(model)[:1]
-    ]
     known = sum(p.value is not None for p in model.parameters)
-    tiles.append(tile("Parameters told", f"{known} of {len(model.parameters)}", "the others only in combinations"))
-    used = f"of {len(evidence.recording.samples)}; {evidence.left_out} left out as faulty"
-    tiles.append(tile("Samples used", str(model.poses), used))
-    return tag("div", *tiles, cls="tiles")
+    rest = ", the others only in combinations" if known < len(model.parameters) else ""
+    also = (
+        f"{model.poses} samples used of {len(evidence.recording.samples)}; {evidence.left_out} left out as faulty",
+        f"{known} of {len(model.parameters)} parameters told{rest}",
+        f"rows of the fit: {first.says(_rms(first.error_after))} rms",
+    )
+    return Answers(session_verdict(evidence), (*_errors(evidence), anywhere(model.free_space)), also=also)
+
+
+def _errors(evidence: SessionEvidence) -> tuple[Number, Number]:
+    """As drawn and now: on unseen rows where there are any, else on those of the fit."""
+    first, proof = evidence.readings[0], next(iter(proofs(evidence.model)), None)
+    if proof is None:
+        before, after = _rms(first.error_before), _rms(first.error_after)
+        on = f"rms of {_what(first)}, those of the fit itself"
+    else:
+        before, after = proof.rms_before, proof.rms_after
+        on = f"rms of {proof.observations} {_what(first)} that the fit has not seen"
+    gain = f"; {significant(before / after)} times better" if after > 0.0 else ""
+    return (
+        Number("as_drawn", "As drawn", before, first.unit, first.says(before), f"{on}; arm as the drawing says"),
+        Number("now", "Identified", after, first.unit, first.says(after), on + gain),
+    )
 
 
 def _what(readings: Readings) -> str:

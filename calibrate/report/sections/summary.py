@@ -3,12 +3,14 @@
 from collections.abc import Sequence
 from math import degrees, isfinite, radians
 
-from calibrate.report.elements import Html, bullets, figure, panels, table, tag
+from calibrate.identification.evidence_record import EvidenceFields
+from calibrate.report.answers import Answers, Number, first_screen
+from calibrate.report.anywhere import anywhere
+from calibrate.report.elements import Html, figure, panels, table, tag
 from calibrate.report.evidence import Evidence
 from calibrate.report.quantities import aligned, angle, decimals_of, fixed, length, significant
 from calibrate.report.reasons import plain_reason
 from calibrate.report.summary_figures import doubts, explained
-from calibrate.report.tiles import tile
 from calibrate.report.verdict import limited_by_measurement, verdict
 from calibrate.zeros.result import JointZero
 
@@ -27,11 +29,10 @@ def masthead(evidence: Evidence) -> Html:
     )
 
 
-def summary(evidence: Evidence) -> Html:
-    """Verdict, four numbers, the zeros in short."""
+def summary(said: Answers, evidence: Evidence) -> Html:
+    """Verdict, three numbers, the zeros in short."""
     zeros, lead = evidence.result.zeros, "True joint angle = reading + zero. Sigma is one standard deviation."
-    content = [_verdict(evidence), _tiles(evidence), tag("h3", "Joint zeros"), tag("p", lead, cls="lead")]
-    content.append(_zeros(evidence))
+    content = [first_screen(said), tag("h3", "Joint zeros"), tag("p", lead, cls="lead"), _zeros(evidence)]
     if any(z.sigma_rad is not None for z in zeros):
         caption = (
             "How well each zero is known, on a logarithmic axis. A long line means that measuring more will not help: "
@@ -41,24 +42,49 @@ def summary(evidence: Evidence) -> Html:
     return tag("div", *content, id="summary")
 
 
-def _verdict(evidence: Evidence) -> Html:
-    judged = verdict(evidence)
-    rest = [bullets(judged.reasons)] if judged.reasons else []
-    return tag("div", tag("strong", judged.sentence), *_limits(evidence), *rest, cls=f"verdict {judged.trust.value}")
+def answers(evidence: Evidence, proved: EvidenceFields | None = None) -> Answers:
+    """How good, whether to trust it, what to do. `proved`: what holds anywhere, where it was asked for."""
+    return Answers(verdict(evidence), _numbers(evidence, proved), _limits(evidence), _also(evidence))
 
 
-def _limits(evidence: Evidence) -> list[Html]:
+def _numbers(evidence: Evidence, proved: EvidenceFields | None) -> tuple[Number, Number, Number]:
+    result, unseen = evidence.result, evidence.result.held_out
+    before, after = result.rms_before_m, result.rms_after_m
+    on = "rms of the spots of the fit itself"
+    if unseen is not None:
+        before, after = unseen.rms_before_m, unseen.rms_after_m
+        on = f"rms of the spots at {unseen.poses} poses that the fit has not seen"
+    return (
+        Number("as_drawn", "Spots off as drawn", before, "m", length(before), f"{on}; arm as the drawing says"),
+        Number("now", "Spots off identified", _finite(after), "m", length(after), on + _gain(before, after)),
+        anywhere(None if proved is None else proved["free_space"]),
+    )
+
+
+def _also(evidence: Evidence) -> tuple[str, ...]:
+    result, expected = evidence.result, evidence.expected
+    found = [z for z in result.zeros if z.value_rad is not None]
+    said = [f"{len(found)} of {len(result.zeros)} zeros determined: {_names(found) or 'none'}"]
+    if expected is not None:
+        said.append(f"noise floor of joints and detectors, as found: {length(expected.floor_m)}")
+    return (*said, f"spots of the fit: {length(result.rms_after_m)} rms, {length(result.rms_before_m)} before")
+
+
+def _finite(value: float) -> float | None:
+    return value if isfinite(value) else None
+
+
+def _limits(evidence: Evidence) -> tuple[str, ...]:
     """What a reader must know before using the numbers: zeros that the drawing limits, zeros that are missing."""
-    zeros, said = evidence.result.zeros, list[Html]()
+    zeros, said = evidence.result.zeros, list[str]()
     loose = [z for z in zeros if z.value_rad is not None and not limited_by_measurement(z)]
     if loose:
         worst = max(z.sigma_rad or 0.0 for z in loose)
         limit = "limited by the drawing's tolerance, not by the measurement"
-        text = f"{_names(loose)}: known to {angle(worst)} only, {limit}."
-        said.append(tag("p", text))
+        said.append(f"{_names(loose)}: known to {angle(worst)} only, {limit}.")
     open_ = [z for z in zeros if z.value_rad is None]
-    said += [tag("p", f"J{z.joint}: not determined; {_reason(z, evidence)}.") for z in open_]
-    return said
+    said += [f"J{z.joint}: not determined; {_reason(z, evidence)}." for z in open_]
+    return tuple(said)
 
 
 def _names(zeros: Sequence[JointZero]) -> str:
@@ -69,27 +95,10 @@ def _reason(zero: JointZero, evidence: Evidence) -> str:
     return plain_reason(f"joint{zero.joint}.zero", evidence.result.identifiability, zero.why)
 
 
-def _tiles(evidence: Evidence) -> Html:
-    result, expected, unseen = evidence.result, evidence.expected, evidence.result.held_out
-    found = [z for z in result.zeros if z.value_rad is not None]
-    tiles = [
-        tile("Zeros determined", f"{len(found)} of {len(result.zeros)}", _names(found) or "none"),
-        tile("Spots off before", length(result.rms_before_m), "rms, arm as drawn at the best places"),
-        tile("Spots off after", length(result.rms_after_m), _gain(result.rms_before_m, result.rms_after_m)),
-    ]
-    if expected is not None:
-        tiles.append(tile("Noise floor", length(expected.floor_m), "rms of joints and detectors, as found"))
-    if unseen is not None:
-        tiles.append(
-            tile("Unseen poses", length(unseen.rms_after_m), f"rms on {unseen.poses} poses kept out of the fit")
-        )
-    return tag("div", *tiles, cls="tiles")
-
-
 def _gain(before_m: float, after_m: float) -> str:
     if not isfinite(after_m):
-        return "no finite fit"
-    return f"rms, {significant(before_m / after_m)} times better" if after_m > 0.0 else "rms"
+        return "; no finite fit"
+    return f"; {significant(before_m / after_m)} times better" if after_m > 0.0 else ""
 
 
 def _explained(evidence: Evidence) -> list[Html]:

@@ -11,6 +11,7 @@ from acquisition.camera.board import Board
 from acquisition.camera.eye import Grey
 from acquisition.camera.model import drawn
 from acquisition.camera.sight import Sight, board_poses
+from acquisition.motion.errors import RefusedMotionError
 from acquisition.motion.rigid import apart, transform
 from acquisition.navigator import Navigator
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
@@ -58,6 +59,44 @@ def test_what_the_camera_does_not_see_is_said_and_nothing_moves(camera_rig, came
     found = aim.run(BeamTarget(1, CENTRES, 0.2, 0.0), home_rad, learner.T_base_fixture(1), np.random.default_rng(1))
     assert found.aimed is Aimed.UNSEEN
     assert bench.moves == 0
+
+
+def test_where_a_box_is_in_the_way_of_one_posture_another_is_taken(camera_rig, camera_plain) -> None:
+    bench, learner = direct_bench(camera_rig, camera_plain, seed=3), FittedLearner(camera_rig)
+
+    class Boxed:
+        """The gate lets no motion through but the third."""
+
+        moves = 0
+
+        def move(self, q_rad: np.ndarray) -> None:
+            self.moves += 1
+            if self.moves < 3:
+                raise RefusedMotionError("the arm would come within 3 mm of the keep-out box 'post'")
+            bench.move(q_rad)
+
+        def look(self, dwell_s: float):
+            return bench.look(dwell_s)
+
+    home_rad, T, rng = bench.standing_rad, learner.T_base_fixture(1), np.random.default_rng(1)
+
+    class Seeing:
+        def fixture(self, arm, q_rad, T_base_fixture) -> np.ndarray:
+            return T
+
+    target = BeamTarget(1, CENTRES, 0.2, 0.0)
+    found = Aim(Boxed(), Seeing(), learner.arm, learner.optics).run(target, home_rad, T, rng)  # type: ignore[arg-type]
+    assert found.aimed is not Aimed.UNREACHABLE
+    assert found.target.roll_rad != 0.0
+    assert found.motions >= 1
+
+    class Walled(Boxed):
+        def move(self, q_rad: np.ndarray) -> None:
+            raise RefusedMotionError("the arm would come within 3 mm of the keep-out box 'post'")
+
+    stuck = Aim(Walled(), Seeing(), learner.arm, learner.optics).run(target, home_rad, T, rng)  # type: ignore[arg-type]
+    assert stuck.aimed is Aimed.UNREACHABLE
+    np.testing.assert_array_equal(stuck.q_rad, home_rad)
 
 
 def test_of_two_poses_that_look_alike_the_one_that_was_believed_is_taken(camera_rig, camera_plain) -> None:

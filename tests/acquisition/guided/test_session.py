@@ -6,7 +6,7 @@ import pytest
 from acquisition.guided.judge import Doubt
 from acquisition.guided.plan import Visit
 from acquisition.guided.session import GuidedSession
-from acquisition.guided.target import BarEnd, Cone
+from acquisition.guided.target import BarEnd, Cone, SphereSpot
 from acquisition.guided.window import Window
 from drivers.errors import DeviceLost
 
@@ -138,6 +138,61 @@ def test_the_same_standstill_is_read_once():
     still = (0.5, 0.0, 0.1, 0.2, 0.3, 0.4)
     summary = made.run([Visit((CONE,), still), Visit((CONE,), still)])
     assert (len(summary.readings), summary.skipped) == (1, 1)
+
+
+class Copies(Hand):
+    """Comes a little away from where it stood before, whatever posture it was asked for, for so many requests."""
+
+    def __init__(self, times, **kinds):
+        super().__init__(**kinds)
+        self.times = times
+
+    def ask(self, request):
+        before = self.q.copy()
+        super().ask(request)
+        if 1 < len(self.requests) <= 1 + self.times:
+            self.q = before + 0.05
+            self.q[:3] = self.requests[-1].posture_rad[:3]
+        return True
+
+
+def test_a_cone_is_not_read_twice_in_one_posture():
+    hand = Copies(times=1)
+    made, _ = session(hand, patience_s=5.0)
+    first, second = made.run([Visit((CONE,)), Visit((CONE,))]).readings
+    assert np.abs(first.q_rad - second.q_rad).max() > 0.1
+    assert "turn some joint by 6 deg" in hand.told[0].says
+
+
+def spot(x, y, z):
+    return SphereSpot(1, (0.0, 0.0, 1.0), 0, (x, y, z))
+
+
+class Sways(Hand):
+    """Holds the probe a little otherwise each time."""
+
+    def ask(self, request):
+        came = super().ask(request)
+        self.q = self.q + np.array([0, 0, 0, 0, 0.01 * len(self.requests), 0])
+        return came
+
+
+def test_a_sphere_is_not_touched_twice_at_one_spot():
+    hand = Sways()
+    made, _ = session(hand, patience_s=5.0)
+    beside = [spot(0.5, 0.0, 0.1), spot(0.5, 0.0012, 0.1), spot(0.5, 0.003, 0.1)]
+    summary = made.run([Visit((one,)) for one in beside])
+    assert (len(summary.readings), summary.skipped) == (2, 1)
+    assert "2 mm or more beside every earlier spot" in hand.told[0].says
+
+
+def test_a_touch_that_leaves_all_in_one_plane_is_refused_and_the_session_goes_on():
+    hand = Sways()
+    made, _ = session(hand, patience_s=5.0)
+    ring = [spot(0.5 + 0.01 * np.cos(a), 0.01 * np.sin(a), 0.1) for a in np.arange(5.0)]
+    summary = made.run([Visit((one,)) for one in (*ring, spot(0.5, 0.0, 0.11))])
+    assert (len(summary.readings), summary.skipped) == (5, 1)
+    assert any("in one plane" in progress.says for progress in hand.told)
 
 
 def test_what_was_taken_before_the_encoders_went_is_kept():

@@ -5,11 +5,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from acquisition.motion.cell import Cell
+from acquisition.motion.cell import Box, Cell, body_points
 from acquisition.motion.errors import InterruptedMotionError, RefusedMotionError
-from acquisition.motion.gate import Gate, Stream
+from acquisition.motion.following import Stream
+from acquisition.motion.gate import Gate
 from acquisition.motion.inverse.closed_form import closed_form
 from acquisition.motion.inverse.solver import Solver
+from acquisition.motion.paths.path import Belt
 from acquisition.motion.paths.segments import By, Pace, Segment
 from acquisition.motion.rigid import transform
 from acquisition.motion.states import State
@@ -104,6 +106,18 @@ def test_stopped_at_any_time_it_brakes_within_the_limit(cycle: int, ending: str)
     assert largest_acceleration(arm) <= 2.0 * PACE.acceleration_rad_s2[0]
 
 
+def test_a_brake_stays_on_the_straight_way() -> None:
+    arm = Arm(lambda n: gate.stop() if n == 60 else None)
+    gate = gate_of(arm)
+    gate.run(gate.plan(HOME_RAD, there(0.2, 0.1, 0.05)), HOME_RAD)
+    flange_m = SOLVER.arm.frames(np.array(arm.q_rad))[:, -1, :3, 3]
+    braked_m = np.linalg.norm(flange_m[-1] - flange_m[60])
+    assert braked_m > 0.01
+    way_m = HOME[:3, :3] @ np.array([0.2, 0.1, 0.05])
+    off_m = np.linalg.norm(np.cross(flange_m - HOME[:3, 3], way_m / np.linalg.norm(way_m)), axis=1)
+    assert off_m.max() < 2e-5  # solutions 5 mm apart, between which joints are interpolated
+
+
 def test_held_and_resumed_it_stays_on_the_path() -> None:
     def at(n: int) -> None:
         if n == 60:
@@ -148,6 +162,113 @@ def test_paused_it_rests_at_the_next_action_and_twice_at_once() -> None:
     gate2 = gate_of(twice)
     gate2.run(gate2.plan(HOME_RAD, there(0.1, 0.0, 0.0)), HOME_RAD)
     assert np.abs(np.diff(twice.q_rad[70:100], axis=0)).max() == 0.0
+
+
+def test_a_pause_rests_where_the_program_says_stop() -> None:
+    rested: list[np.ndarray] = []
+
+    def at(n: int) -> None:
+        if n == 10:
+            gate.pause()
+        if gate.state is State.HELD:
+            rested.append(arm.q_rad[-1])
+            if len(rested) == 30:
+                gate.resume()
+
+    arm = Arm(at)
+    gate = gate_of(arm)
+    first, *_, last = there(0.1, 0.0, 0.0, action="GRASP")
+    gate.run(gate.plan(HOME_RAD, [first, Segment("stop", By.STAND, first.place), last]), HOME_RAD)
+    np.testing.assert_allclose(SOLVER.flange(rested[-1])[:3, 3], first.place.pos[:3, 3], atol=1e-6)
+    assert gate.state is State.DONE
+
+
+@pytest.mark.parametrize(("wait_s", "state"), [(5.0, State.HELD), (12.0, State.PAUSING)])
+def test_a_second_pause_brakes_at_once_within_ten_seconds_only(wait_s: float, state: State) -> None:
+    clock, seen = JumpingClock(), list[State]()
+
+    def at(n: int) -> None:
+        if n in (10, 12):
+            gate.pause()
+        elif n == 11:
+            gate._paused_s -= wait_s
+        elif n == 13:
+            seen.append(gate.state)
+            gate.stop()
+
+    gate = gate_of(Arm(at), clock)
+    gate.run(gate.plan(HOME_RAD, there(0.15, 0.0, 0.0)), HOME_RAD)
+    assert seen == [state]
+
+
+class Conveyor:
+    """A belt along y, whose way is told by the number of set-points sent."""
+
+    def __init__(self, arm: Arm, way_m: Callable[[int], float]) -> None:
+        self._arm, self._way_m = arm, way_m
+
+    def now(self) -> Belt:
+        sent = len(self._arm.q_rad)
+        return Belt(self._way_m(sent), (self._way_m(sent + 1) - self._way_m(sent)) * STREAM.hz)
+
+    @staticmethod
+    def place(*shift: float) -> Place:
+        return Place("part", HOME @ transform(shift), np.eye(4), lambda s_m: transform((0.0, s_m, 0.0)), "belt")
+
+
+def test_the_hand_stays_with_its_belt_however_long_it_takes_to_grip() -> None:
+    arm, gripped = Arm(), list[tuple[int, int]]()
+    conveyor = Conveyor(arm, lambda sent: 2e-4 * sent)
+    place = conveyor.place(0.05, 0.0, 0.0)
+
+    def grip(action: str) -> None:
+        begun = len(arm.q_rad)
+        while len(arm.q_rad) < begun + 60:  # a stream that waits for the hand would wait for ever
+            pass
+        gripped.append((begun, begun + 60))
+
+    gate = gate_of(arm)
+    segments = [Segment("part", By.LINE, place), Segment("grip", By.STAND, place, action="GRASP")]
+    gate.run(gate.plan(HOME_RAD, segments), HOME_RAD, conveyor.now, grip)
+    for sent in gripped[0]:
+        off_m = SOLVER.flange(arm.q_rad[sent])[:3, 3] - place.flange_at(2e-4 * sent)[:3, 3]
+        assert np.linalg.norm(off_m) < 1e-3  # two periods are solved ahead by the belt's speed
+
+
+def test_a_belt_that_runs_off_does_not_take_the_arm_beyond_its_speed() -> None:
+    arm = Arm()
+    conveyor = Conveyor(arm, lambda sent: 2e-4 * sent + max(0.0, 6e-3 * (sent - 60)))
+    gate = gate_of(arm)
+    made = gate.plan(HOME_RAD, [Segment("part", By.LINE, conveyor.place(0.05, 0.0, 0.0))])
+    with pytest.raises(InterruptedMotionError, match=r"joint \d would run at .* of its speed; the arm was stopped"):
+        gate.run(made, HOME_RAD, conveyor.now)
+    assert arm.stops == ["stop"]
+    assert np.abs(np.diff(arm.q_rad, axis=0)).max() * STREAM.hz <= 2.0 * PACE.speed_rad_s[0]
+
+
+def test_a_belt_that_runs_out_of_reach_stops_the_arm() -> None:
+    """No refusal, which a session would take for a pose that cannot be had: a motion was under way."""
+    arm = Arm()
+    conveyor = Conveyor(arm, lambda sent: 2e-4 * sent + max(0.0, 2e-2 * (sent - 60)))
+    gate = gate_of(arm)
+    made = gate.plan(HOME_RAD, [Segment("part", By.LINE, conveyor.place(0.05, 0.0, 0.0))])
+    with pytest.raises(InterruptedMotionError, match=r"segment 1 'part' \(line\): .*; the arm was stopped"):
+        gate.run(made, HOME_RAD, conveyor.now)
+    assert arm.stops == ["stop"]
+
+
+def test_a_belt_that_leads_into_a_keep_out_box_is_left_before_it() -> None:
+    arm = Arm()
+    conveyor = Conveyor(arm, lambda sent: -1e-3 * sent)
+    x, y, z = HOME[:3, 3]
+    cell = Cell(keep_out=(Box("pillar", (x - 0.2, y - 0.5, z - 0.3), (x + 0.2, y - 0.2, z + 0.3)),))
+    gate = Gate(SOLVER, PACE, cell, arm, STREAM, JumpingClock())
+    place = conveyor.place(0.02, 0.0, 0.0)
+    made = gate.plan(HOME_RAD, [Segment("part", By.LINE, place), Segment("ride", By.STAND, place, 5.0)])
+    with pytest.raises(InterruptedMotionError, match="keep-out box 'pillar'"):
+        gate.run(made, HOME_RAD, conveyor.now)
+    points = body_points(SOLVER.arm.frames(np.array(arm.q_rad)), ())
+    assert cell.keep_out[0].distance_m(points).min() > cell.clearance_m - 2e-3
 
 
 @pytest.mark.parametrize(("lost_s", "restarts"), [(0.036, 0), (0.205, 1)])

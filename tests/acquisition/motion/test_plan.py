@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from acquisition.motion.cell import Box, Cell, SlowArea
+from acquisition.motion.cell import Box, Cell, SlowArea, body_points
 from acquisition.motion.errors import RefusedMotionError
 from acquisition.motion.inverse.closed_form import closed_form
 from acquisition.motion.inverse.solver import Solver
@@ -11,7 +11,9 @@ from acquisition.motion.paths.segments import By, Pace, Segment
 from acquisition.motion.plan import OVER, plan
 from acquisition.motion.rigid import transform
 from acquisition.motion.task.place import Place
-from tests.acquisition.motion.conftest import ur5e
+from acquisition.recording.rig import load_rig
+from calibeam.motion.gate_of_rig import cell_of, pace_of
+from tests.acquisition.motion.conftest import RIG, ur5e
 
 SOLVER = Solver(ur5e(1e-3), closed_form(ur5e()))
 HOME_RAD = np.array([0.3, -1.4, 1.6, -0.5, 1.3, 0.1])
@@ -70,6 +72,32 @@ def test_a_straight_line_through_a_singular_wrist_is_refused_with_its_joint() ->
         segment = Segment("flip", By.LINE, Place("flip", SOLVER.flange(target_rad), np.eye(4)))
         with pytest.raises(RefusedMotionError, match=r"segment 1 'flip' \(line\).*joint \d"):
             plan(SOLVER, HOME_RAD, [segment], PACE, OPEN)
+
+
+def test_an_area_too_slow_for_the_path_is_named_with_the_segment() -> None:
+    x, y, z = HOME[:3, 3]
+    area = SlowArea(Box("fixture", (x - 0.5, y - 0.5, z - 0.5), (x + 0.5, y + 0.5, z + 0.5)), 1e-3)
+    with pytest.raises(
+        RefusedMotionError, match=r"segment 2 'there' \(joint\).*tool in the area 'fixture' is .* limit"
+    ):
+        plan(SOLVER, HOME_RAD, [to(0.01, 0.0, 0.0), to(0.2, 0.2, 0.0, by=By.JOINTS)], PACE, Cell(slow=(area,)))
+
+
+def test_a_link_beside_the_line_between_its_joints_is_part_of_the_body() -> None:
+    """The upper arm of a UR5e: its centre of mass is 0.113 m beside the line from shoulder to elbow."""
+    cell = cell_of(load_rig(RIG))
+    frames = ur5e().frames(HOME_RAD[None])
+    plain, beside = (body_points(frames, cell.tool_m, com)[0] for com in ((), cell.com_m))
+    shoulder_m, elbow_m = frames[0, 1, :3, 3], frames[0, 2, :3, 3]
+    middle_m = 0.5 * (shoulder_m + elbow_m) + 0.11336 * frames[0, 2, :3, 2]
+    assert np.linalg.norm(plain - middle_m, axis=1).min() > 0.1
+    assert np.linalg.norm(beside - middle_m, axis=1).min() < 0.035  # points are 6 cm apart along the link
+
+
+def test_a_share_of_the_speed_is_one_of_the_turn_as_well() -> None:
+    whole, half = (pace_of(load_rig(RIG), share) for share in (1.0, 0.5))
+    assert half.line_turn_rad_s == 0.5 * whole.line_turn_rad_s
+    assert half.line_speed_m_s == 0.5 * whole.line_speed_m_s
 
 
 def test_a_joint_that_would_leave_its_range_is_named() -> None:

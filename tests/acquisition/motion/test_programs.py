@@ -7,7 +7,8 @@ import pytest
 
 from acquisition.motion.cell import Cell
 from acquisition.motion.errors import TaskError
-from acquisition.motion.gate import Gate, Stream
+from acquisition.motion.following import Stream
+from acquisition.motion.gate import Gate
 from acquisition.motion.inverse.closed_form import closed_form
 from acquisition.motion.inverse.solver import Solver
 from acquisition.motion.paths.path import Belt
@@ -104,16 +105,21 @@ def test_a_stop_leads_through_the_very_place(inserted) -> None:
 def test_a_part_on_a_running_belt_is_gripped_where_it_is_by_then() -> None:
     task = read_task(TASKS / "conveyor.toml")
     arm, rate_m_s = Arm(), 0.05
+
+    def way_m(sent: int) -> float:
+        return rate_m_s * sent / 50.0
+
     OBJ = transform((0.1, 0.02, 0.03), (0.0, 3.141592653589793, 0.0))
     seen: list[float] = []
 
     def belt() -> Belt:
-        return Belt(rate_m_s * len(arm.q_rad) / 50.0, rate_m_s)
+        return Belt(way_m(len(arm.q_rad)), rate_m_s)
 
     def act(action: str) -> None:
         if action == "GRASP":
-            now = SOLVER.flange(arm.q_rad[-1])
-            part = task.graph.with_value("OBJ", OBJ).solve("at part", "T6", s_m=belt().s_m)
+            sent = list(arm.q_rad)  # the stream goes on meanwhile
+            now = SOLVER.flange(sent[-1])
+            part = task.graph.with_value("OBJ", OBJ).solve("at part", "T6", s_m=way_m(len(sent)))
             seen.append(apart(now, part)[0])
 
     ran = run_task(gate_of(arm), task, Around(lambda: HOME_RAD, lambda name: OBJ, act, belt))

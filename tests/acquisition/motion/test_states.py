@@ -14,7 +14,6 @@ CHANGES = {
     **{(s, E.HOLD): S.HELD for s in (S.MOVING, S.PAUSING)},
     **{(s, E.RESUME): S.MOVING for s in (S.PAUSING, S.HELD)},
     (S.MOVING, E.PAUSE): S.PAUSING,
-    (S.PAUSING, E.PAUSE): S.HELD,
     (S.PAUSING, E.RESTED): S.HELD,
 }
 

@@ -35,6 +35,17 @@ def test_inverses_on_either_side_are_read_as_written() -> None:
     np.testing.assert_allclose(graph.solve("p", "T6"), A @ inverse(B) @ A, atol=1e-12)
 
 
+def test_the_tool_stands_before_an_arm_that_is_written_inverted() -> None:
+    Z, E, P = (transform((0.1, 0.0, k), (0.1 * k, 0.2, 0.3)) for k in (1.0, 2.0, 3.0))
+    plain, turned = (
+        TaskGraph(known(Z=Z, E=E, P=P), {"p": parse_equation(text)}).place("p")
+        for text in ("Z T6 E = P", "E^-1 T6^-1 Z^-1 = P^-1")
+    )
+    np.testing.assert_allclose(turned.flange_at(0.0), plain.flange_at(0.0), atol=1e-12)
+    np.testing.assert_allclose(turned.tool, E, atol=1e-12)
+    np.testing.assert_allclose(turned.pos, plain.pos, atol=1e-12)
+
+
 def test_a_reading_of_the_camera_gives_the_pin_and_then_the_position() -> None:
     CAM, PC = transform((1.0, 0.0, 1.0), (np.pi, 0.0, 0.0)), transform((0.1, 0.0, 0.8))
     one = Constant(np.eye(4))

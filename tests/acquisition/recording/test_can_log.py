@@ -1,5 +1,7 @@
 """CAN logs in and out through python-can: every frame comes back as it was, whatever its kind."""
 
+import dataclasses
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -7,7 +9,7 @@ import can
 import numpy as np
 import pytest
 
-from acquisition.recording.can_frames import Frame, FrameFlag, block_of, channels, frames_of
+from acquisition.recording.can_frames import Frame, FrameFlag, block_of, channels, frames_of, stream_names
 from acquisition.recording.can_log import SUFFIXES, export_can, import_can
 from acquisition.recording.can_message import frame_of
 from acquisition.recording.check import Problem, check
@@ -141,6 +143,33 @@ def test_each_bus_of_a_file_gets_a_stream_of_its_own(tmp_path: Path, rig_source:
         again = list(reader)
     assert [m.arbitration_id for m in again] == list(range(20))
     assert [m.channel for m in again[:2]] == ["can1", "can0"]
+
+
+@pytest.mark.parametrize("stamp", ["nan", "inf", "1e300", "-1.0"])
+def test_a_stamp_that_is_no_time_is_where_the_file_makes_no_sense(stamp: str, tmp_path: Path, rig_source: str) -> None:
+    rows = "\n".join(f"{time_s},0x1,0,0,0,1,AA==" for time_s in ("1790000000.1", "1790000000.2", stamp, "1790000000.4"))
+    (tmp_path / "bus.csv").write_text("timestamp,arbitration_id,extended,remote,error,dlc,data\n" + rows)
+    done = import_can(tmp_path / "bus.csv", tmp_path / "back.mcap", rig_text=rig_source, software="calibeam")
+    assert (done.frames, read(tmp_path / "back.mcap").complete) == (2, False)
+    assert done.damage is not None
+    assert "time stamp" in done.damage
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_without_a_date_times_count_from_the_first_frame(suffix: str, record_frames, tmp_path: Path) -> None:
+    recording = dataclasses.replace(record_frames(messages()[:5]), host_s0=math.nan)
+    export_can(recording, tmp_path / f"bus{suffix}")
+    with can.LogReader(tmp_path / f"bus{suffix}") as reader:
+        times_s = [message.timestamp for message in reader]
+    np.testing.assert_allclose(times_s, np.arange(5) * 1e-3, atol=2e-6)
+
+
+def test_channels_whose_names_fold_into_one_keep_their_own_streams() -> None:
+    buses = ["a/b", "a.b", "A-B", "a-b-2", 0, "0", None]
+    named = stream_names(buses)
+    assert list(named.values()) == buses
+    assert len({name.lower() for name in named}) == len(buses)
+    assert [name for name, bus in named.items() if bus in ("a/b", "a.b", None)] == ["can-a-b", "can-a-b-2", "can"]
 
 
 def test_of_a_torn_log_what_came_before_is_kept_and_told(record_frames, tmp_path: Path, rig_source: str) -> None:

@@ -1,5 +1,8 @@
 """Recovery: a new, whole file of what is good, which says what is lost."""
 
+import errno
+import io
+import os
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -9,8 +12,12 @@ import pytest
 from mcap.reader import make_reader
 
 from acquisition.recording.errors import RecordingError
+from acquisition.recording.layout import FORMAT_VERSION, RECORDING_METADATA, RIG_METADATA
+from acquisition.recording.mcap_file import McapFile
+from acquisition.recording.messages import EVENT, MessageType, packed
 from acquisition.recording.read import read
 from acquisition.recording.recover import recover
+from acquisition.recording.rig import rig_sha256
 from acquisition.recording.stream import Channel, Event
 from acquisition.recording.writer import RecordingWriter
 
@@ -116,6 +123,61 @@ def test_a_lost_start_is_told_and_not_made_up(source: Path, tmp_path: Path) -> N
     recovered = read(tmp_path / "recovered.mcap")
     assert np.isnan(recovered.host_s0)
     assert any("count from an unknown start" in says for says in recovered.damage)
+
+
+class BadDisk(io.FileIO):
+    """A file of which one stretch of bytes cannot be read."""
+
+    def __init__(self, path: Path, bad: range) -> None:
+        super().__init__(path, "rb")
+        self._bad = bad
+
+    def readinto(self, buffer) -> int:
+        begin, room = self.tell(), memoryview(buffer).cast("B")
+        if begin in self._bad:
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+        return super().readinto(room[: self._bad.start - begin] if begin < self._bad.start else room)
+
+
+def test_what_a_disk_still_reads_is_recovered_on_both_sides_of_a_bad_sector(
+    open_writer: Open, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng = np.random.default_rng(3)
+    with open_writer() as writer:
+        stream = writer.stream("psd", (Channel("spot_x_m", "m"),))
+        for batch in range(BATCHES):
+            number = np.arange(100 * batch, 100 * batch + 100)
+            stream.append(1000.0 + number, number, number, {"spot_x_m": rng.normal(size=100)})
+            writer.flush()
+    data, plain = writer.path.read_bytes(), Path.open
+    starts = batch_starts(data)
+    ends = [start + 9 + struct.unpack_from("<Q", data, start + 1)[0] for start in starts]
+    bad = range(starts[5] // 4096 * 4096 + 4096, starts[5] // 4096 * 4096 + 8192)
+    assert starts[4] + 4096 < bad.stop < starts[-1]
+
+    def opened(path: Path, *how: str) -> io.BufferedIOBase:
+        return io.BufferedReader(BadDisk(path, bad)) if path == writer.path else plain(path, *how)
+
+    monkeypatch.setattr(Path, "open", opened)
+    done = recover(writer.path, tmp_path / "recovered.mcap")
+    assert not done.whole
+    assert "the disk cannot read it (Input/output error)" in done.damage[0]
+    lost = [b for b in range(BATCHES) if starts[b] < bad.stop and ends[b] > bad.start]
+    got = read(tmp_path / "recovered.mcap").streams["psd"].sequence
+    assert (set(range(BATCHES)) - set((got // 100).tolist())) == set(lost)
+
+
+def test_a_description_that_makes_no_sense_costs_its_messages_only(tmp_path: Path, rig_source: str) -> None:
+    file = McapFile(tmp_path / "odd.mcap", "calibeam")
+    file.metadata(RECORDING_METADATA, {"format_version": FORMAT_VERSION, "software": "calibeam", "host_s0": "0.0"})
+    file.metadata(RIG_METADATA, {"text": rig_source, "sha256": rig_sha256(rig_source)})
+    file.write(file.topic("odd", MessageType("calibeam.odd", b"\xff\xff", EVENT.new), {}), 1, b"?")
+    file.write(file.topic("events", EVENT, {}), 2, packed(EVENT, {"host_s": 1.0, "kind": "tick", "detail_json": "{}"}))
+    file.finish()
+    done = recover(tmp_path / "odd.mcap", tmp_path / "recovered.mcap")
+    assert any("1 descriptions of messages make no sense" in says for says in done.damage)
+    assert any("1 messages of which the description is lost" in says for says in done.damage)
+    assert [event.kind for event in read(tmp_path / "recovered.mcap").events] == ["tick"]
 
 
 def test_nothing_is_overwritten_and_nothing_is_made_of_nothing(source: Path, tmp_path: Path) -> None:

@@ -157,3 +157,11 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, content: bytes | No
     with pytest.raises(RigFileError, match=says) as refused:
         load_rig(path)
     assert str(path) in str(refused.value)
+
+
+def test_pages_come_and_go_unless_the_rig_says_otherwise(rig_source: str) -> None:
+    assert parse_rig(rig_source, "rig.toml").live.stop_without_page_s is None
+    strict = parse_rig(f"{rig_source}\n[live]\nstop_without_page_s = 5.0\n", "rig.toml")
+    assert strict.live.stop_without_page_s == 5.0
+    with pytest.raises(RigFileError, match="stop_without_page_s"):
+        parse_rig(f"{rig_source}\n[live]\nstop_without_page_s = 0.0\n", "rig.toml")

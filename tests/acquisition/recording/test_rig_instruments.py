@@ -7,7 +7,7 @@ import pytest
 
 from acquisition.recording.errors import RigFileError
 from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import EncoderDriver, PsdDriver
+from acquisition.recording.rig_devices import EncoderDriver, PsdDriver
 
 ROOT = Path(__file__).parents[3]
 PAIR = (ROOT / "rigs" / "ur5e-dual-kpa101.toml").read_text()
@@ -36,6 +36,15 @@ def test_plain_encoders(tmp_path):
     encoders = loaded(tmp_path, PLAIN).devices.encoders
     assert encoders.driver is EncoderDriver.CAN_DBC
     assert len(encoders.signals) == 6
+
+
+def test_files_are_looked_for_beside_the_rig_file(tmp_path):
+    text = PLAIN.replace('driver = "kpa101"', 'driver = "kpa101"\nerror_maps = ["maps/1.json", ""]', 1)
+    devices = loaded(tmp_path, text).devices
+    assert devices.encoders.dbc == str(tmp_path / "rigs/encoders-plain.dbc")
+    assert devices.psd.error_maps == (str(tmp_path / "maps/1.json"), "")
+    elsewhere = text.replace("maps/1.json", "/opt/maps/1.json")
+    assert loaded(tmp_path, elsewhere).devices.psd.error_maps[0] == "/opt/maps/1.json"
 
 
 def test_an_adapter_by_serial_number_and_further_words(tmp_path):

@@ -6,7 +6,7 @@ import pytest
 
 from acquisition.recording.errors import RigFileError
 from acquisition.recording.rig import load_rig, parse_rig, rig_text
-from acquisition.recording.rig_schema import RegisterType, RobotDriver
+from acquisition.recording.rig_devices import RegisterType, RobotDriver
 
 RIGS = Path(__file__).parents[3] / "rigs"
 TEXT = rig_text(RIGS / "irb120-modbus.toml")
@@ -29,7 +29,9 @@ def test_the_shipped_register_maps() -> None:
     [
         ('host = "127.0.0.2"', "", "either 'host' .* or 'serial_port'"),
         ('host = "127.0.0.2"', 'host = "a"\nserial_port = "b"', "and one only"),
-        ('host = "127.0.0.2"', 'serial_port = "b"', "a line at 'serial_port' has none"),
+        ('host = "127.0.0.2"', 'serial_port = "b"', "a serial line has none"),
+        ('host = "127.0.0.2"', 'serial_port = "a"\nserial_number = "b"', "and one only"),
+        ("rate_hz = 50.0", 'rate_hz = 50.0\nparity = "mark"', "parity"),
         ("rate_hz = 50.0", "rate_hz = 5000.0", "no controller serves so many polls"),
         ('name = "life"', 'name = "robot_mode"', "register robot_mode stands twice"),
         ("scale = 0.001", "scale = 0.0", "scale 0 loses the value"),

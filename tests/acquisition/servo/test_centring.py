@@ -163,9 +163,9 @@ def test_law_8_with_a_guess_wrong_by_25_deg_converges_with_ripple(rig, plain_rig
 
 
 def test_centring_from_anywhere_keeps_its_promise(rig, plain_rig) -> None:
-    """The benchmark in small: 16 random starts, fixture pose wrong by up to 80 deg and 50 mm, both orders."""
-    runs = benchmark(rig, plain_rig, cases=16, seed=77, strategies=("registered (sessions use it)",))
+    """The benchmark in small: 10 random starts, fixture pose wrong by up to 80 deg and 50 mm, both orders."""
+    runs = benchmark(rig, plain_rig, cases=range(10), seed=77, strategies=("registered (sessions use it)",))
     assert max(run.losses for run in runs["registered (sessions use it)"]) <= 1
     steps = [run.steps for run in runs["registered (sessions use it)"] if run.status is Status.CENTRED]
-    assert len(steps) >= 15
+    assert len(steps) == 10
     assert np.median(steps) <= 6

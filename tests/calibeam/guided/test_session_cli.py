@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import Devices
+from acquisition.recording.rig_devices import Devices
 from calibeam.cli import run
 from calibeam.guided.recorded import is_guided
 
@@ -35,6 +35,15 @@ def test_without_a_bar_the_session_is_refused_and_leaves_nothing(tmp_path: Path,
     rig.write_text(head + rest[rest.index("[[sphere]]") :])
     assert run(["session", str(rig), "--out", str(tmp_path / "out")]) == 1
     assert "cones alone show no length" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_plan_is_not_for_verifying_and_a_robot_is_not_verified(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    out = ["--verify", "--out", str(tmp_path / "out")]
+    assert run(["session", str(RIG_FILE), "--plan", "plan.toml", *out]) == 1
+    assert "give one of them" in " ".join(capsys.readouterr().err.split())
+    assert run(["session", str(RIG_FILE.with_name("ur5e-dual-psd.toml")), *out]) == 1
+    assert "--verify is of a measuring arm" in " ".join(capsys.readouterr().err.split())
     assert not (tmp_path / "out").exists()
 
 

@@ -9,7 +9,7 @@ from calibeam.motion.keys import Keys
 
 
 class Told:
-    """A gate that keeps what it was told, and follows the table of states."""
+    """A gate that keeps what it was told, and follows the table of states; it is paused twice within ten seconds."""
 
     def __init__(self, state: State) -> None:
         self.state, self.told = state, []
@@ -19,7 +19,7 @@ class Told:
         self.state = after(self.state, event)
 
     def pause(self) -> None:
-        self._tell(Event.PAUSE)
+        self._tell(Event.HOLD if self.state is State.PAUSING else Event.PAUSE)
 
     def resume(self) -> None:
         self._tell(Event.RESUME)
@@ -40,7 +40,7 @@ def test_ctrl_c_pauses_then_holds_then_gives_up() -> None:
     for state in (State.PAUSING, State.HELD, State.ENDING):
         keys.interrupted()
         assert gate.state is state
-    assert gate.told == ["pause", "pause", "abort"]
+    assert gate.told == ["pause", "hold", "abort"]
     assert "Ctrl-C again brakes now" in out.getvalue()
 
 

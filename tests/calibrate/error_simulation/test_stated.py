@@ -70,6 +70,10 @@ def test_what_cannot_be_is_refused_by_name(rig, machine, entry, says):
         ("schema = 1\n[[source]]\nwhat = ['link2.x']\nscale = 1", "line 4.*scale"),
         ("schema = 1\n[[source]]\nwhat = ['link2.x']", "line 2: a source wants one of"),
         ("schema = 1\n[[source]]\nwhat = ['link2.x']\nlaw = 'cauchy'\nscale_m = 1e-5", "line 2.*no variance"),
+        (
+            "schema = 1\n[[source]]\nwhat = ['joint1.zero']\nscale_rad = 1e-5\nloc_m = 0.001",
+            "line 5: loc_m .*give loc_rad",
+        ),
         ("schema = 1\nsource = [", "not TOML"),
     ],
 )

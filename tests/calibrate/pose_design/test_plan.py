@@ -2,11 +2,13 @@
 
 from itertools import pairwise
 
+import msgspec
 import numpy as np
 import pytest
 
 from acquisition.planned_session import check_planned
 from acquisition.recording.pose_plan import read_pose_plan, write_pose_plan
+from acquisition.recording.rig import load_rig
 from calibeam.pose_design.grid import with_grid
 from calibeam.pose_design.reachable import candidates_of
 from calibrate.errors import DataError
@@ -14,6 +16,8 @@ from calibrate.pose_design.design import Asked, design, enough_of
 from calibrate.pose_design.information import information_of
 from calibrate.pose_design.places import choose_places
 from calibrate.pose_design.seen import seen_by
+
+from .conftest import RIG
 
 
 @pytest.fixture(scope="module")
@@ -134,13 +138,27 @@ def test_what_cannot_be_designed_is_refused(rig, candidates, information, asked,
         design(rig, candidates, information, asked)
 
 
-def test_a_rig_without_an_instrument_is_refused():
-    from acquisition.recording.rig import load_rig
-
-    from .conftest import RIG
-
+def test_a_rig_without_an_instrument_is_refused_and_a_measuring_arm_told_that_it_needs_no_plan():
+    arm = load_rig(RIG.with_name("arm-cmm-reference.toml"))
+    with pytest.raises(DataError, match="not for cones and bars"):
+        candidates_of(arm, 4, np.random.default_rng(1))
+    bare = msgspec.structs.replace(arm, seat_list=(), bar_position_list=())
     with pytest.raises(DataError, match="what will be measured"):
-        candidates_of(load_rig(RIG.with_name("arm-cmm-reference.toml")), 4, np.random.default_rng(1))
+        candidates_of(bare, 4, np.random.default_rng(1))
+
+
+def test_what_could_be_seen_is_asked_with_angles_that_scatter_as_the_rig_believes(rig, candidates, made, monkeypatch):
+    asked = []
+
+    def caught(_, samples):
+        asked.append(samples.joints())
+        raise InterruptedError
+
+    monkeypatch.setattr("calibrate.pose_design.seen.session_of", caught)
+    with pytest.raises(InterruptedError):
+        seen_by(rig, candidates, made.taken, np.random.default_rng(1))
+    scatter_rad = (asked[0] - candidates.q_rad[made.taken.poses]).std()
+    assert scatter_rad == pytest.approx(rig.noise.joint_rad, rel=0.2)
 
 
 @pytest.mark.parametrize(("power", "enough"), [(0.5, 10), (1.0, None)])

@@ -1,5 +1,6 @@
 """What reports are made of: a short dual-PSD session in process, and sessions of other instruments by formulas."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,9 +18,14 @@ from calibeam.direct import direct_bench
 from calibeam.identification import Identified, identify_recording
 from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
+from calibrate.identification.evidence_record import evidence_fields
 from calibrate.identification.identify import identify
 from calibrate.identification.record import record_of
 from calibrate.model_file import ModelFile, RigIdentity
+from calibrate.report.evidence import evidence
+from calibrate.report.session_evidence import session_evidence
+from calibrate.report.session_report import session_page
+from calibrate.report.zero_report import ZeroSession, zero_page
 from drivers.clock import SystemClock
 
 RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
@@ -44,6 +50,14 @@ def identified(recorded: Recording) -> Identified:
     return identify_recording(recorded)
 
 
+@pytest.fixture(scope="session")
+def zero_html(recorded: Recording, identified: Identified) -> str:
+    """The whole report of the dual-PSD session, made once."""
+    proved = None if identified.proved is None else evidence_fields(identified.proved.evidence)
+    known = evidence(recorded, identified.zeros, "reported")
+    return zero_page(ZeroSession(known, identified.four_poses, proved=proved))
+
+
 class ArmSession:
     """A UR5e a little beside its drawing, and what its instruments read of it; plain 4 x 4 products."""
 
@@ -51,8 +65,8 @@ class ArmSession:
     turn, shift_m = Rotation.from_rotvec([0.3, -0.4, 2.2]), np.array([1.8, -0.6, 0.4])  # of the device, in the base
     mounted = Rotation.from_rotvec([0.2, 0.1, -0.3])  # a 6-D target on the flange
 
-    def __init__(self, truth, n: int) -> None:
-        self.rng = np.random.default_rng(6)
+    def __init__(self, truth, n: int, seed: int) -> None:
+        self.rng = np.random.default_rng(seed)
         self.q_rad = self.rng.uniform(-1.8, 1.8, (n, 6))
         self.flanges = np.array([truth.flange(q + truth.zeros) for q in self.q_rad])
         self.tips_m = (self.flanges @ np.array([*self.tool_m, 1.0]))[:, :3]
@@ -87,6 +101,27 @@ class ArmSession:
 
 @pytest.fixture(scope="session")
 def arm_session(ur5e_truth):
-    """ArmSession of so many poses; a new one each time, so that its columns may be changed."""
+    """ArmSession of so many poses; a new one each time, so that its columns may be changed; joints moved since."""
     truth = ur5e_truth(np.random.default_rng(5), zero_max=5e-3)
-    return lambda n=80: ArmSession(truth, n)
+
+    def made(n: int = 80, *, seed: int = 6, moved_rad: tuple[float, ...] = (0.0,) * 6) -> ArmSession:
+        return ArmSession(replace(truth, zeros=truth.zeros + np.array(moved_rad)), n, seed)
+
+    return made
+
+
+@pytest.fixture(scope="session")
+def wire_and_positions(arm_session):
+    """Two instruments, each at half of the poses, and a name that would be code."""
+    session = arm_session()
+    half = np.arange(len(session.q_rad)) % 2 == 0
+    columns = {name: np.where(half, column, np.nan) for name, column in session.positions().items()}
+    columns |= {name: np.where(half, np.nan, column) for name, column in session.wire().items()}
+    recording = session.recording(columns, "<script>alert(1)</script>")
+    return recording, session.model(recording)
+
+
+@pytest.fixture(scope="session")
+def session_html(wire_and_positions) -> str:
+    """The whole report of that session, made once."""
+    return session_page(session_evidence(*wire_and_positions))

@@ -9,21 +9,16 @@ import pytest
 
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
+from calibrate.report.page import write_page
+from calibrate.report.sections.arm_data import data_chapter
+from calibrate.report.sections.arm_errors import errors_chapter
+from calibrate.report.sections.arm_parameters import parameters_chapter
+from calibrate.report.sections.arm_proofs import proofs_chapter
 from calibrate.report.session_evidence import session_evidence
-from calibrate.report.session_report import session_report_html, write_session_report
+from calibrate.report.session_report import session_answers
+from calibrate.report.session_workspace import session_arm
 
 NEWER = ("alarms", "proofs", "unproven", "observability", "free_space", "bootstrap", "plan")
-
-
-@pytest.fixture(scope="module")
-def wire_and_positions(arm_session):
-    """Two instruments, each at half of the poses, and a name that would be code."""
-    session = arm_session()
-    half = np.arange(len(session.q_rad)) % 2 == 0
-    columns = {name: np.where(half, column, np.nan) for name, column in session.positions().items()}
-    columns |= {name: np.where(half, np.nan, column) for name, column in session.wire().items()}
-    recording = session.recording(columns, "<script>alert(1)</script>")
-    return recording, session.model(recording)
 
 
 @pytest.fixture(scope="module")
@@ -34,8 +29,8 @@ def poses(arm_session):
 
 
 @pytest.fixture(scope="module")
-def page(wire_and_positions) -> str:
-    return session_report_html(*wire_and_positions)
+def page(session_html) -> str:
+    return session_html
 
 
 def text_of(page: str) -> str:
@@ -102,7 +97,7 @@ def test_a_pose_is_told_as_position_in_metres_and_orientation_in_radians(poses):
     assert (position.unit, orientation.unit) == ("m", "rad")
     assert np.sqrt(np.mean(position.error_after**2)) == pytest.approx(np.sqrt(3) * 20e-6, rel=0.25)
     assert np.sqrt(np.mean(orientation.error_after**2)) == pytest.approx(np.sqrt(3) * 1e-4, rel=0.25)
-    text = text_of(session_report_html(*poses))
+    text = text_of(errors_chapter(session_evidence(*poses)))
     assert "Measured poses, orientation" in text
     assert "µrad" in text
 
@@ -120,10 +115,13 @@ def test_a_model_from_before_these_fields_has_a_report_too(wire_and_positions):
     recording, model = wire_and_positions
     defaults = {f.name: f.default for f in msgspec.structs.fields(ModelFile)}
     old = msgspec.structs.replace(model, **{name: defaults[name] for name in NEWER})
-    text = text_of(session_report_html(recording, old))
+    known = session_evidence(recording, old)
+    text = text_of(proofs_chapter(known) + parameters_chapter(known))
     assert "random 20% of the rows" in text
     assert "Observability" not in text
     assert "Predicted error of the target" not in text
+    assert session_answers(known).numbers[2].value is None
+    assert isinstance(session_arm(known), str)
 
 
 def test_a_row_left_out_is_named_with_its_fault(arm_session):
@@ -131,19 +129,19 @@ def test_a_row_left_out_is_named_with_its_fault(arm_session):
     columns = session.positions()
     columns["y_m"][6] += 0.1
     recording = session.recording(columns)
-    text = text_of(session_report_html(recording, session.model(recording)))
-    assert "row 7, y_m: reads" in text
-    assert "of 80; 1 left out as faulty" in text
+    known = session_evidence(recording, session.model(recording))
+    assert "row 7, y_m: reads" in text_of(data_chapter(known))
+    assert "of 80; 1 left out as faulty" in " ".join(session_answers(known).also)
 
 
 def test_the_model_of_another_recording_is_refused(arm_session, wire_and_positions):
     session = arm_session()
     other = session.recording(session.positions())
     with pytest.raises(DataError, match="it was fitted to position, wire, here are position"):
-        session_report_html(other, wire_and_positions[1])
+        session_evidence(other, wire_and_positions[1])
     shorter = arm_session(60)
     with pytest.raises(DataError, match="it is of 80 samples, here are 60"):
-        session_report_html(shorter.recording(shorter.positions()), session.model(other))
+        session_evidence(shorter.recording(shorter.positions()), session.model(other))
 
 
 def test_the_model_of_other_values_is_refused(arm_session):
@@ -152,9 +150,9 @@ def test_the_model_of_other_values_is_refused(arm_session):
     columns = session.positions()
     columns["x_m"][::2] += 1e-3
     with pytest.raises(DataError, match="give the model of this recording"):
-        session_report_html(session.recording(columns), session.model(recording))
+        session_evidence(session.recording(columns), session.model(recording))
 
 
-def test_a_place_that_cannot_be_written_is_named(wire_and_positions, tmp_path):
+def test_a_place_that_cannot_be_written_is_named(page, tmp_path):
     with pytest.raises(DataError, match="cannot be written"):
-        write_session_report(tmp_path / "missing" / "report.html", *wire_and_positions)
+        write_page(tmp_path / "missing" / "report.html", page)

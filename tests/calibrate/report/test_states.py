@@ -10,8 +10,12 @@ from calibeam.identification import Identified
 from calibrate.errors import DataError
 from calibrate.fit import Status
 from calibrate.report.evidence import evidence
+from calibrate.report.sections.centring import centring
+from calibrate.report.sections.provenance import provenance
+from calibrate.report.sections.summary import answers
+from calibrate.report.sections.unseen import unseen
 from calibrate.report.verdict import Trust, verdict
-from calibrate.report.zero_report import report_html, write_report
+from calibrate.report.zero_report import ZeroSession, zero_page
 from calibrate.zeros.result import JointZero, ZeroResult
 
 
@@ -92,17 +96,18 @@ def test_a_fit_without_a_finite_number_still_gives_a_report(identified: Identifi
         repeats=None,
         held_out=None,
     )
-    page = report_html(identified.used, lost, why_no_point_constraint="nothing was centred")
+    known = evidence(identified.used, lost, "reported")
+    page = zero_page(ZeroSession(known, why_no_point_constraint="nothing was centred"))
     assert "There is no finite fit to judge" in page
+    assert 'href="#proofs"' not in page
     assert "Not done: nothing was centred." in page
     assert ">nan" not in page
 
 
 def test_a_recording_without_centring_and_origin_says_so(identified: Identified) -> None:
     bare = replace(identified.used, events=(), notes={}, software="", host="", started_utc="")
-    page = report_html(bare, identified.zeros)
-    assert "The recording holds no centring run." in page
-    assert page.count("not stated") >= 2
+    assert "The recording holds no centring run." in centring(evidence(bare, identified.zeros, "reported"))
+    assert provenance(bare, 9, "with both spots", "calibeam").count("not stated") >= 2
 
 
 def test_a_zero_that_the_drawing_limits_is_told_from_one_that_the_measurement_limits(identified: Identified) -> None:
@@ -110,13 +115,14 @@ def test_a_zero_that_the_drawing_limits_is_told_from_one_that_the_measurement_li
         replace(z, value_rad=0.01, sigma_rad=5e-4, measurement_sigma_rad=1e-6) if z.joint == 4 else unknown(z)
         for z in identified.zeros.zeros
     )
-    page = report_html(identified.used, replace(identified.zeros, zeros=zeros))
-    assert "limited by the drawing&#x27;s tolerance" in page
-    assert "more poses will not better it" in page
+    known = evidence(identified.used, replace(identified.zeros, zeros=zeros), "reported")
+    assert any("limited by the drawing's tolerance" in said for said in answers(known).known)
+    assert "more poses will not better it" in unseen(known)
 
 
 def test_notes_of_the_recording_are_text(identified: Identified) -> None:
-    page = report_html(replace(identified.used, notes={"<b>plan": "<img src=x>"}), identified.zeros)
+    noted = replace(identified.used, notes={"<b>plan": "<img src=x>"})
+    page = provenance(noted, 9, "with both spots", "calibeam")
     assert "&lt;b&gt;plan" in page
     assert "<img" not in page
 
@@ -124,16 +130,11 @@ def test_notes_of_the_recording_are_text(identified: Identified) -> None:
 def test_the_result_of_another_recording_is_refused(identified: Identified) -> None:
     half = replace(identified.used, samples=identified.used.samples.take(np.arange(10)))
     with pytest.raises(DataError, match=r"the result is of \d+ poses, .* has 10"):
-        report_html(half, identified.zeros)
+        evidence(half, identified.zeros, "reported")
 
 
 def test_the_result_of_another_rig_is_refused(identified: Identified) -> None:
     result = identified.zeros
     other = replace(result, parameters=(replace(result.parameters[0], name="joint9.zero"), *result.parameters[1:]))
     with pytest.raises(DataError, match="other parameters than the rig"):
-        report_html(identified.used, other)
-
-
-def test_a_place_that_cannot_be_written_is_named(identified: Identified, tmp_path) -> None:
-    with pytest.raises(DataError, match="cannot be written"):
-        write_report(tmp_path / "missing" / "report.html", identified.used, identified.zeros)
+        evidence(identified.used, other, "reported")

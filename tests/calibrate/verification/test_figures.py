@@ -142,6 +142,27 @@ def test_places_are_sorted_by_artefact_and_bars_by_where_they_stood():
     assert found.lengths[0].error_m == pytest.approx(0.6 - RIG.bars[1].length_m)
 
 
+def test_bars_that_cross_in_their_middle_stand_in_two_places_and_one_turned_round_in_one():
+    ends = np.array([[-0.3, 0, 0], [0.3, 0, 0], [0, -0.3, 0], [0, 0.3, 0], [0.3, 0.01, 0], [-0.3, 0.01, 0]])
+    samples = table(**{f"q{i + 1}_rad": ends[:, i] for i in range(3)}, bar=np.ones(6), bar_end=np.array(["a", "b"] * 3))
+    assert [length.position for length in measured(samples, RIG, Straight()).lengths] == [1, 2, 1]
+
+
+def test_a_flat_series_of_touches_is_left_out_and_said_and_the_others_count():
+    good, turn = ball(25, 0.025), np.linspace(0.0, 6.0, 25)
+    flat = np.array([0.6, -0.15, 0.2]) + 0.01 * np.stack([np.cos(turn), np.sin(turn), 1e-3 * np.cos(9 * turn)], axis=1)
+    places = np.concatenate([good, flat])
+    samples = table(
+        **{f"q{i + 1}_rad": places[:, i] for i in range(3)}, sphere=np.repeat([1.0, 2.0], 25), series=np.zeros(50)
+    )
+    found = measured(samples, RIG, Straight())
+    assert found.left_out == (
+        "sphere 2, series 0 left out: the touches lie in one plane and show no sphere; touch it all round",
+    )
+    assert by_symbol(iso10360_12.figures(found))["P_Size"].taken == 1
+    assert "left out" in Verification(iso10360_12.figures(found), 50, found.left_out).sentence
+
+
 def test_a_recording_without_artefacts_is_refused():
     empty = table(q1_rad=np.zeros(2), q2_rad=np.zeros(2), q3_rad=np.zeros(2))
     with pytest.raises(DataError, match=r"nothing to verify by.*--verify"):

@@ -1,5 +1,6 @@
 """The camera driver on a real wire: pictures are of now, whatever the source; and how it ends when it cannot."""
 
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from drivers.errors import DeviceError, DeviceLost, DeviceRefused
 
 RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd-camera.toml"
 SIZE = (960, 720)
+LATENCY_S = 0.2
 # Readings from which the emulated camera sees the board of seed 1: in front of the first place.
 SOURCES = ("image.jpg", "stream.mjpg")
 
@@ -60,7 +62,7 @@ def test_an_unmodified_opencv_opens_it(emulation: Emulation, kind: str) -> None:
 @pytest.mark.parametrize("kind", SOURCES)
 def test_a_picture_is_of_now(emulation: Emulation, kind: str) -> None:
     """The fixture is put away and back; every picture asked for afterwards shows it so."""
-    camera, board = Camera(source(emulation, kind), SIZE, SystemClock()), Board(load_rig(RIG).camera.board)
+    camera, board = Camera(source(emulation, kind), SIZE, SystemClock(), LATENCY_S), Board(load_rig(RIG).camera.board)
     camera.connect()
     try:
         for placement in (1, 0, 1, 0, 1):
@@ -71,8 +73,36 @@ def test_a_picture_is_of_now(emulation: Emulation, kind: str) -> None:
         camera.close()
 
 
+def test_what_was_still_on_its_way_when_it_was_asked_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Frames come a tenth of a second apart, and are numbered; the camera holds five back."""
+
+    class Line:
+        number = 0
+
+        def now_s(self) -> float:
+            return 0.1 * self.number
+
+        def read(self) -> tuple[bool, np.ndarray]:
+            time.sleep(1e-3)
+            self.number += 1
+            frame = np.zeros((16, 16), np.uint8)
+            frame[0, :2] = self.number // 256, self.number % 256
+            return True, frame
+
+        def release(self) -> None: ...
+
+    line = Line()
+    monkeypatch.setattr(Camera, "_opened", lambda camera: line)
+    camera = Camera("line", (16, 16), line, 0.5)  # type: ignore[arg-type]
+    camera.connect()
+    asked = line.number
+    high, low = camera.picture()[0, :2].tolist()
+    camera.close()
+    assert 256 * high + low >= asked + 5
+
+
 def test_pictures_of_another_size_are_refused(emulation: Emulation) -> None:
-    camera = Camera(source(emulation, "image.jpg"), (640, 480), SystemClock())
+    camera = Camera(source(emulation, "image.jpg"), (640, 480), SystemClock(), LATENCY_S)
     with pytest.raises(DeviceRefused, match="pictures of 960 x 720"):
         camera.connect()
 
@@ -80,20 +110,20 @@ def test_pictures_of_another_size_are_refused(emulation: Emulation) -> None:
 @pytest.mark.parametrize("kind", ["image.jpg", "nothing.mjpg"])
 def test_a_camera_that_is_not_there_is_lost(kind: str) -> None:
     with pytest.raises(DeviceLost, match="cannot be opened"):
-        Camera(f"http://127.0.0.1:9/{kind}", SIZE, SystemClock()).connect()
+        Camera(f"http://127.0.0.1:9/{kind}", SIZE, SystemClock(), LATENCY_S).connect()
 
 
 def test_a_picture_in_a_file_is_a_camera_too(tmp_path: Path) -> None:
     path = tmp_path / "still.png"
     cv2.imwrite(str(path), np.full((720, 960), 77, np.uint8))
-    camera = Camera(str(path), SIZE, SystemClock())
+    camera = Camera(str(path), SIZE, SystemClock(), LATENCY_S)
     camera.connect()
     assert camera.picture().mean() == 77.0
 
 
 def test_a_camera_that_goes_is_said_to_be_lost(tmp_path: Path) -> None:
     with Emulation(RIG) as short:
-        camera = Camera(source(short, "stream.mjpg"), SIZE, SystemClock())
+        camera = Camera(source(short, "stream.mjpg"), SIZE, SystemClock(), LATENCY_S)
         camera.connect()
     with pytest.raises(DeviceError, match="camera http"):
         camera.picture()

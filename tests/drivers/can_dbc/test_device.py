@@ -185,6 +185,22 @@ def test_damaged_and_error_frames_are_counted_and_the_stream_goes_on():
     encoders.close()
 
 
+def test_rows_from_before_a_failure_are_not_lost_with_it():
+    bus_off = can.Message(arbitration_id=0x40, is_error_frame=True)
+    frames = [(5.0, angle_frame(1, 0)), (5.01, angle_frame(1, 9)), (5.011, bus_off)]
+    frames += [(5.02, angle_frame(1, 10)), (5.03, angle_frame(1, 11)), (5.04, angle_frame(1, 12))]
+    encoders = scripted(frames, SIGNALS[:1])
+    encoders.connect()
+    with pytest.raises(DeviceLost, match="bus-off"):
+        encoders.read(0.05)
+    encoders.connect()
+    block = encoders.read(0.05)
+    assert block.values["position_rad"][:2, 0] == pytest.approx([9 * UNIT_RAD, 11 * UNIT_RAD])
+    assert block.values["bus_errors"].tolist()[:2] == [0, 1]
+    assert block.sequence[1] > block.sequence[0] + 1  # what passed between is not known to be nothing
+    encoders.close()
+
+
 def test_one_that_falls_silent_is_named():
     frames = [(5.0, angle_frame(1, 0)), (5.0, angle_frame(2, 0))]
     frames += [(5.0 + 0.01 * n, angle_frame(1, 0)) for n in range(1, 200)]
@@ -229,6 +245,19 @@ def test_counts_without_a_unit_need_their_number_a_turn(odd):
     (joint,) = joint_signals(odd, ["LINK.Count"], 36000)
     assert joint.scale.unit_rad == pytest.approx(math.tau / 36000)
     assert joint.scale.range_units == 36000  # the stated end, not the 65536 of its bits
+
+
+@pytest.mark.parametrize(
+    ("ends", "range_units"),
+    [("0|360", 3600), ("0|359.9", 3600), ("-180|180", 3600), ("0|720", 7200), ("0|90", 901), ("0|0", 1 << 16)],
+)
+def test_ends_that_are_whole_turns_apart_are_one_place(tmp_path, ends, range_units):
+    (tmp_path / "turn.dbc").write_text(
+        f'VERSION ""\n\nNS_ :\n\nBS_:\n\nBU_: one\n\nBO_ 5 AXIS: 2 one\n'
+        f' SG_ Angle : 0|16@1+ (0.1,0) [{ends}] "deg" one\n'
+    )
+    (joint,) = joint_signals(tmp_path / "turn.dbc", ["AXIS.Angle"], None)
+    assert joint.scale.range_units == range_units
 
 
 def test_what_a_file_cannot_give_is_refused(odd, tmp_path):

@@ -8,7 +8,7 @@ from drivers.clock import SystemClock
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale, WireError
 from drivers.psd_daq.messages import Flag
 from drivers.psd_faces import Face, FaceKind
-from drivers.psd_kpa101.pair import BAUD, Head, Kpa101Pair
+from drivers.psd_kpa101.pair import BAUD, Head, Kpa101Pair, counts_of
 from drivers.psd_kpa101.wiring import Wiring
 from drivers.transports.serial_port import SerialAddress, SerialLine, open_serial
 
@@ -137,6 +137,19 @@ def test_darkness_and_too_much_light_are_flagged(in_memory, light_a, flag):
     in_memory.world.light_a[0] = light_a
     in_memory.psd.connect()
     assert set(in_memory.psd.read(1.0).values["flags"]) == {flag}
+
+
+def test_a_sum_above_half_of_its_scale_is_not_saturated(in_memory):
+    """The sum counts to 65535, the differences to 32767: 60 uA in 100 kV/A are 6 of 10 V."""
+    in_memory.world.light_a[0] = 60e-6
+    in_memory.psd.connect()
+    block = in_memory.psd.read(1.0)
+    assert set(block.values["flags"]) == {0}
+    assert block.values["sum_counts"][:, 0].min() > 32767
+    for channel in in_memory.psd.describe():
+        assert (np.abs(block.values[channel.name]) < channel.full_scale).all(), channel.name
+    np.testing.assert_array_equal(counts_of(block.values, 1)[:, 2], block.values["sum_counts"][:, 0])
+    np.testing.assert_array_equal(counts_of(block.values, 2)[:, :2], block.values["difference_counts"][:, 2:])
 
 
 def test_connecting_again_goes_on_counting(in_memory):

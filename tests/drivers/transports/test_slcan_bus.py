@@ -1,6 +1,7 @@
 """The serial-line adapter that reads all that waits: the frames of python-can's own, however the bytes are split."""
 
 import itertools
+import math
 import os
 import tty
 from collections.abc import Iterator
@@ -9,6 +10,7 @@ from contextlib import suppress
 import can
 import pytest
 
+from acquisition.recording.can_message import frame_of
 from drivers.transports.slcan_bus import LONGEST_LINE, BlockSlcanBus
 
 LINES = (
@@ -73,6 +75,12 @@ def test_all_kinds_of_frames_are_told_in_order(adapter: Adapter) -> None:
     adapter.says(LINES)
     assert heard(adapter.bus, len(FRAMES)) == FRAMES
     assert adapter.bus.recv(0.0) is None
+
+
+def test_frames_carry_no_stamp_for_the_adapter_gives_none(adapter: Adapter) -> None:
+    adapter.says(LINES)
+    messages = [adapter.bus.recv(2.0) for _ in FRAMES]
+    assert all(message is not None and math.isnan(frame_of(message, 7.0, sent=False).device_s) for message in messages)
 
 
 @pytest.mark.parametrize("at", range(1, len(LINES), 5))

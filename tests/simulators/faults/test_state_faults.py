@@ -68,5 +68,18 @@ def test_saturating_light_is_beyond_every_converter(faults, light) -> None:
     assert light.photocurrents_a([0.0]).min() > 0.1
 
 
+def test_faults_that_overlap_end_each_by_itself(faults, light, clock) -> None:
+    """The shorter one ends inside the longer: the longer lasts; then all is well."""
+    faults.inject("spot-off", 4, 1, None, {})
+    faults.inject("saturation", 2, 1, None, {})
+    faults.inject("clock", 4, 1, None, {"step_s": 0.5})
+    faults.inject("clock", 2, 1, None, {"step_s": 2.0})
+    assert (light.photocurrents_a([0.0])[0, 0], clock.tells(1.0)) == (0.0, 3.5)
+    run(faults, 2)
+    assert (light.photocurrents_a([0.0])[0, 0], clock.tells(1.0)) == (0.0, 1.5)
+    run(faults, 2)
+    assert (light.photocurrents_a([0.0])[0, 0], clock.tells(1.0)) == (1e-4, 1.0)
+
+
 def test_everything_else_of_the_world_shows_through(light) -> None:
     assert light.time_s == 3.0

@@ -99,6 +99,21 @@ def test_a_leaning_axis_and_a_yielding_joint_move_the_probe_but_not_the_shafts()
         assert 1e-6 < np.linalg.norm(moved) < 1e-3
 
 
+def test_a_bearing_runs_out_as_far_as_it_is_said_and_comes_back_with_the_turn():
+    """Joint 6 alone turns: the probe is off by its runout, sideways and along, whatever the posture before."""
+    plain, worn = HandWorld.from_rig(rig()), HandWorld.from_rig(rig(radial_runout_m=2e-6, axial_runout_m=1e-6))
+    q = np.array(POSTURE) * np.ones((400, 1))
+    q[:, 5] = np.linspace(-math.pi, math.pi, 400)
+    off_m = worn.arm.tip_m(q) - plain.arm.tip_m(q)
+    np.testing.assert_allclose(off_m[0], off_m[-1], atol=1e-12)
+    last = worn.truth.runouts[5]
+    axis = np.linalg.svd(np.diff(plain.arm.tip_m(q), axis=0))[2][2]
+    along_m, aside_m = off_m @ axis, off_m - np.outer(off_m @ axis, axis)
+    others_m = aside_m.mean(axis=0)
+    assert 0.5 * np.ptp(along_m) == pytest.approx(last.axial_m, rel=1e-3)
+    np.testing.assert_allclose(np.linalg.norm(aside_m - others_m, axis=1), last.radial_m, rtol=1e-2)
+
+
 def test_one_deviation_switched_off_leaves_the_others():
     whole = HandWorld.from_rig(rig(length_sigma_m=1e-4, disc_eccentricity_m=2e-6)).truth
     without = HandWorld.from_rig(rig(length_sigma_m=1e-4)).truth

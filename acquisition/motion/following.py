@@ -1,0 +1,168 @@
+"""One plan on its way to the arm: set-points in time and checked, rests and actions, holds, the brake."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.motion.acting import Acting, Action
+from acquisition.motion.brake import along_path, by_joints
+from acquisition.motion.errors import InterruptedMotionError, RefusedMotionError
+from acquisition.motion.paths.segments import Pace
+from acquisition.motion.paths.solved import SolvedPath
+from acquisition.motion.setpoints import LookAhead
+from acquisition.motion.states import OVER, Event, State
+from acquisition.motion.under_way import UnderWay
+from drivers.clock import Clock
+
+Floats = NDArray[np.float64]
+
+
+class SetPoints(Protocol):
+    """The streaming half of a robot controller; `stop` works from any thread and in every state."""
+
+    def servo_joints(self, q_rad: Floats, period_s: float, lookahead_s: float, gain: float) -> None: ...
+    def servo_stop(self, deceleration_rad_s2: float) -> None: ...
+    def stop(self) -> None: ...
+
+
+@dataclass(frozen=True)
+class Stream:
+    """How set-points go out. `solve_hz` from the structure, `hz` of the controller."""
+
+    hz: float = 500.0  # UR e-Series control cycle
+    solve_hz: float = 100.0
+    lookahead_s: float = 0.03  # URScript servoj: 0.03 to 0.2 s; the least smooths least
+    gain: float = 2000.0  # URScript servoj: 100 to 2000; the stiffest follows best
+    lag_s: float = 0.0  # by which the arm follows its set-points, as measured by `calibeam motion`; 0: nobody has
+    rested_s: float = 0.02  # after so long a silence the arm rests on the last set-point, and is set going from there
+    late_s: float = 1.0  # a stream that was silent longer is given up
+
+
+@dataclass
+class Followed:
+    """How a run went."""
+
+    sent: int = 0
+    missed: int = 0  # cycles in which no set-point could be sent in time
+    worst_late_s: float = 0.0
+    restarts: int = 0  # the stream was silent so long that the arm came to rest
+
+
+@dataclass(frozen=True)
+class Said:
+    """The gate, as the stream sees it. `braked`: the brake is at its end."""
+
+    state: Callable[[], State]
+    tell: Callable[[Event], None]
+    braked: Callable[[], None]
+
+
+class Following:
+    """The one owner of a stream, from its first set-point to its last."""
+
+    def __init__(
+        self, arm: SetPoints, stream: Stream, clock: Clock, points: LookAhead, checked: UnderWay, pace: Pace, said: Said
+    ) -> None:
+        self._arm, self._stream, self._clock, self._points, self._said = arm, stream, clock, points, said
+        self._checked, self._pace, self._period_s = checked, pace, 1.0 / stream.hz
+        self._brake_s = float(np.max(pace.speed_rad_s / pace.acceleration_rad_s2))
+        self._begin_s, self._cycle = clock.now_s(), 0
+        self._q_rad = self._speed_rad_s = np.empty(0)  # of the set-point that was sent last
+        self._action: Action | None = None
+        self._rested = 0
+        self.followed = Followed()
+
+    def run(self, start_rad: Floats, act: Acting, watch: Callable[[], None]) -> None:
+        """Until the motion is over; InterruptedMotionError where a set-point may not be sent, or comes too late."""
+        self._q_rad, self._speed_rad_s = start_rad, np.zeros_like(start_rad)
+        while self._said.state() not in OVER:
+            watch()
+            if self._said.state() is State.ENDING:
+                self._brake(watch)
+                return
+            self._ramp()
+            late_s = self._wait()
+            watch()  # again: most of a cycle is spent waiting, and nothing may be sent after a halt
+            if self._said.state() is State.HALTED:
+                return
+            if late_s > self._stream.rested_s:
+                self._points.restart((self._cycle - 1) * self._period_s)
+                self.followed.restarts += 1
+            self._send(self._next())
+            self._rest(act)
+            if self._points.reached_s >= self._points.path.ends_s:
+                self._said.tell(Event.FINISHED)
+
+    def _next(self) -> Floats:
+        try:
+            return self._points.at(self._cycle * self._period_s)
+        except RefusedMotionError as why:  # solved while it is followed: the belt leads out of reach
+            raise InterruptedMotionError(f"{why}; the arm was stopped") from why
+
+    def _ramp(self) -> None:
+        """Path time slows down to a hold, and up again after it, within the acceleration of every joint."""
+        waits = self._said.state() is State.HELD or self._action is not None
+        change = self._period_s / self._brake_s
+        self._points.scale += float(np.clip((0.0 if waits else 1.0) - self._points.scale, -change, change))
+
+    def _rest(self, act: Acting) -> None:
+        """Where the path rests: an action, for which path time stands still while the stream goes on, or a pause."""
+        rests = self._points.path.rests
+        if self._action is not None:
+            if self._action.over():
+                self._action = None
+                self._go_on()
+        elif self._rested < len(rests) and self._points.reached_s >= rests[self._rested][0]:
+            name = rests[self._rested][1]
+            self._rested += 1
+            if name:
+                self._points.scale, self._action = 0.0, Action(act, name)
+            else:
+                self._go_on()
+
+    def _go_on(self) -> None:
+        """At once: the path rests, so that no joint feels it."""
+        self._said.tell(Event.RESTED)
+        self._points.scale = 0.0 if self._said.state() is State.HELD else 1.0
+
+    def _brake(self, watch: Callable[[], None]) -> None:
+        acceleration = self._pace.acceleration_rad_s2
+        if isinstance(self._points.path, SolvedPath):
+            at = self._points.on_path((self._cycle - 1) * self._period_s)
+            steps = along_path(self._points.path, at, acceleration, self._period_s)
+        else:
+            steps = by_joints(self._q_rad, self._speed_rad_s, acceleration, self._period_s)
+        for q_rad in steps:
+            self._wait()
+            watch()
+            if self._said.state() is not State.ENDING:
+                return
+            self._send(q_rad)
+        self._said.braked()
+
+    def _wait(self) -> float:
+        """Until a set-point is due; by how much (s) the path has to wait because cycles were missed."""
+        late_s = self._clock.now_s() - (self._begin_s + self._cycle * self._period_s)
+        if late_s < 0.0:
+            self._clock.sleep_s(-late_s)
+        if late_s <= self._period_s:
+            return 0.0
+        if late_s > self._stream.late_s:
+            raise InterruptedMotionError(
+                f"set-point {self._cycle} came {1e3 * late_s:.0f} ms late (limit {1e3 * self._stream.late_s:.0f} ms); "
+                "the arm was stopped: free this machine of other work, or lower the solving rate"
+            )
+        self.followed.missed += int(late_s / self._period_s)
+        self.followed.worst_late_s = max(self.followed.worst_late_s, late_s)
+        self._begin_s += late_s
+        return late_s
+
+    def _send(self, q_rad: Floats) -> None:
+        self._checked.check(q_rad, self._clock.now_s())
+        self._arm.servo_joints(q_rad, self._period_s, self._stream.lookahead_s, self._stream.gain)
+        self._speed_rad_s, self._q_rad = (q_rad - self._q_rad) / self._period_s, q_rad
+        self._cycle += 1
+        self.followed.sent += 1

@@ -1,0 +1,111 @@
+"""`calibeam batch`: many recordings at once, one table and one page for a fleet of robots."""
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import msgspec
+from cyclopts import Parameter, validators
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from calibeam.fleet.layout import PAGE, TABLE
+from calibeam.fleet.workers import Engine, Workers
+from calibeam.outcome import PartialResult
+from calibrate.errors import DataError
+
+if TYPE_CHECKING:
+    from calibeam.fleet.run import Ran
+    from calibeam.fleet.summary import Fleet
+
+
+def batch_command(
+    folder: Path,
+    *,
+    out: Path = Path("out/fleet"),
+    diagnose: bool = False,
+    jobs: Annotated[int, Parameter(validator=validators.Number(gte=1))] | None = None,
+    engine: Engine = Engine.LOKY,
+    scheduler: str | None = None,
+    timeout: Annotated[float, Parameter(validator=validators.Number(gte=0.0))] = 900.0,
+    again: bool = False,
+    robot_by_folder: bool = False,
+    json: bool = False,
+) -> None:
+    """Identify every recording and session folder below a folder; one table, and a page of what drifts and why.
+
+    A file that is broken, crashes its process or never ends becomes a row with the reason. What was done stands when
+    the same command runs again; only what is new or changed is done. Ends with 3 when some failed.
+
+    Example: calibeam batch recordings --out out/fleet --diagnose
+
+    Example: calibeam batch /site/recordings --engine dask --scheduler tcp://10.0.0.5:8786
+
+    Parameters
+    ----------
+    folder
+        Searched with all that is below it for *.mcap and session folders.
+    out
+        Folder for fleet.parquet and fleet.html.
+    diagnose
+        Also seek missing physics: some seconds more for each.
+    jobs
+        Recordings at a time; one a core, if not said otherwise.
+    engine
+        loky: processes of this machine. dask: workers of a Dask cluster, by --scheduler, or of this machine.
+    scheduler
+        Address of a Dask scheduler; its workers need calibeam and see the files under the same paths.
+    timeout
+        Seconds that one recording may take; 0: no limit.
+    again
+        Do all anew, whatever stands.
+    robot_by_folder
+        The first folder below names the robot; else its serial number, where the recording has one, else the rig.
+    json
+        Print counts, drifts, shared causes and failures on one line, and nothing else.
+
+    """
+    from calibeam.fleet.lines import print_fleet, record  # with joblib, Arrow, matplotlib: only where they are wanted
+    from calibeam.fleet.page import write_fleet_page
+    from calibeam.fleet.run import Wanted, run
+    from calibeam.fleet.summary import Fleet
+
+    workers = Workers(engine, jobs or os.cpu_count() or 1, scheduler)
+    wanted = Wanted(diagnose, again, robot_by_folder, timeout or None, workers)
+    with _bar(Console(stderr=True)) as bar:
+        task = bar.add_task("recordings", total=None)
+        ran = run(folder, out, wanted, lambda done, total, _: bar.update(task, completed=done, total=total))
+    fleet = Fleet(ran.rows)
+    page = write_fleet_page(out / PAGE, fleet, folder.resolve().name)
+    if json:
+        print(msgspec.json.encode(record(ran, fleet, str(out / TABLE), str(page))).decode())
+    else:
+        console = Console()
+        print_fleet(console, ran, fleet)
+        for line in (f"table: {out / TABLE}", f"page: {page}"):
+            console.print(line, markup=False, highlight=False)
+    _end(ran, fleet, out)
+
+
+def _end(ran: "Ran", fleet: "Fleet", out: Path) -> None:
+    """PartialResult where not all is well, DataError where nothing is."""
+    if ran.stopped:
+        raise PartialResult(
+            f"Ctrl-C; {len(ran.rows)} recordings are in {out / TABLE}, {ran.left} are left; the same command goes on"
+        )
+    if fleet.bad and len(fleet.bad) == len(fleet.rows):
+        raise DataError(f"none of {len(fleet.rows)} recordings could be identified; the first: {fleet.bad[0].error}")
+    if fleet.bad:
+        raise PartialResult(f"{len(fleet.bad)} of {len(fleet.rows)} recordings failed; {out / PAGE} says why")
+
+
+def _bar(console: Console) -> Progress:
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        console=console,
+    )

@@ -1,0 +1,25 @@
+"""`calibeam completion`: what a shell needs to complete commands and options."""
+
+from typing import Literal
+
+from calibeam import cli
+
+
+def completion_command(shell: Literal["bash", "zsh", "fish"]) -> None:
+    """Print the completion script of a shell.
+
+    Example: calibeam completion bash > ~/.local/share/bash-completion/completions/calibeam
+
+    Example: calibeam completion fish > ~/.config/fish/completions/calibeam.fish
+
+    Example: calibeam completion zsh > "${fpath[1]}/_calibeam"
+
+    Parameters
+    ----------
+    shell
+        The shell that reads it.
+
+    """
+    for name in cli.COMMANDS:
+        cli.app[name]  # loads it: its options are completed, too
+    print(cli.app.generate_completion(prog_name="calibeam", shell=shell))

@@ -1,0 +1,70 @@
+"""`calibeam live`: a rig's devices on a page in the browser."""
+
+import json
+import threading
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from acquisition.recording.rig import load_rig
+from acquisition.recording.rig_schema import Rig
+from calibrate.errors import DataError
+from calibrate.model_file import corrections, read_model
+from drivers.clock import SystemClock
+
+
+def live_command(
+    rig: Path,
+    *,
+    model: Path | None = None,
+    host: str = "127.0.0.1",
+    port: int = 8765,
+    token: str | None = None,
+    for_s: float | None = None,
+    json_: Annotated[bool, Parameter(name="--json")] = False,
+) -> None:
+    """Show a rig's devices in the browser until Ctrl-C: detectors, robot with its beam, joints, health, STOP.
+
+    Example: calibeam live rigs/ur5e-dual-psd.toml
+
+    Example: calibeam live rigs/ur5e-dual-psd.toml --host 0.0.0.0
+
+    Nothing is moved or recorded. STOP ends the program that the controller runs; it is no safety stop. A session opens
+    the same devices: watch it by `calibeam session RIG.toml --live` instead.
+
+    Parameters
+    ----------
+    rig
+        The rig file; [devices] says how each device is reached.
+    model
+        The model.json of an identification, by which the robot and its beam are drawn; else as in the rig file.
+    host
+        Address to serve at. Any but this machine's own 127.0.0.1 asks for the token that is printed with the address.
+    port
+        Port to serve at; 0 takes any that is free.
+    token
+        What the address must hold, instead of one made at random.
+    for_s
+        End by itself after so many seconds.
+    json_
+        Print one line of JSON, {"url": ...}, when the page is served.
+
+    """
+    from calibeam.live.devices import devices_of, reading
+    from calibeam.live.page import PageAddress, live_page  # the web server takes a while to load: only here
+
+    loaded, clock = load_rig(rig), SystemClock()
+    believed = {} if model is None else _corrections(model, loaded)
+    with live_page(loaded, clock, PageAddress(host, port, token), "watch") as page:
+        page.feed.believes(believed)
+        print(json.dumps({"url": page.url}) if json_ else f"live page: {page.url} (Ctrl-C ends it)", flush=True)
+        with reading(devices_of(loaded, clock, page.feed), page.feed):
+            threading.Event().wait(for_s)
+
+
+def _corrections(model: Path, rig: Rig) -> dict[str, float]:
+    identified = read_model(model)
+    if identified.rig.name != rig.name:
+        raise DataError(f"{model}: this model is of rig '{identified.rig.name}', not of '{rig.name}'; take its own")
+    return corrections(identified)

@@ -1,0 +1,100 @@
+"""A fleet in short: counts, drifts, shared causes, failures; what terminal, page and --json all say."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from calibeam.fleet.drift import Drift, Drifts, drifts
+from calibeam.fleet.row import Outcome, Row
+from calibeam.fleet.shared import Shared, causes, diagnosed
+from calibrate.report.quantities import angle, doubted_angle, significant
+
+SHARED_BY = 2  # robots: from here on a cause is no single arm's trouble
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """All rows that stand, and what is worked out from them."""
+
+    rows: tuple[Row, ...]
+
+    @cached_property
+    def robots(self) -> tuple[str, ...]:
+        """Names, sorted; of recordings that failed before their rig could be read none is known."""
+        return tuple(sorted({row.robot for row in self.rows if row.robot}))
+
+    @cached_property
+    def good(self) -> tuple[Row, ...]:
+        return tuple(row for row in self.rows if row.good)
+
+    @cached_property
+    def bad(self) -> tuple[Row, ...]:
+        """Failed or lost."""
+        return tuple(row for row in self.rows if row.outcome in (Outcome.FAILED, Outcome.LOST))
+
+    @cached_property
+    def empty(self) -> tuple[Row, ...]:
+        return tuple(row for row in self.rows if row.outcome is Outcome.EMPTY)
+
+    @cached_property
+    def drifts(self) -> Drifts:
+        """Of every zero that was seen on enough dates."""
+        return drifts(self.rows)
+
+    @property
+    def lines(self) -> tuple[Drift, ...]:
+        return self.drifts.lines
+
+    @cached_property
+    def drifting(self) -> tuple[Drift, ...]:
+        return tuple(drift for drift in self.lines if drift.significant)
+
+    @cached_property
+    def causes(self) -> tuple[Shared, ...]:
+        return causes(self.rows)
+
+    @cached_property
+    def shared(self) -> tuple[Shared, ...]:
+        return tuple(cause for cause in self.causes if cause.count >= SHARED_BY)
+
+    @cached_property
+    def diagnosed(self) -> int:
+        """Different recordings that were diagnosed."""
+        return len(diagnosed(self.rows))
+
+    def newest(self) -> tuple[Row, ...]:
+        """The last good recording of every robot, by its start; where none is known, the last by name."""
+        last: dict[str, Row] = {}
+        for row in sorted(self.good, key=lambda row: (row.started_utc, row.name)):
+            last[row.robot] = row
+        return tuple(last[robot] for robot in sorted(last))
+
+
+def drift_words(drift: Drift) -> str:
+    """One sentence for a person."""
+    slope = doubted_angle(drift.slope_rad_year, drift.sigma_rad_year)
+    return (
+        f"{drift.series.robot}: the zero of joint {drift.series.joint} drifts by {slope} a year "
+        f"({angle(drift.change_rad)} over {len(drift.series.year)} recordings, p = {significant(drift.p, 2)})"
+    )
+
+
+def shared_words(cause: Shared) -> str:
+    """One sentence for a person."""
+    return f"{cause.physics} at {cause.where}: {cause.count} of {len(cause.robots)} robots"
+
+
+def method_words(found: Drifts) -> str:
+    """What was tested, and how the number of tests was allowed for."""
+    lines = found.lines
+    robots = len({drift.series.robot for drift in lines})
+    more = (
+        f" The zeros of the fleet scatter {significant(found.scatter, 2)} times as much as their sigmas say; all are "
+        "widened by it."
+        if found.scatter > 1.0
+        else ""
+    )
+    return (
+        f"{len(lines)} zeros of {robots} robots were seen on three dates or more and tested for a drift. By Holm's "
+        "procedure the chance that any of them is said to drift where none does is at most 5 %, over all together."
+        + more
+    )

@@ -1,0 +1,21 @@
+"""Which workers a fleet is given to."""
+
+import os
+from dataclasses import dataclass, field
+from enum import Enum
+
+
+class Engine(Enum):
+    """Joblib's names for where the work is done."""
+
+    LOKY = "loky"
+    DASK = "dask"
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Which workers, how many of our own (one a core), and where a cluster's scheduler listens."""
+
+    engine: Engine = Engine.LOKY
+    jobs: int = field(default_factory=lambda: os.cpu_count() or 1)
+    scheduler: str | None = None

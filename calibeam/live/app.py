@@ -1,0 +1,76 @@
+"""The web application: the page as static files, one websocket that it listens to, and STOP."""
+
+import asyncio
+from collections.abc import AsyncGenerator
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from calibeam.live.access import Guard, Rules
+from calibeam.live.composer import Composer
+from calibeam.live.pulse import Pulse
+from calibeam.live.stopping import Stop
+from calibeam.live.viewers import ON_THE_WAY, Viewer, Viewers
+
+COUNTS = frozenset(map(str, range(1, ON_THE_WAY + 1)))
+STATIC = Path(__file__).parent / "static"
+
+
+def live_app(composer: Composer, stop: Stop, viewers: Viewers, rules: Rules) -> ASGIApp:
+    """Everything behind its guard. `viewers` must be made in the event loop that serves."""
+    pulse = Pulse(viewers, composer)
+
+    async def page(request: Request) -> Response:
+        return FileResponse(STATIC / "index.html")
+
+    async def press(request: Request) -> Response:
+        """Blocks this request alone: the controller may take its time, and a second press must not wait for it."""
+        who = "a page" if request.client is None else f"the page at {request.client.host}"
+        stopped = await asyncio.to_thread(stop.press, who)
+        pulse.hurry()
+        return JSONResponse({"delivered": stopped.delivered, "says": stopped.says})
+
+    async def feed(socket: WebSocket) -> None:
+        await socket.accept()
+        viewer = Viewer()
+        viewer.post("rig", composer.rig())
+        viewers.add(viewer)
+        pulse.hurry()
+        sending = asyncio.create_task(_send(socket, viewer))
+        try:
+            with suppress(WebSocketDisconnect):
+                while True:
+                    count = await socket.receive_text()  # how many messages it has taken
+                    viewers.taken(viewer, int(count) if count in COUNTS else 0)
+        finally:
+            viewers.remove(viewer)
+            sending.cancel()
+
+    @asynccontextmanager
+    async def beating(app: Starlette) -> AsyncGenerator[None]:
+        beat = asyncio.create_task(pulse.run())
+        try:
+            yield
+        finally:
+            beat.cancel()
+
+    routes = [
+        Route("/", page),
+        Route("/stop", press, methods=["POST"]),
+        WebSocketRoute("/feed", feed),
+        Mount("/static", StaticFiles(directory=STATIC)),
+    ]
+    return Guard(Starlette(routes=routes, lifespan=beating), rules)
+
+
+async def _send(socket: WebSocket, viewer: Viewer) -> None:
+    with suppress(WebSocketDisconnect, RuntimeError):  # gone between two messages: the receiver hears of it
+        while True:
+            await socket.send_text(await viewer.next())

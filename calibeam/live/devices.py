@@ -1,0 +1,86 @@
+"""The rig's devices read for the page alone: nothing moves, nothing is recorded; one that is lost is tried again."""
+
+import threading
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from acquisition.guarded import Guarded
+from acquisition.recording.errors import RigFileError
+from acquisition.recording.rig_schema import Devices, Rig
+from calibeam.encoders import encoder_driver
+from calibeam.live.feed import Feed
+from calibeam.psd import psd_driver, psd_view
+from calibeam.robot import robot_of
+from drivers.clock import Clock
+from drivers.device import Device
+from drivers.errors import DeviceError, DeviceRefused
+
+READ_S = 0.5  # without a sample a device counts as lost
+AGAIN_S = 1.0  # between two tries
+
+
+@dataclass(frozen=True)
+class Watched:
+    """A device, and what is done once it is connected."""
+
+    device: Device
+    connected: Callable[[], None] = lambda: None
+
+
+def devices_of(rig: Rig, clock: Clock, feed: Feed) -> list[Watched]:
+    """Those that the rig names; STOP ends what its controller runs.
+
+    RigFileError: it names none. DeviceRefused for values that no driver takes.
+    """
+    watched: list[Watched] = []
+    if rig.devices == Devices():
+        raise RigFileError(f"rig {rig.name}: no [devices]; say how the detectors, encoders or controller are reached")
+    if rig.devices.psd is not None:
+        given, psd = rig.devices.psd, psd_driver(rig.devices.psd, rig, clock)
+        watched.append(Watched(psd, lambda: feed.sees(psd_view(psd, given))))
+    if rig.devices.encoders is not None:
+        watched.append(Watched(encoder_driver(rig.devices.encoders, clock)))
+    if rig.devices.robot is not None:
+        robot = robot_of(rig.devices.robot, clock)
+        watched.append(Watched(robot.reader))
+        try:
+            feed.stops_by(robot.arm().stop)  # never connected: whoever moves the arm keeps it until then
+        except DeviceRefused as why:
+            feed.said(f"STOP has no way to the arm: {why}")
+    return watched
+
+
+@contextmanager
+def reading(watched: list[Watched], feed: Feed) -> Generator[None]:
+    """Inside, a thread reads each device; at the end every port is released."""
+    done = threading.Event()
+    threads = [threading.Thread(target=_read, args=(w, feed, done), name=f"read {w.device.name}") for w in watched]
+    for thread in threads:
+        thread.start()
+    try:
+        yield
+    finally:
+        done.set()
+        for thread in threads:
+            thread.join()
+
+
+def _read(watched: Watched, feed: Feed, done: threading.Event) -> None:
+    device, away = Guarded(watched.device), False
+    while not done.is_set():
+        try:
+            device.connect()
+            watched.connected()
+            if away:
+                feed.said(f"{device.name}: back")
+            while not done.is_set():
+                feed.heard(device.name, device.read(READ_S))
+        except DeviceError as why:
+            feed.lost(device.name, str(why))
+            if not away:
+                feed.said(str(why))
+            away = True
+        finally:
+            device.close()
+        done.wait(AGAIN_S)

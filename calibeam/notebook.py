@@ -1,0 +1,154 @@
+"""For notebooks and scripts: a recording opened, identified, diagnosed, drawn and reported in a few lines.
+
+    import calibeam
+
+    session = calibeam.open("recording.mcap")
+    model = session.identify()
+
+The same functions stand behind the command line; docs/python.md has all of it as examples.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.recording.read import read
+from acquisition.recording.recording import Recording
+from calibrate.errors import DataError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from calibeam.modelled import Modelled
+    from calibrate.diagnose.schema import DiagnosisFile
+    from calibrate.model_file import ModelFile, ModelParameter
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Model:
+    """An identified arm: numbers with their doubt. `file` holds everything that model.json does."""
+
+    file: "ModelFile"
+    trust: str  # "good", "care" or "bad"
+    says: str  # the verdict in one sentence
+    reasons: tuple[str, ...]  # what speaks against trusting it
+
+    def zeros(self) -> dict[int, tuple[float | None, float | None]]:
+        """Joint (from 1) -> (zero, one sigma) in rad; true angle = reading + zero. (None, None): not determined."""
+        found = {p.name: p for p in self.file.parameters}
+        names = [name for name in found if name.startswith("joint") and name.endswith(".zero")]
+        return {int(n[5:-5]): (found[n].value, found[n].sigma) for n in names}
+
+    def __getitem__(self, name: str) -> "ModelParameter":
+        """One parameter by its name in model.json, SI units. KeyError for a name that the model does not have."""
+        for parameter in self.file.parameters:
+            if parameter.name == name:
+                return parameter
+        raise KeyError(f"'{name}': no parameter of the model; it has {', '.join(p.name for p in self.file.parameters)}")
+
+    def flange(self, q_rad: Floats) -> Floats:
+        """T_base_flange (pose, 4, 4), m, at joint readings (pose, joint) or (joint,), rad."""
+        from calibrate.predict import Predictor
+
+        return Predictor.of(self.file).flange(np.atleast_2d(np.asarray(q_rad, dtype=np.float64)))
+
+    def save(self, path: Path | str) -> Path:
+        """Write model.json; returns the path. OSError where it cannot be written."""
+        from calibrate.model_file import write_model
+
+        write_model(Path(path), self.file)
+        return Path(path)
+
+    def __str__(self) -> str:
+        lines = [self.says, *(f"  {reason}" for reason in self.reasons)]
+        for joint, (zero, sigma) in self.zeros().items():
+            told = "not determined" if zero is None or sigma is None else f"{zero:+.6f} ± {sigma:.6f} rad"
+            lines.append(f"joint {joint} zero: {told}")
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True)
+class Session:
+    """A recording that is open. Nothing of it is ever changed; what was computed once is kept."""
+
+    recording: Recording
+
+    @property
+    def samples(self) -> dict[str, NDArray[np.generic]]:
+        """Settled samples, column -> (row,), SI units in the names; `pandas.DataFrame(session.samples)` takes it."""
+        return dict(self.recording.samples.columns)
+
+    def identify(self, plan: Path | str | None = None) -> Model:
+        """The arm by all instruments of the recording, as `calibeam identify` does; `plan`: a fit.toml.
+
+        DataError where nothing can be identified, with the reason.
+        """
+        if plan is None:
+            return _model(self._modelled)
+        from calibeam.any_session import Planned
+        from calibeam.modelled import modelled
+
+        return _model(modelled(self.recording, Planned.read(Path(plan))))
+
+    fit = identify  # what other libraries call it
+
+    def diagnose(self) -> "DiagnosisFile":
+        """What the model lacks: `verdict`, `findings` with size and doubt, `next`; fields are those of diagnosis.json.
+
+        DataError where the recording holds too little.
+        """
+        return self._diagnosis
+
+    def plot(self) -> "Figure":
+        """Error of every reading before and after the fit, along the session, as a matplotlib Figure.
+
+        Lengths of the misfit in µm on a logarithmic axis, one panel an instrument and quantity.
+        """
+        from calibeam.notebook_plot import errors_along_session
+
+        return errors_along_session(self._modelled.errors)
+
+    def report(self, path: Path | str, *, diagnosis: bool = False) -> Path:
+        """Write the report, one HTML file that needs no other; returns its path. With `diagnosis` also its pages.
+
+        DataError where it cannot be written, or the recording holds nothing to fit.
+        """
+        from calibeam.reporting import write_any_report
+
+        write_any_report(self.recording, self._modelled.model, Path(path), self.diagnose() if diagnosis else None)
+        return Path(path)
+
+    def __str__(self) -> str:
+        r = self.recording
+        whole = "" if r.complete else ", cut short or damaged"
+        return f"{r.path.name}: rig {r.rig.name}, {r.rig.n_joints} joints, {len(r.samples)} samples{whole}"
+
+    @cached_property
+    def _modelled(self) -> "Modelled":
+        from calibeam.modelled import modelled
+
+        return modelled(self.recording)
+
+    @cached_property
+    def _diagnosis(self) -> "DiagnosisFile":
+        from calibeam.diagnosis import diagnose_recording
+
+        found, file = diagnose_recording(self.recording)
+        if found.physics is None:
+            raise DataError("; besides, ".join(blunder.says for blunder in found.blunders))
+        return file
+
+
+def opened(path: Path | str) -> Session:
+    """A recording (.mcap) or session folder. RecordingError where it is neither, with the reason."""
+    return Session(read(Path(path)))
+
+
+def _model(found: "Modelled") -> Model:
+    return Model(found.model, found.verdict.trust.value, found.verdict.sentence, found.verdict.reasons)

@@ -1,0 +1,110 @@
+"""Two calibrations of one arm side by side: what moved, what it does to the tool, and whether they can be compared."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from acquisition.recording.recording import Recording
+from acquisition.recording.rig_schema import ArmModel, Rig
+from calibrate.converted_rig import rig_in_model
+from calibrate.diagnose.schema import DiagnosisFile
+from calibrate.errors import DataError
+from calibrate.model_file import ModelFile
+from calibrate.report.drift.drawing import rig_of
+from calibrate.report.drift.parameters import Compared, compared, doubt_of
+from calibrate.report.drift.tool import ToolChange, tool_change
+from calibrate.report.model_tests import repeated, scatter
+from calibrate.report.verdict import UNLIKELY
+from calibrate.report.workspace.known_arm import KnownArm
+from calibrate.report.workspace.room import Room, room_of
+from calibrate.uncertainty.chi_square import Alarm
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """One of the two: its model, and what else there is of it."""
+
+    label: str  # when or where from, for a person
+    model: ModelFile
+    recording: Recording | None = None
+    diagnosis: DiagnosisFile | None = None
+
+
+@dataclass(frozen=True)
+class Drift:
+    """All of the comparison."""
+
+    now: Calibration
+    then: Calibration
+    compared: Compared
+    room: Room | None  # None where no error over the workspace can be told
+    tool: ToolChange | None  # the same, or nothing to compare
+    warnings: tuple[str, ...]
+
+    @property
+    def found(self) -> bool:
+        """Whether anything changed by more than chance gives."""
+        joint = self.compared.together
+        return bool(self.compared.significant) or (joint is not None and joint.significant)
+
+
+def drift_of(now: Calibration, then: Calibration, known: KnownArm | str) -> Drift:
+    """`known`: the arm of `now`. DataError for arms that cannot be compared at all, naming what differs."""
+    rig_now = _rig(now)
+    rig_then = _rig(then)
+    if len(rig_now.arm.joints) != len(rig_then.arm.joints):
+        raise DataError(
+            f"report: {then.label} is of an arm with {len(rig_then.arm.joints)} joints, this one has "
+            f"{len(rig_now.arm.joints)}; give a calibration of the same arm"
+        )
+    if now.model.arm_model != then.model.arm_model:
+        raise DataError(
+            f"report: {then.label} is fitted as '{then.model.arm_model}', this one as '{now.model.arm_model}': their "
+            "parameters mean different things; identify one of them again with the model of the other (--plan)"
+        )
+    found = compared(now.model, rig_now, then.model, rig_then)
+    doubt = doubt_of(found.changes, now.model, then.model)
+    room = None if isinstance(known, str) else room_of(known)
+    tool = None
+    if room is not None and not isinstance(known, str) and doubt is not None and found.changes:
+        tool = tool_change(known, room, found.changes, doubt)
+    warnings = (*_other_arm(rig_now, rig_then), *_more_than_noise(now, then))
+    return Drift(now, then, found, room, tool, warnings)
+
+
+def _rig(one: Calibration) -> Rig:
+    if one.recording is None:
+        return rig_of(one.model, one.label)
+    return rig_in_model(one.recording.rig, ArmModel(one.model.arm_model))
+
+
+def _more_than_noise(now: Calibration, then: Calibration) -> Iterator[str]:
+    """Parameters bend to imitate missing physics, and do so differently at other poses."""
+    short = [one.label for one in (then, now) if _lacks_physics(one.model)]
+    if short:
+        yield (
+            f"The model of {' and of '.join(short)} leaves more than noise, so its sigmas are too small: measuring at "
+            "other poses can alone look like a drift. Compare sessions of the same poses, or find the missing physics "
+            "first (`calibeam diagnose`)."
+        )
+
+
+def _lacks_physics(model: ModelFile) -> bool:
+    """By chi-square against the noise as believed, or by repeated poses."""
+    all_of_it, repeats = scatter(model), repeated(model)
+    by_spots = (model.repeats or {}).get("lack_of_fit_p")  # of the method for spots alone
+    return (
+        (all_of_it is not None and all_of_it.alarm is Alarm.ABOVE_STATED)
+        or (repeats is not None and repeats.alarm is Alarm.LACK_OF_FIT)
+        or (isinstance(by_spots, float) and by_spots < UNLIKELY)
+    )
+
+
+def _other_arm(now: Rig, then: Rig) -> Iterator[str]:
+    ours, theirs = now.arm.serial_number, then.arm.serial_number
+    if ours is not None and theirs is not None and ours != theirs:
+        yield (
+            f"These are two arms: serial number {ours} now, {theirs} then. What follows is how they differ, not how "
+            "one of them moved."
+        )
+    elif now.name != then.name:
+        yield f"The rig is called {now.name} now and was called {then.name} then: is it the same arm?"

@@ -1,0 +1,44 @@
+"""What MkDocs asks of the program: tables that would be wrong the day after if they were written by hand."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+from calibeam.cli import COMMANDS, app
+from calibrate.effects.catalogue import EFFECTS
+
+OPEN = "unknown"
+ROOT = Path(__file__).parents[1]
+
+
+def effects() -> str:
+    """One row a physics; several files may tell of one."""
+    rows = ["| physics | what it is | easily mistaken for | source |", "|---|---|---|---|"]
+    rows += [
+        f"| `{e.physics}` | {e.explains} | {', '.join(f'`{name}`' for name in e.mistaken_for)} | {e.source} |"
+        for e in EFFECTS
+        if e.physics != OPEN
+    ]
+    return "\n".join(rows)
+
+
+def commands() -> str:
+    pages = [app[name].generate_docs(heading_level=2, usage_name=f"calibeam {name}") for name in COMMANDS]
+    return "\n\n".join(pages).replace(f"{ROOT}/", "")
+
+
+def decisions() -> str:
+    notes = sorted((Path(__file__).parent / "decisions").glob("0*.md"))
+    return "\n".join(f"- [{_title(note)}]({note.name})" for note in notes)
+
+
+def _title(note: Path) -> str:
+    return note.read_text(encoding="utf-8").splitlines()[0].removeprefix("# ")
+
+
+TABLES: dict[str, Callable[[], str]] = {"effects": effects, "commands": commands, "decisions": decisions}
+
+
+def on_page_markdown(markdown: str, **_: object) -> str:
+    """Called by MkDocs for every page."""
+    return re.sub(r"\{\{ (\w+) \}\}", lambda found: TABLES[found[1]](), markdown)

@@ -1,0 +1,210 @@
+"""Pause, resume, stop, abort, halt from other threads, while a session waits at its checkpoint or for a motion."""
+
+import threading
+
+import pytest
+
+from acquisition.errors import StoppedError
+from acquisition.reined_bench import ReinedBench
+from acquisition.reins import BrokenOffError, EndedEarlyError, Reins
+from acquisition.session_states import PAUSE_AGAIN_S, Event, State
+from drivers.errors import DeviceLost, DeviceRefused
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.time_s = 100.0
+
+    def now_s(self) -> float:
+        return self.time_s
+
+    def sleep_s(self, seconds: float) -> None:
+        self.time_s += seconds
+
+
+class Arm:
+    """A bench whose motion takes until it is stopped, or let arrive."""
+
+    def __init__(self) -> None:
+        self.moving, self.stopped, self.arrive = threading.Event(), threading.Event(), threading.Event()
+        self.begun = 0
+
+    def move(self, q_rad: object) -> None:
+        self.begun += 1
+        self.moving.set()
+        while not self.arrive.is_set():
+            if self.stopped.wait(0.01):
+                raise DeviceRefused("robot: the motion was ended by stop()")
+
+    def look(self, dwell_s: float) -> None: ...
+
+    def place_fixture(self, placement: int) -> None: ...
+
+    def stop(self) -> None:
+        self.stopped.set()
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+def running(stop=lambda: None, clock=None, **more) -> Reins:
+    reins = Reins(stop, clock, **more)
+    reins.tell(Event.START)
+    return reins
+
+
+def in_thread(act) -> tuple[threading.Thread, list]:
+    out: list = []
+
+    def run() -> None:
+        try:
+            out.append(act())
+        except Exception as error:
+            out.append(error)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    return thread, out
+
+
+def test_a_pause_waits_at_the_checkpoint_until_it_is_resumed(clock) -> None:
+    paused = threading.Event()
+    reins = running(clock=clock, changed=lambda state: paused.set() if state is State.PAUSED else None)
+    assert reins.checkpoint() is False
+    reins.pause()
+    thread, out = in_thread(reins.checkpoint)
+    assert paused.wait(10.0)
+    assert thread.is_alive()
+    reins.resume()
+    thread.join(10.0)
+    assert out == [True]
+
+
+@pytest.mark.parametrize(("after_s", "state"), [(PAUSE_AGAIN_S, State.BREAKING), (PAUSE_AGAIN_S + 0.1, State.PAUSING)])
+def test_a_second_pause_within_ten_seconds_is_at_once(clock, after_s, state) -> None:
+    reins = running(clock=clock)
+    reins.interrupt()
+    clock.time_s += after_s
+    reins.interrupt()
+    assert reins.state is state
+
+
+def test_a_pause_after_a_resume_is_a_first_one(clock) -> None:
+    reins = running(clock=clock)
+    reins.pause()
+    reins.resume()
+    reins.pause()
+    assert reins.state is State.PAUSING
+
+
+def test_ctrl_c_while_paused_aborts(clock) -> None:
+    reins = running(clock=clock)
+    reins.pause()
+    reins.tell(Event.CHECKPOINT)
+    reins.interrupt()
+    with pytest.raises(StoppedError, match="aborted"):
+        reins.checkpoint()
+
+
+def test_stop_ends_at_the_checkpoint_and_not_before() -> None:
+    reins = running()
+    reins.stop()
+    reins.check()
+    with pytest.raises(EndedEarlyError):
+        reins.checkpoint()
+
+
+def test_a_device_that_fails_ends_the_pause() -> None:
+    failed: list[Exception] = []
+    paused = threading.Event()
+    reins = running(
+        failure=lambda: failed[0] if failed else None,
+        changed=lambda state: paused.set() if state is State.PAUSED else None,
+    )
+    reins.pause()
+    thread, out = in_thread(reins.checkpoint)
+    assert paused.wait(10.0)
+    failed.append(DeviceLost("psd: gone"))
+    thread.join(10.0)
+    assert isinstance(out[0], DeviceLost)
+    assert reins.state is State.ABORTED
+
+
+def test_a_motion_under_way_is_broken_off_by_the_second_pause_and_is_no_failure_of_the_arm() -> None:
+    arm = Arm()
+    reins = running(arm.stop)
+    thread, out = in_thread(lambda: ReinedBench(arm, reins).move(None))
+    assert arm.moving.wait(10.0)
+    reins.pause()
+    assert not arm.stopped.is_set()
+    reins.pause()
+    thread.join(10.0)
+    assert isinstance(out[0], BrokenOffError)
+    assert reins.state is State.BREAKING
+
+
+def test_no_motion_begins_while_the_arm_is_being_stopped() -> None:
+    arm = Arm()
+    reins = running(arm.stop)
+    reins.tell(Event.BREAK)
+    with pytest.raises(BrokenOffError):
+        ReinedBench(arm, reins).move(None)
+    assert arm.begun == 0
+
+
+def test_a_stop_that_fell_before_the_motion_is_said_again() -> None:
+    """The session had looked at the reins, and its motion was not sent yet when the arm was stopped."""
+    arm = Arm()
+    reins = running(arm.stop)
+
+    class Slips(Arm):
+        def move(self, q_rad: object) -> None:
+            reins.tell(Event.BREAK)
+            arm.stopped.clear()  # nothing moved yet, so this stop ended nothing
+            arm.move(q_rad)
+
+    thread, out = in_thread(lambda: ReinedBench(Slips(), reins).move(None))
+    assert arm.moving.wait(10.0)
+    reins.insist()
+    thread.join(10.0)
+    assert isinstance(out[0], BrokenOffError)
+
+
+def test_a_motion_that_arrived_as_it_was_broken_off_counts_as_broken_off() -> None:
+    arm = Arm()
+    reins = running()
+    thread, out = in_thread(lambda: ReinedBench(arm, reins).move(None))
+    assert arm.moving.wait(10.0)
+    reins.tell(Event.BREAK)
+    arm.arrive.set()
+    thread.join(10.0)
+    assert isinstance(out[0], BrokenOffError)
+
+
+def test_a_failure_of_the_arm_stays_one() -> None:
+    class Fails(Arm):
+        def move(self, q_rad: object) -> None:
+            raise DeviceRefused("robot: protective stop")
+
+    with pytest.raises(DeviceRefused, match="protective"):
+        ReinedBench(Fails(), running()).move(None)
+
+
+def test_a_stop_that_cannot_be_delivered_is_kept_and_the_session_ends_all_the_same() -> None:
+    def no_way() -> None:
+        raise DeviceLost("robot: no way to the controller")
+
+    reins = running(no_way)
+    reins.abort()
+    assert isinstance(reins.trouble, DeviceLost)
+    with pytest.raises(StoppedError):
+        reins.checkpoint()
+
+
+def test_an_abort_in_the_last_moment_is_no_success() -> None:
+    reins = running()
+    reins.abort()
+    with pytest.raises(StoppedError):
+        reins.finish()

@@ -1,0 +1,58 @@
+"""Every state with every event, in one table: what follows, and whether the arm is stopped."""
+
+import pytest
+
+from acquisition.reins import Reins
+from acquisition.session_states import BROKEN, OVER, Event, State, after
+
+IDLE, RUNNING, PAUSING, BREAKING, PAUSED, ENDING, ABORTING, DONE, ABORTED, HALTED = State
+# START PAUSE BREAK RESUME STOP ABORT HALT CHECKPOINT FINISHED FAULT
+TABLE = {
+    IDLE: (RUNNING, IDLE, IDLE, IDLE, IDLE, IDLE, HALTED, IDLE, IDLE, IDLE),
+    RUNNING: (RUNNING, PAUSING, BREAKING, RUNNING, ENDING, ABORTING, HALTED, RUNNING, DONE, ABORTED),
+    PAUSING: (PAUSING, PAUSING, BREAKING, RUNNING, ENDING, ABORTING, HALTED, PAUSED, DONE, ABORTED),
+    BREAKING: (BREAKING, BREAKING, BREAKING, BREAKING, ENDING, ABORTING, HALTED, PAUSED, DONE, ABORTED),
+    PAUSED: (PAUSED, PAUSED, PAUSED, RUNNING, DONE, ABORTED, HALTED, PAUSED, PAUSED, ABORTED),
+    ENDING: (ENDING, ENDING, BREAKING, ENDING, ENDING, ABORTING, HALTED, DONE, DONE, ABORTED),
+    ABORTING: (ABORTING, ABORTING, ABORTING, ABORTING, ABORTING, ABORTING, HALTED, ABORTED, ABORTED, ABORTED),
+    DONE: (RUNNING, DONE, DONE, DONE, DONE, DONE, HALTED, DONE, DONE, DONE),
+    ABORTED: (ABORTED, ABORTED, ABORTED, ABORTED, ABORTED, ABORTED, HALTED, ABORTED, ABORTED, ABORTED),
+    HALTED: (HALTED,) * 10,
+}
+WAYS = {  # from IDLE to each state, by events alone
+    IDLE: (),
+    RUNNING: (Event.START,),
+    PAUSING: (Event.START, Event.PAUSE),
+    BREAKING: (Event.START, Event.BREAK),
+    PAUSED: (Event.START, Event.PAUSE, Event.CHECKPOINT),
+    ENDING: (Event.START, Event.STOP),
+    ABORTING: (Event.START, Event.ABORT),
+    DONE: (Event.START, Event.FINISHED),
+    ABORTED: (Event.START, Event.FAULT),
+    HALTED: (Event.HALT,),
+}
+PAIRS = [
+    pytest.param(state, event, TABLE[state][k], id=f"{state.name}-{event.name}")
+    for state in State
+    for k, event in enumerate(Event)
+]
+
+
+@pytest.mark.parametrize(("state", "event", "then"), PAIRS)
+def test_every_pair(state: State, event: Event, then: State) -> None:
+    assert after(state, event) is then
+    stops: list[int] = []
+    reins = Reins(lambda: stops.append(1))
+    for before in WAYS[state]:
+        reins.tell(before)
+    assert reins.state is state
+    stops.clear()
+    reins.tell(event)
+    assert reins.state is then
+    # A halt always stops the arm; else it is stopped on the way into a state in which nothing may move.
+    assert bool(stops) is (event is Event.HALT or (then in BROKEN and then is not state))
+
+
+def test_what_is_over_lets_no_motion_go_on_by_itself() -> None:
+    for state in OVER:
+        assert all(after(state, event) in OVER for event in Event if event is not Event.START)

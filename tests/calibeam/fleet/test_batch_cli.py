@@ -1,0 +1,73 @@
+"""`batch` on recordings of an emulated fleet: one table, one page, and what failed in words."""
+
+import json
+
+import pytest
+
+from benchmarks.fleet_sessions import Robot, write_fleet
+from calibeam.cli import run
+from calibeam.fleet.found import recordings
+from calibeam.fleet.judge import judged
+from calibeam.fleet.order import Task
+from calibeam.fleet.row import Outcome
+from calibeam.fleet.table import read_rows
+
+OFF_RAD_YEAR = 0.02  # of joint 2: far beyond any doubt of two dates
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory):
+    root = tmp_path_factory.mktemp("fleet")
+    paths = write_fleet(root, [Robot("A-1", 41, {2: OFF_RAD_YEAR})], ("2025-11-03", "2026-11-03"))
+    torn = root / "A-1" / "torn.mcap"
+    torn.write_bytes(paths[0].read_bytes()[: paths[0].stat().st_size // 3])
+    return root
+
+
+@pytest.fixture(scope="module")
+def out(fleet, tmp_path_factory):
+    where = tmp_path_factory.mktemp("out")
+    assert run(["batch", str(fleet), "--out", str(where), "--jobs", "1"]) == 3
+    return where
+
+
+def test_a_recording_becomes_its_row(out):
+    rows = {row.name: row for row in read_rows(out / "fleet.parquet")}
+    first, second = rows["A-1/2025-11-03.mcap"], rows["A-1/2026-11-03.mcap"]
+    assert (first.outcome, first.robot, first.robot_serial, first.samples) == (Outcome.IDENTIFIED, "A-1", "A-1", 60)
+    assert first.started_utc == "2025-11-03"
+    assert first.instruments == ("position",)
+    assert len(first.zeros) == 6
+    assert first.zeros[0].value_rad is None
+    assert "only in combination" in first.zeros[0].status
+    gained = (second.zeros[1].value_rad or 0.0) - (first.zeros[1].value_rad or 0.0)
+    assert gained == pytest.approx(OFF_RAD_YEAR * 365 / 365.25, abs=5.0 * (first.zeros[1].sigma_rad or 0.0))
+    assert first.free_space_after_m is not None
+    assert first.free_space_before_m is not None
+    assert first.free_space_before_m > 10.0 * first.free_space_after_m
+    assert 1e-5 < first.noise["position"] < 3e-5
+    torn = rows["A-1/torn.mcap"]
+    assert torn.outcome is Outcome.FAILED
+    assert "no settled sample is left" in torn.error
+
+
+def test_what_stands_is_told_again_with_what_failed(fleet, out, capsys):
+    assert run(["batch", str(fleet), "--out", str(out), "--jobs", "1", "--json"]) == 3
+    said = json.loads(capsys.readouterr().out)
+    assert (said["recordings"], said["identified"], said["stood"], said["robots"]) == (3, 2, 3, ["A-1"])
+    assert said["failed"][0]["name"] == "A-1/torn.mcap"
+    assert "A-1/torn.mcap" in (out / "fleet.html").read_text()
+
+
+def test_what_is_no_recording_fails_in_words(tmp_path):
+    (tmp_path / "text.mcap").write_text("nothing of the kind")
+    (tmp_path / "away.mcap").symlink_to(tmp_path / "nowhere")
+    found = recordings(tmp_path, tmp_path / "-")
+    errors = {one.name: judged(Task.of(one, diagnose=False)).error for one in found}
+    assert "not a recording" in errors["text.mcap"]
+    assert "No such file" in errors["away.mcap"]
+
+
+def test_nothing_found_is_one_sentence(tmp_path, capsys):
+    assert run(["batch", str(tmp_path), "--out", str(tmp_path / "out")]) == 1
+    assert "no recording (*.mcap)" in capsys.readouterr().err

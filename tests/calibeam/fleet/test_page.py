@@ -1,0 +1,72 @@
+"""The page says who drifts, who shares a cause, what failed; it needs nothing else and takes any name."""
+
+import re
+
+import numpy as np
+import pytest
+
+from calibeam.fleet.page import LISTED, fleet_html
+from calibeam.fleet.row import Cause, Outcome, Row, Zero
+from calibeam.fleet.shared import causes
+from calibeam.fleet.summary import Fleet, shared_words
+
+DAYS = ("2025-01-01", "2025-07-01", "2026-01-01", "2026-07-01")
+FOUND = Cause("joint3.angle", "q3", "harmonic", "encoder-eccentricity", 0.99, 0.8, "…")
+OTHER = Cause("link2.tilt", "q2", "harmonic", "axis-wobble", 0.99, 0.8, "…")
+
+
+def session(robot, day, zero_rad, found=(), verdict="mismatch"):
+    zeros = (Zero(1, None, None, "not seen"), Zero(2, zero_rad, 2e-5, "determined"))
+    name = f"{robot}/{day}.mcap"
+    known = {"trust": "good", "started_utc": day, "samples": 60, "held_out_after_m": 1e-5, "verdict": verdict}
+    return Row(
+        f"/{name}", name, name, 1, 1, Outcome.IDENTIFIED, "calibeam 1", robot=robot, zeros=zeros, causes=found, **known
+    )
+
+
+@pytest.fixture
+def fleet():
+    rng = np.random.default_rng(1)
+    rows = [
+        session(robot, day, 2e-5 * rng.standard_normal() + (4e-4 * k if robot == "<b>7" else 0.0), found)
+        for robot, found in (("<b>7", (FOUND,)), ("8", (FOUND, OTHER)), ("9", ()))
+        for k, day in enumerate(DAYS)
+    ]
+    torn = Row("/x/torn.mcap", "x/torn.mcap", "", 1, 1, Outcome.FAILED, "calibeam 1", error="torn <before> the rig")
+    return Fleet((*rows, torn))
+
+
+def test_the_page_names_the_robot_that_drifts_the_cause_that_is_shared_and_the_file_that_failed(fleet):
+    page = fleet_html(fleet, "hall 3")
+    assert "1 of 3 robots drifts" in page
+    assert "&lt;b&gt;7: the zero of joint 2 drifts by" in page
+    assert "encoder-eccentricity at joint3.angle: 2 of 3 robots" in page
+    assert "torn &lt;before&gt; the rig" in page
+    assert "Holm" in page
+
+
+def test_the_page_needs_nothing_else(fleet):
+    page = fleet_html(fleet, "hall 3")
+    assert not re.search(r'(?:src|href)="(?!#)', page)
+    assert "url(http" not in page
+    assert "<b>7" not in page
+
+
+def test_ids_stand_once(fleet):
+    ids = re.findall(r'\bid="([^"]+)"', fleet_html(fleet, "hall 3"))
+    assert len(ids) == len(set(ids))
+
+
+def test_causes_are_counted_by_robots_and_recordings(fleet):
+    first, second = causes(fleet.rows)
+    assert (first.where, first.count, first.robots["<b>7"], first.robots["9"]) == ("joint3.angle", 2, (4, 4), (0, 4))
+    assert (second.physics, second.count) == ("axis-wobble", 1)
+    assert shared_words(first) == "encoder-eccentricity at joint3.angle: 2 of 3 robots"
+    assert fleet.shared == (first,)
+
+
+def test_a_fleet_of_failures_has_its_page():
+    lost = [Row(f"/{i}", str(i), "", 1, 1, Outcome.LOST, "c", error="gone") for i in range(LISTED + 5)]
+    page = fleet_html(Fleet(tuple(lost)), "nothing")
+    assert "nothing is known of drift" in page
+    assert "5 more are in fleet.parquet" in page

@@ -1,0 +1,64 @@
+"""Reports in Chromium, from files: the plain one without a word on the console, the interactive one drawn; both alone.
+
+One browser for all, since starting it is what takes time.
+"""
+
+import shutil
+
+import pytest
+
+from calibrate.report.elements import Html
+from calibrate.report.interactive.chapter import interactive_chapter
+from calibrate.report.interactive.session_figures import session_figures
+from calibrate.report.page import page
+from calibrate.report.session_evidence import session_evidence
+
+SOFTWARE_GL = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+
+
+@pytest.fixture(scope="module")
+def browser():
+    path = shutil.which("chromium")
+    if path is None:
+        pytest.skip("no chromium on the PATH (Debian: apt-get install chromium); the pages are not looked at")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as driver:
+        chromium = driver.chromium.launch(executable_path=path, args=list(SOFTWARE_GL))
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def tab(browser):
+    """A page that remembers what it asked for, and what went wrong in it."""
+    opened = browser.new_page(viewport={"width": 480, "height": 640})  # small, since software draws it
+    asked, wrong, said = list[str](), list[str](), list[str]()
+    opened.on("request", lambda request: asked.append(request.url))
+    opened.on("pageerror", lambda error: wrong.append(str(error)))
+    opened.on("console", lambda message: said.append(message.text))
+    yield opened, asked, wrong, said
+    opened.close()
+
+
+def test_the_plain_report_is_quiet_and_asks_for_nothing(tab, zero_html, tmp_path):
+    opened, asked, wrong, said = tab
+    path = tmp_path / "report.html"
+    path.write_text(zero_html, encoding="utf-8")
+    opened.goto(path.as_uri())
+    assert opened.get_by_text("Can I trust it?").is_visible()
+    assert len(opened.screenshot()) > 20_000
+    assert asked == [path.as_uri()]
+    assert wrong == said == []
+
+
+def test_the_interactive_report_is_drawn_from_the_file_alone(tab, wire_and_positions, tmp_path):
+    opened, asked, wrong, _ = tab  # WebGL in software says on the console that it is slow
+    path = tmp_path / "report.html"
+    chapter = interactive_chapter(session_figures(session_evidence(*wire_and_positions)))
+    path.write_text(page("an arm", Html(""), {}, (chapter,), "calibeam", scripts=True), encoding="utf-8")
+    opened.goto(path.as_uri())
+    opened.wait_for_selector("#plot-space canvas", state="attached")
+    opened.wait_for_selector("#plot-residuals .scatterlayer .trace", state="attached")
+    assert asked == [path.as_uri()]
+    assert wrong == []
