@@ -4,6 +4,9 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+from mkdocs.exceptions import PluginError
+from mkdocs.structure.pages import Page
+
 from calibeam.cli import COMMANDS, app
 from calibrate.effects.catalogue import EFFECTS
 
@@ -37,6 +40,13 @@ def _title(note: Path) -> str:
 
 
 TABLES: dict[str, Callable[[], str]] = {"effects": effects, "commands": commands, "decisions": decisions}
+
+
+def on_page_content(html: str, page: Page, **_: object) -> str:
+    """Called by MkDocs for every page: a mistyped include is no include, and nobody else would say so."""
+    if "--8" in html or "{{ " in html:
+        raise PluginError(f"{page.file.src_path}: an include or a table was left as it is")
+    return html
 
 
 def on_page_markdown(markdown: str, **_: object) -> str:

@@ -1,0 +1,174 @@
+"""Keys and Ctrl-C while the arm moves, heard by a thread of their own, so that a stop waits for nobody.
+
+SPACE or p pause, r resume, s stop (finish here), a abort, h halt. Ctrl-C pauses after the pose, again within 10 s at
+once, and once paused it aborts. Where there is no terminal only Ctrl-C is heard, and SIGCONT resumes. SIGTERM and a
+closed terminal end a session as they always do (calibeam.cli). Ctrl-Z pauses: a stopped process would read no device.
+"""
+
+import os
+import queue
+import select
+import signal
+import sys
+import termios
+import threading
+import tty
+from collections.abc import Generator
+from contextlib import ExitStack, contextmanager, suppress
+from types import FrameType
+from typing import Self
+
+from acquisition.errors import StoppedError
+from acquisition.reins import Reins
+from acquisition.session_states import BROKEN, OVER
+
+LISTEN_S = 0.2  # between two times at which a stop that was not heard is said again
+INTERRUPT, SUSPEND, GO_ON, END = b"i", b"z", b"c", b"e"
+ENTER = "\n"
+
+
+class Keys:
+    """What was pressed, told to the reins; or to who asks, while somebody does."""
+
+    def __init__(self, reins: Reins, terminal: int | None) -> None:
+        """`terminal`: file descriptor that keys are read from."""
+        self._reins, self._terminal = reins, terminal
+        self._answers: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._asking = ""
+        self._opened = ExitStack()
+        self._woken = self._wake = -1  # a pipe, while it is listened to
+
+    @property
+    def heard(self) -> bool:
+        """Whether there is a keyboard."""
+        return self._terminal is not None
+
+    def pressed(self, key: str) -> None:
+        """One key."""
+        key = ENTER if key == "\r" else key.lower()
+        if key == "a":
+            self._reins.abort()
+        elif key == "h":
+            self._reins.halt()
+        elif self._asking:
+            if key in self._asking:
+                self._answers.put(key)
+        elif key in " p":
+            self._reins.pause()
+        elif key == "r":
+            self._reins.resume()
+        elif key == "s":
+            self._reins.stop()
+
+    def signalled(self, what: bytes) -> None:
+        """From a signal handler: one byte down a pipe, and nothing else."""
+        with suppress(OSError):
+            os.write(self._wake, what)
+
+    def wait(self, allowed: str) -> str:
+        """One of these keys; Ctrl-C and a mean abort. StoppedError then."""
+        self._asking = allowed
+        try:
+            while True:
+                if self._reins.state in BROKEN or self._reins.state in OVER:
+                    raise StoppedError("the session was given up while a person was asked")
+                with suppress(queue.Empty):
+                    return self._answers.get(timeout=LISTEN_S)
+        finally:
+            self._asking = ""
+
+    def __enter__(self) -> Self:
+        """From now on keys and signals go to the reins; at the end terminal and signals are as they were."""
+        with ExitStack() as opened:
+            self._woken, self._wake = os.pipe()
+            opened.callback(self._close)
+            opened.enter_context(_handled(self))
+            opened.enter_context(_one_by_one(self._terminal))
+            thread = threading.Thread(target=self._listen, name="keys", daemon=True)
+            thread.start()
+            opened.callback(thread.join)
+            opened.callback(self.signalled, END)
+            self._opened = opened.pop_all()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._opened.close()
+
+    def _close(self) -> None:
+        os.close(self._woken)
+        os.close(self._wake)
+        self._woken = self._wake = -1
+
+    def _listen(self) -> None:
+        sources = [self._woken] + ([] if self._terminal is None else [self._terminal])
+        while True:
+            ready = select.select(sources, [], [], LISTEN_S)[0]
+            if self._woken in ready:
+                for code in os.read(self._woken, 64):
+                    if bytes([code]) == END:
+                        return
+                    self._told(bytes([code]))
+            if self._terminal is not None and self._terminal in ready:
+                typed = _read(self._terminal)
+                if not typed:
+                    sources.remove(self._terminal)
+                for key in typed:
+                    self.pressed(key)
+            self._reins.insist()
+
+    def _told(self, code: bytes) -> None:
+        if code == GO_ON:
+            self._reins.resume()
+        elif self._asking:
+            self._reins.abort()
+        elif code == SUSPEND:
+            self._reins.pause()
+        else:
+            self._reins.interrupt()
+
+
+def keyboard() -> int | None:
+    """Standard input, where it is a terminal that this process may read."""
+    try:
+        fd = sys.stdin.fileno()
+        return fd if os.isatty(fd) and os.tcgetpgrp(fd) == os.getpgrp() else None
+    except (OSError, ValueError):
+        return None
+
+
+def _read(fd: int) -> str:
+    try:
+        return os.read(fd, 64).decode(errors="replace")
+    except OSError:
+        return ""
+
+
+@contextmanager
+def _one_by_one(fd: int | None) -> Generator[None]:
+    """Keys arrive without Enter, and are not shown; Ctrl-C stays a signal."""
+    if fd is None:
+        yield
+        return
+    before = termios.tcgetattr(fd)
+    try:
+        tty.setcbreak(fd, termios.TCSANOW)
+        yield
+    finally:
+        termios.tcsetattr(fd, termios.TCSADRAIN, before)
+
+
+@contextmanager
+def _handled(keys: Keys) -> Generator[None]:
+    codes = {signal.SIGINT: INTERRUPT, signal.SIGTSTP: SUSPEND}
+    if not keys.heard:  # in a terminal SIGCONT comes with every `fg`, and must not set an arm going
+        codes[signal.SIGCONT] = GO_ON
+
+    def tell(number: int, frame: FrameType | None) -> None:
+        keys.signalled(codes[signal.Signals(number)])
+
+    before = {number: signal.signal(number, tell) for number in codes}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,146 @@
+"""One part of a session measured: devices connected and recorded, the plan taken under the reins, forecasts beside."""
+
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.camera.sight import Sight
+from acquisition.plan import Block
+from acquisition.planned_session import PlannedSession
+from acquisition.recording.stream import Event
+from acquisition.recording.writer import RecordingWriter
+from acquisition.reins import Reins
+from acquisition.sample import Sample
+from acquisition.servo.centring import Limits
+from acquisition.session import Session, Summary
+from acquisition.wired import WiredBench
+from calibeam.camera import camera_sight
+from calibeam.journal import RecordingJournal
+from calibeam.learner import FittedLearner
+from calibeam.live.feed import Feed
+from calibeam.recorded import end_event, kept, new_recording
+from calibeam.session.ahead import Ahead
+from calibeam.session.earlier import STANDS_IN
+from calibeam.session.forecast import Forecast, forecast
+from calibeam.session.forecaster import Asked, Forecaster
+from calibeam.session.job import Job, Part, notes_of
+from calibeam.session.keys import Keys
+from calibeam.session.person import Person
+from calibeam.session.teller import Teller, ToldJournal
+from calibeam.site import connected
+from drivers.clock import Clock
+
+FORECAST_EVERY = 5  # poses; one takes a tenth of a second, in a thread of its own
+
+
+class Measuring:
+    """A part under way: `take` its plan, then more where that is wanted. Owns the samples of the part."""
+
+    def __init__(
+        self,
+        job: Job,
+        part: Part,
+        ahead: Ahead,
+        bench: WiredBench,
+        writer: RecordingWriter,
+        clock: Clock,
+        told: tuple[Teller, Person],
+        sight: Sight | None = None,
+    ) -> None:
+        self._job, self._part, self._ahead = job, part, ahead
+        self._bench, self._writer, self._clock = bench, writer, clock
+        self._teller, self._person = told
+        self._samples: list[Sample] = []
+        self._forecaster = Forecaster(self._forecast, self._no_forecast)
+        self._reins = Reins(bench.stop, clock, lambda: bench.supervisor.failure, self._teller.state)
+        self._session = self._session_of(sight)
+
+    def take(self, more: Sequence[Block] = ()) -> Summary:
+        """All that was taken in this part so far. PartialResult when it ended early: the arm stands."""
+        with Keys(self._reins, self._person.keyboard) as keys, self._person.at(keys), self._forecaster.running():
+            summary = kept(self._bench, self._writer, self._clock, self._session, self._run(more))
+        end_event(self._writer, self._clock, summary)
+        return summary
+
+    def forecast_now(self) -> Forecast:
+        """With all samples; ahead is what was not taken."""
+        return self._made(Asked(list(self._samples), self._behind()))
+
+    @property
+    def placement(self) -> int | None:
+        """Where the fixture stands."""
+        return self._samples[-1].placement if self._samples else self._part.earlier.standing
+
+    def _session_of(self, sight: Sight | None) -> Session | PlannedSession:
+        rig, options, earlier = self._part.rig, self._job.options, self._part.earlier.taken
+        journal = ToldJournal(RecordingJournal(self._writer, self._clock), self._teller, self._took)
+        learner, home_rad = FittedLearner(rig), np.array(rig.motion.home_rad)
+        tell, limits, reins = self._teller.progress, Limits(step_rad=rig.motion.step_limit_rad), self._reins
+        if self._part.plan is not None:
+            return PlannedSession(
+                self._bench, learner, journal, options, home_rad, tell=tell, sight=sight, reins=reins, earlier=earlier
+            )
+        return Session(
+            self._bench, learner, journal, options, home_rad,
+            limits=limits, tell=tell, sight=sight, reins=reins, earlier=earlier,
+        )  # fmt: skip
+
+    def _run(self, more: Sequence[Block]) -> Callable[[], Summary]:
+        standing = None if self._samples else self._part.earlier.standing
+        if isinstance(self._session, Session):
+            return partial(self._session.take, more or self._part.blocks, standing)
+        assert self._part.plan is not None  # noqa: S101 - it is why the session is one of a plan
+        return partial(self._session.run, self._part.plan, standing)
+
+    def _took(self, samples: list[Sample]) -> None:
+        self._samples = samples
+        if len(samples) % FORECAST_EVERY == 0:
+            self._forecaster.ask(Asked(list(samples), self._behind()))
+
+    def _behind(self) -> int:
+        progress = self._teller.shown.progress
+        return 0 if progress is None else progress.done + progress.skipped
+
+    def _forecast(self, asked: Asked) -> None:
+        self._teller.forecast(self._made(asked))
+
+    def _made(self, asked: Asked) -> Forecast:
+        taken = [*self._part.earlier.taken.values(), *asked.samples]
+        return forecast(self._part.rig, taken, self._ahead.after(asked.taken_of_plan), self._job.goal_m)
+
+    def _no_forecast(self, why: Exception) -> None:
+        self._teller.said(f"no more forecasts in this session: {type(why).__name__}: {why}", loud=False)
+
+
+@contextmanager
+def measuring(
+    job: Job, part: Part, ahead: Ahead, path: Path, clock: Clock, told: tuple[Teller, Person], feed: Feed
+) -> Generator[Measuring]:
+    """Devices connected, the recording begun. DeviceError, RecordingError, and what `camera_sight` raises."""
+    mover = partial(_asked_for, part, told[1]) if job.place is None else partial(_emulated, part, job.place)
+    with (
+        new_recording(path, part.text, clock, notes_of(job, part.seed)) as writer,
+        camera_sight(part.rig, clock) as sight,
+        connected(part.rig, job.addresses, writer, clock, mover, feed) as bench,
+    ):
+        for place in part.earlier.added:
+            instead_of = next((k for k, v in part.earlier.stands_in.items() if v == place.id), None)
+            writer.event(Event(clock.now_s(), STANDS_IN, {"id": place.id, "instead_of": instead_of}))
+        yield Measuring(job, part, ahead, bench, writer, clock, told, sight)
+
+
+def _emulated(part: Part, place: Callable[[int], None], placement: int) -> None:
+    """An emulated fixture knows the places of the rig file only: one that was measured anew is where it was."""
+    origin = {new: old for old, new in part.earlier.stands_in.items()}
+    while placement in origin:
+        placement = origin[placement]
+    place(placement)
+
+
+def _asked_for(part: Part, person: Person, placement: int) -> None:
+    """Has a person place the fixture."""
+    where = ", ".join(f"{value:.3f}" for value in part.rig.placements[placement].psd1_in_base.origin_m)
+    person.place(f"put the fixture at place {placement} (PSD 1 near {where} m in the base)")

@@ -1,0 +1,193 @@
+"""A whole session on site, step by step: devices, plan, arm, measure, look, result.
+
+What a person decides is asked where there is one; a script gets what is safe: no motion without --yes unless the
+devices are emulated, and a fixture that nobody vouches for counts as moved.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from rich.console import Console
+
+from acquisition.planned_session import check_planned
+from acquisition.recording.parts import next_part, parts
+from acquisition.recording.rig_schema import Placement
+from acquisition.session import Summary
+from calibeam.conclude import conclude
+from calibeam.device_check import DeviceCheck, check_devices
+from calibeam.learner import FittedLearner
+from calibeam.live.feed import SILENT, Feed
+from calibeam.outcome import PartialResult
+from calibeam.session.ahead import ahead_of_blocks, ahead_of_plan
+from calibeam.session.earlier import Earlier, earlier_of
+from calibeam.session.job import Job, Part, more_at, moved, part_of, with_place
+from calibeam.session.log_file import NAME, LogFile
+from calibeam.session.measure import Measuring, measuring
+from calibeam.session.pace import clock_words
+from calibeam.session.page_view import PageView
+from calibeam.session.person import Person
+from calibeam.session.places import new_place, placement_text, same_place
+from calibeam.session.plain_view import PlainView
+from calibeam.session.shown import Listener
+from calibeam.session.teller import Teller
+from calibeam.session.terminal_view import TerminalView
+from calibrate.pose_design.candidates import POSE_S
+from drivers.clock import Clock, SystemClock
+from drivers.errors import DeviceRefused
+
+GO_ON = "to go on, give the same command with --continue"
+FINISH, MORE, PLACE = "f", "m", "n"
+
+
+class OnSite:
+    """The steps; owns which part of the session comes next."""
+
+    def __init__(self, job: Job, console: Console, clock: Clock, feed: Feed, *, there: bool, agrees: bool) -> None:
+        self._job, self._console, self._clock, self._feed = job, console, clock, feed
+        terminal = TerminalView(console) if there and console.is_terminal else None
+        view: Listener = PlainView(console) if terminal is None else terminal
+        self.teller = Teller(job.rig, clock, (LogFile(job.out / NAME), view, PageView(feed)))
+        opened = {} if terminal is None else {"view": terminal.opened}
+        self._person = Person(console, self.teller, there=there, agrees=agrees, **opened)
+        self._half_size_m = FittedLearner(job.rig).optics.half_size_m
+
+    def run(self, earlier: Earlier, *, stands: bool) -> None:
+        """Everything, until there is nothing more to be measured. PartialResult, and what its steps raise.
+
+        `stands`: the fixture has not been touched since the earlier parts.
+        """
+        self._devices()
+        earlier, agreed = self._since(earlier, stands=stands), False
+        while True:
+            part = part_of(self._job, earlier, self._half_size_m)
+            if part.left == 0:
+                self.teller.said("everything that was planned is taken")
+                break
+            self._plan(part)
+            if not agreed:
+                self.teller.step("arm")
+                self._person.arm()
+                agreed = True
+            place = self._measure(part)
+            if place is None:
+                break
+            earlier = with_place(earlier_of(self._job.out, self._job.rig), place)
+        self.teller.step("result")
+        files = parts(self._job.out)
+        conclude(files[0] if len(files) == 1 else self._job.out, self._console)
+
+    def _devices(self) -> None:
+        """One line each; goes on when all are good, or a person says so. DeviceRefused where one cannot be had."""
+        self.teller.step("devices")
+        if self._job.addresses.hurry != 1.0:
+            self.teller.said("emulators at another pace than real time: their devices are not judged")
+            return
+        while True:
+            checks = list(self._told())
+            missing = [check.line for check in checks if check.wrong and not check.what]
+            if not any(check.wrong for check in checks):
+                return
+            answer = self._person.choose(
+                "something is wrong:",
+                {"r": "it is mended: try again", "g": "go on all the same", "e": "end"},
+                "e" if missing else "g",
+            )
+            if answer == "e":
+                raise DeviceRefused("; ".join(check.line for check in checks if check.wrong))
+            if answer == "g":
+                return
+
+    def _told(self) -> Iterator[DeviceCheck]:
+        for check in check_devices(self._job.rig, self._clock):
+            self.teller.said(check.line)
+            yield check
+
+    def _since(self, earlier: Earlier, *, stands: bool) -> Earlier:
+        """Where the fixture stands now, as far as it matters: a place that was left half done."""
+        standing = earlier.standing
+        if standing is None:
+            return earlier
+        part = part_of(self._job, earlier, self._half_size_m)
+        if not part.open_at(standing):
+            return replace(earlier, standing=None)
+        told = {"y": "yes, nobody has touched it", "n": "no, or nobody knows: it is measured anew, as a new place"}
+        if stands or self._person.choose(f"does the fixture still stand at place {standing}?", told, "n") == "y":
+            return earlier
+        place = same_place(part.rig, standing)
+        self.teller.said(f"place {standing} is measured anew as place {place.id}; what was taken there still counts")
+        return moved(earlier, place, standing)
+
+    def _plan(self, part: Part) -> None:
+        """Gone through and drawn before anything moves."""
+        from calibeam.motion.rehearsal import draw_session  # matplotlib takes a second to load
+
+        self.teller.step("plan")
+        drawing = next_part(self._job.out).with_suffix(".plan.svg")
+        self.teller.said(draw_session(part.rig, drawing, part.options, part.plan))
+        before = f", {len(part.earlier.taken)} taken before" if part.earlier.begun else ""
+        about = clock_words(POSE_S * part.left / self._job.addresses.hurry)
+        self.teller.said(f"{part.left} readings to take, repeats among them{before}; about {about}")
+
+    def _measure(self, part: Part) -> Placement | None:
+        """A part; a further place that a person wants, None: it is enough."""
+        self.teller.step("measure")
+        ahead = ahead_of_blocks(part.rig, part.blocks) if part.plan is None else ahead_of_plan(part.rig, part.plan)
+        path = next_part(self._job.out)
+        try:
+            with measuring(
+                self._job, part, ahead, path, self._clock, (self.teller, self._person), self._feed
+            ) as session:
+                summary, rounds = session.take(), 0
+                while True:
+                    self._look(session, summary, part)
+                    answer = self._decide(part)
+                    if answer != MORE or session.placement is None:
+                        break
+                    rounds += 1
+                    self.teller.step("measure")
+                    summary = session.take(
+                        more_at(part, session.placement, self._half_size_m, self._job.options, rounds)
+                    )
+        except KeyboardInterrupt as why:  # at a question, while the arm stands
+            raise PartialResult(f"Ctrl-C; what was taken is kept in {path}; {GO_ON}") from why
+        except PartialResult as early:
+            self.teller.said(f"ended early: {early}", loud=False)
+            raise PartialResult(f"{early}; {GO_ON}") from early
+        self.teller.said(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {path}")
+        return self._new_place(part) if answer == PLACE else None
+
+    def _look(self, session: Measuring, summary: Summary, part: Part) -> None:
+        """How good it is."""
+        self.teller.step("look")
+        forecast, quality = session.forecast_now(), self.teller.shown.quality
+        self.teller.forecast(forecast)
+        settled = "" if quality is None or not quality.unsettled else f", {quality.unsettled} of them did not settle"
+        self.teller.said(f"{len(part.earlier.taken) + len(summary.samples)} poses{settled}; {summary.skipped} left out")
+        self.teller.said(f"predicted error of the beam in free space: {forecast.says}")
+
+    def _decide(self, part: Part) -> str:
+        choices = {FINISH: "finish: identify, diagnose, report"}
+        if part.plan is None:
+            choices |= {MORE: "more poses, the fixture stays", PLACE: "a further place of the fixture"}
+        return self._person.choose("what next?", choices, FINISH)
+
+    def _new_place(self, part: Part) -> Placement:
+        numbers = self._person.numbers("PSD 1 in the base: x y z in m, and the turn about z in degrees", 4)
+        place = new_place(part.rig, numbers)
+        self.teller.said(f"place {place.id}; to keep it, add to the rig file:{placement_text(place)}")
+        return place
+
+
+def run_session(
+    job: Job, console: Console, earlier: Earlier, feed: Feed = SILENT, *, there: bool, agrees: bool, stands: bool
+) -> None:
+    """The whole session. `earlier`: what it goes on with; `stands`: the fixture has not been touched since.
+
+    `there`: a terminal at which a person sits; `agrees`: who needs not be asked whether the arm may move.
+    """
+    if job.plan is not None:
+        check_planned(job.plan)
+    clock = SystemClock()
+    job.out.mkdir(parents=True, exist_ok=True)
+    site = OnSite(job, console, clock, feed, there=there, agrees=agrees)
+    site.run(earlier, stands=stands)

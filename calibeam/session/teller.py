@@ -1,0 +1,139 @@
+"""Tells everybody who listens how a session stands; the owner of what is shown."""
+
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from acquisition.journal import Journal
+from acquisition.progress import Phase, Progress
+from acquisition.recording.rig_schema import Rig
+from acquisition.sample import Sample
+from acquisition.session_states import State
+from calibeam.session.forecast import Forecast
+from calibeam.session.pace import Pace
+from calibeam.session.quality import Keeper
+from calibeam.session.shown import Listener, Shown
+from drivers.clock import Clock
+
+STEPS = ("devices", "plan", "arm", "measure", "look", "result")
+WORKING = (State.RUNNING, State.PAUSING, State.ENDING)
+
+
+class Teller:
+    """Verbs for every part of a session, from any thread."""
+
+    def __init__(self, rig: Rig, clock: Clock, listeners: Sequence[Listener]) -> None:
+        joints = rig.arm.joints
+        self._keeper = Keeper(np.array([j.lower_rad for j in joints]), np.array([j.upper_rad for j in joints]))
+        self._pace, self._listeners = Pace(clock), listeners
+        self._turn = threading.RLock()
+        self.shown = Shown()
+
+    def step(self, name: str) -> None:
+        """A step of the whole job begins."""
+        number = STEPS.index(name) + 1
+        with self._turn:
+            self._now(step=f"{number} of {len(STEPS)}  {name.upper()}")
+            self.said(self.shown.step, loud=False)  # those who show it see it change
+
+    def said(self, text: str, *, loud: bool = True) -> None:
+        """One line for a person."""
+        with self._turn:
+            for listener in self._listeners:
+                listener.said(text, loud)
+
+    def progress(self, progress: Progress) -> None:
+        """From the session, as acquisition.progress.Tell."""
+        with self._turn:
+            before = self.shown.progress
+            if before is None or (before.placement, before.first) != (progress.placement, progress.first):
+                self.said(f"place {progress.placement}, PSD {progress.first} first")
+            self._pace.work(progress.phase is not Phase.PLACE and self.shown.state in WORKING)
+            self._now(progress=progress, left_s=self._pace.left_s(progress.left))
+
+    def state(self, state: State) -> None:
+        """From the reins, from several threads: the same one may come twice."""
+        with self._turn:
+            if state is self.shown.state:
+                return
+            self._pace.work(state in WORKING)
+            self._now(state=state)
+            self.said(state.value)
+
+    def asked(self, text: str) -> None:
+        """A person is waited for; "": no more."""
+        with self._turn:
+            self._pace.work(not text and self.shown.state in WORKING)
+            self._now(asked=text)
+
+    def sample(self, sample: Sample) -> None:
+        """A pose was taken."""
+        with self._turn:
+            self._pace.taken()
+            quality, progress = self._keeper.add(sample), self.shown.progress
+            if progress is not None:
+                progress = replace(progress, done=progress.done + 1)
+            self._now(
+                quality=quality,
+                progress=progress,
+                left_s=None if progress is None else self._pace.left_s(progress.left),
+            )
+            self.said(_of_sample(sample, progress), loud=False)
+
+    def forecast(self, forecast: Forecast) -> None:
+        """From the thread that makes them."""
+        with self._turn:
+            self._now(forecast=forecast)
+            self.said(f"accuracy after {forecast.samples} poses: {forecast.says}", loud=False)
+
+    def _now(self, **changed: Any) -> None:
+        self.shown = replace(self.shown, **changed)
+        for listener in self._listeners:
+            listener.shows(self.shown)
+
+
+class ToldJournal:
+    """Implements acquisition.journal.Journal: what goes into the recording is told as well."""
+
+    def __init__(self, journal: Journal, teller: Teller, took: Callable[[list[Sample]], None]) -> None:
+        """`took`: all samples so far, after each."""
+        self._journal, self._teller, self._took = journal, teller, took
+        self.samples: list[Sample] = []
+
+    def sample(self, sample: Sample) -> None:
+        self._journal.sample(sample)
+        self.samples.append(sample)
+        self._teller.sample(sample)
+        self._took(self.samples)
+
+    def event(self, kind: str, detail: Mapping[str, Any]) -> None:
+        self._journal.event(kind, detail)
+        if text := _of_event(kind, detail):
+            self._teller.said(text, loud=kind == "skipped")
+
+
+def _of_sample(sample: Sample, progress: Progress | None) -> str:
+    count = "" if progress is None else f" {progress.done} of {progress.total}"
+    look = sample.look
+    settled = "settled" if look.settled else "NOT settled"
+    after = "" if look.settle_s is None else f" in {look.settle_s:.2f} s"
+    x1, y1, x2, y2 = (1e3 * look.spots_m()).tolist()
+    return (
+        f"pose{count}: place {sample.placement}, PSD {sample.first} first, {settled}{after}; spots "
+        f"({x1:+.3f}, {y1:+.3f}) ({x2:+.3f}, {y2:+.3f}) mm"
+    )
+
+
+def _of_event(kind: str, detail: Mapping[str, Any]) -> str:
+    """What is worth a line of the log."""
+    if kind == "skipped":
+        return f"pose left out at place {detail.get('placement')}: {detail.get('why')}"
+    if kind == "search":
+        return f"search for the light: {detail.get('found')} after {detail.get('motions')} motions"
+    if kind == "centring":
+        steps = len(detail.get("purpose", ())) - 1
+        return f"centring at place {detail.get('placement')}: {detail.get('status')} after {steps} motions"
+    return "" if kind == "sample" else f"{kind}: {', '.join(f'{k} {v}' for k, v in detail.items())}"

@@ -1,0 +1,85 @@
+"""However often a session and its clean-up are interrupted, and at whichever step: the arm is stopped in the end."""
+
+from pathlib import Path
+
+import pytest
+
+from acquisition.errors import StoppedError
+from acquisition.recording.errors import RecordingError
+from calibeam.outcome import PartialResult
+from calibeam.recorded import kept
+from drivers.errors import DeviceLost
+
+STEPS = ("stop", "event", "flush")
+
+
+class Trouble:
+    """Bench, recording and session in one; `raises` says what each step does the first times it is made."""
+
+    path = Path("recording.mcap")
+    taken = 7
+
+    def __init__(self, **raises: list[BaseException]) -> None:
+        self.raises = raises
+        self.done: list[str] = []
+
+    def stop(self) -> None:
+        self._make("stop")
+
+    def event(self, event: object) -> None:
+        self._make("event")
+
+    def flush(self) -> None:
+        self._make("flush")
+
+    def now_s(self) -> float:
+        return 1.0
+
+    def _make(self, step: str) -> None:
+        planned = self.raises.get(step, [])
+        if planned:
+            raise planned.pop(0)
+        self.done.append(step)
+
+
+def ended(trouble: Trouble, why: BaseException) -> str:
+    def run() -> None:
+        raise why
+
+    with pytest.raises(PartialResult) as told:
+        kept(trouble, trouble, trouble, trouble, run)
+    return str(told.value)
+
+
+@pytest.mark.parametrize("step", STEPS)
+@pytest.mark.parametrize("times", [1, 3])
+def test_a_clean_up_that_is_interrupted_begins_again_with_the_stop(step, times) -> None:
+    trouble = Trouble(**{step: [KeyboardInterrupt() for _ in range(times)]})
+    assert ended(trouble, KeyboardInterrupt()).startswith("Ctrl-C; 7 samples are kept in recording.mcap")
+    assert trouble.done[-3:] == ["stop", "event", "flush"]
+
+
+@pytest.mark.parametrize("why", [StoppedError("the session was aborted"), DeviceLost("psd: gone"), KeyboardInterrupt()])
+def test_whatever_ends_it_the_arm_is_told_to_stop_first(why) -> None:
+    trouble = Trouble()
+    ended(trouble, why)
+    assert trouble.done == ["stop", "event", "flush"]
+
+
+def test_a_stop_that_cannot_be_delivered_is_said_and_the_samples_are_saved_all_the_same() -> None:
+    trouble = Trouble(stop=[DeviceLost("robot: no way to the controller")])
+    told = ended(trouble, StoppedError("the session was aborted"))
+    assert "the arm could not be told to stop (robot: no way to the controller); see that it stands" in told
+    assert trouble.done == ["event", "flush"]
+
+
+def test_a_disk_that_is_full_does_not_keep_the_arm_from_its_stop() -> None:
+    trouble = Trouble(event=[RecordingError("disk full")])
+    assert "disk full" in ended(trouble, DeviceLost("psd: gone"))
+    assert trouble.done == ["stop"]
+
+
+def test_what_ends_well_is_left_alone() -> None:
+    trouble = Trouble()
+    assert kept(trouble, trouble, trouble, trouble, lambda: 5) == 5
+    assert trouble.done == []

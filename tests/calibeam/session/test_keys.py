@@ -1,0 +1,113 @@
+"""Keys and signals reach the reins, and the terminal is given back as it was."""
+
+import os
+import pty
+import signal
+import termios
+import threading
+from collections.abc import Callable
+
+import pytest
+
+from acquisition.errors import StoppedError
+from acquisition.reins import Reins
+from acquisition.session_states import Event, State
+from calibeam.session.keys import ENTER, Keys
+
+PATIENCE_S = 10.0
+
+
+class Followed:
+    """Reins that tell when they come into a state."""
+
+    def __init__(self) -> None:
+        self._came = {state: threading.Event() for state in State}
+        self.reins = Reins(lambda: None, changed=lambda state: self._came[state].set())
+        self.reins.tell(Event.START)
+
+    def comes_to(self, state: State) -> bool:
+        return self._came[state].wait(PATIENCE_S)
+
+
+@pytest.fixture
+def followed() -> Followed:
+    return Followed()
+
+
+@pytest.fixture
+def terminal():
+    ours, theirs = pty.openpty()
+    yield ours, theirs
+    os.close(ours)
+    os.close(theirs)
+
+
+@pytest.mark.parametrize(
+    ("typed", "state"),
+    [(" ", State.PAUSING), ("p", State.PAUSING), ("PP", State.BREAKING), ("s", State.ENDING), ("A", State.ABORTING),
+     ("h", State.HALTED), ("pr", State.RUNNING), ("x", State.RUNNING)],
+)  # fmt: skip
+def test_every_key(followed, typed, state) -> None:
+    keys = Keys(followed.reins, None)
+    for key in typed:
+        keys.pressed(key)
+    assert followed.reins.state is state
+
+
+def test_keys_come_without_enter_and_the_terminal_is_as_it_was(followed, terminal) -> None:
+    ours, theirs = terminal
+    before = termios.tcgetattr(theirs)
+    with Keys(followed.reins, theirs):
+        assert not termios.tcgetattr(theirs)[3] & termios.ICANON
+        os.write(ours, b" ")
+        assert followed.comes_to(State.PAUSING)
+    assert termios.tcgetattr(theirs) == before
+
+
+def test_the_terminal_is_as_it_was_after_an_error_too(followed, terminal) -> None:
+    before = termios.tcgetattr(terminal[1])
+    with pytest.raises(RuntimeError), Keys(followed.reins, terminal[1]):
+        raise RuntimeError("in the midst")
+    assert termios.tcgetattr(terminal[1]) == before
+
+
+@pytest.mark.parametrize(
+    ("number", "state"), [(signal.SIGINT, State.PAUSING), (signal.SIGTSTP, State.PAUSING)], ids=["Ctrl-C", "Ctrl-Z"]
+)
+def test_signals_pause(followed, number, state) -> None:
+    before: Callable[..., object] = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with Keys(followed.reins, None):
+            os.kill(os.getpid(), number)
+            assert followed.comes_to(state)
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_without_a_terminal_a_pause_ends_by_the_signal_that_continues(followed) -> None:
+    with Keys(followed.reins, None):
+        followed.reins.pause()
+        followed.reins.tell(Event.CHECKPOINT)
+        followed._came[State.RUNNING].clear()
+        os.kill(os.getpid(), signal.SIGCONT)
+        assert followed.comes_to(State.RUNNING)
+
+
+def test_who_asks_gets_the_answer_and_no_pause(followed) -> None:
+    keys = Keys(followed.reins, None)
+    asked = threading.Thread(target=lambda: answers.append(keys.wait(ENTER)))
+    answers: list[str] = []
+    asked.start()
+    while asked.is_alive():
+        keys.pressed("x")  # on the way to Enter
+        keys.pressed("\r")
+        asked.join(0.01)
+    assert answers == [ENTER]
+    assert followed.reins.state is State.RUNNING
+
+
+def test_an_abort_ends_the_question(followed) -> None:
+    followed.reins.abort()
+    with pytest.raises(StoppedError, match="given up"):
+        Keys(followed.reins, None).wait(ENTER)

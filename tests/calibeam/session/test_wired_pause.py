@@ -1,0 +1,94 @@
+"""One session over real wires, paused by Ctrl-C and gone on with, then taken up again the day after."""
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from acquisition.plan import PlanOptions, blocks
+from acquisition.recording.parts import parts
+from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan, write_pose_plan
+from acquisition.recording.read import read
+from calibeam.cli import run
+from calibeam.emulation import Emulation
+from calibeam.session.ahead import ahead_of_blocks
+
+from .conftest import RIG_FILE
+
+POSES = 3
+LOOK_S = 0.02
+
+
+@pytest.fixture
+def plan(rig, tmp_path) -> Path:
+    """The first poses of a session's own plan, as joint poses: searched where dark, for the arm is not as drawn."""
+    found = ahead_of_blocks(rig, tuple(blocks((1,), 0.01, PlanOptions(repeats=0)))[:1])
+    q_rad = found.poses.q_rad[:POSES]
+    block = PlannedBlock(pose=tuple(PlannedPose(tuple(q.tolist())) for q in q_rad), placement=1, first_psd=1)
+    write_pose_plan(tmp_path / "plan.toml", PosePlan(schema=1, rig=rig.name, block=(block,)))
+    return tmp_path / "plan.toml"
+
+
+@pytest.fixture
+def arguments(tmp_path, plan) -> Iterator[list[str]]:
+    with Emulation(RIG_FILE, seed=5, time_scale=4.0) as emulation:
+        text, where = RIG_FILE.read_text(), emulation.address
+        for old, new in (
+            ("out/emulated/psd", where["psd"]["port"]),
+            ("out/emulated/can", where["can"]["channel"]),
+            ('host = "127.0.0.2"', f'host = "{where["robot"]["host"]}"'),
+        ):
+            assert old in text
+            text = text.replace(old, new, 1)
+        (tmp_path / "rig.toml").write_text(text)
+        control = f"{where['control']['host']}:{where['control']['port']}"
+        yield ["session", str(tmp_path / "rig.toml"), "--out", str(tmp_path / "out"), "--plan", str(plan),
+               "--control", control, "--time-scale", "4"]  # fmt: skip
+
+
+@contextmanager
+def when_said(log: Path, acts: dict[str, Callable[[], None]]) -> Generator[None]:
+    """Does each, once, when the log says its words: conditions, not times."""
+    over, left = threading.Event(), dict(acts)
+
+    def watch() -> None:
+        while left and not over.wait(LOOK_S):
+            said = log.read_text() if log.exists() else ""
+            for words in [words for words in left if words in said]:
+                left.pop(words)()
+
+    thread = threading.Thread(target=watch)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+def test_paused_resumed_and_gone_on_with(arguments, tmp_path, capsys, monkeypatch) -> None:
+    concluded: list[Path] = []
+    monkeypatch.setattr("calibeam.session.run.conclude", lambda path, console: concluded.append(path))
+    log = tmp_path / "out" / "session.log"
+    pause, go_on = (lambda: os.kill(os.getpid(), signal.SIGINT), lambda: os.kill(os.getpid(), signal.SIGCONT))
+    with when_said(log, {" measuring": pause, "paused, the arm stands": go_on}):
+        code = run(arguments)
+    said = log.read_text()
+    assert code == 0, capsys.readouterr().err
+    order = ["6  DEVICES", "6  PLAN", "6  ARM", "6  MEASURE", "paused, the arm stands"]
+    assert sorted(map(said.index, order)) == [said.index(words) for words in order]
+    assert said.count(" measuring") == 2
+    assert f"pose {POSES} of {POSES}" in said
+    assert read(tmp_path / "out" / "recording.mcap").complete
+    assert (tmp_path / "out" / "recording.plan.svg").read_text().startswith("<?xml")
+
+    assert run(arguments) == 1
+    assert "--continue" in capsys.readouterr().err
+    assert run([*arguments, "--continue"]) == 0
+    assert "everything that was planned is taken" in log.read_text()
+    assert concluded == [tmp_path / "out" / "recording.mcap"] * 2
+    assert parts(tmp_path / "out") == concluded[:1]
