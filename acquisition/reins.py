@@ -26,7 +26,8 @@ class EndedEarlyError(Exception):
 class Reins:
     """Owner of a session's state. `stop_arm` works from any thread; DeviceError where it cannot be delivered.
 
-    `failure`: what has gone wrong with a device, so that a pause does not outlast it.
+    `failure`: what has gone wrong with a device, so that a pause does not outlast it. `hold_arm`: stops for good, after
+    abort and halt. `undelivered`: told of a stop that could not be delivered; None: there is none of these any more.
     """
 
     def __init__(
@@ -35,13 +36,16 @@ class Reins:
         clock: Clock | None = None,
         failure: Callable[[], Exception | None] = lambda: None,
         changed: Callable[[State], None] = lambda state: None,
+        hold_arm: Callable[[], None] | None = None,
+        undelivered: Callable[[DeviceError | None], None] = lambda trouble: None,
     ) -> None:
         self._stop_arm, self._failure, self._changed = stop_arm, failure, changed
+        self._hold_arm, self._undelivered = hold_arm or stop_arm, undelivered
         self._clock: Clock = clock or SystemClock()
         self._news = threading.Condition()
         self._state = State.IDLE
         self._paused_s = float("-inf")
-        self.trouble: DeviceError | None = None  # the last stop that could not be delivered
+        self.trouble: DeviceError | None = None  # why the last stop could not be delivered
 
     @property
     def state(self) -> State:
@@ -66,6 +70,8 @@ class Reins:
     def resume(self) -> None:
         """Go on from the last checkpoint."""
         self._paused_s = float("-inf")
+        if self._state is State.PAUSED:
+            self._keep(None)  # the arm stands, whatever became of the stop
         self.tell(Event.RESUME)
 
     def stop(self) -> None:
@@ -82,8 +88,9 @@ class Reins:
 
     def insist(self) -> None:
         """Say the stop once more while the session has not taken note; to be called a few times a second."""
-        if self._state in BROKEN:
-            self._brake()
+        state = self._state
+        if state in BROKEN:
+            self._brake(state)
 
     def tell(self, event: Event) -> None:
         """Any event; where it stops the arm, the arm has been told when this returns."""
@@ -92,7 +99,7 @@ class Reins:
             now = self._state
             self._news.notify_all()
         if event is Event.HALT or (now in BROKEN and now is not before):
-            self._brake()
+            self._brake(now)
         if now is not before:
             self._changed(self._state)  # which may have gone on while the arm was being stopped
 
@@ -109,12 +116,16 @@ class Reins:
             while self._state is State.PAUSED and self._failure() is None:
                 waited = True
                 self._news.wait(WAKE_S)
+        self.check_devices()
+        self._raise_end()
+        return waited
+
+    def check_devices(self) -> None:
+        """Raises what a device has failed with; the session is over then."""
         failure = self._failure()
         if failure is not None:
             self.tell(Event.FAULT)
             raise failure
-        self._raise_end()
-        return waited
 
     def finish(self) -> None:
         """The plan is at its end. StoppedError where a person gave it up in the last moment."""
@@ -135,8 +146,15 @@ class Reins:
         if self._state in OVER:
             raise EndedEarlyError
 
-    def _brake(self) -> None:
+    def _brake(self, state: State) -> None:
+        trouble = None
         try:
-            self._stop_arm()
+            (self._stop_arm if state is State.BREAKING else self._hold_arm)()
         except DeviceError as error:
-            self.trouble = error
+            trouble = error
+        self._keep(trouble)
+
+    def _keep(self, trouble: DeviceError | None) -> None:
+        before, self.trouble = self.trouble, trouble
+        if str(before) != str(trouble):  # it is said again and again, and is news once
+            self._undelivered(trouble)

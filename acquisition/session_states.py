@@ -1,8 +1,8 @@
 """What a session can be doing, what can happen to it, and what it then does: one table, words as in bluesky.
 
 pause: at the next checkpoint, between two samples; again within PAUSE_AGAIN_S: at once, the arm is stopped. resume goes
-on from the last checkpoint. stop: ends at the next checkpoint, as a success. abort: the arm is stopped, what was taken
-is kept, the session has failed to end as asked. halt: the arm is stopped and held, whatever the state.
+on from the last checkpoint. stop: ends at the next checkpoint, as a success. abort: the arm is stopped and held, what
+was taken is kept, the session has failed to end as asked. halt: the arm is stopped and held, whatever the state.
 Source of words and keys: bluesky, "Interrupting" (first Ctrl-C: pause at the next checkpoint; second within 10 s: now).
 """
 
@@ -59,7 +59,8 @@ _TABLE: dict[State, dict[Event, State]] = {
     State.HALTED: {},
     State.RUNNING: {**_UNDER_WAY, Event.PAUSE: State.PAUSING},
     State.PAUSING: {**_UNDER_WAY, Event.RESUME: State.RUNNING, Event.CHECKPOINT: State.PAUSED},
-    State.BREAKING: {**_UNDER_WAY, Event.CHECKPOINT: State.PAUSED},
+    # A stop would let the motion go on that is being broken off: it is to be said once the arm stands.
+    State.BREAKING: {**_UNDER_WAY, Event.CHECKPOINT: State.PAUSED, Event.STOP: State.BREAKING},
     State.PAUSED: {
         Event.RESUME: State.RUNNING,
         Event.STOP: State.DONE,

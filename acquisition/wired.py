@@ -67,6 +67,10 @@ class WiredBench:
     def stop(self) -> None:
         self.arm.stop()
 
+    def hold(self) -> None:
+        """As `stop`, and no motion is accepted any more."""
+        self.arm.hold()
+
     def place_fixture(self, placement: int) -> None:
         self.place(placement)
 

@@ -56,7 +56,7 @@ def batch_command(
     scheduler
         Address of a Dask scheduler; its workers need calibeam and see the files under the same paths.
     timeout
-        Seconds that one recording may take; 0: no limit.
+        Seconds that one recording may take; 0: no limit, with loky only.
     again
         Do all anew, whatever stands.
     robot_by_folder
@@ -84,15 +84,14 @@ def batch_command(
         print_fleet(console, ran, fleet)
         for line in (f"table: {out / TABLE}", f"page: {page}"):
             console.print(line, markup=False, highlight=False)
-    _end(ran, fleet, out)
+    _end(ran, fleet, out, again=again)
 
 
-def _end(ran: "Ran", fleet: "Fleet", out: Path) -> None:
+def _end(ran: "Ran", fleet: "Fleet", out: Path, *, again: bool) -> None:
     """PartialResult where not all is well, DataError where nothing is."""
     if ran.stopped:
-        raise PartialResult(
-            f"Ctrl-C; {len(ran.rows)} recordings are in {out / TABLE}, {ran.left} are left; the same command goes on"
-        )
+        how = "leave --again out to go on" if again else "the same command goes on"
+        raise PartialResult(f"Ctrl-C; {len(ran.rows)} recordings are in {out / TABLE}, {ran.left} are left; {how}")
     if fleet.bad and len(fleet.bad) == len(fleet.rows):
         raise DataError(f"none of {len(fleet.rows)} recordings could be identified; the first: {fleet.bad[0].error}")
     if fleet.bad:

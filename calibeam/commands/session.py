@@ -1,6 +1,6 @@
 """`calibeam session`: the whole job on site, or on emulators that were started beside it."""
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -30,6 +30,18 @@ from calibeam.session.run import run_session
 from calibeam.site import addresses_of, check_session
 from drivers.clock import SystemClock
 
+ACCURACY_UM = 20.0  # as Job.goal_m
+
+
+@dataclass(frozen=True)
+class PageAsked:
+    """Whether there is a live page, and where."""
+
+    wanted: bool = False
+    host: str = "127.0.0.1"
+    port: int = 8765
+    token: str | None = None
+
 
 def session(
     rig: Path,
@@ -40,12 +52,12 @@ def session(
     continue_: Annotated[bool, Parameter(name="--continue")] = False,
     stands: bool = False,
     place: Annotated[tuple[float, float, float, float] | None, Parameter(negative="")] = None,
-    accuracy_um: float = 20.0,
+    accuracy_um: float = ACCURACY_UM,
     yes: bool = False,
     live: bool = False,
-    live_host: str = "127.0.0.1",
-    live_port: int = 8765,
-    live_token: str | None = None,
+    live_host: str = PageAsked.host,
+    live_port: int = PageAsked.port,
+    live_token: str | None = PageAsked.token,
     control: str | None = None,
     time_scale: float = 1.0,
     postures: int = GuidedOptions.postures,
@@ -64,7 +76,7 @@ def session(
         The rig file; [devices] says how each device is reached.
     out
         Folder for recording.mcap, session.log, the drawing of the plan, model.json, diagnosis.json and report.html;
-        nothing in it is overwritten.
+        a recording in it is never written over, what was found from it is made anew.
     plan
         A plan of joint poses, as `calibeam diagnose --plan-out` writes it: these are taken, and no others.
     seed
@@ -103,6 +115,19 @@ def session(
     console = Console()
     loaded, text = load_rig(rig), rig_text(rig)
     _check_verify(loaded, plan, verify=verify)
+    page = PageAsked(live, live_host, live_port, live_token)
+    _check_meant(
+        loaded,
+        of_robot={
+            "--continue": continue_,
+            "--stands": stands,
+            "--place": place is not None,
+            "--accuracy-um": accuracy_um != ACCURACY_UM,
+            "--yes": yes,
+            "--live": page != PageAsked(),
+        },
+        of_hand={"--postures": postures != GuidedOptions.postures, "--lengths": lengths != GuidedOptions.lengths},
+    )
     if is_guided(loaded):
         options = GuidedOptions(postures, lengths, seed)
         return _guided(loaded, text, out, plan, options, control, time_scale, console, verify=verify)
@@ -122,19 +147,9 @@ def session(
     )
     earlier = _earlier(job, go_on=continue_, place=place)
     agrees = yes or (control is not None and not there)
-    with _page(loaded, PageAsked(live, live_host, live_port, live_token), console) as feed:
+    with _page(loaded, page, console) as feed:
         run_session(job, console, earlier, feed, there=there, agrees=agrees, stands=stands)
     return None
-
-
-@dataclass(frozen=True)
-class PageAsked:
-    """Whether there is a live page, and where."""
-
-    wanted: bool
-    host: str
-    port: int
-    token: str | None
 
 
 @contextmanager
@@ -153,8 +168,8 @@ def _earlier(job: Job, *, go_on: bool, place: tuple[float, float, float, float] 
     """What was taken already. RecordingError where a session is in the folder and nobody wants to go on with it."""
     if not go_on and parts(job.out):
         raise RecordingError(
-            f"{job.out}: holds a session already, and nothing is overwritten; go on with it by --continue, or choose "
-            "another --out"
+            f"{job.out}: holds a session already, and no recording is written over; go on with it by --continue, or "
+            "choose another --out"
         )
     earlier = earlier_of(job.out, job.rig) if go_on else Earlier()
     if place is None:
@@ -193,6 +208,15 @@ def _check_verify(rig: Rig, plan: Path | None, *, verify: bool) -> None:
             f"--plan {plan} with --verify: the standards say which readings a verification takes, a plan those that an "
             "arm is identified from; give one of them"
         )
+
+
+def _check_meant(rig: Rig, of_robot: Mapping[str, bool], of_hand: Mapping[str, bool]) -> None:
+    """AcquisitionError where an option was given that would be ignored for this kind of rig."""
+    by_hand = is_guided(rig)
+    given = [name for name, is_given in (of_robot if by_hand else of_hand).items() if is_given]
+    if given:
+        kind = "a rig that a controller moves, and a hand moves this one" if by_hand else "a measuring arm"
+        raise AcquisitionError(f"rig {rig.name}: {', '.join(given)}: meant for {kind}; leave out what is named")
 
 
 def _asked(host: str, port: int, verb: str, /, **arguments: Any) -> Any:

@@ -36,10 +36,16 @@ WAIT_S = 30.0  # for the first worker of a cluster
 MARGIN_S = 60.0  # beyond what any recording may take, for a cluster to start and to move a task
 LOST = f"the worker that had it died or fell silent {ROUNDS} times"
 NEEDS_DASK = "--engine dask needs Dask, which is not installed; pip install 'calibeam[fleet]', or take --engine loky"
+NEEDS_LIMIT = (  # Dask gives up what killed its workers, and joblib is never told
+    "--timeout 0 is not for --engine dask: what kills its workers would be waited for without end; "
+    "give seconds, or take --engine loky"
+)
 
 
 def rows(orders: Sequence[Order], workers: Workers, work: Callable[[Order], Row] = worked) -> Generator[Row]:
     """One row an order, as they come. DataError where the engine cannot be had."""
+    if workers.engine is Engine.DASK and any(order.timeout_s is None for order in orders):
+        raise DataError(NEEDS_LIMIT)
     left = {order.task.path: order for order in orders}
     broken: Counter[str] = Counter()
     try:

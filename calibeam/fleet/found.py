@@ -1,16 +1,17 @@
-"""Which recordings lie below a folder: MCAP files and session folders, with what tells whether one has changed."""
+"""Which recordings lie below a folder: MCAP files, one or all of a session, session folders; what tells a change."""
 
 import hashlib
 import os
 import re
 from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
 
 from calibrate.errors import DataError
 
 MCAP = ".mcap"
 RIG, SAMPLES = "rig.toml", ("samples.csv", "samples.parquet")
-DATE = re.compile(r"(?<!\d)\d{4}-[01]\d-[0-3]\d(?!\d)")  # ISO 8601
+DATE = re.compile(r"(?<!\d)(?:19|20)\d\d-\d\d-\d\d(?!\d)")  # ISO 8601, in years that no serial number is likely to hold
 BLOCK_BYTES = 1 << 20
 
 
@@ -18,15 +19,15 @@ BLOCK_BYTES = 1 << 20
 class Found:
     """A recording or session folder as it lies on the disk."""
 
-    path: Path  # absolute: workers elsewhere see the same files
-    name: str  # below the folder that was searched
+    path: Path  # absolute: workers elsewhere see the same files; of a session of several parts the folder
+    name: str  # below the folder that was searched; of several parts that of the first, as when it was alone
     size_bytes: int
     modified_ns: int
 
     @property
     def date(self) -> str:
         """The last date (YYYY-MM-DD) in the name, "" without one: what a person wrote there goes before the clock."""
-        dates = DATE.findall(self.name)
+        dates = [text for text in DATE.findall(self.name) if _is_day(text)]
         return dates[-1] if dates else ""
 
     @property
@@ -50,11 +51,16 @@ def recordings(folder: Path, but: Path) -> tuple[Found, ...]:
             folders.clear()
             continue
         if RIG in files and any(name in files for name in SAMPLES):
-            found.append(_found(root, Path(here)))
+            found.append(_found(root, Path(here), Path(here)))
             folders.clear()  # what lies in a session folder belongs to it
             continue
+        session = parts_of(Path(here))
+        if len(session) > 1:
+            found.append(_found(root, Path(here), session[0]))
+            files = [name for name in files if Path(here, name) not in session]
         folders[:] = sorted(name for name in folders if not name.startswith("."))
-        found += [_found(root, Path(here, name)) for name in files if name.endswith(MCAP)]
+        alone = [Path(here, name) for name in files if name.endswith(MCAP)]
+        found += [_found(root, path, path) for path in alone]
     if not found:
         raise DataError(
             f"{folder}: no recording (*{MCAP}) and no session folder ({RIG} with {SAMPLES[0]}) in it or below; "
@@ -64,9 +70,9 @@ def recordings(folder: Path, but: Path) -> tuple[Found, ...]:
 
 
 def content_sha256(path: Path) -> str:
-    """SHA-256 of a recording, of a session folder that of rig and samples. OSError where it cannot be read."""
+    """SHA-256 of a recording, of a folder that of rig and samples, or of all parts. OSError where it cannot be read."""
     digest = hashlib.sha256()
-    for part in _parts(path):
+    for part in parts_of(path):
         digest.update(f"{part.name}\n{part.stat().st_size}\n".encode() if path.is_dir() else b"")
         with part.open("rb") as file:
             while block := file.read(BLOCK_BYTES):
@@ -74,11 +80,26 @@ def content_sha256(path: Path) -> str:
     return digest.hexdigest()
 
 
-def _found(root: Path, path: Path) -> Found:
-    stats = [part.stat() for part in _parts(path) if part.exists()]  # a dangling link is found, and fails when read
+def parts_of(path: Path) -> list[Path]:
+    """The files of a recording: itself, rig and samples of a session folder, or all parts of a session in a folder."""
+    if not path.is_dir():
+        return [path]
+    if (path / RIG).is_file():
+        return [path / name for name in (RIG, *SAMPLES) if (path / name).exists()]
+    from acquisition.recording.parts import parts  # with numpy: a worker, which loads this file, does without
+
+    return parts(path)
+
+
+def _found(root: Path, path: Path, named: Path) -> Found:
+    stats = [part.stat() for part in parts_of(path) if part.exists()]  # a dangling link is found, and fails when read
     size_bytes, modified_ns = sum(s.st_size for s in stats), max((s.st_mtime_ns for s in stats), default=0)
-    return Found(path, path.relative_to(root).as_posix(), size_bytes, modified_ns)
+    return Found(path, named.relative_to(root).as_posix(), size_bytes, modified_ns)
 
 
-def _parts(path: Path) -> list[Path]:
-    return [path / name for name in (RIG, *SAMPLES) if (path / name).exists()] if path.is_dir() else [path]
+def _is_day(text: str) -> bool:
+    try:
+        date.fromisoformat(text)
+    except ValueError:
+        return False
+    return True

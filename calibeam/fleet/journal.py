@@ -55,7 +55,7 @@ class Journal:
             raise RecordingError(f"{self._path}: cannot be written ({error.strerror}); free space there") from error
 
     def forget(self, path: str) -> None:
-        """The recording lies elsewhere now, under whose path it has a row."""
+        """The recording has its row under another path now: it lies elsewhere, or is part of a session."""
         self._rows.pop(path, None)
 
     def close(self) -> None:

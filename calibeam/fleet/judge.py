@@ -9,6 +9,7 @@ import msgspec
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
+from acquisition.recording.rig_schema import Rig
 from calibeam.diagnosis import diagnose_recording
 from calibeam.fleet.found import content_sha256
 from calibeam.fleet.free_space import drawn_against_identified
@@ -18,6 +19,7 @@ from calibeam.modelled import Modelled, modelled
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.errors import DataError
 from calibrate.model_file import Fields, ModelFile
+from calibrate.report.drift.drawing import drawn_values
 
 IMPORTED = "imported_from"  # note of a recording that was made of a session folder: its start is that of the import
 OF_NOISE = ("_believed", "_sigma", "_believed_rad", "_believed_m", "_sigma_rad", "_sigma_m")
@@ -66,16 +68,16 @@ def _fields(task: Task, recording: Recording) -> dict[str, Any]:
         return {**known, "outcome": Outcome.FAILED, "error": str(why)}
     if not found.finished:
         return {**known, "outcome": Outcome.FAILED, "fit_status": found.model.status, "error": found.model.says}
-    return {**known, "outcome": Outcome.IDENTIFIED, **_of_model(found), **causes}
+    return {**known, "outcome": Outcome.IDENTIFIED, **_of_model(found, recording.rig), **causes}
 
 
-def _of_model(found: Modelled) -> dict[str, Any]:
+def _of_model(found: Modelled, rig: Rig) -> dict[str, Any]:
     model = found.model
     before_m, after_m = _held_out(model)
     return {
         "instruments": model.instruments,
         "fit_status": model.status,
-        "zeros": _zeros(model),
+        "zeros": _zeros(model, rig),
         "noise": dict(_noise(model.noise)),
         "held_out_before_m": before_m,
         "held_out_after_m": after_m,
@@ -86,10 +88,11 @@ def _of_model(found: Modelled) -> dict[str, Any]:
     }
 
 
-def _zeros(model: ModelFile) -> tuple[Zero, ...]:
-    named = {p.name: p for p in model.parameters}
-    found = ((joint, named.get(f"joint{joint}.zero")) for joint in range(1, len(model.parameters) + 1))
-    return tuple(Zero(joint, p.value, p.sigma, p.undetermined or "determined") for joint, p in found if p is not None)
+def _zeros(model: ModelFile, rig: Rig) -> tuple[Zero, ...]:
+    named, drawn = {p.name: p for p in model.parameters}, drawn_values(rig)
+    names = ((joint, f"joint{joint}.zero") for joint in range(1, len(rig.arm.joints) + 1))
+    found = ((joint, named[name], drawn[name]) for joint, name in names if name in named)
+    return tuple(Zero(joint, p.value, p.sigma, p.undetermined or "determined", rad) for joint, p, rad in found)
 
 
 def _noise(fields: Fields) -> list[tuple[str, float]]:

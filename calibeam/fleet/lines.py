@@ -64,7 +64,7 @@ def record(ran: Ran, fleet: Fleet, table: str, page: str) -> dict[str, Any]:
             {
                 "robot": d.series.robot,
                 "joint": d.series.joint,
-                "dates": len(d.series.year),
+                "dates": d.series.dates,
                 "slope_rad_year": d.slope_rad_year,
                 "sigma_rad_year": d.sigma_rad_year,
                 "low_rad_year": d.low_rad_year,

@@ -101,7 +101,7 @@ def _drift(fleet: Fleet) -> Html | None:
         (
             d.series.robot,
             f"J{d.series.joint}",
-            str(len(d.series.year)),
+            str(d.series.dates),
             doubted_angle(d.slope_rad_year, d.sigma_rad_year),
             f"{angle(d.low_rad_year, 2)} to {angle(d.high_rad_year, 2)}",
             angle(d.change_rad, 2),

@@ -19,12 +19,13 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Zero(Record, frozen=True):
-    """Zero of one joint: true angle = reading + value. Numbers None where `status` says why."""
+    """Zero of one joint: angle in the arm's table = reading + drawn + value. Value None where `status` says why."""
 
     joint: int  # from 1
     value_rad: float | None
     sigma_rad: float | None
     status: str  # "determined", or why not
+    drawn_rad: float  # theta_offset_rad of the rig file, about which the value is a correction
 
 
 class Cause(Record, frozen=True):
@@ -48,7 +49,7 @@ class Row(Record, frozen=True):
     size_bytes: int
     modified_ns: int
     outcome: Outcome
-    software: str
+    software: str  # "" where --again was stopped before it came to this one
     diagnosed: bool = False
     error: str = ""
     seconds: float = 0.0

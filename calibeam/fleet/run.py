@@ -1,6 +1,6 @@
 """A run over a fleet: what is new or changed is judged by workers, every row is kept as it comes, then all are told."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 
 from calibeam.fleet.engine import rows
-from calibeam.fleet.found import recordings
+from calibeam.fleet.found import parts_of, recordings
 from calibeam.fleet.journal import Journal
 from calibeam.fleet.order import CHILD, Order, Task
 from calibeam.fleet.row import Row
@@ -50,15 +50,18 @@ def run(folder: Path, out: Path, wanted: Wanted, tell: Tell) -> Ran:
     with Journal(out) as journal:
         before = () if wanted.again else journal.rows
         stands = standing(found, before, diagnose=wanted.diagnose)
-        for path in stands.moved:
-            journal.forget(path)
         groups = {str(one.path): one.group for one in found}
+        parts = {str(part) for one in found for part in parts_of(one.path)} - groups.keys()
+        for path in (*stands.moved, *parts):
+            journal.forget(path)
         for row in stands.done:
             journal.add(_named(row, groups, wanted))
         orders = [
             Order(Task.of(one, diagnose=wanted.diagnose), wanted.timeout_s, wanted.command) for one in stands.todo
         ]
         done, stopped = _work(orders, wanted, journal, groups, tell, len(stands.done), len(found))
+        if wanted.again:
+            _still_to_do(journal, groups.keys() - done)
         here = tuple(row for row in journal.rows if row.path in groups)
         return Ran(here, len(journal.rows) - len(here), len(stands.done), len(orders) - len(done), stopped)
 
@@ -86,6 +89,12 @@ def _work(
     except KeyboardInterrupt:
         return done, True
     return done, False
+
+
+def _still_to_do(journal: Journal, paths: Set[str]) -> None:
+    """Rows of earlier runs keep their numbers; of no version of the program, they stand for no later run."""
+    for row in [row for row in journal.rows if row.path in paths]:
+        journal.add(msgspec.structs.replace(row, software=""))
 
 
 def _named(row: Row, groups: dict[str, str], wanted: Wanted) -> Row:

@@ -21,7 +21,7 @@ class Series:
     robot: str
     joint: int
     year: Floats  # (date,) years since 1970
-    zero_rad: Floats  # (date,)
+    zero_rad: Floats  # (date,) drawn and correction together, less than half a turn from one date to the next
     sigma_rad: Floats  # (date,)
 
     @property
@@ -41,8 +41,15 @@ def all_series(rows: Iterable[Row]) -> tuple[Series, ...]:
         seen.add(row.sha256)
         for zero in row.zeros:
             if zero.value_rad is not None and zero.sigma_rad:
-                found.setdefault((row.robot, zero.joint), []).append((year, zero.value_rad, zero.sigma_rad))
-    return tuple(Series(robot, joint, *np.array(sorted(points)).T) for (robot, joint), points in sorted(found.items()))
+                found.setdefault((row.robot, zero.joint), []).append(
+                    (year, zero.drawn_rad + zero.value_rad, zero.sigma_rad)
+                )
+    return tuple(_series(robot, joint, points) for (robot, joint), points in sorted(found.items()))
+
+
+def _series(robot: str, joint: int, points: Iterable[tuple[float, float, float]]) -> Series:
+    year, zero_rad, sigma_rad = np.array(sorted(points)).T
+    return Series(robot, joint, year, np.unwrap(zero_rad), sigma_rad)
 
 
 def year_of(started_utc: str) -> float | None:

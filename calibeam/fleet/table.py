@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 from acquisition.recording.errors import RecordingError
 from calibeam.fleet.row import Row
 
-VERSION = b"1"
+VERSION = b"2"
 KEY = b"calibeam.fleet"
 PLAIN = {str: pa.string(), int: pa.int64(), float: pa.float64(), bool: pa.bool_()}
 NESTED = {
@@ -29,6 +29,7 @@ NESTED = {
 RADIANS = ("joint", "orientation")  # sources of noise that are angles; all others are lengths
 ZERO = (("value_rad", "zero_rad", pa.float64()), ("sigma_rad", "zero_sigma_rad", pa.float64()))
 STATUS = ("status", "zero_status", pa.string())
+DRAWN = ("drawn_rad", "drawn_rad", pa.float64())
 
 
 def write_rows(path: Path, rows: Sequence[Row]) -> None:
@@ -43,7 +44,7 @@ def write_rows(path: Path, rows: Sequence[Row]) -> None:
         columns[_noise_name(source)] = pa.array([row["noise"].get(source) for row in plain], type=pa.float64())
     for joint in joints:
         zeros = [next((z for z in row["zeros"] if z["joint"] == joint), {}) for row in plain]
-        for key, name, kind in (*ZERO, STATUS):
+        for key, name, kind in (*ZERO, STATUS, DRAWN):
             columns[f"joint{joint}_{name}"] = pa.array([z.get(key) for z in zeros], type=kind)
     table = pa.table(columns).replace_schema_metadata({KEY: VERSION})
     partial = path.with_name(path.name + ".partial")
@@ -99,5 +100,5 @@ def _zeros(plain: dict[str, Any]) -> Iterable[dict[str, Any]]:
     joint = 1
     while f"joint{joint}_zero_status" in plain:
         if plain[f"joint{joint}_zero_status"] is not None:
-            yield {"joint": joint, **{key: plain[f"joint{joint}_{name}"] for key, name, _ in (*ZERO, STATUS)}}
+            yield {"joint": joint, **{key: plain[f"joint{joint}_{name}"] for key, name, _ in (*ZERO, STATUS, DRAWN)}}
         joint += 1

@@ -99,7 +99,8 @@ class Guard:
             return PlainTextResponse(NO_TOKEN, 401, HEADERS)
         if self._rules.token is not None and not acts and "token" in parse_qs(query):
             answer = RedirectResponse(scope["path"], 303, HEADERS)  # out of the address bar, and of the history
-            answer.set_cookie(self._rules.cookie, self._rules.token, httponly=True, samesite="strict")
+            # A strict one would not travel on to / where the address was clicked on another site; Origin guards STOP.
+            answer.set_cookie(self._rules.cookie, self._rules.token, httponly=True, samesite="lax")
             return answer
         return None
 

@@ -12,6 +12,7 @@ from calibeam.live.viewers import Viewers
 from drivers.clock import Clock
 
 LOOK_S = 0.1
+AGAIN_S = 1.0  # after a STOP that the controller did not take
 
 
 def overdue(viewers: Viewers, limit_s: float, now_s: float) -> bool:
@@ -21,17 +22,20 @@ def overdue(viewers: Viewers, limit_s: float, now_s: float) -> bool:
 
 @contextmanager
 def watched_pages(stop: Stop, viewers: Viewers, limit_s: float | None, clock: Clock) -> Generator[None]:
-    """Inside, STOP is pressed once when pages are overdue; never without a limit."""
+    """Inside, STOP is pressed when pages are overdue, until it is delivered; never without a limit."""
     if limit_s is None:
         yield
         return
     done = threading.Event()
 
     def watch() -> None:
-        while not done.wait(LOOK_S):
+        wait_s = LOOK_S
+        while not done.wait(wait_s):
+            wait_s = LOOK_S
             if stop.ready and overdue(viewers, limit_s, clock.now_s()):
-                stop.press(f"no page has answered for {limit_s:.3g} s")
-                return
+                if stop.press(f"no page has answered for {limit_s:.3g} s").delivered:
+                    return
+                wait_s = AGAIN_S
 
     watcher = threading.Thread(target=watch, name="watch live pages", daemon=True)
     watcher.start()

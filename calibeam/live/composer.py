@@ -10,7 +10,7 @@ from acquisition.recording.rig_schema import Rig
 from calibeam.live.faces import FaceNow, faces_now, measured_m
 from calibeam.live.health import Watch, asked_rates
 from calibeam.live.latest import Heard, Latest
-from calibeam.live.messages import Job, LineSays, Now, RigSays, State, StopSays, Trouble
+from calibeam.live.messages import Job, LineSays, Now, Picture, RigSays, State, StopSays, Trouble
 from calibeam.live.scene import Scene, Standing
 from calibeam.software import SOFTWARE
 
@@ -52,7 +52,7 @@ class Composer:
         """State; also finds out where the fixture stands, if nobody says so."""
         latest, now_s = self._latest, self._latest.clock.now_s()
         devices = [self._watch.look(name, latest.of(name), now_s) for name in self._watch.asked_hz]
-        self._scene.believe(latest.corrections)
+        self._scene.believe(latest.rig or self._rig, latest.corrections)
         q_rad, _ = self._joints(now_s)
         frames = None if q_rad is None else self._scene.frames(q_rad)
         flange = None if frames is None else frames[-1]
@@ -79,17 +79,18 @@ class Composer:
             )
         )
 
-    def trouble(self, error: Exception) -> str:
+    def trouble(self, of: Picture, error: Exception) -> str:
         """Trouble."""
         says = f"calibeam cannot make this picture ({type(error).__name__}: {error}); what you see is old"
-        return self._text(Trouble(says))
+        return self._text(Trouble(of, says))
 
     def _stop(self, now_s: float) -> StopSays:
         stop = self._latest.stop
         if stop.last is None:
             return StopSays(stop.ready)
         last = stop.last
-        return StopSays(stop.ready, round(now_s - last.host_s, 1), last.delivered, last.who, last.says)
+        age_s = round(now_s - last.host_s, 3)  # a page tells by it whether its own press was sooner
+        return StopSays(stop.ready, age_s, last.delivered, last.who, last.says)
 
     def _fresh(self, device: str, now_s: float) -> Heard | None:
         heard = self._latest.of(device)

@@ -2,10 +2,10 @@
 
 import threading
 from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
-from acquisition.guarded import Guarded
+from acquisition.guarded import Guarded, one_error_tree
 from acquisition.recording.errors import RigFileError
 from acquisition.recording.rig_schema import Devices, Rig
 from calibeam.encoders import encoder_driver
@@ -71,7 +71,8 @@ def _read(watched: Watched, feed: Feed, done: threading.Event) -> None:
     while not done.is_set():
         try:
             device.connect()
-            watched.connected()
+            with one_error_tree(device.name, "connected"):
+                watched.connected()
             if away:
                 feed.said(f"{device.name}: back")
             while not done.is_set():
@@ -82,5 +83,6 @@ def _read(watched: Watched, feed: Feed, done: threading.Event) -> None:
                 feed.said(str(why))
             away = True
         finally:
-            device.close()
+            with suppress(DeviceError):  # how it failed was told, or nobody reads any more; it is tried again
+                device.close()
         done.wait(AGAIN_S)

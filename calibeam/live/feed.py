@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from acquisition.psd_view import PsdView
+from acquisition.recording.rig_schema import Rig
 from drivers.device import Block
 
 PAGE_STOP = "STOP was pressed on the live page; see why, then go on with a new session"
@@ -36,6 +37,10 @@ class Feed(Protocol):
         """How the detectors' currents become spots; once the box is identified."""
         ...
 
+    def measures(self, rig: Rig) -> None:
+        """The rig with the places that a session has added; before any of them is named in `stands`."""
+        ...
+
     def stands(self, placement: int, first_psd: int) -> None:
         """Where the fixture stands, and which face the beam strikes first."""
         ...
@@ -63,6 +68,8 @@ class _Silent:
     def lost(self, device: str, why: str) -> None: ...
 
     def sees(self, view: PsdView) -> None: ...
+
+    def measures(self, rig: Rig) -> None: ...
 
     def stands(self, placement: int, first_psd: int) -> None: ...
 

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from acquisition.psd_view import PsdView
+from acquisition.recording.rig_schema import Rig
 from calibeam.live.feed import Progress
 from calibeam.live.stopping import Stop
 from drivers.clock import Clock
@@ -39,6 +40,7 @@ class Latest:
         self.clock = clock
         self.stop = Stop(clock)
         self.view: PsdView | None = None
+        self.rig: Rig | None = None  # None: as the page was begun with
         self.standing: tuple[int, int] | None = None  # placement, first_psd
         self.corrections: Mapping[str, float] = {}
         self.where: Progress | None = None
@@ -60,6 +62,9 @@ class Latest:
 
     def sees(self, view: PsdView) -> None:
         self.view = view
+
+    def measures(self, rig: Rig) -> None:
+        self.rig = rig
 
     def stands(self, placement: int, first_psd: int) -> None:
         self.standing = (placement, first_psd)

@@ -13,6 +13,7 @@ from calibeam.live.health import Health
 from calibeam.live.scene import Beam, Points, Standing
 
 Job = Literal["session", "watch"]
+Picture = Literal["now", "state"]  # what is made anew at every beat, or at some
 
 
 class RigSays(Struct, frozen=True, tag_field="kind", tag="rig"):
@@ -57,8 +58,9 @@ class State(Struct, frozen=True, tag_field="kind", tag="state"):
 
 
 class Trouble(Struct, frozen=True, tag_field="kind", tag="trouble"):
-    """Why the page cannot be shown what it should."""
+    """Why the page cannot be shown what it should; over with the next message of the kind `of`."""
 
+    of: Picture
     says: str
 
 

@@ -1,9 +1,11 @@
 """The beat of the page: the newest 30 times a second, how things stand 4 times, and nothing while nobody looks."""
 
 import asyncio
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from calibeam.live.composer import Composer
+from calibeam.live.messages import Picture
 from calibeam.live.viewers import Viewers
 
 HZ = 30.0  # more was found harmful by others, 10 to 20 too slow (docs/live.md)
@@ -34,11 +36,16 @@ class Pulse:
             await asyncio.sleep(due_s - loop.time())
 
     def _beat(self) -> None:
-        """A message that cannot be made is told on the page: it must neither end the beat nor pass for no news."""
-        try:
-            if self._beats % STATE_EVERY == 0:
-                self.viewers.post("state", self.composer.state())
-            self.viewers.post("now", self.composer.now())
-        except Exception as error:  # whatever it was
-            self.viewers.post("trouble", self.composer.trouble(error))
+        if self._beats % STATE_EVERY == 0:
+            self._tell("state", self.composer.state)
+        self._tell("now", self.composer.now)
         self._beats += 1
+
+    def _tell(self, kind: Picture, made: Callable[[], str]) -> None:
+        """What cannot be made is told on the page: it must neither end the beat, nor pass for no news, nor be hidden
+        by what can.
+        """
+        try:
+            self.viewers.post(kind, made())
+        except Exception as error:  # whatever it was
+            self.viewers.post(f"trouble of {kind}", self.composer.trouble(kind, error))

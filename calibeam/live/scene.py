@@ -46,10 +46,10 @@ class Scene:
         self._corrections: Mapping[str, float] = {}
         self._rebuild()
 
-    def believe(self, corrections: Mapping[str, float]) -> None:
-        """Cheap when they are those of the last time."""
-        if corrections is not self._corrections:
-            self._corrections = corrections
+    def believe(self, rig: Rig, corrections: Mapping[str, float]) -> None:
+        """The rig may have places more than before. Cheap when both are those of the last time."""
+        if rig is not self._rig or corrections is not self._corrections:
+            self._rig, self._corrections = rig, corrections
             self._rebuild()
 
     def frames(self, q_rad: Floats) -> Floats | None:

@@ -82,7 +82,11 @@ def part_of(job: Job, earlier: Earlier, half_size_m: float) -> Part:
 
 
 def more_at(part: Part, placement: int, half_size_m: float, options: PlanOptions, number: int) -> tuple[Block, ...]:
-    """A further round at one place, with poses of its own: the seed is another, and so are their indices."""
+    """A further round at one place, with poses of its own: the seed is another, and so are their indices.
+
+    `number`: from 1 in this part; the rounds of earlier parts at this place come before.
+    """
+    number += max((key.index // MORE for key in part.earlier.taken if key.placement == placement), default=0)
     seed = options.seed + number
     again = replace(options, seed=seed, repeats=0)
     return tuple(

@@ -15,16 +15,26 @@ import threading
 import tty
 from collections.abc import Generator
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, field
 from types import FrameType
 from typing import Self
 
 from acquisition.errors import StoppedError
 from acquisition.reins import Reins
 from acquisition.session_states import BROKEN, OVER
+from calibeam.session.key_stream import KeyStream
 
 LISTEN_S = 0.2  # between two times at which a stop that was not heard is said again
 INTERRUPT, SUSPEND, GO_ON, END = b"i", b"z", b"c", b"e"
 ENTER = "\n"
+
+
+@dataclass(frozen=True)
+class _Question:
+    """Answers go to the question that they were given to: what is pressed too often answers no later one."""
+
+    allowed: str
+    answers: queue.SimpleQueue[str] = field(default_factory=queue.SimpleQueue[str])
 
 
 class Keys:
@@ -33,8 +43,8 @@ class Keys:
     def __init__(self, reins: Reins, terminal: int | None) -> None:
         """`terminal`: file descriptor that keys are read from."""
         self._reins, self._terminal = reins, terminal
-        self._answers: queue.SimpleQueue[str] = queue.SimpleQueue()
-        self._asking = ""
+        self._question: _Question | None = None
+        self._typed = KeyStream()
         self._opened = ExitStack()
         self._woken = self._wake = -1  # a pipe, while it is listened to
 
@@ -45,14 +55,14 @@ class Keys:
 
     def pressed(self, key: str) -> None:
         """One key."""
-        key = ENTER if key == "\r" else key.lower()
+        key, question = ENTER if key == "\r" else key.lower(), self._question
         if key == "a":
             self._reins.abort()
         elif key == "h":
             self._reins.halt()
-        elif self._asking:
-            if key in self._asking:
-                self._answers.put(key)
+        elif question is not None:
+            if key in question.allowed:
+                question.answers.put(key)
         elif key in " p":
             self._reins.pause()
         elif key == "r":
@@ -66,16 +76,17 @@ class Keys:
             os.write(self._wake, what)
 
     def wait(self, allowed: str) -> str:
-        """One of these keys; Ctrl-C and a mean abort. StoppedError then."""
-        self._asking = allowed
+        """One of these keys, pressed from now on. StoppedError when given up (a, Ctrl-C); what a device failed with."""
+        self._question = question = _Question(allowed)
         try:
             while True:
+                self._reins.check_devices()
                 if self._reins.state in BROKEN or self._reins.state in OVER:
                     raise StoppedError("the session was given up while a person was asked")
                 with suppress(queue.Empty):
-                    return self._answers.get(timeout=LISTEN_S)
+                    return question.answers.get(timeout=LISTEN_S)
         finally:
-            self._asking = ""
+            self._question = None
 
     def __enter__(self) -> Self:
         """From now on keys and signals go to the reins; at the end terminal and signals are as they were."""
@@ -112,14 +123,14 @@ class Keys:
                 typed = _read(self._terminal)
                 if not typed:
                     sources.remove(self._terminal)
-                for key in typed:
+                for key in self._typed.keys(typed):
                     self.pressed(key)
             self._reins.insist()
 
     def _told(self, code: bytes) -> None:
         if code == GO_ON:
             self._reins.resume()
-        elif self._asking:
+        elif self._question is not None:
             self._reins.abort()
         elif code == SUSPEND:
             self._reins.pause()

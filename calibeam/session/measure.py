@@ -55,7 +55,14 @@ class Measuring:
         self._teller, self._person = told
         self._samples: list[Sample] = []
         self._forecaster = Forecaster(self._forecast, self._no_forecast)
-        self._reins = Reins(bench.stop, clock, lambda: bench.supervisor.failure, self._teller.state)
+        self._reins = Reins(
+            bench.stop,
+            clock,
+            lambda: bench.supervisor.failure,
+            self._teller.state,
+            hold_arm=bench.hold,
+            undelivered=self._teller.undelivered,
+        )
         self._session = self._session_of(sight)
 
     def take(self, more: Sequence[Block] = ()) -> Summary:
@@ -126,6 +133,7 @@ def measuring(
         camera_sight(part.rig, clock) as sight,
         connected(part.rig, job.addresses, writer, clock, mover, feed) as bench,
     ):
+        feed.measures(part.rig)
         for place in part.earlier.added:
             instead_of = next((k for k, v in part.earlier.stands_in.items() if v == place.id), None)
             writer.event(Event(clock.now_s(), STANDS_IN, {"id": place.id, "instead_of": instead_of}))

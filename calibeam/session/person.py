@@ -86,10 +86,13 @@ class Person:
         self._teller.said(f"{text} {answer}", loud=False)
         return answer
 
-    def numbers(self, text: str, count: int) -> tuple[float, ...]:
-        """So many numbers on one line; asked again until they are."""
+    def numbers(self, text: str, count: int) -> tuple[float, ...] | None:
+        """So many numbers on one line; asked again until they are. None: Ctrl-D, or the terminal went."""
         while True:
-            words = Prompt.ask(text, console=self._console).replace(",", " ").split()
+            try:
+                words = Prompt.ask(text, console=self._console).replace(",", " ").split()
+            except EOFError:
+                return None
             try:
                 values = tuple(float(word) for word in words)
             except ValueError:

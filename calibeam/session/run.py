@@ -145,9 +145,7 @@ class OnSite:
                         break
                     rounds += 1
                     self.teller.step("measure")
-                    summary = session.take(
-                        more_at(part, session.placement, self._half_size_m, self._job.options, rounds)
-                    )
+                    summary = session.take(more_at(part, session.placement, self._half_size_m, part.options, rounds))
         except KeyboardInterrupt as why:  # at a question, while the arm stands
             raise PartialResult(f"Ctrl-C; what was taken is kept in {path}; {GO_ON}") from why
         except PartialResult as early:
@@ -159,10 +157,15 @@ class OnSite:
     def _look(self, session: Measuring, summary: Summary, part: Part) -> None:
         """How good it is."""
         self.teller.step("look")
-        forecast, quality = session.forecast_now(), self.teller.shown.quality
-        self.teller.forecast(forecast)
+        quality = self.teller.shown.quality
         settled = "" if quality is None or not quality.unsettled else f", {quality.unsettled} of them did not settle"
         self.teller.said(f"{len(part.earlier.taken) + len(summary.samples)} poses{settled}; {summary.skipped} left out")
+        try:
+            forecast = session.forecast_now()
+        except Exception as why:  # as in forecaster.py: what was measured is worth more than a forecast of it
+            self.teller.said(f"no forecast: {type(why).__name__}: {why}")
+            return
+        self.teller.forecast(forecast)
         self.teller.said(f"predicted error of the beam in free space: {forecast.says}")
 
     def _decide(self, part: Part) -> str:
@@ -171,8 +174,11 @@ class OnSite:
             choices |= {MORE: "more poses, the fixture stays", PLACE: "a further place of the fixture"}
         return self._person.choose("what next?", choices, FINISH)
 
-    def _new_place(self, part: Part) -> Placement:
+    def _new_place(self, part: Part) -> Placement | None:
+        """None: the terminal went instead of an answer, and it is enough."""
         numbers = self._person.numbers("PSD 1 in the base: x y z in m, and the turn about z in degrees", 4)
+        if numbers is None:
+            return None
         place = new_place(part.rig, numbers)
         self.teller.said(f"place {place.id}; to keep it, add to the rig file:{placement_text(place)}")
         return place

@@ -8,6 +8,8 @@ from acquisition.session_states import State
 from calibeam.session.forecast import Forecast
 from calibeam.session.quality import Quality
 
+UNDELIVERED = "stop not delivered, press the red emergency stop"
+
 
 @dataclass(frozen=True)
 class Shown:
@@ -20,10 +22,13 @@ class Shown:
     quality: Quality | None = None
     forecast: Forecast | None = None
     asked: str = ""  # what a person is waited for
+    undelivered: str = ""  # why the arm could not be told to stop
 
     @property
     def head(self) -> str:
         """What is going on, in a word or two."""
+        if self.undelivered:
+            return UNDELIVERED
         if self.asked:
             return "your turn"
         if self.state is State.RUNNING and self.progress is not None:

@@ -15,8 +15,9 @@ from acquisition.session_states import State
 from calibeam.session.forecast import Forecast
 from calibeam.session.pace import Pace
 from calibeam.session.quality import Keeper
-from calibeam.session.shown import Listener, Shown
+from calibeam.session.shown import UNDELIVERED, Listener, Shown
 from drivers.clock import Clock
+from drivers.errors import DeviceError
 
 STEPS = ("devices", "plan", "arm", "measure", "look", "result")
 WORKING = (State.RUNNING, State.PAUSING, State.ENDING)
@@ -62,6 +63,13 @@ class Teller:
             self._pace.work(state in WORKING)
             self._now(state=state)
             self.said(state.value)
+
+    def undelivered(self, trouble: DeviceError | None) -> None:
+        """From the reins: the arm could not be told to stop; None: now it was, or it need not be."""
+        with self._turn:
+            self._now(undelivered="" if trouble is None else str(trouble))
+            told = "no stop is outstanding any more" if trouble is None else f"{UNDELIVERED.upper()}: {trouble}"
+            self.said(told)
 
     def asked(self, text: str) -> None:
         """A person is waited for; "": no more."""

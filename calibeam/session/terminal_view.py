@@ -35,8 +35,11 @@ STYLES = {
 KEYS = {
     State.RUNNING: "SPACE pause    s finish here    a abort    h halt",
     State.PAUSING: "SPACE stop the arm now    r go on    s finish here    a abort    h halt",
-    State.PAUSED: "r go on    s finish here    a abort        leave the fixture where it is",
+    State.BREAKING: "a abort    h halt",
+    State.PAUSED: "r go on    s finish here    a abort    h halt\n   leave the fixture where it is",
     State.ENDING: "SPACE SPACE stop the arm now    a abort    h halt",
+    State.ABORTING: "h halt",
+    State.HALTED: "h say the stop again",
 }
 
 
@@ -77,6 +80,8 @@ class TerminalView:
 def drawn(shown: Shown) -> Group:
     """The whole view."""
     parts: list[RenderableType] = [Text(), _head(shown)]
+    if shown.undelivered:
+        parts.append(Padding(Text(shown.undelivered, style="bold red"), (0, 3)))
     if shown.asked:
         return Group(*parts, Padding(Text(shown.asked, style="bold"), (1, 3)))
     if shown.progress is not None:
@@ -86,7 +91,7 @@ def drawn(shown: Shown) -> Group:
 
 
 def _head(shown: Shown) -> Text:
-    style = ASKS if shown.asked else STYLES.get(shown.state, MOVES)
+    style = STOPS if shown.undelivered else ASKS if shown.asked else STYLES.get(shown.state, MOVES)
     text = Text(f"   {shown.head.upper()}   ", style=style)
     if shown.progress is not None:
         text.append(

@@ -6,7 +6,7 @@ PolyScope X has no dashboard server.
 """
 
 import socket
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -132,7 +132,7 @@ class _Lines:
 
 
 @contextmanager
-def _hanging_up_said() -> Iterator[None]:
+def _hanging_up_said() -> Generator[None]:
     """A peer that hangs up is seen as an end, a reset or a broken pipe, by a hair: one sentence for all."""
     try:
         yield

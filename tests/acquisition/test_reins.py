@@ -8,7 +8,7 @@ from acquisition.errors import StoppedError
 from acquisition.reined_bench import ReinedBench
 from acquisition.reins import BrokenOffError, EndedEarlyError, Reins
 from acquisition.session_states import PAUSE_AGAIN_S, Event, State
-from drivers.errors import DeviceLost, DeviceRefused
+from drivers.errors import DeviceError, DeviceLost, DeviceRefused
 
 
 class Clock:
@@ -201,6 +201,42 @@ def test_a_stop_that_cannot_be_delivered_is_kept_and_the_session_ends_all_the_sa
     assert isinstance(reins.trouble, DeviceLost)
     with pytest.raises(StoppedError):
         reins.checkpoint()
+
+
+def test_a_stop_that_cannot_be_delivered_is_told_once_and_so_is_the_one_that_is() -> None:
+    ways, told = [DeviceLost("robot: gone"), DeviceLost("robot: gone")], list[DeviceError | None]()
+
+    def stop() -> None:
+        if ways:
+            raise ways.pop()
+
+    reins = running(stop, undelivered=told.append)
+    reins.tell(Event.BREAK)
+    for _ in range(3):
+        reins.insist()
+    assert [str(trouble) for trouble in told] == ["robot: gone", "None"]
+
+
+@pytest.mark.parametrize(
+    ("say", "how"), [(Reins.abort, "hold"), (Reins.halt, "hold"), (lambda reins: reins.tell(Event.BREAK), "stop")]
+)
+def test_only_a_pause_lets_the_arm_move_again(say, how) -> None:
+    done: list[str] = []
+    reins = running(lambda: done.append("stop"), hold_arm=lambda: done.append("hold"))
+    say(reins)
+    reins.insist()
+    assert done == [how, how]
+
+
+def test_a_stop_said_while_the_arm_is_being_stopped_does_not_take_that_back() -> None:
+    stops: list[int] = []
+    reins = running(lambda: stops.append(1))
+    reins.tell(Event.BREAK)
+    reins.stop()
+    reins.insist()
+    assert len(stops) == 2
+    with pytest.raises(BrokenOffError):
+        reins.check()
 
 
 def test_an_abort_in_the_last_moment_is_no_success() -> None:

@@ -6,11 +6,13 @@ const ENDED = 1012; // said by a server that ends (RFC 6455 registry: service re
 const AGAIN_MS = [250, 500, 1000, 2000];
 
 export class Link {
-  // heard(message) for every one; told(state, words) when it changes: "live", "late", "gone".
+  // heard(message) for every one; told(state, words) a few times a second: "live", "late", "gone". Live is what is young
+  // in both kinds that go on: one of them may fail to be made while the other comes.
   constructor(heard, told) {
     this.heard = heard;
     this.told = told;
-    this.newest_ms = -Infinity;
+    this.heard_ms = { any: -Infinity, now: -Infinity, state: -Infinity };
+    this.trouble = { now: "", state: "" };
     this.tries = 0;
     this.refused = "";
     this.open();
@@ -26,18 +28,28 @@ export class Link {
     socket.onmessage = (event) => {
       this.untaken += 1;
       if (this.untaken === TAKE) { socket.send(String(TAKE)); this.untaken = 0; }
-      this.newest_ms = performance.now();
       this.tries = 0;
       this.refused = "";
       this.ended = false;
-      this.heard(JSON.parse(event.data));
+      this.take(JSON.parse(event.data));
     };
     socket.onclose = (event) => { this.ended ||= event.code === ENDED; this.closed(); };
   }
 
+  take(message) {
+    this.heard_ms.any = performance.now();
+    if (message.kind === "trouble") this.trouble[message.of] = message.says;
+    else if (message.kind in this.trouble) {
+      this.heard_ms[message.kind] = this.heard_ms.any;
+      this.trouble[message.kind] = "";
+    }
+    this.heard(message);
+  }
+
   closed() {
     this.socket = null;
-    this.newest_ms = Math.min(this.newest_ms, performance.now() - LATE_MS);
+    this.trouble = { now: "", state: "" };
+    for (const kind in this.heard_ms) this.heard_ms[kind] = Math.min(this.heard_ms[kind], performance.now() - LATE_MS);
     this.look();
     this.why();
     this.again = setTimeout(() => this.open(), AGAIN_MS[Math.min(this.tries, AGAIN_MS.length - 1)]);
@@ -54,10 +66,12 @@ export class Link {
   }
 
   look() {
-    const age_ms = performance.now() - this.newest_ms;
-    const seconds = Number.isFinite(age_ms) ? ` for ${Math.round(age_ms / 1000)} s` : "";
-    if (this.socket && age_ms < LATE_MS) this.told("live", "");
-    else if (this.socket?.readyState === WebSocket.OPEN && Number.isFinite(age_ms)) this.told("late", `Nothing heard${seconds}: the connection is slow or calibeam is held up. What you see is old.`);
+    const at_ms = performance.now(), silent_ms = at_ms - this.heard_ms.any, old_ms = at_ms - Math.min(this.heard_ms.now, this.heard_ms.state);
+    const seconds = Number.isFinite(silent_ms) ? ` for ${Math.round(silent_ms / 1000)} s` : "";
+    const arrives = this.socket && silent_ms < LATE_MS, trouble = this.trouble.now || this.trouble.state;
+    if (arrives && old_ms < LATE_MS) this.told("live", trouble);
+    else if (arrives) this.told("late", trouble || "Only a part arrives. What you see is old.");
+    else if (this.socket?.readyState === WebSocket.OPEN && Number.isFinite(silent_ms)) this.told("late", `Nothing heard${seconds}: the connection is slow or calibeam is held up. What you see is old.`);
     else this.told("gone", this.refused || `${this.ended ? "calibeam has ended its page" : "Not connected to calibeam"}; nothing heard${seconds}, trying again. What you see is old. STOP may not arrive.`);
   }
 }

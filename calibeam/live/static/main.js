@@ -18,7 +18,7 @@ const joints = new JointsView(get("joints"));
 const stop = new StopButton(get("stop"), get("stop-says"));
 
 new Link(heard, (state, words) => {
-  sayLink(state, words || newest.trouble?.says || "");
+  sayLink(state, words);
   if (state !== link) {
     link = state;
     if (newest.state) sayDevices(newest.state.devices, link === "live");
@@ -34,7 +34,6 @@ function heard(message) {
   if (message.kind === "rig") { sayRig(message); robot.fit(message.reach_m); }
   if (message.kind === "state") told(message);
   if (message.kind === "now") {
-    newest.trouble = null;
     faces.forEach((face, k) => face.hear(message.faces?.[k] ?? null, at_ms));
     joints.hear(message.q_rad, at_ms, newest.rig?.lower_rad.length ?? 6);
     draw();

@@ -1,17 +1,27 @@
 """`batch` on recordings of an emulated fleet: one table, one page, and what failed in words."""
 
 import json
+import math
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from acquisition.recording.rig import load_rig
 from benchmarks.fleet_sessions import Robot, write_fleet
 from calibeam.cli import run
+from calibeam.commands.batch import _end
 from calibeam.fleet.found import recordings
-from calibeam.fleet.judge import judged
+from calibeam.fleet.judge import _zeros, judged
 from calibeam.fleet.order import Task
-from calibeam.fleet.row import Outcome
+from calibeam.fleet.row import Outcome, Zero
+from calibeam.fleet.run import Ran
+from calibeam.fleet.summary import Fleet
 from calibeam.fleet.table import read_rows
+from calibeam.outcome import PartialResult
+from calibrate.model_file import ModelParameter
 
+RIG = Path(__file__).parents[3] / "rigs" / "irb120-modbus.toml"
 OFF_RAD_YEAR = 0.02  # of joint 2: far beyond any doubt of two dates
 
 
@@ -66,6 +76,20 @@ def test_what_is_no_recording_fails_in_words(tmp_path):
     errors = {one.name: judged(Task.of(one, diagnose=False)).error for one in found}
     assert "not a recording" in errors["text.mcap"]
     assert "No such file" in errors["away.mcap"]
+
+
+def test_a_zero_comes_with_what_the_rig_file_draws():
+    first = ModelParameter("joint1.zero", "rad", None, None, "why")
+    second = ModelParameter("joint2.zero", "rad", 1e-3, 1e-5, None)
+    told = _zeros(SimpleNamespace(parameters=(first, second)), load_rig(RIG))
+    assert told == (Zero(1, None, None, "why", 0.0), Zero(2, 1e-3, 1e-5, "determined", -math.pi / 2.0))
+
+
+def test_a_stopped_run_says_how_to_go_on():
+    ran = Ran((), 0, 0, 2, stopped=True)
+    for again, says in ((True, "leave --again out to go on"), (False, "the same command goes on")):
+        with pytest.raises(PartialResult, match=says):
+            _end(ran, Fleet(()), Path("out"), again=again)
 
 
 def test_nothing_found_is_one_sentence(tmp_path, capsys):

@@ -15,10 +15,10 @@ def series(year, zero_rad, sigma_rad=SIGMA, robot="r", joint=2):
     return Series(robot, joint, year, np.asarray(zero_rad, dtype=float), np.full(len(year), sigma_rad))
 
 
-def row(robot, date, zero_rad, sigma_rad=SIGMA, **fields):
+def row(robot, date, zero_rad, sigma_rad=SIGMA, drawn_rad=0.0, **fields):
     known = {"trust": "good", "started_utc": date, "sha256": f"{robot}{date}"} | fields
     sha256 = known.pop("sha256")
-    zeros = (Zero(1, None, None, "not seen"), Zero(2, zero_rad, sigma_rad, "determined"))
+    zeros = (Zero(1, None, None, "not seen", 0.0), Zero(2, zero_rad, sigma_rad, "determined", drawn_rad))
     path = f"/{robot}/{date}"
     return Row(path, path[1:], sha256, 1, 1, Outcome.IDENTIFIED, "", robot=robot, zeros=zeros, **known)
 
@@ -85,6 +85,13 @@ def test_two_dates_copies_and_numbers_of_no_trust_are_no_series():
     undated = row("r", "", 1.0)
     assert drifts([*rows, copy, doubtful, undated]).lines == ()
     assert [len(s.year) for s in all_series([*rows, copy, doubtful, undated])] == [2]
+
+
+def test_a_zero_that_was_written_into_the_rig_file_is_no_step():
+    rows = [row("r", "2024-01-01", 3e-3), row("r", "2025-01-01", 3e-3), row("r", "2026-01-01", 0.0, drawn_rad=3e-3)]
+    turned = row("r", "2027-01-01", 3e-3, drawn_rad=-2.0 * np.pi)
+    (found,) = all_series([*rows, turned])
+    np.testing.assert_allclose(found.zero_rad, 3e-3, atol=1e-12)
 
 
 def test_holm_stops_at_the_first_that_could_be_chance():

@@ -1,6 +1,7 @@
 """Worker processes that are killed in the middle of a run, on both engines: every recording gets its row."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
@@ -75,6 +76,12 @@ def test_workers_that_fall_silent_are_not_waited_for(orders, monkeypatch):
     ]  # it never says that it is ready
     found = list(rows(silent, Workers(Engine.LOKY, 2)))
     assert [(row.outcome, row.error) for row in found] == [(Outcome.LOST, LOST)] * 2
+
+
+def test_dask_is_not_waited_for_without_end(orders):
+    unlimited = [replace(order, timeout_s=None) for order in orders("a.mcap")]
+    with pytest.raises(DataError, match="--timeout 0 is not for --engine dask"):
+        next(rows(unlimited, Workers(Engine.DASK)))
 
 
 def test_a_scheduler_belongs_to_dask_and_has_to_answer(orders):

@@ -34,6 +34,26 @@ def test_the_last_date_of_the_name_and_its_first_folder(folder):
     assert (other.date, other.group) == ("2025-03-04", "")
 
 
+@pytest.mark.parametrize(
+    ("name", "date"),
+    [("SN-4711-12-30.mcap", ""), ("2025-13-05.mcap", ""), ("2025-02-30 of 2025-03-04.mcap", "2025-03-04")],
+)
+def test_what_only_looks_like_a_date_is_none(folder, name, date):
+    root = folder(name)
+    assert [one.date for one in recordings(root, root / "nowhere")] == [date]
+
+
+def test_the_parts_of_a_session_are_one_recording(folder):
+    root = folder("r7/recording.mcap", "r7/other.mcap", "r7/below/x.mcap", "r8/recording.mcap")
+    before = content_sha256(root / "r7")
+    folder("r7/recording-0002.mcap")
+    assert names(root) == ["r7/below/x.mcap", "r7/other.mcap", "r7/recording.mcap", "r8/recording.mcap"]
+    whole = recordings(root, root / "nowhere")[2]
+    assert (whole.path, whole.group) == (root / "r7", "r7")
+    assert whole.size_bytes == len("r7/recording.mcap") + len("r7/recording-0002.mcap")
+    assert content_sha256(whole.path) != before
+
+
 def test_content_is_told_by_content_alone(folder):
     root = folder("a.mcap", "b.mcap", "c/rig.toml", "c/samples.csv")
     (root / "b.mcap").write_text("a.mcap")

@@ -2,11 +2,14 @@
 
 import re
 
+import msgspec
 import numpy as np
 import pytest
 
+from calibeam.fleet.lines import record
 from calibeam.fleet.page import LISTED, fleet_html
 from calibeam.fleet.row import Cause, Outcome, Row, Zero
+from calibeam.fleet.run import Ran
 from calibeam.fleet.shared import causes
 from calibeam.fleet.summary import Fleet, shared_words
 
@@ -16,7 +19,7 @@ OTHER = Cause("link2.tilt", "q2", "harmonic", "axis-wobble", 0.99, 0.8, "…")
 
 
 def session(robot, day, zero_rad, found=(), verdict="mismatch"):
-    zeros = (Zero(1, None, None, "not seen"), Zero(2, zero_rad, 2e-5, "determined"))
+    zeros = (Zero(1, None, None, "not seen", 0.0), Zero(2, zero_rad, 2e-5, "determined", 0.0))
     name = f"{robot}/{day}.mcap"
     known = {"trust": "good", "started_utc": day, "samples": 60, "held_out_after_m": 1e-5, "verdict": verdict}
     return Row(
@@ -43,6 +46,17 @@ def test_the_page_names_the_robot_that_drifts_the_cause_that_is_shared_and_the_f
     assert "encoder-eccentricity at joint3.angle: 2 of 3 robots" in page
     assert "torn &lt;before&gt; the rig" in page
     assert "Holm" in page
+
+
+def test_two_recordings_of_one_day_are_one_date(fleet):
+    told = fleet.drifting[0].series
+    again = session(told.robot, DAYS[0], 0.0)
+    rows = (*fleet.rows, msgspec.structs.replace(again, path="/again", name="again", sha256="again"))
+    twice = Fleet(rows)
+    assert record(Ran(rows, 0, 0, 0, stopped=False), twice, "", "")["drifts"][0]["dates"] == len(DAYS)
+    cells = re.search(r"<tr>(?:(?!</tr>).)*>drifts<.*?</tr>", fleet_html(twice, "hall 3"), re.DOTALL)
+    assert cells is not None
+    assert f">{len(DAYS)}<" in cells[0]
 
 
 def test_the_page_needs_nothing_else(fleet):

@@ -91,6 +91,28 @@ def test_ctrl_c_keeps_what_is_done_and_the_next_run_goes_on(ran, folder):
     assert (done.stood, done.left, len(done.rows)) == (1, 0, 3)
 
 
+def test_all_anew_that_was_stopped_goes_on_and_loses_nothing(ran, folder):
+    root = folder("a.mcap", "b.mcap", "c.mcap")
+    ran(root)
+
+    def interrupt(done, total, name):
+        if done == 1:
+            raise KeyboardInterrupt
+
+    stopped = ran(root, interrupt, again=True)
+    assert (stopped.stopped, stopped.left, len(stopped.rows)) == (True, 2, 3)
+    done = ran(root)
+    assert (done.stood, len(done.rows)) == (1, 3)
+
+
+def test_a_part_has_no_row_of_its_own_once_its_session_was_gone_on_with(ran, folder):
+    root = folder("r7/recording.mcap")
+    ran(root)
+    folder("r7/recording-0002.mcap")
+    done = ran(root)
+    assert [row.path for row in read_rows(ran.table)] == [row.path for row in done.rows] == [str(root / "r7")]
+
+
 def test_a_robot_is_named_by_its_serial_number_else_by_its_rig(folder, reader):
     row = module.Row("/f/a/b.mcap", "a/b.mcap", "", 0, 0, Outcome.IDENTIFIED, "", rig="ur5", robot_serial="77")
     named = module._named(row, {row.path: "a"}, Wanted())

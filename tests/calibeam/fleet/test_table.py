@@ -24,7 +24,7 @@ FULL = Row(
     started_utc="2026-01-02T03:04:05+00:00",
     samples=60,
     instruments=("position", "wire"),
-    zeros=(Zero(1, None, None, "only in combination"), Zero(2, 0.1 + 0.2, 1e-6, "determined")),
+    zeros=(Zero(1, None, None, "only in combination", 0.0), Zero(2, 0.1 + 0.2, 1e-6, "determined", -1.5)),
     noise={"position": 2e-5, "joint": 3e-6},
     held_out_after_m=1e-5,
     trust="good",
@@ -43,6 +43,7 @@ def test_each_number_is_a_column_with_its_unit(tmp_path):
     write_rows(tmp_path / "t.parquet", [FULL, BARE])
     plain = pq.read_table(tmp_path / "t.parquet").to_pylist()
     assert plain[0]["joint2_zero_rad"] == 0.1 + 0.2
+    assert plain[0]["joint2_drawn_rad"] == -1.5
     assert plain[0]["joint1_zero_status"] == "only in combination"
     assert (plain[0]["noise_position_m"], plain[0]["noise_joint_rad"]) == (2e-5, 3e-6)
     assert plain[1]["joint2_zero_rad"] is None

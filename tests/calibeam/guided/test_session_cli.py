@@ -47,6 +47,24 @@ def test_a_plan_is_not_for_verifying_and_a_robot_is_not_verified(tmp_path: Path,
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("file", "options"),
+    [
+        (RIG_FILE.name, ["--live-port", "0"]),
+        (RIG_FILE.name, ["--continue", "--yes", "--accuracy-um", "5"]),
+        ("ur5e-dual-psd.toml", ["--postures", "10", "--lengths", "2"]),
+    ],
+)
+def test_what_would_be_ignored_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture, file: str, options: list[str]
+) -> None:
+    assert run(["session", str(RIG_FILE.with_name(file)), "--out", str(tmp_path / "out"), *options]) == 1
+    said = " ".join(capsys.readouterr().err.split())
+    named = ["--live"] if "--live-port" in options else [word for word in options if word.startswith("--")]
+    assert all(word in said for word in [*named, "leave out"])
+    assert not (tmp_path / "out").exists()
+
+
 def test_an_adapter_that_is_not_there_is_named_and_no_recording_is_left(
     tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:

@@ -1,5 +1,6 @@
 """A clock that jumps, blocks with chosen contents, and a rig that lives in this process."""
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -8,6 +9,7 @@ import pytest
 
 from benchmarks.live_feed import LivingRig
 from calibeam.live.latest import Latest
+from calibeam.live.page import PageAddress
 from drivers.device import Block
 
 
@@ -25,6 +27,13 @@ class JumpingClock:
 @pytest.fixture
 def clock() -> JumpingClock:
     return JumpingClock()
+
+
+@pytest.fixture
+def own_address() -> PageAddress:
+    """Any port of a loopback address that no other process uses: one that was freed can be had again."""
+    high, low = divmod(os.getpid() % 0x10000, 0x100)
+    return PageAddress(f"127.77.{high}.{low}", 0)
 
 
 @pytest.fixture

@@ -125,7 +125,7 @@ def test_the_token_goes_from_the_address_into_a_cookie(stranger, pressed) -> Non
     assert (answer.status, answer.getheader("location")) == (303, "/")
     kept = answer.getheader("set-cookie") or ""
     assert "httponly" in kept.lower()
-    assert "samesite=strict" in kept.lower()
+    assert "samesite=lax" in kept.lower()  # else a link in a mail leads to 401: its redirect comes without the cookie
     crumb = kept.partition(";")[0]
     assert stranger.status("GET", "/", cookie=crumb) == 200
     assert '"kind":"rig"' in stranger.listen(origin=stranger.origin, cookie=crumb)

@@ -3,11 +3,13 @@
 import shutil
 from collections.abc import Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 
 import pytest
 from playwright.sync_api import Browser, Page, ViewportSize, expect, sync_playwright
 
 from benchmarks.live_feed import LivingRig
+from calibeam.live.latest import Latest
 from calibeam.live.page import LivePage, PageAddress, live_page
 from drivers.clock import SystemClock
 
@@ -34,6 +36,9 @@ SPOT = """() => {
   const x = box.width / 2 + figure(".x") * scale, y = box.height / 2 - figure(".y") * scale;
   return [...canvas.getContext("2d").getImageData(Math.round(x * ratio), Math.round(y * ratio), 1, 1).data].slice(0, 3);
 }"""
+
+SOONER = "AbortSignal.timeout = ((real) => (ms) => real(ms / 100))(AbortSignal.timeout.bind(AbortSignal))"
+LATER = "performance.now = ((real) => () => real() + 7000)(performance.now.bind(performance))"
 
 
 @pytest.fixture(scope="module")
@@ -134,10 +139,46 @@ def test_a_phone_has_all_of_it_without_scrolling_sideways(browser: Browser, livi
         expect(page.locator("#stop")).to_be_in_viewport(ratio=1.0)
 
 
-def test_a_page_whose_server_went_says_so_and_comes_back_by_itself(browser: Browser, rig) -> None:
+def test_a_stop_that_failed_stays_told_until_one_came_after_it(browser: Browser, living: LivingRig) -> None:
+    assert isinstance(living.feed, Latest)
+    living.feed.stops_by(lambda: None)
+    before = living.feed.stop.press("another page")
+    living.feed.stop.last = replace(before, host_s=before.host_s - 60.0)
+    with browser.new_context(viewport=DESKTOP) as context:
+        page = context.new_page()
+        page.add_init_script(SOONER)
+        page.goto(living.url)
+        is_live(page)
+        page.route("**/stop", lambda request: None)  # stalled for ever
+        page.click("#stop")
+        failed, says = "✕ STOP NOT DELIVERED (no answer): press the red emergency stop now", page.locator("#stop-says")
+        expect(says).to_have_text(failed)
+        page.evaluate(LATER)  # long after the press, and the link was late
+        living.feed.said("heard after the press")
+        expect(page.locator("#log")).to_contain_text("heard after the press")
+        is_live(page)
+        expect(says).to_have_text(failed)
+        living.feed.stop.press("a third page")
+        expect(says).to_contain_text("by a third page: the controller was told to stop, and took it")
+    living.feed.stops_by(None)
+
+
+def test_a_part_that_cannot_be_made_does_not_pass_for_live(shown: Page, living: LivingRig) -> None:
+    assert isinstance(living.feed, Latest)
+    where, living.feed.where = living.feed.where, object()  # pyright: ignore[reportAttributeAccessIssue]
+    try:
+        expect(shown.locator("body")).to_have_attribute("data-link", "late")
+        expect(shown.locator("#banner")).to_contain_text("cannot make this picture")
+    finally:
+        living.feed.where = where
+    is_live(shown)
+    expect(shown.locator("#banner")).to_be_hidden()
+
+
+def test_a_page_whose_server_went_says_so_and_comes_back_by_itself(browser: Browser, rig, own_address) -> None:
     with browser.new_context(viewport=DESKTOP) as context, ExitStack() as first:
         page = context.new_page()
-        served: LivePage = first.enter_context(live_page(rig, SystemClock(), PageAddress(port=0)))
+        served: LivePage = first.enter_context(live_page(rig, SystemClock(), own_address))
         page.goto(served.url)
         is_live(page)
         first.close()
@@ -146,6 +187,6 @@ def test_a_page_whose_server_went_says_so_and_comes_back_by_itself(browser: Brow
         page.click("#stop")
         expect(page.locator("#stop-says")).to_contain_text("press the red emergency stop now")
         port = int(served.url.rpartition(":")[2].strip("/"))
-        with live_page(rig, SystemClock(), PageAddress(port=port)):
+        with live_page(rig, SystemClock(), replace(own_address, port=port)):
             is_live(page)
             expect(page.locator("#banner")).to_be_hidden()

@@ -5,8 +5,10 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
+from msgspec import structs
 
 from acquisition.recording.rig import load_rig
+from acquisition.recording.rig_schema import Placement, Pose
 from calibeam.live.composer import Composer
 from calibeam.live.feed import Progress
 from calibeam.live.latest import Latest
@@ -127,6 +129,16 @@ def test_a_place_that_the_rig_file_does_not_have_is_no_trouble(composer, living,
     latest.believes({"placement9.x": 1e-3, "joint1.zero": 1e-3})
     living.send(0.0)
     assert told(composer.state())["standing"]["placement"] == 1
+
+
+def test_a_place_that_the_session_added_is_drawn_where_it_is(composer, living, rig, latest) -> None:
+    added = Placement(9, Pose(origin_m=(0.3, -0.2, 0.1)))
+    latest.measures(structs.replace(rig, placement_list=(*rig.placement_list, added)))
+    latest.stands(9, 1)
+    living.send(0.0)
+    standing = told(composer.state())["standing"]
+    assert (standing["placement"], standing["told"]) == (9, True)
+    assert np.mean(standing["corners_m"][0], axis=0) == pytest.approx((0.3, -0.2, 0.1), abs=1e-4)
 
 
 def test_progress_and_log_come_with_their_ages(composer, latest, clock) -> None:

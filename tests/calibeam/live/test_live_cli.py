@@ -62,6 +62,34 @@ def test_a_device_that_is_away_is_tried_again_until_the_end(rig, latest) -> None
     assert [line.text for line in latest.lines] == ["psd: no such port; plug it in"]
 
 
+def test_a_device_that_fails_at_every_step_is_still_tried_again(rig, latest, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("calibeam.live.devices.AGAIN_S", 0.0)
+
+    class Failing:
+        name = "psd"
+        tries = 0
+        again = threading.Event()
+
+        def connect(self) -> None:
+            self.tries += 1
+            if self.tries > 2:
+                self.again.set()
+
+        def describe(self) -> tuple: ...
+        def read(self, timeout_s: float) -> None: ...
+
+        def close(self) -> None:
+            raise OSError("the port is gone")
+
+    def unseen() -> None:
+        raise ValueError("an error map that does not fit")
+
+    failing = Failing()
+    with reading([Watched(failing, unseen)], latest):  # pyright: ignore[reportArgumentType]
+        assert failing.again.wait(5.0)
+    assert "an error map that does not fit" in (latest.of("psd").why or "")
+
+
 def test_the_devices_are_those_of_the_rig_and_stop_has_a_way_to_the_arm(rig, latest) -> None:
     watched = devices_of(rig, SystemClock(), latest)
     assert {one.device.name for one in watched} == {"psd", "encoders", "robot"}

@@ -62,15 +62,15 @@ def test_off_loopback_a_token_is_made_at_random(rig, monkeypatch: pytest.MonkeyP
     assert tokens[0] != tokens[1]
 
 
-def test_a_port_that_is_taken_is_told_and_free_again_afterwards(rig) -> None:
-    with live_page(rig, SystemClock(), ANY_PORT) as page:
+def test_a_port_that_is_taken_is_told_and_free_again_afterwards(rig, own_address) -> None:
+    with live_page(rig, SystemClock(), own_address) as page:
         port = int(page.url.rpartition(":")[2].strip("/"))
         with (
-            pytest.raises(PageError, match=rf"127\.0\.0\.1:{port}.*choose another port"),
-            live_page(rig, SystemClock(), replace(ANY_PORT, port=port)),
+            pytest.raises(PageError, match=rf"{re.escape(own_address.host)}:{port}.*choose another port"),
+            live_page(rig, SystemClock(), replace(own_address, port=port)),
         ):
             pass
-    with live_page(rig, SystemClock(), replace(ANY_PORT, port=port)):
+    with live_page(rig, SystemClock(), replace(own_address, port=port)):
         pass
 
 

@@ -81,6 +81,25 @@ def test_where_the_rig_says_so_a_page_that_is_gone_stops_once(stop, clock) -> No
     assert stop.last.who == "no page has answered for 5 s"
 
 
+def test_a_stop_that_was_not_delivered_is_pressed_again_until_it_is(stop, clock, monkeypatch) -> None:
+    monkeypatch.setattr("calibeam.live.alone.AGAIN_S", 0.0)
+    viewers, presses, third = Viewers(clock), [], threading.Event()
+    viewers.newest_s = clock.now_s()
+
+    def stopping() -> None:
+        presses.append(1)
+        if len(presses) < 3:
+            raise DeviceLost("robot: no way to the controller")
+        third.set()
+
+    stop.by(stopping)
+    with watched_pages(stop, viewers, 5.0, clock):
+        clock.time_s += 5.1
+        assert third.wait(5.0)
+    assert len(presses) == 3
+    assert stop.last.delivered
+
+
 def test_else_pages_come_and_go(stop, clock) -> None:
     viewers = Viewers(clock)
     viewers.newest_s = clock.now_s()

@@ -13,7 +13,7 @@ from acquisition.recording.rig import parse_rig
 from acquisition.recording.stream import Event
 from acquisition.recording.writer import RecordingWriter
 from calibeam.session.earlier import Earlier, earlier_of
-from calibeam.session.job import Job, more_at, moved, notes_of, part_of, with_place
+from calibeam.session.job import MORE, Job, more_at, moved, notes_of, part_of, with_place
 from calibeam.session.places import new_place, same_place, with_places
 from calibeam.site import addresses_of
 
@@ -136,6 +136,16 @@ def test_more_poses_are_others(job, ahead) -> None:
     assert not set(keys) & set(part.keys)
     spots = {visit.target.spots_m for block in part.blocks for visit in block.visits if any(visit.target.spots_m)}
     assert not spots & {visit.target.spots_m for block in more for visit in block.visits}
+
+
+def test_more_poses_of_the_day_after_are_others_than_those_of_the_first_day(job, samples) -> None:
+    begun = part_of(job, Earlier(), HALF_M)
+    first = [key for block in more_at(begun, 2, HALF_M, begun.options, 1) for key in block.pose_keys()]
+    part = part_of(job, Earlier(dict(zip(first, samples, strict=False))), HALF_M)
+    again = more_at(part, 2, HALF_M, part.options, 1)
+    assert not {key for block in again for key in block.pose_keys()} & set(first)
+    elsewhere = more_at(part, 3, HALF_M, part.options, 1)
+    assert {key.index // MORE for block in elsewhere for key in block.pose_keys()} == {1}
 
 
 def plan_of(rig) -> PosePlan:

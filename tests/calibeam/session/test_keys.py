@@ -13,6 +13,7 @@ from acquisition.errors import StoppedError
 from acquisition.reins import Reins
 from acquisition.session_states import Event, State
 from calibeam.session.keys import ENTER, Keys
+from drivers.errors import DeviceLost
 
 PATIENCE_S = 10.0
 
@@ -22,8 +23,13 @@ class Followed:
 
     def __init__(self) -> None:
         self._came = {state: threading.Event() for state in State}
-        self.reins = Reins(lambda: None, changed=lambda state: self._came[state].set())
+        self.states: list[State] = []
+        self.reins = Reins(lambda: None, changed=self._changed)
         self.reins.tell(Event.START)
+
+    def _changed(self, state: State) -> None:
+        self.states.append(state)
+        self._came[state].set()
 
     def comes_to(self, state: State) -> bool:
         return self._came[state].wait(PATIENCE_S)
@@ -62,6 +68,16 @@ def test_keys_come_without_enter_and_the_terminal_is_as_it_was(followed, termina
         os.write(ours, b" ")
         assert followed.comes_to(State.PAUSING)
     assert termios.tcgetattr(theirs) == before
+
+
+def test_arrows_and_function_keys_mean_nothing(followed, terminal) -> None:
+    """Up, Home, F3, wheel: else abort, halt, resume, abort."""
+    with Keys(followed.reins, terminal[1]):
+        os.write(terminal[0], b"\x1b[A\x1b[H\x1bOR\x1b[<64;1;1M ")
+        assert followed.comes_to(State.PAUSING)
+        os.write(terminal[0], b"\x1bORs")
+        assert followed.comes_to(State.ENDING)
+    assert followed.states == [State.RUNNING, State.PAUSING, State.ENDING]
 
 
 def test_the_terminal_is_as_it_was_after_an_error_too(followed, terminal) -> None:
@@ -105,6 +121,32 @@ def test_who_asks_gets_the_answer_and_no_pause(followed) -> None:
         asked.join(0.01)
     assert answers == [ENTER]
     assert followed.reins.state is State.RUNNING
+
+
+def test_an_enter_too_many_answers_no_later_question() -> None:
+    typed = [ENTER, ENTER]  # both in one read
+    looks: list[int] = []
+
+    def meanwhile() -> Exception | None:
+        looks.append(1)
+        while typed:
+            keys.pressed(typed.pop())
+        return DeviceLost("psd: nobody answers") if len(looks) == 3 else None
+
+    reins = Reins(lambda: None, failure=meanwhile)
+    reins.tell(Event.START)
+    keys = Keys(reins, None)
+    assert keys.wait(ENTER) == ENTER
+    with pytest.raises(DeviceLost, match="nobody answers"):
+        keys.wait(ENTER)
+
+
+def test_a_device_that_fails_ends_the_question() -> None:
+    reins = Reins(lambda: None, failure=lambda: StoppedError("STOP was pressed on the live page"))
+    reins.tell(Event.START)
+    with pytest.raises(StoppedError, match="live page"):
+        Keys(reins, None).wait(ENTER)
+    assert reins.state is State.ABORTED
 
 
 def test_an_abort_ends_the_question(followed) -> None:

@@ -20,7 +20,8 @@ from calibeam.session.person import Person
 from calibeam.session.plain_view import PlainView
 from calibeam.session.shown import Shown
 from calibeam.session.teller import Teller, ToldJournal
-from calibeam.session.terminal_view import drawn
+from calibeam.session.terminal_view import KEYS, drawn
+from drivers.errors import DeviceLost
 
 
 class Clock:
@@ -84,7 +85,10 @@ def teller(rig, clock, heard) -> Teller:
     [
         (State.RUNNING, "COLLECT", "SPACE pause"),
         (State.PAUSING, "PAUSING AFTER THIS POSE", "SPACE stop the arm now"),
-        (State.PAUSED, "PAUSED, THE ARM STANDS", "r go on"),
+        (State.BREAKING, "STOPPING THE ARM", "a abort    h halt"),
+        (State.PAUSED, "PAUSED, THE ARM STANDS", "r go on    s finish here    a abort    h halt"),
+        (State.ABORTING, "ABORTING", "h halt"),
+        (State.HALTED, "HALTED, THE ARM IS HELD", "h say the stop again"),
         (State.ABORTED, "ABORTED, THE ARM STANDS", ""),
     ],
 )
@@ -106,6 +110,25 @@ def test_the_view_fits_a_terminal_of_eighty_columns(teller, samples) -> None:
     assert max(map(len, (line.rstrip() for line in lines))) <= 80
     assert len(lines) < 24
     assert sum("°" in line for line in lines) == 3  # six joints, two a line
+
+
+@pytest.mark.parametrize("keys", KEYS.values(), ids=[state.name for state in KEYS])
+def test_the_keys_fit_a_terminal_of_eighty_columns(keys) -> None:
+    assert max(map(len, f"   {keys}".splitlines())) <= 80
+
+
+def test_a_stop_that_does_not_reach_the_arm_is_the_largest_thing_on_the_screen(teller, heard) -> None:
+    teller.asked("put the fixture at place 2")
+    teller.undelivered(DeviceLost("robot: no way to the controller"))
+    text = told(teller.shown)
+    assert "STOP NOT DELIVERED, PRESS THE RED EMERGENCY STOP" in text
+    assert "robot: no way to the controller" in text
+    assert heard.lines[-1] == (
+        "STOP NOT DELIVERED, PRESS THE RED EMERGENCY STOP: robot: no way to the controller",
+        True,
+    )
+    teller.undelivered(None)
+    assert "NOT DELIVERED" not in told(teller.shown)
 
 
 def test_a_dark_face_is_said(teller, samples) -> None:

@@ -3,8 +3,7 @@
 import os
 import signal
 import threading
-from collections.abc import Callable, Generator, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -13,14 +12,17 @@ from acquisition.plan import PlanOptions, blocks
 from acquisition.recording.parts import parts
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan, write_pose_plan
 from acquisition.recording.read import read
+from acquisition.sample import Sample
+from acquisition.session_states import State
 from calibeam.cli import run
 from calibeam.emulation import Emulation
 from calibeam.session.ahead import ahead_of_blocks
+from calibeam.session.teller import Teller
 
 from .conftest import RIG_FILE
 
 POSES = 3
-LOOK_S = 0.02
+PATIENCE_S = 30.0
 
 
 @pytest.fixture
@@ -50,33 +52,34 @@ def arguments(tmp_path, plan) -> Iterator[list[str]]:
                "--control", control, "--time-scale", "4"]  # fmt: skip
 
 
-@contextmanager
-def when_said(log: Path, acts: dict[str, Callable[[], None]]) -> Generator[None]:
-    """Does each, once, when the log says its words: conditions, not times."""
-    over, left = threading.Event(), dict(acts)
+@pytest.fixture
+def interrupted(monkeypatch) -> None:
+    """Ctrl-C at the first sample, which is heard before the next; and on again once it is paused."""
+    take, turn, pausing = Teller.sample, Teller.state, threading.Event()
 
-    def watch() -> None:
-        while left and not over.wait(LOOK_S):
-            said = log.read_text() if log.exists() else ""
-            for words in [words for words in left if words in said]:
-                left.pop(words)()
+    def sample(teller: Teller, sample: Sample) -> None:
+        take(teller, sample)
+        if not pausing.is_set():
+            os.kill(os.getpid(), signal.SIGINT)
+            assert pausing.wait(PATIENCE_S)
 
-    thread = threading.Thread(target=watch)
-    thread.start()
-    try:
-        yield
-    finally:
-        over.set()
-        thread.join()
+    def state(teller: Teller, state: State) -> None:
+        turn(teller, state)
+        if state is State.PAUSING:
+            pausing.set()
+        elif state is State.PAUSED:
+            os.kill(os.getpid(), signal.SIGCONT)
+
+    monkeypatch.setattr(Teller, "sample", sample)
+    monkeypatch.setattr(Teller, "state", state)
 
 
+@pytest.mark.usefixtures("interrupted")
 def test_paused_resumed_and_gone_on_with(arguments, tmp_path, capsys, monkeypatch) -> None:
     concluded: list[Path] = []
     monkeypatch.setattr("calibeam.session.run.conclude", lambda path, console: concluded.append(path))
     log = tmp_path / "out" / "session.log"
-    pause, go_on = (lambda: os.kill(os.getpid(), signal.SIGINT), lambda: os.kill(os.getpid(), signal.SIGCONT))
-    with when_said(log, {" measuring": pause, "paused, the arm stands": go_on}):
-        code = run(arguments)
+    code = run(arguments)
     said = log.read_text()
     assert code == 0, capsys.readouterr().err
     order = ["6  DEVICES", "6  PLAN", "6  ARM", "6  MEASURE", "paused, the arm stands"]

@@ -1,0 +1,42 @@
+"""Steps of a session on site, one at a time, without devices."""
+
+from types import SimpleNamespace
+
+import pytest
+from rich.console import Console
+
+from acquisition.plan import PlanOptions
+from acquisition.session import Summary
+from calibeam.live.feed import SILENT
+from calibeam.session.earlier import Earlier
+from calibeam.session.job import Job, part_of
+from calibeam.session.run import OnSite
+from calibeam.site import addresses_of
+from drivers.clock import SystemClock
+
+from .conftest import RIG_FILE
+
+
+@pytest.fixture
+def site(rig, tmp_path) -> OnSite:
+    job = Job(rig, RIG_FILE.read_text(), tmp_path, addresses_of(rig), PlanOptions())
+    return OnSite(job, Console(quiet=True), SystemClock(), SILENT, there=True, agrees=True)
+
+
+def test_a_forecast_that_cannot_be_made_is_said_and_ends_nothing(site, tmp_path) -> None:
+    def fails() -> None:
+        raise ZeroDivisionError("no pose ahead")
+
+    part = part_of(site._job, Earlier(), 0.01)
+    site._look(SimpleNamespace(forecast_now=fails), Summary((), (), 2), part)
+    log = (tmp_path / "session.log").read_text()
+    assert "0 poses; 2 left out" in log
+    assert "no forecast: ZeroDivisionError: no pose ahead" in log
+
+
+def test_a_terminal_that_goes_instead_of_the_numbers_of_a_place_finishes(site, monkeypatch) -> None:
+    def gone(*words: object, **more: object) -> str:
+        raise EOFError
+
+    monkeypatch.setattr("calibeam.session.person.Prompt.ask", gone)
+    assert site._new_place(part_of(site._job, Earlier(), 0.01)) is None
