@@ -47,6 +47,7 @@ def test_a_plain_effect_is_found_named_and_better_where_nobody_measured(tmp_path
     assert "as it should be" in (tmp_path / "p" / "proof.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.endure  # as `make mutate` does with ten effects
 @pytest.mark.timeout(300)
 def test_an_effect_taken_out_of_the_catalogue_turns_unknown_at_its_place(tmp_path: Path) -> None:
     """Reading lag: nothing else of the catalogue depends on the last move of a joint alone."""
@@ -58,6 +59,7 @@ def test_an_effect_taken_out_of_the_catalogue_turns_unknown_at_its_place(tmp_pat
     assert not case.misnamed
 
 
+@pytest.mark.endure  # as `make prove` does with every kind; tests/calibeam/test_recorded_streams.py is for every day
 @pytest.mark.timeout(300)
 def test_a_fault_that_only_streams_tell_is_found_and_named(tmp_path: Path) -> None:
     options = ("--kind", "streams", "--mechanism", "stream-slipping-encoder", "--cases", "1")
