@@ -2,12 +2,14 @@
 
 from pathlib import Path
 
+import msgspec
+
 from acquisition.recording.recover import recover
 from acquisition.recording.rig import rig_text
 from calibeam.outcome import PartialResult
 
 
-def recover_command(recording: Path, *, out: Path, rig: Path | None = None) -> None:
+def recover_command(recording: Path, *, out: Path, rig: Path | None = None, json: bool = False) -> None:
     """Write what can be read of a torn or damaged recording into a new, whole file.
 
     Example: calibeam recover session-1/recording.mcap --out recovered.mcap
@@ -23,10 +25,16 @@ def recover_command(recording: Path, *, out: Path, rig: Path | None = None) -> N
         The recording to make.
     rig
         A rig file to put in the place of one that is damaged.
+    json
+        Print what was kept and what is lost on one line, and nothing else.
 
     """
     done = recover(recording, out, None if rig is None else rig_text(rig))
-    print(f"{out}: {done.messages} messages")
+    if json:
+        kept = {"out": str(out), "messages": done.messages, "whole": done.whole, "damage": done.damage}
+        print(msgspec.json.encode(kept).decode())
+    else:
+        print(f"{out}: {done.messages} messages")
     if not done.whole:
         why = "; ".join(done.damage) or "the recording was cut short before its end"
         raise PartialResult(f"{recording}: {why}; what is good is in {out}")

@@ -270,7 +270,11 @@ def test_the_command_logs_exports_imports_recovers(
     torn = tmp_path / "torn.mcap"
     torn.write_bytes(segment.read_bytes()[:-3000])
     assert run(["recover", str(segment), "--out", str(tmp_path / "whole.mcap")]) == 0
-    assert run(["recover", str(torn), "--out", str(tmp_path / "partial.mcap")]) == 3
+    capsys.readouterr()
+    assert run(["recover", str(torn), "--out", str(tmp_path / "partial.mcap"), "--json"]) == 3
+    kept = msgspec.json.decode(capsys.readouterr().out)
+    assert (kept["whole"], kept["out"]) == (False, str(tmp_path / "partial.mcap"))
+    assert kept["messages"] > 0
     torn.write_bytes(segment.read_bytes()[:60])
     assert run(["recover", str(torn), "--out", str(tmp_path / "nothing.mcap")]) == 1
     assert not (tmp_path / "nothing.mcap").exists()
