@@ -87,7 +87,7 @@ def main() -> None:
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
-    raise KeyboardInterrupt
+    raise KeyboardInterrupt(signal.Signals(number).name)
 
 
 def run(arguments: list[str]) -> int:
@@ -103,8 +103,8 @@ def run(arguments: list[str]) -> int:
     except PartialResult as partial:
         errors.print(f"[bold]stopped:[/bold] {escape(str(partial))}")
         return 3
-    except KeyboardInterrupt:
-        errors.print("stopped by Ctrl-C")
+    except KeyboardInterrupt as interrupt:
+        errors.print(f"stopped by {interrupt.args[0] if interrupt.args else 'Ctrl-C'}")
         return 1
     except TOLD as error:
         errors.print("error:", str(error), markup=False)

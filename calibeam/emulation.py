@@ -1,13 +1,16 @@
 """The emulators as a child process of their own, and their side channel."""
 
 import sys
+from ipaddress import ip_address
 from pathlib import Path
 
+from acquisition.recording.rig_devices import RobotDevice
 from simulators.process import EmulatorProcess, EmulatorsError, ask_emulators
 
-__all__ = ["Emulation", "EmulationError", "ask_emulators"]
+__all__ = ["Emulation", "EmulationError", "ask_emulators", "moves_nothing_real"]
 
 EmulationError = EmulatorsError
+TERMINALS = "/dev/pts"  # where pseudo-terminals are
 
 
 class Emulation(EmulatorProcess):
@@ -33,3 +36,13 @@ class Emulation(EmulatorProcess):
     def place_fixture(self, placement: int) -> None:
         """Move the emulated fixture, as a person would on site."""
         self.ask("fixture.place", id=placement)
+
+
+def moves_nothing_real(robot: RobotDevice) -> bool:
+    """Whether the controller can only be an emulator: on loopback, or behind a pseudo-terminal."""
+    if robot.host is None:
+        return robot.serial_port is not None and Path(robot.serial_port).resolve().is_relative_to(TERMINALS)
+    try:
+        return robot.host == "localhost" or ip_address(robot.host).is_loopback
+    except ValueError:
+        return False

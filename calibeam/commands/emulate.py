@@ -1,6 +1,7 @@
 """`calibeam emulate`: the rig's devices as emulators on real wires, until stopped."""
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -57,7 +58,7 @@ def emulate(
     """
     from simulators.serve import ServeOptions, serve  # the physics takes a second to load: only here
 
-    load_rig(rig)  # tells what is wrong with the file in its own words
+    stated = load_rig(rig).devices.robot  # tells what is wrong with the file in its own words
     options = ServeOptions(
         robot_host=robot_host,
         truth_path=truth,
@@ -68,17 +69,22 @@ def emulate(
         links=links,
         end_with_stdin=end_with_stdin,
     )
-    serve(plain_rig(rig_text(rig), str(rig)), options, _print_json if json_ else _print_table)
+    show = _print_json if json_ else partial(_print_table, None if stated is None else stated.host)
+    serve(plain_rig(rig_text(rig), str(rig)), options, show)
 
 
 def _print_json(where: dict[str, dict[str, Any]]) -> None:
     print(json.dumps(where), flush=True)
 
 
-def _print_table(where: dict[str, dict[str, Any]]) -> None:
+def _print_table(host: str | None, where: dict[str, dict[str, Any]]) -> None:
+    """`host`: of the controller in the rig file."""
     for device, address in where.items():
         print(f"{device:8s}", "  ".join(f"{key} {_words(value)}" for key, value in address.items()), flush=True)
     print("ready; Ctrl-C ends the emulators", flush=True)
+    standing = where.get("robot", {}).get("host", host)
+    if standing != host:
+        print(f'first write host = "{standing}" under [devices.robot] of the rig file that clients read', flush=True)
     if "control" in where:
         control = f"{where['control']['host']}:{where['control']['port']}"
         print(f"a session on them: calibeam session RIG.toml --control {control} --out session-1", flush=True)

@@ -18,7 +18,7 @@ from acquisition.recording.parts import parts
 from acquisition.recording.pose_plan import read_pose_plan
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.rig_schema import Rig
-from calibeam.emulation import ask_emulators
+from calibeam.emulation import ask_emulators, moves_nothing_real
 from calibeam.guided.recorded import encoder_address, is_guided
 from calibeam.guided.run import plan_of, run_guided
 from calibeam.live.feed import SILENT, Feed
@@ -146,7 +146,7 @@ def session(
         None if control is None else _through(*_host_and_port(control)),
     )
     earlier = _earlier(job, go_on=continue_, place=place)
-    agrees = yes or (control is not None and not there)
+    agrees = yes or (control is not None and not there and moves_nothing_real(job.addresses.robot))
     with _page(loaded, page, console) as feed:
         run_session(job, console, earlier, feed, there=there, agrees=agrees, stands=stands)
     return None

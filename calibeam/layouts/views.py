@@ -10,6 +10,7 @@ from mcap.records import Channel, Schema
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.layout import EVENTS_TOPIC, GAPS_TOPIC, SAMPLES_TOPIC, VIEW_TOPIC
 from acquisition.recording.mcap_scan import Scan
+from acquisition.recording.parts import parts
 
 TIME = "host_s"  # of every message: an axis, not a curve
 OTHERS = (EVENTS_TOPIC, SAMPLES_TOPIC, GAPS_TOPIC)
@@ -29,9 +30,15 @@ class Views:
 
 
 def views_of(path: Path) -> Views:
-    """Of a recording, whole or torn. RecordingError where it is none, or shows nothing to viewers."""
+    """Of a recording, whole or torn, or the first of a session's folder.
+
+    RecordingError where it is none, or shows nothing to viewers.
+    """
     if path.is_dir():
-        raise RecordingError(f"{path}: a session folder has no topics; give a recording (.mcap)")
+        recorded = parts(path)
+        if not recorded:
+            raise RecordingError(f"{path}: no recording in it, and tables have no topics; give a recording (.mcap)")
+        path = recorded[0]
     schemas: dict[int, Schema] = {}
     views: dict[str, tuple[str, ...]] = {}
     others: dict[str, tuple[str, ...]] = {}

@@ -14,11 +14,12 @@ POINT = ("X", "Y", "Z")  # millimetres, in the tracker's own frame
 
 def convert(table: Path, samples: Path) -> int:
     """Rows written. Units are converted here and nowhere else: everything behind this line is SI."""
-    lab = np.genfromtxt(table, delimiter=",", names=True, dtype=float)
+    lab = np.atleast_1d(np.genfromtxt(table, delimiter=",", names=True, dtype=float))
     columns = {"t_s": np.arange(len(lab), dtype=float)}
     columns |= {f"q{i}_rad": np.radians(lab[name]) for i, name in enumerate(JOINTS, start=1)}
     columns |= {f"{axis.lower()}_m": lab[axis] / 1000.0 for axis in POINT}
     header, rows = ",".join(columns), np.column_stack(list(columns.values()))
+    samples.parent.mkdir(parents=True, exist_ok=True)
     np.savetxt(samples, rows, delimiter=",", header=header, comments="", fmt="%.12g")
     return len(lab)
 

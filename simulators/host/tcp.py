@@ -131,7 +131,9 @@ def _listen(port: TcpPort) -> socket.socket:
 def _explained(port: TcpPort, error: OSError) -> HostError:
     where = f"{port.name}: {port.host}:{port.port}"
     if error.errno == errno.EADDRINUSE:
-        return PortBusy(f"{where} is in use by another program; stop it or take another address", port.host)
+        return PortBusy(
+            f"{where} is in use by another program; stop it or take another address (--robot-host auto)", port.host
+        )
     if error.errno == errno.EADDRNOTAVAIL:
         return HostError(f"{where} is no address of this machine; emulate on one of 127.0.0.x")
     return HostError(f"{where} cannot be opened: {error.strerror or error}; take another address")

@@ -92,6 +92,13 @@ def test_every_curve_of_the_plotjuggler_layout_is_in_the_recording(recording, fi
         assert int(splitter.get("count")) == len(splitter.findall("DockArea")) == len(splitter.get("sizes").split(";"))
 
 
-def test_a_session_folder_has_nothing_to_show(tmp_path, capsys):
+def test_the_folder_of_a_session_is_its_first_recording(recording, tmp_path):
+    (tmp_path / "session").mkdir()
+    recording.rename(tmp_path / "session" / "recording.mcap")
+    assert run(["layouts", str(tmp_path / "session"), "--out", str(tmp_path / "out")]) == 0
+    assert (tmp_path / "out" / "foxglove.json").exists()
+
+
+def test_a_folder_without_a_recording_has_nothing_to_show(tmp_path, capsys):
     assert run(["layouts", str(tmp_path), "--out", str(tmp_path / "out")]) == 1
     assert "give a recording" in capsys.readouterr().err
