@@ -87,13 +87,15 @@ def test_a_move_blocks_until_the_arm_has_arrived(emulated, control) -> None:
 
 
 def test_a_small_move_costs_little_more_than_its_motion(control) -> None:
+    """The least of many: a busy machine only adds, and what every move would wait for is in each."""
+    control.move_joints(HOME, 1.0, 3.0)
     took_s = []
-    for step in range(9):
+    for step in range(1, 21):
         start_s = time.monotonic()
         control.move_joints(HOME + 0.01745 * (step % 2), 1.0, 3.0)
         took_s.append(time.monotonic() - start_s)
     motion_s = (2.0 * (0.01745 / 3.0) ** 0.5 + 0.05) / 4.0  # trapezoid and settling, at four times real time
-    assert np.median(took_s) < motion_s + 0.02
+    assert min(took_s) < motion_s + 0.02
 
 
 def test_a_line_moves_the_tool(emulated, control) -> None:
