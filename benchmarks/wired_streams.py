@@ -17,7 +17,8 @@ from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.writer import RecordingWriter
 from benchmarks.disturbed import Trouble
 from calibeam.diagnosis import diagnose_recording
-from calibeam.recorded import progress_bar, record_session
+from calibeam.progress_bar import progress_bar
+from calibeam.recorded import record_session
 from calibeam.site import addresses_of, connected
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.report.diagnosis.words import stream_words

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 import msgspec
 from cyclopts import Parameter, validators
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from calibeam.fleet.layout import PAGE, TABLE
 from calibeam.fleet.workers import Engine, Workers
 from calibeam.outcome import PartialResult
+from calibeam.progress_bar import progress_bar
 from calibrate.errors import DataError
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def batch_command(
 
     workers = Workers(engine, jobs or os.cpu_count() or 1, scheduler)
     wanted = Wanted(diagnose, again, robot_by_folder, timeout or None, workers)
-    with _bar(Console(stderr=True)) as bar:
+    with progress_bar(Console(stderr=True)) as bar:
         task = bar.add_task("recordings", total=None)
         ran = run(folder, out, wanted, lambda done, total, _: bar.update(task, completed=done, total=total))
     fleet = Fleet(ran.rows)
@@ -96,15 +96,3 @@ def _end(ran: "Ran", fleet: "Fleet", out: Path, *, again: bool) -> None:
         raise DataError(f"none of {len(fleet.rows)} recordings could be identified; the first: {fleet.bad[0].error}")
     if fleet.bad:
         raise PartialResult(f"{len(fleet.bad)} of {len(fleet.rows)} recordings failed; {out / PAGE} says why")
-
-
-def _bar(console: Console) -> Progress:
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        console=console,
-    )

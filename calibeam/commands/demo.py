@@ -10,7 +10,8 @@ from acquisition.plan import PlanOptions
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.rig import load_rig, rig_text
 from calibeam.emulation import Emulation
-from calibeam.recorded import new_recording, progress_bar, record_session
+from calibeam.progress_bar import progress_bar
+from calibeam.recorded import new_recording, record_session
 from calibeam.reveal import reveal
 from calibeam.site import addresses_of, check_session, connected
 from calibeam.terminal import print_revealed

@@ -12,7 +12,7 @@ from rich.console import Console
 from acquisition.recording.pose_plan import write_pose_plan
 from acquisition.recording.rig import load_rig
 from acquisition.recording.rig_schema import Rig
-from calibeam.recorded import progress_bar
+from calibeam.progress_bar import progress_bar
 from calibeam.software import SOFTWARE
 
 if TYPE_CHECKING:  # loaded when it is needed: it takes a second

@@ -10,7 +10,7 @@ from rich.console import Console
 from acquisition.recording.rig import load_rig
 from acquisition.recording.rig_schema import Rig
 from calibeam.error_lines import print_simulation
-from calibeam.recorded import progress_bar
+from calibeam.progress_bar import progress_bar
 from calibeam.software import SOFTWARE
 from calibrate.error_simulation.machine import Machine, identified_machine, machine_of
 from calibrate.error_simulation.plan import NOTHING_STATED, read_error_plan

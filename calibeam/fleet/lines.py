@@ -37,7 +37,9 @@ def print_fleet(console: Console, ran: Ran, fleet: Fleet) -> None:
 
 
 def _counts(ran: Ran, fleet: Fleet) -> str:
-    said = f"{len(fleet.rows)} recordings: {len(fleet.good)} identified, {len(fleet.bad)} failed or lost"
+    said = f"{len(fleet.rows)} recordings: {len(fleet.good)} identified"
+    said += f" ({len(fleet.torn)} of them cut short or damaged)" if fleet.torn else ""
+    said += f", {len(fleet.bad)} failed or lost"
     said += f", {len(fleet.empty)} without samples" if fleet.empty else ""
     said += f"; {ran.stood} stood from an earlier run" if ran.stood else ""
     return said + (f"; {ran.kept} of the table are not in this folder (any more)" if ran.kept else "")
@@ -52,6 +54,7 @@ def record(ran: Ran, fleet: Fleet, table: str, page: str) -> dict[str, Any]:
         "page": page,
         "recordings": len(fleet.rows),
         "identified": len(fleet.good),
+        "torn": [row.name for row in fleet.torn],
         "empty": len(fleet.empty),
         "failed": [{"name": r.name, "outcome": r.outcome.value, "error": r.error} for r in fleet.bad],
         "stood": ran.stood,

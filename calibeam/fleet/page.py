@@ -150,8 +150,9 @@ def _now(fleet: Fleet) -> Html | None:
     if not newest:
         return None
     lead = (
-        "The last recording of each robot. Unseen rows: rms error on rows that the fit has not seen. Free space: rms "
-        "over the workspace, arm as drawn against the identified one, and the predicted error of the identified one."
+        "The last recording of each robot, a whole one where there is one. Unseen rows: rms error on rows that the fit "
+        "has not seen. Free space: rms over the workspace, arm as drawn against the identified one, and the predicted "
+        "error of the identified one."
     )
     rows = [
         (
@@ -196,7 +197,7 @@ def _line(row: Row) -> tuple[str, ...]:
     return (
         row.robot,
         row.started_utc[:10] or DASH,
-        row.name,
+        row.name if row.complete else f"{row.name} (cut short or damaged)",
         str(row.samples),
         f"{told} of {len(row.zeros)}",
         _change(row.held_out_before_m, row.held_out_after_m),

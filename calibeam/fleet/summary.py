@@ -32,6 +32,11 @@ class Fleet:
         return tuple(row for row in self.rows if row.outcome in (Outcome.FAILED, Outcome.LOST))
 
     @cached_property
+    def torn(self) -> tuple[Row, ...]:
+        """Identified by what was left of a recording that was cut short or damaged."""
+        return tuple(row for row in self.good if not row.complete)
+
+    @cached_property
     def empty(self) -> tuple[Row, ...]:
         return tuple(row for row in self.rows if row.outcome is Outcome.EMPTY)
 
@@ -62,9 +67,12 @@ class Fleet:
         return len(diagnosed(self.rows))
 
     def newest(self) -> tuple[Row, ...]:
-        """The last good recording of every robot, by its start; where none is known, the last by name."""
+        """The last good recording of every robot, by its start; where none is known, the last by name.
+
+        One that was cut short stands for a robot only where no whole one does.
+        """
         last: dict[str, Row] = {}
-        for row in sorted(self.good, key=lambda row: (row.started_utc, row.name)):
+        for row in sorted(self.good, key=lambda row: (row.complete, row.started_utc, row.name)):
             last[row.robot] = row
         return tuple(last[robot] for robot in sorted(last))
 

@@ -15,7 +15,8 @@ from acquisition.recording.recording import Recording
 from acquisition.recording.rig import parse_rig, plain_rig, rig_text
 from calibeam.emulation import EmulationError
 from calibeam.outcome import PartialResult
-from calibeam.recorded import new_recording, progress_bar, record_session
+from calibeam.progress_bar import progress_bar
+from calibeam.recorded import new_recording, record_session
 from calibeam.site import addresses_of, connected
 from calibrate.diagnose.streams.sample_times import sample_windows
 from drivers.clock import SystemClock

@@ -17,7 +17,8 @@ from acquisition.recording.writer import RecordingWriter
 from calibeam.camera import camera_sight
 from calibeam.cli import run
 from calibeam.emulation import Emulation
-from calibeam.recorded import progress_bar, record_session
+from calibeam.progress_bar import progress_bar
+from calibeam.recorded import record_session
 from calibeam.site import addresses_of, connected
 from drivers.clock import SystemClock
 

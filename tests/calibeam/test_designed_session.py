@@ -13,7 +13,8 @@ from acquisition.recording.samples import Samples
 from acquisition.recording.writer import RecordingWriter
 from calibeam.direct import direct_bench
 from calibeam.pose_design.reachable import candidates_of
-from calibeam.recorded import progress_bar, record_session
+from calibeam.progress_bar import progress_bar
+from calibeam.recorded import record_session
 from calibrate.pose_design.plan_of import blocks_of, plan_of, taken
 from drivers.clock import SystemClock
 

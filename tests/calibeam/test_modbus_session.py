@@ -12,7 +12,8 @@ from acquisition.recording.read import read
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.writer import RecordingWriter
 from calibeam.emulation import Emulation
-from calibeam.recorded import progress_bar, record_session
+from calibeam.progress_bar import progress_bar
+from calibeam.recorded import record_session
 from calibeam.site import addresses_of, check_session, connected
 from drivers.clock import SystemClock
 from drivers.errors import DeviceRefused

@@ -18,7 +18,8 @@ from calibeam.direct import direct_bench
 from calibeam.emulation import Emulation
 from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
-from calibeam.recorded import progress_bar, record_session
+from calibeam.progress_bar import progress_bar
+from calibeam.recorded import record_session
 from calibeam.site import addresses_of, connected
 from drivers.clock import SystemClock
 from simulators.world.world import World

@@ -21,7 +21,8 @@ from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Summary
 from calibeam.emulation import Emulation
 from calibeam.outcome import PartialResult
-from calibeam.recorded import progress_bar, record_session
+from calibeam.progress_bar import progress_bar
+from calibeam.recorded import record_session
 from calibeam.site import addresses_of, connected
 from drivers.clock import SystemClock
 from drivers.ur.reader import UrReader

@@ -5,6 +5,7 @@ import re
 import msgspec
 import numpy as np
 import pytest
+from msgspec import structs
 
 from calibeam.fleet.lines import record
 from calibeam.fleet.page import LISTED, fleet_html
@@ -37,6 +38,16 @@ def fleet():
     ]
     torn = Row("/x/torn.mcap", "x/torn.mcap", "", 1, 1, Outcome.FAILED, "calibeam 1", error="torn <before> the rig")
     return Fleet((*rows, torn))
+
+
+def test_a_recording_that_was_cut_short_is_marked_and_stands_for_no_robot_that_has_a_whole_one(fleet):
+    torn = structs.replace(session("9", "2026-11-01", 0.0), complete=False)
+    alone = structs.replace(session("10", "2026-11-01", 0.0), complete=False)
+    more = Fleet((*fleet.rows, torn, alone))
+    assert {row.robot: row.started_utc for row in more.newest()}["9"] == DAYS[-1]
+    assert alone in more.newest()
+    assert more.torn == (torn, alone)
+    assert fleet_html(more, "hall 3").count("cut short or damaged") == 2
 
 
 def test_the_page_names_the_robot_that_drifts_the_cause_that_is_shared_and_the_file_that_failed(fleet):
