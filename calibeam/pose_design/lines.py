@@ -12,7 +12,8 @@ from calibrate.diagnose.smallest_visible import Smallest
 from calibrate.pose_design.design import Design
 from calibrate.pose_design.places import Places
 from calibrate.pose_design.seen import Seen
-from calibrate.report.quantities import length, significant
+from calibrate.report.diagnosis.words import size_of
+from calibrate.report.quantities import length
 
 MATTERS_M = 1e-7  # of what no pose shows: below, the target does not feel it
 
@@ -113,16 +114,17 @@ def _print_smallest(console: Console, seen: Seen) -> None:
     for physics, one in sorted(best.items()):
         count = sum(other.name.physics == physics for other in seen.smallest)
         where = one.name.where if count == 1 else f"{one.name.where}, best of {count}"
-        table.add_row(physics, where, f"{one.parameter.replace('_', ' ')} {significant(one.value)}")
+        table.add_row(physics, where, size_of(one.parameter, one.value))
     console.print(table)
 
 
 def _print_confusable(console: Console, seen: Seen) -> None:
     lines = [
         f"could not be told apart: {name_of(a)} and {name_of(b)} (R2 {r2:.3f})"
-        for a, b, r2 in seen.confusable
+        for a, b, r2 in sorted(seen.confusable, key=lambda pair: pair[2])
         if (a.physics, a.where) != (b.physics, b.where)
     ]
+    lines = list({line.partition(" (R2")[0]: line for line in lines}.values())  # forms of one cause: the most alike
     lines += [f"not shown at all: {name_of(one)}" for one in seen.invisible]
     for line in lines or ["all causes of the catalogue can be told apart"]:
         console.print(line, markup=False, highlight=False)

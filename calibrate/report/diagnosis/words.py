@@ -12,21 +12,10 @@ from calibrate.diagnose.schema import (
     SplitRecord,
     UnexplainedRecord,
 )
+from calibrate.report.diagnosis.units import unit_of
 
 NOISE = 1.15  # times the floor: some dozen samples held out scatter by so much
 TOLD = ("encoder-eccentricity", "joint-compliance", "backlash")  # in a sentence; all of them stand in the table
-UNITS = (  # ending of a parameter's name, factor, unit
-    ("_rad_per_rad", 1e6, "µrad/rad"),
-    ("_rad_per_nm", 1e6, "µrad/Nm"),
-    ("_rad_nm", 1e6, "µrad/Nm"),
-    ("_rad_per_k", 1e6, "µrad/K"),
-    ("_rad_k", 1e6, "µrad/K"),
-    ("_m_per_k", 1e6, "µm/K"),
-    ("_per_k", 1e6, "ppm/K"),
-    ("_share", 1e6, "ppm"),
-    ("_rad", 1e6, "µrad"),
-    ("_m", 1e6, "µm"),
-)
 
 
 def verdict_words(file: DiagnosisFile) -> str:
@@ -86,11 +75,9 @@ def visible_words(smallest: SmallestRecord) -> str:
 
 
 def size_of(parameter: str, value: float) -> str:
-    """With the unit that stands in the parameter's name."""
-    for ending, factor, unit in UNITS:
-        if parameter.endswith(ending):
-            return f"{factor * value:.3g} {unit}"
-    return f"{value:.3g} ({parameter})"
+    """With the unit that stands in the parameter's name, else with the name."""
+    factor, unit = unit_of(parameter, value)
+    return f"{factor * value:.3g}{unit}" if unit else f"{value:.3g} ({parameter})"
 
 
 def hardest_to_see(file: DiagnosisFile) -> tuple[SmallestRecord, ...]:

@@ -8,10 +8,11 @@ from calibrate.diagnose.diagnosis import Named
 from calibrate.pose_design.design import Design
 from calibrate.pose_design.places import Places
 from calibrate.pose_design.seen import Seen
+from calibrate.report.diagnosis.words import size_of
 from calibrate.report.elements import Html, bullets, figure, section, table, tag
 from calibrate.report.page import page, write_page
 from calibrate.report.pose_design.figures import curve_figure, isolability_figure, joints_figure
-from calibrate.report.quantities import length, significant
+from calibrate.report.quantities import length
 from calibrate.report.tiles import tile
 
 CONTENTS = {"promise": "How many poses", "plan": "The plan", "places": "Places of the fixture", "causes": "Causes"}
@@ -79,10 +80,7 @@ def _places(places: Sequence[Places]) -> Html:
 
 
 def _causes(seen: Seen) -> Html:
-    rows = [
-        (one.name.physics, one.name.where, f"{one.parameter.replace('_', ' ')} {significant(one.value)}")
-        for one in seen.smallest
-    ]
+    rows = [(one.name.physics, one.name.where, size_of(one.parameter, one.value)) for one in seen.smallest]
     alike = [f"{_name(a)} and {_name(b)}: R2 {r2:.3f}" for a, b, r2 in seen.confusable]
     caption = (
         "Largest share, in percent, of the signal of a cause (row) that any form of another one (column) could "
