@@ -125,7 +125,10 @@ def _print_confusable(console: Console, seen: Seen) -> None:
         if (a.physics, a.where) != (b.physics, b.where)
     ]
     lines = list({line.partition(" (R2")[0]: line for line in lines}.values())  # forms of one cause: the most alike
-    lines += [f"not shown at all: {name_of(one)}" for one in seen.invisible]
+    places: dict[str, dict[str, None]] = {}
+    for one in seen.invisible:
+        places.setdefault(one.physics, {})[one.where] = None
+    lines += [f"not shown, or not in every form: {physics} at {', '.join(at)}" for physics, at in places.items()]
     for line in lines or ["all causes of the catalogue can be told apart"]:
         console.print(line, markup=False, highlight=False)
 

@@ -77,7 +77,9 @@ def visible_words(smallest: SmallestRecord) -> str:
 def size_of(parameter: str, value: float) -> str:
     """With the unit that stands in the parameter's name, else with the name."""
     factor, unit = unit_of(parameter, value)
-    return f"{factor * value:.3g}{unit}" if unit else f"{value:.3g} ({parameter})"
+    shown = factor * value
+    digits = f"{shown:.3g}" if abs(shown) < 999.5 else f"{shown:.0f}"
+    return f"{digits}{unit}" if unit else f"{digits} ({parameter})"
 
 
 def hardest_to_see(file: DiagnosisFile) -> tuple[SmallestRecord, ...]:

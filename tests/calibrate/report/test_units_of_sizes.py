@@ -12,6 +12,7 @@ from calibrate.report.diagnosis.words import size_of
         ("scale_error_rad_per_rad", 1.1e-5, "11 µrad per rad"),
         ("shift_x_m", 4.26e-6, "4.26 µm"),
         ("sag_m", 2.5e-3, "2.5 mm"),
+        ("wobble_rad", 2.66e-3, "2660 µrad"),
         ("odd", 3.0, "3 (odd)"),
     ],
 )
