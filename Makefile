@@ -22,13 +22,12 @@ demo: $(READY)
 	$(BIN)/calibeam demo --out out/demo
 
 test: $(READY) $(CLIENTS)/.ready
-	$(BIN)/python -m pytest -m "not endure and not wired" -n 2 --dist loadfile
-	$(BIN)/python -m pytest -m "wired and not endure" -n 2 --dist loadfile tests/drivers tests/simulators
-	$(BIN)/python -m pytest -m "wired and not endure" tests/calibeam
+	$(BIN)/python tests/phases.py daily
 
-# What takes too long for every day: a million mutated inputs a codec, a hundred plugs pulled, and more of the same.
-endure: $(READY)
-	$(BIN)/python -m pytest -m endure --timeout 3600
+# What takes too long for every day: a million mutated inputs a codec, a hundred plugs pulled, mutated files for every
+# command, and the calculating tests again with other kernels of linear algebra and another number of threads.
+endure: $(READY) $(CLIENTS)/.ready
+	$(BIN)/python tests/phases.py endure
 
 # Third-party clients that tests start as processes, in an environment of their own.
 clients: $(CLIENTS)/.ready

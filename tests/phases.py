@@ -1,0 +1,130 @@
+"""Runs every phase of the tests, also after one that fails, and sums them up on the last line.
+
+python tests/phases.py daily     what `make test` runs
+python tests/phases.py endure    what takes too long for every day, and the calculations as other processors round
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+import time
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+TWO_AT_A_TIME = ("-n", "2", "--dist", "loadfile")
+CALCULATING = ("-m", "not endure and not wired", *TWO_AT_A_TIME)
+
+
+@dataclass(frozen=True)
+class Phase:
+    """One run of pytest: its arguments, and what its environment has beside that of the caller."""
+
+    name: str
+    arguments: tuple[str, ...]
+    environment: Mapping[str, str] = field(default_factory=dict[str, str])
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a phase came to; `exit_code` is pytest's own."""
+
+    name: str
+    exit_code: int
+    passed: int
+    failed: int
+    skipped: int
+    duration_s: float
+
+
+DAILY = (
+    Phase("calculating", CALCULATING),
+    Phase("devices on wires", ("-m", "wired and not endure", *TWO_AT_A_TIME, "tests/drivers", "tests/simulators")),
+    Phase("sessions on wires", ("-m", "wired and not endure", "tests/calibeam")),
+)
+
+
+def endure() -> tuple[Phase, ...]:
+    """The marked tests, then the calculating phase with other linear algebra and other vector units.
+
+    OPENBLAS_CORETYPE chooses the kernels of OpenBLAS, NPY_DISABLE_CPU_FEATURES the loops of numpy, and NUMBA_CPU_NAME
+    what numba compiles for: together they round as another processor does. Kernels that this processor cannot run are
+    left out.
+    """
+    narrow = {"NPY_DISABLE_CPU_FEATURES": " ".join(_wide_vectors()), "NUMBA_CPU_NAME": "haswell"}
+    kernels = [("Haswell", "avx2", narrow), ("Zen", "avx2", {}), ("SkylakeX", "avx512f", {})]
+    able = _processor_flags()
+    return (
+        Phase("marked endure", ("-m", "endure", "--timeout", "3600")),
+        Phase("calculating, 2 threads", CALCULATING, {"OPENBLAS_NUM_THREADS": "2"}),
+        *(
+            Phase(f"calculating, {name}", CALCULATING, {"OPENBLAS_CORETYPE": name, **more})
+            for name, flag, more in kernels
+            if flag in able
+        ),
+    )
+
+
+def main() -> int:
+    """0 when every phase passed, otherwise 1."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("which", choices=("daily", "endure"))
+    phases = DAILY if parser.parse_args().which == "daily" else endure()
+    outcomes = [run(phase, ROOT / "out" / "tests" / f"{number}.xml") for number, phase in enumerate(phases, 1)]
+    print(*table(outcomes), sep="\n")
+    return int(any(outcome.exit_code for outcome in outcomes))
+
+
+def run(phase: Phase, results: Path) -> Outcome:
+    """The phase in a pytest of its own; `results` receives its JUnit file."""
+    results.parent.mkdir(parents=True, exist_ok=True)
+    results.unlink(missing_ok=True)
+    print(f"\n===== {phase.name} =====", flush=True)
+    begin_s = time.monotonic()
+    command = [sys.executable, "-m", "pytest", *phase.arguments, f"--junitxml={results}"]
+    code = subprocess.run(command, cwd=ROOT, env={**os.environ, **phase.environment}, check=False).returncode
+    return Outcome(phase.name, code, *_counts(results, code), time.monotonic() - begin_s)
+
+
+def table(outcomes: list[Outcome]) -> list[str]:
+    """A line a phase, and the sum as the last line."""
+    lines = [
+        "",
+        *(
+            f"{o.name:>26}: {o.passed:5d} passed, {o.failed} failed, {o.skipped} skipped, {o.duration_s:.0f} s"
+            + ("" if o.exit_code in (0, 1) else f", ended with pytest's exit code {o.exit_code}")
+            for o in outcomes
+        ),
+    ]
+    passed, failed, skipped = (sum(getattr(o, what) for o in outcomes) for what in ("passed", "failed", "skipped"))
+    return [*lines, f"total: {passed} passed, {failed} failed, {skipped} skipped"]
+
+
+def _counts(results: Path, exit_code: int) -> tuple[int, int, int]:
+    """Passed, failed, skipped. A phase that left no file, or that failed without a failed test, is one failure."""
+    if not results.exists():
+        return 0, 1, 0
+    suite = next(ET.parse(results).getroot().iter("testsuite"))
+    tests, failed, errors, skipped = (int(suite.get(key, 0)) for key in ("tests", "failures", "errors", "skipped"))
+    failed += errors
+    return tests - failed - skipped, max(failed, int(exit_code != 0)), skipped
+
+
+def _wide_vectors() -> list[str]:
+    """What numpy has found here beyond AVX2, by its own names."""
+    import numpy as np
+
+    found = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
+    return [name for name in found if name == "X86_V4" or name.startswith("AVX512")]
+
+
+def _processor_flags() -> set[str]:
+    info = Path("/proc/cpuinfo")
+    return set(info.read_text().split()) if info.exists() else set()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,52 @@
+"""`make test` reports every phase, whatever happened in those before."""
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests import phases
+
+BODIES = {"fails": "def test_it(): assert False\n", "passes": "def test_it(): pass\n", "nothing": ""}
+
+
+@pytest.fixture
+def outcomes(tmp_path: Path) -> dict[str, phases.Outcome]:
+    found = {}
+    for name, body in BODIES.items():
+        (tmp_path / f"test_{name}.py").write_text(body)
+        alone = ("-c", os.devnull, "--rootdir", str(tmp_path), "-p", "no:cacheprovider", "-p", "no:xdist", "-q")
+        phase = phases.Phase(name, (*alone, str(tmp_path / f"test_{name}.py")))
+        found[name] = phases.run(phase, tmp_path / "results" / f"{name}.xml")
+    return found
+
+
+def test_a_failed_phase_counts_and_the_next_one_runs(outcomes):
+    counts = {name: (o.exit_code, o.passed, o.failed) for name, o in outcomes.items()}
+    # A phase in which nothing ran is a failure: pytest's exit code 5.
+    assert counts == {"fails": (1, 0, 1), "passes": (0, 1, 0), "nothing": (5, 0, 1)}
+    assert phases.table(list(outcomes.values()))[-1] == "total: 1 passed, 2 failed, 0 skipped"
+
+
+@pytest.mark.parametrize("failing", [0, 1])
+def test_every_phase_runs_and_one_failure_fails_the_whole(failing, monkeypatch, capsys):
+    ran = []
+
+    def outcome(phase, results):
+        ran.append(phase.name)
+        failed = int(len(ran) == failing)
+        return phases.Outcome(phase.name, failed, 3, failed, 0, 1.0)
+
+    monkeypatch.setattr(phases, "run", outcome)
+    monkeypatch.setattr(sys, "argv", ["phases.py", "daily"])
+    assert phases.main() == failing
+    assert ran == [phase.name for phase in phases.DAILY]
+    assert capsys.readouterr().out.splitlines()[-1] == f"total: 9 passed, {failing} failed, 0 skipped"
+
+
+def test_other_rounding_is_asked_for_by_environment():
+    kernels = {phase.environment.get("OPENBLAS_CORETYPE") for phase in phases.endure()}
+    threads = {phase.environment.get("OPENBLAS_NUM_THREADS") for phase in phases.endure()}
+    assert {"2"} < threads
+    assert kernels - {None} <= {"Haswell", "Zen", "SkylakeX"}
