@@ -1,8 +1,6 @@
 """Asks the oracle and other methods about some of the cases, in worker processes, after the seals are open."""
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 
 import msgspec
 
@@ -10,6 +8,7 @@ from calibeam.prove.comparison import Compared, compare
 from calibeam.prove.layout import Layout
 from calibeam.prove.record import CaseScore
 from calibeam.prove.truth import Truth
+from calibeam.worker_processes import without_ctrl_c, worker_pool
 from calibrate.errors import DataError
 
 ASKED = ("one", "disturbed", "three")
@@ -30,8 +29,10 @@ def compared_cases(
     if not fit:
         return out
     orders = [(layout, cases[i].name, truths[i], cases[i].family) for i in fit]
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        for number, (i, found) in enumerate(zip(fit, pool.map(_compared, orders), strict=True), start=1):
+    with worker_pool(jobs) as pool:
+        with without_ctrl_c():
+            coming = pool.map(_compared, orders)
+        for number, (i, found) in enumerate(zip(fit, coming, strict=True), start=1):
             tell(f"compared {number} of {len(fit)}")
             if found is not None:
                 out[i] = msgspec.structs.replace(
