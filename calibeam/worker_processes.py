@@ -1,12 +1,16 @@
 """Worker processes of a long computation: Ctrl-C is for the process that started them, which then ends them all."""
 
 import signal
-from collections.abc import Generator
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import active_children, get_context
+from typing import TypeVar
 
 from calibeam.recorded import uninterrupted
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 
 @contextmanager
@@ -23,16 +27,19 @@ def without_ctrl_c() -> Generator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-@contextmanager
-def worker_pool(jobs: int) -> Generator[ProcessPoolExecutor]:
-    """New interpreters, so many at a time; when the block ends by an exception they are ended in mid-work.
+def in_workers(work: Callable[[Item], Result], items: Sequence[Item], jobs: int) -> Generator[Result]:
+    """Results in the order of the items, from so many new interpreters at a time; what `work` raises is raised here.
 
-    Submit inside `without_ctrl_c`: that is when they are started.
+    Whoever leaves it before its end, by Ctrl-C too, closes it: the workers are ended in mid-work then.
     """
     others = set(active_children())
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         try:
-            yield pool
+            with without_ctrl_c():
+                # Not `map`: it cancels what is left, and a thread of an executor whose workers die then fails by it.
+                coming = [pool.submit(work, item) for item in items]
+            for future in coming:
+                yield future.result()
         except BaseException:
             with uninterrupted():
                 for worker in set(active_children()) - others:

@@ -1,6 +1,7 @@
 """Asks the oracle and other methods about some of the cases, in worker processes, after the seals are open."""
 
 from collections.abc import Callable, Sequence
+from contextlib import closing
 
 import msgspec
 
@@ -8,7 +9,7 @@ from calibeam.prove.comparison import Compared, compare
 from calibeam.prove.layout import Layout
 from calibeam.prove.record import CaseScore
 from calibeam.prove.truth import Truth
-from calibeam.worker_processes import without_ctrl_c, worker_pool
+from calibeam.worker_processes import in_workers
 from calibrate.errors import DataError
 
 ASKED = ("one", "disturbed", "three")
@@ -29,9 +30,7 @@ def compared_cases(
     if not fit:
         return out
     orders = [(layout, cases[i].name, truths[i], cases[i].family) for i in fit]
-    with worker_pool(jobs) as pool:
-        with without_ctrl_c():
-            coming = pool.map(_compared, orders)
+    with closing(in_workers(_compared, orders, jobs)) as coming:
         for number, (i, found) in enumerate(zip(fit, coming, strict=True), start=1):
             tell(f"compared {number} of {len(fit)}")
             if found is not None:

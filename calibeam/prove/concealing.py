@@ -10,7 +10,7 @@ from calibeam.prove.scenario import DRAWS, WIRED_DRAWS, Mix, Scenario, scenario,
 from calibeam.prove.seal import fingerprint, new_key, sealed
 from calibeam.prove.streamed import conceal_streams, told
 from calibeam.prove.unseen_file import write_asked
-from calibeam.worker_processes import without_ctrl_c, worker_pool
+from calibeam.worker_processes import in_workers
 from simulators.conceal.belief import rig_document
 from simulators.conceal.case import Case, conceal
 from simulators.conceal.reveal import truth_document
@@ -48,10 +48,7 @@ def conceal_cases(layout: Layout, mix: Mix, seed: int, cases: int, jobs: int, wi
     orders = [_Order(layout, mix, seed, number, new_key(), number >= cases) for number in range(cases + wired)]
     for few, at_a_time in ((orders[cases:], 1), (orders[:cases], jobs)):
         if few:
-            with worker_pool(at_a_time) as pool:
-                with without_ctrl_c():
-                    coming = pool.map(_conceal, few)
-                yield from coming
+            yield from in_workers(_conceal, few, at_a_time)
 
 
 def publish(layout: Layout, cases: list[Concealed]) -> str:

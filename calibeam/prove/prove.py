@@ -53,7 +53,7 @@ def ending_early(out: Path, tell: Tell, reason: str) -> Generator[Tell]:
 
     `reason`: why it cannot be continued.
     """
-    last = "nothing was diagnosed"
+    last = "nothing was finished"
 
     def count(word: str) -> None:
         nonlocal last
@@ -64,8 +64,8 @@ def ending_early(out: Path, tell: Tell, reason: str) -> Generator[Tell]:
         yield count
     except KeyboardInterrupt as why:
         raise PartialResult(
-            f"{interruption(why)}; {last}; the files are kept in {out}, but it cannot be continued, because {reason}; "
-            "start it again with another --out"
+            f"{interruption(why)}; {last}; the files are kept in {out}, but a proof cannot be continued, because "
+            f"{reason}; start it again with another --out"
         ) from why
 
 
