@@ -4,7 +4,7 @@ import signal
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from multiprocessing import active_children, get_context
+from multiprocessing import active_children, get_context, resource_tracker
 from typing import TypeVar
 
 from calibeam.recorded import uninterrupted
@@ -20,6 +20,7 @@ def without_ctrl_c() -> Generator[None]:
     A terminal sends it to every process of a job, and each worker would print a traceback. The blocked signal is
     inherited; one that comes meanwhile is delivered at the end.
     """
+    resource_tracker.ensure_running()  # who starts it lets SIGINT through afterwards, whatever was blocked before
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

@@ -15,6 +15,7 @@ from multiprocessing import TimeoutError as SilenceError  # what joblib raises
 from typing import Any
 
 from joblib import Parallel, delayed, parallel_config
+from joblib.externals.loky.backend import resource_tracker as loky_tracker
 
 from calibeam.fleet.order import Order
 from calibeam.fleet.row import Row
@@ -87,6 +88,7 @@ def _round(
     alone = settings["n_jobs"] == 1  # then joblib works in this process, and has no limit of time
     patience_s = None if alone or None in limits else START_S + MARGIN_S + max(limit or 0.0 for limit in limits)
     with parallel_config(**settings):
+        loky_tracker.ensure_running()  # as in without_ctrl_c: joblib has one of its own
         with without_ctrl_c():
             coming: Any = Parallel(timeout=patience_s, **ONE_BY_ONE)(tasks())
         try:
