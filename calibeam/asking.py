@@ -25,9 +25,7 @@ from acquisition.errors import AcquisitionError
 GO, REFUSALS = "go", ("n", "no", "q")
 CELL = "THE ARM WILL MOVE. Is the cell clear?"
 YES = "give --yes when the cell is clear"
-REACTION_S = (
-    0.2  # a person takes longer to react (about 0.25 s); text under way through kernel and network arrives sooner
-)
+REACTION_S = 0.2  # a person takes longer (about 0.25 s); what kernel or network still carry arrives sooner
 END_OF_INPUT = b"\x04"  # what Ctrl-D sends where another program left the terminal without line editing
 
 
@@ -87,7 +85,8 @@ class Asking:
 
     def ask(self, question: str, cue: str) -> str | None:
         """One line, without spaces around it, typed after `question` was on the screen; None at the end of input."""
-        self.show(question)
+        if not self.show(question):
+            return None
         self.forget()
         self._write(cue, end="")
         line = self._line()
@@ -95,13 +94,15 @@ class Asking:
             self._write("")
         return line
 
-    def show(self, text: str) -> None:
-        """Returns when it can have been seen."""
+    def show(self, text: str) -> bool:
+        """Returns when it can have been seen; False where the terminal cannot be written to."""
         for stream in (sys.stdout, sys.stderr):
             with suppress(OSError, ValueError):
                 stream.flush()  # what was printed before comes first
-        self._write(text, bold=True)
+        if not self._write(text, bold=True):
+            return False
         self.wait_until_seen()
+        return True
 
     def wait_until_seen(self) -> None:
         """Returns when what was printed can have been seen."""
@@ -135,10 +136,14 @@ class Asking:
     def _bell(self) -> None:
         self._write("\a", end="")
 
-    def _write(self, text: str, *, end: str = "\n", bold: bool = False) -> None:
-        with suppress(OSError), os.fdopen(self._screen(), "w", encoding="utf-8", errors="replace") as screen:
-            style = "bold" if bold else None
-            Console(file=screen).print(text, end=end, style=style, markup=False, highlight=False, soft_wrap=True)
+    def _write(self, text: str, *, end: str = "\n", bold: bool = False) -> bool:
+        try:
+            with os.fdopen(self._screen(), "w", encoding="utf-8", errors="replace") as screen:
+                style = "bold" if bold else None
+                Console(file=screen).print(text, end=end, style=style, markup=False, highlight=False, soft_wrap=True)
+        except OSError:  # the terminal is gone, or is another user's
+            return False
+        return True
 
     def _screen(self) -> int:
         """A descriptor of the same terminal to write to, also where standard output is a file."""
@@ -163,8 +168,8 @@ def someone(asking: Asking | None, whether: str, remedy: str) -> Asking:
     """
     if asking is None:
         raise NotAgreedError(
-            f"nobody can be asked {whether}: standard input is not a terminal, or not this program's; run it in the "
-            f"foreground of a terminal, or {remedy}"
+            f"nobody can be asked {whether}: standard input is not a terminal, or the program runs in the background; "
+            f"run it in the foreground of a terminal, or {remedy}"
         )
     return asking
 

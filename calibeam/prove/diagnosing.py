@@ -122,9 +122,10 @@ def diagnose_cases(layout: Layout, names: Sequence[str], jobs: int, without: Seq
             try:
                 yield from pool.map(one, names)
             except BaseException:
-                ended.set()
-                for blind in begun:
-                    blind.kill()
+                with uninterrupted():
+                    ended.set()
+                    for blind in begun:
+                        blind.kill()
                 raise
     finally:
         with uninterrupted():

@@ -59,8 +59,8 @@ class Person:
         try:
             if self._console.is_terminal:
                 self._asking.wait_until_seen()
-            else:  # the view is a file, and shows nothing at the terminal
-                self._asking.show(f"{text}, then press ENTER")
+            elif not self._asking.show(f"{text}, then press ENTER"):  # the view is a file
+                raise AcquisitionError(f"{text}: nobody can be asked, the terminal cannot be written to")
             self._keys.wait(ENTER)
         finally:
             self._teller.asked("")

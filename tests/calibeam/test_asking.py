@@ -191,6 +191,27 @@ def test_a_terminal_that_goes_is_a_refusal(typist, monkeypatch) -> None:
         Asking(typist.terminal).may_move()
 
 
+def test_a_question_that_cannot_be_shown_is_a_refusal(typist, monkeypatch) -> None:
+    """A word that is typed is no answer then."""
+
+    def gone(_: Asking) -> int:
+        raise OSError("no terminal")
+
+    monkeypatch.setattr(Asking, "_screen", gone)
+    typist.ahead("go\n")
+    with pytest.raises(NotAgreedError, match="the input ended"):
+        Asking(typist.terminal).may_move()
+
+
+def test_a_terminal_that_can_only_be_read_shows_the_question_all_the_same(typist) -> None:
+    typist.answers(CUE, "go\n")
+    reading = os.open(os.ttyname(typist.terminal), os.O_RDONLY | os.O_NOCTTY)
+    try:
+        Asking(reading).may_move()
+    finally:
+        os.close(reading)
+
+
 def test_a_choice_is_one_of_its_letters_or_enter_for_the_first_offered(typist) -> None:
     asks, choices = Asking(typist.terminal), {"f": "finish", "n": "a further place"}
     typist.answers("what next? [f/n, ENTER: f] ", "x\n", "N\n", "\n", "\x04")

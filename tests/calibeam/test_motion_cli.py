@@ -61,9 +61,6 @@ def test_what_was_typed_ahead_moves_nothing(rig: Path, tmp_path: Path, typist, c
     assert run(["jog", str(rig), *command]) == 1
     assert "nothing was moved: the answer was 'q'" in capsys.readouterr().err
     np.testing.assert_allclose(stands_deg(rig), before, atol=1e-4)
-    typist.answers("Type go to move, no to leave it: ", "go\n")
-    assert run(["jog", str(rig), *command]) == 0
-    assert np.max(np.abs(stands_deg(rig) - before)) > 0.5  # 20 mm at an arm's length of 1 m turn some joint by 1°
 
 
 def test_a_motion_into_a_keep_out_box_is_refused(rig: Path, tmp_path: Path, capsys) -> None:
