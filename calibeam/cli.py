@@ -15,7 +15,7 @@ from rich.markup import escape
 from acquisition.errors import AcquisitionError
 from acquisition.recording.errors import RecordingError, RigFileError, SamplesError
 from calibeam.emulation import EmulationError
-from calibeam.outcome import CheckFailed, PartialResult
+from calibeam.outcome import CheckFailed, PartialResult, interruption
 from calibeam.prove.seal import BrokenSealError
 from calibrate.errors import DataError
 from drivers.errors import DeviceError
@@ -104,7 +104,7 @@ def run(arguments: list[str]) -> int:
         errors.print(f"[bold]stopped:[/bold] {escape(str(partial))}")
         return 3
     except KeyboardInterrupt as interrupt:
-        errors.print(f"stopped by {interrupt.args[0] if interrupt.args else 'Ctrl-C'}")
+        errors.print(f"stopped by {interruption(interrupt)}")
         return 1
     except TOLD as error:
         errors.print("error:", str(error), markup=False)

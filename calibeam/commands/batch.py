@@ -76,6 +76,8 @@ def batch_command(
         task = bar.add_task("recordings", total=None)
         ran = run(folder, out, wanted, lambda done, total, _: bar.update(task, completed=done, total=total))
     fleet = Fleet(ran.rows)
+    if ran.stopped and not json:
+        _end(ran, fleet, out, again=again)
     page = write_fleet_page(out / PAGE, fleet, folder.resolve().name)
     if json:
         print(msgspec.json.encode(record(ran, fleet, str(out / TABLE), str(page))).decode())
@@ -91,7 +93,9 @@ def _end(ran: "Ran", fleet: "Fleet", out: Path, *, again: bool) -> None:
     """PartialResult where not all is well, DataError where nothing is."""
     if ran.stopped:
         how = "leave --again out to go on" if again else "the same command goes on"
-        raise PartialResult(f"Ctrl-C; {len(ran.rows)} recordings are in {out / TABLE}, {ran.left} are left; {how}")
+        raise PartialResult(
+            f"{ran.stopped}; {len(ran.rows)} recordings are in {out / TABLE}, {ran.left} are left; {how}"
+        )
     if fleet.bad and len(fleet.bad) == len(fleet.rows):
         raise DataError(f"none of {len(fleet.rows)} recordings could be identified; the first: {fleet.bad[0].error}")
     if fleet.bad:

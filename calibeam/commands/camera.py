@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from rich.console import Console
-from rich.prompt import Confirm
 
 from acquisition.recording.errors import RigFileError
 from acquisition.recording.rig import load_rig, rig_text
+from calibeam.asking import YES, at_terminal, someone
 from calibeam.outcome import CheckFailed
 from calibeam.recorded import new_recording
 from calibeam.site import addresses_of, check_session, connected
@@ -41,9 +41,8 @@ def camera_command(
     check_session(loaded)
     if loaded.camera is None:
         raise RigFileError(f"rig {loaded.name}: no [camera]; say how it is reached, and what board is on the fixture")
-    if not (yes or Confirm.ask("the arm will move round the fixture; is the cell clear", default=False)):
-        console.print("nothing was moved")
-        return
+    if not yes:
+        someone(at_terminal(), "whether the arm may move", YES).may_move()
     from acquisition.camera.measuring import CameraMeasuring
     from acquisition.camera.model import write_model
     from calibeam.camera import opened

@@ -7,7 +7,7 @@ import msgspec
 from rich.console import Console
 
 from calibeam.prove.lines import print_proof, print_real
-from calibeam.prove.prove import Plan, fresh, prove
+from calibeam.prove.prove import Plan, ending_early, fresh, prove
 from calibeam.prove.real import prove_real
 from calibeam.prove.real_page import write_real_page
 from calibeam.prove.scenario import DEVELOPMENT, KINDS, Kind, Mix
@@ -103,7 +103,9 @@ def _tell(console: Console, word: str) -> None:
 
 def _real(console: Console, data: Path, out: Path, jobs: int) -> None:
     """Pages of all sets, real.html and real.json in `out`."""
-    sets = prove_real(data, fresh(out).out, jobs, lambda word: _tell(console, word))
+    folder = fresh(out).out
+    with ending_early(out, lambda word: _tell(console, word), "it begins with an empty folder") as count:
+        sets = prove_real(data, folder, jobs, count)
     (out / "real.json").write_bytes(msgspec.json.format(msgspec.json.encode(sets), indent=1) + b"\n")
     write_real_page(out / "real.html", sets, SOFTWARE)
     print_real(console, sets)

@@ -12,6 +12,7 @@ from acquisition.psd_view import psd_window
 from acquisition.recording.errors import SamplesError
 from acquisition.recording.rig import load_rig
 from acquisition.recording.rig_devices import PsdDevice
+from calibeam.asking import Asking, NotAgreedError, at_terminal, someone
 from calibeam.psd import PsdInstrument, psd_driver
 from drivers.clock import SystemClock
 from drivers.device import Block
@@ -24,6 +25,7 @@ from drivers.psd_kpa101.selfcheck import CheckStatus, UnitCheck, check_unit
 Floats = NDArray[np.float64]
 READ_S = 1.0
 COLUMNS = ("x_m", "y_m")
+NO_WAIT = "give --no-wait where something else moves the spot"
 RIG_DIFFERS = "the rig says"
 
 
@@ -51,12 +53,13 @@ def psd_check_command(rig: Path, *, points: Path, unit: int = 1, out: Path | Non
     out
         Where to write the error map, to be named in error_maps of the rig.
     wait
-        Wait for Enter at each place.
+        Wait for ENTER at each place. With --no-wait something else moves the spot, and nothing is asked.
 
     """
     place_m = _places(points)
     if unit not in (1, 2):
         raise SamplesError(f"--unit {unit}: the faces are 1 and 2")
+    ready = asked_at(someone(at_terminal(), "at each place", NO_WAIT)) if wait else _say_nothing
     loaded = load_rig(rig)
     device = loaded.devices.psd
     if device is None:
@@ -65,7 +68,7 @@ def psd_check_command(rig: Path, *, points: Path, unit: int = 1, out: Path | Non
     psd.connect()
     try:
         face = _face(psd, device, unit)
-        seen = collect(psd, face, unit, place_m, _ask_person if wait else _say_nothing)
+        seen = collect(psd, face, unit, place_m, ready)
     finally:
         psd.close()
     told: list[str] = []
@@ -161,8 +164,15 @@ def _places(path: Path) -> Floats:
     return np.array(rows)
 
 
-def _ask_person(number: int, place: Floats) -> None:
-    input(f"place {number}: put the spot to x = {place[0] * 1e3:+.3f} mm, y = {place[1] * 1e3:+.3f} mm, then Enter ")
+def asked_at(asking: Asking) -> Callable[[int, Floats], None]:
+    """Asks for the spot at each place. NotAgreedError, when it is called, on a refusal or the end of input."""
+
+    def ask(number: int, place: Floats) -> None:
+        where = f"x = {place[0] * 1e3:+.3f} mm, y = {place[1] * 1e3:+.3f} mm"
+        if not asking.enter(f"place {number}: put the spot to {where}"):
+            raise NotAgreedError(f"the check was ended at place {number}; nothing was written")
+
+    return ask
 
 
 def _say_nothing(number: int, place: Floats) -> None:

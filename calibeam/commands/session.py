@@ -18,13 +18,13 @@ from acquisition.recording.parts import parts
 from acquisition.recording.pose_plan import read_pose_plan
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.rig_schema import Rig
+from calibeam.asking import at_terminal
 from calibeam.emulation import ask_emulators, moves_nothing_real
 from calibeam.guided.recorded import encoder_address, is_guided
 from calibeam.guided.run import plan_of, run_guided
 from calibeam.live.feed import SILENT, Feed
 from calibeam.session.earlier import Earlier, earlier_of
 from calibeam.session.job import Job, with_place
-from calibeam.session.keys import keyboard
 from calibeam.session.places import new_place, with_places
 from calibeam.session.run import run_session
 from calibeam.site import addresses_of, check_session
@@ -133,7 +133,7 @@ def session(
         return _guided(loaded, text, out, plan, options, control, time_scale, console, verify=verify)
     check_session(loaded)
     poses = None if plan is None else read_pose_plan(plan, loaded)
-    there = keyboard() is not None
+    asking = at_terminal()
     job = Job(
         loaded,
         text,
@@ -146,9 +146,9 @@ def session(
         None if control is None else _through(*_host_and_port(control)),
     )
     earlier = _earlier(job, go_on=continue_, place=place)
-    agrees = yes or (control is not None and not there and moves_nothing_real(job.addresses.robot))
+    agrees = yes or (control is not None and asking is None and moves_nothing_real(job.addresses.robot))
     with _page(loaded, page, console) as feed:
-        run_session(job, console, earlier, feed, there=there, agrees=agrees, stands=stands)
+        run_session(job, console, earlier, feed, asking=asking, agrees=agrees, stands=stands)
     return None
 
 

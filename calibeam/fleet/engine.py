@@ -9,17 +9,19 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from importlib.metadata import version
 from multiprocessing import TimeoutError as SilenceError  # what joblib raises
 from typing import Any
 
 from joblib import Parallel, delayed, parallel_config
+from joblib.externals.loky.backend import resource_tracker as loky_tracker
 
 from calibeam.fleet.order import Order
 from calibeam.fleet.row import Row
 from calibeam.fleet.supervised import START_S, rest, worked
 from calibeam.fleet.workers import Engine, Workers
+from calibeam.worker_processes import without_ctrl_c
 from calibrate.errors import DataError
 
 ROUNDS = 3  # in which a worker may die over one recording, before it is given up
@@ -86,7 +88,9 @@ def _round(
     alone = settings["n_jobs"] == 1  # then joblib works in this process, and has no limit of time
     patience_s = None if alone or None in limits else START_S + MARGIN_S + max(limit or 0.0 for limit in limits)
     with parallel_config(**settings):
-        coming: Any = Parallel(timeout=patience_s, **ONE_BY_ONE)(tasks())
+        loky_tracker.ensure_running()  # as in without_ctrl_c: joblib has one of its own
+        with without_ctrl_c():
+            coming: Any = Parallel(timeout=patience_s, **ONE_BY_ONE)(tasks())
         try:
             yield from coming
         finally:
@@ -137,8 +141,8 @@ def _client(workers: Workers) -> Generator[Any]:
         with client:
             yield client
         return
-    with (
-        LocalCluster(n_workers=workers.jobs, **OF_OUR_OWN) as cluster,
-        Client(cluster, set_as_default=False) as client,
-    ):
+    with ExitStack() as opened:
+        with without_ctrl_c():
+            cluster = opened.enter_context(LocalCluster(n_workers=workers.jobs, **OF_OUR_OWN))
+            client = opened.enter_context(Client(cluster, set_as_default=False))
         yield client

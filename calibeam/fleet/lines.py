@@ -59,7 +59,7 @@ def record(ran: Ran, fleet: Fleet, table: str, page: str) -> dict[str, Any]:
         "failed": [{"name": r.name, "outcome": r.outcome.value, "error": r.error} for r in fleet.bad],
         "stood": ran.stood,
         "left": ran.left,
-        "stopped": ran.stopped,
+        "stopped": bool(ran.stopped),
         "robots": list(fleet.robots),
         "tested": len(fleet.lines),
         "scatter": fleet.drifts.scatter,

@@ -14,6 +14,7 @@ from calibeam.fleet.order import CHILD, Order, Task
 from calibeam.fleet.row import Row
 from calibeam.fleet.standing import standing
 from calibeam.fleet.workers import Workers
+from calibeam.outcome import interruption
 
 Tell = Callable[[int, int, str], None]  # done, of so many, what
 
@@ -38,7 +39,7 @@ class Ran:
     kept: int  # rows of recordings that are not there any more
     stood: int  # taken from an earlier run
     left: int  # not begun or not ended when the run was stopped
-    stopped: bool
+    stopped: str  # by what (Ctrl-C, SIGTERM); "" where it came to its end
 
 
 def run(folder: Path, out: Path, wanted: Wanted, tell: Tell) -> Ran:
@@ -74,21 +75,21 @@ def _work(
     tell: Tell,
     stood: int,
     total: int,
-) -> tuple[set[str], bool]:
-    """Paths that were done, and whether Ctrl-C came before all were."""
+) -> tuple[set[str], str]:
+    """Paths that were done, and what stopped it before all were."""
     done: set[str] = set()
     tell(stood, total, "")
     if not orders:
-        return done, False
+        return done, ""
     try:
         with closing(rows(orders, wanted.workers)) as coming:
             for row in coming:
                 journal.add(_named(row, groups, wanted))
                 done.add(row.path)
                 tell(stood + len(done), total, row.name)
-    except KeyboardInterrupt:
-        return done, True
-    return done, False
+    except KeyboardInterrupt as why:
+        return done, interruption(why)
+    return done, ""
 
 
 def _still_to_do(journal: Journal, paths: Set[str]) -> None:

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
-from rich.prompt import Confirm
 
 from acquisition.motion.cell import Cell
 from acquisition.motion.gate import Gate
@@ -15,6 +14,7 @@ from acquisition.motion.inverse.solver import Solver
 from acquisition.motion.paths.segments import Segment
 from acquisition.motion.plan import Plan
 from acquisition.recording.rig_schema import Rig
+from calibeam.asking import YES, Asking, at_terminal, someone
 from calibeam.motion.gate_of_rig import cell_of, gate_of, solver_of
 from calibeam.motion.keys import keys_of
 from calibeam.motion.robot import streamed_robot
@@ -37,8 +37,12 @@ class Agreement:
 def move_by_hand(rig: Rig, model: Path | None, asked: Asked, agreement: Agreement, console: Console) -> Floats:
     """Plan, draw, ask, move; the readings (joint,) in the end.
 
-    RefusedMotionError before anything moves; InterruptedMotionError, DeviceError in the motion: the arm stands then.
+    NotAgreedError, RefusedMotionError before anything moves; InterruptedMotionError, DeviceError in the motion: the arm
+    stands then.
     """
+    asking: Asking | None = None
+    if not (agreement.yes or agreement.dry):
+        asking = someone(at_terminal(), "whether the arm may move", f"{YES} (--dry-run plans and draws only)")
     clock, solver = SystemClock(), solver_of(rig, model)
     with streamed_robot(rig, clock) as robot:
         gate = gate_of(rig, solver, robot.arm, clock, agreement.speed_share)
@@ -46,9 +50,11 @@ def move_by_hand(rig: Rig, model: Path | None, asked: Asked, agreement: Agreemen
         made = gate.plan(now_rad, asked(solver, now_rad))
         draw_plan_file(made, cell_of(rig), agreement.plan_file)
         console.print(_said(made, agreement.plan_file), soft_wrap=True)
-        if agreement.dry or not (agreement.yes or Confirm.ask("move", default=False)):
+        if agreement.dry:
             console.print("nothing was moved")
             return now_rad
+        if asking is not None:
+            asking.may_move()
         return _drive(gate, made, robot.joints, robot.supervisor.check, console)
 
 

@@ -1,7 +1,7 @@
 """Ctrl-C and words at the keyboard while the arm moves: pause, hold, abort; resume, stop, halt.
 
 First Ctrl-C: rest at the next place. Second within 10 s: brake now. Third: give up. SIGTERM and a closed terminal give
-up at once. While the motion is held a line is read: r resume, s stop, a abort, h halt.
+up at once. While the motion is held a line is read, where there is a terminal: r resume, s stop, a abort, h halt.
 """
 
 import signal
@@ -14,17 +14,18 @@ from typing import TextIO
 
 from acquisition.motion.gate import Gate
 from acquisition.motion.states import State
+from calibeam.asking import Asking, at_terminal
 from drivers.errors import DeviceError
 
-WORDS = "held: r resume, s stop, a abort, h halt; then Enter"
+WORDS = "r resume, s stop, a abort, h halt, then ENTER"
 
 
 class Keys:
     """What was pressed, told to the gate."""
 
-    def __init__(self, gate: Gate, words: TextIO, out: TextIO) -> None:
-        self._gate, self._words, self._out = gate, words, out
-        self._asking: threading.Thread | None = None
+    def __init__(self, gate: Gate, asking: Asking | None, out: TextIO) -> None:
+        self._gate, self._asking, self._out = gate, asking, out
+        self._thread: threading.Thread | None = None
 
     def interrupted(self) -> None:
         """Ctrl-C."""
@@ -33,7 +34,7 @@ class Keys:
             return
         self._gate.pause()
         told = "braking" if self._held() else "resting at the next place; Ctrl-C again brakes now"
-        print(f"\n{told}. {WORDS}", file=self._out, flush=True)
+        print(f"\n{told}", file=self._out, flush=True)
         self._ask()
 
     def ended(self) -> None:
@@ -42,11 +43,11 @@ class Keys:
 
     def word(self, text: str) -> None:
         """One line of the keyboard."""
-        said = {"r": self._gate.resume, "s": self._gate.stop, "a": self._gate.abort, "h": self._gate.halt}
-        act = said.get(text.strip().lower()[:1])
+        word = text.strip().lower()
+        ends = {"s": self._gate.stop, "a": self._gate.abort, "h": self._gate.halt}
+        act = self._gate.resume if word in ("r", "resume") else ends.get(word[:1])
         if act is None:
-            print(WORDS, file=self._out, flush=True)
-            return
+            return  # asked again, with the words that there are
         try:
             act()
         except DeviceError as error:
@@ -56,15 +57,15 @@ class Keys:
         return self._gate.state is State.HELD
 
     def _ask(self) -> None:
-        if self._asking is None or not self._asking.is_alive():
-            self._asking = threading.Thread(target=self._listen, name="keys", daemon=True)
-            self._asking.start()
+        if self._asking is not None and (self._thread is None or not self._thread.is_alive()):
+            self._thread = threading.Thread(target=self._listen, args=(self._asking,), name="keys", daemon=True)
+            self._thread.start()
 
-    def _listen(self) -> None:
-        """Until the motion goes on or ends; end of input says nothing, Ctrl-C still does."""
+    def _listen(self, asking: Asking) -> None:
+        """Until the motion goes on or ends; the end of input means nothing, for Ctrl-C is still heard."""
         while self._gate.state in (State.HELD, State.PAUSING):
-            line = self._words.readline()
-            if not line:
+            line = asking.ask(WORDS, "> ")
+            if line is None:
                 return
             self.word(line)
 
@@ -72,7 +73,7 @@ class Keys:
 @contextmanager
 def keys_of(gate: Gate) -> Generator[Keys]:
     """Inside, Ctrl-C and SIGTERM speak to the gate instead of ending the program."""
-    keys = Keys(gate, sys.stdin, sys.stderr)
+    keys = Keys(gate, at_terminal(), sys.stderr)
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         keys.interrupted()

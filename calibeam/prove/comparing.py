@@ -1,8 +1,7 @@
 """Asks the oracle and other methods about some of the cases, in worker processes, after the seals are open."""
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
+from contextlib import closing
 
 import msgspec
 
@@ -10,6 +9,7 @@ from calibeam.prove.comparison import Compared, compare
 from calibeam.prove.layout import Layout
 from calibeam.prove.record import CaseScore
 from calibeam.prove.truth import Truth
+from calibeam.worker_processes import in_workers
 from calibrate.errors import DataError
 
 ASKED = ("one", "disturbed", "three")
@@ -30,8 +30,8 @@ def compared_cases(
     if not fit:
         return out
     orders = [(layout, cases[i].name, truths[i], cases[i].family) for i in fit]
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        for number, (i, found) in enumerate(zip(fit, pool.map(_compared, orders), strict=True), start=1):
+    with closing(in_workers(_compared, orders, jobs)) as coming:
+        for number, (i, found) in enumerate(zip(fit, coming, strict=True), start=1):
             tell(f"compared {number} of {len(fit)}")
             if found is not None:
                 out[i] = msgspec.structs.replace(

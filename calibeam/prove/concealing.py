@@ -1,10 +1,8 @@
 """Conceals cases in worker processes: recordings for the diagnosis, seals for the end, hashes for the public."""
 
 import json
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Generator
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 
 from calibeam.prove.layout import Layout
@@ -12,6 +10,7 @@ from calibeam.prove.scenario import DRAWS, WIRED_DRAWS, Mix, Scenario, scenario,
 from calibeam.prove.seal import fingerprint, new_key, sealed
 from calibeam.prove.streamed import conceal_streams, told
 from calibeam.prove.unseen_file import write_asked
+from calibeam.worker_processes import in_workers
 from simulators.conceal.belief import rig_document
 from simulators.conceal.case import Case, conceal
 from simulators.conceal.reveal import truth_document
@@ -41,7 +40,7 @@ class _Order:
     wired: bool = False
 
 
-def conceal_cases(layout: Layout, mix: Mix, seed: int, cases: int, jobs: int, wired: int = 0) -> Iterator[Concealed]:
+def conceal_cases(layout: Layout, mix: Mix, seed: int, cases: int, jobs: int, wired: int = 0) -> Generator[Concealed]:
     """The wired cases first, one at a time, for emulators and readers take two cores; then all others in their order.
 
     ConcealError where one cannot be drawn at all, or a machine is too busy for a session on the wires.
@@ -49,8 +48,7 @@ def conceal_cases(layout: Layout, mix: Mix, seed: int, cases: int, jobs: int, wi
     orders = [_Order(layout, mix, seed, number, new_key(), number >= cases) for number in range(cases + wired)]
     for few, at_a_time in ((orders[cases:], 1), (orders[:cases], jobs)):
         if few:
-            with ProcessPoolExecutor(at_a_time, mp_context=get_context("spawn")) as pool:
-                yield from pool.map(_conceal, few)
+            yield from in_workers(_conceal, few, at_a_time)
 
 
 def publish(layout: Layout, cases: list[Concealed]) -> str:

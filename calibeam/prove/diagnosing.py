@@ -4,13 +4,16 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+import threading
+from collections.abc import Generator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
 
 from calibeam.prove.layout import Layout
+from calibeam.recorded import uninterrupted
 
 KEPT = ("PATH", "HOME", "PYTHONPATH", "LANG", "SYSTEMROOT")  # of the environment; nothing in them is about a case
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
@@ -42,6 +45,7 @@ class Blind:
             text=True,
             env=bare_environment(os.environ),
             cwd=folder,
+            start_new_session=True,  # Ctrl-C is for the process that asks; this one ends with its input
         )
 
     def answer(self, layout: Layout, name: str) -> Answered:
@@ -54,9 +58,11 @@ class Blind:
         stdin, stdout = self._child.stdin, self._child.stdout
         if stdin is None or stdout is None:
             raise RuntimeError("the diagnosing process has no pipes")
-        stdin.write(json.dumps(order) + "\n")
-        stdin.flush()
-        line = stdout.readline()
+        line = ""
+        with suppress(BrokenPipeError):
+            stdin.write(json.dumps(order) + "\n")
+            stdin.flush()
+            line = stdout.readline()
         if not line:
             return Answered(name, 0.0, f"the diagnosing process ended with code {self._child.wait()}")
         said = json.loads(line)
@@ -70,34 +76,58 @@ class Blind:
     def alive(self) -> bool:
         return self._child.poll() is None
 
+    def kill(self) -> None:
+        """Ends the process in mid-work, from any thread: who waits for its answer gets an error."""
+        self._child.kill()
+
     def close(self) -> None:
         """Ends the process as soon as it has nothing to do."""
         if self._child.stdin is not None:
-            self._child.stdin.close()
+            with suppress(BrokenPipeError):
+                self._child.stdin.close()
         if self._child.stdout is not None:
             self._child.stdout.close()
         self._child.wait()
 
 
-def diagnose_cases(layout: Layout, names: Sequence[str], jobs: int, without: Sequence[str] = ()) -> Iterator[Answered]:
-    """In order of names; one process for each job, each taking a case at a time; `without` some physics, by name."""
+def diagnose_cases(layout: Layout, names: Sequence[str], jobs: int, without: Sequence[str] = ()) -> Generator[Answered]:
+    """In order of names; one process for each job, each taking a case at a time; `without` some physics, by name.
+
+    Whoever leaves it before its end, by Ctrl-C too, closes it: all processes are ended in mid-work then.
+    """
+    begun: list[Blind] = []
     idle: SimpleQueue[Blind] = SimpleQueue()
-    for _ in range(jobs):
-        idle.put(Blind(layout.answers, without))
+    ended = threading.Event()
+
+    def begin() -> Blind:
+        begun.append(Blind(layout.answers, without))
+        return begun[-1]
 
     def one(name: str) -> Answered:
         blind = idle.get()
         try:
-            if not blind.alive:
+            if not blind.alive and not ended.is_set():
                 blind.close()
-                blind = Blind(layout.answers, without)
+                blind = begin()
+            if ended.is_set():
+                blind.kill()
             return blind.answer(layout, name)
         finally:
             idle.put(blind)
 
     try:
+        for _ in range(jobs):
+            idle.put(begin())
         with ThreadPoolExecutor(jobs) as pool:
-            yield from pool.map(one, names)
+            try:
+                yield from pool.map(one, names)
+            except BaseException:
+                with uninterrupted():
+                    ended.set()
+                    for blind in begun:
+                        blind.kill()
+                raise
     finally:
-        while not idle.empty():
-            idle.get().close()
+        with uninterrupted():
+            for blind in begun:
+                blind.close()

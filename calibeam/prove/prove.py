@@ -1,12 +1,14 @@
 """The concealed proof: conceal, publish the hashes, diagnose blindly, open the seals, score."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
 
+from calibeam.outcome import PartialResult, interruption
 from calibeam.prove.comparing import compared_cases
 from calibeam.prove.concealing import Concealed, conceal_cases, publish
 from calibeam.prove.diagnosing import Answered, diagnose_cases
@@ -38,23 +40,54 @@ class Plan:
 
 
 def prove(out: Path, plan: Plan, tell: Tell, command: str) -> ProofFile:
-    """Everything, and proof.json in `out`. DataError where `out` holds something already."""
+    """Everything, and proof.json in `out`. DataError where `out` holds something already; PartialResult by Ctrl-C."""
     _refuse_unlisted(plan.without)
-    layout, began_s, total = fresh(out), time.monotonic(), plan.cases + plan.wired
+    layout = fresh(out)
+    with ending_early(out, tell, "the keys of its seals are never written") as count:
+        return _proved(layout, plan, tell, count, command)
+
+
+@contextmanager
+def ending_early(out: Path, tell: Tell, reason: str) -> Generator[Tell]:
+    """PartialResult instead of KeyboardInterrupt, with the last count that was reported by what is yielded.
+
+    `reason`: why it cannot be continued.
+    """
+    last = "nothing was finished"
+
+    def count(word: str) -> None:
+        nonlocal last
+        last = word
+        tell(word)
+
+    try:
+        yield count
+    except KeyboardInterrupt as why:
+        raise PartialResult(
+            f"{interruption(why)}; {last}; the files are kept in {out}, but a proof cannot be continued, because "
+            f"{reason}; start it again with another --out"
+        ) from why
+
+
+def _proved(layout: Layout, plan: Plan, tell: Tell, count: Tell, command: str) -> ProofFile:
+    began_s, total = time.monotonic(), plan.cases + plan.wired
     concealed: list[Concealed] = []
-    for one in conceal_cases(layout, plan.mix, plan.seed, plan.cases, plan.jobs, plan.wired):
-        concealed.append(one)
-        tell(f"concealed {len(concealed)} of {total}")
+    with closing(conceal_cases(layout, plan.mix, plan.seed, plan.cases, plan.jobs, plan.wired)) as coming:
+        for one in coming:
+            concealed.append(one)
+            count(f"concealed {len(concealed)} of {total}")
     concealed.sort(key=lambda one: one.scenario.name)
     published = publish(layout, concealed)
     tell(f"SHA-256 of {layout.hashes.name}, which seals all {total} cases: {published}")
     answered: list[Answered] = []
-    for answer in diagnose_cases(layout, [c.scenario.name for c in concealed], plan.jobs, plan.without):
-        answered.append(answer)
-        tell(f"diagnosed {len(answered)} of {total}")
+    names = [c.scenario.name for c in concealed]
+    with closing(diagnose_cases(layout, names, plan.jobs, plan.without)) as answers:
+        for answer in answers:
+            answered.append(answer)
+            count(f"diagnosed {len(answered)} of {total}")
     truths = [_opened(layout, c, plan.without) for c in concealed]
     scored = [score(layout, c, a, t) for c, a, t in zip(concealed, answered, truths, strict=True)]
-    scored = compared_cases(layout, scored, truths, plan.compare, plan.jobs, tell)
+    scored = compared_cases(layout, scored, truths, plan.compare, plan.jobs, count)
     proof = ProofFile(
         SCHEMA,
         SOFTWARE,

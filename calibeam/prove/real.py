@@ -1,6 +1,7 @@
 """Real recordings: what is found, what remains, and what is inferred of columns that were hidden on purpose."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -54,9 +55,10 @@ def prove_real(data: Path, out: Path, jobs: int, tell: Callable[[str], None]) ->
     for name, recording in sets.items():
         names += _laid_out(layout, name, recording)
     answers: dict[str, Answered] = {}
-    for answer in diagnose_cases(layout, names, jobs):
-        answers[answer.name] = answer
-        tell(f"diagnosed {answer.name}" + (f": {answer.error}" if answer.error else ""))
+    with closing(diagnose_cases(layout, names, jobs)) as coming:
+        for answer in coming:
+            answers[answer.name] = answer
+            tell(f"diagnosed {answer.name}" + (f": {answer.error}" if answer.error else ""))
     return tuple(_scored(layout, name, recording, answers) for name, recording in sets.items())
 
 

@@ -9,7 +9,6 @@ import os
 import queue
 import select
 import signal
-import sys
 import termios
 import threading
 import tty
@@ -45,6 +44,7 @@ class Keys:
         self._reins, self._terminal = reins, terminal
         self._question: _Question | None = None
         self._typed = KeyStream()
+        self._reading = threading.Lock()  # what is read is handed on before a question begins, or not at all
         self._opened = ExitStack()
         self._woken = self._wake = -1  # a pipe, while it is listened to
 
@@ -77,7 +77,10 @@ class Keys:
 
     def wait(self, allowed: str) -> str:
         """One of these keys, pressed from now on. StoppedError when given up (a, Ctrl-C); what a device failed with."""
-        self._question = question = _Question(allowed)
+        question = _Question(allowed)
+        with self._reading:
+            self._forget()
+            self._question = question
         try:
             while True:
                 self._reins.check_devices()
@@ -119,13 +122,26 @@ class Keys:
                     if bytes([code]) == END:
                         return
                     self._told(bytes([code]))
-            if self._terminal is not None and self._terminal in ready:
-                typed = _read(self._terminal)
-                if not typed:
-                    sources.remove(self._terminal)
-                for key in self._typed.keys(typed):
-                    self.pressed(key)
+            if self._terminal is not None and self._terminal in ready and not self._read(self._terminal):
+                sources.remove(self._terminal)
             self._reins.insist()
+
+    def _read(self, terminal: int) -> bool:
+        """Hands on what was typed; whether there may be more."""
+        with self._reading:
+            if not select.select([terminal], [], [], 0.0)[0]:
+                return True  # it was discarded in this moment
+            typed = _read(terminal)
+            for key in self._typed.keys(typed):
+                self.pressed(key)
+            return bool(typed)
+
+    def _forget(self) -> None:
+        """What was typed before a question was asked answers none."""
+        self._typed = KeyStream()
+        if self._terminal is not None:
+            with suppress(termios.error):
+                termios.tcflush(self._terminal, termios.TCIFLUSH)
 
     def _told(self, code: bytes) -> None:
         if code == GO_ON:
@@ -136,15 +152,6 @@ class Keys:
             self._reins.pause()
         else:
             self._reins.interrupt()
-
-
-def keyboard() -> int | None:
-    """Standard input, where it is a terminal that this process may read."""
-    try:
-        fd = sys.stdin.fileno()
-        return fd if os.isatty(fd) and os.tcgetpgrp(fd) == os.getpgrp() else None
-    except (OSError, ValueError):
-        return None
 
 
 def _read(fd: int) -> str:

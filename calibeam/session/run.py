@@ -13,6 +13,7 @@ from acquisition.planned_session import check_planned
 from acquisition.recording.parts import next_part, parts
 from acquisition.recording.rig_schema import Placement
 from acquisition.session import Summary
+from calibeam.asking import Asking
 from calibeam.conclude import conclude
 from calibeam.device_check import DeviceCheck, check_devices
 from calibeam.learner import FittedLearner
@@ -42,13 +43,15 @@ FINISH, MORE, PLACE = "f", "m", "n"
 class OnSite:
     """The steps; owns which part of the session comes next."""
 
-    def __init__(self, job: Job, console: Console, clock: Clock, feed: Feed, *, there: bool, agrees: bool) -> None:
+    def __init__(
+        self, job: Job, console: Console, clock: Clock, feed: Feed, asking: Asking | None, *, agrees: bool
+    ) -> None:
         self._job, self._console, self._clock, self._feed = job, console, clock, feed
-        terminal = TerminalView(console) if there and console.is_terminal else None
+        terminal = TerminalView(console) if asking is not None and console.is_terminal else None
         view: Listener = PlainView(console) if terminal is None else terminal
         self.teller = Teller(job.rig, clock, (LogFile(job.out / NAME), view, PageView(feed)))
         opened = {} if terminal is None else {"view": terminal.opened}
-        self._person = Person(console, self.teller, there=there, agrees=agrees, **opened)
+        self._person = Person(console, self.teller, asking, agrees=agrees, **opened)
         self._half_size_m = FittedLearner(job.rig).optics.half_size_m
 
     def run(self, earlier: Earlier, *, stands: bool) -> None:
@@ -90,7 +93,8 @@ class OnSite:
             answer = self._person.choose(
                 "something is wrong:",
                 {"r": "it is mended: try again", "g": "go on all the same", "e": "end"},
-                "e" if missing else "g",
+                default="e" if missing else "g",
+                at_end="e",
             )
             if answer == "e":
                 raise DeviceRefused("; ".join(check.line for check in checks if check.wrong))
@@ -110,8 +114,9 @@ class OnSite:
         part = part_of(self._job, earlier, self._half_size_m)
         if not part.open_at(standing):
             return replace(earlier, standing=None)
+        question = f"does the fixture still stand at place {standing}?"
         told = {"y": "yes, nobody has touched it", "n": "no, or nobody knows: it is measured anew, as a new place"}
-        if stands or self._person.choose(f"does the fixture still stand at place {standing}?", told, "n") == "y":
+        if stands or self._person.choose(question, told, "n", "n") == "y":
             return earlier
         place = same_place(part.rig, standing)
         self.teller.said(f"place {standing} is measured anew as place {place.id}; what was taken there still counts")
@@ -172,7 +177,7 @@ class OnSite:
         choices = {FINISH: "finish: identify, diagnose, report"}
         if part.plan is None:
             choices |= {MORE: "more poses, the fixture stays", PLACE: "a further place of the fixture"}
-        return self._person.choose("what next?", choices, FINISH)
+        return self._person.choose("what next?", choices, FINISH, FINISH)
 
     def _new_place(self, part: Part) -> Placement | None:
         """None: the terminal went instead of an answer, and it is enough."""
@@ -185,15 +190,22 @@ class OnSite:
 
 
 def run_session(
-    job: Job, console: Console, earlier: Earlier, feed: Feed = SILENT, *, there: bool, agrees: bool, stands: bool
+    job: Job,
+    console: Console,
+    earlier: Earlier,
+    feed: Feed = SILENT,
+    *,
+    asking: Asking | None,
+    agrees: bool,
+    stands: bool,
 ) -> None:
     """The whole session. `earlier`: what it goes on with; `stands`: the fixture has not been touched since.
 
-    `there`: a terminal at which a person sits; `agrees`: who needs not be asked whether the arm may move.
+    `asking`: the terminal at which a person sits; `agrees`: who needs not be asked whether the arm may move.
     """
     if job.plan is not None:
         check_planned(job.plan)
     clock = SystemClock()
     job.out.mkdir(parents=True, exist_ok=True)
-    site = OnSite(job, console, clock, feed, there=there, agrees=agrees)
+    site = OnSite(job, console, clock, feed, asking, agrees=agrees)
     site.run(earlier, stands=stands)

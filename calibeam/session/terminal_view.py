@@ -67,11 +67,14 @@ class TerminalView:
             self._console.print(text, highlight=False, markup=False, soft_wrap=self._live is None)
 
     def shows(self, shown: Shown) -> None:
-        if shown.asked and not self._shown.asked:
-            self._console.bell()
+        asks = bool(shown.asked) and not self._shown.asked
         if shown.step != self._shown.step:
             self._console.rule(f"[bold]{shown.step}[/bold]", align="left", style="bold")
         self._shown = shown
+        if asks:
+            self._console.bell()
+            if self._live is not None:
+                self._live.refresh()  # at once: only an answer to what is on the screen counts
 
     def _drawn(self) -> RenderableType:
         return drawn(self._shown)

@@ -1,5 +1,7 @@
 """The shipped rig, and emulators as a process of their own for tests that need real wires."""
 
+import os
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -8,6 +10,8 @@ import pytest
 from acquisition.recording.rig import load_rig
 from acquisition.recording.rig_schema import Rig
 from calibeam.emulation import Emulation
+
+from .typist import Typist
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
 
@@ -22,3 +26,14 @@ def emulation() -> Iterator[Emulation]:
     """Emulators of the shipped rig at eight times real time."""
     with Emulation(RIG, seed=5, time_scale=8.0) as running:
         yield running
+
+
+@pytest.fixture
+def typist(monkeypatch: pytest.MonkeyPatch) -> Iterator[Typist]:
+    """Standard input is a terminal at which somebody sits, and it is this process's own."""
+    person = Typist()
+    monkeypatch.setattr(os, "tcgetpgrp", lambda fd: os.getpgrp())
+    with os.fdopen(os.dup(person.terminal)) as standard_input:
+        monkeypatch.setattr(sys, "stdin", standard_input)
+        yield person
+    person.close()

@@ -54,6 +54,15 @@ def test_a_dry_run_draws_and_moves_nothing(rig: Path, tmp_path: Path, capsys) ->
     np.testing.assert_allclose(stands_deg(rig), before, atol=1e-4)
 
 
+def test_what_was_typed_ahead_moves_nothing(rig: Path, tmp_path: Path, typist, capsys) -> None:
+    before, command = stands_deg(rig), ["--axis", "z", "--by-mm", "20", "--out", str(tmp_path / "plan.svg")]
+    typist.ahead("go\n")
+    typist.answers("Type go to move, no to leave it: ", "yes\n", "q\n")
+    assert run(["jog", str(rig), *command]) == 1
+    assert "nothing was moved: the answer was 'q'" in capsys.readouterr().err
+    np.testing.assert_allclose(stands_deg(rig), before, atol=1e-4)
+
+
 def test_a_motion_into_a_keep_out_box_is_refused(rig: Path, tmp_path: Path, capsys) -> None:
     up = ["0", "-90", "0", "-90", "0", "0"]
     assert run(["move", str(rig), "--joints-deg", *up, "--yes", "--out", str(tmp_path / "plan.svg")]) == 1

@@ -75,10 +75,10 @@ def test_signs_scale_and_map_are_measured_and_used(bench, places, tmp_path, monk
     def move(number: int, place) -> None:
         bench.place_m = tuple(place)
 
-    monkeypatch.setattr(psd_check, "_ask_person", move)
+    monkeypatch.setattr(psd_check, "_say_nothing", move)
     monkeypatch.setattr(psd_check, "READ_S", 0.1)
     out = tmp_path / "psd2.json"
-    assert run(["psd-check", str(RIG), "--points", str(places), "--unit", "2", "--out", str(out)]) == 0
+    assert run(["psd-check", str(RIG), "--points", str(places), "--unit", "2", "--out", str(out), "--no-wait"]) == 0
     text = capsys.readouterr().out
     assert "unit 2: x_signs -1, as in the rig" in text
     assert "unit 2: y_signs 1, as in the rig" in text
@@ -90,14 +90,14 @@ def test_signs_scale_and_map_are_measured_and_used(bench, places, tmp_path, monk
 
 
 def test_a_rig_with_the_wrong_sign_is_corrected(bench, places, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(psd_check, "_ask_person", lambda number, place: setattr(bench, "place_m", tuple(place)))
+    monkeypatch.setattr(psd_check, "_say_nothing", lambda number, place: setattr(bench, "place_m", tuple(place)))
     monkeypatch.setattr(psd_check, "READ_S", 0.1)
     wrong = tmp_path / "wrong.toml"
     wrong.write_text(
         RIG.read_text().replace("x_signs = [-1, -1]", "x_signs = [1, -1]").replace("[10.0, 10.0]", "[40.0, 10.0]")
     )
     made = tmp_path / "map.json"
-    assert run(["psd-check", str(wrong), "--points", str(places), "--unit", "1", "--out", str(made)]) == 1
+    assert run(["psd-check", str(wrong), "--points", str(places), "--unit", "1", "--out", str(made), "--no-wait"]) == 1
     text, error = capsys.readouterr()
     assert "first, then measure the map again" in " ".join(error.split())
     assert not made.exists()

@@ -86,7 +86,7 @@ def test_a_zero_comes_with_what_the_rig_file_draws():
 
 
 def test_a_stopped_run_says_how_to_go_on():
-    ran = Ran((), 0, 0, 2, stopped=True)
+    ran = Ran((), 0, 0, 2, stopped="SIGTERM")
     for again, says in ((True, "leave --again out to go on"), (False, "the same command goes on")):
         with pytest.raises(PartialResult, match=says):
             _end(ran, Fleet(()), Path("out"), again=again)

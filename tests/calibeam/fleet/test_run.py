@@ -85,7 +85,7 @@ def test_ctrl_c_keeps_what_is_done_and_the_next_run_goes_on(ran, folder):
             raise KeyboardInterrupt
 
     stopped = ran(root, interrupt)
-    assert (stopped.stopped, stopped.left, len(stopped.rows)) == (True, 2, 1)
+    assert (stopped.stopped, stopped.left, len(stopped.rows)) == ("Ctrl-C", 2, 1)
     assert len(read_rows(ran.table)) == 1
     done = ran(root)
     assert (done.stood, done.left, len(done.rows)) == (1, 0, 3)
@@ -100,7 +100,7 @@ def test_all_anew_that_was_stopped_goes_on_and_loses_nothing(ran, folder):
             raise KeyboardInterrupt
 
     stopped = ran(root, interrupt, again=True)
-    assert (stopped.stopped, stopped.left, len(stopped.rows)) == (True, 2, 3)
+    assert (stopped.stopped, stopped.left, len(stopped.rows)) == ("Ctrl-C", 2, 3)
     done = ran(root)
     assert (done.stood, len(done.rows)) == (1, 3)
 

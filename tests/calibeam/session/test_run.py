@@ -7,12 +7,15 @@ from rich.console import Console
 
 from acquisition.plan import PlanOptions
 from acquisition.session import Summary
+from calibeam.asking import Asking
+from calibeam.device_check import DeviceCheck
 from calibeam.live.feed import SILENT
 from calibeam.session.earlier import Earlier
 from calibeam.session.job import Job, part_of
 from calibeam.session.run import OnSite
 from calibeam.site import addresses_of
 from drivers.clock import SystemClock
+from drivers.errors import DeviceRefused
 
 from .conftest import RIG_FILE
 
@@ -20,7 +23,7 @@ from .conftest import RIG_FILE
 @pytest.fixture
 def site(rig, tmp_path) -> OnSite:
     job = Job(rig, RIG_FILE.read_text(), tmp_path, addresses_of(rig), PlanOptions())
-    return OnSite(job, Console(quiet=True), SystemClock(), SILENT, there=True, agrees=True)
+    return OnSite(job, Console(quiet=True), SystemClock(), SILENT, None, agrees=True)
 
 
 def test_a_forecast_that_cannot_be_made_is_said_and_ends_nothing(site, tmp_path) -> None:
@@ -34,9 +37,18 @@ def test_a_forecast_that_cannot_be_made_is_said_and_ends_nothing(site, tmp_path)
     assert "no forecast: ZeroDivisionError: no pose ahead" in log
 
 
-def test_a_terminal_that_goes_instead_of_the_numbers_of_a_place_finishes(site, monkeypatch) -> None:
-    def gone(*words: object, **more: object) -> str:
-        raise EOFError
+def test_a_terminal_that_goes_instead_of_the_numbers_of_a_place_finishes(rig, tmp_path, typist) -> None:
+    job = Job(rig, RIG_FILE.read_text(), tmp_path, addresses_of(rig), PlanOptions())
+    site = OnSite(job, Console(quiet=True), SystemClock(), SILENT, Asking(typist.terminal), agrees=False)
+    typist.answers("> ", "\x04")
+    assert site._new_place(part_of(job, Earlier(), 0.01)) is None
 
-    monkeypatch.setattr("calibeam.session.person.Prompt.ask", gone)
-    assert site._new_place(part_of(site._job, Earlier(), 0.01)) is None
+
+def test_devices_that_are_wrong_end_the_session_where_the_input_ends(rig, tmp_path, typist, monkeypatch) -> None:
+    job = Job(rig, RIG_FILE.read_text(), tmp_path, addresses_of(rig), PlanOptions())
+    site = OnSite(job, Console(quiet=True), SystemClock(), SILENT, Asking(typist.terminal), agrees=False)
+    monkeypatch.setattr(OnSite, "_told", lambda _: [DeviceCheck("psd", "PSD2001-E", wrong="too few samples")])
+    typist.ahead("g\n")
+    typist.answers("something is wrong: [r/g/e, ENTER: g] ", "\x04")
+    with pytest.raises(DeviceRefused, match="too few samples"):
+        site._devices()

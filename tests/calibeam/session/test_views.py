@@ -1,5 +1,7 @@
 """What an engineer reads: in the terminal, on plain output, in the log, on the live page; and who is asked."""
 
+import os
+import threading
 from datetime import UTC, datetime
 from io import StringIO
 
@@ -9,10 +11,13 @@ from rich.console import Console
 
 from acquisition.errors import AcquisitionError
 from acquisition.progress import Phase, Progress
-from acquisition.session_states import State
+from acquisition.reins import Reins
+from acquisition.session_states import Event, State
+from calibeam.asking import Asking
 from calibeam.live.feed import SILENT
 from calibeam.live.feed import Progress as PageProgress
 from calibeam.session.forecast import Forecast
+from calibeam.session.keys import Keys
 from calibeam.session.log_file import LogFile
 from calibeam.session.pace import Pace, clock_words
 from calibeam.session.page_view import PageView
@@ -20,8 +25,10 @@ from calibeam.session.person import Person
 from calibeam.session.plain_view import PlainView
 from calibeam.session.shown import Shown
 from calibeam.session.teller import Teller, ToldJournal
-from calibeam.session.terminal_view import KEYS, drawn
+from calibeam.session.terminal_view import KEYS, TerminalView, drawn
 from drivers.errors import DeviceLost
+
+PATIENCE_S = 30.0
 
 
 class Clock:
@@ -236,29 +243,47 @@ def test_the_page_is_told_the_same_and_what_it_draws_by() -> None:
     assert last == again == PageProgress("collect", 3, 78, 60.0, "accuracy: not determined yet: ")
 
 
-def person(teller, *, there: bool, agrees: bool) -> Person:
-    return Person(Console(quiet=True), teller, there=there, agrees=agrees)
+def person(teller, asking: Asking | None, *, agrees: bool) -> Person:
+    return Person(Console(quiet=True), teller, asking, agrees=agrees)
 
 
 def test_where_nobody_can_be_asked_the_arm_does_not_move_without_yes(teller) -> None:
     with pytest.raises(AcquisitionError, match="--yes"):
-        person(teller, there=False, agrees=False).arm()
-    person(teller, there=False, agrees=True).arm()
-
-
-@pytest.mark.parametrize(("answer", "moves"), [("go", True), ("Go ", True), ("y", False), ("", False)])
-def test_only_the_word_lets_the_arm_move(teller, monkeypatch, answer, moves) -> None:
-    monkeypatch.setattr("calibeam.session.person.Prompt.ask", lambda *a, **k: answer)
-    asked = person(teller, there=True, agrees=False)
-    if moves:
-        asked.arm()
-    else:
-        with pytest.raises(AcquisitionError, match="nothing was moved"):
-            asked.arm()
+        person(teller, None, agrees=False).arm()
+    person(teller, None, agrees=True).arm()
 
 
 def test_a_script_gets_what_is_safe_and_nobody_puts_a_fixture_for_it(teller) -> None:
-    alone = person(teller, there=False, agrees=True)
-    assert alone.choose("does it stand?", {"y": "yes", "n": "no"}, "n") == "n"
+    alone = person(teller, None, agrees=True)
+    assert alone.choose("does it stand?", {"y": "yes", "n": "no"}, "n", "n") == "n"
     with pytest.raises(AcquisitionError, match="nobody can be asked"):
         alone.place("put the fixture at place 2")
+
+
+def test_the_question_for_the_fixture_is_on_the_screen_before_an_enter_counts(teller, heard, typist) -> None:
+    """Typed ahead, and typed while the question is being drawn: neither is an answer."""
+    reins = Reins(lambda: None, changed=teller.state)
+    reins.tell(Event.START)
+    asked = person(teller, Asking(typist.terminal), agrees=False)
+    typist.ahead("\n")
+    typist.answers("then press ENTER", "\n")
+    with Keys(reins, typist.terminal) as keys, asked.at(keys):
+        asker = threading.Thread(target=asked.place, args=("put the fixture at place 2",))
+        asker.start()
+        assert typist.shows("put the fixture at place 2, then press ENTER")
+        while keys._question is None:
+            asker.join(0.01)
+        assert asker.is_alive()
+        os.write(typist._ours, b"\n")
+        asker.join(PATIENCE_S)
+    assert not asker.is_alive()
+    assert [shown.asked for shown in heard.shown][-2:] == ["put the fixture at place 2, then press ENTER", ""]
+
+
+def test_what_a_person_is_asked_is_drawn_at_once(teller) -> None:
+    """Not at the next turn of the view, up to a quarter of a second later."""
+    console = Console(file=StringIO(), width=80, force_terminal=True)
+    view = TerminalView(console)
+    with view.opened():
+        view.shows(Shown(asked="put the fixture at place 2"))
+        assert "put the fixture at place 2" in console.file.getvalue()

@@ -6,18 +6,21 @@ import threading
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from acquisition.plan import PlanOptions, blocks
 from acquisition.recording.parts import parts
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan, write_pose_plan
 from acquisition.recording.read import read
+from acquisition.recording.rig import load_rig
 from acquisition.sample import Sample
 from acquisition.session_states import State
 from calibeam.cli import run
 from calibeam.emulation import Emulation
 from calibeam.session.ahead import ahead_of_blocks
 from calibeam.session.teller import Teller
+from drivers.ur.reader import UrReader
 
 from .conftest import RIG_FILE
 
@@ -72,6 +75,26 @@ def interrupted(monkeypatch) -> None:
 
     monkeypatch.setattr(Teller, "sample", sample)
     monkeypatch.setattr(Teller, "state", state)
+
+
+def test_a_word_typed_ahead_leaves_the_arm_where_it_stands(arguments, tmp_path, typist, capsys) -> None:
+    before_rad = reported_rad(tmp_path / "rig.toml")
+    typist.ahead("go\n")
+    typist.answers("Type go to move, no to leave it: ", "no\n")
+    assert run(arguments) == 1
+    assert "nothing was moved: the answer was 'no'" in capsys.readouterr().err
+    np.testing.assert_allclose(reported_rad(tmp_path / "rig.toml"), before_rad, atol=1e-5)
+    assert parts(tmp_path / "out") == []
+    assert "MEASURE" not in (tmp_path / "out" / "session.log").read_text()
+
+
+def reported_rad(rig_file: Path) -> np.ndarray:
+    reader = UrReader(load_rig(rig_file).devices.robot.host)
+    reader.connect()
+    try:
+        return reader.read(PATIENCE_S).values["actual_q_rad"][-1]
+    finally:
+        reader.close()
 
 
 @pytest.mark.usefixtures("interrupted")
