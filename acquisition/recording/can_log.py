@@ -142,7 +142,7 @@ def _messages(recording: Recording) -> Iterator[can.Message]:
     named: dict[str, int | str | None] = msgspec.json.decode(recording.notes.get(CHANNELS_NOTE, "{}"))
     start_s = _since_1970(recording.started_utc) - recording.host_s0
     if not math.isfinite(start_s):
-        start_s = -min(float(stream.host_s[0]) for stream in streams if stream.host_s.size)
+        start_s = -min((float(stream.host_s[0]) for stream in streams if stream.host_s.size), default=0.0)
     rows: list[tuple[float, int | str | None, Frame]] = []
     for stream in streams:
         channel = named.get(stream.name)
