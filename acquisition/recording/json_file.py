@@ -53,9 +53,9 @@ def read_json(path: Path, kind: JsonKind, records: type[T], other: Check) -> T:
         place, says, value = located(error, content, records)
         key = ".".join(map(str, place)) or "the file"
         is_one = not isinstance(value, dict | list)
-        spelled = f" = {shown(value)}" if is_one else ""
+        spelled = f" = {shown(value, 80)}" if is_one else ""
         raise kind.fault(
-            f"{path}: damaged {kind.name}: {shown(key)}{spelled}: {shown(plain(says))}; {kind.again}"
+            f"{path}: damaged {kind.name}: {shown(key, 80)}{spelled}: {shown(plain(says))}; {kind.again}"
         ) from error
 
 
