@@ -13,7 +13,7 @@ KeyPath = tuple[str | int, ...]  # ("arm", "joint", 0, "a_m"): elements of array
 _WORD = re.compile(
     r'"""(?:\\.|[^\\])*?"{3,5}'  # multi-line strings first: they begin like two short ones
     r"|'''(?:.|\n)*?'{3,5}"
-    r'|"(?:\\.|[^"\\\n])*"'
+    r'|"(?:[^"\\\n]++|\\.)*+"'
     r"|'[^'\n]*'"
     r"|\#[^\n]*"
     r"|\n"
