@@ -1,6 +1,6 @@
 """Every input variable a client may write: its type, and what writing it does.
 
-Analog outputs and the external force-torque are accepted and kept, without effect on the emulated world.
+The external force-torque is accepted and kept, without effect on the emulated world.
 Source of names and types: Universal Robots, "Real-Time Data Exchange (RTDE) Guide", table of controller inputs.
 """
 

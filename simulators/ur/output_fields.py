@@ -1,13 +1,15 @@
 """Every output variable a recipe may name: its type, and where the value comes from.
 
 Emulated are time, joints (position, speed, current, moment, temperature, mode), tool pose and speed, states, speed
-scaling, load, digital outputs and registers. target_current, target_moment and joint_control_output repeat the actual
-values. Plausible constants are: actual_current_window, actual_TCP_force and ft_raw_wrench (no contact), tool and base
-accelerations, analog inputs and outputs, digital inputs, tool inputs, voltages and robot current, momentum, execution
-times, accelerometer, elbow, Euromap67, encoder inputs, energies, collision and deviation ratios.
+scaling, load, forces at the tool (see dynamics), accelerometer (gravity only), elbow, digital and analog outputs,
+tool voltage and registers. target_current, target_moment and joint_control_output repeat the actual values. Plausible
+constants are: actual_current_window, wrench_calc_from_currents, tool and base accelerations, analog and digital inputs,
+tool inputs, voltages and robot current, momentum, execution times, Euromap67, encoder inputs, energies, collision and
+deviation ratios.
 Source of names and types: Universal Robots, "Real-Time Data Exchange (RTDE) Guide", table of controller outputs.
 """
 
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -28,7 +30,7 @@ class Field:
     constant: float | tuple[float, ...] | None = None  # where the value is always the same
 
 
-ZERO3, ZERO6 = (0.0,) * 3, (0.0,) * 6
+ZERO6 = (0.0,) * 6
 
 
 LIVE: dict[str, Field] = {
@@ -63,8 +65,18 @@ LIVE: dict[str, Field] = {
     "payload_cog": Field("VECTOR3D", lambda r: r.memory.installation.payload_cog_m),
     "payload_inertia": Field("VECTOR6D", lambda r: r.memory.installation.payload_inertia_kg_m2),
     "target_gravity": Field("VECTOR3D", lambda r: r.memory.installation.gravity_m_s2),
+    "actual_TCP_force": Field("VECTOR6D", lambda r: r.tool_wrench),
+    "ft_raw_wrench": Field("VECTOR6D", lambda r: r.raw_wrench),
+    "tcp_force_scalar": Field("DOUBLE", lambda r: math.hypot(*r.tool_wrench[:3])),
+    "actual_tool_accelerometer": Field("VECTOR3D", lambda r: r.accelerometer_m_s2),
+    "elbow_position": Field("VECTOR3D", lambda r: r.elbow_m),
+    "elbow_velocity": Field("VECTOR3D", lambda r: r.elbow_speed_m_s),
     "actual_digital_output_bits": Field("UINT64", lambda r: r.memory.digital_outputs),
     "actual_configurable_digital_output_bits": Field("UINT64", lambda r: (r.memory.digital_outputs >> 8) & 0xFF),
+    "analog_io_types": Field("UINT32", lambda r: r.memory.analog_types),
+    "standard_analog_output0": Field("DOUBLE", lambda r: r.memory.analog_outputs[0]),
+    "standard_analog_output1": Field("DOUBLE", lambda r: r.memory.analog_outputs[1]),
+    "tool_output_voltage": Field("INT32", lambda r: r.memory.tool_voltage_v),
     "output_bit_registers0_to_31": Field("UINT32", lambda r: r.memory.outputs.word(0)),
     "output_bit_registers32_to_63": Field("UINT32", lambda r: r.memory.outputs.word(32)),
     "input_bit_registers0_to_31": Field("UINT32", lambda r: r.memory.inputs.word(0)),
@@ -80,30 +92,20 @@ CONSTANT: dict[str, tuple[str, float | tuple[float, ...]]] = {
     "actual_robot_current": ("DOUBLE", 0.6),
     "actual_joint_voltage": ("VECTOR6D", (48.0,) * 6),
     "actual_current_window": ("VECTOR6D", (1.0,) * 6),
-    "actual_TCP_force": ("VECTOR6D", ZERO6),
-    "ft_raw_wrench": ("VECTOR6D", ZERO6),
     "wrench_calc_from_currents": ("VECTOR6D", ZERO6),
-    "tcp_force_scalar": ("DOUBLE", 0.0),
     "actual_TCP_acceleration": ("VECTOR6D", ZERO6),
     "target_TCP_acceleration": ("VECTOR6D", ZERO6),
     "target_base_acceleration": ("VECTOR6D", ZERO6),
     "target_base_wrench": ("VECTOR6D", ZERO6),
-    "actual_tool_accelerometer": ("VECTOR3D", (0.0, 0.0, 9.82)),
-    "elbow_position": ("VECTOR3D", ZERO3),
-    "elbow_velocity": ("VECTOR3D", ZERO3),
     "actual_digital_input_bits": ("UINT64", 0),
     "actual_configurable_digital_input_bits": ("UINT64", 0),
-    "analog_io_types": ("UINT32", 3),
     "io_current": ("DOUBLE", 0.02),
     "standard_analog_input0": ("DOUBLE", 0.0),
     "standard_analog_input1": ("DOUBLE", 0.0),
-    "standard_analog_output0": ("DOUBLE", 0.0),
-    "standard_analog_output1": ("DOUBLE", 0.0),
     "tool_mode": ("UINT32", 253),
     "tool_analog_input_types": ("UINT32", 3),
     "tool_analog_input0": ("DOUBLE", 0.0),
     "tool_analog_input1": ("DOUBLE", 0.0),
-    "tool_output_voltage": ("INT32", 0),
     "tool_output_current": ("DOUBLE", 0.0),
     "tool_temperature": ("DOUBLE", 30.0),
     "tool_output_mode": ("UINT8", 0),

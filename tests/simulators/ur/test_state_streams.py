@@ -58,7 +58,7 @@ def test_a_protective_stop_shows_in_the_flags(bench) -> None:
 
 
 def test_the_real_time_stream_comes_every_cycle(bench) -> None:
-    stream = realtime_stream(lambda: bench.controller.rtde.readout, VERSION)
+    stream = realtime_stream(lambda: bench.controller.rtde.readout)
     sizes = []
     for _ in range(5):
         bench.run(0.002)
