@@ -124,7 +124,7 @@ class Dashboard:
         if not self._loaded or not self._arm.power.ready or self._runner.program is not None:
             return "Failed to execute: play"
         try:
-            self._runner.start(self._compile(self.programs[self._loaded]))
+            self._runner.start(self._compile(self.programs[self._loaded]), delay_s=0.0)  # answers when it runs
         except (ScriptRefused, MoveRefused) as refused:  # the text was replaced since it was loaded
             self._runner.fail(str(refused))
             return "Failed to execute: play"

@@ -58,14 +58,16 @@ class ProgramRunner:
         new = min(self.n_failures - count, len(self._failures))
         return list(self._failures)[len(self._failures) - new :]
 
-    def start(self, program: Program) -> None:
+    def start(self, program: Program, delay_s: float = START_DELAY_S) -> None:
         """Replaces the running program; refused in silence while the arm may not move, as the script port does."""
         self.stop()
         if not self._arm.power.ready:
             self.last_error = f"program not started: robot {self._arm.power.robot_mode.name}, safety {self._arm.power.safety_mode.name}"  # noqa: E501
             return
         self._program, self.last_error = program, ""
-        self._starts_s = self._now_s + START_DELAY_S
+        self._starts_s = self._now_s + delay_s
+        if delay_s == 0.0:
+            self.state = RuntimeState.PLAYING
 
     def stop(self) -> None:
         """Works in every state; a moving arm brakes."""
