@@ -84,7 +84,7 @@ class ControlScript:
     # --- contact
 
     def contact_steps(self, direction: Sequence[float]) -> int:
-        """For how many cycles the tool has been touching the obstacle, 0 when it does not; asked once a cycle."""
+        """Cycles back to just before a contact, 0 without one (URScript, tool_contact). To be asked once a cycle."""
         touches = self.arm.dynamics.touches(self.arm.T_flange_tool, direction)
         goes_on = self._now_s - self._asked_s < 1.5 * TICK_S  # asked in the cycle before, too
         self._asked_s = self._now_s
@@ -92,9 +92,9 @@ class ControlScript:
         return self._touched_steps
 
     def back_to_contact(self, steps: int) -> Wait:
-        """Brakes, then returns on a straight line to where the joints were `steps` cycles ago."""
-        history = self.arm.history_rad
-        goal = self.arm.arm.tool(history[-min(steps + 1, len(history))].tolist(), self.arm.T_flange_tool)
+        """Brakes, then returns on a straight line to where the joints were `steps` cycles ago: just before it."""
+        history = self.arm.history_rad  # its newest is of the cycle before this one
+        goal = self.arm.arm.tool(history[-min(steps, len(history))].tolist(), self.arm.T_flange_tool)
         self.arm.stop_tool(CONTACT_DECELERATION_M_S2)
         returning = False
 
