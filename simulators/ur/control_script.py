@@ -2,13 +2,13 @@
 
 The script itself (URScript, 42 kB) is not interpreted: this is its behaviour, for PolyScope 5.12 to 5.25. Not
 imitated: its text messages, and its threads (a new motion replaces the one before, where two threads would fight).
-Source: the control script of ur_rtde 1.6.5: main loop, `process_cmd`, `exec_stopl_stopj`, `contact_thread`.
+Source: the control script of ur_rtde 1.6.5: main loop, `process_cmd`, `exec_stopl_stopj`, `contact_thread`,
+`write_async_progress_register`.
 """
 
 import math
 from collections.abc import Sequence
 
-from simulators.ur.async_status import AsyncStatus
 from simulators.ur.commands import COMMANDS
 from simulators.ur.motion import ArmController, MoveRefused
 from simulators.ur.moves import Leg
@@ -27,6 +27,9 @@ CONTACT_DECELERATION_M_S2 = 3.0  # of stopl after a contact
 CONTACT_LINE = (0.25, 1.2)  # speed [m/s] and acceleration [m/s^2] back to it: the defaults of movel
 # executed every cycle while present, and never answered with "done"
 REALTIME_COMMANDS = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, 66, 67, 68, 69, 70, 71})
+
+RUNNING = 1 << 15
+COUNTER_LIMIT = 127
 
 
 class ControlScript:
@@ -247,3 +250,30 @@ class ControlScript:
 
     def _report_word(self, word: int) -> None:
         self.memory.outputs.ints[self._ints + PROGRESS] = word
+
+
+class AsyncStatus:
+    """The progress word, output integer register 2.
+
+    Bits 0-14 progress, bit 15 running, bits 16-23 write counter, bits 24-30 operation id, both counting 0..127. Every
+    change counts up, so that a client sees even an operation that is shorter than its cycle.
+    """
+
+    def __init__(self) -> None:
+        self._writes = 0
+        self._operation = 0
+
+    def started(self) -> int:
+        self._operation = 0 if self._operation == COUNTER_LIMIT else self._operation + 1
+        return self._word(RUNNING)
+
+    def progress(self, value: int) -> int:
+        """`value`: what the program reports, for a path the index of the leg."""
+        return self._word(RUNNING | min(max(value, 0), RUNNING - 1))
+
+    def finished(self) -> int:
+        return self._word(0)
+
+    def _word(self, low: int) -> int:
+        self._writes = 0 if self._writes == COUNTER_LIMIT else self._writes + 1
+        return low | (self._writes << 16) | (self._operation << 24)

@@ -1,6 +1,6 @@
 """What the controller streams on 30001, 30002 (10 Hz) and 30003 (500 Hz), where it also takes programs.
 
-Emulated are the values that RTDE has, too; all others are the constants of simulators/ur/output_fields.py. Every robot
+Emulated are the values that RTDE has, too; all others are the constants of simulators/ur/fields.py. Every robot
 state holds all its sub-packages. 30001 also reports programs that were refused or ended in an error. What is not
 imitated: the safety sub-package (10, for the manufacturer's own use), key, label, pop-up and text messages.
 Source: Universal Robots, "Client Interfaces, primary and secondary" and "real-time client interface", versions 5.10 to

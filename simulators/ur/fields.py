@@ -1,12 +1,13 @@
-"""Every output variable a recipe may name: its type, and where the value comes from.
+"""Every variable that a recipe may name: its type, where an output comes from, and what writing an input does.
 
-Emulated are time, joints (position, speed, current, moment, temperature, mode), tool pose and speed, states, speed
+Of the outputs, emulated are time, joints (position, speed, current, moment, temperature, mode), tool pose and speed, states, speed
 scaling, load, forces at the tool (see dynamics), accelerometer (gravity only), elbow, digital and analog outputs,
 tool voltage and registers. target_current, target_moment and joint_control_output repeat the actual values. Plausible
 constants are: actual_current_window, wrench_calc_from_currents, tool and base accelerations, analog and digital inputs,
 tool inputs, voltages and robot current, momentum, execution times, Euromap67, encoder inputs, energies, collision and
-deviation ratios.
-Source of names and types: Universal Robots, "Real-Time Data Exchange (RTDE) Guide", table of controller outputs.
+deviation ratios. Of the inputs, the external force-torque is accepted and kept, without effect on the emulated world.
+Source of names and types: Universal Robots, "Real-Time Data Exchange (RTDE) Guide", tables of controller outputs and
+inputs.
 """
 
 import math
@@ -16,7 +17,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from simulators.ur.readout import Readout
-from simulators.ur.registers import N_BITS, N_REGISTERS, Registers
+from simulators.ur.registers import N_BITS, N_REGISTERS, Memory, Registers
 
 Source = Callable[[Readout], Any]  # a number, or as many as the type is long
 
@@ -136,10 +137,10 @@ def output_field(name: str) -> Field | None:
         field_type, value = CONSTANT[name]
         return Field(field_type, lambda r: value, value)
     match = REGISTER.fullmatch(name)
-    return None if match is None else _register_field(match[1] == "input", match[2], int(match[3]))
+    return None if match is None else _output_register(match[1] == "input", match[2], int(match[3]))
 
 
-def _register_field(is_input: bool, kind: str, index: int) -> Field | None:
+def _output_register(is_input: bool, kind: str, index: int) -> Field | None:
     def side(readout: Readout) -> Registers:
         return readout.memory.inputs if is_input else readout.memory.outputs
 
@@ -149,4 +150,54 @@ def _register_field(is_input: bool, kind: str, index: int) -> Field | None:
         return Field("DOUBLE", lambda r: side(r).doubles[index])
     if kind == "bit" and 64 <= index < N_BITS:
         return Field("BOOL", lambda r: side(r).bit(index))
+    return None
+
+
+# --- inputs
+
+SETTINGS = {
+    "speed_slider_mask": "UINT32",
+    "speed_slider_fraction": "DOUBLE",
+    "standard_digital_output_mask": "UINT8",
+    "standard_digital_output": "UINT8",
+    "configurable_digital_output_mask": "UINT8",
+    "configurable_digital_output": "UINT8",
+    "tool_digital_output_mask": "UINT8",
+    "tool_digital_output": "UINT8",
+    "standard_analog_output_mask": "UINT8",
+    "standard_analog_output_type": "UINT8",
+    "standard_analog_output_0": "DOUBLE",
+    "standard_analog_output_1": "DOUBLE",
+    "external_force_torque": "VECTOR6D",
+}
+INPUT_REGISTER = re.compile(r"input_(int|double|bit)_register_(\d+)")
+
+
+@dataclass(frozen=True)
+class InputField:
+    """A variable: its RTDE type and how it is written (one number, or a tuple for a vector)."""
+
+    type_name: str
+    write: Callable[[Any], None]
+
+
+def input_field(name: str, memory: Memory) -> InputField | None:
+    """The variable of that name, None when there is none (the controller then answers NOT_FOUND)."""
+    if name in SETTINGS:
+        return InputField(SETTINGS[name], lambda value: memory.settings.__setitem__(name, value))
+    if name == "input_bit_registers0_to_31":
+        return InputField("UINT32", lambda value: memory.inputs.set_word(0, value))
+    if name == "input_bit_registers32_to_63":
+        return InputField("UINT32", lambda value: memory.inputs.set_word(32, value))
+    match = INPUT_REGISTER.fullmatch(name)
+    return None if match is None else _input_register(match[1], int(match[2]), memory)
+
+
+def _input_register(kind: str, index: int, memory: Memory) -> InputField | None:
+    if kind == "int" and index < N_REGISTERS:
+        return InputField("INT32", lambda value: memory.write_int(index, value))
+    if kind == "double" and index < N_REGISTERS:
+        return InputField("DOUBLE", lambda value: memory.inputs.doubles.__setitem__(index, value))
+    if kind == "bit" and 64 <= index < N_BITS:
+        return InputField("BOOL", lambda value: memory.inputs.set_bit(index, value))
     return None
