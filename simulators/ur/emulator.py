@@ -209,7 +209,9 @@ class Safety:
         self._controller.report_version((major, minor, bugfix, build))
 
     def store(self, name: str, script: str) -> None:
-        """Puts a program on the controller's disk, as a text of URScript, for the dashboard to load."""
+        """Puts a program on the controller's disk, as a text of URScript. ValueError unless name and text are texts."""
+        if not (isinstance(name, str) and isinstance(script, str)):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise ValueError(f"program {name!r}: name and script must be texts")
         self._controller.dashboard.programs[name] = script
 
     def obstacle(self, point_m: Sequence[float], normal: Sequence[float]) -> None:

@@ -1,11 +1,11 @@
 """Every variable that a recipe may name: its type, where an output comes from, and what writing an input does.
 
-Of the outputs, emulated are time, joints (position, speed, current, moment, temperature, mode), tool pose and speed, states, speed
-scaling, load, forces at the tool (see dynamics), accelerometer (gravity only), elbow, digital and analog outputs,
-tool voltage and registers. target_current, target_moment and joint_control_output repeat the actual values. Plausible
-constants are: actual_current_window, wrench_calc_from_currents, tool and base accelerations, analog and digital inputs,
+Emulated outputs: time, joints (position, speed, current, moment, temperature, mode), tool pose and speed, states, speed
+scaling, load, forces at the tool (see dynamics), accelerometer (gravity only), elbow, digital and analog outputs, tool
+voltage and registers. target_current, target_moment and joint_control_output repeat the actual values. Plausible
+constants: actual_current_window, wrench_calc_from_currents, tool and base accelerations, analog and digital inputs,
 tool inputs, voltages and robot current, momentum, execution times, Euromap67, encoder inputs, energies, collision and
-deviation ratios. Of the inputs, the external force-torque is accepted and kept, without effect on the emulated world.
+deviation ratios. Inputs: the external force-torque is kept, without effect on the emulated world.
 Source of names and types: Universal Robots, "Real-Time Data Exchange (RTDE) Guide", tables of controller outputs and
 inputs.
 """

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from simulators.ur.dynamics import Carried, Dynamics, Obstacle
+from simulators.ur.emulator import Safety
 from simulators.ur.poses import IDENTITY, compose, frame_of, invert, rotate
 from simulators.ur.registers import Installation
 from simulators.ur.states import RuntimeState, SafetyMode
@@ -149,3 +150,21 @@ def test_an_earlier_script_leaves_the_registers_as_they_are(bench) -> None:
         bench.run(0.004)
     assert client.results(6) == [7.0] * 6
     assert client.state == 1
+
+
+# --- what a person at the robot may change
+
+
+def test_an_obstacle_is_a_point_and_a_direction(bench) -> None:
+    verbs = Safety(bench.controller)
+    verbs.obstacle([0.1, 0.2, 0.3], [0.0, 3.0, 4.0])
+    assert bench.arm.dynamics.obstacle == Obstacle((0.1, 0.2, 0.3), (0.0, 0.6, 0.8))
+    for point_m, normal in (([0.0, 0.0], [0.0, 0.0, 1.0]), ([0.0] * 3, [0.0] * 3), ([math.nan] * 3, [0.0, 0.0, 1.0])):
+        with pytest.raises(ValueError, match="three finite numbers"):
+            verbs.obstacle(point_m, normal)
+
+
+@pytest.mark.parametrize("version", ["5.12", "5.12.0.x", "", "5.12.0.-1"])
+def test_a_version_has_four_numbers(bench, version: str) -> None:
+    with pytest.raises(ValueError, match="four numbers"):
+        Safety(bench.controller).polyscope(version)
