@@ -15,8 +15,9 @@ from simulators.modbus.plc import WRITTEN_BY_CLIENTS, MotionProgram
 from simulators.modbus.register_map import RegisterMap
 from simulators.modbus.rtu_wire import RtuWire
 from simulators.modbus.tcp_wire import TcpWire
+from simulators.ur.dynamics import ArmWorld
 from simulators.ur.emulator import arm_controller
-from simulators.ur.motion import ArmController, ArmWorld
+from simulators.ur.motion import ArmController
 from simulators.ur.readout import TORQUE_PER_CURRENT_NM_A
 from simulators.ur.states import SafetyMode
 from simulators.wire import Bench, SerialPort, TcpPort, Wire

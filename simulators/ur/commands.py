@@ -1,7 +1,9 @@
 """The commands of ur_rtde's control script: number, inputs, effect, results.
 
-Without effect on the emulated world, but answered as the script does: force mode, free-drive, teach mode, force sensor,
-contact detection (there is never a contact), direct torque. `getTargetWaypoint` gives the set-point's tool pose.
+Without effect on the emulated world, but answered as the script does: force mode, free-drive, teach mode, an external
+force sensor, direct torque. `getTargetWaypoint` gives the set-point's tool pose. Contact is that of the tool point with
+the obstacle of simulators/ur/dynamics.py. Commands 67 to 71 are answered only where the script holds their functions,
+which ur_rtde uploads from PolyScope 5.23 on; before that they do nothing, as in the script.
 Source of numbers and registers: the control script of ur_rtde 1.6.5, `process_cmd`.
 """
 
@@ -13,6 +15,7 @@ from simulators.ur.moves import Leg
 from simulators.ur.poses import IDENTITY, compose, frame_of, pose_of, rotate
 from simulators.ur.program import Wait
 from simulators.ur.registers import Memory
+from simulators.ur.setpoint import Floats
 from simulators.wire import TICK_S
 
 
@@ -22,12 +25,19 @@ class Script(Protocol):
     arm: ArmController
     memory: Memory
     tool_speed_mode: bool
+    has_dynamics: bool
 
     def number(self, index: int) -> float: ...
     def numbers(self, first: int, count: int = 6) -> list[float]: ...
     def integer(self, index: int) -> int: ...
     def answer(self, values: "list[float] | tuple[float, ...]") -> None: ...
     def answer_integer(self, value: int) -> None: ...
+    def answer_matrix(self, matrix: Floats) -> None: ...
+    def contact_steps(self, direction: "list[float]") -> int: ...
+    def back_to_contact(self, steps: int) -> Wait: ...
+    def watch_contact(self, direction: "list[float] | None") -> None: ...
+    @property
+    def contact_step_back(self) -> int: ...
     def begin(self, legs: list[Leg], is_async: bool) -> Wait | None: ...
     def begin_path(self, is_async: bool) -> Wait | None: ...
     def stop(self, is_tool: bool, deceleration: float, is_async: bool) -> Wait | None: ...
@@ -120,9 +130,41 @@ def jog_stop(s: Script) -> Wait | None:
 
 
 def move_until_contact(s: Script) -> Wait:
-    """There is never a contact: it moves until it is stopped or reaches a limit."""
-    s.arm.speed_tool(s.numbers(0), s.number(12))
-    return lambda: False
+    """Tool speed until the tool touches the obstacle, then back to where it touched first.
+
+    Without an obstacle in its way the arm goes on to a limit, where a protective stop ends the program.
+    """
+    speed, direction, acceleration = s.numbers(0), s.numbers(6, 3), s.number(12)
+    s.end_async()
+    rest: list[Wait] = []
+
+    def done() -> bool:
+        if not rest:
+            steps = s.contact_steps(direction)
+            if not steps:
+                s.arm.speed_tool(speed, acceleration)
+                return False
+            rest.append(s.back_to_contact(steps))
+        return rest[0]()
+
+    return done
+
+
+def tool_contact(s: Script) -> None:
+    s.answer_integer(s.contact_steps(s.numbers(0, 3)))
+
+
+def start_contact_detection(s: Script) -> None:
+    s.watch_contact(s.numbers(0, 3))
+
+
+def stop_contact_detection(s: Script) -> None:
+    s.watch_contact(None)
+    s.answer_integer(s.contact_step_back)
+
+
+def read_contact_detection(s: Script) -> None:
+    s.answer_integer(s.contact_step_back)
 
 
 def protective_stop(s: Script) -> None:
@@ -156,6 +198,10 @@ def get_tool(s: Script) -> None:
     s.answer(pose_of(s.arm.T_flange_tool))
 
 
+def zero_sensor(s: Script) -> None:
+    s.arm.dynamics.zero_sensor(s.arm.arm.forward(s.arm.joints.q_rad.tolist())[0], s.memory.installation)
+
+
 def set_gravity(s: Script) -> None:
     s.memory.installation.gravity_m_s2 = tuple(s.numbers(0, 3))
 
@@ -179,7 +225,35 @@ def target_waypoint(s: Script) -> None:
 
 
 def joint_torques(s: Script) -> None:
-    s.answer(s.arm.joints.torque_nm.tolist())
+    """Without those that the arm itself and the stated payload need: about zero where nothing touches the arm."""
+    qdd_rad_s2 = s.arm.setpoint.qdd_rad_s2
+    s.answer(s.arm.dynamics.outer_torque_nm(s.arm.joints, qdd_rad_s2, s.memory.installation).tolist())
+
+
+def mass_matrix(s: Script) -> None:
+    if s.has_dynamics:
+        s.answer_matrix(s.arm.dynamics.mass_matrix_kg_m2(s.arm.joints.q_rad))
+
+
+def coriolis_torques(s: Script) -> None:
+    if s.has_dynamics:
+        s.answer(s.arm.dynamics.coriolis_nm(s.arm.joints.q_rad, s.arm.joints.qd_rad_s).tolist())
+
+
+def target_accelerations(s: Script) -> None:
+    if s.has_dynamics:
+        s.answer(s.arm.setpoint.qdd_rad_s2.tolist())
+
+
+def jacobian(s: Script) -> None:
+    if s.has_dynamics:
+        s.answer_matrix(s.arm.arm.jacobian(s.arm.joints.q_rad.tolist(), s.arm.T_flange_tool)[0])
+
+
+def jacobian_rate(s: Script) -> None:
+    if s.has_dynamics:
+        joints = s.arm.joints
+        s.answer_matrix(s.arm.dynamics.jacobian_rate(joints.q_rad, joints.qd_rad_s, s.arm.T_flange_tool))
 
 
 def flange_pose(s: Script) -> None:
@@ -226,8 +300,8 @@ def is_steady(s: Script) -> None:
     s.answer_integer(int(s.arm.steady))
 
 
-def no_contact(s: Script) -> None:
-    s.answer_integer(0)
+def freedrive_status(s: Script) -> None:
+    s.answer_integer(0)  # normal
 
 
 def no_effect(s: Script) -> None:
@@ -249,7 +323,7 @@ COMMANDS: dict[int, Command] = {
     4: move_line_to_joints,
     6: no_effect,  # force mode
     7: no_effect,
-    8: no_effect,  # zero the force sensor
+    8: zero_sensor,
     9: speed_joints,
     10: speed_line,
     11: servo_joints,
@@ -262,7 +336,7 @@ COMMANDS: dict[int, Command] = {
     20: no_effect,  # force mode damping and gain
     21: no_effect,
     24: servo_line,
-    25: no_contact,
+    25: tool_contact,
     26: step_time,
     27: joints_before,
     28: target_waypoint,
@@ -287,15 +361,21 @@ COMMANDS: dict[int, Command] = {
     51: move_until_contact,
     52: no_effect,  # free-drive
     53: no_effect,
-    54: no_contact,  # free-drive status 0: normal
+    54: freedrive_status,
     56: no_effect,  # force input
     57: no_effect,
     58: flange_pose,
     59: set_gravity,
     60: has_inverse,
     61: has_inverse_near,
-    62: no_effect,  # contact detection
-    63: no_contact,
-    64: no_contact,
+    62: start_contact_detection,
+    63: stop_contact_detection,
+    64: read_contact_detection,
     65: set_target_payload,
+    66: no_effect,  # direct torque, from PolyScope 5.26 on
+    67: mass_matrix,
+    68: coriolis_torques,
+    69: target_accelerations,
+    70: jacobian,
+    71: jacobian_rate,
 }

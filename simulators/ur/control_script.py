@@ -1,14 +1,14 @@
 """What ur_rtde's uploaded control script does: a command register in, a state register out, once per cycle.
 
-The script itself (URScript, 42 kB) is not interpreted: this is its behaviour, for PolyScope 5.12. Not imitated: its
-text messages, its threads (a new motion replaces the one before, where two threads would fight), and commands 66 to
-71, which the script for 5.12 does not hold either.
-Source: the control script of ur_rtde 1.6.5: main loop, `process_cmd`, `exec_stopl_stopj`.
+The script itself (URScript, 42 kB) is not interpreted: this is its behaviour, for PolyScope 5.12 to 5.25. Not
+imitated: its text messages, and its threads (a new motion replaces the one before, where two threads would fight).
+Source: the control script of ur_rtde 1.6.5: main loop, `process_cmd`, `exec_stopl_stopj`, `contact_thread`,
+`write_async_progress_register`.
 """
 
+import math
 from collections.abc import Sequence
 
-from simulators.ur.async_status import AsyncStatus
 from simulators.ur.commands import COMMANDS
 from simulators.ur.motion import ArmController, MoveRefused
 from simulators.ur.moves import Leg
@@ -16,12 +16,20 @@ from simulators.ur.program import Wait
 from simulators.ur.registers import Memory
 from simulators.ur.script_program import leg_of
 from simulators.ur.script_text import ScriptRefused, UploadedControl
+from simulators.ur.setpoint import Floats
+from simulators.wire import TICK_S
 
 READY, DONE = 1, 2
 IDLE_COMMAND, STOP_SCRIPT_COMMAND = 0, 255
 COMMAND, STATE, PROGRESS = 0, 0, 2  # integer registers
+MATRIX_REGISTERS = (*range(24), *range(36, 48))  # column by column
+CONTACT_DECELERATION_M_S2 = 3.0  # of stopl after a contact
+CONTACT_LINE = (0.25, 1.2)  # speed [m/s] and acceleration [m/s^2] back to it: the defaults of movel
 # executed every cycle while present, and never answered with "done"
 REALTIME_COMMANDS = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, 66, 67, 68, 69, 70, 71})
+
+RUNNING = 1 << 15
+COUNTER_LIMIT = 127
 
 
 class ControlScript:
@@ -31,6 +39,13 @@ class ControlScript:
         """ScriptRefused or MoveRefused when the injected path cannot be run."""
         self.arm, self.memory = arm, memory
         self.tool_speed_mode = False  # the last speed command was speedl, not speedj
+        self.has_dynamics = uploaded.has_dynamics
+        self.contact_step_back = 0  # cycles since the tool touched first, of the last contact that was watched for
+        self._touched_steps = 0
+        self._asked_s = -math.inf
+        self._watched: list[float] | None = None  # direction of the contact that is watched for
+        self._was_free = False  # no contact since the watch began
+        self._contact_came = False
         self._ints, self._doubles = uploaded.int_offset, uploaded.float_offset
         self._path = [call for call in uploaded.path if call.name != "signal_async_progress"]
         self._status = AsyncStatus()
@@ -62,6 +77,48 @@ class ControlScript:
     def answer_integer(self, value: int) -> None:
         self.memory.outputs.ints[self._ints + 1] = value
 
+    def answer_matrix(self, matrix: Floats) -> None:
+        """36 results of (6, 6). MoveRefused with the upper registers, where the script writes beyond the last one."""
+        if self._doubles:
+            raise MoveRefused(f"write_output_float_register: register {self._doubles + MATRIX_REGISTERS[-1]}")
+        for register, value in zip(MATRIX_REGISTERS, matrix.T.ravel().tolist(), strict=True):
+            self.memory.outputs.doubles[register] = value
+
+    # --- contact
+
+    def contact_steps(self, direction: Sequence[float]) -> int:
+        """Cycles back to just before a contact, 0 without one (URScript, tool_contact). To be asked once a cycle."""
+        touches = self.arm.dynamics.touches(self.arm.T_flange_tool, direction)
+        goes_on = self._now_s - self._asked_s < 1.5 * TICK_S  # asked in the cycle before, too
+        self._asked_s = self._now_s
+        self._touched_steps = (self._touched_steps if goes_on else 0) + 1 if touches else 0
+        return self._touched_steps
+
+    def back_to_contact(self, steps: int) -> Wait:
+        """Brakes, then returns on a straight line to where the joints were `steps` cycles ago: just before it."""
+        history = self.arm.history_rad  # its newest is of the cycle before this one
+        goal = self.arm.arm.tool(history[-min(steps, len(history))].tolist(), self.arm.T_flange_tool)
+        self.arm.stop_tool(CONTACT_DECELERATION_M_S2)
+        returning = False
+
+        def done() -> bool:
+            nonlocal returning
+            if self.arm.moving:
+                return False
+            if returning:
+                return True
+            self.arm.move_path([self.arm.line_leg(goal, *CONTACT_LINE)])
+            returning = True
+            return False
+
+        return done
+
+    def watch_contact(self, direction: Sequence[float] | None) -> None:
+        """From now on a contact ends an asynchronous motion; None ends the watch."""
+        self._watched = None if direction is None else list(direction)
+        if direction is not None:
+            self.contact_step_back, self._was_free, self._contact_came = 0, False, False
+
     # --- program
 
     def step(self, t_s: float) -> bool:
@@ -74,6 +131,7 @@ class ControlScript:
                 f"watchdog: no command for {t_s - self._heard_s:.2f} s, limit {self._silence_limit_s:.2f} s"
             )
         self._watch_async()
+        self._look_for_contact()
         if self._wait is not None:
             if self._wait():
                 self._wait = None
@@ -133,10 +191,30 @@ class ControlScript:
             self._reported_leg = self.arm.path_leg
             self._report_word(self._status.progress(self.arm.path_leg))
 
+    def _look_for_contact(self) -> None:
+        """The script's own thread: waits until the tool is free, then until it touches."""
+        if self._watched is None:
+            return
+        # the script tests the sum: a negative direction counts as none, and the tool's motion is taken
+        direction = self._watched if sum(self._watched) >= 1e-10 else self._target_direction()
+        steps = self.contact_steps(direction)
+        self._was_free = self._was_free or not steps
+        if steps and self._was_free:
+            self.contact_step_back, self._contact_came, self._watched = steps, True, None
+
+    def _target_direction(self) -> Sequence[float]:
+        setpoint = self.arm.setpoint
+        J, _ = self.arm.arm.jacobian(setpoint.q_rad.tolist(), self.arm.T_flange_tool)
+        return (J @ setpoint.qd_rad_s)[:3].tolist()
+
     def _obey(self, command: int) -> bool:
         if command in REALTIME_COMMANDS:
             self._process(command)
             self._say(READY)
+        elif command == IDLE_COMMAND and self._contact_came and not self._executing:
+            self._contact_came, self._executing = False, True
+            self.end_async()
+            self._wait = self.back_to_contact(self.contact_step_back)
         elif command == IDLE_COMMAND:
             self._executing = False
             self._say(READY)
@@ -172,3 +250,30 @@ class ControlScript:
 
     def _report_word(self, word: int) -> None:
         self.memory.outputs.ints[self._ints + PROGRESS] = word
+
+
+class AsyncStatus:
+    """The progress word, output integer register 2.
+
+    Bits 0-14 progress, bit 15 running, bits 16-23 write counter, bits 24-30 operation id, both counting 0..127. Every
+    change counts up, so that a client sees even an operation that is shorter than its cycle.
+    """
+
+    def __init__(self) -> None:
+        self._writes = 0
+        self._operation = 0
+
+    def started(self) -> int:
+        self._operation = 0 if self._operation == COUNTER_LIMIT else self._operation + 1
+        return self._word(RUNNING)
+
+    def progress(self, value: int) -> int:
+        """`value`: what the program reports, for a path the index of the leg."""
+        return self._word(RUNNING | min(max(value, 0), RUNNING - 1))
+
+    def finished(self) -> int:
+        return self._word(0)
+
+    def _word(self, low: int) -> int:
+        self._writes = 0 if self._writes == COUNTER_LIMIT else self._writes + 1
+        return low | (self._writes << 16) | (self._operation << 24)

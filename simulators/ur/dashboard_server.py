@@ -1,15 +1,19 @@
 """Dashboard server on port 29999: one ASCII line in, one line out.
 
-What it does not imitate: stored programs (there are none to load), installations, user roles, operational modes,
-pop-ups beyond their replies, and `shutdown`, which is answered without effect.
-Source: Universal Robots, "Dashboard Server e-Series"; replies as ur_rtde 1.6.5 and others match them.
+Programs are texts of URScript that were put on the controller by name (side channel, `robot.store`): they are loaded,
+played, paused and stopped. What it does not imitate: installations, program trees, flight reports and support files,
+pop-ups beyond their replies, what local control and user roles forbid, and `shutdown`, which is answered without
+effect.
+Source: Universal Robots, "Dashboard Server e-Series, port 29999" (commands and replies); where the manual leaves the
+wording open, as ur_rtde 1.6.5 and Universal_Robots_Client_Library match it.
 """
 
 import re
 from collections.abc import Callable
 
-from simulators.ur.motion import ArmController
-from simulators.ur.program import ProgramRunner
+from simulators.ur.motion import ArmController, MoveRefused
+from simulators.ur.program import Program, ProgramRunner
+from simulators.ur.script_text import ScriptRefused
 from simulators.ur.states import RobotMode, RuntimeState, SafetyMode
 
 BANNER = b"Connected: Universal Robots Dashboard Server\n"
@@ -21,17 +25,25 @@ SAFETY_NAMES = {
     SafetyMode.ROBOT_EMERGENCY_STOP: "ROBOT_EMERGENCY_STOP",
 }
 MODE_NAMES = {mode: mode.name for mode in RobotMode}
-PROGRAM = "rtde_control.urp"  # the name under which an uploaded program shows
+UNNAMED = "<unnamed>"  # the program of a controller that has loaded none; a text from a script port has no name
+FOLDER = "/programs/"
+NO_MODE = "NONE"  # the operational mode is the pendant's affair
 
 
 class Dashboard:
     """What the dashboard says and does; shared by all connections."""
 
     def __init__(
-        self, arm: ArmController, runner: ProgramRunner, polyscope: str, serial_number: str, model: str
-    ) -> None:
-        self._arm, self._runner = arm, runner
-        self._polyscope, self._serial_number, self._model = polyscope, serial_number, model
+        self, arm: ArmController, runner: ProgramRunner, compile_text: Callable[[str], Program], polyscope: str,
+        serial_number: str, model: str,
+    ) -> None:  # fmt: skip
+        """`compile_text` raises ScriptRefused or MoveRefused for a text that the controller cannot run."""
+        self._arm, self._runner, self._compile = arm, runner, compile_text
+        self._serial_number, self._model = serial_number, model
+        self.polyscope = polyscope
+        self.programs: dict[str, str] = {}  # on the disk, by file name
+        self._loaded = ""
+        self._operational_mode, self._user_role = NO_MODE, "NONE"
         self.remote_control = True
 
     def accept(self) -> "DashboardWire":
@@ -48,10 +60,10 @@ class Dashboard:
     # --- questions
 
     def version(self, text: str) -> str:
-        return f"URSoftware {self._polyscope} (Mar 01 2022)"
+        return f"URSoftware {self.polyscope} (Mar 01 2022)"
 
     def short_version(self, text: str) -> str:
-        return self._polyscope
+        return self.polyscope
 
     def serial_number(self, text: str) -> str:
         return self._serial_number
@@ -76,12 +88,65 @@ class Dashboard:
 
     def program_state(self, text: str) -> str:
         names = {RuntimeState.PLAYING: "PLAYING", RuntimeState.PAUSED: "PAUSED"}
-        return f"{names.get(self._runner.state, 'STOPPED')} {PROGRAM}"
+        return f"{names.get(self._runner.state, 'STOPPED')} {self._loaded or UNNAMED}"
+
+    def loaded_program(self, text: str) -> str:
+        return f"Loaded program: {FOLDER}{self._loaded}" if self._loaded else "No program loaded"
+
+    def program_saved(self, text: str) -> str:
+        return f"true {self._loaded}" if self._loaded else f"false {UNNAMED}"
+
+    def operational_mode(self, text: str) -> str:
+        return self._operational_mode
+
+    def user_role(self, text: str) -> str:
+        return self._user_role
 
     # --- verbs
 
+    def load(self, text: str) -> str:
+        """Ends the running program when there is such a file."""
+        name = text.strip().removeprefix(FOLDER)
+        if name not in self.programs:
+            return f"File not found: {text.strip()}"
+        try:
+            self._compile(self.programs[name]).halt()
+        except (ScriptRefused, MoveRefused) as refused:
+            self._runner.fail(str(refused))
+            return f"Error while loading program: {text.strip()}"
+        self._runner.stop()
+        self._loaded = name
+        return f"Loading program: {FOLDER}{name}"
+
     def play(self, text: str) -> str:
-        return "Starting program" if self._runner.resume() else "Failed to execute: play"
+        if self._runner.resume():
+            return "Starting program"
+        if not self._loaded or not self._arm.power.ready or self._runner.program is not None:
+            return "Failed to execute: play"
+        try:
+            self._runner.start(self._compile(self.programs[self._loaded]), delay_s=0.0)  # answers when it runs
+        except (ScriptRefused, MoveRefused) as refused:  # the text was replaced since it was loaded
+            self._runner.fail(str(refused))
+            return "Failed to execute: play"
+        return "Starting program"
+
+    def set_operational_mode(self, text: str) -> str:
+        wanted = text.strip().upper()
+        if wanted not in ("MANUAL", "AUTOMATIC"):
+            return f"Failed setting operational mode: {text.strip()}"
+        self._operational_mode = wanted
+        return f"Setting operational mode: {wanted}"
+
+    def clear_operational_mode(self, text: str) -> str:
+        self._operational_mode = NO_MODE
+        return "operational mode is no longer controlled by Dashboard Server"
+
+    def set_user_role(self, text: str) -> str:
+        wanted = text.strip().upper()
+        if wanted not in ("PROGRAMMER", "OPERATOR", "NONE", "LOCKED", "RESTRICTED"):
+            return f"Failed setting user role: {text.strip()}"
+        self._user_role = wanted
+        return f"Setting user role: {wanted}"
 
     def pause(self, text: str) -> str:
         return "Pausing program" if self._runner.pause() else "Failed to execute: pause"
@@ -140,16 +205,20 @@ _COMMANDS = (
     _command("close safety popup", _says("closing safety popup")),
     _command("restart safety", _says("Restarting safety")),
     _command("load installation (?P<text>.*)", _says("File not found: {text}")),
-    _command("load (?P<text>.*)", _says("File not found: {text}")),
-    _command("get loaded program", _says("No program loaded")),
-    _command("isprogramsaved", _says("false <unnamed>")),
+    _command("load (?P<text>.*)", Dashboard.load),
+    _command("get loaded program", Dashboard.loaded_program),
+    _command("isprogramsaved", Dashboard.program_saved),
     _command("popup (?P<text>.*)", _says("showing popup")),
     _command("close popup", _says("closing popup")),
     _command("addtolog (?P<text>.*)", _says("Added log message")),
-    _command("setuserrole (?P<text>.*)", _says("Setting user role: {text}")),
-    _command("get operational mode", _says("NONE")),
-    _command("set operational mode (?P<text>.*)", _says("Setting operational mode: {text}")),
-    _command("clear operational mode", _says("operational mode is no longer controlled by Dashboard Server")),
+    _command("setuserrole (?P<text>.*)", Dashboard.set_user_role),
+    _command("getuserrole", Dashboard.user_role),
+    _command("get operational mode", Dashboard.operational_mode),
+    _command("set operational mode (?P<text>.*)", Dashboard.set_operational_mode),
+    _command("clear operational mode", Dashboard.clear_operational_mode),
+    _command("savelog", _says("Log saved to disk")),
+    _command("generate flight report ?(?P<text>.*)", _says("Error: no flight report was recorded")),
+    _command("generate support file ?(?P<text>.*)", _says("Error: no support file can be written to {text}")),
     _command("quit", _says("Disconnected")),
     _command("shutdown", _says("Shutting down")),
 )

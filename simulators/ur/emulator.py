@@ -2,21 +2,23 @@
 
     bench = build(world, rig, "127.0.0.2")
 
-What it does not imitate: Modbus (simulators/modbus does), PolyScope X, stored programs, URCaps,
+What it does not imitate: Modbus (simulators/modbus does), PolyScope X, program trees, URCaps, and the
 speed of the controller's own start. What each port leaves out stands in its own file: rtde_server, script_port,
 script_text, dashboard_server, control_script; what the arm leaves out, in motion.
 """
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, Protocol
 
 from simulators.faults.device_clock import DeviceClock
 from simulators.ur.control_script import ControlScript
 from simulators.ur.dashboard_server import Dashboard
+from simulators.ur.dynamics import ArmWorld, Carried, Obstacle
 from simulators.ur.kinematics import NominalArm
-from simulators.ur.motion import ArmController, ArmWorld, MoveRefused
-from simulators.ur.program import ProgramRunner
+from simulators.ur.motion import ArmController, MoveRefused
+from simulators.ur.program import Program, ProgramRunner
 from simulators.ur.readout import Readout
 from simulators.ur.registers import Installation, Memory
 from simulators.ur.rtde_server import RtdeServer
@@ -27,8 +29,9 @@ from simulators.ur.state_streams import primary_stream, realtime_stream
 from simulators.wire import Bench, TcpPort, Wire
 
 RTDE_PORT, DASHBOARD_PORT, SCRIPT_PORTS = 30004, 29999, (30001, 30002, 30003)
-REALTIME_PORT = 30003
+PRIMARY_PORT, REALTIME_PORT = 30001, 30003
 VERSION = (5, 12, 0, 1101)  # later than 5.22 changes recipes and breaks upper registers of ur_rtde 1.6.5
+OLDEST, NEWEST = (5, 10), (5, 25)  # sizes of the state streams; direct_torque(), which 5.26 has
 SERIAL_NUMBER, MODEL = "20195000001", "UR5"  # a UR5e calls itself UR5 on the dashboard
 FULL_TURN_RAD = 6.283185307179586
 
@@ -48,7 +51,7 @@ class UrController:
         self.arm, self.memory = arm, memory
         self.runner = ProgramRunner(arm)
         self.rtde = RtdeServer(memory, VERSION, self._read)
-        self.dashboard = Dashboard(arm, self.runner, ".".join(map(str, VERSION)), SERIAL_NUMBER, MODEL)
+        self.dashboard = Dashboard(arm, self.runner, self._compile, _dotted(VERSION), SERIAL_NUMBER, MODEL)
         self.clock = DeviceClock()
         self._tick = 0
         self._wires: list[Closable] = []
@@ -65,14 +68,15 @@ class UrController:
     def run_script(self, text: str) -> None:
         """A program from a script port replaces the running one; a refused one leaves a reason and nothing else."""
         try:
-            if is_control_program(text):
-                program = ControlScript(read_control_program(text), self.arm, self.memory)
-            else:
-                program = LineProgram(read_lines(text), self.arm, self.memory)
+            self.runner.start(self._compile(text))
         except (ScriptRefused, MoveRefused) as refused:
-            self.runner.last_error = str(refused)
-            return
-        self.runner.start(program)
+            self.runner.fail(str(refused))
+
+    def report_version(self, version: tuple[int, int, int, int]) -> None:
+        """The PolyScope version that clients see from their next connection on. ValueError for one not imitated."""
+        if not OLDEST <= version[:2] <= NEWEST:
+            raise ValueError(f"PolyScope {_dotted(version)}: {_dotted(OLDEST)} to {_dotted(NEWEST)} can be imitated")
+        self.rtde.version, self.dashboard.polyscope = version, _dotted(version)
 
     def port(self, name: str, host: str, number: int, accept: Callable[[], Closable]) -> TcpPort:
         """A port whose clients `disconnect` reaches."""
@@ -90,8 +94,20 @@ class UrController:
             wire.closing = True
 
     def script_wire(self, port: int = REALTIME_PORT) -> ScriptWire:
-        begin = realtime_stream if port == REALTIME_PORT else primary_stream
-        return ScriptWire(self.run_script, begin(lambda: self.rtde.readout, VERSION).due)
+        if port == REALTIME_PORT:
+            stream = realtime_stream(self._readout)
+        else:
+            stream = primary_stream(self._readout, self.rtde.version, self.runner if port == PRIMARY_PORT else None)
+        return ScriptWire(self.run_script, stream.due)
+
+    def _compile(self, text: str) -> Program:
+        """ScriptRefused or MoveRefused for a text that cannot be run."""
+        if is_control_program(text):
+            return ControlScript(read_control_program(text), self.arm, self.memory)
+        return LineProgram(read_lines(text), self.arm, self.memory)
+
+    def _readout(self) -> Readout:
+        return self.rtde.readout
 
     def _closed(self, wire: Wire) -> None:
         self._wires = [other for other in self._wires if other is not wire]
@@ -106,8 +122,8 @@ def build(world: ArmWorld, rig: Mapping[str, Any], host: str, *, unlock_delay_s:
 
     `unlock_delay_s`: for how long a protective stop refuses to be unlocked (5 s on a real controller).
     """
-    tool = rig.get("tool", {})
-    installation = Installation(float(tool.get("mass_kg", 0.0)), tuple(tool.get("com_m", (0.0, 0.0, 0.0))))
+    carried = _carried(rig)
+    installation = Installation(carried.mass_kg, carried.com_m)
     controller = UrController(arm_controller(world, rig, unlock_delay_s=unlock_delay_s), Memory(installation))
     verbs = Safety(controller)
     ports = [
@@ -126,6 +142,9 @@ def build(world: ArmWorld, rig: Mapping[str, Any], host: str, *, unlock_delay_s:
             "robot.disconnect": controller.disconnect,
             "robot.unlock_delay": verbs.unlock_delay,
             "robot.remote_control": verbs.remote_control,
+            "robot.polyscope": verbs.polyscope,
+            "robot.store": verbs.store,
+            "robot.obstacle": verbs.obstacle,
             "robot.state": verbs.state,
             "robot.standing": verbs.standing,
         },
@@ -145,7 +164,14 @@ def arm_controller(world: ArmWorld, rig: Mapping[str, Any], *, unlock_delay_s: f
         [joint.get("upper_rad", FULL_TURN_RAD) for joint in joints],
         reading_step_rad=max(FULL_TURN_RAD / count if count else 0.0 for count in counts),
         unlock_delay_s=unlock_delay_s,
+        carried=_carried(rig),
     )
+
+
+def _carried(rig: Mapping[str, Any]) -> Carried:
+    tool = rig.get("tool", {})
+    gravity_m_s2 = rig["arm"].get("gravity_m_s2", Carried().gravity_m_s2)
+    return Carried(tool.get("mass_kg", 0.0), tuple(tool.get("com_m", (0.0, 0.0, 0.0))), tuple(gravity_m_s2))
 
 
 class Safety:
@@ -174,6 +200,28 @@ class Safety:
     def remote_control(self, on: bool) -> None:
         self._controller.dashboard.remote_control = on
 
+    def polyscope(self, version: str) -> None:
+        """The version to report, such as "5.23.0.0", from the next connections on. ValueError for another form."""
+        numbers = version.split(".")
+        if len(numbers) != 4 or not all(number.isdecimal() for number in numbers):
+            raise ValueError(f"PolyScope version {version!r}; give four numbers such as 5.12.0.1101")
+        major, minor, bugfix, build = map(int, numbers)
+        self._controller.report_version((major, minor, bugfix, build))
+
+    def store(self, name: str, script: str) -> None:
+        """Puts a program on the controller's disk, as a text of URScript. ValueError unless name and text are texts."""
+        if not (isinstance(name, str) and isinstance(script, str)):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise ValueError(f"program {name!r}: name and script must be texts")
+        self._controller.dashboard.programs[name] = script
+
+    def obstacle(self, point_m: Sequence[float], normal: Sequence[float]) -> None:
+        """Where contact functions feel a surface, in the base frame. ValueError unless a point and a direction."""
+        length = math.hypot(*normal)
+        if len(point_m) != 3 or len(normal) != 3 or not (math.isfinite(math.fsum(point_m)) and 0 < length < math.inf):
+            raise ValueError(f"obstacle at {point_m!r} m, normal {normal!r}: three finite numbers each, not all 0")
+        x, y, z = (component / length for component in normal)
+        self._controller.arm.dynamics.obstacle = Obstacle((point_m[0], point_m[1], point_m[2]), (x, y, z))
+
     def standing(self) -> bool:
         """Nothing moves, and nothing is about to."""
         return not self._controller.arm.moving
@@ -187,3 +235,7 @@ class Safety:
             "runtime_state": self._controller.runner.state.name,
             "last_error": self._controller.runner.last_error,
         }
+
+
+def _dotted(version: tuple[int, ...]) -> str:
+    return ".".join(map(str, version))

@@ -38,6 +38,9 @@ class NominalArm:
 
     def __init__(self, links: Sequence[Link], T_tip_flange: Frame = IDENTITY) -> None:
         self.n_joints = len(links)
+        self.a_m, self.d_m = [link.a_m for link in links], [link.d_m for link in links]
+        self.alpha_rad = [link.alpha_rad for link in links]
+        self.theta_offset_rad = [link.theta_offset_rad for link in links]
         self._links = [
             (link.a_m, math.cos(link.alpha_rad), math.sin(link.alpha_rad), link.d_m, link.theta_offset_rad)
             for link in links

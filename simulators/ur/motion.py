@@ -10,11 +10,11 @@ collision detection, reduced mode, jerk limits, blends.
 import math
 from collections import deque
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from simulators.ur.dynamics import ArmWorld, Carried, Dynamics, Joints
 from simulators.ur.kinematics import NominalArm
 from simulators.ur.moves import JointMove, Leg, LineMove, PathMove
 from simulators.ur.poses import IDENTITY, Frame
@@ -35,30 +35,6 @@ SETTLE_LIMIT_S = 1.0  # an arm that keeps trembling does not keep its program wa
 HISTORY_STEPS = 100  # what get_actual_joint_positions_history can look back
 
 
-class Joints(Protocol):
-    """What the joint sensors report; each (n,)."""
-
-    @property
-    def q_rad(self) -> Floats: ...
-    @property
-    def qd_rad_s(self) -> Floats: ...
-    @property
-    def torque_nm(self) -> Floats: ...
-    @property
-    def temperature_degC(self) -> Floats: ...
-
-
-class ArmWorld(Protocol):
-    """The part of the world that a controller drives and senses."""
-
-    n_joints: int
-
-    @property
-    def time_s(self) -> float: ...
-    def command(self, q_rad: ArrayLike) -> None: ...
-    def joints(self) -> Joints: ...
-
-
 class MoveRefused(Exception):  # noqa: N818 - said by the controller, not an error of the emulator
     """The arm may not or cannot make this move; the message says why."""
 
@@ -70,10 +46,11 @@ class ArmController:
 
     def __init__(
         self, world: ArmWorld, arm: NominalArm, lower_rad: Sequence[float], upper_rad: Sequence[float],
-        reading_step_rad: float = 0.0, unlock_delay_s: float = 0.0,
+        reading_step_rad: float = 0.0, unlock_delay_s: float = 0.0, carried: Carried | None = None,
     ) -> None:  # fmt: skip
         """Limits (n,); `reading_step_rad`: one count of the joint encoders, which no following error can undercut."""
         self.arm, self.power = arm, Power(unlock_delay_s)
+        self.dynamics = Dynamics(world, arm, carried or Carried())
         self.T_flange_tool: Frame = IDENTITY
         self.speed_scaling = 1.0
         self.stop_reason = ""  # of the last protective stop
@@ -115,6 +92,11 @@ class ArmController:
     def path_leg(self) -> int:
         """Index of the present leg of a path, 0 for a single move."""
         return max(0, self._motion.leg) if isinstance(self._motion, PathMove) else 0
+
+    @property
+    def limits_rad(self) -> list[tuple[float, float]]:
+        """Lower and upper limit of each joint."""
+        return list(zip(self._lower_rad, self._upper_rad, strict=True))
 
     def within_limits(self, q_rad: ArrayLike) -> bool:
         q = np.asarray(q_rad, dtype=np.float64)

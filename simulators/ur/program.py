@@ -4,6 +4,7 @@ What is not imitated: the state STOPPING (a stopped program counts as stopped at
 the loading time of a long program.
 """
 
+from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
@@ -12,6 +13,7 @@ from simulators.ur.states import RuntimeState
 
 START_DELAY_S = 0.05  # from the last line of a program on the script port to its first cycle; feels right
 SCALING_PER_CYCLE = 0.01  # the arm slows down to a lower speed slider, or to a pause, within 0.2 s; feels right
+KEPT_FAILURES = 100
 
 Wait = Callable[[], bool]  # True when what was waited for has happened
 
@@ -34,6 +36,8 @@ class ProgramRunner:
     def __init__(self, arm: ArmController) -> None:
         self.state = RuntimeState.STOPPED
         self.last_error = ""  # why the last program ended before its end
+        self.n_failures = 0  # programs that were refused or ended in an error
+        self._failures: deque[str] = deque(maxlen=KEPT_FAILURES)
         self._arm = arm
         self._program: Program | None = None
         self._starts_s = 0.0
@@ -43,14 +47,27 @@ class ProgramRunner:
     def program(self) -> Program | None:
         return self._program
 
-    def start(self, program: Program) -> None:
+    def fail(self, reason: str) -> None:
+        """A program was refused, or ends because of an error."""
+        self.last_error = reason
+        self._failures.append(reason)
+        self.n_failures += 1
+
+    def failures_since(self, count: int) -> list[str]:
+        """The reasons of all failures after the first `count`, as far as they are remembered."""
+        new = min(self.n_failures - count, len(self._failures))
+        return list(self._failures)[len(self._failures) - new :]
+
+    def start(self, program: Program, delay_s: float = START_DELAY_S) -> None:
         """Replaces the running program; refused in silence while the arm may not move, as the script port does."""
         self.stop()
         if not self._arm.power.ready:
             self.last_error = f"program not started: robot {self._arm.power.robot_mode.name}, safety {self._arm.power.safety_mode.name}"  # noqa: E501
             return
         self._program, self.last_error = program, ""
-        self._starts_s = self._now_s + START_DELAY_S
+        self._starts_s = self._now_s + delay_s
+        if delay_s == 0.0:
+            self.state = RuntimeState.PLAYING
 
     def stop(self) -> None:
         """Works in every state; a moving arm brakes."""
@@ -94,7 +111,7 @@ class ProgramRunner:
             if program is not None and not program.step(t_s):
                 self.stop()
         except MoveRefused as refused:
-            self.last_error = str(refused)
+            self.fail(str(refused))
             self.stop()
 
     def _scale(self, wanted: float) -> None:

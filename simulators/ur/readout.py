@@ -4,9 +4,10 @@ from collections.abc import Callable
 from typing import Any, Generic, TypeVar, overload
 
 from simulators.faults.device_clock import DeviceClock
+from simulators.ur.dynamics import Joints
 from simulators.ur.kinematics import Axis, tool_speed
-from simulators.ur.motion import ArmController, Joints
-from simulators.ur.poses import Frame, Pose, compose, pose_of
+from simulators.ur.motion import ArmController
+from simulators.ur.poses import IDENTITY, Frame, Pose, Vector, compose, invert, pose_of, rotate
 from simulators.ur.registers import Memory
 from simulators.ur.setpoint import SetPoint
 from simulators.ur.states import JOINT_MODES, SAFETY_BITS, JointMode, RobotMode, RobotStatus, RuntimeState
@@ -14,6 +15,7 @@ from simulators.wire import TICK_S
 
 TORQUE_PER_CURRENT_NM_A = (11.7, 11.7, 11.7, 7.0, 7.0, 7.0)
 # at the joint: gear 101 x motor constants of the size 3 and size 1 joints, about; only the ratio of joints matters here
+ELBOW = 2  # the third axis
 
 T = TypeVar("T")
 
@@ -80,6 +82,10 @@ class Readout:
         return self.setpoint.qdd_rad_s2.tolist()
 
     @once
+    def flange(self) -> Frame:
+        return self.arm.arm.forward(self.q_rad)[0]
+
+    @once
     def _actual_tool(self) -> tuple[Frame, tuple[Axis, ...]]:
         T_base_flange, axes = self.arm.arm.forward(self.q_rad)
         return compose(T_base_flange, self.arm.T_flange_tool), axes
@@ -104,6 +110,28 @@ class Readout:
     @once
     def target_tool_speed(self) -> Pose:
         return tool_speed(self._target_tool[1], self._target_tool[0], self.target_qd_rad_s)
+
+    @once
+    def tool_wrench(self) -> Pose:
+        return self.arm.dynamics.tool_wrench(self.flange, self._actual_tool[0], self.memory.installation)
+
+    @once
+    def raw_wrench(self) -> Pose:
+        return self.arm.dynamics.raw_wrench(self.flange)
+
+    @once
+    def accelerometer_m_s2(self) -> Vector:
+        """In the axes of the flange, of an arm that stands."""
+        return rotate(invert(self.flange), self.memory.installation.gravity_m_s2)
+
+    @once
+    def elbow_m(self) -> Vector:
+        return self._actual_tool[1][ELBOW][3:]
+
+    @once
+    def elbow_speed_m_s(self) -> Vector:
+        axes = self._actual_tool[1]
+        return tool_speed(axes[:ELBOW], (*IDENTITY[:9], *self.elbow_m), self.qd_rad_s[:ELBOW])[:3]
 
     @once
     def joint_mode(self) -> tuple[int, ...]:

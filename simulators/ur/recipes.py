@@ -4,8 +4,7 @@ import struct
 from collections.abc import Sequence
 from typing import Any, cast
 
-from simulators.ur.input_fields import InputField, input_field
-from simulators.ur.output_fields import Field, Source, output_field
+from simulators.ur.fields import Field, InputField, Source, input_field, output_field
 from simulators.ur.readout import Readout
 from simulators.ur.registers import Memory
 from simulators.ur.rtde_types import LENGTHS, STRUCT_CODES, FrameType

@@ -44,7 +44,7 @@ class Registers:
 
 @dataclass
 class Installation:
-    """What the program may set about the arm's load; it is reported, and bends nothing in the emulated world."""
+    """What the program may state about the arm's load; it is reported, and changes nothing in the emulated world."""
 
     payload_kg: float = 0.0
     payload_cog_m: tuple[float, ...] = (0.0, 0.0, 0.0)
@@ -61,6 +61,9 @@ class Memory:
         self.outputs = Registers()
         self.settings: dict[str, Value] = {}  # input fields that are not registers, by their RTDE name
         self.digital_outputs = 0  # bits 0-7 standard, 8-15 configurable, 16-17 tool (RTDE guide)
+        self.analog_outputs = [0.0, 0.0]  # V or A, by the type
+        self.analog_types = 0b1111  # inputs 0 and 1, outputs 0 and 1: set is a voltage, clear a current (RTDE guide)
+        self.tool_voltage_v = 0
         self.speed_slider = 1.0
         self.on_int_written: list[Callable[[int], None]] = []  # told the index: what a watchdog listens to
         self._owners: dict[str, object] = {}
@@ -83,10 +86,26 @@ class Memory:
         for prefix, low, width in (("standard", 0, 8), ("configurable", 8, 8), ("tool", 16, 2)):
             mask = self._take(f"{prefix}_digital_output_mask") & ((1 << width) - 1)
             if mask:
-                wanted = int(self._number(f"{prefix}_digital_output")) & mask
-                self.digital_outputs = (self.digital_outputs & ~(mask << low)) | (wanted << low)
+                self.set_digital_outputs(mask << low, int(self._number(f"{prefix}_digital_output")) << low)
+        mask = self._take("standard_analog_output_mask")
+        for index in (0, 1):
+            if mask >> index & 1:
+                is_voltage = bool(int(self._number("standard_analog_output_type")) >> index & 1)
+                self.set_analog_output(index, is_voltage, self._number(f"standard_analog_output_{index}"))
         if self._take("speed_slider_mask"):
             self.speed_slider = min(max(self._number("speed_slider_fraction"), 0.0), 1.0)
+
+    def set_digital_outputs(self, mask: int, bits: int) -> None:
+        """Those of `mask`; bits 0-7 standard, 8-15 configurable, 16-17 tool."""
+        self.digital_outputs = (self.digital_outputs & ~mask) | (bits & mask)
+
+    def set_analog_output(self, index: int, is_voltage: bool | None, ratio: float) -> None:
+        """`ratio` 0..1 of 0 to 10 V, or of 4 to 20 mA; None keeps which of them it is (URScript, set_analog_out)."""
+        bit = 1 << (2 + index)
+        if is_voltage is not None:
+            self.analog_types = self.analog_types | bit if is_voltage else self.analog_types & ~bit
+        ratio = min(max(ratio, 0.0), 1.0)
+        self.analog_outputs[index] = 10.0 * ratio if self.analog_types & bit else 0.004 + 0.016 * ratio
 
     def _take(self, name: str) -> int:
         """The mask once; a mask that has been applied is spent."""

@@ -6,10 +6,16 @@ from simulators.ur.motion import ArmController, MoveRefused
 from simulators.ur.moves import Leg
 from simulators.ur.poses import Frame, frame_of
 from simulators.ur.program import Wait
-from simulators.ur.registers import N_REGISTERS, Memory
+from simulators.ur.registers import N_BITS, N_REGISTERS, Memory
 from simulators.ur.script_text import Argument, Call, PoseLiteral, ScriptRefused
 
 MOVEJ_DEFAULTS = (1.4, 1.05)  # acceleration, speed: URScript manual, movej
+DIGITAL_OUTPUTS = {  # first bit and number (URScript manual; set_digital_out counts through all three kinds)
+    "set_standard_digital_out": (0, 8),
+    "set_configurable_digital_out": (8, 8),
+    "set_tool_digital_out": (16, 2),
+    "set_digital_out": (0, 18),
+}
 MOVEL_DEFAULTS = (1.2, 0.25)  # URScript manual, movel
 
 
@@ -71,18 +77,32 @@ class LineProgram:
         match call.name:
             case "set_tcp":
                 self._arm.T_flange_tool = frame_of(six(call.first()))
-            case "set_payload":
+            case "set_payload" | "set_target_payload":
                 self._memory.installation.payload_kg = call.number("m", 0, 0.0)
+                self._memory.installation.payload_cog_m = call.numbers("cog", 1, 3) or self._arm.T_flange_tool[9:]
+            case "set_gravity":
+                self._memory.installation.gravity_m_s2 = call.numbers("d", 0, 3) or (0.0, 0.0, 9.82)
+            case "zero_ftsensor":
+                T_base_flange = self._arm.arm.forward(self._arm.joints.q_rad.tolist())[0]
+                self._arm.dynamics.zero_sensor(T_base_flange, self._memory.installation)
+            case "set_tool_voltage":
+                self._memory.tool_voltage_v = int(call.number("voltage", 0, 0.0))
+            case "set_standard_analog_out" | "set_analog_out":
+                self._memory.set_analog_output(_below(call, 2), None, call.number("f", 1, 0.0))
+            case name if name in DIGITAL_OUTPUTS:
+                low, count = DIGITAL_OUTPUTS[name]
+                bit = 1 << (low + _below(call, count))
+                self._memory.set_digital_outputs(bit, bit if call.number("b", 1, 0.0) else 0)
             case "protective_stop":
                 self._arm.protective_stop("protective_stop() in a script")
             case "halt":
                 self._calls.clear()
             case "write_output_integer_register":
-                outputs.ints[_register(call)] = int(call.number("value", 1, 0.0))
+                outputs.ints[_below(call, N_REGISTERS)] = int(call.number("value", 1, 0.0))
             case "write_output_float_register":
-                outputs.doubles[_register(call)] = call.number("value", 1, 0.0)
+                outputs.doubles[_below(call, N_REGISTERS)] = call.number("value", 1, 0.0)
             case "write_output_boolean_register":
-                outputs.set_bit(_register(call), bool(call.number("value", 1, 0.0)))
+                outputs.set_bit(_below(call, N_BITS), bool(call.number("value", 1, 0.0)))
             case _:  # textmsg, popup, sync, signal_async_progress: nobody to tell
                 pass
 
@@ -107,7 +127,7 @@ def six(argument: Argument) -> tuple[float, ...]:
     """Six numbers of a list or of a pose. ScriptRefused otherwise."""
     if isinstance(argument, PoseLiteral):
         return argument.values
-    if isinstance(argument, tuple):
+    if isinstance(argument, tuple) and len(argument) == 6:
         return argument
     raise ScriptRefused(f"{argument!r}: six numbers are needed")
 
@@ -122,8 +142,9 @@ def _tool_frame(goal: Argument, arm: ArmController) -> Frame:
     return frame_of(six(goal)) if isinstance(goal, PoseLiteral) else arm.arm.tool(six(goal), arm.T_flange_tool)
 
 
-def _register(call: Call) -> int:
+def _below(call: Call, count: int) -> int:
+    """The number of an output or a register, the first argument. ScriptRefused outside 0..count - 1."""
     index = int(call.number("n", 0, 0.0))
-    if not 0 <= index < N_REGISTERS:
-        raise ScriptRefused(f"{call.name}: register {index}; there are 0..{N_REGISTERS - 1}")
+    if not 0 <= index < count:
+        raise ScriptRefused(f"{call.name}: number {index}; there are 0..{count - 1}")
     return index

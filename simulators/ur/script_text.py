@@ -14,7 +14,9 @@ from typing import cast
 KNOWN_CALLS = frozenset(
     {
         "movej", "movel", "stopj", "stopl", "servoj", "speedj", "speedl", "sleep", "sync", "textmsg", "popup",
-        "set_tcp", "set_payload", "write_output_integer_register", "write_output_float_register",
+        "set_tcp", "set_payload", "set_target_payload", "set_gravity", "zero_ftsensor", "set_standard_digital_out",
+        "set_digital_out", "set_configurable_digital_out", "set_tool_digital_out", "set_standard_analog_out",
+        "set_analog_out", "set_tool_voltage", "write_output_integer_register", "write_output_float_register",
         "write_output_boolean_register", "signal_async_progress", "protective_stop", "halt",
     }
 )  # fmt: skip
@@ -53,6 +55,13 @@ class Call:
             raise ScriptRefused(f"{self.name}: {name} is {value!r}, a number is needed")
         return value
 
+    def numbers(self, name: str, position: int, length: int) -> tuple[float, ...] | None:
+        """A list of that length by its name or position, None when there is none. ScriptRefused for something else."""
+        value = self.named.get(name, self.positional[position] if position < len(self.positional) else None)
+        if value is not None and (not isinstance(value, tuple) or len(value) != length):
+            raise ScriptRefused(f"{self.name}: {name} is {value!r}, a list of {length} numbers is needed")
+        return value
+
     def first(self) -> Argument:
         """The argument that says where to. ScriptRefused when there is none."""
         if not self.positional:
@@ -67,6 +76,7 @@ class UploadedControl:
     int_offset: int
     float_offset: int
     path: tuple[Call, ...]
+    has_dynamics: bool  # mass matrix, Jacobian and so on: uploaded to PolyScope 5.23 and later
 
 
 def is_control_program(text: str) -> bool:
@@ -79,7 +89,7 @@ def read_control_program(text: str) -> UploadedControl:
     numbers = [next((int(group) for group in match.groups() if group), None) for match in offsets if match]
     if len(numbers) != 2 or numbers[0] is None or numbers[1] is None:
         raise ScriptRefused("control program without register offsets")
-    return UploadedControl(numbers[0], numbers[1], _injected_path(text))
+    return UploadedControl(numbers[0], numbers[1], _injected_path(text), "get_mass_matrix()" in text)
 
 
 def read_lines(text: str) -> tuple[Call, ...]:
@@ -120,7 +130,10 @@ def _value(node: ast.expr, line: str) -> Argument:
     if isinstance(node, ast.Name) and node.id in ("True", "False"):
         return float(node.id == "True")
     if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node.value.id == "p":
-        return PoseLiteral(_numbers(node.slice, line))
+        pose = _numbers(node.slice, line)
+        if len(pose) != 6:
+            raise ScriptRefused(f"line {line[:80]!r}: a pose has six numbers, here are {len(pose)}")
+        return PoseLiteral(pose)
     if isinstance(node, ast.List):
         return _numbers(node, line)
     return _number(node, line)
@@ -128,8 +141,6 @@ def _value(node: ast.expr, line: str) -> Argument:
 
 def _numbers(node: ast.expr, line: str) -> tuple[float, ...]:
     elements = cast(Sequence[ast.expr], getattr(node, "elts", ()))
-    if len(elements) != 6:
-        raise ScriptRefused(f"line {line[:80]!r}: six numbers are needed, there are {len(elements)}")
     return tuple(_number(element, line) for element in elements)
 
 

@@ -95,6 +95,22 @@ class ArmBody:
     def torque_nm(self) -> Floats:
         return self._servo.torque_nm
 
+    def mass_matrix_kg_m2(self, q_rad: Floats) -> Floats:
+        """(n, n) of the links and the tool at the readings `q_rad` (n,), without the rotors."""
+        full = self._engine.inertia_at(self._position_at(q_rad))
+        return full[np.ix_(self._driven, self._driven)]
+
+    def load_nm(self, q_rad: Floats, qd_rad_s: Floats) -> Floats:
+        """(n,) torques of gravity, Coriolis and centrifugal forces at readings and speeds (n,)."""
+        qvel = np.zeros(self._engine.n_freedoms)
+        qvel[self._driven] = qd_rad_s
+        return self._engine.bias_at(self._position_at(q_rad), qvel)[self._driven]
+
+    def _position_at(self, q_rad: Floats) -> Floats:
+        qpos = self._engine.qpos.copy()
+        qpos[self._at] = q_rad + self._offset_rad()
+        return qpos
+
     def beam(self) -> Ray:
         """The laser in the base frame."""
         x, y, z = self._laser_origin.tolist()

@@ -21,6 +21,7 @@ class Engine:
     def __init__(self, mjcf: str) -> None:
         self._model: Any = _mujoco.MjModel.from_xml_string(mjcf)
         self._data: Any = _mujoco.MjData(self._model)
+        self._elsewhere: Any = _mujoco.MjData(self._model)  # for questions about states that the mechanism is not in
         self.n_freedoms = int(self._model.nv)
         self.qpos: Floats = self._data.qpos
         self.qvel: Floats = self._data.qvel
@@ -59,3 +60,19 @@ class Engine:
         product = np.empty(self.n_freedoms)
         _mujoco.mj_mulM(self._model, self._data, product, vector)
         return product
+
+    def inertia_at(self, qpos: Floats) -> Floats:
+        """M(q), (n_freedoms, n_freedoms), at any position, without the armature of the rotors."""
+        full = np.empty((self.n_freedoms, self.n_freedoms))
+        self._put_elsewhere(qpos, np.zeros(self.n_freedoms))
+        _mujoco.mj_fullM(self._model, self._elsewhere, full)
+        return full - np.diag(self._model.dof_armature)
+
+    def bias_at(self, qpos: Floats, qvel: Floats) -> Floats:
+        """Gravity, Coriolis and centrifugal forces, (n_freedoms,), in any state."""
+        self._put_elsewhere(qpos, qvel)
+        return self._elsewhere.qfrc_bias.copy()
+
+    def _put_elsewhere(self, qpos: Floats, qvel: Floats) -> None:
+        self._elsewhere.qpos[:], self._elsewhere.qvel[:] = qpos, qvel
+        _mujoco.mj_step1(self._model, self._elsewhere)

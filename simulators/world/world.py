@@ -140,6 +140,14 @@ class World:
         temperature_degC = np.full(self.n_joints, joint_temperature_degC(self.time_s))
         return JointState(q_rad, self._body.speed_rad_s(), self._body.torque_nm().copy(), temperature_degC)
 
+    def mass_matrix_kg_m2(self, q_rad: ArrayLike) -> Floats:
+        """(n, n) of links and tool at the readings `q_rad` (n,), without the rotors. WorldError as `command`."""
+        return self._body.mass_matrix_kg_m2(self._checked(q_rad))
+
+    def load_nm(self, q_rad: ArrayLike, qd_rad_s: ArrayLike) -> Floats:
+        """(n,) torques of gravity, Coriolis and centrifugal forces at readings and joint speeds, each (n,)."""
+        return self._body.load_nm(self._checked(q_rad), self._checked(qd_rad_s))
+
     def link_encoders_rad(self) -> Floats:
         """(n,) what encoders at the links see: true angle and their own mounting offset, not quantised."""
         return self._body.true_rad() + self.truth.link_encoder_offset_rad

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 from simulators.ur.emulator import UrController, arm_controller
+from simulators.ur.kinematics import NominalArm
 from simulators.ur.registers import Memory
 from simulators.wire import TICK_S
 
@@ -41,8 +43,8 @@ class FollowingWorld:
 
     n_joints = 6
 
-    def __init__(self) -> None:
-        self.time_s = 0.0
+    def __init__(self, arm: NominalArm) -> None:
+        self.arm, self.time_s = arm, 0.0
         self._now_rad, self._next_rad = START_RAD.copy(), START_RAD.copy()
         self._speed_rad_s = np.zeros(6)
 
@@ -53,6 +55,18 @@ class FollowingWorld:
         self._speed_rad_s = (self._next_rad - self._now_rad) / (until_s - self.time_s)
         self._now_rad, self.time_s = self._next_rad, until_s
 
+    def mass_matrix_kg_m2(self, q_rad: np.ndarray) -> np.ndarray:
+        return np.diag(np.arange(6.0) + 1.0)
+
+    def load_nm(self, q_rad: np.ndarray, qd_rad_s: np.ndarray) -> np.ndarray:
+        return np.arange(6.0) + np.asarray(qd_rad_s) ** 2
+
+    def T_base_flange(self) -> np.ndarray:
+        frame = self.arm.forward(self._now_rad.tolist())[0]
+        pose = np.eye(4)
+        pose[:3] = np.array(frame).reshape(4, 3).T
+        return pose
+
     def joints(self) -> Joints:
         return Joints(self._now_rad, self._speed_rad_s, np.arange(6.0), np.full(6, 30.0))
 
@@ -61,7 +75,7 @@ class Bench:
     """A controller whose time is run by the test."""
 
     def __init__(self, rig: dict) -> None:
-        self.world = FollowingWorld()
+        self.world = FollowingWorld(NominalArm.from_rig(rig))
         self.arm = arm_controller(self.world, rig)
         self.controller = UrController(self.arm, Memory())
         self.trace_rad: list[np.ndarray] = []
@@ -111,10 +125,10 @@ class Emulated:
         return answer["result"]
 
 
-@pytest.fixture(scope="session")
-def emulated() -> Iterator[Emulated]:
-    """Real world and wires at twice real time."""
-    command = [sys.executable, "-c", SERVE, str(RIG_PATH), "2"]
+@contextmanager
+def emulator_process(time_scale: float) -> Iterator[Emulated]:
+    """Real world and wires, at so many emulated seconds a second."""
+    command = [sys.executable, "-c", SERVE, str(RIG_PATH), str(time_scale)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdin is not None
         assert process.stdout is not None
@@ -122,3 +136,17 @@ def emulated() -> Iterator[Emulated]:
         yield Emulated(where["robot"]["host"], (where["control"]["host"], where["control"]["port"]))
         process.stdin.close()
         process.wait(10.0)
+
+
+@pytest.fixture(scope="session")
+def emulated() -> Iterator[Emulated]:
+    """At twice real time."""
+    with emulator_process(2.0) as where:
+        yield where
+
+
+@pytest.fixture(scope="module")
+def fresh_emulated() -> Iterator[Emulated]:
+    """Another, which nobody has used before this file's tests."""
+    with emulator_process(2.0) as where:
+        yield where

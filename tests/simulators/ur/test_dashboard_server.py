@@ -24,6 +24,21 @@ def ask(bench, line: str) -> str:
         ("close safety popup", "closing safety popup"),
         ("popup look here", "showing popup"),
         ("load demo.urp", "File not found: demo.urp"),
+        ("load installation default.installation", "File not found: default.installation"),
+        ("get loaded program", "No program loaded"),
+        ("isProgramSaved", "false <unnamed>"),
+        ("programState", "STOPPED <unnamed>"),
+        ("play", "Failed to execute: play"),
+        ("pause", "Failed to execute: pause"),
+        ("get operational mode", "NONE"),
+        ("set operational mode resting", "Failed setting operational mode: resting"),
+        ("getUserRole", "NONE"),
+        ("setUserRole king", "Failed setting user role: king"),
+        ("saveLog", "Log saved to disk"),
+        ("addToLog a line", "Added log message"),
+        ("generate flight report", "Error: no flight report was recorded"),
+        ("generate support file /tmp", "Error: no support file can be written to /tmp"),
+        ("restart safety", "Restarting safety"),
         ("make coffee", "could not understand: 'make coffee'"),
     ],
 )
@@ -74,3 +89,59 @@ def test_pause_holds_the_arm_on_its_path_and_play_goes_on(bench) -> None:
     assert ask(bench, "play") == "Starting program"
     bench.settle()
     assert bench.world.joints().q_rad[0] == 1.0
+
+
+def test_a_stored_program_is_loaded_played_paused_and_stopped(bench) -> None:
+    programs = bench.controller.dashboard.programs
+    programs["turn.urp"] = "def turn():\n  movej([1.0, -1.5, 1.5, -1.5, -1.5, 0.0], a=3.0, v=0.5)\nend\n"
+    assert ask(bench, "load turn.urp") == "Loading program: /programs/turn.urp"
+    assert ask(bench, "get loaded program") == "Loaded program: /programs/turn.urp"
+    assert ask(bench, "isProgramSaved") == "true turn.urp"
+    assert ask(bench, "programState") == "STOPPED turn.urp"
+    assert ask(bench, "play") == "Starting program"
+    assert ask(bench, "programState") == "PLAYING turn.urp"  # answered when it runs
+    bench.run(1.0)
+    assert ask(bench, "pause") == "Pausing program"
+    assert ask(bench, "programState") == "PAUSED turn.urp"
+    assert ask(bench, "play") == "Starting program"
+    bench.run_until(lambda: ask(bench, "running") == "Program running: false", 10.0)
+    assert bench.world.joints().q_rad[0] == 1.0
+    assert ask(bench, "load /programs/turn.urp") == "Loading program: /programs/turn.urp"
+    assert ask(bench, "play") == "Starting program"
+    assert ask(bench, "play") == "Failed to execute: play"  # it runs already
+    assert ask(bench, "stop") == "Stopped"
+    assert ask(bench, "running") == "Program running: false"
+
+
+def test_a_program_that_cannot_run_is_not_loaded(bench) -> None:
+    bench.controller.dashboard.programs["loop.urp"] = "def loop():\n  while True:\n    sync()\n  end\nend\n"
+    assert ask(bench, "load loop.urp") == "Error while loading program: loop.urp"
+    assert "while True:" in bench.controller.runner.last_error
+    assert ask(bench, "play") == "Failed to execute: play"
+
+
+def test_nothing_plays_while_the_arm_may_not_move(bench) -> None:
+    bench.controller.dashboard.programs["rest.urp"] = "sleep(1)"
+    ask(bench, "load rest.urp")
+    bench.arm.protective_stop()
+    assert ask(bench, "play") == "Failed to execute: play"
+    ask(bench, "unlock protective stop")
+    assert ask(bench, "play") == "Starting program"
+
+
+def test_mode_and_role_are_kept(bench) -> None:
+    assert ask(bench, "set operational mode automatic") == "Setting operational mode: AUTOMATIC"
+    assert ask(bench, "get operational mode") == "AUTOMATIC"
+    ask(bench, "clear operational mode")
+    assert ask(bench, "get operational mode") == "NONE"
+    assert ask(bench, "setUserRole operator") == "Setting user role: OPERATOR"
+    assert ask(bench, "getUserRole") == "OPERATOR"
+
+
+def test_the_reported_version_is_one_that_can_be_imitated(bench) -> None:
+    bench.controller.report_version((5, 23, 0, 7))
+    assert ask(bench, "PolyscopeVersion") == "URSoftware 5.23.0.7 (Mar 01 2022)"
+    assert ask(bench, "version") == "5.23.0.7"
+    for version in ((5, 9, 0, 0), (5, 26, 0, 0), (10, 12, 0, 0)):
+        with pytest.raises(ValueError, match=r"5\.10 to 5\.25 can be imitated"):
+            bench.controller.report_version(version)

@@ -1,11 +1,17 @@
 """What Universal Robots' own RTDE client does: negotiate, ask for documented fields, write inputs; many at once.
 
+That client is no package of the index, so its requests are made here, and its way of reading: every package, in order.
+
 Names and types are those of the RTDE guide's tables of controller outputs and inputs.
 """
 
+import socket
 import struct
+from itertools import pairwise
 
 import pytest
+
+from tests.simulators.ur.conftest import emulator_process
 
 DOUBLES = [
     "timestamp",
@@ -156,3 +162,50 @@ def test_pause_and_start_again(bench) -> None:
     client.wire.handle(frame("S"))
     bench.run(0.002)
     assert client.wire.due()
+
+
+def received_cycles(host: str, count: int) -> list[int]:
+    """Cycle numbers of as many data packages in a row, read over the wire as the official client reads them."""
+    with socket.create_connection((host, 30004), 5.0) as line:
+        stream = line.makefile("rwb")
+
+        def answer() -> tuple[bytes, bytes]:
+            size, kind = struct.unpack(">Hc", stream.read(3))
+            return kind, stream.read(size - 3)
+
+        for request in (
+            frame("V", struct.pack(">H", 2)),
+            frame("v"),
+            frame("O", struct.pack(">d", 500.0) + b"timestamp,actual_q,actual_TCP_pose"),
+            frame("S"),
+        ):
+            stream.write(request)
+            stream.flush()
+            kind, payload = answer()
+            assert kind == request[2:3]
+        assert payload == b"\1"
+        cycles: list[int] = []
+        while len(cycles) < count:
+            kind, payload = answer()
+            assert kind == b"U"
+            cycles.append(round(struct.unpack_from(">d", payload, 1)[0] / 0.002))
+        stream.write(frame("P"))
+        stream.flush()
+        while kind == b"U":  # what was on its way
+            kind, payload = answer()
+        assert (kind, payload) == (b"P", b"\1")
+    return cycles
+
+
+def gaps(cycles: list[int]) -> list[tuple[int, int]]:
+    return [(before, after) for before, after in pairwise(cycles) if after - before != 1]
+
+
+def test_a_thousand_packages_arrive_without_a_gap(emulated) -> None:
+    assert gaps(received_cycles(emulated.host, 1000)) == []
+
+
+@pytest.mark.endure
+def test_ten_minutes_of_packages_arrive_without_a_gap() -> None:
+    with emulator_process(time_scale=1.0) as where:
+        assert gaps(received_cycles(where.host, 300_000)) == []

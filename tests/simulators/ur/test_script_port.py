@@ -85,3 +85,36 @@ def test_a_program_arrives_whole_in_any_split(cuts: list[int]) -> None:
     for start, end in itertools.pairwise(edges):
         wire.handle(text[start:end])
     assert got == ["textmsg(1)", "def go():\n  sync()\nend", "stopj(2)"]
+
+
+def test_lines_set_outputs_load_and_gravity(bench) -> None:
+    send(
+        bench,
+        "def set():\n  set_standard_digital_out(1, True)\n  set_configurable_digital_out(2, True)\n"
+        "  set_tool_digital_out(0, True)\n  set_digital_out(3, True)\n  set_digital_out(3, False)\n"
+        "  set_standard_analog_out(0, 0.25)\n  set_tool_voltage(24)\n  set_payload(1.5, [0.0, 0.01, 0.02])\n"
+        "  set_gravity([0.0, 9.82, 0.0])\nend\n",
+    )
+    bench.run(0.2)
+    memory = bench.controller.memory
+    assert memory.digital_outputs == 1 << 1 | 1 << 10 | 1 << 16
+    assert memory.analog_outputs == [2.5, 0.0]  # V
+    assert memory.tool_voltage_v == 24
+    assert memory.installation.payload_kg == 1.5
+    assert memory.installation.payload_cog_m == (0.0, 0.01, 0.02)
+    assert memory.installation.gravity_m_s2 == (0.0, 9.82, 0.0)
+
+
+def test_the_force_sensor_is_zeroed_by_a_line(bench) -> None:
+    assert bench.controller.rtde.readout.tool_wrench[2] < -3.0  # this bench states no payload
+    send(bench, "zero_ftsensor()\n")
+    bench.run(0.2)
+    assert bench.controller.rtde.readout.tool_wrench == pytest.approx([0.0] * 6, abs=1e-12)
+
+
+@pytest.mark.parametrize("line", ["set_tool_digital_out(2, True)", "set_payload(1.0, [0.0])", "set_gravity(9.82)"])
+def test_a_line_with_an_impossible_number_ends_its_program(bench, line: str) -> None:
+    send(bench, f"{line}\n")
+    bench.run(0.2)
+    assert line.partition("(")[0] in bench.controller.runner.last_error
+    assert bench.controller.memory.digital_outputs == 0

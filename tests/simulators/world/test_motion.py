@@ -122,3 +122,21 @@ def test_time_advances_in_whole_milliseconds_whatever_is_asked(ur5e):
     assert world.time_s == pytest.approx(0.3, abs=1e-12)
     world.advance(0.3009)
     assert world.time_s == pytest.approx(0.3, abs=1e-12)
+
+
+def test_masses_and_loads_are_asked_for_anywhere_and_leave_the_arm_where_it_is(ur5e):
+    world = World.from_rig(ur5e(), q_rad=BENT)
+    held_nm = world.joints().torque_nm
+    rest, speed = np.zeros(6), np.array([0.2, -0.3, 0.4, 0.1, 0.5, -0.2])
+    assert world.load_nm(BENT, rest) == pytest.approx(held_nm, abs=1e-9)
+    there = BENT + 0.3
+    mass = world.mass_matrix_kg_m2(there)
+    assert mass == pytest.approx(mass.T, abs=1e-12)
+    assert np.linalg.eigvalsh(mass).min() > 0.0  # without rotors: the last joint turns a tool of 0.4 kg
+    # power of the Coriolis forces is half that of the changing inertia (Siciliano, section 7.2.1)
+    step_s = 1e-6
+    change = world.mass_matrix_kg_m2(there + step_s * speed) - world.mass_matrix_kg_m2(there - step_s * speed)
+    power_w = speed @ (world.load_nm(there, speed) - world.load_nm(there, rest))
+    assert power_w == pytest.approx(0.5 * speed @ (change / (2.0 * step_s)) @ speed, rel=1e-6)
+    assert np.array_equal(world.joints().q_rad, BENT)
+    assert np.array_equal(world.joints().torque_nm, held_nm)

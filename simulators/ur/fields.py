@@ -1,20 +1,23 @@
-"""Every output variable a recipe may name: its type, and where the value comes from.
+"""Every variable that a recipe may name: its type, where an output comes from, and what writing an input does.
 
-Emulated are time, joints (position, speed, current, moment, temperature, mode), tool pose and speed, states, speed
-scaling, load, digital outputs and registers. target_current, target_moment and joint_control_output repeat the actual
-values. Plausible constants are: actual_current_window, actual_TCP_force and ft_raw_wrench (no contact), tool and base
-accelerations, analog inputs and outputs, digital inputs, tool inputs, voltages and robot current, momentum, execution
-times, accelerometer, elbow, Euromap67, encoder inputs, energies, collision and deviation ratios.
-Source of names and types: Universal Robots, "Real-Time Data Exchange (RTDE) Guide", table of controller outputs.
+Emulated outputs: time, joints (position, speed, current, moment, temperature, mode), tool pose and speed, states, speed
+scaling, load, forces at the tool (see dynamics), accelerometer (gravity only), elbow, digital and analog outputs, tool
+voltage and registers. target_current, target_moment and joint_control_output repeat the actual values. Plausible
+constants: actual_current_window, wrench_calc_from_currents, tool and base accelerations, analog and digital inputs,
+tool inputs, voltages and robot current, momentum, execution times, Euromap67, encoder inputs, energies, collision and
+deviation ratios. Inputs: the external force-torque is kept, without effect on the emulated world.
+Source of names and types: Universal Robots, "Real-Time Data Exchange (RTDE) Guide", tables of controller outputs and
+inputs.
 """
 
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from simulators.ur.readout import Readout
-from simulators.ur.registers import N_BITS, N_REGISTERS, Registers
+from simulators.ur.registers import N_BITS, N_REGISTERS, Memory, Registers
 
 Source = Callable[[Readout], Any]  # a number, or as many as the type is long
 
@@ -28,7 +31,7 @@ class Field:
     constant: float | tuple[float, ...] | None = None  # where the value is always the same
 
 
-ZERO3, ZERO6 = (0.0,) * 3, (0.0,) * 6
+ZERO6 = (0.0,) * 6
 
 
 LIVE: dict[str, Field] = {
@@ -63,8 +66,18 @@ LIVE: dict[str, Field] = {
     "payload_cog": Field("VECTOR3D", lambda r: r.memory.installation.payload_cog_m),
     "payload_inertia": Field("VECTOR6D", lambda r: r.memory.installation.payload_inertia_kg_m2),
     "target_gravity": Field("VECTOR3D", lambda r: r.memory.installation.gravity_m_s2),
+    "actual_TCP_force": Field("VECTOR6D", lambda r: r.tool_wrench),
+    "ft_raw_wrench": Field("VECTOR6D", lambda r: r.raw_wrench),
+    "tcp_force_scalar": Field("DOUBLE", lambda r: math.hypot(*r.tool_wrench[:3])),
+    "actual_tool_accelerometer": Field("VECTOR3D", lambda r: r.accelerometer_m_s2),
+    "elbow_position": Field("VECTOR3D", lambda r: r.elbow_m),
+    "elbow_velocity": Field("VECTOR3D", lambda r: r.elbow_speed_m_s),
     "actual_digital_output_bits": Field("UINT64", lambda r: r.memory.digital_outputs),
     "actual_configurable_digital_output_bits": Field("UINT64", lambda r: (r.memory.digital_outputs >> 8) & 0xFF),
+    "analog_io_types": Field("UINT32", lambda r: r.memory.analog_types),
+    "standard_analog_output0": Field("DOUBLE", lambda r: r.memory.analog_outputs[0]),
+    "standard_analog_output1": Field("DOUBLE", lambda r: r.memory.analog_outputs[1]),
+    "tool_output_voltage": Field("INT32", lambda r: r.memory.tool_voltage_v),
     "output_bit_registers0_to_31": Field("UINT32", lambda r: r.memory.outputs.word(0)),
     "output_bit_registers32_to_63": Field("UINT32", lambda r: r.memory.outputs.word(32)),
     "input_bit_registers0_to_31": Field("UINT32", lambda r: r.memory.inputs.word(0)),
@@ -80,30 +93,20 @@ CONSTANT: dict[str, tuple[str, float | tuple[float, ...]]] = {
     "actual_robot_current": ("DOUBLE", 0.6),
     "actual_joint_voltage": ("VECTOR6D", (48.0,) * 6),
     "actual_current_window": ("VECTOR6D", (1.0,) * 6),
-    "actual_TCP_force": ("VECTOR6D", ZERO6),
-    "ft_raw_wrench": ("VECTOR6D", ZERO6),
     "wrench_calc_from_currents": ("VECTOR6D", ZERO6),
-    "tcp_force_scalar": ("DOUBLE", 0.0),
     "actual_TCP_acceleration": ("VECTOR6D", ZERO6),
     "target_TCP_acceleration": ("VECTOR6D", ZERO6),
     "target_base_acceleration": ("VECTOR6D", ZERO6),
     "target_base_wrench": ("VECTOR6D", ZERO6),
-    "actual_tool_accelerometer": ("VECTOR3D", (0.0, 0.0, 9.82)),
-    "elbow_position": ("VECTOR3D", ZERO3),
-    "elbow_velocity": ("VECTOR3D", ZERO3),
     "actual_digital_input_bits": ("UINT64", 0),
     "actual_configurable_digital_input_bits": ("UINT64", 0),
-    "analog_io_types": ("UINT32", 3),
     "io_current": ("DOUBLE", 0.02),
     "standard_analog_input0": ("DOUBLE", 0.0),
     "standard_analog_input1": ("DOUBLE", 0.0),
-    "standard_analog_output0": ("DOUBLE", 0.0),
-    "standard_analog_output1": ("DOUBLE", 0.0),
     "tool_mode": ("UINT32", 253),
     "tool_analog_input_types": ("UINT32", 3),
     "tool_analog_input0": ("DOUBLE", 0.0),
     "tool_analog_input1": ("DOUBLE", 0.0),
-    "tool_output_voltage": ("INT32", 0),
     "tool_output_current": ("DOUBLE", 0.0),
     "tool_temperature": ("DOUBLE", 30.0),
     "tool_output_mode": ("UINT8", 0),
@@ -134,10 +137,10 @@ def output_field(name: str) -> Field | None:
         field_type, value = CONSTANT[name]
         return Field(field_type, lambda r: value, value)
     match = REGISTER.fullmatch(name)
-    return None if match is None else _register_field(match[1] == "input", match[2], int(match[3]))
+    return None if match is None else _output_register(match[1] == "input", match[2], int(match[3]))
 
 
-def _register_field(is_input: bool, kind: str, index: int) -> Field | None:
+def _output_register(is_input: bool, kind: str, index: int) -> Field | None:
     def side(readout: Readout) -> Registers:
         return readout.memory.inputs if is_input else readout.memory.outputs
 
@@ -147,4 +150,54 @@ def _register_field(is_input: bool, kind: str, index: int) -> Field | None:
         return Field("DOUBLE", lambda r: side(r).doubles[index])
     if kind == "bit" and 64 <= index < N_BITS:
         return Field("BOOL", lambda r: side(r).bit(index))
+    return None
+
+
+# --- inputs
+
+SETTINGS = {
+    "speed_slider_mask": "UINT32",
+    "speed_slider_fraction": "DOUBLE",
+    "standard_digital_output_mask": "UINT8",
+    "standard_digital_output": "UINT8",
+    "configurable_digital_output_mask": "UINT8",
+    "configurable_digital_output": "UINT8",
+    "tool_digital_output_mask": "UINT8",
+    "tool_digital_output": "UINT8",
+    "standard_analog_output_mask": "UINT8",
+    "standard_analog_output_type": "UINT8",
+    "standard_analog_output_0": "DOUBLE",
+    "standard_analog_output_1": "DOUBLE",
+    "external_force_torque": "VECTOR6D",
+}
+INPUT_REGISTER = re.compile(r"input_(int|double|bit)_register_(\d+)")
+
+
+@dataclass(frozen=True)
+class InputField:
+    """A variable: its RTDE type and how it is written (one number, or a tuple for a vector)."""
+
+    type_name: str
+    write: Callable[[Any], None]
+
+
+def input_field(name: str, memory: Memory) -> InputField | None:
+    """The variable of that name, None when there is none (the controller then answers NOT_FOUND)."""
+    if name in SETTINGS:
+        return InputField(SETTINGS[name], lambda value: memory.settings.__setitem__(name, value))
+    if name == "input_bit_registers0_to_31":
+        return InputField("UINT32", lambda value: memory.inputs.set_word(0, value))
+    if name == "input_bit_registers32_to_63":
+        return InputField("UINT32", lambda value: memory.inputs.set_word(32, value))
+    match = INPUT_REGISTER.fullmatch(name)
+    return None if match is None else _input_register(match[1], int(match[2]), memory)
+
+
+def _input_register(kind: str, index: int, memory: Memory) -> InputField | None:
+    if kind == "int" and index < N_REGISTERS:
+        return InputField("INT32", lambda value: memory.write_int(index, value))
+    if kind == "double" and index < N_REGISTERS:
+        return InputField("DOUBLE", lambda value: memory.inputs.doubles.__setitem__(index, value))
+    if kind == "bit" and 64 <= index < N_BITS:
+        return InputField("BOOL", lambda value: memory.inputs.set_bit(index, value))
     return None
