@@ -142,17 +142,14 @@ class Cia406Encoders:
             while len(self._rows) < self._batch:
                 if now_s >= deadline_s:
                     break
-                if now_s >= self._cycle.wakes_s:
-                    self._keep_pace(now_s)
                 messages = self._receive(min(self._cycle.wakes_s, deadline_s) - now_s)
                 now_s = self._clock.now_s()
-                if not messages:
-                    self._watch.check_heartbeats()
-                    self._add(self._cycle.give_up(now_s))
-                    continue
-                self._watch.look(now_s)
-                for message in messages:
-                    self._take(message, now_s)
+                # Before the work on what came, which is of earlier SYNCs: it would delay this one, and its answers.
+                sent = now_s >= self._cycle.wakes_s and self._keep_pace(now_s)
+                self._take_all(messages, now_s)
+                if sent:
+                    self._cycle.sent(now_s)
+            self._watch.check_heartbeats()
         if not self._rows:
             raise DeviceStale(
                 f"{self.name}: no encoder answered a SYNC within {timeout_s:g} s; check power, bus and bitrate"
@@ -233,12 +230,13 @@ class Cia406Encoders:
 
     # --- streaming
 
-    def _keep_pace(self, now_s: float) -> None:
+    def _keep_pace(self, now_s: float) -> bool:
+        """Whether a SYNC was due, and went out."""
         self._check_silence(now_s)
-        if self._cycle.sync_due(now_s):
-            sent_s = self._clock.now_s()  # the frames that came last have taken time since `now_s`
+        due = self._cycle.sync_due(now_s)
+        if due:
             self._connected().send(SYNC, SEND_LIMIT_S)
-            self._cycle.sent(sent_s)
+        return due
 
     def _receive(self, timeout_s: float) -> list[can.Message]:
         """What came; waits for it at most `timeout_s`, and when that is short to its end: one waking for all."""
@@ -250,6 +248,15 @@ class Cia406Encoders:
         except (ValueError, IndexError):  # python-can's parser on a damaged line of a serial adapter
             self._bad_lines += 1
             return []
+
+    def _take_all(self, messages: Sequence[can.Message], now_s: float) -> None:
+        if not messages:
+            self._watch.check_heartbeats()
+            self._add(self._cycle.give_up(now_s))
+            return
+        self._watch.look(now_s)
+        for message in messages:
+            self._take(message, now_s)
 
     def _take(self, message: can.Message, now_s: float | None = None) -> None:
         """One frame: a position, a heartbeat, an emergency, an error, or nothing of ours; heard now unless told."""
