@@ -256,20 +256,19 @@ class Cia406Encoders:
             return
         self._watch.look(now_s)
         for message in messages:
-            self._take(message, now_s)
+            place = self._node_of_pdo.get(message.arbitration_id)
+            if place is None or message.is_extended_id or message.is_remote_frame or message.is_error_frame:
+                self._take(message, now_s)
+            else:
+                self._take_position(place, message.data, now_s)
 
     def _take(self, message: can.Message, now_s: float | None = None) -> None:
-        """One frame: a position, a heartbeat, an emergency, an error, or nothing of ours; heard now unless told."""
+        """A heartbeat, an emergency, an error, or nothing of ours; heard now unless a time is given."""
         at_s = self._clock.now_s() if now_s is None else now_s
         if message.is_error_frame:
             self._faults.take(message, at_s)
-        if message.is_extended_id or message.is_remote_frame or message.is_error_frame:
-            return
-        place = self._node_of_pdo.get(message.arbitration_id)
-        if self._operational and place is not None:
-            self._take_position(place, message.data, at_s)
-            return
-        self._watch.take(message.arbitration_id, bytes(message.data), at_s)
+        elif not (message.is_extended_id or message.is_remote_frame):
+            self._watch.take(message.arbitration_id, bytes(message.data), at_s)
 
     def _take_position(self, place: int, data: bytes | bytearray, now_s: float) -> None:
         units = self._positions[place].read(data)
