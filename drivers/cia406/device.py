@@ -40,7 +40,7 @@ MAX_SYNC_HZ = 1000.0  # six encoders fill half of a bus of 1 Mbit/s
 SILENT_S = 0.5  # a node that answers no SYNC for so long is gone
 HEARTBEAT_GOES_ON_S = 0.49  # of SILENT_S: a heartbeat this fresh is one of after the silence began
 BATCH_S = 0.02  # rows gathered in one block; more only delays a reader
-TOGETHER_S = 0.001  # answers may wait so long for the next SYNC: at 1 kHz one waking a row in place of two or more
+TOGETHER_S = 1.1e-3  # answers wait so long for the next SYNC: at 1 kHz one waking a row in place of two or more
 SYNC = can.Message(arbitration_id=objects.SYNC_ID, is_extended_id=False)
 
 
