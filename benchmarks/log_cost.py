@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import psutil
 
 from acquisition.recording.read import read
 from acquisition.recording.segments import segments
@@ -54,7 +53,7 @@ def _logged(rig: Path, folder: Path, for_s: float) -> Iterator[str]:
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as logger:
             assert logger.stdout is not None
             _place(logger.pid, -1)
-            used = _watched(psutil.Process(logger.pid), folder / "log" / "segment-0001.mcap", for_s - 2.0 * MARGIN_S)
+            used = _watched(logger.pid, folder / "log" / "segment-0001.mcap", for_s - 2.0 * MARGIN_S)
             counts = json.loads(logger.stdout.read())
         bus.stdin.close()
     (file,) = segments(folder / "log")
@@ -74,21 +73,25 @@ def _logged(rig: Path, folder: Path, for_s: float) -> Iterator[str]:
     yield f"{file.stat().st_size / counts['rows']:.0f} bytes a row of six positions and seven frames"
 
 
-def _watched(logger: psutil.Process, first: Path, for_s: float) -> _Used:
+def _watched(pid: int, first: Path, for_s: float) -> _Used:
     while not first.exists():
         time.sleep(0.01)
     time.sleep(MARGIN_S)
-    before, memory, switches, from_s = logger.cpu_times(), logger.memory_info(), _waits(logger), time.monotonic()
+    before, from_s = _so_far(pid), time.monotonic()
     time.sleep(for_s)
-    after, span_s = logger.cpu_times(), time.monotonic() - from_s
-    cpu_s = after.user + after.system - before.user - before.system
-    return _Used(cpu_s, span_s, _waits(logger) - switches, logger.memory_info().rss - memory.rss)
+    after, span_s = _so_far(pid), time.monotonic() - from_s
+    cpu_s, switches, rss_bytes = (end - begin for end, begin in zip(after, before, strict=True))
+    return _Used(cpu_s, span_s, int(switches), int(rss_bytes))
 
 
-def _waits(logger: psutil.Process) -> int:
-    """Of all its threads; psutil counts those of the first alone."""
-    status = (task.joinpath("status").read_text() for task in Path(f"/proc/{logger.pid}/task").glob("*"))
-    return sum(int(line.split()[1]) for text in status for line in text.splitlines() if line.startswith("voluntary"))
+def _so_far(pid: int) -> tuple[float, float, float]:
+    """Processor seconds, waits of all threads, bytes in memory (Linux, proc(5))."""
+    process = Path(f"/proc/{pid}")
+    user, system = (process / "stat").read_text().rpartition(")")[2].split()[11:13]
+    lines = [line for task in process.glob("task/*/status") for line in task.read_text().splitlines()]
+    switches = sum(int(line.split()[1]) for line in lines if line.startswith("voluntary"))
+    pages = int((process / "statm").read_text().split()[1])
+    return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK"), switches, pages * os.sysconf("SC_PAGE_SIZE")
 
 
 def _place(pid: int, core: int) -> None:
