@@ -8,12 +8,22 @@ import can
 import numpy as np
 from numpy.typing import ArrayLike
 
-from acquisition.recording.can_frames import CLASSIC_BYTES, FD_BYTES, FD_STREAM, STREAM, Frame, block_of, channels
+from acquisition.recording.can_frames import (
+    CLASSIC_BYTES,
+    FD_BYTES,
+    FD_STREAM,
+    STREAM,
+    Frame,
+    FrameFlag,
+    block_of,
+    channels,
+)
 from acquisition.recording.can_message import frame_of
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.stream import Channel
 from drivers.clock import Clock
 
+_ERROR = int(FrameFlag.ERROR)  # comparing with a member of an enumeration takes ten times as long
 BLOCK_S = 0.02  # as long as the encoder driver gathers rows: more would only lengthen what a kill loses
 
 
@@ -47,14 +57,14 @@ class FrameLog:
         self._long: _Counted | None = None
         self._now_s: Callable[[], float] = clock.now_s
         self._turn = threading.Lock()
-        self._heard: list[tuple[can.Message, float, bool]] = []
+        self._heard: list[tuple[Sequence[can.Message], float, bool]] = []
         self._failure: RecordingError | None = None
 
-    def hear(self, message: can.Message, sent: bool) -> None:
+    def hear(self, messages: Sequence[can.Message], sent: bool) -> None:
         """Never raises, for what a tap raises looks to a driver like a fault of the bus; `flush` does."""
         now_s = self._now_s()
         with self._turn:
-            self._heard.append((message, now_s, sent))  # a frame is made of it later: here every microsecond counts
+            self._heard.append((messages, now_s, sent))  # frames are made of them later: here every microsecond counts
             if now_s - self._heard[0][1] >= BLOCK_S:
                 try:
                     self._write()
@@ -72,9 +82,9 @@ class FrameLog:
         heard, self._heard = self._heard, []
         if not heard:
             return
-        frames = [frame_of(message, host_s, sent=sent) for message, host_s, sent in heard]
+        frames = [frame_of(message, host_s, sent=sent) for messages, host_s, sent in heard for message in messages]
         self.count += len(frames)
-        self.errors += sum(message.is_error_frame for message, _, _ in heard)
+        self.errors += sum(frame.flags & _ERROR > 0 for frame in frames)
         long = [frame for frame in frames if len(frame.data) > CLASSIC_BYTES]
         if long:
             self._write_long(long)

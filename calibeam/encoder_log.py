@@ -3,7 +3,7 @@
 import gc
 import signal
 import threading
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -124,9 +124,9 @@ class EncoderLog:
         finally:
             self._recording.close(complete)
 
-    def _hear(self, message: can.Message, sent: bool) -> None:
+    def _hear(self, messages: Sequence[can.Message], sent: bool) -> None:
         assert self._frames is not None  # noqa: S101 - made before the bus is opened
-        self._frames.hear(message, sent)
+        self._frames.hear(messages, sent)
 
     def _keep(self, block: Block) -> None:
         assert self._stream is not None  # noqa: S101 - made before the pump starts

@@ -1,13 +1,35 @@
 """One MCAP file being written by one thread: metadata, topics, messages, flush. Knows nothing of what they mean."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any, Self
 
+from mcap.data_stream import RecordBuilder
+from mcap.records import ChunkIndex
 from mcap.writer import Writer
 
 from acquisition.recording.disk_file import DiskFile, create_file
 from acquisition.recording.layout import CHECKSUM, PROFILE, checksum
 from acquisition.recording.messages import MessageType
+
+
+class _ChunkIndexes:
+    """The index of an open file, as the bytes that will stand at its end.
+
+    With 20 batches a second, mcap's own list of objects takes 70 MB in an hour, this one 8 MB.
+    """
+
+    def __init__(self) -> None:
+        self._records = RecordBuilder()
+
+    def append(self, index: ChunkIndex) -> None:
+        index.write(self._records)
+
+    def __iter__(self) -> Iterator[Self]:
+        yield self
+
+    def write(self, stream: RecordBuilder) -> None:
+        stream.write(self._records.end())
 
 
 class McapFile:
@@ -16,6 +38,8 @@ class McapFile:
     def __init__(self, path: Path, software: str) -> None:
         self._disk: DiskFile = create_file(path)
         self._writer = Writer(self._disk, enable_data_crcs=True)  # pyright: ignore[reportArgumentType] - a file by its verbs
+        writer: Any = self._writer
+        writer._Writer__chunk_indices = _ChunkIndexes()  # noqa: SLF001 - mcap has no option for it
         self._writer.start(profile=PROFILE, library=software)
         self._sequence: dict[int, int] = {}
         self._latest_ns = self.safe_ns = 0

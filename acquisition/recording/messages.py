@@ -5,8 +5,8 @@ https://mcap.dev/spec/registry), so any reader decodes the recording without thi
 """
 
 import enum
-from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
@@ -48,8 +48,12 @@ class MessageType:
     new: type[Message]
 
 
-def message_type(name: str, fields: Iterable[Field]) -> MessageType:
-    """The message `calibeam.<name>` with these fields, numbered from 1."""
+@lru_cache(maxsize=64)
+def message_type(name: str, fields: tuple[Field, ...]) -> MessageType:
+    """The message `calibeam.<name>` with these fields, numbered from 1; the same one when asked again.
+
+    A log of days has the same messages in every segment, and protobuf never frees the classes of its messages at once.
+    """
     file = descriptor_pb2.FileDescriptorProto(name=f"calibeam/{name}.proto", package="calibeam", syntax="proto3")
     message = file.message_type.add(name=name)
     for number, field in enumerate(fields, start=1):

@@ -38,8 +38,8 @@ class SamplesEncoder:
 
     def _declare(self, file: McapFile, columns: tuple[str, ...]) -> tuple[int, MessageType]:
         self._fields = field_names(columns)
-        fields = [Field(field, _FIELD_TYPE[kind_of(name)], Presence.OPTIONAL) for name, field in self._fields.items()]
-        kind = message_type("sample", fields)
+        fields = (Field(field, _FIELD_TYPE[kind_of(name)], Presence.OPTIONAL) for name, field in self._fields.items())
+        kind = message_type("sample", tuple(fields))
         return file.topic(SAMPLES_TOPIC, kind, {"columns": msgspec.json.encode(self._fields).decode()}), kind
 
 

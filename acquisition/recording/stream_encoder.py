@@ -69,11 +69,11 @@ class StreamEncoder:
                 Field(name, FieldType.INT64 if array.dtype.kind == "i" else FieldType.DOUBLE, Presence.REPEATED)
             )
         identifier = self._name.replace("-", "_")
-        batch = message_type(f"{identifier}_batch", fields)
+        batch = message_type(f"{identifier}_batch", tuple(fields))
         self._batch = file.topic(STREAM_TOPIC + self._name, batch, {"channels": channels_json(self._channels)}), batch
         if self._viewed:
             names = ("host_s", *(name for channel in self._viewed for name in scalar_names(channel)))
-            view = message_type(f"{identifier}_view", [Field(name, FieldType.DOUBLE) for name in names])
+            view = message_type(f"{identifier}_view", tuple(Field(name, FieldType.DOUBLE) for name in names))
             self._view = file.topic(VIEW_TOPIC + self._name, view, {}), view
 
     def _emit_batch(self, file: McapFile, piece: Piece, rows: slice) -> None:

@@ -73,7 +73,7 @@ class RecordingWriter:
         self.path = Path(path)
         self.rig = parse_rig(rig_text, f"{path} (rig)")
         self.host_s0 = clock.now_s() if host_s0 is None else host_s0
-        self._streams: dict[str, StreamWriter] = {}
+        self._streams: set[str] = set()  # names only: a stream knows its writer, and a cycle would keep a closed one
         self._samples_encoder = SamplesEncoder()
         self._topics: dict[str, int] = {}  # belongs to the writing thread
         self._n_samples = 0
@@ -131,10 +131,9 @@ class RecordingWriter:
                 raise ValueError(f"stream '{name}' is declared twice; give each device its own name")
             encoder = StreamEncoder(name, channels, names if viewer is None else viewer)
             self._spool.put(partial(self._begin_stream, name=name, channels=channels, encoder=encoder), 0)
-            self._streams[name] = StreamWriter(
-                name, channels, partial(self._put_piece, encoder), partial(self._put_gap, name), after
-            )
-            return self._streams[name]
+            self._streams.add(name)
+            put = partial(self._put_piece, encoder)
+            return StreamWriter(name, channels, put, partial(self._put_gap, name), after)
 
     def sample(self, row: Mapping[str, Cell], host_s: float | None = None) -> None:
         """One settled sample: column -> value, None (or NaN) where missing; names of the session-folder format.

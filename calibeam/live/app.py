@@ -15,6 +15,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from calibeam.live.access import Guard, Rules
 from calibeam.live.composer import Composer
+from calibeam.live.limits import TOO_MANY, Limits
 from calibeam.live.pulse import Pulse
 from calibeam.live.stopping import Stop
 from calibeam.live.viewers import ON_THE_WAY, Viewer, Viewers
@@ -23,7 +24,7 @@ COUNTS = frozenset(map(str, range(1, ON_THE_WAY + 1)))
 STATIC = Path(__file__).parent / "static"
 
 
-def live_app(composer: Composer, stop: Stop, viewers: Viewers, rules: Rules) -> ASGIApp:
+def live_app(composer: Composer, stop: Stop, viewers: Viewers, rules: Rules, limits: Limits) -> ASGIApp:
     """Everything behind its guard. `viewers` must be made in the event loop that serves."""
     pulse = Pulse(viewers, composer)
 
@@ -39,6 +40,9 @@ def live_app(composer: Composer, stop: Stop, viewers: Viewers, rules: Rules) -> 
 
     async def feed(socket: WebSocket) -> None:
         await socket.accept()
+        if len(viewers) >= limits.viewers:
+            await socket.close(TOO_MANY, "too many pages are open")
+            return
         viewer = Viewer()
         viewer.post("rig", composer.rig())
         viewers.add(viewer)
@@ -47,8 +51,11 @@ def live_app(composer: Composer, stop: Stop, viewers: Viewers, rules: Rules) -> 
         try:
             with suppress(WebSocketDisconnect):
                 while True:
-                    count = await socket.receive_text()  # how many messages it has taken
+                    async with asyncio.timeout(limits.silent_viewer_s):
+                        count = await socket.receive_text()  # how many messages it has taken
                     viewers.taken(viewer, int(count) if count in COUNTS else 0)
+        except TimeoutError:
+            await socket.close(reason="nothing was acknowledged")
         finally:
             viewers.remove(viewer)
             sending.cancel()

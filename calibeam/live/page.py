@@ -1,12 +1,15 @@
 """The live page as a server in a thread of its own, beside whatever feeds it."""
 
 import asyncio
+import math
 import secrets
 import socket
 import threading
 from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
+from typing import Any, cast
 from urllib.parse import quote
 
 import uvicorn
@@ -19,6 +22,7 @@ from calibeam.live.app import live_app
 from calibeam.live.composer import Composer
 from calibeam.live.feed import Feed
 from calibeam.live.latest import Latest
+from calibeam.live.limits import ACCEPTED_AT_ONCE, LimitedHttp, LimitedServer, LimitedWebSocket, Limits
 from calibeam.live.messages import Job
 from calibeam.live.viewers import Viewers
 from drivers.clock import Clock
@@ -49,14 +53,17 @@ class LivePage:
 
 
 @contextmanager
-def live_page(rig: Rig, clock: Clock, address: PageAddress, job: Job = "session") -> Generator[LivePage]:
+def live_page(
+    rig: Rig, clock: Clock, address: PageAddress, job: Job = "session", limits: Limits | None = None
+) -> Generator[LivePage]:
     """Served inside. PageError when that cannot be. The end of the page stops nothing."""
     listening = _listen(address)
     port = int(listening.getsockname()[1])
     token = address.token or (None if is_loopback(address.host) else secrets.token_urlsafe(TOKEN_BYTES))
     names = LOOPBACK_NAMES | {address.host} if is_loopback(address.host) else None
     latest = Latest(clock)
-    serving = _Serving(Composer(rig, latest, job), latest, Rules(port, token, names), listening)
+    rules = Rules(port, token, names)
+    serving = _Serving(Composer(rig, latest, job), latest, rules, limits or Limits(), listening)
     limit_s = rig.live.stop_without_page_s if job == "session" else None  # who only watches owns no motion
     with serving.running(), watched_pages(latest.stop, serving.viewers, limit_s, clock):
         yield LivePage(latest, _url(address.host, port, token))
@@ -65,22 +72,27 @@ def live_page(rig: Rig, clock: Clock, address: PageAddress, job: Job = "session"
 class _Serving:
     """uvicorn in a thread."""
 
-    def __init__(self, composer: Composer, latest: Latest, rules: Rules, listening: socket.socket) -> None:
+    def __init__(
+        self, composer: Composer, latest: Latest, rules: Rules, limits: Limits, listening: socket.socket
+    ) -> None:
         self.viewers = Viewers(latest.clock)
         self._socket = listening
         config = uvicorn.Config(
-            live_app(composer, latest.stop, self.viewers, rules),
+            live_app(composer, latest.stop, self.viewers, rules, limits),
             lifespan="on",
             log_config=None,
             access_log=False,
             proxy_headers=False,
             server_header=False,
-            ws="websockets-sansio",
+            backlog=ACCEPTED_AT_ONCE,
+            timeout_keep_alive=math.ceil(limits.request_s),
+            http=cast(Any, partial(LimitedHttp, limits=limits)),  # uvicorn calls it, and asks for a class
+            ws=cast(Any, partial(LimitedWebSocket, limits=limits)),
             ws_per_message_deflate=False,  # would cost more than the bytes it saves on a local line
-            ws_max_size=1024,  # a page says little
+            ws_max_size=limits.viewer_message_bytes,
             timeout_graceful_shutdown=1,
         )
-        self._server = uvicorn.Server(config)
+        self._server = LimitedServer(config)
         self._thread = threading.Thread(target=self._run, name="live page", daemon=True)
 
     @contextmanager

@@ -34,12 +34,13 @@ from drivers.cia406.watch import NodeWatch
 from drivers.clock import Clock, SystemClock
 from drivers.device import Block, Channel
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale
-from drivers.transports.can_interfaces import OpenBus, opened
+from drivers.transports.can_interfaces import OpenBus, opened, received
 
 MAX_SYNC_HZ = 1000.0  # six encoders fill half of a bus of 1 Mbit/s
 SILENT_S = 0.5  # a node that answers no SYNC for so long is gone
 HEARTBEAT_GOES_ON_S = 0.49  # of SILENT_S: a heartbeat this fresh is one of after the silence began
 BATCH_S = 0.02  # rows gathered in one block; more only delays a reader
+TOGETHER_S = 1.1e-3  # answers wait so long for the next SYNC: at 1 kHz one waking a row in place of two or more
 SYNC = can.Message(arbitration_id=objects.SYNC_ID, is_extended_id=False)
 
 
@@ -48,7 +49,8 @@ class Cia406Encoders:
     slip_rad (node,), the sum of all steps that were no motion; bus_errors, error frames so far.
 
     device_s is when the SYNC was sent, by the host's clock, which is when all encoders latch: they have no clock of
-    their own. `Cia406Encoders(bus_opener("socketcan", "can0", 1_000_000), nodes=[1, 2, 3, 4, 5, 6])`.
+    their own. host_s is when the last answer was taken, TOGETHER_S after it came at most.
+    `Cia406Encoders(bus_opener("socketcan", "can0", 1_000_000), nodes=[1, 2, 3, 4, 5, 6])`.
     """
 
     def __init__(
@@ -140,16 +142,14 @@ class Cia406Encoders:
             while len(self._rows) < self._batch:
                 if now_s >= deadline_s:
                     break
-                if now_s >= self._cycle.wakes_s:
-                    self._keep_pace(now_s)
-                message = self._receive(min(self._cycle.wakes_s, deadline_s) - now_s)
+                messages = self._receive(min(self._cycle.wakes_s, deadline_s) - now_s)
                 now_s = self._clock.now_s()
-                if message is None:
-                    self._watch.check_heartbeats()
-                    self._add(self._cycle.give_up(now_s))
-                    continue
-                self._watch.look(now_s)
-                self._take(message, now_s)
+                # Before the work on what came, which is of earlier SYNCs: it would delay this one, and its answers.
+                sent = now_s >= self._cycle.wakes_s and self._keep_pace(now_s)
+                self._take_all(messages, now_s)
+                if sent:
+                    self._cycle.sent(now_s)
+            self._watch.check_heartbeats()
         if not self._rows:
             raise DeviceStale(
                 f"{self.name}: no encoder answered a SYNC within {timeout_s:g} s; check power, bus and bitrate"
@@ -230,31 +230,45 @@ class Cia406Encoders:
 
     # --- streaming
 
-    def _keep_pace(self, now_s: float) -> None:
+    def _keep_pace(self, now_s: float) -> bool:
+        """Whether a SYNC was due, and went out."""
         self._check_silence(now_s)
-        if self._cycle.sync_due(now_s):
+        due = self._cycle.sync_due(now_s)
+        if due:
             self._connected().send(SYNC, SEND_LIMIT_S)
-            self._cycle.sent(now_s)
+        return due
 
-    def _receive(self, timeout_s: float) -> can.Message | None:
+    def _receive(self, timeout_s: float) -> list[can.Message]:
+        """What came; waits for it at most `timeout_s`, and when that is short to its end: one waking for all."""
+        if 0.0 < timeout_s <= TOGETHER_S:
+            self._clock.sleep_s(timeout_s)
+            timeout_s = 0.0
         try:
-            return (self._bus or self._connected()).recv(timeout_s if timeout_s > 0.0 else 0.0)
+            return received(self._bus or self._connected(), max(timeout_s, 0.0))
         except (ValueError, IndexError):  # python-can's parser on a damaged line of a serial adapter
             self._bad_lines += 1
-            return None
+            return []
+
+    def _take_all(self, messages: Sequence[can.Message], now_s: float) -> None:
+        if not messages:
+            self._watch.check_heartbeats()
+            self._add(self._cycle.give_up(now_s))
+            return
+        self._watch.look(now_s)
+        for message in messages:
+            place = self._node_of_pdo.get(message.arbitration_id)
+            if place is None or message.is_extended_id or message.is_remote_frame or message.is_error_frame:
+                self._take(message, now_s)
+            else:
+                self._take_position(place, message.data, now_s)
 
     def _take(self, message: can.Message, now_s: float | None = None) -> None:
-        """One frame: a position, a heartbeat, an emergency, an error, or nothing of ours; heard now unless told."""
+        """A heartbeat, an emergency, an error, or nothing of ours; heard now unless a time is given."""
         at_s = self._clock.now_s() if now_s is None else now_s
         if message.is_error_frame:
             self._faults.take(message, at_s)
-        if message.is_extended_id or message.is_remote_frame or message.is_error_frame:
-            return
-        place = self._node_of_pdo.get(message.arbitration_id)
-        if self._operational and place is not None:
-            self._take_position(place, message.data, at_s)
-            return
-        self._watch.take(message.arbitration_id, bytes(message.data), at_s)
+        elif not (message.is_extended_id or message.is_remote_frame):
+            self._watch.take(message.arbitration_id, bytes(message.data), at_s)
 
     def _take_position(self, place: int, data: bytes | bytearray, now_s: float) -> None:
         units = self._positions[place].read(data)

@@ -12,6 +12,7 @@ from drivers.transports.serial_port import find_port
 from drivers.transports.slcan_bus import BlockSlcanBus
 
 SLCAN_SETTLE_S = 0.05  # python-can waits 2 s by default, for boards that reset when opened; ours need not
+MOST_AT_ONCE = 64  # ten rows of six encoders: a bus that is flooded does not keep the SYNC waiting
 OpenBus = Callable[[], can.BusABC]
 
 
@@ -63,6 +64,24 @@ def opened(open_bus: OpenBus, name: str) -> can.BusABC:
             f"{name}: the CAN bus cannot be opened ({type(cause).__name__}: {cause}); check the adapter "
             "and its driver, and interface, channel, bitrate and options in the rig file"
         ) from cause
+
+
+def received(bus: can.BusABC, timeout_s: float) -> list[can.Message]:
+    """All frames that are there, at most MOST_AT_ONCE; when there is none yet, waits for the first."""
+    at_once: Callable[[float], list[can.Message]] | None = getattr(bus, "recv_all", None)
+    if at_once is not None:
+        return at_once(timeout_s)
+    messages: list[can.Message] = []
+    message = bus.recv(timeout_s)
+    while message is not None:
+        messages.append(message)
+        if len(messages) == MOST_AT_ONCE:
+            break
+        try:
+            message = bus.recv(0.0)
+        except can.CanError:  # an adapter that has gone raises it again, when what came before is taken
+            break
+    return messages
 
 
 def _check_interface(interface: str) -> None:

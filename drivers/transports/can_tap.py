@@ -1,12 +1,13 @@
 """A CAN bus that shows every frame, sent and received, to somebody else before the driver takes it: for raw logs."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import can
 
-Tap = Callable[[can.Message, bool], None]  # the frame; True when this side sent it
-OpenBus = Callable[[], can.BusABC]
+from drivers.transports.can_interfaces import OpenBus, received
+
+Tap = Callable[[Sequence[can.Message], bool], None]  # frames, in order; True when this side sent them
 
 
 class TappedBus(can.BusABC):
@@ -21,12 +22,19 @@ class TappedBus(can.BusABC):
     def recv(self, timeout: float | None = None) -> can.Message | None:
         message = self._bus.recv(timeout)
         if message is not None:
-            self._tap(message, False)
+            self._tap((message,), False)
         return message
+
+    def recv_all(self, timeout: float) -> list[can.Message]:
+        """As `received`: one call of the tap for all of them."""
+        messages = received(self._bus, timeout)
+        if messages:
+            self._tap(messages, False)
+        return messages
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         self._bus.send(msg, timeout)
-        self._tap(msg, True)
+        self._tap((msg,), True)
 
     def shutdown(self) -> None:
         super().shutdown()

@@ -59,6 +59,18 @@ class BlockSlcanBus(slcanBus):
             message.timestamp = NO_STAMP
         return message
 
+    def recv_all(self, timeout: float | None = None) -> list[can.Message]:
+        """All plain frames that are there, waiting for the first; or one of a rarer kind."""
+        if not self._lines:
+            self._fill(timeout)
+        messages: list[can.Message] = []
+        while self._lines and not self._filters and (message := _classic(self._lines[0])) is not None:
+            self._lines.popleft()
+            messages.append(message)
+        if not messages and self._lines and (rare := self.recv(0.0)) is not None:
+            messages.append(rare)
+        return messages
+
     def flush(self) -> None:
         super().flush()
         self._lines.clear()
@@ -78,13 +90,17 @@ class BlockSlcanBus(slcanBus):
 
     def _fill(self, timeout: float | None) -> None:
         """Wait for a whole line, unless one is there."""
-        deadline_s = None if timeout is None else time.monotonic() + timeout
+        left_s = timeout
+        deadline_s = time.monotonic() + timeout if timeout else None
         while not self._lines:
-            left_s = None if deadline_s is None else max(0.0, deadline_s - time.monotonic())
-            with error_check("Could not read from serial device"):
+            try:
                 self._split(self._waiting(left_s))
+            except Exception as error:
+                raise can.CanOperationError("Could not read from serial device") from error
             if left_s == 0.0:
                 return
+            if deadline_s is not None:
+                left_s = max(0.0, deadline_s - time.monotonic())
 
     def _waiting(self, timeout_s: float | None) -> bytes:
         """All bytes that are there, waiting for the first; b"" when none came in time."""
@@ -92,11 +108,12 @@ class BlockSlcanBus(slcanBus):
         descriptor = self._descriptor()
         if descriptor is None:
             return bytes(port.read(port.in_waiting or 1))
+        if timeout_s == 0.0 and (data := _read(descriptor)):  # who does not wait mostly comes when something is there
+            return data
         if not select.select([descriptor], [], [], timeout_s)[0]:
             return b""
-        try:
-            data = os.read(descriptor, READ_BYTES)
-        except BlockingIOError:  # somebody else has read it
+        data = _read(descriptor)
+        if data is None:  # somebody else has read it
             return b""
         if not data:
             raise OSError("the port is ready and gives nothing: unplugged")
@@ -136,6 +153,14 @@ class BlockSlcanBus(slcanBus):
         *lines, begun = (self._begun + data.decode("latin-1")).replace("\a", "\r").split("\r")
         self._lines.extend([line for line in lines if line not in _ACKNOWLEDGED])
         self._begun = begun[:LONGEST_LINE]
+
+
+def _read(descriptor: int) -> bytes | None:
+    """What waits; None when nothing does, b"" then also with some drivers, and when the port has gone."""
+    try:
+        return os.read(descriptor, READ_BYTES)
+    except BlockingIOError:
+        return None
 
 
 def _classic(line: str) -> can.Message | None:

@@ -67,7 +67,7 @@ def test_frames_wait_for_a_block_and_are_written_in_order(recorded) -> None:
     log = FrameLog(recorded, clock)
     kept = recorded.streams["can"]
     for number in range(100):
-        log.hear(frame(number), number % 7 == 0)
+        log.hear([frame(number)], number % 7 == 0)
         clock.s += 0.001
     written_by_itself = kept.blocks
     log.flush()
@@ -81,8 +81,8 @@ def test_frames_wait_for_a_block_and_are_written_in_order(recorded) -> None:
 def test_long_frames_of_can_fd_stand_beside_the_others_and_cost_none_of_them(recorded) -> None:
     log = FrameLog(recorded, Clock())
     for number in range(6):
-        log.hear(frame(number), False)
-        log.hear(can.Message(arbitration_id=number, is_fd=True, data=bytes(12), dlc=12), False)
+        log.hear([frame(number)], False)
+        log.hear([can.Message(arbitration_id=number, is_fd=True, data=bytes(12), dlc=12)], False)
     log.flush()
     assert (recorded.streams["can"].ids, recorded.streams["can-fd"].ids) == ([*range(6)], [*range(6)])
     assert recorded.streams["can-fd"].sequence == [*range(6)]
@@ -98,17 +98,17 @@ def test_a_recording_that_failed_is_told_by_flush_and_not_to_the_bus(recorded) -
         raise RecordingError("disk full")
 
     recorded.streams["can"].append = refuse
-    log.hear(frame(1), False)
+    log.hear([frame(1)], False)
     clock.s += 1.0
-    log.hear(frame(2), False)
+    log.hear([frame(2)], False)
     with pytest.raises(RecordingError, match="disk full"):
         log.flush()
 
 
 def test_error_frames_are_counted(recorded) -> None:
     log = FrameLog(recorded, Clock())
-    log.hear(frame(1, is_error_frame=True), False)
-    log.hear(frame(2), False)
+    log.hear([frame(1, is_error_frame=True)], False)
+    log.hear([frame(2)], False)
     log.flush()
     assert (log.count, log.errors) == (2, 1)
 
@@ -119,7 +119,7 @@ def test_two_threads_lose_and_double_nothing(recorded) -> None:
 
     def hear(first: int) -> None:
         for number in range(first, first + 1000):
-            log.hear(frame(number % 0x7FF), False)
+            log.hear([frame(number % 0x7FF)], False)
             log.flush()
 
     threads = [threading.Thread(target=hear, args=(first,)) for first in (0, 1000)]

@@ -3,6 +3,7 @@
 const TAKE = 3; // messages told of at once: half of what may be on the way, and a third of the server's work
 const LATE_MS = 1000; // 30 messages are missing
 const ENDED = 1012; // said by a server that ends (RFC 6455 registry: service restart); a broken line says nothing
+const TOO_MANY = 1013; // the same registry: try again later (limits.py)
 const AGAIN_MS = [250, 500, 1000, 2000];
 
 export class Link {
@@ -30,10 +31,10 @@ export class Link {
       if (this.untaken === TAKE) { socket.send(String(TAKE)); this.untaken = 0; }
       this.tries = 0;
       this.refused = "";
-      this.ended = false;
+      this.ended = this.full = false;
       this.take(JSON.parse(event.data));
     };
-    socket.onclose = (event) => { this.ended ||= event.code === ENDED; this.closed(); };
+    socket.onclose = (event) => { this.ended ||= event.code === ENDED; this.full ||= event.code === TOO_MANY; this.closed(); };
   }
 
   take(message) {
@@ -72,6 +73,6 @@ export class Link {
     if (arrives && old_ms < LATE_MS) this.told("live", trouble);
     else if (arrives) this.told("late", trouble || "Only a part arrives. What you see is old.");
     else if (this.socket?.readyState === WebSocket.OPEN && Number.isFinite(silent_ms)) this.told("late", `Nothing heard${seconds}: the connection is slow or calibeam is held up. What you see is old.`);
-    else this.told("gone", this.refused || `${this.ended ? "calibeam has ended its page" : "Not connected to calibeam"}; nothing heard${seconds}, trying again. What you see is old. STOP may not arrive.`);
+    else this.told("gone", this.refused || (this.full && "Too many pages are open: close one of them. This page tries again. STOP works.") || `${this.ended ? "calibeam has ended its page" : "Not connected to calibeam"}; nothing heard${seconds}, trying again. What you see is old. STOP may not arrive.`);
   }
 }

@@ -293,3 +293,41 @@ def read_for(memory, seconds: float) -> None:
     until_s = memory.clock.now_s() + seconds
     while memory.clock.now_s() < until_s:
         memory.encoders.read(1.0)
+
+
+# --- what a row costs, and when it is seen
+
+
+def test_at_a_kilohertz_a_row_takes_one_waking(memory, monkeypatch: pytest.MonkeyPatch):
+    """Its answers, 0.6 ms after the SYNC as those of six nodes at 1 Mbit/s, wait for the next SYNC."""
+    memory.bus.delay_s = 0.0006
+    encoders = Cia406Encoders(lambda: memory.bus, [1, 2], 1000.0, clock=memory.clock)
+    encoders.connect()
+    wakings: list[float] = []
+    sleep_s, recv = memory.clock.sleep_s, memory.bus.recv
+
+    def sleeping(seconds: float) -> None:
+        wakings.append(seconds)
+        sleep_s(seconds)
+
+    def receiving(timeout: float | None = None) -> can.Message | None:
+        if timeout:
+            wakings.append(timeout)
+        return recv(timeout)
+
+    monkeypatch.setattr(memory.clock, "sleep_s", sleeping)
+    monkeypatch.setattr(memory.bus, "recv", receiving)
+    blocks = [encoders.read(READ_S) for _ in range(10)]
+    sequence = np.concatenate([block.sequence for block in blocks])
+    assert (np.diff(sequence) == 1).all()  # no SYNC without a row, no deadline left out
+    assert np.isfinite(np.concatenate([block.values["position_rad"] for block in blocks])).all()
+    assert len(wakings) <= len(sequence) + 2  # the first SYNC, and one that is under way
+    taken_s = np.concatenate([block.host_s - block.device_s for block in blocks])
+    assert taken_s.max() == pytest.approx(1e-3, abs=1e-9)
+
+
+def test_at_slower_rates_an_answer_is_seen_when_it_comes(memory):
+    memory.bus.delay_s = 0.0006
+    memory.encoders.connect()
+    block = memory.encoders.read(READ_S)
+    np.testing.assert_allclose(block.host_s - block.device_s, 0.0006, atol=1e-9)

@@ -8,7 +8,7 @@ import can
 import pytest
 
 from drivers.errors import DeviceLost
-from drivers.transports.can_interfaces import bus_opener, interfaces, opened
+from drivers.transports.can_interfaces import MOST_AT_ONCE, bus_opener, interfaces, opened, received
 
 
 @pytest.mark.parametrize("interface", [name for name in interfaces() if name != "udp_multicast"])
@@ -68,3 +68,32 @@ def test_a_serial_adapter_is_looked_up_at_every_opening(tmp_path):
     plugs.clear()
     with pytest.raises(DeviceLost, match="no USB plug with serial number 'A1'"):
         opened(open_bus, "encoders")
+
+
+def test_all_frames_of_any_bus_are_received_together() -> None:
+    with can.Bus("together", interface="virtual") as there, can.Bus("together", interface="virtual") as here:
+        for number in range(MOST_AT_ONCE + 2):
+            there.send(can.Message(arbitration_id=number, is_extended_id=False))
+        assert [message.arbitration_id for message in received(here, 1.0)] == list(range(MOST_AT_ONCE))
+        assert len(received(here, 1.0)) == 2
+        assert received(here, 0.0) == []
+
+
+def test_frames_before_the_loss_of_an_adapter_are_kept() -> None:
+    class Going(can.BusABC):
+        def __init__(self) -> None:
+            super().__init__(channel="going")
+            self.left = 2
+
+        def recv(self, timeout: float | None = None) -> can.Message | None:
+            self.left -= 1
+            if self.left < 0:
+                raise can.CanOperationError("unplugged")
+            return can.Message(arbitration_id=self.left)
+
+        def send(self, msg: can.Message, timeout: float | None = None) -> None: ...
+
+    with Going() as bus:
+        assert [message.arbitration_id for message in received(bus, 1.0)] == [1, 0]
+        with pytest.raises(can.CanError, match="unplugged"):
+            received(bus, 1.0)

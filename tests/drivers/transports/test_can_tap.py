@@ -8,7 +8,8 @@ from drivers.transports.can_tap import TappedBus, tapped
 def test_every_frame_is_shown_and_passed_on() -> None:
     shown: list[tuple[int, bool]] = []
     open_bus = tapped(
-        lambda: can.Bus("tap", interface="virtual"), lambda message, sent: shown.append((message.arbitration_id, sent))
+        lambda: can.Bus("tap", interface="virtual"),
+        lambda messages, sent: shown.extend((message.arbitration_id, sent) for message in messages),
     )
     with can.Bus("tap", interface="virtual") as there, open_bus() as bus:
         bus.send(can.Message(arbitration_id=1, is_extended_id=False))
@@ -23,7 +24,7 @@ def test_every_frame_is_shown_and_passed_on() -> None:
 
 def test_what_closes_the_tap_closes_the_bus() -> None:
     inner = can.Bus("closed", interface="virtual")
-    bus = TappedBus(inner, lambda message, sent: None)
+    bus = TappedBus(inner, lambda messages, sent: None)
     assert bus.channel_info == inner.channel_info
     bus.shutdown()
     assert inner._is_shutdown

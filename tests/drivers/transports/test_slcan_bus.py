@@ -144,3 +144,26 @@ def test_an_adapter_that_takes_nothing_more_is_told_in_time_and_no_frame_is_torn
     while taken.count(b"\r") < whole:
         taken += adapter.hears()
     assert taken.startswith(whole * b"t28180000000000000000\r")
+
+
+def test_all_plain_frames_that_wait_come_at_once_and_a_rarer_one_by_itself(adapter: Adapter) -> None:
+    adapter.says(LINES)
+    found: list[list[int]] = []
+    while sum(map(len, found)) < len(FRAMES):
+        found.append([message.arbitration_id for message in adapter.bus.recv_all(2.0)])
+    assert found == [[0x281, 0x080], [0x1ABCDEF8], [0x123], [0x123], [0x7FF]]
+    assert adapter.bus.recv_all(0.0) == []
+
+
+def test_a_damaged_line_costs_no_frame_before_or_after_it(adapter: Adapter) -> None:
+    adapter.says(b"t0800\rt28140A0B\rt0810\r")
+    assert [message.arbitration_id for message in adapter.bus.recv_all(2.0)] == [0x080]
+    with suppress(ValueError, IndexError):
+        adapter.bus.recv_all(0.0)
+    assert [message.arbitration_id for message in adapter.bus.recv_all(0.0)] == [0x081]
+
+
+def test_an_adapter_that_has_gone_is_no_silence_to_one_who_does_not_wait(adapter: Adapter) -> None:
+    adapter.is_unplugged()
+    with pytest.raises(can.CanError):
+        adapter.bus.recv_all(0.0)
