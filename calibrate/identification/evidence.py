@@ -75,15 +75,15 @@ def free_space_of(
 ) -> FreeSpace:
     """Over poses drawn evenly between the joint limits: the doubt of the parameters, and a single pose's with it."""
     lower, upper = (np.array([getattr(j, k) for j in rig.arm.joints]) for k in ("lower_rad", "upper_rad"))
-    point = about_of(fitted.weighting).get("tool", rig.tool.point_m or FLANGE)[:3]
-    room = Workspace(lower, upper, np.array(point))
+    x, y, z = about_of(fitted.weighting).get("tool", rig.tool.point_m or FLANGE)[:3]
+    room = Workspace(lower, upper, np.array([x, y, z]))
     model = fitted.weighting.measured[0].problem.chain.model
     scatter, says = _scatter(noise)
     poses = rng.integers(2**31)  # the same ones for both
     each = [
         free_space_error(model, fitted.fit, seen, room, np.random.default_rng(poses), s) for s in (Scatter(), scatter)
     ]
-    return FreeSpace(each[0], each[1], scatter, says, room.poses, tuple(point))
+    return FreeSpace(each[0], each[1], scatter, says, room.poses, (x, y, z))
 
 
 def _scatter(noise: tuple[Noise, ...]) -> tuple[Scatter, str]:

@@ -70,7 +70,7 @@ class FreeSpace:
     scatter: Scatter
     scatter_says: str  # what the scatter is made of
     poses: int
-    point_m: tuple[float, ...]  # (3,) the target in the flange frame
+    point_m: tuple[float, float, float]  # the target in the flange frame
 
 
 @dataclass(frozen=True)
