@@ -11,9 +11,26 @@ import threading
 
 from drivers.clock import Clock
 from drivers.errors import DeviceLost, DeviceStale
-from drivers.ur.control_link import Alive, Answer, Call, Close, Ended, Link, Motion, Outcome, Ready, Request, Stop
+from drivers.ur.control_link import (
+    BEAT_S,
+    LEASE_S,
+    Alive,
+    Answer,
+    Beat,
+    Call,
+    Close,
+    Ended,
+    Link,
+    Motion,
+    Outcome,
+    Ready,
+    Request,
+    ServoStop,
+    Stop,
+)
 
-SILENCE_LIMIT_S = 2.0  # twenty heartbeats of the child; ur_rtde itself blocks up to 4 s when it waits in vain
+SILENCE_LIMIT_S = LEASE_S  # of the child in a motion; it then counts as frozen, or hung in ur_rtde, and is killed
+BRAKING_LIMIT_S = 2.0  # of a child that brakes: it waits in ur_rtde until the arm stands
 STOP_NOTICE_S = 0.3  # the child looks at its stop line every millisecond; a busy machine may take tenths
 STOP_LIMIT_S = 1.0  # braking from full speed at 5 rad/s2 takes 0.63 s; after this the other way is taken
 UNREACHED = (Outcome.DISCONNECTED, Outcome.SILENT)  # then nobody knows whether the arm brakes
@@ -29,6 +46,9 @@ class SupervisedChild:
         self._place, self._clock = place, clock
         self.killed = False
         self._ordering = threading.Lock()  # a stop falls before a call or after it
+        self._stopping = False
+        self._over = threading.Event()
+        self._writing = threading.Lock()  # of the stop line: beats and stops
         self._number = 0
         self._held = False
         calls, child_calls = socket.socketpair()
@@ -45,6 +65,7 @@ class SupervisedChild:
                 stderr=subprocess.STDOUT,
                 start_new_session=True,  # Ctrl-C in the terminal must not reach it before its parent
             )
+        threading.Thread(target=self._beat, name=f"beat of {place}", daemon=True).start()
 
     @property
     def pid(self) -> int:
@@ -70,6 +91,7 @@ class SupervisedChild:
         DeviceStale: no sign of life, or no end within `limit_s`. DeviceLost: the child died.
         """
         deadline_s = self._clock.now_s() + limit_s
+        silence_s = BRAKING_LIMIT_S if isinstance(request, ServoStop) else SILENCE_LIMIT_S
         with self._ordering:
             if self._held:
                 return Ended(Outcome.STOPPED)
@@ -77,13 +99,18 @@ class SupervisedChild:
             self._send(self._calls, Call(self._number, request))
         while True:
             left_s = deadline_s - self._clock.now_s()
-            answer = self._next_answer(self._calls, min(SILENCE_LIMIT_S, left_s))
+            answer = self._next_answer(self._calls, min(silence_s, left_s))
             if isinstance(answer, Ended):
                 return answer
             if answer is None:
                 name = type(request).__name__
                 if self._clock.now_s() < deadline_s:
-                    raise DeviceStale(f"{self._place}: {name}: ur_rtde is silent for {SILENCE_LIMIT_S:.3g} s")
+                    if self._stopping:  # it brakes, and answers when the arm stands
+                        continue
+                    raise DeviceStale(
+                        f"{self._place}: {name}: the control process has not answered for {silence_s:.3g} s; the arm "
+                        "was told to stop through the dashboard: connect again"
+                    )
                 raise DeviceStale(f"{self._place}: {name} has not ended within {limit_s:.3g} s")
 
     def hold(self) -> None:
@@ -93,17 +120,20 @@ class SupervisedChild:
 
     def stop(self, deceleration_rad_s2: float) -> bool:
         """From any thread, also in the middle of a call. False when the child did not obey in time."""
+        self._stopping = True
         try:
             while self._stops.next_answer(0.0) is not None:
                 pass  # late answers to a stop that was given up
-            with self._ordering:
-                self._stops.send(Stop(deceleration_rad_s2, self._number))
+            with self._ordering, self._writing:
+                self._stops.send_now(Stop(deceleration_rad_s2, self._number))
             if not isinstance(self._stops.next_answer(STOP_NOTICE_S), Alive):
                 return False
             ended = self._stops.next_answer(STOP_LIMIT_S)
             return isinstance(ended, Ended) and ended.outcome not in UNREACHED
         except OSError:
             return False
+        finally:
+            self._stopping = False
 
     def end(self) -> None:
         """Asks it to end, and waits for that; no call may be under way."""
@@ -114,15 +144,29 @@ class SupervisedChild:
     def kill(self) -> None:
         """SIGKILL; safe in every state and from any thread: a call that is under way ends with DeviceLost."""
         self.killed = True
+        self._over.set()
         if self.alive:
             self._process.kill()
         self._process.wait()
 
     def release(self) -> None:
         """Closes the lines; no call may be under way."""
+        self._over.set()
         self._calls.close()
-        self._stops.close()
+        with self._writing:
+            self._stops.close()
         self._printed.close()
+
+    def _beat(self) -> None:
+        """Shows the child that this process runs; a child that reads nothing finds later that it was frozen."""
+        while not self._over.wait(BEAT_S):
+            try:
+                with self._writing:
+                    self._stops.send_now(Beat())
+            except BlockingIOError:
+                continue
+            except OSError:
+                return
 
     def _send(self, link: Link, request: Request) -> None:
         try:
