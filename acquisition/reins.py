@@ -48,6 +48,7 @@ class Reins:
         self._hold_arm, self._undelivered = hold_arm or stop_arm, undelivered
         self._rests_in_s, self._ease_arm, self._pausing = rests_in_s, ease_arm or stop_arm, pausing
         self._eased = False  # the motion under way was braked softly, and the session has not taken note
+        self._interrupts, self._interrupted_s = 0, float("-inf")
         self._why = ""
         self._clock: Clock = clock or SystemClock()
         self._news = threading.Condition()
@@ -62,10 +63,13 @@ class Reins:
     # --- what a person may say, from any thread and in every state
 
     def interrupt(self) -> None:
-        """Ctrl-C: pause; again within 10 s: at once; a third one, or one while paused: abort."""
-        if self._state in (State.PAUSED, State.BREAKING):
+        """Ctrl-C: pause; again within 10 s: at once; a third one, or one long after the arm stands: abort."""
+        now_s = self._clock.now_s()
+        self._interrupts = self._interrupts + 1 if now_s - self._interrupted_s <= PAUSE_AGAIN_S else 1
+        self._interrupted_s = now_s
+        if self._interrupts > 2 or (self._state is State.PAUSED and self._interrupts == 1):
             self.abort()
-        else:
+        elif self._state is not State.PAUSED:
             self.pause()
 
     def pause(self) -> None:
@@ -84,7 +88,7 @@ class Reins:
 
     def resume(self) -> None:
         """Go on from the last checkpoint."""
-        self._paused_s = float("-inf")
+        self._paused_s = self._interrupted_s = float("-inf")
         if self._state is State.PAUSED:
             self._keep(None)  # the arm stands, whatever became of the stop
         self.tell(Event.RESUME)
@@ -170,7 +174,8 @@ class Reins:
         outlasts = rests_in_s > 0.0 and self._clock.now_s() - self._paused_s > REST_S
         if not self._eased and (rests_in_s > REST_S or outlasts):
             self._eased = True  # before the arm stops, for the session notices that at once
-            self._deliver(self._ease_arm)
+            # A thread of its own: whoever says so must be heard again while the arm brakes.
+            threading.Thread(target=self._deliver, args=(self._ease_arm,), name="ease", daemon=True).start()
 
     def _brake(self, state: State) -> None:
         self._deliver(self._stop_arm if state is State.BREAKING else self._hold_arm)
