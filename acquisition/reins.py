@@ -170,7 +170,7 @@ class Reins:
             raise EndedEarlyError
 
     def _ease(self, rests_in_s: float) -> None:
-        """A motion that outlasts its pause is braked, whatever was expected of it: an operator may slow the arm down."""
+        """A motion that outlasts its pause is braked, whatever was expected: an operator may slow the arm down."""
         outlasts = rests_in_s > 0.0 and self._clock.now_s() - self._paused_s > REST_S
         if not self._eased and (rests_in_s > REST_S or outlasts):
             self._eased = True  # before the arm stops, for the session notices that at once

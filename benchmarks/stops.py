@@ -365,7 +365,13 @@ class Cell:
     @property
     def line(self) -> str:
         rest = "stood" if self.rest_s == 0.0 else f"{self.rest_s:.2f} s"
-        how = f"exit {self.code} after {self.ended_s:.1f} s, recording closed after {self.closed_s:.1f} s" if self.code is not None else "asks" if self.asks else "waits"
+        how = (
+            f"exit {self.code} after {self.ended_s:.1f} s, recording closed after {self.closed_s:.1f} s"
+            if self.code is not None
+            else "asks"
+            if self.asks
+            else "waits"
+        )
         kept = "no recording" if self.samples is None else f"{self.samples} samples"
         return (
             f"{self.state:10} | {self.event:34} | {rest:7} | {self.after_rad_s:6.3f} rad/s | {how:20} | {kept} | "

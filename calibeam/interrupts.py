@@ -47,7 +47,7 @@ class Interrupts:
         self._closing, self._raised_s = False, float("-inf")
 
     def leave_terminal(self) -> None:
-        """The terminal was closed: what is still printed goes nowhere, instead of failing in the middle of a clean-up."""
+        """The terminal was closed: what is still printed goes nowhere, and fails in no clean-up."""
         nowhere = os.open(os.devnull, os.O_RDWR)
         for fd in self._terminals:
             os.dup2(nowhere, fd)

@@ -35,7 +35,9 @@ class Keys:
             return
         self._gate.pause()
         if self._held():
-            told = f"braking along the path, at rest within {self._gate.brake_s:.1f} s; Ctrl-C again gives the motion up"
+            told = (
+                f"braking along the path, at rest within {self._gate.brake_s:.1f} s; Ctrl-C again gives the motion up"
+            )
         else:
             told = f"resting at the next place within {self._gate.rests_in_s():.1f} s; Ctrl-C again brakes now"
         print(f"\n{told}. {WORDS}", file=self._out, flush=True)

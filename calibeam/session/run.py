@@ -113,7 +113,10 @@ class OnSite:
         try:
             answer = self._person.choose(
                 "the arm was stopped, and the recording is closed:",
-                {"g": "go on: check the devices, then ask before the arm moves", "e": "end here; --continue goes on later"},
+                {
+                    "g": "go on: check the devices, then ask before the arm moves",
+                    "e": "end here; --continue goes on later",
+                },
                 "e",
             )
         except KeyboardInterrupt:

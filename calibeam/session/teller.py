@@ -69,7 +69,9 @@ class Teller:
 
     def ended_early(self, early: PartialResult) -> None:
         """At once, for closing the recording takes a second."""
-        self.said(f"THE ARM WAS STOPPED: {early}" if isinstance(early.__cause__, DeviceError) else f"ended early: {early}")
+        self.said(
+            f"THE ARM WAS STOPPED: {early}" if isinstance(early.__cause__, DeviceError) else f"ended early: {early}"
+        )
 
     def undelivered(self, trouble: DeviceError | None) -> None:
         """From the reins: the arm could not be told to stop; None: now it was, or it need not be."""
