@@ -4,8 +4,8 @@
 
 How a stop reaches the arm: the child watches a line of its own for it and brakes; if it does not answer within tenths,
 the program is stopped through the dashboard, which needs neither the child nor RTDE. If that fails too, the child is
-killed and the controller's watchdog, which nobody kicks any more, ends the program. A child that is frozen or gone is
-noticed within LEASE_S, and stopped the same way; a program that is frozen is noticed by its child, which brakes.
+killed and the controller's watchdog, which nobody kicks any more, ends the program. A child that is frozen or gone
+is noticed within tenths, and the arm stopped the same way; a program that is frozen is noticed by its child.
 After any fault the child is killed: call `connect` again, it starts a new one.
 """
 
@@ -20,7 +20,6 @@ from drivers.clock import Clock, SystemClock
 from drivers.device import Floats
 from drivers.errors import DeviceError, DeviceLost, DeviceRefused, DeviceStale
 from drivers.ur.control_link import (
-    LEASE_S,
     Ended,
     Motion,
     MoveJoints,
@@ -34,7 +33,7 @@ from drivers.ur.dashboard import UrDashboard
 from drivers.ur.pulse import check_stream
 from drivers.ur.supervised import SupervisedChild
 
-WATCHDOG_HZ = 1.0 / LEASE_S
+WATCHDOG_HZ = 1.0
 CONNECT_LIMIT_S = 15.0  # ur_rtde itself waits 5 s for its program to run
 MARGIN_S = 3.0  # settling, round trips, a busy machine
 SLOWEST_SPEED_SLIDER = 0.1  # an operator may slow the arm down to this without making a move fail
@@ -204,8 +203,8 @@ class UrControl:
             case Outcome.EXPIRED:
                 self._give_up(child)
                 return DeviceStale(
-                    f"{self.place}: this program or its control process did not run for more than {LEASE_S:.3g} s; the "
-                    "arm was braked, and what was commanded before is not carried out: connect again"
+                    f"{self.place}: this program or its control process was frozen; the arm was braked, and "
+                    "what was commanded before is not carried out: connect again"
                 )
             case Outcome.NOT_RUNNING:
                 self._give_up(child)

@@ -3,9 +3,9 @@
     python -m drivers.ur.control_child HOST CALLS_FD STOPS_FD WATCHDOG_HZ
 
 Every motion is started asynchronously and watched, so that a stop never waits behind it. When the parent has gone, the
-child stops the arm and ends; when the child has gone, the controller's watchdog stops the arm. When the parent's beats
-stop, or the child itself was frozen, the arm is braked and no call is begun any more: what was asked for before a
-freeze is not carried out after it.
+child stops the arm and ends; when the child has gone, the controller's watchdog stops the arm. When the parent is
+stopped or beats no more, or the child itself was frozen, the arm is braked and no call is begun any more: what was
+asked for before a freeze is not carried out after it.
 """
 
 import os
@@ -15,6 +15,7 @@ import socket
 import sys
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, Protocol
 
 from drivers.ur.control_link import (
@@ -32,10 +33,12 @@ from drivers.ur.control_link import (
     ServoJoints,
     ServoStop,
     Stop,
+    is_stopped,
 )
 from drivers.ur.pulse import Pulse
 
 WATCH_S = 0.001  # between two looks at a running motion; the control object itself learns of its end every 2 ms
+ASK_S = 0.05  # between two looks whether the parent was stopped
 ALIVE_S = 0.1  # the parent gives up after many of these
 KICKS_PER_WATCHDOG = 20  # kicks in the time that the watchdog allows, so that a busy machine may miss many
 NO_REAL_TIME_PRIORITY = -1  # the control object would otherwise try to raise its own priority
@@ -76,14 +79,16 @@ class ControlChild:
         watchdog_hz: float,
         now_s: Callable[[], float],
         silent: Callable[[], bool] = lambda: False,
+        parent_stopped: Callable[[], bool] = lambda: False,
     ) -> None:
         """`silent`: whether the controller sends nothing new any more, which the control object notices late."""
         self._control, self._calls, self._stops, self._now_s = control, calls, stops, now_s
-        self._silent = silent
+        self._silent, self._parent_stopped = silent, parent_stopped
         self._stopped_up_to = 0
         self._kick_every_s = 1.0 / (watchdog_hz * KICKS_PER_WATCHDOG)
         self._kicked_s = self._told_s = now_s()
         self._beaten_s = self._turned_s = now_s()  # when the parent last beat, and when this process last looked
+        self._asked_s = now_s()  # after the parent's state
         self._expired = False
         self._servoing = False
 
@@ -169,10 +174,13 @@ class ControlChild:
     def _expire(self) -> bool:
         """Looked at before anything is read: what waits in the lines after a freeze is older than the freeze."""
         now_s = self._now_s()
-        if not self._expired and max(now_s - self._beaten_s, now_s - self._turned_s) > LEASE_S:
+        stopped = False
+        if now_s - self._asked_s >= ASK_S:
+            self._asked_s, stopped = now_s, self._parent_stopped()
+        if not self._expired and (stopped or max(now_s - self._beaten_s, now_s - self._turned_s) > LEASE_S):
             self._expired = True
             self._brake(EXPIRED_DECELERATION_RAD_S2)
-        self._turned_s = now_s
+        self._turned_s = self._now_s()
         return self._expired
 
     def _renew(self) -> None:
@@ -222,7 +230,8 @@ def main(arguments: Sequence[str]) -> int:
         calls.send(Ended(Outcome.REFUSED, str(error)))
         return 1
     pulse = Pulse(host, time.monotonic)
-    child = ControlChild(control, calls, stops, watchdog_hz, time.monotonic, pulse.silent)
+    parent = partial(is_stopped, os.getppid())
+    child = ControlChild(control, calls, stops, watchdog_hz, time.monotonic, pulse.silent, parent)
     try:
         calls.send(ready)
         child.run()

@@ -13,7 +13,6 @@ from drivers.clock import Clock
 from drivers.errors import DeviceLost, DeviceStale
 from drivers.ur.control_link import (
     BEAT_S,
-    LEASE_S,
     Alive,
     Answer,
     Beat,
@@ -25,12 +24,12 @@ from drivers.ur.control_link import (
     Outcome,
     Ready,
     Request,
-    ServoStop,
     Stop,
+    is_stopped,
 )
 
-SILENCE_LIMIT_S = LEASE_S  # of the child in a motion; it then counts as frozen, or hung in ur_rtde, and is killed
-BRAKING_LIMIT_S = 2.0  # of a child that brakes: it waits in ur_rtde until the arm stands
+SILENCE_LIMIT_S = 2.0  # twenty heartbeats of the child; ur_rtde itself blocks up to 4 s when it waits in vain
+LOOK_S = 0.1  # between two looks whether the child was stopped by a signal
 STOP_NOTICE_S = 0.3  # the child looks at its stop line every millisecond; a busy machine may take tenths
 STOP_LIMIT_S = 1.0  # braking from full speed at 5 rad/s2 takes 0.63 s; after this the other way is taken
 UNREACHED = (Outcome.DISCONNECTED, Outcome.SILENT)  # then nobody knows whether the arm brakes
@@ -46,7 +45,6 @@ class SupervisedChild:
         self._place, self._clock = place, clock
         self.killed = False
         self._ordering = threading.Lock()  # a stop falls before a call or after it
-        self._stopping = False
         self._over = threading.Event()
         self._writing = threading.Lock()  # of the stop line: beats and stops
         self._number = 0
@@ -91,27 +89,27 @@ class SupervisedChild:
         DeviceStale: no sign of life, or no end within `limit_s`. DeviceLost: the child died.
         """
         deadline_s = self._clock.now_s() + limit_s
-        silence_s = BRAKING_LIMIT_S if isinstance(request, ServoStop) else SILENCE_LIMIT_S
         with self._ordering:
             if self._held:
                 return Ended(Outcome.STOPPED)
             self._number += 1
             self._send(self._calls, Call(self._number, request))
+        name, heard_s = type(request).__name__, self._clock.now_s()
         while True:
-            left_s = deadline_s - self._clock.now_s()
-            answer = self._next_answer(self._calls, min(silence_s, left_s))
+            answer = self._next_answer(self._calls, min(LOOK_S, deadline_s - self._clock.now_s()))
             if isinstance(answer, Ended):
                 return answer
-            if answer is None:
-                name = type(request).__name__
-                if self._clock.now_s() < deadline_s:
-                    if self._stopping:  # it brakes, and answers when the arm stands
-                        continue
-                    raise DeviceStale(
-                        f"{self._place}: {name}: the control process has not answered for {silence_s:.3g} s; the arm "
-                        "was told to stop through the dashboard: connect again"
-                    )
+            now_s = self._clock.now_s()
+            heard_s = heard_s if answer is None else now_s
+            if now_s >= deadline_s:
                 raise DeviceStale(f"{self._place}: {name} has not ended within {limit_s:.3g} s")
+            if answer is None and is_stopped(self._process.pid):
+                raise DeviceStale(
+                    f"{self._place}: {name}: the control process was frozen, and the arm was told to stop another way; "
+                    "connect again"
+                )
+            if now_s - heard_s >= SILENCE_LIMIT_S:
+                raise DeviceStale(f"{self._place}: {name}: ur_rtde is silent for {SILENCE_LIMIT_S:.3g} s")
 
     def hold(self) -> None:
         """No call is sent any more."""
@@ -120,7 +118,6 @@ class SupervisedChild:
 
     def stop(self, deceleration_rad_s2: float) -> bool:
         """From any thread, also in the middle of a call. False when the child did not obey in time."""
-        self._stopping = True
         try:
             while self._stops.next_answer(0.0) is not None:
                 pass  # late answers to a stop that was given up
@@ -132,8 +129,6 @@ class SupervisedChild:
             return isinstance(ended, Ended) and ended.outcome not in UNREACHED
         except OSError:
             return False
-        finally:
-            self._stopping = False
 
     def end(self) -> None:
         """Asks it to end, and waits for that; no call may be under way."""
