@@ -22,7 +22,7 @@ from typing import Self
 
 from acquisition.errors import StoppedError
 from acquisition.reins import Reins
-from acquisition.session_states import BROKEN, OVER
+from acquisition.session_states import BROKEN, OVER, State
 from acquisition.supervisor import FROZEN_S
 from calibeam.interrupts import INTERRUPTS
 from calibeam.session.key_stream import KeyStream
@@ -114,7 +114,7 @@ class Keys:
     def __exit__(self, *error: object) -> None:
         """KeyboardInterrupt where a signal that ends the session came when nothing was under way any more."""
         self._opened.close()
-        if self._ended_by and error[0] is None:
+        if self._ended_by and error[0] is None and self._reins.state in (State.IDLE, State.DONE):
             raise KeyboardInterrupt(self._ended_by)
 
     def _close(self) -> None:

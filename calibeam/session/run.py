@@ -181,7 +181,7 @@ class OnSite:
                     summary = session.take(more_at(part, session.placement, self._half_size_m, part.options, rounds))
         except KeyboardInterrupt as why:  # at a question, while the arm stands
             INTERRUPTS.close()
-            raise PartialResult(f"{why or 'Ctrl-C'}; what was taken is kept in {path}; {GO_ON}") from why
+            raise PartialResult(f"{str(why) or 'Ctrl-C'}; what was taken is kept in {path}; {GO_ON}") from why
         except PartialResult as early:
             raise PartialResult(f"{early}; {GO_ON}") from early.__cause__
         self.teller.said(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {path}")
