@@ -1,6 +1,6 @@
 """What stops a session, and how fast: event x state on the emulated controller, by the controller's own time stamps.
 
-`python -m benchmarks stops [STATE-EVENT …]` prints the table of docs/safety.md. Every cell is a session of its own in a
+`python -m benchmarks stops` prints the table of docs/safety.md. Every cell is a session of its own in a
 terminal of its own, in real time. "at rest" is counted from the newest sample of the controller before the event to the
 last one in which a joint still moved; "moved after" is the largest joint speed from SETTLED_S after the event on.
 """
@@ -26,11 +26,14 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.recording.errors import RecordingError
+from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan, write_pose_plan
 from acquisition.recording.read import read
+from acquisition.recording.rig import load_rig
 from calibeam.emulation import Emulation
 from drivers.errors import DeviceError
 from drivers.ur.reader import UrReader
 
+CRUISES_RAD_S = 0.9  # the rig's speed is 1 rad/s
 MOVES_RAD_S = 1e-3  # a joint that is faster moves
 FREEZE_S = 5.0
 SETTLED_S = 1.5  # from the event, or from the thaw, after which nothing may move
@@ -131,15 +134,19 @@ class Staged:
 
 
 @contextmanager
-def staged(rig: Path, more: Sequence[str] = (), time_scale: float = 1.0) -> Generator[Staged]:
-    """A session that waits at its question, or has begun with --yes in `more`."""
+def staged(rig: Path, more: Sequence[str] = (), time_scale: float = 1.0, *, travels: bool = False) -> Generator[Staged]:
+    """A session that waits at its question, or has begun with --yes in `more`; `travels`: first it goes a long way."""
     folder = Path(tempfile.mkdtemp(prefix="stops-"))
     try:
-        with Emulation(rig, seed=SEED, time_scale=time_scale) as emulation:
-            path = emulated_rig(rig, emulation, folder)
+        alone = folder / "alone.toml"
+        alone.write_text(without_encoders(rig.read_text()))
+        with Emulation(alone, seed=SEED, time_scale=time_scale) as emulation:
+            path = emulated_rig(alone, emulation, folder)
             control = emulation.address["control"]
             ours, theirs = pty.openpty()
             command = [sys.executable, "-m", "calibeam", "session", str(path), "--out", str(folder / "out")]
+            if travels:
+                command += ["--plan", str(long_way(rig, folder / "plan.toml"))]
             command += ["--control", f"{control['host']}:{control['port']}", "--time-scale", str(time_scale), *more]
             with subprocess.Popen(
                 command, stdin=theirs, stdout=theirs, stderr=theirs, preexec_fn=_own_terminal(theirs)
@@ -159,12 +166,26 @@ def staged(rig: Path, more: Sequence[str] = (), time_scale: float = 1.0) -> Gene
         shutil.rmtree(folder, ignore_errors=True)
 
 
+def long_way(rig: Path, path: Path) -> Path:
+    """A plan that begins with a travel of almost three seconds, and needs no light for it."""
+    loaded = load_rig(rig)
+    far_rad = np.array(loaded.motion.home_rad) + np.array([0.0, 0.0, 0.0, 0.0, 0.0, 2.5])
+    block = PlannedBlock(pose=(PlannedPose(tuple(far_rad.tolist())),), placement=1, first_psd=1)
+    write_pose_plan(path, PosePlan(schema=1, rig=loaded.name, block=(block,)))
+    return path
+
+
+def without_encoders(text: str) -> str:
+    """Link-side encoders stop no arm, and their emulators want a third of a core."""
+    before, _, rest = text.partition("[devices.encoders]")
+    return before + rest[rest.index("\n[") :]
+
+
 def emulated_rig(rig: Path, emulation: Emulation, folder: Path) -> Path:
     """The rig file with the devices where the emulators are."""
     text, where = rig.read_text(), emulation.address
     for old, new in (
         ("out/emulated/psd", where["psd"]["port"]),
-        ("out/emulated/can", where["can"]["channel"]),
         ('host = "127.0.0.2"', f'host = "{where["robot"]["host"]}"'),
     ):
         text = text.replace(old, new, 1)
@@ -187,7 +208,7 @@ def asking(s: Staged) -> bool:
 
 
 def travelling(s: Staged) -> bool:
-    return _agreed(s) and s.until(lambda: s.watch.newest()[1] > 0.7)
+    return _agreed(s) and s.until(lambda: s.watch.newest()[1] > CRUISES_RAD_S)
 
 
 def centring(s: Staged) -> bool:
@@ -381,7 +402,7 @@ class Cell:
 
 def measured(rig: Path, state: str, event: str) -> Cell | None:
     """None: the state was not reached."""
-    with staged(rig, ("--live", "--live-port", "0")) as s:
+    with staged(rig, ("--live", "--live-port", "0"), travels=state in ("travelling", "paused")) as s:
         if not STATES[state](s):
             print(s.screen[-1500:], s.log[-800:], s.process.poll(), file=sys.stderr)
             return None

@@ -7,12 +7,12 @@ import time
 import pytest
 
 from acquisition.recording.read import read
-from benchmarks.stops import MOVES_RAD_S, Staged, staged, travelling
+from benchmarks.stops import CRUISES_RAD_S, MOVES_RAD_S, Staged, staged, travelling
 
 from .conftest import RIG_FILE
 
-TIME_SCALE = 4.0
-QUIET_S = 8.0  # emulated, in which nothing may move; two seconds of this machine
+TIME_SCALE = 2.0
+QUIET_S = 4.0  # emulated, in which nothing may move; two seconds of this machine
 CLOSED = "the recording is closed"
 
 
@@ -33,7 +33,7 @@ def ten_ctrl_c(s: Staged) -> int:
 
 def test_a_killed_control_child_is_reported_and_a_person_decides() -> None:
     """And then ten Ctrl-C end what was gone on with."""
-    with staged(RIG_FILE, time_scale=TIME_SCALE) as s:
+    with staged(RIG_FILE, time_scale=TIME_SCALE, travels=True) as s:
         assert travelling(s)
         os.kill(s.child(), signal.SIGKILL)
         assert s.until(lambda: "THE ARM WAS STOPPED" in s.log and CLOSED in s.screen)
@@ -45,7 +45,7 @@ def test_a_killed_control_child_is_reported_and_a_person_decides() -> None:
         assert s.until(lambda: s.screen.count("Is the cell clear") == 2)
         assert not moves_for(s, 1.0)
         s.type("go\n")
-        assert s.until(lambda: s.watch.newest()[1] > 0.5)
+        assert s.until(lambda: s.watch.newest()[1] > CRUISES_RAD_S)
         assert ten_ctrl_c(s) == 3
         assert "Traceback" not in s.screen
         assert "pause: the arm brakes on its way and stands within" in s.log
@@ -56,7 +56,7 @@ def test_a_killed_control_child_is_reported_and_a_person_decides() -> None:
 @pytest.mark.endure
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_it_with_what_was_taken(number) -> None:
-    with staged(RIG_FILE, time_scale=TIME_SCALE) as s:
+    with staged(RIG_FILE, time_scale=TIME_SCALE, travels=True) as s:
         assert travelling(s)
         s.signal(number)
         assert s.until(lambda: s.process.poll() is not None, 30.0)
@@ -69,7 +69,7 @@ def test_a_signal_ends_it_with_what_was_taken(number) -> None:
 @pytest.mark.endure
 @pytest.mark.parametrize("typed", ["r", "\n", "g\n"])
 def test_a_frozen_session_counts_nothing_that_was_typed_meanwhile(typed) -> None:
-    with staged(RIG_FILE, time_scale=TIME_SCALE) as s:
+    with staged(RIG_FILE, time_scale=TIME_SCALE, travels=True) as s:
         assert travelling(s)
         s.signal(signal.SIGSTOP)
         assert s.until(lambda: s.watch.newest()[1] < MOVES_RAD_S)
