@@ -101,9 +101,12 @@ class Staged:
     def screen(self) -> str:
         while select.select([self.terminal], [], [], 0.0)[0]:
             try:
-                self._screen += os.read(self.terminal, 65536)
+                said = os.read(self.terminal, 65536)
             except OSError:
                 break
+            if not said:
+                break
+            self._screen += said
         return self._screen.decode(errors="replace")
 
     @property
@@ -122,6 +125,10 @@ class Staged:
 
     def type(self, text: str) -> None:
         os.write(self.terminal, text.encode())
+
+    def now_s(self) -> float:
+        """Emulated time, as in the controller's stamps: the stream may be read late."""
+        return float(self.emulation.ask("world.time"))
 
     def child(self) -> int:
         """The control child."""
@@ -407,7 +414,7 @@ def measured(rig: Path, state: str, event: str) -> Cell | None:
         if not STATES[state](s):
             print(s.screen[-1500:], s.log[-800:], s.process.poll(), file=sys.stderr)
             return None
-        begin_s, host_s, said = s.watch.newest()[0], time.monotonic(), len(s.log)
+        begin_s, host_s, said = s.now_s(), time.monotonic(), len(s.log)
         unix_s = time.time()
         frozen_s = EVENTS[event](s)
         watched_from_s = time.monotonic()

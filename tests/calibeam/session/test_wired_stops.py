@@ -13,12 +13,13 @@ from .conftest import RIG_FILE
 
 TIME_SCALE = 2.0
 QUIET_S = 4.0  # emulated, in which nothing may move; two seconds of this machine
+BRAKES_S = 0.5  # emulated; the question may come before the arm stands
 CLOSED = "the recording is closed"
 
 
 def moves_for(s: Staged, seconds: float) -> bool:
-    """Whether a joint moves in so much emulated time from now on."""
-    begin_s = s.watch.newest()[0]
+    """Whether a joint moves in so much emulated time, once an arm that brakes now has come to rest."""
+    begin_s = s.now_s() + BRAKES_S
     assert s.until(lambda: s.watch.newest()[0] > begin_s + seconds)
     return bool((s.watch.since(begin_s)[1] > MOVES_RAD_S).any())
 
