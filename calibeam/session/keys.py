@@ -133,11 +133,11 @@ class Keys:
                         return
                     if not (frozen and bytes([code]) == GO_ON):
                         self._told(bytes([code]))
-            if self._terminal is not None and self._terminal in ready:
+            if self._terminal is not None and self._terminal in ready and not frozen:  # else it is empty now
                 typed = _read(self._terminal)
                 if not typed:
                     sources.remove(self._terminal)
-                for key in "" if frozen else self._typed.keys(typed):
+                for key in self._typed.keys(typed):
                     self.pressed(key)
             self.insist()
 

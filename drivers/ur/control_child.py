@@ -44,7 +44,7 @@ KICKS_PER_WATCHDOG = 20  # kicks in the time that the watchdog allows, so that a
 NO_REAL_TIME_PRIORITY = -1  # the control object would otherwise try to raise its own priority
 DEFAULT_FREQUENCY = -1.0
 LAST_WORDS_S = 3.0  # for stopping arm and program: a dead controller would be waited for, without end
-EXPIRED_DECELERATION_RAD_S2 = 5.0  # as STOP_DECELERATION_RAD_S2 of drivers/ur/control.py
+LONELY_DECELERATION_RAD_S2 = 5.0  # as STOP_DECELERATION_RAD_S2 of drivers/ur/control.py
 CAP_PORT = 50002  # of ur_rtde's constructor; not used without the URCap flag
 
 
@@ -113,7 +113,7 @@ class ControlChild:
 
     def halt(self) -> None:
         """The arm to rest, whatever it does."""
-        self._brake(2.0)
+        self._brake(LONELY_DECELERATION_RAD_S2)
 
     def _obey(self, call: Call) -> Ended:
         if self._expired:
@@ -179,7 +179,7 @@ class ControlChild:
             self._asked_s, stopped = now_s, self._parent_stopped()
         if not self._expired and (stopped or max(now_s - self._beaten_s, now_s - self._turned_s) > LEASE_S):
             self._expired = True
-            self._brake(EXPIRED_DECELERATION_RAD_S2)
+            self._brake(LONELY_DECELERATION_RAD_S2)
         self._turned_s = self._now_s()
         return self._expired
 
