@@ -324,7 +324,7 @@ def page_stop(s: Staged) -> float:
 
 
 def unplugged(s: Staged) -> float:
-    s.emulation.inject("psd", "unplug")
+    s.emulation.inject("psd", "disconnect")
     return 0.0
 
 
