@@ -17,7 +17,7 @@ class ReinedBench:
         self._bench, self._reins = bench, reins
 
     def move(self, q_rad: Floats) -> None:
-        self._reins.check()
+        self._reins.check(begins=True)
         try:
             self._bench.move(q_rad)
         except DeviceError:

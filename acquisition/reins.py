@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable
 
 from acquisition.errors import StoppedError
-from acquisition.session_states import BROKEN, OVER, PAUSE_AGAIN_S, Event, State, after
+from acquisition.session_states import BROKEN, OVER, PAUSE_AGAIN_S, REST_S, Event, State, after
 from drivers.clock import Clock, SystemClock
 from drivers.errors import DeviceError
 
@@ -28,6 +28,8 @@ class Reins:
 
     `failure`: what has gone wrong with a device, so that a pause does not outlast it. `hold_arm`: stops for good, after
     abort and halt. `undelivered`: told of a stop that could not be delivered; None: there is none of these any more.
+    `rests_in_s`: when the motion under way ends; 0: nothing moves. `ease_arm`: brakes softly. `pausing`: told when the
+    arm rests after a pause (s, at most), and whether it brakes for that.
     """
 
     def __init__(
@@ -38,9 +40,16 @@ class Reins:
         changed: Callable[[State], None] = lambda state: None,
         hold_arm: Callable[[], None] | None = None,
         undelivered: Callable[[DeviceError | None], None] = lambda trouble: None,
+        rests_in_s: Callable[[], float] = lambda: 0.0,
+        ease_arm: Callable[[], None] | None = None,
+        pausing: Callable[[float, bool], None] = lambda rests_in_s, eased: None,
     ) -> None:
         self._stop_arm, self._failure, self._changed = stop_arm, failure, changed
         self._hold_arm, self._undelivered = hold_arm or stop_arm, undelivered
+        self._rests_in_s, self._ease_arm, self._pausing = rests_in_s, ease_arm or stop_arm, pausing
+        self._eased = False  # the motion under way was braked softly, and the session has not taken note
+        self._interrupts, self._interrupted_s = 0, float("-inf")
+        self._why = ""
         self._clock: Clock = clock or SystemClock()
         self._news = threading.Condition()
         self._state = State.IDLE
@@ -54,22 +63,32 @@ class Reins:
     # --- what a person may say, from any thread and in every state
 
     def interrupt(self) -> None:
-        """Ctrl-C: pause; again within 10 s: at once; while paused: abort."""
-        if self._state is State.PAUSED:
+        """Ctrl-C: pause; again within 10 s: at once; a third one, or one long after the arm stands: abort."""
+        now_s = self._clock.now_s()
+        self._interrupts = self._interrupts + 1 if now_s - self._interrupted_s <= PAUSE_AGAIN_S else 1
+        self._interrupted_s = now_s
+        if self._interrupts > 2 or (self._state is State.PAUSED and self._interrupts == 1):
             self.abort()
-        else:
+        elif self._state is not State.PAUSED:
             self.pause()
 
     def pause(self) -> None:
-        """At the next checkpoint; a second time within PAUSE_AGAIN_S: at once."""
-        now_s = self._clock.now_s()
+        """The arm rests within REST_S and begins no further motion; a second time within PAUSE_AGAIN_S: at once."""
+        now_s, before = self._clock.now_s(), self._state
         again = now_s - self._paused_s <= PAUSE_AGAIN_S
         self._paused_s = now_s
-        self.tell(Event.BREAK if again and self._state in (State.PAUSING, State.ENDING) else Event.PAUSE)
+        if again and before in (State.PAUSING, State.ENDING):
+            self.tell(Event.BREAK)
+            return
+        self.tell(Event.PAUSE)
+        if before is State.RUNNING:
+            rests_in_s = self._rests_in_s()
+            self._pausing(rests_in_s, rests_in_s > REST_S)
+            self._ease(rests_in_s)
 
     def resume(self) -> None:
         """Go on from the last checkpoint."""
-        self._paused_s = float("-inf")
+        self._paused_s = self._interrupted_s = float("-inf")
         if self._state is State.PAUSED:
             self._keep(None)  # the arm stands, whatever became of the stop
         self.tell(Event.RESUME)
@@ -78,8 +97,9 @@ class Reins:
         """End at the next checkpoint, as a success."""
         self.tell(Event.STOP)
 
-    def abort(self) -> None:
+    def abort(self, why: str = "") -> None:
         """Stop the arm and give the session up."""
+        self._why = self._why or why
         self.tell(Event.ABORT)
 
     def halt(self) -> None:
@@ -91,6 +111,8 @@ class Reins:
         state = self._state
         if state in BROKEN:
             self._brake(state)
+        elif state is State.PAUSING:
+            self._ease(self._rests_in_s())
 
     def tell(self, event: Event) -> None:
         """Any event; where it stops the arm, the arm has been told when this returns."""
@@ -111,7 +133,7 @@ class Reins:
         EndedEarlyError, StoppedError when a person has ended the session; and whatever a device has failed with.
         """
         self.tell(Event.CHECKPOINT)
-        waited = False
+        self._eased = waited = False
         with self._news:
             while self._state is State.PAUSED and self._failure() is None:
                 waited = True
@@ -133,23 +155,35 @@ class Reins:
         if self._state in (State.ABORTED, State.HALTED):
             self._raise_end()
 
-    def check(self) -> None:
-        """Before and after every motion. BrokenOffError where the step is broken off; StoppedError."""
+    def check(self, *, begins: bool = False) -> None:
+        """Before (`begins`) and after every motion. BrokenOffError where the step is broken off; StoppedError."""
         if self._state is State.HALTED:
             self._raise_end()
-        if self._state in BROKEN:
+        if self._state in BROKEN or self._eased or (begins and self._state is State.PAUSING):
             raise BrokenOffError
 
     def _raise_end(self) -> None:
         if self._state in (State.ABORTED, State.HALTED):
-            raise StoppedError(f"the session was {self._state.value}")
+            why = f"{self._why}: " if self._why else ""
+            raise StoppedError(f"{why}the session was {self._state.value}")
         if self._state in OVER:
             raise EndedEarlyError
 
+    def _ease(self, rests_in_s: float) -> None:
+        """A motion that outlasts its pause is braked, whatever was expected: an operator may slow the arm down."""
+        outlasts = rests_in_s > 0.0 and self._clock.now_s() - self._paused_s > REST_S
+        if not self._eased and (rests_in_s > REST_S or outlasts):
+            self._eased = True  # before the arm stops, for the session notices that at once
+            # A thread of its own: whoever says so must be heard again while the arm brakes.
+            threading.Thread(target=self._deliver, args=(self._ease_arm,), name="ease", daemon=True).start()
+
     def _brake(self, state: State) -> None:
+        self._deliver(self._stop_arm if state is State.BREAKING else self._hold_arm)
+
+    def _deliver(self, stop: Callable[[], None]) -> None:
         trouble = None
         try:
-            (self._stop_arm if state is State.BREAKING else self._hold_arm)()
+            stop()
         except DeviceError as error:
             trouble = error
         self._keep(trouble)

@@ -1,7 +1,8 @@
 """What a session can be doing, what can happen to it, and what it then does: one table, words as in bluesky.
 
-pause: at the next checkpoint, between two samples; again within PAUSE_AGAIN_S: at once, the arm is stopped. resume goes
-on from the last checkpoint. stop: ends at the next checkpoint, as a success. abort: the arm is stopped and held, what
+pause: the arm rests within REST_S, at the end of the motion under way or braked softly, and no further motion begins;
+the pose is taken again later. Again within PAUSE_AGAIN_S: at once, the arm is stopped. resume goes on from the last
+checkpoint. stop: ends at the next checkpoint, as a success. abort: the arm is stopped and held, what
 was taken is kept, the session has failed to end as asked. halt: the arm is stopped and held, whatever the state.
 Source of words and keys: bluesky, "Interrupting" (first Ctrl-C: pause at the next checkpoint; second within 10 s: now).
 """
@@ -9,6 +10,7 @@ Source of words and keys: bluesky, "Interrupting" (first Ctrl-C: pause at the ne
 import enum
 
 PAUSE_AGAIN_S = 10.0
+REST_S = 1.0  # a motion that ends sooner is let arrive, and braked softly else
 
 
 class State(enum.Enum):
@@ -16,7 +18,7 @@ class State(enum.Enum):
 
     IDLE = "ready"
     RUNNING = "measuring"
-    PAUSING = "pausing after this pose"
+    PAUSING = "pausing, the arm comes to rest"
     BREAKING = "stopping the arm"
     PAUSED = "paused, the arm stands"
     ENDING = "ending after this pose"

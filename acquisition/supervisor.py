@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from drivers.clock import Clock, SystemClock
 from drivers.errors import DeviceError, DeviceStale
 
+FROZEN_S = 1.0  # in which this program did nothing at all: stopped by a signal, or the machine hung
 STALE_S = 1.0  # twice what a reader itself waits: this is for one that hangs in a library and tells nothing
 LOOK_S = 0.05
 
@@ -27,8 +28,14 @@ class Supervisor:
         self._hold_arm = hold_arm
         self._clock: Clock = clock or SystemClock()
         self._lock = threading.Lock()
-        self._watched: list[_Watched] = []
-        self.failure: Exception | None = None
+        self._watching, self._turned_s = 0, 0.0
+        self._failure: Exception | None = None
+
+    @property
+    def failure(self) -> Exception | None:
+        """The first one; a freeze of this program counts as one."""
+        self._notice_freeze()
+        return self._failure
 
     def failed(self, failure: Exception) -> None:
         """A device, or the recording, cannot go on: stop the arm now; later failures are followers of the first.
@@ -37,7 +44,7 @@ class Supervisor:
         which stops it again.
         """
         with self._lock:
-            first, self.failure = self.failure is None, self.failure or failure
+            first, self._failure = self._failure is None, self._failure or failure
         if first:
             with suppress(DeviceError):
                 self._hold_arm()
@@ -48,19 +55,23 @@ class Supervisor:
         DeviceError when the stop cannot be delivered; the session ends all the same, at its next step.
         """
         with self._lock:
-            self.failure = self.failure or why
+            self._failure = self._failure or why
         self._hold_arm()
 
     def check(self) -> None:
-        """Raise the first failure, if there was one."""
-        if self.failure is not None:
-            raise self.failure
+        """Raise the first failure, if there was one; called before every motion."""
+        failure = self.failure
+        if failure is not None:
+            raise failure
 
     @contextmanager
     def watching(self, name: str, newest_s: Callable[[], float | None], limit_s: float = STALE_S) -> Generator[None]:
         """Inside, the arm is stopped when the newest sample (host time; None: none yet) is older than the limit."""
         watched = _Watched(name, newest_s, self._clock.now_s(), limit_s)
         done = threading.Event()
+        with self._lock:
+            self._turned_s = self._turned_s if self._watching else self._clock.now_s()
+            self._watching += 1
         watcher = threading.Thread(target=self._watch, args=(watched, done), name=f"watch {name}", daemon=True)
         watcher.start()
         try:
@@ -68,6 +79,8 @@ class Supervisor:
         finally:
             done.set()
             watcher.join()
+            with self._lock:
+                self._watching -= 1
 
     def look(self, watched: _Watched) -> bool:
         """Whether the samples are fresh enough; fails the session when they are not."""
@@ -81,5 +94,19 @@ class Supervisor:
         return False
 
     def _watch(self, watched: _Watched, done: threading.Event) -> None:
-        while not done.wait(LOOK_S) and self.look(watched):
+        while not done.wait(LOOK_S) and self.failure is None and self.look(watched):
             pass
+
+    def _notice_freeze(self) -> None:
+        """Whoever comes first after it notices: a watching thread, or the session before its next motion."""
+        now_s = self._clock.now_s()
+        with self._lock:
+            gap_s, self._turned_s = now_s - self._turned_s, now_s
+            frozen = bool(self._watching) and gap_s > FROZEN_S
+        if frozen:
+            self.failed(
+                DeviceStale(
+                    f"this program did not run for {gap_s:.1f} s (it was stopped, or the machine hung); the arm is "
+                    "held, and nothing that was asked for before is carried out"
+                )
+            )

@@ -7,17 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.bench import Look
+from acquisition.motion.gated_arm import GatedArm
 from acquisition.psd_view import PsdView, PsdWindow, psd_window
 from acquisition.settling import SettleRule, stretch_to_average
 from acquisition.streams import Pump
 from acquisition.supervisor import Supervisor
 from drivers.clock import Clock
-from drivers.device import Block, Movable
+from drivers.device import Block
 from drivers.errors import DeviceError
 
 Floats = NDArray[np.float64]
 
 LATENESS_S = 2.0  # of host time looked back on, to learn how early a PSD sample can arrive at all
+SOFT_S = 0.8  # within which a pause brakes at most: rigs with a gentler acceleration are braked harder
 SILENCE_S = 0.5  # host time without a sample after which a wait gives up
 
 
@@ -42,7 +44,7 @@ class Pumps:
 class WiredBench:
     """Implements acquisition.bench.Bench. `place` asks a person, or the emulated world, to move the fixture."""
 
-    arm: Movable
+    arm: GatedArm
     pumps: Pumps
     view: PsdView
     speeds: Speeds
@@ -66,6 +68,23 @@ class WiredBench:
 
     def stop(self) -> None:
         self.arm.stop()
+
+    def rests_in_s(self) -> float:
+        """Host time (s) until the motion under way ends, at most; 0: none is under way."""
+        return self.arm.rests_in_s() / self.hurry
+
+    @property
+    def ease_s(self) -> float:
+        """Host time (s) that `ease` takes from full speed."""
+        return self.speeds.speed_rad_s / self._soft_rad_s2 / self.hurry
+
+    def ease(self) -> None:
+        """As `stop`, with the deceleration that every motion ends with."""
+        self.arm.stop(self._soft_rad_s2)
+
+    @property
+    def _soft_rad_s2(self) -> float:
+        return max(self.speeds.acceleration_rad_s2, self.speeds.speed_rad_s / SOFT_S)
 
     def hold(self) -> None:
         """As `stop`, and no motion is accepted any more."""

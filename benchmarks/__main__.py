@@ -33,6 +33,7 @@ from benchmarks import (
     rtde_jitter,
     slices,
     speed,
+    stops,
     streams,
     wired_streams,
     zeros,
@@ -167,6 +168,12 @@ def run_faults() -> None:
         print(row, flush=True)
 
 
+def run_stops() -> None:
+    print("what stops a session, and how fast: event x state, by the controller's own time stamps")
+    for row in stops.lines(RIG):
+        print(row, flush=True)
+
+
 def run_live() -> None:
     print("the live page's own thread, devices at 1000, 500 and 100 Hz")
     print("\n".join(cost.line for cost in live.run(load_rig(RIG))))
@@ -245,6 +252,7 @@ BENCHMARKS: dict[str, Callable[[], None]] = {
     "recording": run_recording,
     "log_cost": run_log_cost,
     "faults": run_faults,
+    "stops": run_stops,
     "live": run_live,
     "live_endured": run_live_endured,
     "live_picture": run_live_picture,

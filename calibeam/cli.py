@@ -3,10 +3,8 @@
 0 good, 1 failed, 2 wrong usage, 3 partial (what was recorded is kept, but the job did not end as asked).
 """
 
-import signal
 import sys
 from importlib.metadata import version
-from types import FrameType
 
 from cyclopts import App, CycloptsError
 from rich.console import Console
@@ -15,6 +13,7 @@ from rich.markup import escape
 from acquisition.errors import AcquisitionError
 from acquisition.recording.errors import RecordingError, RigFileError, SamplesError, brief
 from calibeam.emulation import EmulationError
+from calibeam.interrupts import INTERRUPTS
 from calibeam.outcome import CheckFailed, PartialResult, interruption
 from calibeam.prove.seal import BrokenSealError
 from calibrate.errors import DataError
@@ -81,13 +80,15 @@ for name, place in COMMANDS.items():
 
 def main() -> None:
     """Run the command line; ends the process with one of the four exit codes."""
-    for number in (signal.SIGTERM, signal.SIGHUP):  # a closed terminal must leave the arm standing, too
-        signal.signal(number, _interrupt)
-    sys.exit(run(sys.argv[1:]))
-
-
-def _interrupt(number: int, frame: FrameType | None) -> None:
-    raise KeyboardInterrupt(signal.Signals(number).name)
+    INTERRUPTS.listen()  # a closed terminal must leave the arm standing, too
+    code = 1
+    try:
+        code = run(sys.argv[1:])
+    except KeyboardInterrupt:  # while the last line was printed
+        pass
+    finally:
+        INTERRUPTS.end()
+    sys.exit(code)
 
 
 def run(arguments: list[str]) -> int:

@@ -126,7 +126,7 @@ def _ended_early(
 
     The readers still run: whoever opened the recording closes it after them.
     """
-    reason = "Ctrl-C" if isinstance(why, KeyboardInterrupt) else str(why)
+    reason = (str(why) or "Ctrl-C") if isinstance(why, KeyboardInterrupt) else str(why)
     also: list[str] = []
     with uninterrupted():
         try:

@@ -16,7 +16,7 @@ from drivers.modbus.line import ModbusLine, RtuAddress, TcpAddress
 from drivers.modbus.reader import ModbusReader
 from drivers.modbus.register import Register
 from drivers.modbus.register_map import RegisterMap
-from drivers.ur.control import UrControl
+from drivers.ur.control import WATCHDOG_HZ, UrControl
 from drivers.ur.reader import UrReader
 
 MODBUS_PORT = 502  # registered for Modbus TCP
@@ -43,9 +43,10 @@ def emulated_robot(device: RobotDevice, where: Mapping[str, Any]) -> RobotDevice
 
 def _ur(device: RobotDevice, clock: Clock, hurry: float) -> Robot:
     host = _given(device.host, "host")
-    # The controller's watchdog counts its own seconds: 1 s of silence on this side ends the program.
+    # The controller's watchdog counts its own seconds, not those of this side.
     return Robot(
-        UrReader(host, device.rate_hz, clock=clock), lambda: UrControl(host, watchdog_hz=1.0 / hurry, clock=clock)
+        UrReader(host, device.rate_hz, clock=clock),
+        lambda: UrControl(host, watchdog_hz=WATCHDOG_HZ / hurry, clock=clock),
     )
 
 

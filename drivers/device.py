@@ -68,8 +68,11 @@ class Movable(Protocol):
         """Blocks until the controller says the motion has ended. DeviceRefused on a stop, DeviceLost, DeviceStale."""
         ...
 
-    def stop(self) -> None:
-        """Brakes; a move that was sent before the stop, even if it has not begun yet, ends with DeviceRefused."""
+    def stop(self, deceleration_rad_s2: float = ...) -> None:
+        """Brakes; a move that was sent before the stop, even if it has not begun yet, ends with DeviceRefused.
+
+        A controller whose program knows only one way to brake takes that, whatever deceleration is asked for.
+        """
         ...
 
     def hold(self) -> None:

@@ -19,6 +19,7 @@ WIRED = (
     "calibeam/live/test_wired_live.py",
     "calibeam/prove/test_wired.py",
     "calibeam/session/test_wired_pause.py",
+    "calibeam/session/test_wired_stops.py",
     "calibeam/test_camera_cli.py",
     "calibeam/test_check_cli.py",
     "calibeam/test_cli.py",

@@ -24,7 +24,7 @@ from acquisition.motion.paths.segments import By, Pace, Segment
 from acquisition.motion.paths.solved import SolvedPath
 from acquisition.motion.plan import BeltAt, Plan, plan
 from acquisition.motion.setpoints import BeltNow, LookAhead
-from acquisition.motion.states import OVER, PAUSE_AGAIN_S, Event, State, after
+from acquisition.motion.states import OVER, PAUSE_AGAIN_S, REST_S, Event, State, after
 from acquisition.motion.under_way import UnderWay
 from drivers.clock import Clock
 from drivers.errors import DeviceRefused
@@ -45,6 +45,7 @@ class Gate:
         self._lock = threading.RLock()  # a signal handler may come in the middle of itself
         self._state = State.IDLE
         self._paused_s = -np.inf
+        self._points: LookAhead | None = None
         self._made: Plan | None = None
         self._wanted_end = State.DONE
 
@@ -62,11 +63,27 @@ class Gate:
     # --- what a person may say, from any thread and in every state
 
     def pause(self) -> None:
-        """At the next rest; a second time within 10 s: at once."""
+        """At the next rest, or braking along the path where that is further than REST_S; again within 10 s: at once."""
         now_s = self._clock.now_s()
         again = now_s - self._paused_s <= PAUSE_AGAIN_S
         self._paused_s = now_s
-        self._tell(Event.HOLD if again and self._state is State.PAUSING else Event.PAUSE)
+        at_once = again and self._state is State.PAUSING
+        self._tell(Event.HOLD if at_once or self.rests_in_s() > REST_S else Event.PAUSE)
+
+    def rests_in_s(self) -> float:
+        """Until the next rest of the path, or its end, at the planned speed; 0 where nothing moves."""
+        points = self._points
+        if points is None or self._state not in (State.MOVING, State.PAUSING):
+            return 0.0
+        here_s = points.reached_s
+        rests_s = [t_s for t_s, _ in points.path.rests if t_s > here_s]
+        return max(0.0, min([*rests_s, points.path.ends_s]) - here_s)
+
+    @property
+    def brake_s(self) -> float:
+        """How long braking along the path takes from full speed, with what is solved ahead."""
+        pace = self._pace
+        return float(np.max(pace.speed_rad_s / pace.acceleration_rad_s2)) + PIPELINE / self._stream.solve_hz
 
     def hold(self) -> None:
         """Brake on the path, and stay ready to go on."""
@@ -110,6 +127,8 @@ class Gate:
         self._tell(Event.START)
         try:
             following = self._following(made, belt)
+            if self._state is State.PAUSING:  # while it was solved
+                self._tell(Event.HOLD)
             following.run(made.start_rad, act, watch)
             if self._halted():
                 self._arm.stop()  # once more: a set-point may have crossed the halt on its way
@@ -121,6 +140,8 @@ class Gate:
             if isinstance(error, DeviceRefused) and self._halted():  # a set-point that came after the halt
                 raise InterruptedMotionError(HALTED) from error
             raise
+        finally:
+            self._points = None
         if self._halted():
             raise InterruptedMotionError(HALTED)
         if self._state is State.ABORTED:
@@ -130,7 +151,7 @@ class Gate:
     def _following(self, made: Plan, belt: BeltNow) -> Following:
         """Solving takes a while: whatever is said meanwhile counts, for the motion has begun."""
         path = made.path() if made.carried else SolvedPath(made.path(), 1.0 / self._stream.solve_hz)
-        points = LookAhead(path, self._stream.solve_hz, belt, made.start_rad, self._stream.lag_s)
+        self._points = points = LookAhead(path, self._stream.solve_hz, belt, made.start_rad, self._stream.lag_s)
         checked = UnderWay(self._solver.arm, self._pace, self._cell, made.start_rad, 1.0 / self._stream.hz)
         said = Said(lambda: self._state, self._tell, self._braked)
         return Following(self._arm, self._stream, self._clock, points, checked, self._pace, said)

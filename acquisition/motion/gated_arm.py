@@ -3,6 +3,7 @@
 Sessions move this way: the controller interpolates, so the way is known, and is gone through before it is let go.
 """
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -25,6 +26,7 @@ class GatedArm:
     def __init__(self, arm: Movable, kinematics: Kinematics, cell: Cell, now: Callable[[], Floats]) -> None:
         self.name = arm.name
         self._arm, self._kinematics, self._cell, self._now = arm, kinematics, cell, now
+        self._under_way: tuple[Floats, float, float] | None = None  # target, speed, acceleration
 
     def connect(self) -> None:
         self._arm.connect()
@@ -38,10 +40,28 @@ class GatedArm:
         frames = self._kinematics.frames(start_rad + shares * (q_rad - start_rad))
         self._check_boxes(frames)
         share = 1.0 if way_rad == 0.0 else self._speed_share(frames, shares[:, 0] * way_rad, speed_rad_s)
-        self._arm.move_joints(q_rad, share * speed_rad_s, acceleration_rad_s2)
+        self._under_way = q_rad, share * speed_rad_s, acceleration_rad_s2
+        try:
+            self._arm.move_joints(q_rad, share * speed_rad_s, acceleration_rad_s2)
+        finally:
+            self._under_way = None
 
-    def stop(self) -> None:
-        self._arm.stop()
+    def rests_in_s(self) -> float:
+        """Device time (s) until the motion under way ends, at most, at full speed slider; 0: none is under way."""
+        under_way = self._under_way
+        if under_way is None:
+            return 0.0
+        target_rad, speed_rad_s, acceleration_rad_s2 = under_way
+        way_rad = float(np.max(np.abs(target_rad - self._now())))
+        if way_rad < speed_rad_s**2 / acceleration_rad_s2:  # too short to reach the speed
+            return 2.0 * math.sqrt(way_rad / acceleration_rad_s2)
+        return way_rad / speed_rad_s + speed_rad_s / acceleration_rad_s2
+
+    def stop(self, deceleration_rad_s2: float | None = None) -> None:
+        if deceleration_rad_s2 is None:
+            self._arm.stop()
+        else:
+            self._arm.stop(deceleration_rad_s2)
 
     def hold(self) -> None:
         self._arm.hold()

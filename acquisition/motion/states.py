@@ -1,6 +1,7 @@
 """What a motion can be doing, what can happen to it, and what it then does: one table, words as in bluesky.
 
-pause: at the next rest of the path; the gate makes a second one within PAUSE_AGAIN_S a hold. resume goes on.
+pause: at the next rest of the path; the gate makes it a hold where that is further than REST_S, and so a second one
+within PAUSE_AGAIN_S. resume goes on.
 abort: brake, clean up, end as aborted. stop: brake, clean up, end as a success. halt: stop the arm, no clean-up.
 Source of the words and keys: bluesky, "Interrupting" (first Ctrl-C: pause at the next checkpoint; second within 10 s:
 pause now).
@@ -9,6 +10,7 @@ pause now).
 import enum
 
 PAUSE_AGAIN_S = 10.0
+REST_S = 1.0
 
 
 class State(enum.Enum):

@@ -35,7 +35,8 @@ def move_command(
 ) -> None:
     """Move the arm: planned and drawn first, refused where limits or boxes forbid it, then asked for. Clear the cell.
 
-    The arm moves once `go` is typed. Ctrl-C rests at the next place, a second one brakes at once, a third gives up.
+    The arm moves once `go` is typed. Ctrl-C rests at the next place, or brakes where that is more than a second away;
+    again brakes at once, then gives up.
 
     Example: calibeam move rigs/ur5e-dual-psd.toml --joints-deg 17 -80 92 -29 29 0
 

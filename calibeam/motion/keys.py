@@ -1,7 +1,8 @@
 """Ctrl-C and words at the keyboard while the arm moves: pause, hold, abort; resume, stop, halt.
 
-First Ctrl-C: rest at the next place. Second within 10 s: brake now. Third: give up. SIGTERM and a closed terminal give
-up at once. While the motion is held a line is read, where there is a terminal: r resume, s stop, a abort, h halt.
+First Ctrl-C: rest at the next place, or brake along the path where that is further than a second. Again: brake, where
+it does not brake yet, then give up. SIGTERM and a closed terminal give up at once. While the motion is held a line is
+read: r resume, s stop, a abort, h halt.
 """
 
 import signal
@@ -15,6 +16,7 @@ from typing import TextIO
 from acquisition.motion.gate import Gate
 from acquisition.motion.states import State
 from calibeam.asking import Asking, at_terminal
+from calibeam.interrupts import INTERRUPTS
 from drivers.errors import DeviceError
 
 WORDS = "r resume, s stop, a abort, h halt, then ENTER"
@@ -33,7 +35,12 @@ class Keys:
             self._gate.abort()
             return
         self._gate.pause()
-        told = "braking" if self._held() else "resting at the next place; Ctrl-C again brakes now"
+        if self._held():
+            told = (
+                f"braking along the path, at rest within {self._gate.brake_s:.1f} s; Ctrl-C again gives the motion up"
+            )
+        else:
+            told = f"resting at the next place within {self._gate.rests_in_s():.1f} s; Ctrl-C again brakes now"
         print(f"\n{told}", file=self._out, flush=True)
         self._ask()
 
@@ -79,6 +86,8 @@ def keys_of(gate: Gate) -> Generator[Keys]:
         keys.interrupted()
 
     def end(number: int, frame: FrameType | None) -> None:
+        if number == signal.SIGHUP:
+            INTERRUPTS.leave_terminal()
         keys.ended()
 
     before = {
@@ -88,6 +97,9 @@ def keys_of(gate: Gate) -> Generator[Keys]:
     }
     try:
         yield keys
+    except BaseException:
+        INTERRUPTS.close()  # the arm stands, or was told to stop; what is left is to release it
+        raise
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

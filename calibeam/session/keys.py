@@ -1,8 +1,9 @@
 """Keys and Ctrl-C while the arm moves, heard by a thread of their own, so that a stop waits for nobody.
 
-SPACE or p pause, r resume, s stop (finish here), a abort, h halt. Ctrl-C pauses after the pose, again within 10 s at
-once, and once paused it aborts. Where there is no terminal only Ctrl-C is heard, and SIGCONT resumes. SIGTERM and a
-closed terminal end a session as they always do (calibeam.cli). Ctrl-Z pauses: a stopped process would read no device.
+SPACE or p pause, r resume, s stop (finish here), a abort, h halt. Ctrl-C pauses, again within 10 s at once, and a third
+time, or once paused, it aborts. Where there is no terminal only Ctrl-C is heard, and SIGCONT resumes. SIGTERM and a
+closed terminal abort. Ctrl-Z pauses: a stopped process would read no device. After a freeze of this program what was
+typed in it is dropped, and SIGCONT resumes nothing.
 """
 
 import os
@@ -20,11 +21,15 @@ from typing import Self
 
 from acquisition.errors import StoppedError
 from acquisition.reins import Reins
-from acquisition.session_states import BROKEN, OVER
+from acquisition.session_states import BROKEN, OVER, State
+from acquisition.supervisor import FROZEN_S
+from calibeam.interrupts import INTERRUPTS
 from calibeam.session.key_stream import KeyStream
+from drivers.clock import Clock, SystemClock
 
 LISTEN_S = 0.2  # between two times at which a stop that was not heard is said again
-INTERRUPT, SUSPEND, GO_ON, END = b"i", b"z", b"c", b"e"
+INTERRUPT, SUSPEND, GO_ON, TERMINATE, HANG_UP, END = b"i", b"z", b"c", b"t", b"u", b"e"
+ENDED_BY = {TERMINATE: "SIGTERM", HANG_UP: "the terminal was closed"}
 ENTER = "\n"
 
 
@@ -39,9 +44,12 @@ class _Question:
 class Keys:
     """What was pressed, told to the reins; or to who asks, while somebody does."""
 
-    def __init__(self, reins: Reins, terminal: int | None) -> None:
+    def __init__(self, reins: Reins, terminal: int | None, clock: Clock | None = None) -> None:
         """`terminal`: file descriptor that keys are read from."""
         self._reins, self._terminal = reins, terminal
+        self._clock: Clock = clock or SystemClock()
+        self._turned_s = self._clock.now_s()
+        self._ended_by = ""  # a signal that ends the session, whatever it is doing
         self._question: _Question | None = None
         self._typed = KeyStream()
         self._reading = threading.Lock()  # what is read is handed on before a question begins, or not at all
@@ -95,6 +103,7 @@ class Keys:
         """From now on keys and signals go to the reins; at the end terminal and signals are as they were."""
         with ExitStack() as opened:
             self._woken, self._wake = os.pipe()
+            self._turned_s = self._clock.now_s()
             opened.callback(self._close)
             opened.enter_context(_handled(self))
             opened.enter_context(_one_by_one(self._terminal))
@@ -106,7 +115,10 @@ class Keys:
         return self
 
     def __exit__(self, *error: object) -> None:
+        """KeyboardInterrupt where a signal that ends the session came when nothing was under way any more."""
         self._opened.close()
+        if self._ended_by and error[0] is None and self._reins.state in (State.IDLE, State.DONE):
+            raise KeyboardInterrupt(self._ended_by)
 
     def _close(self) -> None:
         os.close(self._woken)
@@ -117,14 +129,33 @@ class Keys:
         sources = [self._woken] + ([] if self._terminal is None else [self._terminal])
         while True:
             ready = select.select(sources, [], [], LISTEN_S)[0]
+            frozen = self._was_frozen()
             if self._woken in ready:
                 for code in os.read(self._woken, 64):
                     if bytes([code]) == END:
                         return
-                    self._told(bytes([code]))
-            if self._terminal is not None and self._terminal in ready and not self._read(self._terminal):
+                    if not (frozen and bytes([code]) == GO_ON):
+                        self._told(bytes([code]))
+            # What was typed during a freeze is discarded; the terminal that was ready is empty then.
+            if self._terminal in ready and not frozen and not self._read(self._terminal):
                 sources.remove(self._terminal)
-            self._reins.insist()
+            self.insist()
+
+    def insist(self) -> None:
+        """What the session has not taken note of is repeated; to be called a few times a second."""
+        if self._ended_by:
+            self._reins.abort(self._ended_by)  # it may have come before the session began
+        self._reins.insist()
+
+    def _was_frozen(self) -> bool:
+        """Whether this program did nothing since the last turn; what the terminal holds then is discarded."""
+        now_s = self._clock.now_s()
+        gap_s, self._turned_s = now_s - self._turned_s, now_s
+        if gap_s <= FROZEN_S + LISTEN_S:
+            return False
+        with self._reading:
+            self._forget()
+        return True
 
     def _read(self, terminal: int) -> bool:
         """Hands on what was typed; whether there may be more."""
@@ -144,7 +175,10 @@ class Keys:
                 termios.tcflush(self._terminal, termios.TCIFLUSH)
 
     def _told(self, code: bytes) -> None:
-        if code == GO_ON:
+        if code in ENDED_BY:
+            self._ended_by = self._ended_by or ENDED_BY[code]
+            self._reins.abort(self._ended_by)
+        elif code == GO_ON:
             self._reins.resume()
         elif self._question is not None:
             self._reins.abort()
@@ -172,16 +206,24 @@ def _one_by_one(fd: int | None) -> Generator[None]:
         tty.setcbreak(fd, termios.TCSANOW)
         yield
     finally:
-        termios.tcsetattr(fd, termios.TCSADRAIN, before)
+        with suppress(termios.error):  # it was closed meanwhile
+            termios.tcsetattr(fd, termios.TCSADRAIN, before)
 
 
 @contextmanager
 def _handled(keys: Keys) -> Generator[None]:
-    codes = {signal.SIGINT: INTERRUPT, signal.SIGTSTP: SUSPEND}
+    codes = {
+        signal.SIGINT: INTERRUPT,
+        signal.SIGTSTP: SUSPEND,
+        signal.SIGTERM: TERMINATE,
+        signal.SIGHUP: HANG_UP,
+    }
     if not keys.heard:  # in a terminal SIGCONT comes with every `fg`, and must not set an arm going
         codes[signal.SIGCONT] = GO_ON
 
     def tell(number: int, frame: FrameType | None) -> None:
+        if number == signal.SIGHUP:
+            INTERRUPTS.leave_terminal()
         keys.signalled(codes[signal.Signals(number)])
 
     before = {number: signal.signal(number, tell) for number in codes}

@@ -18,9 +18,11 @@ from acquisition.servo.centring import Limits
 from acquisition.session import Session, Summary
 from acquisition.wired import WiredBench
 from calibeam.camera import camera_sight
+from calibeam.interrupts import INTERRUPTS
 from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibeam.live.feed import Feed
+from calibeam.outcome import PartialResult
 from calibeam.recorded import end_event, kept, new_recording
 from calibeam.session.ahead import Ahead
 from calibeam.session.earlier import STANDS_IN
@@ -62,13 +64,21 @@ class Measuring:
             self._teller.state,
             hold_arm=bench.hold,
             undelivered=self._teller.undelivered,
+            rests_in_s=bench.rests_in_s,
+            ease_arm=bench.ease,
+            pausing=lambda rests_in_s, eased: self._teller.pausing(rests_in_s, bench.ease_s if eased else None),
         )
         self._session = self._session_of(sight)
 
     def take(self, more: Sequence[Block] = ()) -> Summary:
         """All that was taken in this part so far. PartialResult when it ended early: the arm stands."""
         with Keys(self._reins, self._person.keyboard) as keys, self._person.at(keys), self._forecaster.running():
-            summary = kept(self._bench, self._writer, self._clock, self._session, self._run(more))
+            try:
+                summary = kept(self._bench, self._writer, self._clock, self._session, self._run(more))
+            except PartialResult as early:
+                INTERRUPTS.close()  # a recording is being closed
+                self._teller.ended_early(early)
+                raise
         end_event(self._writer, self._clock, summary)
         return summary
 

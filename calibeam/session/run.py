@@ -16,6 +16,7 @@ from acquisition.session import Summary
 from calibeam.asking import Asking
 from calibeam.conclude import conclude
 from calibeam.device_check import DeviceCheck, check_devices
+from calibeam.interrupts import INTERRUPTS
 from calibeam.learner import FittedLearner
 from calibeam.live.feed import SILENT, Feed
 from calibeam.outcome import PartialResult
@@ -34,7 +35,7 @@ from calibeam.session.teller import Teller
 from calibeam.session.terminal_view import TerminalView
 from calibrate.pose_design.candidates import POSE_S
 from drivers.clock import Clock, SystemClock
-from drivers.errors import DeviceRefused
+from drivers.errors import DeviceError, DeviceRefused
 
 GO_ON = "to go on, give the same command with --continue"
 FINISH, MORE, PLACE = "f", "m", "n"
@@ -71,7 +72,13 @@ class OnSite:
                 self.teller.step("arm")
                 self._person.arm()
                 agreed = True
-            place = self._measure(part)
+            try:
+                place = self._measure(part)
+            except PartialResult as early:
+                if not self._goes_on(early):
+                    raise
+                agreed, earlier = False, self._again()
+                continue
             if place is None:
                 break
             earlier = with_place(earlier_of(self._job.out, self._job.rig), place)
@@ -100,6 +107,33 @@ class OnSite:
                 raise DeviceRefused("; ".join(check.line for check in checks if check.wrong))
             if answer == "g":
                 return
+
+    def _goes_on(self, early: PartialResult) -> bool:
+        """A device failed, and the arm was stopped: whether to go on is a person's decision, never the program's."""
+        if not isinstance(early.__cause__, DeviceError):
+            return False
+        INTERRUPTS.heed()
+        self.teller.asked("the arm was stopped; answer at the terminal whether the session goes on")
+        try:
+            answer = self._person.choose(
+                "the arm was stopped, and the recording is closed:",
+                {
+                    "g": "go on: check the devices, then ask before the arm moves",
+                    "e": "end here; --continue goes on later",
+                },
+                default="e",
+                at_end="e",
+            )
+        except KeyboardInterrupt:
+            return False
+        finally:
+            self.teller.asked("")
+        return answer == "g"
+
+    def _again(self) -> Earlier:
+        """After a failure every device is connected anew, and asked for, into a further recording."""
+        self._devices()
+        return self._since(earlier_of(self._job.out, self._job.rig), stands=False)
 
     def _told(self) -> Iterator[DeviceCheck]:
         for check in check_devices(self._job.rig, self._clock):
@@ -152,10 +186,10 @@ class OnSite:
                     self.teller.step("measure")
                     summary = session.take(more_at(part, session.placement, self._half_size_m, part.options, rounds))
         except KeyboardInterrupt as why:  # at a question, while the arm stands
-            raise PartialResult(f"Ctrl-C; what was taken is kept in {path}; {GO_ON}") from why
+            INTERRUPTS.close()
+            raise PartialResult(f"{str(why) or 'Ctrl-C'}; what was taken is kept in {path}; {GO_ON}") from why
         except PartialResult as early:
-            self.teller.said(f"ended early: {early}", loud=False)
-            raise PartialResult(f"{early}; {GO_ON}") from early
+            raise PartialResult(f"{early}; {GO_ON}") from early.__cause__
         self.teller.said(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {path}")
         return self._new_place(part) if answer == PLACE else None
 

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -12,6 +13,7 @@ from acquisition.progress import Phase, Progress
 from acquisition.recording.rig_schema import Rig
 from acquisition.sample import Sample
 from acquisition.session_states import State
+from calibeam.outcome import PartialResult
 from calibeam.session.forecast import Forecast
 from calibeam.session.pace import Pace
 from calibeam.session.quality import Keeper
@@ -44,7 +46,8 @@ class Teller:
         """One line for a person."""
         with self._turn:
             for listener in self._listeners:
-                listener.said(text, loud)
+                with suppress(OSError):  # a terminal that was closed ends no session
+                    listener.said(text, loud)
 
     def progress(self, progress: Progress) -> None:
         """From the session, as acquisition.progress.Tell."""
@@ -64,12 +67,28 @@ class Teller:
             self._now(state=state)
             self.said(state.value)
 
+    def ended_early(self, early: PartialResult) -> None:
+        """At once, for closing the recording takes a second."""
+        self.said(
+            f"THE ARM WAS STOPPED: {early}" if isinstance(early.__cause__, DeviceError) else f"ended early: {early}"
+        )
+
     def undelivered(self, trouble: DeviceError | None) -> None:
         """From the reins: the arm could not be told to stop; None: now it was, or it need not be."""
         with self._turn:
             self._now(undelivered="" if trouble is None else str(trouble))
             told = "no stop is outstanding any more" if trouble is None else f"{UNDELIVERED.upper()}: {trouble}"
             self.said(told)
+
+    def pausing(self, rests_in_s: float, eased_s: float | None) -> None:
+        """From the reins: when the arm rests (s, at most); `eased_s`: it is braked softly for that, in this time."""
+        if eased_s is not None:
+            what = f"pause: the arm brakes on its way and stands within {_up(eased_s)} s"
+        elif rests_in_s > 0.0:
+            what = f"pause: the motion under way ends within {_up(rests_in_s)} s, no other begins"
+        else:
+            what = "pause: the arm stands, the reading under way is finished"
+        self.said(f"{what}; SPACE or Ctrl-C again brakes at once, r goes on")
 
     def asked(self, text: str) -> None:
         """A person is waited for; "": no more."""
@@ -100,7 +119,8 @@ class Teller:
     def _now(self, **changed: Any) -> None:
         self.shown = replace(self.shown, **changed)
         for listener in self._listeners:
-            listener.shows(self.shown)
+            with suppress(OSError):
+                listener.shows(self.shown)
 
 
 class ToldJournal:
@@ -121,6 +141,10 @@ class ToldJournal:
         self._journal.event(kind, detail)
         if text := _of_event(kind, detail):
             self._teller.said(text, loud=kind == "skipped")
+
+
+def _up(seconds: float) -> str:
+    return f"{np.ceil(10.0 * seconds) / 10.0:.1f}"
 
 
 def _of_sample(sample: Sample, progress: Progress | None) -> str:

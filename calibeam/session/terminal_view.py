@@ -4,7 +4,7 @@ The view stays at the bottom; what is said scrolls by above it, and stands in th
 """
 
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import numpy as np
 from rich.console import Console, Group, RenderableType
@@ -54,13 +54,15 @@ class TerminalView:
     @contextmanager
     def opened(self) -> Generator[None]:
         """The view stands at the bottom inside, and stays as it was last."""
-        with Live(console=self._console, refresh_per_second=REFRESH_HZ, get_renderable=self._drawn) as live:
-            self._live = live
-            try:
-                yield
-            finally:
-                live.refresh()
-                self._live = None
+        live = Live(console=self._console, refresh_per_second=REFRESH_HZ, get_renderable=self._drawn)
+        live.start()
+        self._live = live
+        try:
+            yield
+        finally:
+            self._live = None
+            with suppress(OSError):  # the terminal was closed
+                live.stop()  # draws it once more
 
     def said(self, text: str, loud: bool) -> None:
         if loud and not (self._live is not None and text in {state.value for state in State}):  # the view shows these

@@ -21,6 +21,7 @@ from drivers.modbus.register_map import ANSWERS, COMMANDS, RegisterMap
 
 POLL_S = 0.02  # between two looks at a running move
 LIFE_S = 0.1  # between two counts of host_life, a tenth of what the controller's program waits for
+BEGIN_LIMIT_S = 4.0  # from the call to the command's number: four writes of up to 0.75 s each, and room
 TAKEN_LIMIT_S = 1.0  # from the command's number to the program's answer: some cycles
 STANDING_LIMIT_S = 1.5  # braking from full speed, with room
 MARGIN_S = 3.0
@@ -101,22 +102,23 @@ class ModbusArm:
         """
         target_rad = _checked(q_rad, speed_rad_s, acceleration_rad_s2)
         with self._moving:
-            stops = self._stops
+            stops, begin_s = self._stops, self._clock.now_s()
             try:
                 self._put("command_q_rad", target_rad)
                 self._put("command_speed_rad_s", speed_rad_s)
                 self._put("command_acceleration_rad_s2", acceleration_rad_s2)
                 self._count_life()
-                self._order(stops)
+                self._order(stops, begin_s)
                 limit_s = (FULL_RANGE_RAD / speed_rad_s + speed_rad_s / acceleration_rad_s2) / SLOWEST_OVERRIDE
                 self._await_arrival(limit_s + MARGIN_S)
             except (DeviceLost, DeviceStale):
                 self._give_up()
                 raise
 
-    def stop(self) -> None:
+    def stop(self, deceleration_rad_s2: float = math.nan) -> None:
         """Brakes, from any thread and in every state; a move that is under way ends with DeviceRefused.
 
+        The handshake has one way to brake, whatever deceleration is asked for.
         DeviceLost when the stop cannot be delivered, DeviceStale when the arm goes on: press the emergency stop.
         """
         self._brake(hold=False)
@@ -131,8 +133,13 @@ class ModbusArm:
 
     # --- inside
 
-    def _order(self, stops: int) -> None:
+    def _order(self, stops: int, begin_s: float) -> None:
         with self._ordering:
+            if self._clock.now_s() - begin_s > BEGIN_LIMIT_S:
+                raise DeviceStale(
+                    f"{self._line.place}: a motion was {self._clock.now_s() - begin_s:.1f} s old before it could be "
+                    "sent, and is not carried out; connect again"
+                )
             if self._held:
                 raise DeviceRefused(f"{self._line.place}: stopped by stop(), or not connected; connect again")
             if self._stops != stops:

@@ -4,7 +4,8 @@
 
 How a stop reaches the arm: the child watches a line of its own for it and brakes; if it does not answer within tenths,
 the program is stopped through the dashboard, which needs neither the child nor RTDE. If that fails too, the child is
-killed and the controller's watchdog, which nobody kicks any more, ends the program.
+killed and the controller's watchdog, which nobody kicks any more, ends the program. A child that is frozen or gone
+is noticed within tenths, and the arm stopped the same way; a program that is frozen is noticed by its child.
 After any fault the child is killed: call `connect` again, it starts a new one.
 """
 
@@ -32,6 +33,7 @@ from drivers.ur.dashboard import UrDashboard
 from drivers.ur.pulse import check_stream
 from drivers.ur.supervised import SupervisedChild
 
+WATCHDOG_HZ = 1.0
 CONNECT_LIMIT_S = 15.0  # ur_rtde itself waits 5 s for its program to run
 MARGIN_S = 3.0  # settling, round trips, a busy machine
 SLOWEST_SPEED_SLIDER = 0.1  # an operator may slow the arm down to this without making a move fail
@@ -49,7 +51,7 @@ class UrControl:
         host: str,
         *,
         name: str = "robot",
-        watchdog_hz: float = 1.0,
+        watchdog_hz: float = WATCHDOG_HZ,
         dashboard: UrDashboard | None = None,
         clock: Clock | None = None,
     ) -> None:
@@ -128,13 +130,13 @@ class UrControl:
         """Ends a stream of set-points; blocks until the arm stands. Raises as `move_joints`."""
         self._call(ServoStop(deceleration_rad_s2), MARGIN_S)
 
-    def stop(self) -> None:
+    def stop(self, deceleration_rad_s2: float = STOP_DECELERATION_RAD_S2) -> None:
         """Brakes, from any thread and in every state; a move that is under way ends with DeviceRefused.
 
         DeviceLost when no way to the controller is left: press the emergency stop.
         """
         with self._stopping:
-            self._brake()
+            self._brake(deceleration_rad_s2)
 
     def hold(self) -> None:
         """As `stop`; every motion from now on ends with DeviceRefused, until `connect`."""
@@ -162,9 +164,9 @@ class UrControl:
 
     # --- inside
 
-    def _brake(self) -> None:
+    def _brake(self, deceleration_rad_s2: float = STOP_DECELERATION_RAD_S2) -> None:
         child = self._child
-        if child is None or not child.stop(STOP_DECELERATION_RAD_S2):
+        if child is None or not child.stop(deceleration_rad_s2):
             self._stop_independently(child)
 
     def _call(self, request: Motion, limit_s: float) -> None:
@@ -197,6 +199,12 @@ class UrControl:
                 return DeviceStale(
                     f"{self.place}: the controller has sent nothing new for half a second; look at the pendant, "
                     "then connect again"
+                )
+            case Outcome.EXPIRED:
+                self._give_up(child)
+                return DeviceStale(
+                    f"{self.place}: this program or its control process was frozen; the arm was braked, and "
+                    "what was commanded before is not carried out: connect again"
                 )
             case Outcome.NOT_RUNNING:
                 self._give_up(child)

@@ -3,7 +3,9 @@
     python -m drivers.ur.control_child HOST CALLS_FD STOPS_FD WATCHDOG_HZ
 
 Every motion is started asynchronously and watched, so that a stop never waits behind it. When the parent has gone, the
-child stops the arm and ends; when the child has gone, the controller's watchdog stops the arm.
+child stops the arm and ends; when the child has gone, the controller's watchdog stops the arm. When the parent is
+stopped or beats no more, or the child itself was frozen, the arm is braked and no call is begun any more: what was
+asked for before a freeze is not carried out after it.
 """
 
 import os
@@ -13,10 +15,13 @@ import socket
 import sys
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, Protocol
 
 from drivers.ur.control_link import (
+    LEASE_S,
     Alive,
+    Beat,
     Call,
     Close,
     Ended,
@@ -28,15 +33,18 @@ from drivers.ur.control_link import (
     ServoJoints,
     ServoStop,
     Stop,
+    is_stopped,
 )
 from drivers.ur.pulse import Pulse
 
 WATCH_S = 0.001  # between two looks at a running motion; the control object itself learns of its end every 2 ms
+ASK_S = 0.05  # between two looks whether the parent was stopped
 ALIVE_S = 0.1  # the parent gives up after many of these
 KICKS_PER_WATCHDOG = 20  # kicks in the time that the watchdog allows, so that a busy machine may miss many
 NO_REAL_TIME_PRIORITY = -1  # the control object would otherwise try to raise its own priority
 DEFAULT_FREQUENCY = -1.0
 LAST_WORDS_S = 3.0  # for stopping arm and program: a dead controller would be waited for, without end
+LONELY_DECELERATION_RAD_S2 = 5.0  # as STOP_DECELERATION_RAD_S2 of drivers/ur/control.py
 CAP_PORT = 50002  # of ur_rtde's constructor; not used without the URCap flag
 
 
@@ -71,13 +79,17 @@ class ControlChild:
         watchdog_hz: float,
         now_s: Callable[[], float],
         silent: Callable[[], bool] = lambda: False,
+        parent_stopped: Callable[[], bool] = lambda: False,
     ) -> None:
         """`silent`: whether the controller sends nothing new any more, which the control object notices late."""
         self._control, self._calls, self._stops, self._now_s = control, calls, stops, now_s
-        self._silent = silent
+        self._silent, self._parent_stopped = silent, parent_stopped
         self._stopped_up_to = 0
         self._kick_every_s = 1.0 / (watchdog_hz * KICKS_PER_WATCHDOG)
         self._kicked_s = self._told_s = now_s()
+        self._beaten_s = self._turned_s = now_s()  # when the parent last beat, and when this process last looked
+        self._asked_s = now_s()  # after the parent's state
+        self._expired = False
         self._servoing = False
 
     def run(self) -> None:
@@ -87,6 +99,7 @@ class ControlChild:
             waiter.register(link.line, select.POLLIN)
         while True:
             waiter.poll(1e3 * self._kick_every_s)
+            self._expire()
             self._kick()
             try:
                 self._take_stop(0.0)
@@ -100,9 +113,11 @@ class ControlChild:
 
     def halt(self) -> None:
         """The arm to rest, whatever it does."""
-        self._brake(2.0)
+        self._brake(LONELY_DECELERATION_RAD_S2)
 
     def _obey(self, call: Call) -> Ended:
+        if self._expired:
+            return Ended(Outcome.EXPIRED)
         if call.number <= self._stopped_up_to:
             return Ended(Outcome.STOPPED)
         fault = self._fault()
@@ -119,7 +134,9 @@ class ControlChild:
                     return self._judge(self._control.servoJ(q, 0.0, 0.0, period, lookahead, gain))
                 case ServoStop(deceleration):
                     self._servoing = False
-                    return self._judge(self._control.servoStop(deceleration))
+                    stopped = self._control.servoStop(deceleration)
+                    self._renew()
+                    return self._judge(stopped)
         except (RuntimeError, ValueError, TypeError) as error:  # what ur_rtde throws for arguments out of range
             return Ended(Outcome.REFUSED, str(error))
 
@@ -128,6 +145,8 @@ class ControlChild:
         if not accepted:
             return self._judge(accepted)
         while self._control.getAsyncOperationProgress() >= 0:
+            if self._expire():
+                return Ended(Outcome.EXPIRED)
             if self._take_stop(WATCH_S):
                 return Ended(Outcome.STOPPED)
             self._kick()
@@ -152,8 +171,27 @@ class ControlChild:
             return Ended(Outcome.SILENT)
         return None if self._control.isProgramRunning() else Ended(Outcome.NOT_RUNNING)
 
+    def _expire(self) -> bool:
+        """Looked at before anything is read: what waits in the lines after a freeze is older than the freeze."""
+        now_s = self._now_s()
+        stopped = False
+        if now_s - self._asked_s >= ASK_S:
+            self._asked_s, stopped = now_s, self._parent_stopped()
+        if not self._expired and (stopped or max(now_s - self._beaten_s, now_s - self._turned_s) > LEASE_S):
+            self._expired = True
+            self._brake(LONELY_DECELERATION_RAD_S2)
+        self._turned_s = self._now_s()
+        return self._expired
+
+    def _renew(self) -> None:
+        """After a call of ur_rtde that waits until the arm stands: nothing was read meanwhile."""
+        self._beaten_s = self._turned_s = self._now_s()
+
     def _take_stop(self, timeout_s: float) -> bool:
         request = self._stops.next_request(timeout_s)
+        while isinstance(request, Beat):
+            self._beaten_s = self._now_s()
+            request = self._stops.next_request(0.0)
         if not isinstance(request, Stop):
             return False
         self._stopped_up_to = max(self._stopped_up_to, request.up_to)
@@ -172,6 +210,7 @@ class ControlChild:
             self._control.servoStop(deceleration_rad_s2)
         else:
             self._control.stopJ(deceleration_rad_s2)
+        self._renew()
 
     def _kick(self) -> None:
         if self._now_s() - self._kicked_s >= self._kick_every_s:
@@ -191,7 +230,8 @@ def main(arguments: Sequence[str]) -> int:
         calls.send(Ended(Outcome.REFUSED, str(error)))
         return 1
     pulse = Pulse(host, time.monotonic)
-    child = ControlChild(control, calls, stops, watchdog_hz, time.monotonic, pulse.silent)
+    parent = partial(is_stopped, os.getppid())
+    child = ControlChild(control, calls, stops, watchdog_hz, time.monotonic, pulse.silent, parent)
     try:
         calls.send(ready)
         child.run()

@@ -1,13 +1,18 @@
 """What the parent and its child say to each other: one JSON object a line, over a socket pair.
 
-There are two lines: `calls` for one call at a time and its answer, `stops` for a stop in the middle of a call.
+There are two lines: `calls` for one call at a time and its answer, `stops` for a stop in the middle of a call and for
+the beats by which the parent shows that it runs.
 """
 
 import select
 import socket
 from enum import StrEnum
+from pathlib import Path
 
 import msgspec
+
+BEAT_S = 0.1
+LEASE_S = 1.0  # ten beats: a busy machine may delay one by tenths. A process that is stopped is noticed at once
 
 
 class MoveJoints(msgspec.Struct, frozen=True, tag=True):
@@ -58,6 +63,10 @@ class Stop(msgspec.Struct, frozen=True, tag=True):
     up_to: int = 0
 
 
+class Beat(msgspec.Struct, frozen=True, tag=True):
+    """On the stop line, every BEAT_S as long as the parent runs. Not answered."""
+
+
 class Close(msgspec.Struct, frozen=True, tag=True):
     """The child ends the control program and itself."""
 
@@ -70,6 +79,7 @@ class Outcome(StrEnum):
     NOT_RUNNING = "not running"  # the control program has ended: safety stop, pendant, dashboard, watchdog
     DISCONNECTED = "disconnected"  # the controller's line is gone
     SILENT = "silent"  # the line is there, but nothing new comes over it
+    EXPIRED = "expired"  # parent or child did not run: the arm was braked, and no later call is begun
     REFUSED = "refused"  # an argument that ur_rtde or the controller does not take, or no control at all
 
 
@@ -92,10 +102,19 @@ class Ended(msgspec.Struct, frozen=True, tag=True):
 
 
 Motion = MoveJoints | MoveLine | ServoJoints | ServoStop
-Request = Call | Stop | Close
+Request = Call | Stop | Beat | Close
 Answer = Ready | Alive | Ended
 _requests = msgspec.json.Decoder[Request](Request)
 _answers = msgspec.json.Decoder[Answer](Answer)
+
+
+def is_stopped(pid: int) -> bool:
+    """Whether a signal or a debugger has stopped the process: Linux proc(5), state T. False where nobody can say."""
+    try:
+        status = Path(f"/proc/{pid}/stat").read_bytes()
+    except OSError:
+        return False
+    return status.rpartition(b")")[2].split()[:1] in ([b"T"], [b"t"])
 
 
 class Link:
@@ -107,6 +126,10 @@ class Link:
 
     def send(self, message: Request | Answer) -> None:
         self.line.sendall(msgspec.json.encode(message) + b"\n")  # a few hundred bytes: the socket buffer takes them
+
+    def send_now(self, message: Request | Answer) -> None:
+        """BlockingIOError where the other end has not read for so long that nothing more fits into the line."""
+        self.line.send(msgspec.json.encode(message) + b"\n", socket.MSG_DONTWAIT)
 
     def next_request(self, timeout_s: float) -> Request | None:
         """None when none came in time."""

@@ -78,20 +78,25 @@ class UrDashboard:
         return f"dashboard at {self._host}:{self._port}"
 
     def _command(self, line: str, expected: str, timeout_s: float | None = None) -> None:
-        (reply,) = self._converse([line], timeout_s)
+        (reply,) = self._converse([line], timeout_s, at_once=True)
         if reply != expected:
             raise DeviceRefused(f'{self._place}: "{line}" is refused: {reply}; look at the pendant')
 
-    def _converse(self, lines: list[str], timeout_s: float | None = None) -> list[str]:
+    def _converse(self, lines: list[str], timeout_s: float | None = None, *, at_once: bool = False) -> list[str]:
+        """`at_once`: the one line is sent before the banner has come, so that a controller which hangs finds it first
+        when it goes on.
+        """
         limit_s = self._timeout_s if timeout_s is None else timeout_s
         deadline_s = self._clock.now_s() + limit_s
         try:
             with socket.create_connection((self._host, self._port), limit_s) as line:
                 replies = _Lines(line, self._clock, deadline_s)
+                if at_once:
+                    replies.send(lines[0])
                 banner = replies.next()
                 if not banner.startswith(BANNER):
                     raise WireError(f"{self._place}: no dashboard server: it says {banner[:32]!r}; check the address")
-                return [replies.ask(text) for text in lines]
+                return [replies.next()] if at_once else [replies.ask(text) for text in lines]
         except TimeoutError as error:
             raise DeviceStale(
                 f"{self._place}: no reply to {lines} within {limit_s:.3g} s; is the controller hung?"
@@ -112,9 +117,12 @@ class _Lines:
         self._pending = b""
 
     def ask(self, text: str) -> str:
+        self.send(text)
+        return self.next()
+
+    def send(self, text: str) -> None:
         with _hanging_up_said():
             self._line.sendall(f"{text}\n".encode())
-        return self.next()
 
     def next(self) -> str:
         """TimeoutError, ConnectionError; a line without an end counts as silence."""

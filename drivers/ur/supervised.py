@@ -11,9 +11,25 @@ import threading
 
 from drivers.clock import Clock
 from drivers.errors import DeviceLost, DeviceStale
-from drivers.ur.control_link import Alive, Answer, Call, Close, Ended, Link, Motion, Outcome, Ready, Request, Stop
+from drivers.ur.control_link import (
+    BEAT_S,
+    Alive,
+    Answer,
+    Beat,
+    Call,
+    Close,
+    Ended,
+    Link,
+    Motion,
+    Outcome,
+    Ready,
+    Request,
+    Stop,
+    is_stopped,
+)
 
 SILENCE_LIMIT_S = 2.0  # twenty heartbeats of the child; ur_rtde itself blocks up to 4 s when it waits in vain
+LOOK_S = 0.1  # between two looks whether the child was stopped by a signal
 STOP_NOTICE_S = 0.3  # the child looks at its stop line every millisecond; a busy machine may take tenths
 STOP_LIMIT_S = 1.0  # braking from full speed at 5 rad/s2 takes 0.63 s; after this the other way is taken
 UNREACHED = (Outcome.DISCONNECTED, Outcome.SILENT)  # then nobody knows whether the arm brakes
@@ -29,6 +45,8 @@ class SupervisedChild:
         self._place, self._clock = place, clock
         self.killed = False
         self._ordering = threading.Lock()  # a stop falls before a call or after it
+        self._over = threading.Event()
+        self._writing = threading.Lock()  # of the stop line: beats and stops
         self._number = 0
         self._held = False
         calls, child_calls = socket.socketpair()
@@ -45,6 +63,7 @@ class SupervisedChild:
                 stderr=subprocess.STDOUT,
                 start_new_session=True,  # Ctrl-C in the terminal must not reach it before its parent
             )
+        threading.Thread(target=self._beat, name=f"beat of {place}", daemon=True).start()
 
     @property
     def pid(self) -> int:
@@ -75,16 +94,22 @@ class SupervisedChild:
                 return Ended(Outcome.STOPPED)
             self._number += 1
             self._send(self._calls, Call(self._number, request))
+        name, heard_s = type(request).__name__, self._clock.now_s()
         while True:
-            left_s = deadline_s - self._clock.now_s()
-            answer = self._next_answer(self._calls, min(SILENCE_LIMIT_S, left_s))
+            answer = self._next_answer(self._calls, min(LOOK_S, deadline_s - self._clock.now_s()))
             if isinstance(answer, Ended):
                 return answer
-            if answer is None:
-                name = type(request).__name__
-                if self._clock.now_s() < deadline_s:
-                    raise DeviceStale(f"{self._place}: {name}: ur_rtde is silent for {SILENCE_LIMIT_S:.3g} s")
+            now_s = self._clock.now_s()
+            heard_s = heard_s if answer is None else now_s
+            if now_s >= deadline_s:
                 raise DeviceStale(f"{self._place}: {name} has not ended within {limit_s:.3g} s")
+            if answer is None and is_stopped(self._process.pid):
+                raise DeviceStale(
+                    f"{self._place}: {name}: the control process was frozen, and the arm was told to stop another way; "
+                    "connect again"
+                )
+            if now_s - heard_s >= SILENCE_LIMIT_S:
+                raise DeviceStale(f"{self._place}: {name}: ur_rtde is silent for {SILENCE_LIMIT_S:.3g} s")
 
     def hold(self) -> None:
         """No call is sent any more."""
@@ -96,8 +121,8 @@ class SupervisedChild:
         try:
             while self._stops.next_answer(0.0) is not None:
                 pass  # late answers to a stop that was given up
-            with self._ordering:
-                self._stops.send(Stop(deceleration_rad_s2, self._number))
+            with self._ordering, self._writing:
+                self._stops.send_now(Stop(deceleration_rad_s2, self._number))
             if not isinstance(self._stops.next_answer(STOP_NOTICE_S), Alive):
                 return False
             ended = self._stops.next_answer(STOP_LIMIT_S)
@@ -114,15 +139,29 @@ class SupervisedChild:
     def kill(self) -> None:
         """SIGKILL; safe in every state and from any thread: a call that is under way ends with DeviceLost."""
         self.killed = True
+        self._over.set()
         if self.alive:
             self._process.kill()
         self._process.wait()
 
     def release(self) -> None:
         """Closes the lines; no call may be under way."""
+        self._over.set()
         self._calls.close()
-        self._stops.close()
+        with self._writing:
+            self._stops.close()
         self._printed.close()
+
+    def _beat(self) -> None:
+        """Shows the child that this process runs; a child that reads nothing finds later that it was frozen."""
+        while not self._over.wait(BEAT_S):
+            try:
+                with self._writing:
+                    self._stops.send_now(Beat())
+            except BlockingIOError:
+                continue
+            except OSError:
+                return
 
     def _send(self, link: Link, request: Request) -> None:
         try:

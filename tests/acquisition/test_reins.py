@@ -7,7 +7,7 @@ import pytest
 from acquisition.errors import StoppedError
 from acquisition.reined_bench import ReinedBench
 from acquisition.reins import BrokenOffError, EndedEarlyError, Reins
-from acquisition.session_states import PAUSE_AGAIN_S, Event, State
+from acquisition.session_states import PAUSE_AGAIN_S, REST_S, Event, State
 from drivers.errors import DeviceError, DeviceLost, DeviceRefused
 
 
@@ -103,6 +103,7 @@ def test_ctrl_c_while_paused_aborts(clock) -> None:
     reins = running(clock=clock)
     reins.pause()
     reins.tell(Event.CHECKPOINT)
+    clock.time_s += PAUSE_AGAIN_S + 0.1
     reins.interrupt()
     with pytest.raises(StoppedError, match="aborted"):
         reins.checkpoint()
@@ -244,3 +245,74 @@ def test_an_abort_in_the_last_moment_is_no_success() -> None:
     reins.abort()
     with pytest.raises(StoppedError):
         reins.finish()
+
+
+@pytest.mark.parametrize(("left_s", "eases"), [(0.0, False), (0.9 * REST_S, False), (1.1 * REST_S, True), (10.0, True)])
+def test_a_pause_lets_a_short_motion_arrive_and_brakes_a_long_one_softly(clock, left_s, eases) -> None:
+    eased, told = threading.Event(), list[tuple[float, bool]]()
+    reins = running(
+        lambda: pytest.fail("a first pause is soft"),
+        clock,
+        rests_in_s=lambda: left_s,
+        ease_arm=eased.set,
+        pausing=lambda rests_in_s, eased: told.append((rests_in_s, eased)),
+    )
+    reins.interrupt()
+    assert told == [(left_s, eases)]
+    assert eased.wait(10.0 if eases else 0.0) is eases
+    if eases:
+        with pytest.raises(BrokenOffError):
+            reins.check()
+    else:
+        reins.check()
+
+
+def test_a_motion_that_outlasts_its_pause_is_braked(clock) -> None:
+    """An operator has slowed the arm down, or the motion had not begun yet when the pause was said."""
+    eased, left_s = threading.Event(), [0.5]
+    reins = running(clock=clock, rests_in_s=lambda: left_s[0], ease_arm=eased.set)
+    reins.pause()
+    reins.insist()
+    assert not eased.is_set()
+    clock.time_s += REST_S + 0.1
+    reins.insist()
+    assert eased.wait(10.0)
+
+
+def test_no_motion_begins_in_a_pause() -> None:
+    arm = Arm()
+    reins = running(arm.stop)
+    reins.pause()
+    with pytest.raises(BrokenOffError):
+        ReinedBench(arm, reins).move(None)
+    assert arm.begun == 0
+
+
+def test_a_motion_braked_by_a_pause_is_broken_off_also_after_a_resume(clock) -> None:
+    arm = Arm()
+    reins = running(arm.stop, clock, rests_in_s=lambda: 5.0)
+    thread, out = in_thread(lambda: ReinedBench(arm, reins).move(None))
+    assert arm.moving.wait(10.0)
+    reins.pause()
+    reins.resume()
+    thread.join(10.0)
+    assert isinstance(out[0], BrokenOffError)
+    assert reins.checkpoint() is False
+    reins.check(begins=True)
+
+
+@pytest.mark.parametrize(
+    ("moves", "states"),
+    [
+        (True, [State.PAUSING, State.BREAKING, State.ABORTING, State.ABORTING]),
+        (False, [State.PAUSED, State.PAUSED, State.ABORTED, State.ABORTED]),
+    ],
+)
+def test_ctrl_c_again_and_again(clock, moves, states) -> None:
+    """The second one finds an arm that stands already, or brakes it now; the third gives up."""
+    reins = running(clock=clock)
+    for state in states:
+        reins.interrupt()
+        if not moves:
+            reins.tell(Event.CHECKPOINT)
+        assert reins.state is state

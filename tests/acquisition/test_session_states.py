@@ -56,3 +56,16 @@ def test_every_pair(state: State, event: Event, then: State) -> None:
 def test_what_is_over_lets_no_motion_go_on_by_itself() -> None:
     for state in OVER:
         assert all(after(state, event) in OVER for event in Event if event is not Event.START)
+
+
+@pytest.mark.parametrize("state", State)
+def test_however_often_ctrl_c_comes_no_motion_begins_by_it_and_three_end_a_session(state: State) -> None:
+    reins = Reins(lambda: None)
+    for before in WAYS[state]:
+        reins.tell(before)
+    for _ in range(3):
+        now = reins.state
+        reins.interrupt()
+        assert reins.state is not RUNNING
+        assert not (now in BROKEN and reins.state not in BROKEN)
+    assert reins.state in (OVER if state in OVER else (ABORTING, ABORTED, HALTED))

@@ -7,7 +7,7 @@ import pytest
 
 from acquisition.errors import StoppedError
 from acquisition.guarded import Guarded
-from acquisition.supervisor import Supervisor
+from acquisition.supervisor import FROZEN_S, Supervisor
 from drivers.errors import DeviceError, DeviceLost, DeviceRefused, DeviceStale, WireError
 
 
@@ -94,7 +94,7 @@ def test_fresh_samples_are_left_alone(clock) -> None:
 
     def newest_s() -> float:
         looked.release()
-        clock.time_s += 10.0
+        clock.time_s += 0.5  # more would be a freeze of this program
         return clock.time_s
 
     supervisor = Supervisor(lambda: None, clock)
@@ -143,3 +143,33 @@ def test_whatever_a_library_raises_is_one_of_ours(raised, told) -> None:
             act()
         assert type(caught.value) is told
         assert caught.value is raised or caught.value.__cause__ is raised
+
+
+@pytest.mark.parametrize("gap_s", [FROZEN_S - 0.1, 5.0])
+def test_a_freeze_of_this_program_is_noticed_before_the_next_motion(clock, gap_s) -> None:
+    """Whatever comes first after it: here no thread has looked yet, and the samples are fresh."""
+    held: list[int] = []
+    waits = threading.Event()
+    supervisor = Supervisor(lambda: held.append(1), clock)
+
+    def newest_s() -> float:
+        waits.wait(10.0)
+        return clock.time_s
+
+    with supervisor.watching("psd", newest_s):
+        supervisor.check()
+        clock.time_s += gap_s
+        if gap_s > FROZEN_S:
+            with pytest.raises(DeviceStale, match=r"this program did not run for 5.0 s .* nothing that was asked for"):
+                supervisor.check()
+        else:
+            supervisor.check()
+        waits.set()
+    assert bool(held) is (gap_s > FROZEN_S)
+
+
+def test_what_lasts_long_while_nothing_is_watched_is_no_freeze(clock) -> None:
+    supervisor = Supervisor(lambda: None, clock)
+    clock.time_s += 60.0
+    with supervisor.watching("psd", lambda: clock.time_s):
+        supervisor.check()

@@ -14,7 +14,7 @@ from acquisition.motion.inverse.solver import Solver
 from acquisition.motion.paths.path import Belt
 from acquisition.motion.paths.segments import By, Pace, Segment
 from acquisition.motion.rigid import transform
-from acquisition.motion.states import State
+from acquisition.motion.states import REST_S, State
 from acquisition.motion.task.place import Place
 from drivers.errors import DeviceRefused
 from tests.acquisition.motion.conftest import ur5e
@@ -139,10 +139,11 @@ def test_held_and_resumed_it_stays_on_the_path() -> None:
 
 
 def test_paused_it_rests_at_the_next_action_and_twice_at_once() -> None:
-    pressed: list[int] = []
+    pressed, paused = list[int](), list[int]()
 
     def at(n: int) -> None:
-        if n == 10:
+        if not paused and gate.rests_in_s() < 0.5:
+            paused.append(n)
             gate.pause()
         if gate.state is State.HELD and len(arm.q_rad) > 40 and not pressed:
             pressed.append(n)
@@ -165,10 +166,11 @@ def test_paused_it_rests_at_the_next_action_and_twice_at_once() -> None:
 
 
 def test_a_pause_rests_where_the_program_says_stop() -> None:
-    rested: list[np.ndarray] = []
+    rested, paused = list[np.ndarray](), list[int]()
 
     def at(n: int) -> None:
-        if n == 10:
+        if not paused and gate.rests_in_s() < 0.5:
+            paused.append(n)
             gate.pause()
         if gate.state is State.HELD:
             rested.append(arm.q_rad[-1])
@@ -185,20 +187,44 @@ def test_a_pause_rests_where_the_program_says_stop() -> None:
 
 @pytest.mark.parametrize(("wait_s", "state"), [(5.0, State.HELD), (12.0, State.PAUSING)])
 def test_a_second_pause_brakes_at_once_within_ten_seconds_only(wait_s: float, state: State) -> None:
-    clock, seen = JumpingClock(), list[State]()
+    clock, seen, near = JumpingClock(), list[State](), list[int]()
 
     def at(n: int) -> None:
-        if n in (10, 12):
+        if not near and gate.rests_in_s() > 0.5:
+            return
+        near.append(n)
+        if len(near) in (1, 3):
             gate.pause()
-        elif n == 11:
+        elif len(near) == 2:
             gate._paused_s -= wait_s
-        elif n == 13:
+        elif len(near) == 4:
             seen.append(gate.state)
             gate.stop()
 
     gate = gate_of(Arm(at), clock)
     gate.run(gate.plan(HOME_RAD, there(0.15, 0.0, 0.0)), HOME_RAD)
     assert seen == [state]
+
+
+def test_a_first_pause_far_from_the_next_rest_brakes_along_the_path() -> None:
+    said: list[tuple[float, State]] = []
+
+    def at(n: int) -> None:
+        if n == 10:
+            said.append((gate.rests_in_s(), gate.state))
+            gate.pause()
+            said.append((gate.brake_s, gate.state))
+        if n == 150:
+            gate.stop()
+
+    arm = Arm(at)
+    gate = gate_of(arm)
+    gate.run(gate.plan(HOME_RAD, there(0.4, 0.0, 0.0)), HOME_RAD)
+    (left_s, _), (brake_s, state) = said
+    assert left_s > REST_S > brake_s
+    assert state is State.HELD
+    assert np.abs(np.diff(arm.q_rad[10 + int(np.ceil(brake_s * STREAM.hz)) : 150], axis=0)).max() == 0.0
+    assert largest_acceleration(arm) <= 2.0 * PACE.acceleration_rad_s2[0]  # the path's own, and the brake's
 
 
 class Conveyor:

@@ -16,6 +16,10 @@ class Told:
 
     def __init__(self, state: State) -> None:
         self.state, self.told = state, []
+        self.brake_s = 0.4
+
+    def rests_in_s(self) -> float:
+        return 0.7
 
     def _tell(self, event: Event) -> None:
         self.told.append(event.value)
@@ -44,7 +48,8 @@ def test_ctrl_c_pauses_then_holds_then_gives_up() -> None:
         keys.interrupted()
         assert gate.state is state
     assert gate.told == ["pause", "hold", "abort"]
-    assert "Ctrl-C again brakes now" in out.getvalue()
+    assert "resting at the next place within 0.7 s; Ctrl-C again brakes now" in out.getvalue()
+    assert "at rest within 0.4 s; Ctrl-C again gives the motion up" in out.getvalue()
 
 
 @pytest.mark.parametrize(("word", "told"), [("r\n", "resume"), ("Stop", "stop"), ("a", "abort"), ("h", "halt")])

@@ -2,9 +2,11 @@
 
 import os
 import pty
+import select
 import signal
 import termios
 import threading
+import tty
 from collections.abc import Callable
 
 import pytest
@@ -153,3 +155,42 @@ def test_an_abort_ends_the_question(followed) -> None:
     followed.reins.abort()
     with pytest.raises(StoppedError, match="given up"):
         Keys(followed.reins, None).wait(ENTER)
+
+
+@pytest.mark.parametrize(("number", "why"), [(signal.SIGTERM, "SIGTERM"), (signal.SIGHUP, "the terminal was closed")])
+def test_a_signal_that_ends_the_session_aborts_it(followed, number, why) -> None:
+    with Keys(followed.reins, None):
+        os.kill(os.getpid(), number)
+        assert followed.comes_to(State.ABORTING)
+        with pytest.raises(StoppedError, match=f"^{why}: the session was aborted"):
+            followed.reins.checkpoint()
+
+
+def test_a_signal_that_came_when_nothing_was_under_way_ends_the_program(followed) -> None:
+    followed.reins.finish()
+    with pytest.raises(KeyboardInterrupt, match="SIGTERM"), Keys(followed.reins, None) as keys:
+        keys.signalled(b"t")
+
+
+class JumpingClock:
+    time_s = 100.0
+
+    def now_s(self) -> float:
+        return self.time_s
+
+    def sleep_s(self, seconds: float) -> None:
+        self.time_s += seconds
+
+
+@pytest.mark.parametrize(("gap_s", "left"), [(0.1, "r"), (5.0, "")])
+def test_what_was_typed_while_this_program_was_frozen_is_dropped(followed, terminal, gap_s, left) -> None:
+    ours, theirs = terminal
+    clock = JumpingClock()
+    keys = Keys(followed.reins, theirs, clock)
+    tty.setcbreak(theirs)
+    os.write(ours, b"r")
+    assert select.select([theirs], [], [], PATIENCE_S)[0]
+    clock.time_s += gap_s
+    assert keys._was_frozen() is not bool(left)
+    waits = bool(select.select([theirs], [], [], 0.0)[0])
+    assert (os.read(theirs, 8).decode() if waits else "") == left

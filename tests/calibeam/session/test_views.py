@@ -91,7 +91,7 @@ def teller(rig, clock, heard) -> Teller:
     ("state", "large", "keys"),
     [
         (State.RUNNING, "COLLECT", "SPACE pause"),
-        (State.PAUSING, "PAUSING AFTER THIS POSE", "SPACE stop the arm now"),
+        (State.PAUSING, "PAUSING, THE ARM COMES TO REST", "SPACE stop the arm now"),
         (State.BREAKING, "STOPPING THE ARM", "a abort    h halt"),
         (State.PAUSED, "PAUSED, THE ARM STANDS", "r go on    s finish here    a abort    h halt"),
         (State.ABORTING, "ABORTING", "h halt"),

@@ -5,7 +5,19 @@ import socket
 import pytest
 
 from drivers.ur.control_child import ControlChild
-from drivers.ur.control_link import Alive, Call, Ended, Link, MoveJoints, Outcome, ServoJoints, Stop
+from drivers.ur.control_link import (
+    BEAT_S,
+    LEASE_S,
+    Alive,
+    Beat,
+    Call,
+    Ended,
+    Link,
+    MoveJoints,
+    Outcome,
+    ServoJoints,
+    Stop,
+)
 
 MOVE = MoveJoints([0.0] * 6, 1.0, 1.0)
 
@@ -13,6 +25,8 @@ MOVE = MoveJoints([0.0] * 6, 1.0, 1.0)
 class Notes:
     def __init__(self) -> None:
         self.done: list[str] = []
+        self.looks_left = 0  # at a motion that is under way
+        self.looked = lambda: None
 
     def moveJ(self, q, speed, acceleration, asynchronous) -> bool:
         self.done.append("move")
@@ -30,7 +44,9 @@ class Notes:
         return True
 
     def getAsyncOperationProgress(self) -> int:
-        return -1
+        self.looked()
+        self.looks_left -= 1
+        return 0 if self.looks_left >= 0 else -1
 
     def isConnected(self) -> bool:
         return True
@@ -44,19 +60,25 @@ class Notes:
 
 class Child:
     def __init__(self) -> None:
-        self.notes, self.silent = Notes(), False
+        self.notes, self.silent, self.time_s = Notes(), False, 0.0
         near_calls, far_calls = socket.socketpair()
         near_stops, far_stops = socket.socketpair()
         self.calls, self.stops = Link(near_calls), Link(near_stops)
         self._ends = (Link(far_calls), Link(far_stops))
-        self.child = ControlChild(self.notes, *self._ends, 1.0, lambda: 0.0, lambda: self.silent)
+        self.child = ControlChild(self.notes, *self._ends, 1.0, lambda: self.time_s, lambda: self.silent)
 
     def turn(self) -> None:
         """One turn of the child's loop: a stop goes before a call."""
+        self.child._expire()
         self.child._take_stop(0.0)
         request = self._ends[0].next_request(0.0)
         if request is not None:
             self._ends[0].send(self.child._obey(request))
+
+    def turn_of_loop(self) -> None:
+        """Nothing to be read."""
+        self.child._expire()
+        self.child._take_stop(0.0)
 
     def close(self) -> None:
         for link in (self.calls, self.stops, *self._ends):
@@ -100,3 +122,60 @@ def test_no_motion_begins_at_a_silent_controller(child) -> None:
     child.turn()
     assert child.calls.next_answer(1.0) == Ended(Outcome.SILENT)
     assert child.notes.done == []
+
+
+def test_beats_keep_a_motion_going(child) -> None:
+    def looked() -> None:
+        child.time_s += BEAT_S
+        child.stops.send(Beat())
+
+    child.notes.looked, child.notes.looks_left = looked, 50
+    child.calls.send(Call(1, MOVE))
+    child.turn()
+    assert child.notes.done == ["move"]
+    assert _ended(child) == Ended(Outcome.DONE)
+
+
+def test_a_motion_is_braked_when_the_parent_beats_no_more(child) -> None:
+    def looked() -> None:
+        child.time_s += 0.5 * LEASE_S
+
+    child.notes.looked, child.notes.looks_left = looked, 50
+    child.calls.send(Call(1, MOVE))
+    child.turn()
+    assert child.notes.done == ["move", "stop"]
+    assert child.time_s < 2.0 * LEASE_S
+    assert _ended(child) == Ended(Outcome.EXPIRED)
+
+
+@pytest.mark.parametrize("request_", [MOVE, ServoJoints([0.0] * 6, 0.002, 0.1, 300.0)])
+def test_a_call_that_waited_in_the_line_of_a_frozen_child_is_not_begun(child, request_) -> None:
+    """Fresh beats behind it change nothing: they are of the time after which nobody reckoned with this child."""
+    child.stops.send(Beat())
+    child.calls.send(Call(1, request_))
+    child.time_s += 5.0
+    child.stops.send(Beat())
+    for number in (2, 3):
+        child.turn()
+        assert _ended(child) == Ended(Outcome.EXPIRED)
+        child.calls.send(Call(number, request_))
+        child.stops.send(Beat())
+    assert child.notes.done == ["stop"]
+
+
+def test_a_call_after_a_freeze_of_the_parent_is_not_begun(child) -> None:
+    for _ in range(50):
+        child.time_s += BEAT_S
+        child.turn_of_loop()
+    child.stops.send(Beat())
+    child.calls.send(Call(1, MOVE))
+    child.turn()
+    assert _ended(child) == Ended(Outcome.EXPIRED)
+    assert child.notes.done == ["stop"]
+
+
+def _ended(child) -> object:
+    answer = child.calls.next_answer(1.0)
+    while isinstance(answer, Alive):
+        answer = child.calls.next_answer(1.0)
+    return answer

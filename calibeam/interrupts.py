@@ -1,0 +1,69 @@
+"""Ctrl-C, SIGTERM and a closed terminal end a command once, in one sentence, however often they come.
+
+The first one raises KeyboardInterrupt in the main thread. Those that follow while the command cleans up are not heard:
+a recording has to be closed, and a traceback on the way out helps nobody. While the arm of a session moves, its keys
+hear them instead (calibeam/session/keys.py).
+"""
+
+import os
+import signal
+import time
+from types import FrameType
+
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+AGAIN_S = 10.0  # a clean-up that takes longer may be interrupted once more
+
+
+class Interrupts:
+    """Of this process. Only the console command listens; a program that imports calibeam keeps its own handlers."""
+
+    def __init__(self) -> None:
+        self._closing = False
+        self._raised_s = float("-inf")
+        self._terminals: tuple[int, ...] = ()
+
+    def listen(self) -> None:
+        """From now on. To be called before anything else: a Ctrl-C before it has the system's own effect."""
+        self._terminals = tuple(fd for fd in (0, 1, 2) if _is_terminal(fd))
+        for number in ENDING:
+            signal.signal(number, self.came)
+
+    def came(self, number: int, frame: FrameType | None) -> None:
+        """The handler. KeyboardInterrupt, with the signal's name where it is not Ctrl-C."""
+        if number == signal.SIGHUP:
+            self.leave_terminal()
+        now_s = time.monotonic()
+        if self._closing or now_s - self._raised_s < AGAIN_S:
+            return
+        self._raised_s = now_s
+        raise KeyboardInterrupt(*([] if number == signal.SIGINT else [signal.Signals(number).name]))
+
+    def close(self) -> None:
+        """The command ends: nothing is heard any more, until `heed`."""
+        self._closing = True
+
+    def heed(self) -> None:
+        """A person is asked: Ctrl-C is an answer."""
+        self._closing, self._raised_s = False, float("-inf")
+
+    def leave_terminal(self) -> None:
+        """The terminal was closed: what is still printed goes nowhere, and fails in no clean-up."""
+        nowhere = os.open(os.devnull, os.O_RDWR)
+        for fd in self._terminals:
+            os.dup2(nowhere, fd)
+        os.close(nowhere)
+
+    def end(self) -> None:
+        """The exit code is decided: no signal changes it while the interpreter ends."""
+        for number in ENDING:
+            signal.signal(number, signal.SIG_IGN)
+
+
+def _is_terminal(fd: int) -> bool:
+    try:
+        return os.isatty(fd)
+    except OSError:
+        return False
+
+
+INTERRUPTS = Interrupts()
