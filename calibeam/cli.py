@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from acquisition.errors import AcquisitionError
-from acquisition.recording.errors import RecordingError, RigFileError, SamplesError
+from acquisition.recording.errors import RecordingError, RigFileError, SamplesError, brief
 from calibeam.emulation import EmulationError
 from calibeam.outcome import CheckFailed, PartialResult
 from calibeam.prove.seal import BrokenSealError
@@ -101,13 +101,13 @@ def run(arguments: list[str]) -> int:
     except CycloptsError:
         return 2  # cyclopts has printed what was wrong
     except PartialResult as partial:
-        errors.print(f"[bold]stopped:[/bold] {escape(str(partial))}")
+        errors.print(f"[bold]stopped:[/bold] {escape(brief(str(partial)))}")
         return 3
     except KeyboardInterrupt as interrupt:
         errors.print(f"stopped by {interrupt.args[0] if interrupt.args else 'Ctrl-C'}")
         return 1
     except TOLD as error:
-        errors.print("error:", str(error), markup=False)
+        errors.print("error:", brief(str(error)), markup=False)
         return 1
     except OSError as error:  # a folder that cannot be made or written; devices' own are DeviceErrors above
         errors.print(

@@ -4,25 +4,22 @@ Keys are those of docs/formats.md. Patterns are shell patterns over parameter na
 """
 
 import enum
-import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-import msgspec
 from msgspec import Meta, Struct
 
-from acquisition.recording.rig_faults import explain
-from acquisition.recording.rig_lines import KeyPath, key_lines, line_of
+from acquisition.recording.bounds import Count, Few, Name, Positive
+from acquisition.recording.rig_lines import KeyPath
 from acquisition.recording.rig_schema import ArmModel
+from acquisition.recording.toml_file import parse_toml, read_text
 from calibrate.errors import DataError
 from calibrate.fit import Loss, Method
 from calibrate.redundant import Redundant
 from calibrate.uncertainty.splits import SplitKind
 
-Pattern = Annotated[str, Meta(min_length=1)]
-Positive = Annotated[float, Meta(gt=0.0)]
-Count = Annotated[int, Meta(ge=0)]
+Rounds = Annotated[int, Meta(ge=0, le=100_000)]  # some seconds each
 
 
 class LossName(enum.Enum):
@@ -66,17 +63,17 @@ class FitPlan(Struct, frozen=True, forbid_unknown_fields=True):
 
     schema: Literal[1]
     model: ArmModel | None = None  # the rig's arm is written anew in this model
-    instruments: tuple[InstrumentName, ...] = ()  # none: all that the samples allow
-    free: tuple[Pattern, ...] = ()  # without an opinion of the drawing
-    priors: Mapping[str, Positive] = {}  # pattern -> one sigma about the drawing, m or rad; a later one wins
-    hold: tuple[Pattern, ...] = ()  # as drawn; wins over `free` and `priors`
+    instruments: Few[InstrumentName] = ()  # none: all that the samples allow
+    free: Few[Name] = ()  # without an opinion of the drawing
+    priors: Mapping[Name, Positive] = {}  # pattern -> one sigma about the drawing, m or rad; a later one wins
+    hold: Few[Name] = ()  # as drawn; wins over `free` and `priors`
     loss: LossName = LossName.LEAST_SQUARES
     solver: SolverName = SolverName.LEVENBERG
     redundant: RedundantName = RedundantName.REMOVED
-    splits: tuple[SplitKind, ...] = tuple(SplitKind)
+    splits: Few[SplitKind] = tuple(SplitKind)
     share: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.2  # of the rows, held out; 0: no proof
     seed: Count = 1  # of everything that is drawn: the same plan and samples give the same model
-    bootstrap: Count = 0  # rounds
+    bootstrap: Rounds = 0  # rounds
 
     @property
     def robust_loss(self) -> Loss:
@@ -105,40 +102,17 @@ DEFAULT = FitPlan(schema=1)
 
 def read_plan(path: Path) -> tuple[FitPlan, str]:
     """The plan of a file, and its text. DataError naming file, line, key, value and remedy."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise DataError(f"{path}: cannot read the fit plan ({error.strerror}); check the path") from error
-    except UnicodeDecodeError as error:
-        raise DataError(f"{path}: the fit plan is not UTF-8 (byte {error.start}); save it as UTF-8") from error
+    text = read_text(path, "fit plan", DataError)
     return parse_plan(text, str(path)), text
 
 
 def parse_plan(text: str, name: str) -> FitPlan:
     """The plan of a text; `name` stands for the file in errors."""
-    try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise DataError(f"{name}: not TOML: {error}; correct the line") from error
-    lines = key_lines(text)
-    try:
-        plan = msgspec.convert(document, type=FitPlan)
-    except msgspec.ValidationError as error:
-        faults = [*_prior_faults(document.get("priors")), explain(error, document, FitPlan)]
-        raise _fault(name, lines, *faults[0]) from error
+    file = parse_toml(text, name, DataError)
+    plan = file.checked(FitPlan)
     for path, says in _contradictions(plan):
-        raise _fault(name, lines, path, says)
+        raise file.error(path, says)
     return plan
-
-
-def _prior_faults(priors: Any) -> Iterator[tuple[KeyPath, str]]:
-    """The type check does not say which entry of a table is wrong."""
-    for key, value in priors.items() if isinstance(priors, dict) else ():
-        if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0.0:
-            yield (
-                ("priors", key),
-                f"'{key}' = {value!r} in [priors]: one sigma is a positive number in m or rad; correct it",
-            )
 
 
 def _contradictions(plan: FitPlan) -> Iterator[tuple[KeyPath, str]]:
@@ -152,7 +126,3 @@ def _contradictions(plan: FitPlan) -> Iterator[tuple[KeyPath, str]]:
             yield ("instruments",), f"'{one.value}' and '{other.value}' are the same readings; choose one of them"
     if plan.share == 0.0 and plan.splits != tuple(SplitKind):
         yield ("share",), "share = 0 holds nothing out, so that `splits` has no meaning; leave one of them out"
-
-
-def _fault(name: str, lines: Mapping[KeyPath, int], path: KeyPath, says: str) -> DataError:
-    return DataError(f"{name} line {line_of(lines, path)}: {says}")

@@ -5,12 +5,27 @@ Angles are rad, lengths m. A joint's true angle is its reading plus `joint<i>.ze
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording.bounds import (
+    Correction,
+    Count,
+    FileText,
+    Label,
+    Many,
+    Metres,
+    Name,
+    Number,
+    Sentence,
+    Statistic,
+    Whole,
+)
+from acquisition.recording.errors import shown
+from acquisition.recording.json_file import JsonKind, read_json
 from calibrate.errors import DataError
 from calibrate.parameters import Parameter
 from calibrate.zeros.result import ZeroResult
@@ -18,104 +33,112 @@ from calibrate.zeros.result import ZeroResult
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-Fields = dict[str, float | int | str | bool | None]
+Fields = dict[Name, Statistic | Whole | Sentence | bool | None]
+ArmName = Annotated[str, msgspec.Meta(pattern="^(dh|mdh|local-poe)$")]
+About = dict[Name, tuple[Metres, ...]]
 SCHEMA = 1
+KIND = JsonKind("model.json", "give the model.json of an identification", "identify the recording again", DataError)
 
 
 class RigIdentity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Which rig file the model corrects."""
 
-    name: str
-    sha256: str
-    text: str | None = None
+    name: Name
+    sha256: Label
+    text: FileText | None = None
 
 
 class Unseen(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Parameters that can only be told together."""
 
-    words: str
-    members: tuple[str, ...]
+    words: Sentence
+    members: Many[Name]
     structural: bool
 
 
 class ModelParameter(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One correction, or why there is none."""
 
-    name: str
-    unit: str
-    value: float | None
-    sigma: float | None
-    undetermined: str | None
-    low: float | None = None  # 95 % by the covariance, normal law
-    high: float | None = None
-    predicted_sigma: float | None = None  # what poses, noise and priors promise; null where they promise nothing
-    bootstrap_sigma: float | None = None
-    bootstrap_low: float | None = None  # 95 % of the refits
-    bootstrap_high: float | None = None
+    name: Name
+    unit: Label
+    value: Correction | None
+    sigma: Statistic | None
+    undetermined: Sentence | None
+    low: Statistic | None = None  # 95 % by the covariance, normal law
+    high: Statistic | None = None
+    predicted_sigma: Statistic | None = None  # what poses, noise and priors promise; null where they promise nothing
+    bootstrap_sigma: Statistic | None = None
+    bootstrap_low: Statistic | None = None  # 95 % of the refits
+    bootstrap_high: Statistic | None = None
 
 
 class Covariance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Posterior of the free parameters."""
 
-    names: tuple[str, ...]
-    rows: tuple[tuple[float, ...], ...]
+    names: Many[Name]
+    rows: Many[Many[Number]]
+
+    def __post_init__(self) -> None:
+        size = len(self.names)
+        if len(self.rows) != size or any(len(row) != size for row in self.rows):
+            raise ValueError(f"covariance.rows is not square, {size} by {size}, as the {size} names are")
 
 
 class LeftOut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A blunder of the file: its rows, from 1, took no part."""
 
-    kind: str
-    rows: tuple[int, ...]
-    column: str
-    says: str
+    kind: Label
+    rows: Many[Count]
+    column: Sentence
+    says: Sentence
 
 
 class UnseenRows(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Error of one instrument on rows that the fit has not seen, by one way to split."""
 
-    split: str
-    instrument: str
-    observations: int
-    rms_before: float
-    rms_after: float
-    chi_after: float
+    split: Label
+    instrument: Label
+    observations: Count
+    rms_before: Statistic
+    rms_after: Statistic
+    chi_after: Statistic
 
 
 class ObservabilityRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How well the poses show what the data alone can tell; `condition` null where they show nothing."""
 
-    o1: float
-    o2: float
-    o3: float
-    o4: float
-    o5: float
-    condition: float | None
-    parameters: int
+    o1: Statistic
+    o2: Statistic
+    o3: Statistic
+    o4: Statistic
+    o5: Statistic
+    condition: Statistic | None
+    parameters: Count
 
 
 class FreeSpaceRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Predicted error of the target over the workspace; numbers null where `status` says why."""
 
-    status: str
-    says: str
-    rms_m: float | None
-    p95_m: float | None
-    max_m: float | None
-    pose_rms_m: float | None
-    pose_p95_m: float | None
-    pose_max_m: float | None
-    scatter: str
-    point_m: tuple[float, ...]
-    poses: int
-    undetermined: tuple[str, ...] = ()
-    guessed: tuple[str, ...] = ()
+    status: Label
+    says: Sentence
+    rms_m: Statistic | None
+    p95_m: Statistic | None
+    max_m: Statistic | None
+    pose_rms_m: Statistic | None
+    pose_p95_m: Statistic | None
+    pose_max_m: Statistic | None
+    scatter: Sentence
+    point_m: tuple[Metres, Metres, Metres]
+    poses: Count
+    undetermined: Many[Sentence] = ()
+    guessed: Many[Sentence] = ()
 
 
 class BootstrapRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How many refits to drawn rows stand behind the bootstrap numbers of `parameters`."""
 
-    rounds: int
-    failed: int
+    rounds: Count
+    failed: Count
 
 
 class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -123,36 +146,42 @@ class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     schema: Literal[1]
     kind: Literal["calibeam-model"]
-    software: str
+    software: Label
     rig: RigIdentity
-    arm_model: str
-    status: str
-    says: str
-    poses: int
-    rank: int
-    free: int
-    condition: float | None
-    singular_values: tuple[float, ...]
-    unseen: tuple[Unseen, ...]
-    parameters: tuple[ModelParameter, ...]
-    chain: dict[str, float]
+    arm_model: ArmName
+    status: Label
+    says: Sentence
+    poses: Count
+    rank: Count
+    free: Count
+    condition: Statistic | None
+    singular_values: Many[Statistic]
+    unseen: Many[Unseen]
+    parameters: Many[ModelParameter]
+    chain: dict[Name, Correction]
     covariance: Covariance | None
     noise: Fields
     repeats: Fields | None
     held_out: Fields | None
-    rms_before_m: float
-    rms_after_m: float
-    instruments: tuple[str, ...] = ("dual-psd",)
-    about: dict[str, tuple[float, ...]] = msgspec.field(default_factory=dict[str, tuple[float, ...]])
-    blunders: tuple[LeftOut, ...] = ()
-    alarms: tuple[str, ...] = ()
-    proofs: tuple[UnseenRows, ...] = ()
-    unproven: tuple[str, ...] = ()
+    rms_before_m: Statistic
+    rms_after_m: Statistic
+    instruments: Many[Name] = ("dual-psd",)
+    about: About = msgspec.field(default_factory=dict[Name, tuple[Metres, ...]])
+    blunders: Many[LeftOut] = ()
+    alarms: Many[Sentence] = ()
+    proofs: Many[UnseenRows] = ()
+    unproven: Many[Sentence] = ()
     observability: ObservabilityRecord | None = None
     free_space: FreeSpaceRecord | None = None
     bootstrap: BootstrapRecord | None = None
-    plan: str | None = None
-    readings_sha256: str | None = None  # which readings it was made of (acquisition/recording/fingerprint.py)
+    plan: FileText | None = None
+    readings_sha256: Label | None = None  # which readings it was made of (acquisition/recording/fingerprint.py)
+
+    def __post_init__(self) -> None:
+        for name, numbers in self.about.items():
+            sizes = (6,) if name == "device" else (3, 6) if name == "tool" else (3,)
+            if len(numbers) not in sizes:
+                raise ValueError(f"about.{shown(name)} holds {len(numbers)} numbers instead of {max(sizes)}")
 
 
 def model_of(result: ZeroResult, rig: RigIdentity, arm_model: str) -> ModelFile:
@@ -192,36 +221,19 @@ def write_model(path: Path, model: ModelFile) -> None:
 
 def read_model(path: Path) -> ModelFile:
     """Read model.json. DataError naming file, place and remedy where it is none or of another version."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise DataError(
-            f"{path}: cannot be read ({error.strerror}); give the model.json of an identification"
-        ) from error
-    try:
-        version = msgspec.json.decode(data, type=_Version)
-    except msgspec.DecodeError as error:
-        raise DataError(f"{path}: not a model.json ({error}); identify the recording again") from error
-    if version.kind != "calibeam-model" or version.schema != SCHEMA:
-        raise DataError(
-            f"{path}: kind '{version.kind}', schema {version.schema}; expected 'calibeam-model', schema {SCHEMA}"
-        )
-    try:
-        return msgspec.json.decode(data, type=ModelFile)
-    except msgspec.DecodeError as error:
-        raise DataError(f"{path}: damaged model.json ({error}); identify the recording again") from error
+    return read_json(path, KIND, ModelFile, _other)
+
+
+def _other(content: dict[str, Any]) -> str | None:
+    kind, schema = content.get("kind"), content.get("schema")
+    if kind == "calibeam-model" and schema == SCHEMA:
+        return None
+    return f"kind '{shown(kind)}', schema {shown(schema)}; expected 'calibeam-model', schema {SCHEMA}"
 
 
 def corrections(model: ModelFile) -> dict[str, float]:
     """The complete set of values for predictions, by parameter name: what believed.BelievedRig takes."""
     return dict(model.chain)
-
-
-class _Version(msgspec.Struct, frozen=True):
-    """The two fields that every version has."""
-
-    schema: int
-    kind: str
 
 
 def covariance_record(parameters: tuple[Parameter, ...], covariance: NDArray[np.float64]) -> Covariance | None:

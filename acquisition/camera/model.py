@@ -6,20 +6,29 @@ camera.json, version 1: see docs/formats.md.
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-import msgspec
 import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
 from acquisition.errors import AcquisitionError
 from acquisition.motion.rigid import rotation_vector, transform
+from acquisition.recording.bounds import Correction, Count, Label, Pixels, Statistic, Vector
+from acquisition.recording.errors import shown
+from acquisition.recording.json_file import JsonKind, read_json
 from acquisition.recording.rig_schema import Camera, Pose
-from acquisition.recording.rig_values import Vector
 
 Floats = NDArray[np.float64]
 
 KIND = "calibeam-camera"
+FILE = JsonKind(
+    "camera calibration",
+    "measure the camera first: calibeam camera RIG.toml",
+    "measure it again: calibeam camera",
+    AcquisitionError,
+)
+_Row = tuple[Correction, Correction, Correction]  # of the camera matrix, pixels
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,22 +55,22 @@ class CameraFit:
 
 
 class _File(Struct, frozen=True):
-    schema: int
-    kind: str
-    rig: str
-    software: str
-    width_px: int
-    height_px: int
-    matrix_px: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
-    distortion: tuple[float, float, float, float, float]
+    schema: Count
+    kind: Label
+    rig: Label
+    software: Label
+    width_px: Pixels
+    height_px: Pixels
+    matrix_px: tuple[_Row, _Row, _Row]
+    distortion: tuple[Correction, Correction, Correction, Correction, Correction]
     in_flange: Pose
-    views: int
-    reprojection_px: float
-    board_m: float
-    board_rad: float
-    lit: int = 0
-    beam_m: float | None = None
-    beam_rad: float | None = None
+    views: Count
+    reprojection_px: Statistic
+    board_m: Statistic
+    board_rad: Statistic
+    lit: Count = 0
+    beam_m: Statistic | None = None
+    beam_rad: Statistic | None = None
 
 
 def drawn(camera: Camera) -> CameraModel:
@@ -101,20 +110,20 @@ def write_model(path: Path, model: CameraModel, fit: CameraFit, rig: str, softwa
 
 def read_model(path: Path, camera: Camera) -> CameraModel:
     """AcquisitionError where the file is none, or is of a camera with other pictures."""
-    try:
-        file = msgspec.json.decode(path.read_bytes(), type=_File)
-    except OSError as error:
-        raise AcquisitionError(
-            f"{path}: {error.strerror}; measure the camera first: calibeam camera RIG.toml"
-        ) from error
-    except msgspec.DecodeError as error:
-        raise AcquisitionError(f"{path}: no camera calibration ({error}); measure it again: calibeam camera") from error
     size_px = (camera.width_px, camera.height_px)
-    if file.kind != KIND or file.schema != 1 or (file.width_px, file.height_px) != size_px:
-        raise AcquisitionError(
-            f"{path}: kind {file.kind}, version {file.schema}, pictures of {file.width_px} x {file.height_px}; wanted "
-            f"is {KIND}, 1, {size_px[0]} x {size_px[1]}; measure this camera: calibeam camera"
+
+    def other(content: dict[str, Any]) -> str | None:
+        kind, version = content.get("kind"), content.get("schema")
+        pictures = (content.get("width_px"), content.get("height_px"))
+        if kind == KIND and version == 1 and pictures == size_px:
+            return None
+        return (
+            f"kind {shown(kind, 40)}, version {shown(version, 20)}, pictures of {shown(pictures[0], 20)} x "
+            f"{shown(pictures[1], 20)}; wanted is {KIND}, 1, {size_px[0]} x {size_px[1]}; measure this camera: "
+            "calibeam camera"
         )
+
+    file = read_json(path, FILE, _File, other)
     origin_m: Vector = file.in_flange.origin_m
     mount = transform(origin_m, file.in_flange.rotation_rad)
     return CameraModel(size_px, np.array(file.matrix_px), np.array(file.distortion), mount)

@@ -1,9 +1,11 @@
-"""What can go wrong with a recording, a rig file or a table of samples, as one short tree.
+"""What can go wrong with a recording, a rig file or a table of samples, as one short tree; and how errors show values.
 
 RecordingError      file missing, damaged, of another kind, or the disk refuses
 |-- RigFileError    the rig text: file, line, key, value, remedy
 `-- SamplesError    the settled samples: file, row, column, value, remedy
 """
+
+VALUE_LENGTH, MESSAGE_LENGTH = 120, 300  # characters: a line of a terminal; what a person reads of an error
 
 
 class RecordingError(Exception):
@@ -16,3 +18,24 @@ class RigFileError(RecordingError):
 
 class SamplesError(RecordingError):
     """A table of settled samples that cannot be taken as it is; the message holds the file, the row and the column."""
+
+
+def shown(value: object, most: int = VALUE_LENGTH) -> str:
+    """A value or name as an error shows it: on one line, of at most `most` characters; text without quotes."""
+    if isinstance(value, str):
+        start = value[: most + 1]
+        text = start if start.isprintable() else "".join(c if c.isprintable() else " " for c in start)
+    else:
+        try:
+            text = repr(value)
+        except (ValueError, RecursionError):  # integers of more than 4,300 digits; lists within lists without end
+            text = f"a {type(value).__name__} that is too large to show"
+    return text if len(text) <= most else text[: most - 1] + "…"
+
+
+def brief(message: str, most: int = MESSAGE_LENGTH) -> str:
+    """A message of at most `most` characters: beginning and end stay, since they name the place and the remedy."""
+    if len(message) <= most:
+        return message
+    end = most // 3
+    return f"{message[: most - end - 3]} … {message[-end:]}"

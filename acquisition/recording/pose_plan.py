@@ -1,50 +1,49 @@
 """A plan of explicit joint poses, `next.toml`: written by a diagnosis, run by a session (docs/formats.md)."""
 
 import math
-import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta, Struct
 
-from acquisition.recording.errors import RigFileError
-from acquisition.recording.rig_faults import explain
-from acquisition.recording.rig_lines import KeyPath, key_lines, line_of
+from acquisition.recording.bounds import Identity, Kilograms, Many, Metres, Name, PerJoint, Radians, Sentence
+from acquisition.recording.errors import RigFileError, shown
+from acquisition.recording.rig_lines import KeyPath
 from acquisition.recording.rig_schema import Rig
+from acquisition.recording.toml_file import parse_toml, read_text
 
 Way = Annotated[int, Meta(ge=-1, le=1)]
-Group = Annotated[int, Meta(ge=1)]
-Spots = tuple[float, float, float, float]
+Spots = tuple[Metres, Metres, Metres, Metres]
 
 
 class PlannedPose(Struct, frozen=True, forbid_unknown_fields=True):
     """One pose; where a fixture stands, also where the light is expected on it."""
 
-    q_rad: tuple[float, ...]  # readings, one a joint
-    approach: tuple[Way, ...] = ()  # the way each joint comes; 0 or absent: as it falls
+    q_rad: PerJoint[Radians]  # readings, one a joint
+    approach: PerJoint[Way] = ()  # the way each joint comes; 0 or absent: as it falls
     spots_m: Spots | None = None  # psd1 x, y, psd2 x, y
-    repeat: Group | None = None  # poses of one number are one pose, taken again
+    repeat: Identity | None = None  # poses of one number are one pose, taken again
 
 
 class PlannedBlock(Struct, frozen=True, forbid_unknown_fields=True):
     """Poses that follow one another at one place."""
 
-    pose: tuple[PlannedPose, ...]
-    placement: int | None = None
+    pose: Many[PlannedPose]
+    placement: Identity | None = None
     first_psd: Literal[1, 2] | None = None
-    seat: int | None = None
-    payload_kg: float | None = None
+    seat: Identity | None = None
+    payload_kg: Kilograms | None = None
 
 
 class PosePlan(Struct, frozen=True, forbid_unknown_fields=True):
     """A whole plan."""
 
     schema: Literal[1]
-    rig: str  # its name
-    block: tuple[PlannedBlock, ...]
-    purpose: tuple[str, ...] = ()  # one line for a person each
+    rig: Name  # its name
+    block: Many[PlannedBlock]
+    purpose: Many[Sentence] = ()  # one line for a person each
 
     @property
     def poses(self) -> int:
@@ -53,23 +52,10 @@ class PosePlan(Struct, frozen=True, forbid_unknown_fields=True):
 
 def read_pose_plan(path: Path, rig: Rig) -> PosePlan:
     """The plan of a file, checked against the rig. RigFileError naming file, line, key, value and remedy."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise RigFileError(f"{path}: cannot read the pose plan ({error.strerror}); check the path") from error
-    except UnicodeDecodeError as error:
-        raise RigFileError(f"{path}: the pose plan is not UTF-8 (byte {error.start}); save it as UTF-8") from error
-    try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise RigFileError(f"{path}: not TOML: {error}; correct the line") from error
-    lines = key_lines(text)
-    try:
-        plan = msgspec.convert(document, type=PosePlan)
-    except msgspec.ValidationError as error:
-        raise _fault(path, lines, *explain(error, document, PosePlan)) from error
+    file = parse_toml(read_text(path, "pose plan", RigFileError), str(path), RigFileError)
+    plan = file.checked(PosePlan)
     for place, says in _contradictions(plan, rig):
-        raise _fault(path, lines, place, says)
+        raise file.error(place, says)
     return plan
 
 
@@ -81,7 +67,10 @@ def write_pose_plan(path: Path, plan: PosePlan) -> None:
 
 def _contradictions(plan: PosePlan, rig: Rig) -> Iterator[tuple[KeyPath, str]]:
     if plan.rig != rig.name:
-        yield ("rig",), f"rig = '{plan.rig}', but this rig is '{rig.name}'; give the plan of this rig"
+        yield (
+            ("rig",),
+            f"rig = '{shown(plan.rig, 60)}', but this rig is '{shown(rig.name, 60)}'; give the plan of this rig",
+        )
     for b, block in enumerate(plan.block):
         if block.placement is not None and block.placement not in rig.placements:
             known = ", ".join(map(str, rig.placements)) or "none"
@@ -103,10 +92,6 @@ def _of_pose(pose: PlannedPose, rig: Rig) -> Iterator[str]:
                 f"joint {i} at {q:g} rad is outside its range {joint.lower_rad:g} ... {joint.upper_rad:g}; "
                 "leave the pose out"
             )
-
-
-def _fault(path: Path, lines: Mapping[KeyPath, int], place: KeyPath, says: str) -> RigFileError:
-    return RigFileError(f"{path} line {line_of(lines, place)}: {says}")
 
 
 def _lines(plan: PosePlan) -> Iterator[str]:

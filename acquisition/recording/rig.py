@@ -2,20 +2,20 @@
 
 import hashlib
 import math
-import re
-import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, cast
 
 import msgspec
 
-from acquisition.recording.errors import RigFileError
-from acquisition.recording.rig_faults import explain, unknown_key
-from acquisition.recording.rig_lines import KeyPath, key_lines, line_of
+from acquisition.recording.bounds import most_of
+from acquisition.recording.errors import RigFileError, shown
+from acquisition.recording.rig_faults import spelled, unknown_key
+from acquisition.recording.rig_lines import KeyPath
 from acquisition.recording.rig_quantity import si_value, suffix_of
 from acquisition.recording.rig_rules import faults
 from acquisition.recording.rig_schema import EMULATION_KEYS, ArmModel, Rig
+from acquisition.recording.toml_file import TomlFile, parse_toml, read_text
 
 
 def load_rig(path: Path | str) -> Rig:
@@ -28,13 +28,7 @@ def load_rig(path: Path | str) -> Rig:
 
 def rig_text(path: Path | str) -> str:
     """The text of a rig file to the letter, line ends included. RigFileError if it cannot be read as UTF-8."""
-    try:
-        return Path(path).read_bytes().decode("utf-8")
-    except OSError as error:
-        raise RigFileError(f"{path}: cannot read the rig file ({error.strerror}); check the path") from error
-    except UnicodeDecodeError as error:
-        line = Path(path).read_bytes()[: error.start].count(b"\n") + 1
-        raise RigFileError(f"{path} line {line}: byte {error.start} is not UTF-8; save the file as UTF-8") from error
+    return read_text(path, "rig file", RigFileError)
 
 
 def rig_sha256(text: str) -> str:
@@ -44,14 +38,10 @@ def rig_sha256(text: str) -> str:
 
 def parse_rig(text: str, name: str) -> Rig:
     """The rig of a text; `name` stands for the file in errors. RigFileError naming line, key, value and remedy."""
-    document = plain_rig(text, name)
-    lines = key_lines(text)
-    try:
-        rig = msgspec.convert(document, type=Rig)
-    except msgspec.ValidationError as error:
-        raise _fault(name, lines, *explain(error, document)) from error
+    file = parse_toml(text, name, RigFileError)
+    rig = file.checked(Rig, _converted(file))
     for path, says in faults(rig):
-        raise _fault(name, lines, path, says)
+        raise file.error(path, says)
     return _completed(rig)
 
 
@@ -61,17 +51,16 @@ def plain_rig(text: str, name: str) -> dict[str, Any]:
     RigFileError for bad TOML, a quantity that does not fit its key, a number that is not finite, and in [emulation].
     All else is checked by `parse_rig`.
     """
+    return _converted(parse_toml(text, name, RigFileError))
+
+
+def _converted(file: TomlFile) -> dict[str, Any]:
     try:
-        document = tomllib.loads(text.removeprefix("\ufeff"))
-    except tomllib.TOMLDecodeError as error:
-        raise _syntax_fault(name, text, str(error)) from error
-    lines = key_lines(text.removeprefix("\ufeff"))
-    try:
-        converted = cast("dict[str, Any]", _in_si(document, (), ""))
+        converted = cast("dict[str, Any]", _in_si(file.document, (), ""))
     except _MisfitError as misfit:
-        raise _fault(name, lines, misfit.path, misfit.says) from misfit
+        raise file.error(misfit.path, misfit.says) from misfit
     for path, says in _emulation_faults(converted.get("emulation")):
-        raise _fault(name, lines, path, says)
+        raise file.error(path, says)
     return converted
 
 
@@ -94,9 +83,9 @@ def _in_si(value: Any, path: KeyPath, key: str) -> Any:
         try:
             value = si_value(key, value)
         except ValueError as error:
-            raise _MisfitError(path, f"{key}: {error}") from error
+            raise _MisfitError(path, f"{shown(key)}: {error}") from error
     if isinstance(value, float) and not math.isfinite(value):
-        raise _MisfitError(path, f"{key} = {value} is not a finite number; correct it or leave the key out")
+        raise _MisfitError(path, f"{shown(key)} = {value} is not a finite number; correct it or leave the key out")
     return value
 
 
@@ -108,7 +97,9 @@ def _emulation_faults(section: Any) -> Iterator[tuple[KeyPath, str]]:
         if key not in EMULATION_KEYS:
             yield path, unknown_key(key, ("emulation",), EMULATION_KEYS)
         elif isinstance(value, bool) or not isinstance(value, int | float):
-            yield path, f"{key} = {value!r} in [emulation]: expected a number; correct it"
+            yield path, f"{key} = {spelled(value)} in [emulation]: expected a number; correct it"
+        elif abs(value) > (most := most_of(key)):
+            yield path, f"{key} = {spelled(value)} in [emulation]: expected at most {most:g} either way; correct it"
 
 
 def _completed(rig: Rig) -> Rig:
@@ -133,16 +124,3 @@ def _with_files_from(folder: Path, rig: Rig) -> Rig:
     if encoders is not None and encoders.dbc is not None:
         encoders = replace(encoders, dbc=str(folder / encoders.dbc))
     return replace(rig, devices=replace(rig.devices, psd=psd, encoders=encoders))
-
-
-def _fault(name: str, lines: Mapping[KeyPath, int], path: KeyPath, says: str) -> RigFileError:
-    return RigFileError(f"{name} line {line_of(lines, path)}: {says}")
-
-
-def _syntax_fault(name: str, text: str, says: str) -> RigFileError:
-    """The words of tomllib; their place is "(at line 3, column 5)" or "(at end of document)"."""
-    place = re.search(r"\(at line (\d+), column (\d+)\)", says)
-    line = int(place[1]) if place else text.count("\n") + 1
-    wrong = re.sub(r"\s*\(at [^)]*\)$", "", says)
-    column = f", column {place[2]}" if place else ""
-    return RigFileError(f"{name} line {line}{column}: not TOML: {wrong}; correct the line")

@@ -9,9 +9,27 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct, field
 
-from acquisition.recording.rig_values import Identity, Positive, Word
+from acquisition.recording.bounds import (
+    Acceleration,
+    Factor,
+    Few,
+    FilePath,
+    Hertz,
+    Identity,
+    Label,
+    Name,
+    Number,
+    PerJoint,
+    PositiveFactor,
+    Size,
+    Volts,
+    Whole,
+)
 
 RegisterAddress = Annotated[int, Meta(ge=0, le=65535)]  # Modbus Application Protocol V1.1b3, section 4.4
+RegisterCount = Annotated[int, Meta(ge=1, le=65536)]
+NodeId = Annotated[int, Meta(ge=1, le=127)]  # CiA 301, 7.2
+MaybePath = Annotated[str, Meta(max_length=1000)]  # as FilePath; empty: none
 
 
 class PsdDriver(enum.Enum):
@@ -60,19 +78,19 @@ class PsdDevice(Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     driver: PsdDriver
-    port: Word | None = None
-    serial_number: Word | None = None
-    rate_hz: Positive = 1000.0  # where the 2 um of a PSD are stated
-    ports: tuple[Word, Word] | None = None
-    serial_numbers: tuple[Word, Word] | None = None
-    error_maps: tuple[str, str] | None = None  # files of both faces, "" for none
-    spot_radius_m: Positive | None = None  # at 1/e^2; only a quadrant face needs it
+    port: FilePath | None = None
+    serial_number: Name | None = None
+    rate_hz: Hertz = 1000.0  # where the 2 um of a PSD are stated
+    ports: tuple[FilePath, FilePath] | None = None
+    serial_numbers: tuple[Name, Name] | None = None
+    error_maps: tuple[MaybePath, MaybePath] | None = None  # files of both faces, "" for none
+    spot_radius_m: Size | None = None  # at 1/e^2; only a quadrant face needs it
     head: PsdHead = PsdHead.PIN_CUSHION
-    length_m: Positive | None = None  # resistance length; None: twice fixture.half_size_m
+    length_m: Size | None = None  # resistance length; None: twice fixture.half_size_m
     x_signs: tuple[Literal[-1, 1], Literal[-1, 1]] = (-1, -1)
     y_signs: tuple[Literal[-1, 1], Literal[-1, 1]] = (1, 1)
-    sum_full_scale_v: tuple[Positive, Positive] = (10.0, 10.0)  # at 65535 counts
-    transimpedance_v_a: Positive = 1e5  # Thorlabs PDP90A; it places no spot
+    sum_full_scale_v: tuple[Volts, Volts] = (10.0, 10.0)  # at 65535 counts
+    transimpedance_v_a: PositiveFactor = 1e5  # Thorlabs PDP90A; it places no spot
 
 
 class EncodersDevice(Struct, frozen=True, forbid_unknown_fields=True):
@@ -82,27 +100,27 @@ class EncodersDevice(Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     driver: EncoderDriver
-    interface: Word
-    channel: str = ""  # empty: by serial number
-    nodes: tuple[Annotated[int, Meta(ge=1, le=127)], ...] = ()  # CiA 301, 7.2: node-IDs 1 to 127
+    interface: Name
+    channel: MaybePath = ""  # empty: by serial number
+    nodes: PerJoint[NodeId] = ()
     bitrate: Identity = 1_000_000
-    sync_hz: Positive = 200.0
-    serial_number: Word | None = None
-    options: Mapping[str, bool | int | float | str] = {}  # further words of python-can for this interface
-    dbc: Word | None = None  # file that describes plain encoders
-    signals: tuple[Word, ...] = ()  # "Message.Signal" of the DBC file
-    units_per_turn: Positive | None = None  # for signals whose unit is no angle
-    acceleration_limit_rad_s2: Positive | None = None  # beyond it a step is a slip, not motion
+    sync_hz: Hertz = 200.0
+    serial_number: Name | None = None
+    options: Mapping[Name, bool | Whole | Number | Label] = {}  # further words of python-can for this interface
+    dbc: FilePath | None = None  # file that describes plain encoders
+    signals: PerJoint[Name] = ()  # "Message.Signal" of the DBC file
+    units_per_turn: PositiveFactor | None = None  # for signals whose unit is no angle
+    acceleration_limit_rad_s2: Acceleration | None = None  # beyond it a step is a slip, not motion
 
 
 class RobotRegister(Struct, frozen=True, forbid_unknown_fields=True):
     """One entry of a Modbus register map; SI value = scale * number. Names: `docs/protocols/modbus.md`."""
 
-    name: Word
+    name: Name
     address: RegisterAddress
     type: RegisterType
-    count: Identity = 1
-    scale: float = 1.0
+    count: RegisterCount = 1
+    scale: Factor = 1.0
     word_order: Literal["big", "little"] = "big"  # which word of a longer number comes first
     table: Literal["holding", "input"] = "holding"
     turns_address: RegisterAddress | None = None  # first of the counts of whole turns that belong to angles
@@ -112,17 +130,17 @@ class RobotDevice(Struct, frozen=True, forbid_unknown_fields=True):
     """The controller's address and the rate of its stream; the keys from `port` on are for Modbus only."""
 
     driver: RobotDriver
-    host: Word | None = None
-    rate_hz: Positive = 500.0  # e-Series control cycle
+    host: Name | None = None
+    rate_hz: Hertz = 500.0  # e-Series control cycle
     port: Annotated[int, Meta(ge=0, le=65535)] | None = None  # of Modbus TCP, 502 when not given
-    serial_port: Word | None = None  # Modbus RTU instead of TCP
-    serial_number: Word | None = None  # of the RTU adapter's USB plug, in place of serial_port
+    serial_port: FilePath | None = None  # Modbus RTU instead of TCP
+    serial_number: Name | None = None  # of the RTU adapter's USB plug, in place of serial_port
     baud: Identity = 115_200
     parity: Literal["none", "even", "odd"] = "none"
     stop_bits: Literal[1, 2] = 1
     unit: Annotated[int, Meta(ge=0, le=255)] = 1
     read_across: Annotated[int, Meta(ge=0, le=123)] = 0  # registers outside the map that may be read in one go
-    registers: tuple[RobotRegister, ...] = field(name="register", default=())
+    registers: Few[RobotRegister] = field(name="register", default=())
 
     @property
     def is_rtu(self) -> bool:

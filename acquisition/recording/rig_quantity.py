@@ -9,6 +9,8 @@ import re
 from collections.abc import Mapping
 from decimal import Decimal
 
+from acquisition.recording.errors import shown
+
 _LENGTH = {"m": "1", "cm": "1e-2", "mm": "1e-3", "um": "1e-6", "µm": "1e-6", "μm": "1e-6", "nm": "1e-9"}
 _ANGLE = {"rad": "1", "mrad": "1e-3", "urad": "1e-6", "µrad": "1e-6", "μrad": "1e-6"}
 _DEGREES = {"deg": "1", "°": "1", "arcmin": "60", "arcsec": "3600"}  # parts of a degree
@@ -34,7 +36,7 @@ _BY_DEGREE: Mapping[str, Mapping[str, str]] = {
     "rad_s": {"deg/s": "1", "°/s": "1"},
     "rad_s2": {"deg/s2": "1", "deg/s^2": "1", "deg/s²": "1"},
 }
-_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S*)\s*")
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S*)\s*", re.ASCII)
 _BY_LENGTH = sorted(UNITS, key=len, reverse=True)
 
 
@@ -47,11 +49,11 @@ def si_value(key: str, text: str) -> float:
     """The SI number for a text such as "0.2 mm" under a key with a unit suffix. ValueError says what does not fit."""
     suffix = suffix_of(key)
     if suffix is None:
-        raise ValueError(f"'{text}' stands where a number is expected")
+        raise ValueError(f"'{shown(text)}' stands where a number is expected")
     match = _QUANTITY.fullmatch(text)
     if match is None:
         raise ValueError(
-            f"'{text}' is no quantity; write a number in {spelt(suffix)}, or text such as {_example(suffix)}"
+            f"'{shown(text)}' is no quantity; write a number in {spelt(suffix)}, or text such as {_example(suffix)}"
         )
     number, unit = match.groups()
     if unit in UNITS[suffix]:
@@ -77,6 +79,7 @@ def spelt(suffix: str) -> str:
 
 
 def _misfit(key: str, text: str, unit: str, suffix: str) -> str:
+    text, unit = shown(text), shown(unit)
     if not unit:
         return f"'{text}' has no unit; write it as a number in {spelt(suffix)}, or with its unit: {_example(suffix)}"
     fitting = [*UNITS[suffix], *_BY_DEGREE.get(suffix, {})]

@@ -10,8 +10,40 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct, field
 
+from acquisition.recording.bounds import (
+    JOINTS,
+    ZERO,
+    Acceleration,
+    Count,
+    Direction,
+    Few,
+    FilePath,
+    GearRatio,
+    Gravity,
+    Hertz,
+    Identity,
+    Kilograms,
+    Markers,
+    Metres,
+    MetresOrNone,
+    Name,
+    Number,
+    PerJoint,
+    Pixels,
+    Positive,
+    Radians,
+    RadiansAbove,
+    Rotation,
+    Seconds,
+    SecondsAbove,
+    Share,
+    SigmaMetres,
+    SigmaRadians,
+    Size,
+    Speed,
+    Vector,
+)
 from acquisition.recording.rig_devices import Devices
-from acquisition.recording.rig_values import ZERO, Identity, NotNegative, Positive, Vector, Word
 
 
 class ArmModel(enum.Enum):
@@ -26,23 +58,23 @@ class Pose(Struct, frozen=True, forbid_unknown_fields=True):
     """A frame in another one: its origin (m) and its rotation vector (rad)."""
 
     origin_m: Vector = ZERO
-    rotation_rad: Vector = ZERO
+    rotation_rad: Rotation = ZERO
 
 
 class Joint(Struct, frozen=True, forbid_unknown_fields=True):
     """One axis and the link after it. Either a, alpha, d (and theta offset), or origin and rotation, by `arm.model`."""
 
-    lower_rad: float
-    upper_rad: float
-    a_m: float | None = None
-    alpha_rad: float | None = None
-    d_m: float | None = None
-    theta_offset_rad: float | None = None  # None in a D-H arm counts as 0: parse_rig fills it in
+    lower_rad: Radians
+    upper_rad: Radians
+    a_m: Metres | None = None
+    alpha_rad: Radians | None = None
+    d_m: Metres | None = None
+    theta_offset_rad: Radians | None = None  # None in a D-H arm counts as 0: parse_rig fills it in
     origin_m: Vector | None = None
-    rotation_rad: Vector | None = None
-    gear_ratio: Positive | None = None
+    rotation_rad: Rotation | None = None
+    gear_ratio: GearRatio | None = None
     encoder_counts: Identity | None = None
-    mass_kg: NotNegative | None = None
+    mass_kg: Kilograms | None = None
     com_m: Vector | None = None
 
 
@@ -50,27 +82,27 @@ class Arm(Struct, frozen=True, forbid_unknown_fields=True):
     """The kinematic chain, base to flange."""
 
     model: ArmModel
-    joints: Annotated[tuple[Joint, ...], Meta(min_length=1)] = field(name="joint")
-    gravity_m_s2: Vector = (0.0, 0.0, -9.81)  # an arm that stands on its feet
+    joints: Annotated[tuple[Joint, ...], Meta(min_length=1, max_length=JOINTS)] = field(name="joint")
+    gravity_m_s2: Gravity = (0.0, 0.0, -9.81)  # an arm that stands on its feet
     flange: Pose = Pose()
-    serial_number: Word | None = None  # of the maker's plate: tells two arms of one kind apart
+    serial_number: Name | None = None  # of the maker's plate: tells two arms of one kind apart
 
 
 class Tool(Struct, frozen=True, forbid_unknown_fields=True):
     """What hangs at the flange, in the flange frame. `laser_direction` has length 1 after reading."""
 
-    mass_kg: NotNegative | None = None
+    mass_kg: Kilograms | None = None
     com_m: Vector | None = None
     point_m: Vector | None = None
     laser_origin_m: Vector | None = None
-    laser_direction: Vector | None = None
-    probe_diameter_m: NotNegative | None = None  # of the ball whose centre is `point_m`
+    laser_direction: Direction | None = None
+    probe_diameter_m: MetresOrNone | None = None  # of the ball whose centre is `point_m`
 
 
 class Fixture(Struct, frozen=True, forbid_unknown_fields=True):
     """Two square detectors that see each other."""
 
-    half_size_m: Positive
+    half_size_m: Size
     psd2_in_psd1: Pose
 
 
@@ -86,15 +118,15 @@ class KnownDistance(Struct, frozen=True, forbid_unknown_fields=True):
 
     from_placement: Identity = field(name="from")
     to_placement: Identity = field(name="to")
-    length_m: Positive
-    sigma_m: Positive
+    length_m: Size
+    sigma_m: SigmaMetres
 
 
 class Bar(Struct, frozen=True, forbid_unknown_fields=True):
     """A calibrated length artefact."""
 
     id: Identity
-    length_m: Positive
+    length_m: Size
 
 
 class BarPosition(Struct, frozen=True, forbid_unknown_fields=True):
@@ -103,7 +135,7 @@ class BarPosition(Struct, frozen=True, forbid_unknown_fields=True):
     id: Identity
     bar: Identity
     middle_m: Vector
-    direction: Vector
+    direction: Direction
 
 
 class Seat(Struct, frozen=True, forbid_unknown_fields=True):
@@ -118,43 +150,43 @@ class Sphere(Struct, frozen=True, forbid_unknown_fields=True):
 
     id: Identity
     origin_m: Vector
-    diameter_m: Positive
+    diameter_m: Size
 
 
 class PermissibleErrors(Struct, frozen=True, forbid_unknown_fields=True):
     """Maximum permissible errors as the maker or the user states them; None: not stated, so nothing is judged."""
 
-    p_form_m: Positive | None = None
-    p_size_m: Positive | None = None
-    l_dia_m: Positive | None = None
-    e_uni_m: Positive | None = None  # of E_Uni = e_uni_m + e_uni_per_m * length
-    e_uni_per_m: NotNegative = 0.0
-    effective_diameter_m: Positive | None = None  # ASME B89.4.22: greatest deviation
-    single_point_m: Positive | None = None  # ASME B89.4.22: two standard deviations
-    volumetric_m: Positive | None = None  # ASME B89.4.22: greatest deviation
+    p_form_m: SigmaMetres | None = None
+    p_size_m: SigmaMetres | None = None
+    l_dia_m: SigmaMetres | None = None
+    e_uni_m: SigmaMetres | None = None  # of E_Uni = e_uni_m + e_uni_per_m * length
+    e_uni_per_m: Share = 0.0
+    effective_diameter_m: SigmaMetres | None = None  # ASME B89.4.22: greatest deviation
+    single_point_m: SigmaMetres | None = None  # ASME B89.4.22: two standard deviations
+    volumetric_m: SigmaMetres | None = None  # ASME B89.4.22: greatest deviation
 
 
 class Noise(Struct, frozen=True, forbid_unknown_fields=True):
     """One sigma as believed: a start value only. None: nothing is believed."""
 
-    psd_m: Positive | None = None
-    position_m: Positive | None = None
-    wire_m: Positive | None = None
-    seat_m: Positive | None = None
-    joint_rad: Positive | None = None
+    psd_m: SigmaMetres | None = None
+    position_m: SigmaMetres | None = None
+    wire_m: SigmaMetres | None = None
+    seat_m: SigmaMetres | None = None
+    joint_rad: SigmaRadians | None = None
 
 
 class Tolerance(Struct, frozen=True, forbid_unknown_fields=True):
     """One sigma of the drawing: priors of the fit. What may be None is, without it, taken as `docs/formats.md` says."""
 
-    length_m: Positive
-    angle_rad: Positive
+    length_m: SigmaMetres
+    angle_rad: SigmaRadians
     gain: Positive | None = None  # of both detectors' scales, about 1
-    psd2_m: Positive | None = None  # of PSD 2 in PSD 1, with psd2_rad
-    psd2_rad: Positive | None = None
-    device_m: Positive | None = None  # of [device] in the base, with device_rad
-    device_rad: Positive | None = None
-    eccentricity_rad: Positive | None = None  # of what an encoder's disc off its axis does to a reading; None: centred
+    psd2_m: SigmaMetres | None = None  # of PSD 2 in PSD 1, with psd2_rad
+    psd2_rad: SigmaRadians | None = None
+    device_m: SigmaMetres | None = None  # of [device] in the base, with device_rad
+    device_rad: SigmaRadians | None = None
+    eccentricity_rad: SigmaRadians | None = None  # of an encoder's disc off its axis; None: centred
 
 
 class CameraBoard(Struct, frozen=True, forbid_unknown_fields=True):
@@ -163,32 +195,32 @@ class CameraBoard(Struct, frozen=True, forbid_unknown_fields=True):
     Its frame: origin in the middle of the markers, x right and y up as printed, z towards who reads it.
     """
 
-    side_m: Positive  # of the black square of one marker
-    gap_m: Positive  # of white between two
+    side_m: Size  # of the black square of one marker
+    gap_m: Size  # of white between two
     in_psd1: Pose
-    columns: Identity = 2
-    rows: Identity = 2
-    first_id: Annotated[int, Meta(ge=0)] = 0
+    columns: Markers = 2
+    rows: Markers = 2
+    first_id: Count = 0
     dictionary: Literal["aruco-4x4-50", "apriltag-36h11"] = "aruco-4x4-50"
 
 
 class Camera(Struct, frozen=True, forbid_unknown_fields=True):
     """The camera on the flange for coarse aim, roughly as mounted; `calibration` is what sessions go by."""
 
-    source: Annotated[int, Meta(ge=0)] | Word  # number of a video device, URL, or path of a picture or film
-    width_px: Annotated[int, Meta(ge=16)]
-    height_px: Annotated[int, Meta(ge=16)]
-    view_rad: Annotated[float, Meta(gt=0.0, lt=3.0)]  # across the width, as the data sheet says
+    source: Count | FilePath  # number of a video device, URL, or path of a picture or film
+    width_px: Pixels
+    height_px: Pixels
+    view_rad: Annotated[float, Meta(ge=1e-3, lt=3.0)]  # across the width, as the data sheet says
     in_flange: Pose  # x right in the picture, y down, z where it looks
     board: CameraBoard
-    calibration: Word | None = None  # file of `calibeam camera`
-    latency_s: NotNegative = 0.2  # from exposure to program at most: four frames at 30 Hz
+    calibration: FilePath | None = None  # file of `calibeam camera`
+    latency_s: Seconds = 0.2  # from exposure to program at most: four frames at 30 Hz
 
 
 class MotionBox(Struct, frozen=True, forbid_unknown_fields=True):
     """A box along the axes of the base that no part of the arm may enter."""
 
-    name: Word
+    name: Name
     lower_m: Vector
     upper_m: Vector
 
@@ -196,31 +228,31 @@ class MotionBox(Struct, frozen=True, forbid_unknown_fields=True):
 class SlowBox(Struct, frozen=True, forbid_unknown_fields=True):
     """A box along the axes of the base in which the tool is slow."""
 
-    name: Word
+    name: Name
     lower_m: Vector
     upper_m: Vector
-    speed_m_s: Positive
+    speed_m_s: Speed
 
 
 class Motion(Struct, frozen=True, forbid_unknown_fields=True):
     """Limits of every motion. The defaults are slow: nobody has said yet what this cell allows."""
 
-    speed_rad_s: Positive = 0.5
-    acceleration_rad_s2: Positive = 1.0
-    step_limit_rad: Positive = 0.1  # largest joint step of the centring servo
-    home_rad: tuple[float, ...] | None = None  # joint readings clear of everything, where a session starts
-    line_speed_m_s: Positive = 0.25  # of the tool on straight lines: ISO 10218-1, reduced speed
-    structural_hz: Positive = 10.0  # lowest resonance of the arm; feels right for 1 m of reach until it is measured
-    lag_s: NotNegative = 0.0  # by which the arm follows streamed set-points (`calibeam motion`); 0: not measured
-    clearance_m: NotNegative = 0.06  # half the width of the arm's links, kept between their middle and every keep_out
-    keep_out: tuple[MotionBox, ...] = ()
-    slow_area: tuple[SlowBox, ...] = ()
+    speed_rad_s: Speed = 0.5
+    acceleration_rad_s2: Acceleration = 1.0
+    step_limit_rad: RadiansAbove = 0.1  # largest joint step of the centring servo
+    home_rad: PerJoint[Radians] | None = None  # joint readings clear of everything, where a session starts
+    line_speed_m_s: Speed = 0.25  # of the tool on straight lines: ISO 10218-1, reduced speed
+    structural_hz: Hertz = 10.0  # lowest resonance of the arm; feels right for 1 m of reach until it is measured
+    lag_s: Seconds = 0.0  # by which the arm follows streamed set-points (`calibeam motion`); 0: not measured
+    clearance_m: MetresOrNone = 0.06  # half the width of the arm's links, kept between their middle and every keep_out
+    keep_out: Few[MotionBox] = ()
+    slow_area: Few[SlowBox] = ()
 
 
 class Live(Struct, frozen=True, forbid_unknown_fields=True):
     """What the live page may do to a session beside its STOP."""
 
-    stop_without_page_s: Positive | None = None  # no page answers for so long: as STOP; None: pages come and go
+    stop_without_page_s: SecondsAbove | None = None  # no page answers for so long: as STOP; None: pages come and go
 
 
 # Keys of [emulation]; the section belongs to the emulators, which read it themselves from the same file.
@@ -265,17 +297,17 @@ class Rig(Struct, frozen=True, forbid_unknown_fields=True):
     """A whole rig file. Sections that are absent are None, empty, or a record of defaults."""
 
     schema: Literal[1]
-    name: Word
+    name: Name
     arm: Arm
     tool: Tool = Tool()
     fixture: Fixture | None = None
-    placement_list: tuple[Placement, ...] = field(name="placement", default=())
+    placement_list: Few[Placement] = field(name="placement", default=())
     device: Pose | None = None  # measuring device of position and wire observations, in the base frame
-    known_distances: tuple[KnownDistance, ...] = field(name="known_distance", default=())
-    bar_list: tuple[Bar, ...] = field(name="bar", default=())
-    bar_position_list: tuple[BarPosition, ...] = field(name="bar_position", default=())
-    seat_list: tuple[Seat, ...] = field(name="seat", default=())
-    sphere_list: tuple[Sphere, ...] = field(name="sphere", default=())
+    known_distances: Few[KnownDistance] = field(name="known_distance", default=())
+    bar_list: Few[Bar] = field(name="bar", default=())
+    bar_position_list: Few[BarPosition] = field(name="bar_position", default=())
+    seat_list: Few[Seat] = field(name="seat", default=())
+    sphere_list: Few[Sphere] = field(name="sphere", default=())
     mpe: PermissibleErrors = PermissibleErrors()
     noise: Noise = Noise()
     tolerance: Tolerance | None = None
@@ -283,7 +315,7 @@ class Rig(Struct, frozen=True, forbid_unknown_fields=True):
     camera: Camera | None = None
     motion: Motion = Motion()
     live: Live = Live()
-    emulation: Mapping[str, float] | None = None
+    emulation: Mapping[Name, Number] | None = None
 
     @property
     def n_joints(self) -> int:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording.bounds import most_of
 from acquisition.recording.columns import (
     COMPLETE_PER_JOINT,
     ORIENTATION,
@@ -21,7 +22,7 @@ from acquisition.recording.columns import (
     per_joint,
     required,
 )
-from acquisition.recording.errors import SamplesError
+from acquisition.recording.errors import SamplesError, shown
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Cell, Samples
 
@@ -29,6 +30,7 @@ Table = Mapping[str, NDArray[Any]]
 Fault = tuple[int | None, str, str]  # row from 0, column, what is wrong and what to do
 Place = Callable[[int | None], str]  # row from 0, None for the whole table -> where that is, for a person
 
+LONGEST_NAME = 200  # characters, as of all names
 _WHOLE_LIMIT = 2.0**53  # beyond, float64 has no unit step
 
 
@@ -63,16 +65,20 @@ class _BadCellError(ValueError):
 
 def _error(fault: Fault, place: Place) -> SamplesError:
     row, column, says = fault
-    return SamplesError(f"{place(row)}, column '{column}': {says}")
+    return SamplesError(f"{place(row)}, column '{shown(column, 60)}': {says}")
 
 
 def _header_faults(names: tuple[str, ...], n_joints: int) -> Iterator[Fault]:
     for name in required(n_joints):
         if name not in names:
-            near = difflib.get_close_matches(name, [other for other in names if joint_of(other) is None], n=1)
-            hint = f"; is it '{near[0]}'?" if near else ""
+            near = difflib.get_close_matches(
+                name, [n for n in names if len(n) <= LONGEST_NAME and joint_of(n) is None], n=1
+            )
+            hint = f"; is it '{shown(near[0], 60)}'?" if near else ""
             yield None, name, f"the column is missing; the rig's arm has {n_joints} joints{hint}"
     for name in names:
+        if len(name) > LONGEST_NAME:
+            yield None, name, f"the name has {len(name)} characters; at most {LONGEST_NAME} are read, shorten it"
         joint = joint_of(name)
         if joint is not None and not 1 <= joint <= n_joints:
             yield (
@@ -108,6 +114,12 @@ def _array(name: str, cells: Sequence[Cell]) -> NDArray[Any]:
         raise _BadCellError(
             infinite[0], f"{array[infinite[0]]} is not a finite number; leave the cell empty if it is missing"
         )
+    if beyond := np.flatnonzero(np.abs(array) > most_of(name)).tolist():
+        raise _BadCellError(
+            beyond[0],
+            f"{array[beyond[0]]:g} is beyond {most_of(name):g}, the most that such a column holds; correct it, "
+            "or leave the cell empty if it is missing",
+        )
     if kind_of(name) is Kind.INTEGER:
         _whole(array)
     return array
@@ -115,12 +127,12 @@ def _array(name: str, cells: Sequence[Cell]) -> NDArray[Any]:
 
 def _number(row: int, cell: float | int | str) -> float:
     try:
-        if not isinstance(cell, str) or "_" not in cell:  # float() would take "1_000"
+        if not isinstance(cell, str) or ("_" not in cell and cell.isascii()):  # float() takes "1_000" and "\u0661"
             return float(cell)
     except (ValueError, TypeError, OverflowError):  # also what Parquet may hold: dates, blobs
         pass
     raise _BadCellError(
-        row, f"'{cell}' is not a number; write it in SI units, or leave the cell empty if it is missing"
+        row, f"'{shown(cell)}' is not a number; write it in SI units, or leave the cell empty if it is missing"
     )
 
 
@@ -158,7 +170,7 @@ def _bar_faults(table: Table, rig: Rig) -> Iterator[Fault]:
     yield from _among(table, "bar", tuple(rig.bars), "a [[bar]] of the rig")
     ends = table["bar_end"]
     for row in np.flatnonzero(~np.isin(ends, ("", "a", "b"))).tolist()[:1]:
-        yield row, "bar_end", f"'{ends[row]}' is no end of a bar; write a or b"
+        yield row, "bar_end", f"'{shown(ends[row])}' is no end of a bar; write a or b"
     with_bar, with_end = ~np.isnan(table["bar"]), ends != ""
     yield from _first(with_bar & ~with_end, "bar_end", "the value is missing, though the row names a bar; write a or b")
     yield from _first(with_end & ~with_bar, "bar", "the value is missing, though the row names an end; say which bar")
@@ -184,5 +196,5 @@ def _among(table: Table, column: str, known: tuple[int, ...], what: str) -> Iter
         return
     values = table[column]
     for row in np.flatnonzero(~np.isnan(values) & ~np.isin(values, known)).tolist()[:1]:
-        choices = ", ".join(str(choice) for choice in known) or "none"
+        choices = shown(", ".join(str(choice) for choice in known)) or "none"
         yield row, column, f"{int(values[row])} is not {what} (known: {choices}); correct it or add it to the rig"

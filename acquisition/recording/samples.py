@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.columns import SPOTS, Kind, kind_of, per_joint
-from acquisition.recording.errors import SamplesError
+from acquisition.recording.errors import SamplesError, shown
 
 Floats = NDArray[np.float64]
 Cell = float | int | str | None
@@ -38,7 +38,7 @@ class Samples:
     def column(self, name: str) -> Floats:
         """A numeric column (row,), NaN where missing. SamplesError if there is none of this name."""
         if name not in self.columns or kind_of(name) is Kind.TEXT:
-            raise SamplesError(f"no numeric column '{name}' in the samples; there are {', '.join(self.columns)}")
+            raise SamplesError(f"no numeric column '{name}' in the samples; there are {shown(', '.join(self.columns))}")
         return self.columns[name]
 
     def integers(self, name: str, missing: int) -> NDArray[np.int64]:

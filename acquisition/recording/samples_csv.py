@@ -5,7 +5,7 @@ import io
 from collections.abc import Iterable
 from pathlib import Path
 
-from acquisition.recording.errors import RecordingError, SamplesError
+from acquisition.recording.errors import RecordingError, SamplesError, shown
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.sample_rules import checked_samples
 from acquisition.recording.samples import Cell, Samples, cells_of
@@ -69,7 +69,7 @@ def check_header(names: Iterable[str], file: str) -> None:
         if not column:
             raise SamplesError(f"{file}: column {number} has no name; name it or remove it")
         if column in seen:
-            raise SamplesError(f"{file}: column '{column}' stands twice; rename or remove one")
+            raise SamplesError(f"{file}: column '{shown(column)}' stands twice; rename or remove one")
         seen.add(column)
 
 

@@ -4,7 +4,7 @@ import importlib
 from pathlib import Path
 from typing import Any
 
-from acquisition.recording.errors import SamplesError
+from acquisition.recording.errors import SamplesError, shown
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.sample_rules import checked_samples
 from acquisition.recording.samples import Samples, cells_of
@@ -18,7 +18,7 @@ def read_parquet(path: Path, rig: Rig) -> Samples:
     try:
         table = parquet.read_table(path)
     except (OSError, ValueError) as error:  # pyarrow.ArrowInvalid is a ValueError
-        raise SamplesError(f"{path}: cannot read the Parquet file ({error}); write it again") from error
+        raise SamplesError(f"{path}: cannot read the Parquet file ({shown(str(error))}); write it again") from error
     check_header(table.column_names, str(path))
     columns = {name: table.column(name).to_pylist() for name in table.column_names}
     return checked_samples(columns, rig, lambda row: str(path) if row is None else f"{path} row {row + 1}")

@@ -1,11 +1,16 @@
 """diagnosis.json: writing and reading."""
 
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
+from acquisition.recording.errors import shown
+from acquisition.recording.json_file import JsonKind, read_json
 from calibrate.diagnose.schema import SCHEMA, DiagnosisFile
 from calibrate.errors import DataError
+
+KIND = JsonKind("diagnosis.json", "give the diagnosis.json of a diagnosis", "diagnose the recording again", DataError)
 
 
 def write_diagnosis(path: Path, diagnosis: DiagnosisFile) -> None:
@@ -18,23 +23,9 @@ def write_diagnosis(path: Path, diagnosis: DiagnosisFile) -> None:
 
 def read_diagnosis(path: Path) -> DiagnosisFile:
     """Read diagnosis.json. DataError naming file, place and remedy where it is none or of another version."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror}); give the diagnosis.json of a diagnosis") from error
-    try:
-        version = msgspec.json.decode(data, type=_Version)
-    except msgspec.DecodeError as error:
-        raise DataError(f"{path}: not a diagnosis.json ({error}); diagnose the recording again") from error
-    if version.schema != SCHEMA:
-        raise DataError(f"{path}: schema {version.schema}; this version reads {SCHEMA}")
-    try:
-        return msgspec.json.decode(data, type=DiagnosisFile)
-    except msgspec.DecodeError as error:
-        raise DataError(f"{path}: damaged diagnosis.json ({error}); diagnose the recording again") from error
+    return read_json(path, KIND, DiagnosisFile, _other)
 
 
-class _Version(msgspec.Struct, frozen=True):
-    """The field that every version has."""
-
-    schema: int
+def _other(content: dict[str, Any]) -> str | None:
+    schema = content.get("schema")
+    return None if schema == SCHEMA else f"schema {shown(schema)}; this version reads {SCHEMA}"

@@ -4,6 +4,8 @@ from typing import Literal
 
 import msgspec
 
+from acquisition.recording.bounds import Count, Label, Many, Name, Number, Sentence, Statistic, Whole
+
 SCHEMA = 1
 
 
@@ -14,194 +16,198 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class SizeRecord(Record, frozen=True):
     """A parameter; null where it is no finite number."""
 
-    value: float | None
-    sigma: float | None
+    value: Number | None
+    sigma: Number | None
 
 
 class NameRecord(Record, frozen=True):
     """Place, driver, form and physics of a cause, in the words of docs/formats.md."""
 
-    where: str
-    depends_on: str
-    shape: str
-    order: int | None
-    physics: str
+    where: Label
+    depends_on: Label
+    shape: Label
+    order: Whole | None
+    physics: Label
 
 
 class RivalRecord(NameRecord, frozen=True):
     """A cause that the data cannot tell from the finding; `margin`: BIC by which the finding is better."""
 
-    confidence: float
-    margin: float
+    confidence: Statistic
+    margin: Statistic
     plausible: bool = True  # False: it fits better, but only with a size that no machine has
 
 
 class CurveRecord(Record, frozen=True):
     """The residual without the finding, pulled back to its port, over the driver; null where nothing is felt."""
 
-    driver: str
-    unit: str  # of the port: rad or m
-    values: tuple[float | None, ...]
-    residual: tuple[float | None, ...]
-    fitted: tuple[float | None, ...]
+    driver: Label
+    unit: Label  # of the port: rad or m
+    values: Many[Number | None]
+    residual: Many[Number | None]
+    fitted: Many[Number | None]
+
+    def __post_init__(self) -> None:
+        if not len(self.values) == len(self.residual) == len(self.fitted):
+            raise ValueError("values, residual and fitted of a curve are of different lengths")
 
 
 class FindingRecord(NameRecord, frozen=True):
     """One cause with its size and its doubt."""
 
-    parameters: dict[str, SizeRecord]
-    share: float | None  # null where it was found in a stream: it removes nothing from the samples
-    confidence: float
-    says: str
-    rivals: tuple[RivalRecord, ...]
-    p: float
-    bic_gain: float | None
-    held_out_gain: float | None
-    explains: str = ""
-    plausible_to: float | None = (
+    parameters: dict[Name, SizeRecord]
+    share: Statistic | None  # null where it was found in a stream: it removes nothing from the samples
+    confidence: Statistic
+    says: Sentence
+    rivals: Many[RivalRecord]
+    p: Statistic
+    bic_gain: Statistic | None
+    held_out_gain: Statistic | None
+    explains: Sentence = ""
+    plausible_to: Statistic | None = (
         None  # the largest that a machine of its kind shows, in the unit of the first parameter
     )
     curve: CurveRecord | None = None
-    stream: str | None = None  # where it was found, if not in the samples
-    from_s: float | None = None  # on the clock of that stream
-    to_s: float | None = None
+    stream: Label | None = None  # where it was found, if not in the samples
+    from_s: Statistic | None = None  # on the clock of that stream
+    to_s: Statistic | None = None
 
 
 class ClockRecord(Record, frozen=True):
     """A device's clock against the joints' one: joints = own + offset_s + drift (own - middle_s)."""
 
-    stream: str
-    status: str
-    offset_s: float | None
-    offset_sigma_s: float | None
-    drift: float | None
-    drift_sigma: float | None
-    middle_s: float
+    stream: Label
+    status: Label
+    offset_s: Statistic | None
+    offset_sigma_s: Statistic | None
+    drift: Statistic | None
+    drift_sigma: Statistic | None
+    middle_s: Statistic
 
 
 class StreamsRecord(Record, frozen=True):
     """What the streams show beside the findings: usual things with their size, and what they cannot show."""
 
-    stands: int
-    clocks: tuple[ClockRecord, ...]
-    usual: tuple[FindingRecord, ...]
-    unseen: tuple[str, ...]
+    stands: Count
+    clocks: Many[ClockRecord]
+    usual: Many[FindingRecord]
+    unseen: Many[Sentence]
 
 
 class UnexplainedRecord(Record, frozen=True):
     """Structure without a name."""
 
-    where: str
-    depends_on: str
-    rms_m: float | None
-    share: float
-    p: float
-    says: str
+    where: Label
+    depends_on: Label
+    rms_m: Statistic | None
+    share: Statistic
+    p: Statistic
+    says: Sentence
 
 
 class SplitRecord(Record, frozen=True):
     """Error of one instrument on samples that neither fit has seen."""
 
-    split: str
-    instrument: str
-    observations: int
-    wild: int
-    rms_before_m: float | None
-    rms_after_m: float | None
-    removed_low: float | None
-    removed_high: float | None
+    split: Label
+    instrument: Label
+    observations: Count
+    wild: Count
+    rms_before_m: Statistic | None
+    rms_after_m: Statistic | None
+    removed_low: Statistic | None
+    removed_high: Statistic | None
 
 
 class FloorRecord(Record, frozen=True):
     """What remains unexplainable of one instrument, and how that is known."""
 
-    instrument: str
-    rms_m: float | None
-    source: str
+    instrument: Label
+    rms_m: Statistic | None
+    source: Sentence
 
 
 class LackOfFitRecord(Record, frozen=True):
     """Misfit that comes back with a repeated pose, over the scatter within repeats."""
 
-    groups: int
-    ratio: float
-    p: float
+    groups: Count
+    ratio: Statistic
+    p: Statistic
     significant: bool
 
 
 class RejectedRecord(NameRecord, frozen=True):
     """The best candidate of a physics that was tested and is not there; `bic_gain` null: not to be seen."""
 
-    bic_gain: float | None
-    why: str
+    bic_gain: Statistic | None
+    why: Sentence
 
 
 class SmallestRecord(NameRecord, frozen=True):
     """The smallest size of a cause that these poses would have shown; `parameter` with its unit."""
 
-    parameter: str
-    value: float
+    parameter: Label
+    value: Statistic
 
 
 class NotRecorded(Record, frozen=True):
     """A driver that the record does not hold, and the physics that cannot be told without it."""
 
-    driver: str
-    column: str
-    physics: str
+    driver: Label
+    column: Label
+    physics: Label
 
 
 class FreeSpaceRecord(Record, frozen=True):
     """Predicted error of the target over poses drawn between the angles of the session."""
 
-    rms_before_m: float
-    rms_after_m: float
-    poses: int
+    rms_before_m: Statistic
+    rms_after_m: Statistic
+    poses: Count
 
 
 class BlunderRecord(Record, frozen=True):
     """A fault of the file: its rows, from 1, took no part, or next to none; without rows all of it is wrong."""
 
-    kind: str
-    rows: tuple[int, ...]
-    column: str
-    says: str
+    kind: Label
+    rows: Many[Count]
+    column: Sentence
+    says: Sentence
 
 
 class RigRecord(Record, frozen=True):
     """Which rig the session was made with."""
 
-    name: str
-    sha256: str
+    name: Label
+    sha256: Label
 
 
 class DiagnosisFile(Record, frozen=True):
     """Content of diagnosis.json."""
 
     schema: Literal[1]
-    verdict: str
-    noise_floor_m: float | None
-    rms_before_m: float | None
-    rms_after_m: float | None
-    findings: tuple[FindingRecord, ...]
+    verdict: Label
+    noise_floor_m: Statistic | None
+    rms_before_m: Statistic | None
+    rms_after_m: Statistic | None
+    findings: Many[FindingRecord]
     unexplained: UnexplainedRecord | None
-    next: tuple[str, ...]
+    next: Many[Sentence]
     kind: Literal["calibeam-diagnosis"] = "calibeam-diagnosis"
-    software: str = ""
+    software: Label = ""
     rig: RigRecord | None = None
-    samples: int = 0
-    noise_floor_source: str = ""
+    samples: Count = 0
+    noise_floor_source: Sentence = ""
     noise_wanders: bool = False
-    also_unexplained: tuple[UnexplainedRecord, ...] = ()
-    splits: tuple[SplitRecord, ...] = ()
-    floors: tuple[FloorRecord, ...] = ()
+    also_unexplained: Many[UnexplainedRecord] = ()
+    splits: Many[SplitRecord] = ()
+    floors: Many[FloorRecord] = ()
     free_space: FreeSpaceRecord | None = None
     lack_of_fit: LackOfFitRecord | None = None
-    rejected: tuple[RejectedRecord, ...] = ()
-    invisible: tuple[NameRecord, ...] = ()
-    smallest: tuple[SmallestRecord, ...] = ()
-    confusable: tuple[tuple[NameRecord, NameRecord, float], ...] = ()
-    not_recorded: tuple[NotRecorded, ...] = ()
-    derived: tuple[str, ...] = ()
-    blunders: tuple[BlunderRecord, ...] = ()
+    rejected: Many[RejectedRecord] = ()
+    invisible: Many[NameRecord] = ()
+    smallest: Many[SmallestRecord] = ()
+    confusable: tuple[tuple[NameRecord, NameRecord, Statistic], ...] = ()
+    not_recorded: Many[NotRecorded] = ()
+    derived: Many[Sentence] = ()
+    blunders: Many[BlunderRecord] = ()
     streams: StreamsRecord | None = None

@@ -1,43 +1,56 @@
 """`errors.toml`: which errors of an arm, by which law and how large (docs/error-simulation.md)."""
 
-import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
-import msgspec
-from msgspec import Meta, Struct
+from msgspec import Struct
 
-from acquisition.recording.rig_faults import explain
-from acquisition.recording.rig_lines import KeyPath, key_lines, line_of
+from acquisition.recording.bounds import (
+    Expansion,
+    Few,
+    Kelvin,
+    KelvinOrNone,
+    Metres,
+    MetresOrNone,
+    Name,
+    Number,
+    Order,
+    PerJoint,
+    Radians,
+    RadiansOrNone,
+)
+from acquisition.recording.errors import shown
+from acquisition.recording.rig_lines import KeyPath
+from acquisition.recording.toml_file import parse_toml, read_text
 from calibrate.error_simulation.law import Law
 from calibrate.errors import DataError
 
-NotNegative = Annotated[float, Meta(ge=0.0)]
-Positive = Annotated[float, Meta(gt=0.0)]
 SUFFIX = {"m": "_m", "rad": "_rad", "K": "_k"}
 
 
 class SourceEntry(Struct, frozen=True, forbid_unknown_fields=True):
     """One [[source]]: names or shell patterns of them, a law, its size in the unit of the source."""
 
-    what: tuple[str, ...]
-    law: str = "normal"
-    shape: tuple[float, ...] = ()
-    scale_m: NotNegative | None = None
-    scale_rad: NotNegative | None = None
-    scale_k: NotNegative | None = None
-    loc_m: float | None = None
-    loc_rad: float | None = None
-    loc_k: float | None = None
-    order: Positive | None = None  # of waves, cycles a turn
+    what: Few[Name]
+    law: Name = "normal"
+    shape: PerJoint[Number] = ()
+    scale_m: MetresOrNone | None = None
+    scale_rad: RadiansOrNone | None = None
+    scale_k: KelvinOrNone | None = None
+    loc_m: Metres | None = None
+    loc_rad: Radians | None = None
+    loc_k: Kelvin | None = None
+    order: Order | None = None  # of waves, cycles a turn
 
     def law_in(self, unit: str) -> Law:
         """Its law for sources of a unit. DataError where the size is not in this unit."""
         suffix = SUFFIX[unit]
         scale, loc = getattr(self, f"scale{suffix}"), getattr(self, f"loc{suffix}")
         if scale is None:
-            raise DataError(f"source {', '.join(self.what)}: no scale{suffix}, but this error is in {unit}; give it")
+            raise DataError(
+                f"source {shown(', '.join(self.what))}: no scale{suffix}, but this error is in {unit}; give it"
+            )
         return Law(self.law, scale, loc or 0.0, self.shape)
 
 
@@ -45,8 +58,8 @@ class ErrorPlan(Struct, frozen=True, forbid_unknown_fields=True):
     """A whole file; a later entry wins over an earlier one."""
 
     schema: Literal[1]
-    source: tuple[SourceEntry, ...]
-    expansion_per_k: Positive | None = None  # of the links' material; heat needs it
+    source: Few[SourceEntry]
+    expansion_per_k: Expansion | None = None  # of the links' material; heat needs it
     believed: bool = True  # whether what the rig file believes stands beside it
 
 
@@ -55,23 +68,10 @@ NOTHING_STATED = ErrorPlan(schema=1, source=())
 
 def read_error_plan(path: Path) -> ErrorPlan:
     """The plan of a file. DataError naming file, line, key, value and remedy."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise DataError(f"{path}: cannot read the error plan ({error.strerror}); check the path") from error
-    except UnicodeDecodeError as error:
-        raise DataError(f"{path}: the error plan is not UTF-8 (byte {error.start}); save it as UTF-8") from error
-    try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise DataError(f"{path}: not TOML: {error}; correct the line") from error
-    lines = key_lines(text)
-    try:
-        plan = msgspec.convert(document, type=ErrorPlan)
-    except msgspec.ValidationError as error:
-        raise _fault(path, lines, *explain(error, document, ErrorPlan)) from error
+    file = parse_toml(read_text(path, "error plan", DataError), str(path), DataError)
+    plan = file.checked(ErrorPlan)
     for place, says in _contradictions(plan):
-        raise _fault(path, lines, place, says)
+        raise file.error(place, says)
     return plan
 
 
@@ -88,7 +88,3 @@ def _contradictions(plan: ErrorPlan) -> Iterator[tuple[KeyPath, str]]:
             entry.law_in(next(unit for unit, s in SUFFIX.items() if s == stated[0]))
         except DataError as error:
             yield ("source", i), str(error)
-
-
-def _fault(path: Path, lines: Mapping[KeyPath, int], place: KeyPath, says: str) -> DataError:
-    return DataError(f"{path} line {line_of(lines, place)}: {says}")

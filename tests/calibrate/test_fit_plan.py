@@ -35,7 +35,7 @@ def test_a_plan_that_says_nothing_is_the_default():
         ('solver = "lm"', "line 2: .*known are levenberg-marquardt, dog-leg"),
         ('instruments = ["tracker"]', "line 2: instruments = 'tracker'.*known are dual-psd"),
         ("share = 0.7", "line 2: share = 0.7 in the file: expected float <= 0.5"),
-        ('[priors]\n"link1.length" = -1.0', r"line 3: 'link1.length' = -1.0 in \[priors\]: one sigma is a positive"),
+        ('[priors]\n"link1.length" = -1.0', r"line 3: link1.length = -1.0 in \[priors\]: expected float >= 1e-20"),
         ('instruments = ["position", "distance"]', "line 2: 'position' and 'distance' are the same readings"),
         ('share = 0\nsplits = ["last"]', "line 2: share = 0 holds nothing out"),
         ("free = [", "not TOML"),

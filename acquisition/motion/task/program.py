@@ -12,41 +12,42 @@ from typing import Literal
 from msgspec import Struct
 
 from acquisition.motion.errors import TaskError
+from acquisition.recording.bounds import Few, Name, Seconds, Whole
 
 
 class Move(Struct, frozen=True, forbid_unknown_fields=True, tag="move", tag_field="do"):
     """To a position of the task; `time_s`: not faster than this. `stop`: through the very place, which takes a rest."""
 
-    to: str
+    to: Name
     by: Literal["joint", "line"] = "joint"
-    time_s: float = 0.0
+    time_s: Seconds = 0.0
     stop: bool = False
 
 
 class Grasp(Struct, frozen=True, forbid_unknown_fields=True, tag="grasp", tag_field="do"):
     """Close the hand where the arm stands, and wait."""
 
-    wait_s: float = 0.0
+    wait_s: Seconds = 0.0
 
 
 class Release(Struct, frozen=True, forbid_unknown_fields=True, tag="release", tag_field="do"):
     """Open the hand where the arm stands, and wait."""
 
-    wait_s: float = 0.0
+    wait_s: Seconds = 0.0
 
 
 class Read(Struct, frozen=True, forbid_unknown_fields=True, tag="read", tag_field="do"):
     """Take a transform of the task from its camera; the arm stands meanwhile."""
 
-    transform: str
+    transform: Name
 
 
 class For(Struct, frozen=True, forbid_unknown_fields=True, tag="for", tag_field="do"):
     """The steps once for every value; {each} in a name stands for it."""
 
-    each: str
-    of: tuple[str | int, ...]
-    step: tuple["Step", ...]
+    each: Name
+    of: Few[Name | Whole]
+    step: Few["Step"]
 
 
 Step = Move | Grasp | Release | Read | For

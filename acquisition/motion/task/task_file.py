@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 
-import msgspec
 import numpy as np
 from msgspec import Struct
 
@@ -23,36 +22,35 @@ from acquisition.motion.task.equation import Equation, parse_equation
 from acquisition.motion.task.graph import TaskGraph
 from acquisition.motion.task.program import Step, filled, loops
 from acquisition.motion.task.transforms import Belt, Constant, Source, Unread, Untaught
-
-Vector = tuple[float, float, float]
-ZERO: Vector = (0.0, 0.0, 0.0)
+from acquisition.recording.bounds import ZERO, Direction, Few, Line, Name, Rotation, Vector
+from acquisition.recording.toml_file import parse_toml, read_text
 
 
 class TransformEntry(Struct, frozen=True, forbid_unknown_fields=True):
     """One named transform."""
 
     origin_m: Vector = ZERO
-    rotation_rad: Vector = ZERO
+    rotation_rad: Rotation = ZERO
     untaught: bool = False
     unread: bool = False
-    belt_direction: Vector | None = None
+    belt_direction: Direction | None = None
 
 
 class Teach(Struct, frozen=True, forbid_unknown_fields=True):
     """The arm is placed at a position, and one transform of its equation follows."""
 
-    transform: str
-    at: str
+    transform: Name
+    at: Name
 
 
 class TaskEntries(Struct, frozen=True, forbid_unknown_fields=True):
     """The whole file."""
 
-    transform: dict[str, TransformEntry]
-    position: dict[str, str]
-    step: tuple[Step, ...] = ()
-    relation: tuple[str, ...] = ()
-    teach: tuple[Teach, ...] = ()
+    transform: dict[Name, TransformEntry]
+    position: dict[Name, Line]
+    step: Few[Step] = ()
+    relation: Few[Line] = ()
+    teach: Few[Teach] = ()
 
 
 @dataclass(frozen=True)
@@ -66,12 +64,10 @@ class Task:
 
 def read_task(path: Path) -> Task:
     """TaskError with the file's name for what cannot be read or contradicts itself."""
+    entries = parse_toml(read_text(path, "task", TaskError), str(path), TaskError).checked(TaskEntries)
     try:
-        entries = msgspec.toml.decode(path.read_bytes(), type=TaskEntries)
         return task_of(entries)
-    except OSError as error:
-        raise TaskError(f"{path}: {error.strerror}; give the path of a task file") from error
-    except (msgspec.DecodeError, TaskError) as error:
+    except TaskError as error:
         raise TaskError(f"{path}: {error}") from error
 
 

@@ -120,7 +120,7 @@ def test_emulators_get_the_same_numbers_as_a_plain_mapping(edited: Edit) -> None
         ("upper_rad = 2.0\n", "", 15, r"\[\[arm.joint\]\] needs the key 'upper_rad'; add it"),
         ('model = "dh"', 'model = "mhd"', 5, r"unknown value 'mhd'; known are dh, mdh, local-poe; did you mean 'mdh'"),
         ("schema = 1", "schema = 2", 1, r"schema = 2 .* this version reads schema 1"),
-        ("half_size_m = 0.010", "half_size_m = 0.0", 28, r"half_size_m = 0.0 in \[fixture\]: expected float > 0.0"),
+        ("half_size_m = 0.010", "half_size_m = 0.0", 28, r"half_size_m = 0.0 in \[fixture\]: expected float >= 1e-09"),
         ("id = 7", "id = 1", 36, r"id = 1 is used twice in \[\[placement\]\]"),
         ("to = 7", "to = 8", 41, r"to = 8 is no placement of this rig \(it has \[1, 7\]\)"),
         ("to = 7", "to = 1", 41, r"from and to are the same placement 1"),
