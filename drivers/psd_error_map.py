@@ -20,6 +20,8 @@ Floats = NDArray[np.float64]
 TERMS = ("offset", "gain", "cross", "cushion", "cubic")
 RANK_LIMIT = 1e-2  # of singular values of scaled columns: a grid of 4 x 4 points has 0.12, one of 3 x 3 none: u^3 = u
 FORMAT = "calibeam-psd-error-map-1"
+LARGEST_M, LARGEST_REACH = 1.0, 10.0  # no face is longer than some centimetres, and none shows spots far beside it
+SHOWN = 120  # characters of what a file holds, in an error
 
 
 class MapStatus(Enum):
@@ -43,8 +45,14 @@ class ErrorMap:
 
     def __post_init__(self) -> None:
         rows = (self.x_m, self.y_m, self.x_sigma_m, self.y_sigma_m)
-        if not self.half_length_m > 0.0 or not self.reach > 0.0 or any(len(row) != len(TERMS) for row in rows):
-            raise ValueError(f"error map: lengths above 0 and {len(TERMS)} coefficients an axis are needed, got {self}")
+        if any(len(row) != len(TERMS) for row in rows):
+            raise ValueError(f"error map: {len(TERMS)} coefficients an axis are needed")
+        if not (0.0 < self.half_length_m <= LARGEST_M and 0.0 < self.reach <= LARGEST_REACH):
+            raise ValueError(
+                f"error map: half_length_m {self.half_length_m:g}, reach {self.reach:g} are of no detector"
+            )
+        if not np.all(np.abs(rows) <= LARGEST_M):  # no number fails as well
+            raise ValueError(f"error map: coefficients within {LARGEST_M:g} m are needed")
 
     def correct(self, x_m: ArrayLike, y_m: ArrayLike) -> tuple[Floats, Floats]:
         """Where the spot truly is, for spots as shown, of any one shape."""
@@ -60,13 +68,14 @@ class ErrorMap:
     def load(path: Path) -> "ErrorMap":
         """ValueError naming the file when it is not an error map; OSError when it cannot be read."""
         try:
-            held: Any = json.loads(path.read_text())
+            held: Any = json.loads(path.read_text(encoding="utf-8"))
             if held.pop("format") != FORMAT:
                 raise ValueError("another format")
             rows = {name: tuple(map(float, held.pop(name))) for name in ("x_m", "y_m", "x_sigma_m", "y_sigma_m")}
             return ErrorMap(float(held["half_length_m"]), **rows, reach=float(held["reach"]))
-        except (ValueError, KeyError, TypeError, AttributeError) as cause:
-            raise ValueError(f"{path}: no error map of format {FORMAT} ({cause}); measure one") from cause
+        except (ValueError, KeyError, TypeError, AttributeError, ArithmeticError, RecursionError) as cause:
+            why = str(cause)[:SHOWN]
+            raise ValueError(f"{path}: no error map of format {FORMAT} ({why}); measure one") from cause
 
 
 @dataclass(frozen=True)

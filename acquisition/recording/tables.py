@@ -6,6 +6,7 @@ Numbers are written so that they read back bit for bit. Parquet columns carry th
 
 import enum
 import importlib
+import math
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -75,7 +76,7 @@ def write_table(columns: dict[str, Any], path: Path, kind: TableFormat) -> None:
 
 
 def _columns(pa: Any, stream: Stream, channel: Channel) -> Iterable[tuple[Any, np.ndarray[Any, Any]]]:
-    values = stream.values[channel.name].reshape(len(stream.host_s), -1)
+    values = stream.values[channel.name].reshape(len(stream.host_s), math.prod(channel.shape))
     kind = pa.int64() if values.dtype.kind == "i" else pa.float64()
     for number, name in enumerate(scalar_names(channel)):
         yield (

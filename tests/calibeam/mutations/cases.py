@@ -66,7 +66,7 @@ def faults(pair: Pair, seed: int, ran: Ran) -> list[str]:
         found.append(f"exit code 0 with {ran.err[-200:]}")
     if "Warning: " in ran.err:
         found.append(f"a warning of a library: {ran.err.strip().splitlines()[0][:200]}")
-    if ran.code == 0 and pair.kind in REFUSED.get(pair.mutator(seed).__name__, ()) and not pair.together:
+    if ran.code == 0 and not pair.together and pair.kind in REFUSED.get(pair.mutator(seed).__name__, ()):
         found.append("was taken, exit code 0")
     found += [f"{len(m)} characters: {m[:160]}…{m[-60:]}" for m in messages(ran) if len(m) > MESSAGE]
     if ran.peak_bytes > LIMIT_BYTES:
@@ -76,7 +76,7 @@ def faults(pair: Pair, seed: int, ran: Ran) -> list[str]:
 
 def messages(ran: Ran) -> list[str]:
     """Sentences for a person about what is wrong: how the command ended, and devices that are not fit."""
-    ended = re.split(r"(?m)^(?=error: |stopped: )", ran.err)[1:]
+    ended = re.split(r"(?m)^(?:error|stopped): ", ran.err)[1:]
     return [each.strip() for each in ended] + [line for line in ran.out.splitlines() if " BAD " in line[:20]]
 
 

@@ -15,6 +15,7 @@ from tests.calibeam.mutations.text_mutators import (
     Rng,
     bad_utf8,
     bom,
+    cut,
     many,
     pick,
 )
@@ -34,6 +35,8 @@ def _edited(rng: Rng, data: bytes, wanted: Callable[[Any], bool], change: Callab
     """A raw token may be written by a string that begins with RAW."""
     tree = json.loads(data)
     found = [place for place in _places(tree) if wanted(place[0][place[1]])]
+    if not found:
+        return cut(rng, data)
     # by key first: else most changes fall into the longest list
     key = pick(rng, sorted({str(key) for _, key in found}))
     holder, at = pick(rng, [place for place in found if str(place[1]) == key])
@@ -87,14 +90,20 @@ def json_uneven(rng: Rng, data: bytes) -> bytes:
 
 def json_missing(rng: Rng, data: bytes) -> bytes:
     tree = json.loads(data)
-    holder, key = pick(rng, [place for place in _places(tree) if isinstance(place[0], dict)])
+    found = [place for place in _places(tree) if isinstance(place[0], dict)]
+    if not found:
+        return cut(rng, data)
+    holder, key = pick(rng, found)
     del holder[key]
     return json.dumps(tree).encode()
 
 
 def json_renamed(rng: Rng, data: bytes) -> bytes:
     tree = json.loads(data)
-    holder, key = pick(rng, [place for place in _places(tree) if isinstance(place[0], dict)])
+    found = [place for place in _places(tree) if isinstance(place[0], dict)]
+    if not found:
+        return cut(rng, data)
+    holder, key = pick(rng, found)
     holder[pick(rng, ("x", "", "k" * many(rng), "a\u0000b", "name"))] = holder.pop(key)
     return json.dumps(tree).encode()
 
@@ -102,7 +111,10 @@ def json_renamed(rng: Rng, data: bytes) -> bytes:
 def json_twice(rng: Rng, data: bytes) -> bytes:
     """A key a second time, with another value."""
     text = data.decode()
-    one = pick(rng, list(re.finditer(r'("[\w.]+")\s*:', text)))
+    keys = list(re.finditer(r'("[\w.]+")\s*:', text))
+    if not keys:
+        return cut(rng, data)
+    one = pick(rng, keys)
     return (text[: one.start()] + f"{one[1]}: {pick(rng, WRONG)}, " + text[one.start() :]).encode()
 
 

@@ -13,15 +13,17 @@ import numpy as np
 
 from calibeam.cli import COMMANDS
 from tests.calibeam.mutations.json_mutators import JSON
+from tests.calibeam.mutations.recording_mutators import RECORDING
 from tests.calibeam.mutations.table_mutators import CSV, PARQUET
 from tests.calibeam.mutations.text_mutators import BINARY, LINES, TOML, Mutator
 
 KINDS = {
-    ".toml": "toml", ".json": "json", ".csv": "csv", ".parquet": "parquet", ".mcap": "binary", ".blf": "binary",
+    ".toml": "toml", ".json": "json", ".csv": "csv", ".parquet": "parquet", ".mcap": "recording", ".blf": "binary",
     ".log": "lines", ".asc": "lines", ".dbc": "lines", ".jsonl": "lines",
 }  # fmt: skip
 MUTATORS: dict[str, tuple[Mutator, ...]] = {
     "toml": TOML, "json": JSON, "csv": CSV, "lines": LINES, "binary": BINARY, "parquet": PARQUET,
+    "recording": RECORDING,
 }  # fmt: skip
 REFUSED = {"bad_utf8": ("toml", "json", "csv")}  # what no reader of these kinds may take
 DAILY, ENDURE = 20, 300
@@ -167,7 +169,6 @@ DEVICES = (
     Pair("psd1.json", "check rig.toml"),
     Pair("psd1.json", "live rig.toml --port 0 --for-s 0"),
     Pair("psd1.json", "session rig.toml --out made --yes"),
-    Pair("psd1.json", "psd-check rig.toml --points points.csv --no-wait"),
     Pair("camera.json", "check eye.toml"),
     Pair("camera.json", "session eye.toml --out made --yes"),
     Pair("points.csv", "psd-check rig.toml --points points.csv --no-wait"),

@@ -116,7 +116,7 @@ def test_a_fork_ends_as_the_console_script_does(
         (Ran(0, "", "error: but good\n", 0.1, 0.1, 1000), "exit code 0"),
         (Ran(2, "", "usage", 0.1, 0.1, 1000), "exit code 2"),
         (Ran(-11, "", "", 0.1, 0.1, 1000), "exit code -11"),
-        (Ran(1, "", f"error: {'x' * 300}\n", 0.1, 0.1, 1000), "307 characters"),
+        (Ran(1, "", f"error: {'x' * 301}\n", 0.1, 0.1, 1000), "301 characters"),
         (Ran(0, "", "", 0.1, 0.1, 2_000_000_000), "took 2000 MB"),
         (Ran(-9, "", "", 60.1, 0.1, 1000, "took too long"), "took too long after 60.1 s"),
     ],
