@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from acquisition.errors import AcquisitionError
 from acquisition.guarded import one_error_tree
 from acquisition.psd_view import psd_window
-from acquisition.recording.errors import RigFileError
+from acquisition.recording.errors import RigFileError, brief
 from acquisition.recording.rig_devices import EncoderDriver, RobotDriver
 from acquisition.recording.rig_schema import Camera, Rig
 from calibeam.camera import camera_sight
@@ -45,10 +45,10 @@ class DeviceCheck:
     @property
     def line(self) -> str:
         if self.wrong and not self.what:
-            return f"{self.device:9s} BAD   {self.wrong}"
+            return brief(f"{self.device:9s} BAD   {self.wrong}")
         facts = [self.what, f"firmware {self.firmware}" if self.firmware else "", f"{self.rate_hz:.0f} Hz", self.noise]
         told = ", ".join(fact for fact in facts if fact)
-        return f"{self.device:9s} BAD   {told}: {self.wrong}" if self.wrong else f"{self.device:9s} good  {told}"
+        return brief(f"{self.device:9s} BAD   {told}: {self.wrong}" if self.wrong else f"{self.device:9s} good  {told}")
 
 
 def check_devices(rig: Rig, clock: Clock) -> Iterator[DeviceCheck]:

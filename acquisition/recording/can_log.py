@@ -23,6 +23,7 @@ import numpy as np
 from can.io.blf import BLFParseError
 from can.io.generic import MessageReader, MessageWriter
 
+from acquisition.recording.bounds import TIME_S
 from acquisition.recording.can_frames import (
     CHANNELS_NOTE,
     CLASSIC_BYTES,
@@ -35,12 +36,11 @@ from acquisition.recording.can_frames import (
     stream_names,
 )
 from acquisition.recording.can_message import frame_of, message_of
-from acquisition.recording.errors import RecordingError
+from acquisition.recording.errors import RecordingError, shown
 from acquisition.recording.recording import Recording
 from acquisition.recording.stream_writer import StreamWriter
 from acquisition.recording.writer import RecordingWriter
 
-LATEST_S = 253_402_300_799.0  # since 1970: the end of the year 9999, beyond which no date can be written
 BLOCK = 10_000  # frames at a time into the recording
 MALFORMED = (  # what python-can's readers raise on lines and bytes that make no sense
     BLFParseError,
@@ -142,7 +142,7 @@ def _messages(recording: Recording) -> Iterator[can.Message]:
     named: dict[str, int | str | None] = msgspec.json.decode(recording.notes.get(CHANNELS_NOTE, "{}"))
     start_s = _since_1970(recording.started_utc) - recording.host_s0
     if not math.isfinite(start_s):
-        start_s = -min(float(stream.host_s[0]) for stream in streams if stream.host_s.size)
+        start_s = -min((float(stream.host_s[0]) for stream in streams if stream.host_s.size), default=0.0)
     rows: list[tuple[float, int | str | None, Frame]] = []
     for stream in streams:
         channel = named.get(stream.name)
@@ -177,14 +177,14 @@ class _Log:
             # opened here: python-can leaves a file open whose beginning it does not know
             with self._path.open(self._mode) as file, self._open(file) as messages:
                 for message in messages:
-                    if not 0.0 <= message.timestamp <= LATEST_S:
+                    if not 0.0 <= message.timestamp <= TIME_S:
                         raise ValueError(f"time stamp {message.timestamp}")
                     yield message
                     count += 1
         except OSError as error:
             raise RecordingError(f"{self._path}: cannot read it ({error.strerror or error}); check the path") from error
         except MALFORMED as error:
-            self.damage = f"after {count} frames the file makes no sense ({type(error).__name__}: {error})"
+            self.damage = f"after {count} frames the file makes no sense ({shown(f'{type(error).__name__}: {error}')})"
 
 
 @dataclass(frozen=True)

@@ -33,9 +33,11 @@ def read_json(path: Path, kind: JsonKind, records: type[T], other: Check) -> T:
     """
     data = _read(path, kind)
     try:
+        data.decode("utf-8")
         document: Any = msgspec.json.decode(data)
-    except UnicodeDecodeError:
-        raise kind.fault(f"{path}: {_not_utf8(data)}; {kind.again}") from None
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise kind.fault(f"{path} line {line}: byte {error.start} is not UTF-8; {kind.again}") from error
     except RecursionError:
         raise kind.fault(f"{path}: not a {kind.name} (lists or objects hundreds deep); {kind.again}") from None
     except msgspec.DecodeError as error:
@@ -51,9 +53,9 @@ def read_json(path: Path, kind: JsonKind, records: type[T], other: Check) -> T:
         place, says, value = located(error, content, records)
         key = ".".join(map(str, place)) or "the file"
         is_one = not isinstance(value, dict | list)
-        spelled = f" = {shown(value)}" if is_one else ""
+        spelled = f" = {shown(value, 80)}" if is_one else ""
         raise kind.fault(
-            f"{path}: damaged {kind.name}: {shown(key)}{spelled}: {shown(plain(says))}; {kind.again}"
+            f"{path}: damaged {kind.name}: {shown(key, 80)}{spelled}: {shown(plain(says))}; {kind.again}"
         ) from error
 
 
@@ -66,12 +68,3 @@ def _read(path: Path, kind: JsonKind) -> bytes:
     if len(data) > LARGEST_BYTES:
         raise kind.fault(f"{path}: larger than {LARGEST_BYTES / 1e6:g} MB, which no {kind.name} is; {kind.give}")
     return data
-
-
-def _not_utf8(data: bytes) -> str:
-    try:
-        data.decode("utf-8")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        return f"byte {error.start} (line {line}) is not UTF-8"
-    return "text that is not UTF-8"

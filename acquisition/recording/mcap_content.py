@@ -10,6 +10,7 @@ from google.protobuf.message import DecodeError
 from mcap.records import Channel as McapChannel
 from mcap.records import Message, Metadata, Schema
 
+from acquisition.recording.bounds import TIME_S, Label, Name, Statistic
 from acquisition.recording.layout import (
     CHECKSUM,
     EVENTS_TOPIC,
@@ -29,11 +30,11 @@ _CLOCKS = ("host_s", "device_s", "sequence")
 class _ChannelRow(msgspec.Struct):
     """A channel as it is declared in the file."""
 
-    name: str
-    unit: str
-    shape: tuple[Annotated[int, msgspec.Meta(ge=1)], ...]
-    resolution: float
-    full_scale: float = float("inf")
+    name: Name
+    unit: Label
+    shape: tuple[Annotated[int, msgspec.Meta(ge=1, le=1_000_000)], ...]
+    resolution: Statistic
+    full_scale: Statistic = float("inf")
 
 
 class Content:
@@ -105,6 +106,8 @@ class Content:
         piece = {field: np.array(getattr(batch, field)) for field in sizes}
         if any(piece[field].size != size * len(batch.host_s) for field, size in sizes.items()):
             raise ValueError("the arrays of one batch are of different lengths")
+        if not np.all(np.abs(piece["host_s"]) <= TIME_S) or np.any(np.abs(piece["device_s"]) > TIME_S):
+            raise ValueError("a time stamp of the batch is beyond what 64 bits of nanoseconds hold")
         self._pieces.setdefault(name, []).append(piece)
 
     def _take_sample(self, channel: McapChannel, sample: Any) -> None:

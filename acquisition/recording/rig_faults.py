@@ -54,11 +54,11 @@ def located(error: msgspec.ValidationError, document: Mapping[str, Any], root: A
 
 def unknown_key(key: str, path: KeyPath, known: Sequence[str]) -> str:
     """Says what a key that nobody knows was probably meant to be."""
-    says = f"unknown key '{shown(key)}' in {section(path)}"
+    says = f"unknown key '{shown(key, 60)}' in {section(path)}"
     if (in_si := si_name(key)) in known:
         return f"{says}; the file is in SI units: write '{in_si}' in {spelt(suffix_of(str(in_si)) or '')}"
     near = difflib.get_close_matches(key[:LONGEST_KEY], known, n=1)
-    return f"{says}; did you mean '{near[0]}'?" if near else f"{says}; known are {', '.join(known)}"
+    return f"{says}; did you mean '{near[0]}'?" if near else f"{says}; known are {shown(', '.join(known))}"
 
 
 def known_keys(path: KeyPath, document: Mapping[str, Any], root: Any = Rig) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from typing import IO, Self
 
 import msgspec
 
-from acquisition.recording.errors import RecordingError
+from acquisition.recording.errors import RecordingError, shown
 from calibeam.fleet.layout import JOURNAL, TABLE
 from calibeam.fleet.row import Row
 from calibeam.fleet.table import read_rows, write_rows
@@ -82,7 +82,8 @@ def _lines(file: IO[bytes]) -> list[Row]:
     whole = [line for line in file if line.endswith(b"\n")]
     try:
         return [msgspec.json.decode(line, type=Row) for line in whole]
-    except msgspec.DecodeError as error:
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise RecordingError(
-            f"{file.name}: of another version of this program ({error}); take it away, or choose another --out"
+            f"{file.name}: damaged, or of another version of this program ({shown(str(error))}); remove it, or choose "
+            "another --out"
         ) from error

@@ -2,13 +2,13 @@
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, get_args, get_origin
 
 import msgspec
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from acquisition.recording.errors import RecordingError
+from acquisition.recording.errors import RecordingError, shown
 from calibeam.fleet.row import Row
 
 VERSION = b"2"
@@ -64,9 +64,9 @@ def read_rows(path: Path) -> list[Row]:
         if (table.schema.metadata or {}).get(KEY) != VERSION:
             raise ValueError("not a table of this program, or of another version of it")
         return [_row(plain) for plain in table.to_pylist()]
-    except (OSError, ValueError) as error:  # pyarrow.ArrowInvalid and msgspec's errors are ValueErrors
+    except (OSError, ValueError, KeyError) as error:  # pyarrow.ArrowInvalid and msgspec's errors are ValueErrors
         raise RecordingError(
-            f"{path}: cannot be gone on with ({error}); choose another --out, or take the file away"
+            f"{path}: cannot be continued ({shown(str(error))}); choose another --out, or remove the file"
         ) from error
 
 
@@ -76,7 +76,8 @@ def _kinds() -> dict[str, Any]:
     for field in msgspec.structs.fields(Row):
         if field.name in ("zeros", "noise"):
             continue
-        kind = float if field.name.endswith("_m") else field.type
+        stated = get_args(field.type)[0] if get_origin(field.type) is Annotated else field.type
+        kind = float if field.name.endswith("_m") else stated
         kinds[field.name] = NESTED.get(field.name, PLAIN.get(kind, pa.string()))
     return kinds
 

@@ -28,6 +28,9 @@ Floats = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
 TRIES = 40  # targets for each pose that is wanted: of a place out of reach none ever lands
+FUTILE = (
+    5 * TRIES
+)  # targets of a place of which none has landed: of a place that fills up in time, 1 in 170 comes to it
 BRANCHES = 2  # of one target, drawn at random
 TURN_RAD = np.pi  # angles of robots that may turn further are drawn within this: a second turn shows nothing new
 LOWEST_M = 0.05  # of a target that a tracker is to see, above the base plane
@@ -76,8 +79,8 @@ def _landed(
     options, solver, half_m = PlanOptions(), solver_of(rig), believed.fixture.half_size_m
     home, T = np.array(rig.motion.home_rad or np.zeros(rig.n_joints)), believed.T_base_psd1(place)
     edge_m, out = options.face_share * half_m, list[tuple[Floats, Floats]]()
-    for _ in range(TRIES * wanted):
-        if len(out) >= wanted:
+    for tried in range(TRIES * wanted):
+        if len(out) >= wanted or (tried == FUTILE and not out):
             break
         x1, y1, x2, y2 = rng.uniform(-edge_m, edge_m, 4).tolist()
         stand_off, roll = float(rng.uniform(*options.stand_off_m)), float(rng.uniform(-np.pi, np.pi))

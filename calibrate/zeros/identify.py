@@ -16,7 +16,7 @@ from scipy.special import ndtr, stdtrit
 from calibrate import noise as noise_model
 from calibrate import variance
 from calibrate.chain import Chain
-from calibrate.errors import DataError
+from calibrate.errors import DataError, naming_undetermined
 from calibrate.fit import Fit, Status
 from calibrate.identifiability import Identifiability
 from calibrate.noise import NoiseModel, VarianceFactors
@@ -137,7 +137,8 @@ def _noise(problem: Problem, theta: Floats, parts: Floats, known: VarianceFactor
     free, information = _free(problem.parameters)
     deviation = (theta - start_values(problem.parameters))[free]
     rows = noisy_rows(problem, theta, parts)
-    return variance.estimate((rows,), 2, information, information * deviation, known)
+    with naming_undetermined([p.name for p in problem.parameters if p.free], problem.q_rad):
+        return variance.estimate((rows,), 2, information, information * deviation, known)
 
 
 def _free(parameters: tuple[Parameter, ...]) -> tuple[NDArray[np.intp], Floats]:
@@ -150,7 +151,8 @@ def _widening(weighted: Weighted) -> Floats:
     """(param,) factor on sigma that keeps the odds of 3 sigma when the noise is known from few data."""
     problem, theta = weighted.problem, weighted.fit.theta
     free, information = _free(problem.parameters)
-    dof = variance.doubt((noisy_rows(problem, theta, weighted.parts),), information, weighted.factors)
+    with naming_undetermined([p.name for p in problem.parameters if p.free], problem.q_rad):
+        dof = variance.doubt((noisy_rows(problem, theta, weighted.parts),), information, weighted.factors)
     out = np.ones(len(theta))
     out[free] = stdtrit(np.maximum(dof, LEAST_DOF), ndtr(3.0)) / 3.0
     return out

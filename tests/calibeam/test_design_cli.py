@@ -8,6 +8,7 @@ import pytest
 from acquisition.recording.pose_plan import read_pose_plan
 from acquisition.recording.rig import load_rig
 from calibeam.cli import run
+from calibeam.pose_design import reachable
 
 RIGS = Path(__file__).parents[2] / "rigs"
 ROBOT, ARM = RIGS / "ur5e-dual-psd.toml", RIGS / "arm-cmm-reference.toml"
@@ -71,3 +72,27 @@ def test_an_error_that_moves_nothing_has_no_worst_posture_and_no_share(tmp_path,
 def test_errors_without_a_size_are_refused(capsys):
     assert run(["simulate-errors", str(ROBOT), "--only", "heat.*"]) == 1
     assert "no error to simulate" in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_design_of_places_out_of_reach_gives_up_after_a_stated_number_of_tries(tmp_path, capsys, monkeypatch):
+    tried = []
+
+    def none(*_):
+        tried.append(1)
+        return []
+
+    monkeypatch.setattr(reachable, "all_solutions", none)
+    far = tmp_path / "rig.toml"
+    far.write_text(ROBOT.read_text().replace("d_m = 0.1625", "d_m = 1000.0", 1))
+    places = len(load_rig(far).placements)
+    assert run(["design", str(far), "--out", str(tmp_path / "plan.toml")]) == 1
+    assert len(tried) == 2 * places * reachable.FUTILE  # each place, with either face first
+    assert "no pose lights both faces at any place; check placements" in capsys.readouterr().err
+
+
+def test_errors_of_a_rig_with_an_endless_name_are_refused(tmp_path, capsys):
+    named = tmp_path / "rig.toml"
+    for length in (10**6, 10**7):
+        named.write_text(ARM.read_text().replace('name = "', 'name = "' + "x" * length, 1))
+        assert run(["simulate-errors", str(named), "--arms", "10", "--poses", "1"]) == 1
+        assert len(capsys.readouterr().err.replace(str(tmp_path), ".").strip()) <= 300 + len("error: ")

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from calibrate.errors import DataError, naming_undetermined
 from calibrate.noisy_rows import FIXED, NoisyRows, covariance_of, independent
 from calibrate.restricted_score import score_at
 
@@ -141,4 +142,10 @@ def test_an_open_combination_is_refused():
     rows = instrument(np.random.default_rng(9), 4, (0, 1))
     rows.jacobian[:, :, 3] = 0.0
     with pytest.raises(np.linalg.LinAlgError):
+        score_at([independent(rows)], np.zeros(2), np.zeros(PARAMS), np.zeros(PARAMS))
+    names, q_rad = [f"p{i}" for i in range(PARAMS)], np.column_stack([np.arange(4.0), np.zeros(4)])
+    with (
+        pytest.raises(DataError, match=r"not determined by these samples: p3 \(q2_rad = 0 in every row\)"),
+        naming_undetermined(names, q_rad),
+    ):
         score_at([independent(rows)], np.zeros(2), np.zeros(PARAMS), np.zeros(PARAMS))

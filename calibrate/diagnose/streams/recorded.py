@@ -1,5 +1,6 @@
 """The tracks that a recording holds, each on its device's own clock, by the names of their channels."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -71,7 +72,8 @@ def _of(recording: Recording, channel: str, name: str) -> Device | None:
     stream = _stream(recording, channel)
     if stream is None:
         return None
-    values = np.asarray(stream.values[channel], dtype=float).reshape(len(stream.host_s), -1)
+    values = np.asarray(stream.values[channel], dtype=float)
+    values = values.reshape(len(values), math.prod(values.shape[1:]))  # also of a stream without a sample
     return Device(Track(name, "rad", stream.device_s, values), stream.sequence, stream.host_s)
 
 

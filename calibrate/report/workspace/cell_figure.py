@@ -38,20 +38,25 @@ def paint_unsupported(axes: Axes, grid: Grid, cells: Bools) -> None:
 
 def paint_poses(axes: Axes, grid: Grid, points_m: Floats) -> None:
     """Where the poses of the session were."""
-    some = grid.view.flat(points_m[:: -(-len(points_m) // MOST_POSES)])
+    some = grid.view.flat(points_m[:: _stride(len(points_m))])
     paper, ink = Tone.PAPER.value, Tone.INK.value
     axes.plot(*some.T, "o", ms=2.6, mfc=paper, mec=ink, mew=0.5, zorder=4)
 
 
 def paint_measured(axes: Axes, grid: Grid, points_m: Floats, values_m: Floats, steps: Steps) -> None:
     """A point a pose in the colour of its error, the largest on top; of many, every n-th."""
-    some = np.arange(0, len(values_m), -(-len(values_m) // MOST_POSES))
+    some = np.arange(0, len(values_m), _stride(len(values_m)))
     order = some[np.argsort(values_m[some])]
     flat, step = grid.view.flat(points_m[order]), steps.of(values_m[order])
     for k, colour in enumerate(steps.colours):
         own = flat[step == k]
         if len(own):
             axes.plot(*own.T, "o", ms=3.6, mfc=colour, mec=Tone.INK.value, mew=0.25, zorder=4 + k)
+
+
+def _stride(count: int) -> int:
+    """Every so many of `count` poses are drawn; also where no pose has a value."""
+    return max(1, -(-count // MOST_POSES))
 
 
 def dress(axes: Axes, grid: Grid, title: str, what: str, *, first: bool) -> None:

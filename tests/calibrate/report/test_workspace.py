@@ -6,15 +6,17 @@ import msgspec
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 
 from calibrate.fit import solve
 from calibrate.report.deleted import deleted_misfit
 from calibrate.report.sections.workspace import workspace
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_workspace import session_arm, session_measured
+from calibrate.report.workspace.cell_figure import paint_measured, paint_poses
 from calibrate.report.workspace.room import room_of
 from calibrate.report.workspace.scale import steps_for
-from calibrate.report.workspace.sections import ABOVE, SIDE, grid_of
+from calibrate.report.workspace.sections import ABOVE, SIDE, Grid, grid_of
 
 
 @pytest.fixture(scope="module")
@@ -106,3 +108,11 @@ def test_steps_are_round_hold_the_largest_and_darken_with_it(low, high):
     grey = [np.dot(to_rgb(colour), (0.2126, 0.7152, 0.0722)) for colour in steps.colours]
     assert np.all(np.diff(grey) < 0.0)
     assert steps.of(np.array([np.nan, high])).tolist() == [-1, len(steps.colours) - 1]
+
+
+def test_of_no_pose_at_all_nothing_is_drawn():
+    axes, grid = Figure().add_subplot(), Grid(ABOVE, 0.1, (0, 0), (2, 2))
+    steps = steps_for(np.array([1e-5, 2e-5]))
+    paint_poses(axes, grid, np.zeros((0, 3)))
+    paint_measured(axes, grid, np.zeros((0, 3)), np.zeros(0), steps)
+    assert not any(len(line.get_xdata()) for line in axes.lines)
