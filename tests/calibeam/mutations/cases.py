@@ -14,7 +14,7 @@ from pathlib import Path
 from tests.calibeam.mutations.server import Ran, Server
 from tests.calibeam.mutations.table import REFUSED, TABLE, Pair
 
-LIMIT_S, LIMIT_BYTES = 60.0, 1_000_000_000
+LIMIT_S, LIMIT_BYTES = 60.0, 1_000_000_000  # of processor time, so that a busy machine finds no hang
 MESSAGE = 300  # characters
 CODES = (0, 1, 3)  # good, failed, partial; 2 is for words of the command line, and those are right
 SAID = {1: "error: ", 3: "stopped: "}  # how the line begins that says why
@@ -54,7 +54,7 @@ def lay_out(good: Path, pair: Pair, seeds: range, folder: Path) -> None:
 def faults(pair: Pair, seed: int, ran: Ran) -> list[str]:
     """In words; none for a run as it should be."""
     if ran.killed:
-        return [f"{ran.killed} after {ran.seconds:.1f} s"]
+        return [f"{ran.killed}: {ran.cpu_s:.1f} s of a core in {ran.seconds:.1f} s"]
     found: list[str] = []
     if "Traceback (most recent call last)" in ran.err + ran.out:
         found.append(f"traceback: {ran.err.strip().splitlines()[-1][:200]}")

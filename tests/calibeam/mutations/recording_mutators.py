@@ -6,7 +6,7 @@ Written again by the MCAP library itself, so that nothing but the change is wron
 import hashlib
 import io
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from mcap.reader import NonSeekingReader
@@ -23,15 +23,28 @@ from tests.mutated import mutated
 class _Content:
     """Records of a whole recording in their order."""
 
-    metadata: list[Metadata] = field(default_factory=list)
-    messages: list[tuple[Schema | None, Channel, Message]] = field(default_factory=list)
+    metadata: list[Metadata]
+    messages: list[tuple[Schema | None, Channel, Message]]
+
+
+def rewritten(data: bytes, change: Callable[[bytes], bytes]) -> bytes:
+    """The same recording with every message changed."""
+    content = _content(data)
+    content.messages = [(s, c, replace(m, data=change(m.data))) for s, c, m in content.messages]
+    return _written(content)
+
+
+def _content(data: bytes) -> _Content:
+    records = StreamReader(io.BytesIO(data)).records
+    return _Content(
+        [one for one in records if isinstance(one, Metadata)],
+        list(NonSeekingReader(io.BytesIO(data)).iter_messages(log_time_order=False)),
+    )
 
 
 def _rewritten(change: Callable[[Rng, _Content], None]) -> Mutator:
     def made(rng: Rng, data: bytes) -> bytes:
-        content = _Content()
-        content.metadata = [one for one in StreamReader(io.BytesIO(data)).records if isinstance(one, Metadata)]
-        content.messages = list(NonSeekingReader(io.BytesIO(data)).iter_messages(log_time_order=False))
+        content = _content(data)
         change(rng, content)
         return _written(content)
 

@@ -5,17 +5,21 @@ A command answers bad content with exit code 1 and a line `error: …`, or keeps
 names the command that repeats it: see cases.py.
 """
 
+import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from calibeam.cli import COMMANDS
 from tests.calibeam.mutations.cases import Fault, faults, lay_out, run_case
+from tests.calibeam.mutations.recording_mutators import rewritten
 from tests.calibeam.mutations.server import Ran, Server
 from tests.calibeam.mutations.table import ENDURE, EXEMPT, TABLE, Pair, missing
+
+Change = Callable[[bytes], bytes]
 
 CHUNK = 100  # seeds of one test
 REAL = (  # through the installed console script as well: one of each way to end
@@ -26,6 +30,23 @@ REAL = (  # through the installed console script as well: one of each way to end
     ("tracker:samples.csv|export_tracker_--out_made", 0),
     ("rig.toml|check_rig.toml", 5),
 )
+PSD_CHECK = "psd-check rig.toml --points points.csv --no-wait"
+CONTINUE = "session rig.toml --continue --out begun --yes"
+FACTOR = b"(0.00034332275390625,0)"
+FOUND = (  # what mutations have shown once: file, change, command line, what is in its answer
+    ("encoders.dbc", lambda data: data.replace(FACTOR, b"(0,0)", 1), "check rig.toml", "correct the DBC file"),
+    ("encoders.dbc", lambda data: data + b"BO_ " * 2000, "check rig.toml", "export it again"),
+    ("psd1.json", lambda data: data[:-9], "check rig.toml", "no error map of format"),
+    ("psd1.json", lambda data: b"[" * 100_000, "session rig.toml --out made --yes", "no error map of format"),
+    ("points.csv", lambda data: data.replace(b"-0.006", b"1e308", 1), PSD_CHECK, "row 1: x_m = 1e+308"),
+    ("points.csv", lambda data: b"\xff" + data, PSD_CHECK, "it needs columns x_m, y_m"),
+    ("begun/recording.mcap", lambda data: _other_events(data), CONTINUE, "do not say which poses are done"),
+)
+
+
+def _other_events(data: bytes) -> bytes:
+    """Poses under another name, in every message, with the checksums of the new ones."""
+    return rewritten(data, lambda message: message.replace(b'"first":1', b'"fiest":1'))
 
 
 @pytest.fixture(scope="module")
@@ -103,6 +124,17 @@ def test_a_fork_ends_as_the_console_script_does(
     assert done.stdout.splitlines()[:1] == forked.out.splitlines()[:1]
 
 
+@pytest.mark.parametrize(("file", "change", "words", "told"), FOUND, ids=[f"{one[0]}-{one[3]}" for one in FOUND])
+def test_what_was_found_is_answered(
+    file: str, change: Change, words: str, told: str, server: Server, good: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(good, tmp_path / "case")
+    (tmp_path / "case" / file).write_bytes(change((good / file).read_bytes()))
+    ran = server.run(words.split(), tmp_path / "case", 60.0, 10**9)
+    assert told in ran.out + ran.err
+    assert not faults(Pair(file, words), 0, ran)
+
+
 @pytest.mark.parametrize(
     ("ran", "told"),
     [
@@ -118,7 +150,7 @@ def test_a_fork_ends_as_the_console_script_does(
         (Ran(-11, "", "", 0.1, 0.1, 1000), "exit code -11"),
         (Ran(1, "", f"error: {'x' * 301}\n", 0.1, 0.1, 1000), "301 characters"),
         (Ran(0, "", "", 0.1, 0.1, 2_000_000_000), "took 2000 MB"),
-        (Ran(-9, "", "", 60.1, 0.1, 1000, "took too long"), "took too long after 60.1 s"),
+        (Ran(-9, "", "", 70.0, 60.1, 1000, "took too long"), "took too long: 60.1 s of a core"),
     ],
 )
 def test_what_counts_as_a_fault(ran: Ran, told: str | None) -> None:
