@@ -15,6 +15,7 @@ from tests.calibeam.mutations.server import Ran, Server
 from tests.calibeam.mutations.table import REFUSED, TABLE, Pair
 
 LIMIT_S, LIMIT_BYTES = 60.0, 1_000_000_000  # of processor time, so that a busy machine finds no hang
+WRITTEN = ("fleet", "begun")  # inputs that a command may write to
 MESSAGE = 300  # characters
 CODES = (0, 1, 3)  # good, failed, partial; 2 is for words of the command line, and those are right
 SAID = {1: "error: ", 3: "stopped: "}  # how the line begins that says why
@@ -41,13 +42,18 @@ def run_case(server: Server, good: Path, pair: Pair, seeds: range, folder: Path)
 
 def lay_out(good: Path, pair: Pair, seeds: range, folder: Path) -> None:
     """The inputs with one of them mutated; together: session folders sets/s<seed>, each with one file mutated."""
-    shutil.copytree(good, folder)
+    changed, _, name = pair.file.partition("/")
+    folder.mkdir()
+    for one in good.iterdir():
+        if one.name in (changed, *WRITTEN):
+            (shutil.copytree if one.is_dir() else shutil.copy)(one, folder / one.name)
+        else:
+            (folder / one.name).symlink_to(one)
     if not pair.together:
         (folder / pair.file).write_bytes(pair.mutated(good, seeds[0]))
         return
-    session, _, name = pair.file.partition("/")
     for seed in seeds:
-        shutil.copytree(good / session, folder / "sets" / f"s{seed}")
+        shutil.copytree(good / changed, folder / "sets" / f"s{seed}")
         (folder / "sets" / f"s{seed}" / name).write_bytes(pair.mutated(good, seed))
 
 

@@ -5,6 +5,7 @@ A fork gets no keyboard, its own process group and no network but loopback. It s
 has none; test_mutations.py compares it with the installed console script.
 """
 
+import gc
 import json
 import os
 import resource
@@ -106,6 +107,8 @@ def serve(folder: Path) -> None:
     write_inputs(folder, run)
     if threading.active_count() > 1:
         raise RuntimeError(f"threads that a fork would not have: {threading.enumerate()}")
+    gc.collect()
+    gc.freeze()  # a collection in a fork would copy every page that it looks at
     print("{}", file=answers)
     for line in sys.stdin:
         request = json.loads(line)
