@@ -34,7 +34,8 @@ class PsdInstrument(Device, Protocol):
 
 
 def psd_driver(device: PsdDevice, rig: Rig, clock: Clock, hurry: float = 1.0) -> PsdInstrument:
-    """Not connected yet. DeviceRefused for values that no driver takes. `hurry`: see Kpa101Pair."""
+    """Not connected yet. DeviceRefused for values and error maps that nobody can take. `hurry`: see Kpa101Pair."""
+    _error_maps(device)  # what is wrong with a file is reported before a device is touched
     try:
         if device.driver is PsdDriver.KPA101:
             return _pair(device, rig, clock, hurry)
@@ -57,11 +58,9 @@ def psd_view(psd: PsdInstrument, device: PsdDevice) -> PsdView:
         raise DeviceRefused(f"{psd.name}: not identified; connect it first")
     try:
         one, other = (Face(face.kind, face.length_m, device.spot_radius_m) for face in identity.faces)
-        files = device.error_maps or ("", "")
-        maps = (_error_map(files[0]), _error_map(files[1]))
-    except (ValueError, OSError) as error:
+    except ValueError as error:
         raise DeviceRefused(f"[devices.psd] of the rig file: {error}") from error
-    return PsdView((one, other), identity.transimpedance_v_a, maps)
+    return PsdView((one, other), identity.transimpedance_v_a, _error_maps(device))
 
 
 def _pair(device: PsdDevice, rig: Rig, clock: Clock, hurry: float) -> Kpa101Pair:
@@ -97,5 +96,9 @@ def _apt_line(address: SerialAddress, clock: Clock) -> Transport:
     return opened
 
 
-def _error_map(path: str) -> ErrorMap | None:
-    return ErrorMap.load(Path(path)) if path else None
+def _error_maps(device: PsdDevice) -> tuple[ErrorMap | None, ErrorMap | None]:
+    one, other = device.error_maps or ("", "")
+    try:
+        return (ErrorMap.load(Path(one)) if one else None, ErrorMap.load(Path(other)) if other else None)
+    except (ValueError, OSError) as error:
+        raise DeviceRefused(f"error_maps in [devices.psd] of the rig file: {error}") from error

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.errors import DataError
 from calibrate.problem import whitener_of
 
 Floats = NDArray[np.float64]
@@ -63,8 +64,19 @@ def independent(rows: NoisyRows | IndependentRows) -> NoisyRows | IndependentRow
 
 
 def common_axes(parts: Floats) -> tuple[Floats, Floats]:
-    """(row, k, k) turns, and the (part, row * k) variances after them, for one or two parts (part, row, k, k)."""
-    whitener = whitener_of(parts.sum(axis=0))
+    """(row, k, k) turns, and the (part, row * k) variances after them, for one or two parts (part, row, k, k).
+
+    DataError where the noise of a row leaves one of its coordinates exact.
+    """
+    total = parts.sum(axis=0)
+    try:
+        whitener = whitener_of(total)
+    except np.linalg.LinAlgError:
+        worst = int(np.argmin(np.linalg.eigvalsh(total)[:, 0]))
+        raise DataError(
+            f"reading {worst + 1} of those fitted cannot be weighed: the noise of its coordinates is "
+            "not positive definite; check the joint angles and readings of its row, and the noise stated in the rig"
+        ) from None
     if len(parts) == 1:
         return whitener, np.ones((1, parts.shape[1] * parts.shape[2]))
     share, axes = np.linalg.eigh(whitener @ parts[0] @ np.swapaxes(whitener, 1, 2))

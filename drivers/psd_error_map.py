@@ -67,7 +67,7 @@ class ErrorMap:
     def load(path: Path) -> "ErrorMap":
         """ValueError naming the file when it is not an error map; OSError when it cannot be read."""
         try:
-            held: Any = json.loads(path.read_text())
+            held: Any = json.loads(path.read_text(encoding="utf-8"))
             if held.pop("format") != FORMAT:
                 raise ValueError("another format")
             rows = {name: tuple(map(float, held.pop(name))) for name in ("x_m", "y_m", "x_sigma_m", "y_sigma_m")}

@@ -5,9 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 
 
-def mutated(rng: np.random.Generator, good: Sequence[bytes]) -> bytes:
-    """One to three good pieces with bits turned, bytes exchanged, lost or put in, a length torn up, the end cut off."""
-    data = bytearray(b"".join(good[rng.integers(len(good))] for _ in range(rng.integers(1, 4))))
+def mutated(rng: np.random.Generator, good: Sequence[bytes], pieces: int | None = None) -> bytes:
+    """Good pieces with bits turned, bytes exchanged, lost or put in, a length torn up, the end cut off.
+
+    One to three pieces follow one another, if `pieces` does not give their number.
+    """
+    many = rng.integers(1, 4) if pieces is None else pieces
+    data = bytearray(b"".join(good[rng.integers(len(good))] for _ in range(many)))
     for _ in range(rng.integers(1, 5)):
         at, many = int(rng.integers(0, len(data) + 1)), int(rng.integers(1, 9))
         match int(rng.integers(6)):

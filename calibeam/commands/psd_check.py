@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 
 from acquisition.psd_view import psd_window
-from acquisition.recording.errors import SamplesError
+from acquisition.recording.errors import SamplesError, shown
 from acquisition.recording.rig import load_rig
 from acquisition.recording.rig_devices import PsdDevice
 from calibeam.asking import Asking, NotAgreedError, at_terminal, someone
@@ -26,6 +27,7 @@ Floats = NDArray[np.float64]
 READ_S = 1.0
 COLUMNS = ("x_m", "y_m")
 NO_WAIT = "give --no-wait where something else moves the spot"
+LARGEST_M = 0.1  # of a place from the middle; faces are some centimetres long
 RIG_DIFFERS = "the rig says"
 
 
@@ -64,7 +66,7 @@ def psd_check_command(rig: Path, *, points: Path, unit: int = 1, out: Path | Non
     device = loaded.devices.psd
     if device is None:
         raise DeviceRefused(f"rig {loaded.name}: no [devices.psd]; name the detectors in the rig file")
-    psd = psd_driver(device, loaded, SystemClock())
+    psd = psd_driver(structs.replace(device, error_maps=None), loaded, SystemClock())  # they are measured anew
     psd.connect()
     try:
         face = _face(psd, device, unit)
@@ -155,12 +157,16 @@ def _read_for(psd: PsdInstrument, seconds: float) -> list[Block]:
 
 def _places(path: Path) -> Floats:
     try:
-        with path.open(newline="") as lines:
+        with path.open(newline="", encoding="utf-8-sig") as lines:
             rows = [[float(row[name]) for name in COLUMNS] for row in csv.DictReader(lines)]
-    except (KeyError, ValueError, TypeError, UnicodeDecodeError) as error:
-        raise SamplesError(f"{path}: {error}; it needs columns {', '.join(COLUMNS)} of numbers") from error
+    except (KeyError, ValueError, TypeError, UnicodeDecodeError, csv.Error) as error:
+        raise SamplesError(f"{path}: {shown(str(error))}; it needs columns {', '.join(COLUMNS)} of numbers") from error
     if not rows:
         raise SamplesError(f"{path}: no places; give a row for each place of the spot")
+    for number, row in enumerate(rows, 1):
+        for name, value in zip(COLUMNS, row, strict=True):
+            if not abs(value) <= LARGEST_M:
+                raise SamplesError(f"{path} row {number}: {name} = {value:g} lies beyond any face; give metres")
     return np.array(rows)
 
 

@@ -1,13 +1,13 @@
 """What earlier parts of a session in the same folder have taken, and under which places: read from their recordings."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import msgspec
 
 from acquisition.plan import PoseKey
-from acquisition.recording.errors import RecordingError
+from acquisition.recording.errors import RecordingError, shown
 from acquisition.recording.parts import differs, parts
 from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
@@ -39,6 +39,17 @@ def earlier_of(folder: Path, rig: Rig) -> Earlier:
     if not files:
         raise RecordingError(f"{folder}: no session to go on with; leave --continue out, or give the folder of one")
     each = [read(path) for path in files]
+    try:
+        return _of_parts(each, folder, rig)
+    except (KeyError, TypeError, ValueError) as error:  # events and samples of another program, or damaged
+        raise RecordingError(
+            f"{folder}: its recordings do not say which poses are done ({shown(str(error))}); begin a new session with "
+            "another --out"
+        ) from error
+
+
+def _of_parts(each: Sequence[Recording], folder: Path, rig: Rig) -> Earlier:
+    """KeyError, TypeError, ValueError where events or samples are not as a session writes them."""
     last = each[-1]
     listed = {place.id: place for place in rig.placement_list}
     added = tuple(place for place in last.rig.placement_list if place.id not in listed)

@@ -14,6 +14,7 @@ from cantools.database.can import Database, Message, Signal
 from drivers.cia406.angle import Scale
 from drivers.errors import DeviceRefused
 
+SHOWN = 120  # characters of what a file holds, in an error
 UNITS_RAD = {
     "rad": 1.0,
     "mrad": 1e-3,
@@ -57,7 +58,8 @@ def joint_signals(path: Path, names: Sequence[str], units_per_turn: float | None
     try:
         database = cantools.database.load_file(path)
     except (OSError, ValueError, cantools.Error) as cause:
-        raise DeviceRefused(f"encoders: {path} cannot be read as a DBC file ({cause})") from cause
+        why = str(cause)[:SHOWN]  # a parser's words repeat the whole line
+        raise DeviceRefused(f"encoders: {path} cannot be read as a DBC file ({why}); export it again") from cause
     if not isinstance(database, Database):
         raise DeviceRefused(f"encoders: {path} describes no CAN bus, but diagnostics; name a DBC file")
     return tuple(_joint_signal(database, path, name, units_per_turn) for name in names)
@@ -70,15 +72,17 @@ def _joint_signal(database: Database, path: Path, name: str, units_per_turn: flo
         for signal in message.signals
     }
     if name not in known:
-        raise DeviceRefused(f"encoders: no signal {name!r} in {path}; there are {', '.join(sorted(known)[:20])}")
+        there = ", ".join(sorted(known))[:SHOWN]
+        raise DeviceRefused(f"encoders: no signal '{name[:SHOWN]}' in {path}; there are {there or 'none'}")
     message, signal = known[name]
     if signal.is_float:
         raise DeviceRefused(f"encoders: {name} of {path} is a floating-point signal; encoders count")
     try:
         scale = _scale(signal, units_per_turn)
-    except ValueError as cause:
-        raise DeviceRefused(f"encoders: {name} of {path}: {cause}") from cause
-    return JointSignal(name, message, signal.name, scale, float(signal.offset) / float(signal.scale) * scale.unit_rad)
+        offset_rad = float(signal.offset) / float(signal.scale) * scale.unit_rad
+    except (ArithmeticError, ValueError) as cause:  # a factor of 0, a range without end
+        raise DeviceRefused(f"encoders: {name} of {path}: {str(cause)[:SHOWN]}; correct the DBC file") from cause
+    return JointSignal(name, message, signal.name, scale, offset_rad)
 
 
 def _scale(signal: Signal, units_per_turn: float | None) -> Scale:

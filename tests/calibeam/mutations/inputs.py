@@ -1,0 +1,278 @@
+"""One small good file of every format, in one folder: arms of three joints and sessions of some 20 rows where possible.
+
+What a command leaves of its mutated file, it works through, so a small file is what keeps thousands of runs affordable.
+"""
+
+import csv
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import can
+import msgspec
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from acquisition.recording.can_frames import block_of, channels
+from acquisition.recording.can_message import frame_of
+from acquisition.recording.rig import load_rig, rig_sha256, rig_text
+from acquisition.recording.stream import Channel, Event
+from acquisition.recording.writer import RecordingWriter
+from calibeam.fleet.found import recordings
+from calibeam.fleet.judge import judged
+from calibeam.fleet.order import Task
+from calibeam.fleet.table import write_rows
+from calibeam.guided.arm import BelievedGuidedArm
+from calibrate.arms.catalogue import arm_of
+from calibrate.arms.eccentric import with_discs
+from calibrate.model_file import ModelFile, RigIdentity, write_model
+from drivers.psd_error_map import ErrorMap
+from simulators.conceal.case import conceal
+from simulators.conceal.wanted import Family, Wanted
+from simulators.conceal.write import write_case
+
+Floats = NDArray[np.float64]
+Run = Callable[[list[str]], int]
+
+RIGS = Path(__file__).parents[3] / "rigs"
+LINKS = [(0.0, np.pi / 2, 0.3), (0.4, 1.2, 0.0), (0.3, 0.3, 0.1)]  # a, alpha, d
+POINT_M = np.array([0.031, -0.012, 0.052])
+JOINT = "[[arm.joint]]\na_m = {}\nalpha_rad = {}\nd_m = {}\nlower_rad = -2.9\nupper_rad = 2.9\n"
+RIG = """schema = 1
+name = "three-joints"
+[arm]
+model = "dh"
+{}
+[tool]
+point_m = [0.031, -0.012, 0.052]
+[noise]
+position_m = 1e-5
+"""
+
+
+def write_inputs(folder: Path, run: Run) -> None:
+    """All of them. `run` is calibeam's command line in this process: models and diagnoses are its own."""
+    folder.mkdir(parents=True)
+    rng = np.random.default_rng(3)
+    q = rng.uniform(-2.0, 2.0, (20, len(LINKS)))
+    _session(folder / "tracker", q, seen(q + np.array([0.0, 2e-4, 3e-4]), rng))
+    _session(folder / "other", q, seen(q, rng))
+    turned = np.tile([0.2, -0.9, 0.8], (20, 1))
+    for row in range(20):
+        turned[row, 1 + row // 10] += -1.2 + 2.4 * (row % 10) / 9.0
+    _session(folder / "turned", turned, seen(turned, rng))
+    family: Family
+    for family, rows in (("dual-psd", 24), ("cones", 40), ("wire", 40)):
+        write_case(conceal(Wanted(family, 7, samples=rows, places=3, arm="irb120")), folder / "case")
+        (folder / "case" / "recording").rename(folder / family)
+        shutil.rmtree(folder / "case")
+    _parquet(folder / "tracker", folder / "columns")
+    _guided(folder)
+    _ur(folder)
+    _can_logs(folder)
+    _streams(folder / "streams.mcap", folder / "rig.toml")
+    _made_by_calibeam(folder, run)
+
+
+def seen(q_rad: Floats, rng: np.random.Generator) -> Floats:
+    """Positions (row, 3) of the target in a tracker's frame, by turning it back through every link."""
+    point = np.tile(POINT_M, (len(q_rad), 1))
+    for j, (a, alpha, d) in reversed(list(enumerate(LINKS))):
+        point = Rotation.from_rotvec([alpha, 0, 0]).apply(point) + np.array([a, 0.0, d])
+        point = Rotation.from_rotvec(q_rad[:, j, None] * [0, 0, 1]).apply(point)
+    point = Rotation.from_rotvec([0.2, 0.1, 2.0]).apply(point) + np.array([1.0, 2.0, 0.5])
+    return point + rng.normal(0.0, 1e-5, point.shape)
+
+
+def _session(folder: Path, q_rad: Floats, position_m: Floats) -> None:
+    folder.mkdir()
+    joints = "".join(JOINT.format(*map(float, link)) for link in LINKS)
+    (folder / "rig.toml").write_text(RIG.format(joints), encoding="utf-8")
+    with (folder / "samples.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["t_s", *(f"q{j + 1}_rad" for j in range(len(LINKS))), "x_m", "y_m", "z_m", "temp_arm_degC"])
+        for k, row in enumerate(np.hstack([q_rad, position_m]).tolist()):
+            writer.writerow([float(k), *row, 20.0 + 0.01 * k])
+
+
+def _parquet(source: Path, folder: Path) -> None:
+    folder.mkdir()
+    shutil.copy(source / "rig.toml", folder)
+    with (source / "samples.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    pq.write_table(pa.table({name: [float(row[name]) for row in rows] for name in rows[0]}), folder / "samples.parquet")
+
+
+def _guided(folder: Path) -> None:
+    """A verification of the measuring arm, and its model, which is the arm as drawn."""
+    source = RIGS / "arm-cmm-reference.toml"
+    rig, rng = load_rig(source), np.random.default_rng(1)
+    arm = BelievedGuidedArm(rig)
+
+    def posture(point_m: tuple[float, ...]) -> Floats:
+        return arm.postures(rng.uniform(arm.lower_rad, arm.upper_rad, (200, 6)), np.array(point_m))[0]
+
+    rows = [(posture((0.5, 0.1, 0.2)), "1,,") for _ in range(10)]
+    rows += [
+        (posture((0.5, -0.3, 0.2)), ",1,a"),
+        (posture((0.5, rig.bars[1].length_m - 0.3, 0.2)), ",1,b"),
+    ]
+    (folder / "guided").mkdir()
+    shutil.copy(source, folder / "guided" / "rig.toml")
+    header = "t_s," + ",".join(f"q{i}_rad" for i in range(1, 7)) + ",seat,bar,bar_end"
+    lines = [f"{k},{','.join(map(repr, map(float, q)))},{what}" for k, (q, what) in enumerate(rows)]
+    (folder / "guided" / "samples.csv").write_text("\n".join([header, *lines]) + "\n", encoding="utf-8")
+    _drawn_model(folder / "guided.json", source)
+
+
+def _drawn_model(path: Path, rig_file: Path) -> None:
+    """The model of an arm that is as drawn: all corrections are zero."""
+    rig, text = load_rig(rig_file), rig_text(rig_file)
+    names = [p.name for p in with_discs(arm_of(rig), rig).parameters] + ["tool.x", "tool.y", "tool.z"]
+    identity = RigIdentity(rig.name, rig_sha256(text), text)
+    model = ModelFile(
+        1, "calibeam-model", "test", identity, rig.arm.model.value, "CONVERGED", "", 10, 1, 1, None, (), (), (),
+        dict.fromkeys(names, 0.0), None, {}, None, None, 0.0, 0.0,
+    )  # fmt: skip
+    write_model(path, model)
+
+
+def _ur(folder: Path) -> None:
+    """The shipped arm with encoders by DBC, error maps and, in eye.toml, a camera; no device is where it says."""
+    plain, eye = ((RIGS / name).read_text("utf-8") for name in ("ur5e-dual-psd.toml", "ur5e-dual-psd-camera.toml"))
+    encoders = plain[plain.index("[devices.encoders]") : plain.index("[devices.robot]")]
+    signals = ", ".join(f'"ENCODER{i}.Angle"' for i in range(1, 7))
+    described = (
+        '[devices.encoders]\ndriver = "can-dbc"\ninterface = "slcan"\nchannel = "away/can"\n'
+        f'dbc = "encoders.dbc"\nsignals = [{signals}]\n\n'
+    )
+    for name, text in (("rig.toml", plain.replace(encoders, described)), ("eye.toml", eye)):
+        text = text.replace("out/emulated/", "away/").replace("127.0.0.2", "127.0.0.9")
+        text = text.replace('port = "away/psd"', 'port = "away/psd"\nerror_maps = ["psd1.json", ""]')
+        text = text.replace("http://127.0.0.1:8071/image.jpg", "away.jpg").replace("out/camera/", "")
+        (folder / name).write_text(text, encoding="utf-8")
+    shutil.copy(RIGS / "encoders-plain.dbc", folder / "encoders.dbc")
+    shutil.copy(RIGS / "tasks" / "conveyor.toml", folder / "task.toml")
+    errors = (RIGS / "errors" / "arm-cmm.toml").read_text("utf-8")
+    (folder / "errors.toml").write_text(errors.replace("heat.link5", "heat.link2"), encoding="utf-8")
+    gain = (0.0, 0.01, 0.0, 0.0, 0.0)
+    ErrorMap(0.01, gain, gain, (1e-6,) * 5, (1e-6,) * 5, 0.9).save(folder / "psd1.json")
+    (folder / "camera.json").write_text(json.dumps(_camera(), indent=1), encoding="utf-8")
+    _drawn_model(folder / "arm.json", folder / "rig.toml")
+    poses = "".join(
+        f"[[block.pose]]\nq_rad = [0.3, -1.4, 1.6, -0.5, 0.5, {0.1 * k:.1f}]\napproach = [1, 1, 0, 0, -1, 1]\n"
+        for k in range(4)
+    )
+    plan = f'schema = 1\nrig = "ur5e-dual-psd"\npurpose = ["a test"]\n[[block]]\nplacement = 1\nfirst_psd = 1\n{poses}'
+    (folder / "plan.toml").write_text(plan, encoding="utf-8")
+    spots = "\n".join(f"{x:.3f},{y:.3f}" for x in (-0.006, -0.002, 0.002, 0.006) for y in (-0.006, 0.0, 0.006))
+    (folder / "points.csv").write_text(f"x_m,y_m\n{spots}\n", encoding="utf-8")
+    fit = 'schema = 1\nmodel = "mdh"\nfree = ["joint*.zero"]\nhold = ["link3.*"]\nloss = "huber"\nseed = 1\n'
+    (folder / "fit.toml").write_text(fit + '[priors]\n"link*.length" = 1e-3\n"link*.twist" = 1e-3\n', encoding="utf-8")
+
+
+def _camera() -> dict[str, Any]:
+    return {
+        "schema": 1, "kind": "calibeam-camera", "rig": "ur5e-dual-psd-camera", "software": "test",
+        "width_px": 960, "height_px": 720,
+        "matrix_px": [[760.0, 0.0, 480.0], [0.0, 760.0, 360.0], [0.0, 0.0, 1.0]],
+        "distortion": [0.0, 0.0, 0.0, 0.0, 0.0],
+        "in_flange": {"origin_m": [0.045, 0.02, 0.055], "rotation_rad": [-1.57, 0.0, 0.0]},
+        "views": 12, "reprojection_px": 0.2, "board_m": 1e-4, "board_rad": 1e-3,
+    }  # fmt: skip
+
+
+def _frames() -> list[can.Message]:
+    rng = np.random.default_rng(4)
+    return [
+        can.Message(
+            timestamp=1_790_000_000.25 + 1e-3 * k,
+            arbitration_id=int(rng.integers(0, 0x7FF)),
+            is_extended_id=k % 3 == 0,
+            data=rng.bytes(k % 9),
+            channel=0,
+        )
+        for k in range(30)
+    ]
+
+
+def _can_logs(folder: Path) -> None:
+    writers = {"log": can.CanutilsLogWriter, "asc": can.ASCWriter, "blf": can.BLFWriter, "csv": can.CSVWriter}
+    for suffix, make in writers.items():
+        with make(folder / f"bus.{suffix}") as writer:
+            for message in _frames():
+                writer.on_message_received(message)
+
+
+class _Standing:
+    """Host time that never passes."""
+
+    def now_s(self) -> float:
+        return 0.0
+
+
+def _streams(path: Path, rig_file: Path) -> None:
+    """Streams, CAN frames, samples and events of one short session, as a session writes them."""
+    six, t, pose = (6,), np.arange(50) * 0.01, {"placement": 1, "first": 1, "index": 0, "again": 0}
+    with RecordingWriter(path, rig_text=rig_text(rig_file), software="test", clock=_Standing()) as writer:
+        for name, made in {
+            "robot": (Channel("actual_q_rad", "rad", six), Channel("actual_qd_rad_s", "rad/s", six)),
+            "encoders": (Channel("position_rad", "rad", six),),
+            "spots": tuple(Channel(each, "m") for each in ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")),
+        }.items():
+            stream = writer.stream(name, made)
+            values = {one.name: np.sin(t).reshape(-1, *[1] * len(one.shape)) * np.ones(one.shape) for one in made}
+            stream.append(t, t, np.arange(len(t)), values)
+        block = block_of([frame_of(m, m.timestamp - 1_790_000_000.0, sent=False) for m in _frames()], 8)
+        frames = writer.stream("can", channels(8), viewer=())
+        frames.append(block.host_s, block.device_s, np.arange(len(block.host_s)), block.values)
+        for k in range(3):
+            q = {f"q{i + 1}_rad": 0.1 * i + 0.05 * k for i in range(6)}
+            writer.sample({"t_s": float(k), "placement": 1, "first_psd": 1, **q})
+            writer.event(Event(float(k), "sample", {"pose": pose | {"index": k}}))
+
+
+def _made_by_calibeam(folder: Path, run: Run) -> None:
+    """What its own commands write: model, diagnosis, recording, results of a fleet. RuntimeError where they fail."""
+    earlier, fleet = folder / "earlier", folder / "fleet"
+    for words in (
+        ["identify", f"{folder}/tracker", "--out", f"{folder}/model.json"],
+        ["diagnose", f"{folder}/tracker", "--out", f"{folder}/diagnosis.json"],
+        ["report", f"{folder}/tracker", "--out", f"{folder}/report.html"],
+        ["import", f"{folder}/tracker", "--out", f"{folder}/recording.mcap"],
+        ["import", f"{folder}/turned", "--out", f"{folder}/turned.mcap"],
+        ["import", f"{folder}/guided", "--out", f"{folder}/guided.mcap"],
+    ):
+        if code := run(words):
+            raise RuntimeError(f"calibeam {' '.join(words)}: exit code {code}")
+    _with_a_finding(folder / "diagnosis.json")
+    for name in ("model.json", "diagnosis.json"):
+        earlier.mkdir(exist_ok=True)
+        shutil.copy(folder / name, earlier)
+    for name in ("diagnosis.html", "report.html"):  # made so that a fork finds figures and fonts loaded
+        (folder / name).unlink()
+    (folder / "begun").mkdir()
+    shutil.copy(folder / "streams.mcap", folder / "begun" / "recording.mcap")
+    shutil.copytree(folder / "tracker", folder / "fleet-of-one" / "tracker")
+    fleet.mkdir()
+    row = judged(Task.of(recordings(folder / "fleet-of-one", fleet)[0], diagnose=False))
+    write_rows(fleet / "fleet.parquet", [row])
+    (fleet / "fleet.rows.jsonl").write_bytes(msgspec.json.encode(row) + b"\n")
+
+
+def _with_a_finding(path: Path) -> None:
+    """So small a session shows none; the page of one reads more keys."""
+    file = json.loads(path.read_bytes())
+    name = {"where": "joint2.angle", "depends_on": "q2", "shape": "harmonic", "order": 1}
+    rival = name | {"physics": "encoder-harmonic", "confidence": 0.1, "margin": 4.0}
+    curve = {"driver": "q2", "unit": "rad", "values": [0.0, 1.0], "residual": [1e-4, 2e-4], "fitted": [1e-4, 2e-4]}
+    size = {"amplitude_rad": {"value": 2e-4, "sigma": 1e-5}, "phase_rad": {"value": 0.4, "sigma": 0.03}}
+    finding = name | {"physics": "encoder-eccentricity", "parameters": size, "share": 0.8, "confidence": 0.9}
+    finding |= {"says": "a disc off its shaft", "rivals": [rival], "p": 1e-4, "bic_gain": 20.0, "held_out_gain": 5.0}
+    file["findings"] = [finding | {"curve": curve}]
+    path.write_text(json.dumps(file, indent=1), encoding="utf-8")

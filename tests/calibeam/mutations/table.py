@@ -1,0 +1,190 @@
+"""Which command reads which file, and how it is called: a new command or format is one line here.
+
+A command that talks to devices reads its files and then finds no device, for inputs.py names none that is there; one
+that would emulate a whole session stops at its output folder.
+"""
+
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+
+from calibeam.cli import COMMANDS
+from tests.calibeam.mutations.json_mutators import JSON
+from tests.calibeam.mutations.recording_mutators import RECORDING
+from tests.calibeam.mutations.table_mutators import CSV, PARQUET
+from tests.calibeam.mutations.text_mutators import BINARY, LINES, TOML, Mutator
+
+KINDS = {
+    ".toml": "toml", ".json": "json", ".csv": "csv", ".parquet": "parquet", ".mcap": "recording", ".blf": "binary",
+    ".log": "lines", ".asc": "lines", ".dbc": "lines", ".jsonl": "lines",
+}  # fmt: skip
+MUTATORS: dict[str, tuple[Mutator, ...]] = {
+    "toml": TOML, "json": JSON, "csv": CSV, "lines": LINES, "binary": BINARY, "parquet": PARQUET,
+    "recording": RECORDING,
+}  # fmt: skip
+REFUSED = {"bad_utf8": ("toml", "json", "csv")}  # what no reader of these kinds may take
+DAILY, ENDURE = 20, 300
+SLOW = 4  # daily, of commands that take a second and more of a core on a small valid input
+DAILY_OF = {"report": SLOW, "diagnose": SLOW, "compare": SLOW, "simulate-errors": SLOW, "design": SLOW}
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A file that is mutated, and a command line that reads it; paths from the folder of the inputs on."""
+
+    file: str
+    words: str
+    together: int = 0  # so many mutated session folders in the folder "sets" at a time, for commands over a fleet
+    kind: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        kind = "lines" if self.file == "bus.csv" else KINDS[PurePosixPath(self.file).suffix]
+        object.__setattr__(self, "kind", kind)
+
+    @property
+    def command(self) -> str:
+        return self.words.split()[0]
+
+    @property
+    def daily(self) -> int:
+        """Seeds of every day: of the first line of a file and a command; others read it by the same code."""
+        first = next(pair for pair in TABLE if (pair.command, pair.format) == (self.command, self.format))
+        return DAILY_OF.get(self.command, DAILY) if first is self else 0
+
+    @property
+    def format(self) -> str:
+        return PurePosixPath(self.file).name
+
+    @property
+    def name(self) -> str:
+        """Of the test: file and command, with the words that tell it from others of the same command."""
+        return f"{self.file}|{self.words}".replace(" ", "_").replace("/", ":")
+
+    def mutator(self, seed: int) -> Mutator:
+        """All in turn; beginning with another one for each pair."""
+        kinds = MUTATORS[self.kind]
+        return kinds[(seed + zlib.crc32(self.name.encode())) % len(kinds)]
+
+    def mutated(self, good: Path, seed: int) -> bytes:
+        rng = np.random.default_rng([zlib.crc32(self.file.encode()), seed])
+        return self.mutator(seed)(rng, (good / self.file).read_bytes())
+
+
+def _of_sessions() -> Iterator[Pair]:
+    """Whatever reads a session folder or a recording."""
+    for file in ("tracker/samples.csv", "tracker/rig.toml", "columns/samples.parquet", "recording.mcap"):
+        what = file if file.endswith(".mcap") else file.partition("/")[0]
+        yield Pair(file, f"identify {what} --export urdf --export json")
+        yield Pair(file, f"diagnose {what}")
+        yield Pair(file, f"report {what}")
+        yield Pair(file, f"compare {what} other")
+        yield Pair(file, f"export {what} --out made")
+        yield Pair(file, f"check {what}" if "rig" not in file else "check tracker")
+        if not file.endswith(".mcap"):
+            yield Pair(file, f"import {what} --out made.mcap")
+    for folder in ("dual-psd", "cones", "wire"):
+        for file in ("samples.csv", "rig.toml"):
+            for command in ("identify", "diagnose", "report"):
+                yield Pair(f"{folder}/{file}", f"{command} {folder}")
+    for file, what in (("turned/samples.csv", "turned"), ("turned/rig.toml", "turned"), ("turned.mcap", "turned.mcap")):
+        yield Pair(file, f"tool-axes {what}")
+    for file, what in (("guided/samples.csv", "guided"), ("guided/rig.toml", "guided"), ("guided.mcap", "guided.mcap")):
+        yield Pair(file, f"verify {what} --model guided.json")
+
+
+SESSIONS = tuple(_of_sessions())
+OTHER_SESSIONS = (
+    Pair("other/samples.csv", "compare tracker other"),
+    Pair("other/samples.csv", "report tracker --against other"),
+    Pair("tracker/samples.csv", "report tracker --model model.json"),
+    Pair("tracker/samples.csv", "predict model.json tracker/samples.csv"),
+    Pair("columns/samples.parquet", "predict model.json columns/samples.parquet"),
+    Pair("tracker/samples.csv", "batch sets --out fleet --jobs 2", together=20),
+    Pair("tracker/rig.toml", "batch sets --out fleet --jobs 2", together=20),
+    Pair("tracker/samples.csv", "prove --real sets --out proof --jobs 2", together=20),
+    Pair("recording.mcap", "recover recording.mcap --out made.mcap"),
+    Pair("recording.mcap", "report tracker --against recording.mcap"),
+    Pair("streams.mcap", "recover streams.mcap --out made.mcap"),
+    Pair("streams.mcap", "check streams.mcap"),
+    Pair("streams.mcap", "export streams.mcap --out made --streams"),
+    Pair("streams.mcap", "export streams.mcap --out made --streams --table parquet"),
+    Pair("streams.mcap", "export streams.mcap --out made.blf"),
+    Pair("streams.mcap", "layouts streams.mcap"),
+    Pair("streams.mcap", "compare streams.mcap streams.mcap"),
+    Pair("begun/recording.mcap", "session rig.toml --continue --out begun --yes"),
+)
+MODELS = (
+    Pair("model.json", "predict model.json tracker/samples.csv"),
+    Pair("model.json", "simulate-errors model.json --errors errors.toml --arms 500 --poses 2 --out made"),
+    Pair("model.json", "report tracker --model model.json"),
+    Pair("model.json", "report tracker --against model.json"),
+    Pair("earlier/model.json", "report tracker --against earlier"),
+    Pair("model.json", "diagnose tracker --model model.json"),
+    Pair("guided.json", "verify guided --model guided.json"),
+    Pair("arm.json", "live rig.toml --model arm.json --port 0 --for-s 0"),
+    Pair("arm.json", "move rig.toml --home --model arm.json --dry-run"),
+    Pair("arm.json", "jog rig.toml --joint 1 --by-deg 1 --model arm.json --dry-run"),
+    Pair("diagnosis.json", "report tracker --diagnosis diagnosis.json"),
+    Pair("earlier/diagnosis.json", "report tracker --against earlier"),
+)
+RIGS = (
+    Pair("rig.toml", "check rig.toml"),
+    Pair("rig.toml", "session rig.toml --out made --yes"),
+    Pair("rig.toml", "emulate rig.toml --end-with-stdin --robot-host auto"),
+    Pair("rig.toml", "live rig.toml --port 0 --for-s 0"),
+    Pair("rig.toml", "log encoders rig.toml --out made --for-s 0"),
+    Pair("rig.toml", "design rig.toml --poses 8 --repeats 0 --candidates 4"),
+    Pair("rig.toml", "move rig.toml --home --dry-run"),
+    Pair("rig.toml", "jog rig.toml --axis z --by-mm 1 --dry-run"),
+    Pair("rig.toml", "motion --rig rig.toml --out points.csv"),
+    Pair("rig.toml", "demo --rig rig.toml --out begun"),
+    Pair("rig.toml", "psd-check rig.toml --points points.csv --out made.json --no-wait"),
+    Pair("rig.toml", "simulate-errors rig.toml --arms 500 --poses 2"),
+    Pair("rig.toml", "import bus.log --rig rig.toml --out made.mcap"),
+    Pair("rig.toml", "recover streams.mcap --rig rig.toml --out made.mcap"),
+    Pair("eye.toml", "camera eye.toml --out made --yes"),
+    Pair("eye.toml", "check eye.toml"),
+    Pair("guided/rig.toml", "session guided/rig.toml --out made"),
+    Pair("guided/rig.toml", "session guided/rig.toml --out made --verify"),
+    Pair("guided/rig.toml", "emulate guided/rig.toml --end-with-stdin"),
+    Pair("guided/rig.toml", "simulate-errors guided/rig.toml --arms 500 --poses 2"),
+)
+PLANS = (
+    Pair("plan.toml", "session rig.toml --plan plan.toml --out made --yes"),
+    Pair("fit.toml", "identify tracker --plan fit.toml"),
+    Pair("task.toml", "move rig.toml --task task.toml --position bin --dry-run"),
+    Pair("errors.toml", "simulate-errors tracker/rig.toml --errors errors.toml --arms 500 --poses 2"),
+)
+DEVICES = (
+    *(
+        Pair(f"bus.{suffix}", f"import bus.{suffix} --rig rig.toml --out made.mcap")
+        for suffix in ("log", "asc", "blf", "csv")
+    ),
+    Pair("encoders.dbc", "check rig.toml"),
+    Pair("encoders.dbc", "log encoders rig.toml --out made --for-s 0"),
+    Pair("encoders.dbc", "live rig.toml --port 0 --for-s 0"),
+    Pair("psd1.json", "check rig.toml"),
+    Pair("psd1.json", "live rig.toml --port 0 --for-s 0"),
+    Pair("psd1.json", "session rig.toml --out made --yes"),
+    Pair("camera.json", "check eye.toml"),
+    Pair("camera.json", "session eye.toml --out made --yes"),
+    Pair("points.csv", "psd-check rig.toml --points points.csv --no-wait"),
+    Pair("fleet/fleet.rows.jsonl", "batch fleet-of-one --out fleet --jobs 1"),
+    Pair("fleet/fleet.parquet", "batch fleet-of-one --out fleet --jobs 1"),
+)
+TABLE = (*SESSIONS, *OTHER_SESSIONS, *MODELS, *RIGS, *PLANS, *DEVICES)
+
+# Commands that read no file, and files that no command reads from outside.
+EXEMPT = {"completion": "prints a script of the shell; it reads nothing"}
+UNREAD = {
+    "truth.json": "demo writes it and reads it again in the same run, in a folder that it has emptied before",
+    "proof.json": "prove writes it for the page and for its own table; no command takes one",
+}
+
+
+def missing() -> set[str]:
+    """Commands of the program that stand neither in the table nor among the exemptions."""
+    return set(COMMANDS) - {pair.command for pair in TABLE} - EXEMPT.keys()

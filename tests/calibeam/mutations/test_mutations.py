@@ -1,0 +1,171 @@
+"""Every file format mutated against every command that reads it: no traceback, no hang, 1 GB, one short message.
+
+A command answers bad content with exit code 1 and a line `error: …`, or keeps what is good of it and ends with 3 and
+`stopped: …`; a mutation that leaves the file good ends with 0. Code 2 is for words of the command line alone. A failure
+names the command that repeats it: see cases.py.
+"""
+
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from calibeam.cli import COMMANDS
+from tests.calibeam.mutations.cases import Fault, faults, lay_out, run_case
+from tests.calibeam.mutations.recording_mutators import rewritten
+from tests.calibeam.mutations.server import Ran, Server
+from tests.calibeam.mutations.table import ENDURE, EXEMPT, TABLE, Pair, missing
+
+Change = Callable[[bytes], bytes]
+
+CHUNK = 100  # seeds of one test
+REAL = (  # through the installed console script as well: one of each way to end
+    ("fit.toml|identify_tracker_--plan_fit.toml", 3),
+    ("model.json|predict_model.json_tracker:samples.csv", 1),
+    ("streams.mcap|recover_streams.mcap_--out_made.mcap", 2),
+    ("bus.asc|import_bus.asc_--rig_rig.toml_--out_made.mcap", 4),
+    ("tracker:samples.csv|export_tracker_--out_made", 0),
+    ("rig.toml|check_rig.toml", 5),
+)
+PSD_CHECK = "psd-check rig.toml --points points.csv --no-wait"
+CONTINUE = "session rig.toml --continue --out begun --yes"
+FACTOR = b"(0.00034332275390625,0)"
+FOUND = (  # what mutations have shown once: file, change, command line, what is in its answer
+    ("encoders.dbc", lambda data: data.replace(FACTOR, b"(0,0)", 1), "check rig.toml", "correct the DBC file"),
+    ("encoders.dbc", lambda data: data + b"BO_ " * 2000, "check rig.toml", "export it again"),
+    ("psd1.json", lambda data: data[:-9], "check rig.toml", "no error map of format"),
+    ("psd1.json", lambda data: b"[" * 100_000, "session rig.toml --out made --yes", "no error map of format"),
+    ("points.csv", lambda data: data.replace(b"-0.006", b"1e308", 1), PSD_CHECK, "row 1: x_m = 1e+308"),
+    ("points.csv", lambda data: b"\xff" + data, PSD_CHECK, "it needs columns x_m, y_m"),
+    ("begun/recording.mcap", lambda data: _other_events(data), CONTINUE, "do not say which poses are done"),
+)
+
+
+def _other_events(data: bytes) -> bytes:
+    """Poses under another name, in every message, with the checksums of the new ones."""
+    return rewritten(data, lambda message: message.replace(b'"first":1', b'"fiest":1'))
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("m") / "good"
+
+
+@pytest.fixture(scope="module")
+def server(good: Path) -> Iterator[Server]:
+    with Server(good) as running:
+        yield running
+
+
+def named(pair: Pair, seeds: range) -> str:
+    return f"{pair.name}|{seeds.start}-{seeds.stop - 1}"
+
+
+def ran_into(server: Server, good: Path, pair: Pair, seeds: range, scratch: Path) -> list[Fault]:
+    found: list[Fault] = []
+    for seed in range(seeds.start, seeds.stop, max(1, pair.together)):
+        some = range(seed, min(seed + max(1, pair.together), seeds.stop))
+        found += run_case(server, good, pair, some, scratch / "case")[1]
+        shutil.rmtree(scratch / "case")  # thousands of them fill a disk
+    return found
+
+
+DAILY = [(pair, range(pair.daily)) for pair in TABLE if pair.daily]
+ENDURED = [(pair, range(first, first + CHUNK)) for pair in TABLE for first in range(0, ENDURE, CHUNK)]
+
+
+@pytest.mark.parametrize(("pair", "seeds"), DAILY, ids=[named(*one) for one in DAILY])
+def test_a_mutated_file_is_refused_in_one_message_or_read(
+    pair: Pair, seeds: range, server: Server, good: Path, tmp_path: Path
+) -> None:
+    found = ran_into(server, good, pair, seeds, tmp_path)
+    assert not found, "\n".join(map(str, found))
+
+
+@pytest.mark.endure
+@pytest.mark.parametrize(("pair", "seeds"), ENDURED, ids=[named(*one) for one in ENDURED])
+def test_so_are_hundreds_of_each(pair: Pair, seeds: range, server: Server, good: Path, tmp_path: Path) -> None:
+    found = ran_into(server, good, pair, seeds, tmp_path)
+    assert not found, "\n".join(map(str, found))
+
+
+def test_every_command_stands_in_the_table_or_has_a_reason_not_to() -> None:
+    assert not missing()
+    assert EXEMPT.keys() <= COMMANDS.keys()
+    assert len({pair.name for pair in TABLE}) == len(TABLE)
+
+
+def test_every_file_that_is_mutated_is_there_and_the_same_seed_gives_the_same_bytes(server: Server, good: Path) -> None:
+    for pair in TABLE:
+        assert (good / pair.file).is_file(), pair.file
+    some = TABLE[0]
+    assert some.mutated(good, 7) == some.mutated(good, 7)
+    assert len({some.mutated(good, seed) for seed in range(20)}) > 15
+
+
+@pytest.mark.parametrize(("name", "seed"), REAL)
+def test_a_fork_ends_as_the_console_script_does(
+    name: str, seed: int, server: Server, good: Path, tmp_path: Path
+) -> None:
+    pair = next(pair for pair in TABLE if pair.name == name)
+    forked, _ = run_case(server, good, pair, range(seed, seed + 1), tmp_path / "forked")
+    lay_out(good, pair, range(seed, seed + 1), tmp_path / "real")
+    script = Path(sys.executable).with_name("calibeam")
+    done = subprocess.run(
+        [str(script), *pair.words.split()],
+        cwd=tmp_path / "real",
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+    )
+    assert (done.returncode, done.stderr) == (forked.code, forked.err)
+    assert done.stdout.splitlines()[:1] == forked.out.splitlines()[:1]
+
+
+@pytest.mark.parametrize(("file", "change", "words", "told"), FOUND, ids=[f"{one[0]}-{one[3]}" for one in FOUND])
+def test_what_was_found_is_answered(
+    file: str, change: Change, words: str, told: str, server: Server, good: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(good, tmp_path / "case")
+    (tmp_path / "case" / file).write_bytes(change((good / file).read_bytes()))
+    ran = server.run(words.split(), tmp_path / "case", 60.0, 10**9)
+    assert told in ran.out + ran.err
+    assert not faults(Pair(file, words), 0, ran)
+
+
+@pytest.mark.parametrize(
+    ("ran", "told"),
+    [
+        (Ran(0, "fine", "", 0.1, 0.1, 1000), None),
+        (Ran(1, "", "error: tracker: no samples\n", 0.1, 0.1, 1000), None),
+        (
+            Ran(1, "", "Traceback (most recent call last):\n  x\nValueError: y\n", 0.1, 0.1, 1000),
+            "traceback: ValueError",
+        ),
+        (Ran(1, "", "no reason\n", 0.1, 0.1, 1000), "without a line"),
+        (Ran(0, "", "error: but good\n", 0.1, 0.1, 1000), "exit code 0"),
+        (Ran(2, "", "usage", 0.1, 0.1, 1000), "exit code 2"),
+        (Ran(-11, "", "", 0.1, 0.1, 1000), "exit code -11"),
+        (Ran(1, "", f"error: {'x' * 301}\n", 0.1, 0.1, 1000), "301 characters"),
+        (Ran(0, "", "", 0.1, 0.1, 2_000_000_000), "took 2000 MB"),
+        (Ran(-9, "", "", 70.0, 60.1, 1000, "took too long"), "took too long: 60.1 s of a core"),
+    ],
+)
+def test_what_counts_as_a_fault(ran: Ran, told: str | None) -> None:
+    found = faults(next(pair for pair in TABLE if pair.kind == "binary"), 0, ran)
+    assert (told is None and not found) or (told is not None and told in found[0])
+
+
+def test_a_run_that_hangs_or_fills_the_memory_is_ended(server: Server, tmp_path: Path) -> None:
+    assert server.run(["emulate", "--help"], tmp_path, 0.0, 10**9).killed == "took too long"
+    assert server.run(["emulate", "--help"], tmp_path, 60.0, 10**6).killed.startswith("took ")
+
+
+def test_a_fork_reaches_no_other_machine(server: Server, good: Path, tmp_path: Path) -> None:
+    text = (good / "rig.toml").read_text("utf-8")
+    (tmp_path / "rig.toml").write_text(text.replace("127.0.0.9", "robot.example").replace("psd1.json", ""), "utf-8")
+    ran = server.run(["move", "rig.toml", "--home", "--dry-run"], tmp_path, 60.0, 10**9)
+    assert "no network in this test" in ran.err
