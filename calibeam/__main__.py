@@ -1,6 +1,15 @@
-"""`python -m calibeam`: the same as the console command."""
+"""The console command, also as `python -m calibeam`: it hears Ctrl-C before the libraries are loaded."""
 
-from calibeam.cli import main
+from calibeam.interrupts import INTERRUPTS
+
+
+def main() -> None:
+    """Loads the command line, which takes about a second, and runs it."""
+    INTERRUPTS.load()
+    from calibeam.cli import main as run
+
+    run()
+
 
 if __name__ == "__main__":
     main()

@@ -4,28 +4,33 @@ An answer counts only if it was typed after the question was on the screen. The 
 that it is answered at; once the terminal has taken it, and a person could have begun to read, all that was typed until
 then is discarded. Only then the cue is written and a line is read, from the terminal itself: nothing of it is ever in
 a buffer of Python's, and nothing else of the program reads standard input as lines. A pasted text of several lines
-answers one question only, because the next one discards the rest.
+answers one question only, because the next one discards the rest. What was typed while this program did not run
+(stopped, or the machine hung) is discarded, too, and the question is asked again.
 """
 
 import errno
 import fcntl
 import math
 import os
+import select
 import sys
 import termios
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from rich.console import Console
 
 from acquisition.errors import AcquisitionError
+from acquisition.supervisor import FROZEN_S
+from drivers.clock import Clock, SystemClock
 
 GO, REFUSALS = "go", ("n", "no", "q")
 CELL = "THE ARM WILL MOVE. Is the cell clear?"
 YES = "give --yes when the cell is clear"
 REACTION_S = 0.2  # a person takes longer (about 0.25 s); what kernel or network still carry arrives sooner
+LISTEN_S = 0.2  # between two looks whether this program was frozen, or nobody waits for the answer any more
 END_OF_INPUT = b"\x04"  # what Ctrl-D sends where another program left the terminal without line editing
 
 
@@ -33,11 +38,16 @@ class NotAgreedError(AcquisitionError):
     """Nobody could be asked, or who was asked did not agree; nothing was moved."""
 
 
+class _FrozenError(Exception):
+    """The program did not run for a while; the message is shown to a person."""
+
+
 @dataclass(frozen=True)
 class Asking:
     """A person at a terminal. `fd`: file descriptor that the answers are read from."""
 
     fd: int
+    clock: Clock = field(default_factory=SystemClock)
 
     def may_move(self) -> None:
         """Returns once the word is typed. NotAgreedError on a refusal or the end of input; anything else asks again."""
@@ -83,16 +93,28 @@ class Asking:
             answer = self.ask(f"{short(answer)} is no answer", cue)
         return answer is not None
 
-    def ask(self, question: str, cue: str) -> str | None:
-        """One line, without spaces around it, typed after `question` was on the screen; None at the end of input."""
-        if not self.show(question):
-            return None
-        self.forget()
-        self._write(cue, end="")
-        line = self._line()
-        if line is None:
-            self._write("")
-        return line
+    def ask(self, question: str, cue: str, over: Callable[[], bool] = lambda: False) -> str | None:
+        """One line, without spaces around it, typed after `question` was on the screen.
+
+        None at the end of input, or when `over`: nobody waits for the answer any more.
+        """
+        shown = question
+        while self.show(shown):
+            begin_s = self.clock.now_s()
+            self.forget()
+            self._write(cue, end="")
+            try:
+                line = self._line(begin_s, over)
+            except _FrozenError as freeze:
+                self._write("")
+                if over():
+                    return None
+                shown = f"{freeze}. {question}"
+                continue
+            if line is None:
+                self._write("")
+            return line
+        return None
 
     def show(self, text: str) -> bool:
         """Returns when it can have been seen; False where the terminal cannot be written to."""
@@ -120,11 +142,20 @@ class Asking:
         with suppress(termios.error):
             termios.tcflush(self.fd, termios.TCIFLUSH)
 
-    def _line(self) -> str | None:
-        """None where the input, or the terminal, ended first."""
-        typed = b""
+    def _line(self, begin_s: float, over: Callable[[], bool]) -> str | None:
+        """None where the input, or the terminal, ended first, or it is over. _FrozenError: nothing counts."""
+        typed, turned_s = b"", begin_s
         while not typed.endswith((b"\n", b"\r")):
+            if over():
+                return None
             try:
+                ready = select.select([self.fd], [], [], LISTEN_S)[0]
+                now_s = self.clock.now_s()
+                gap_s, turned_s = now_s - turned_s, now_s
+                if gap_s > FROZEN_S + LISTEN_S:
+                    raise _FrozenError(f"This program did not run for {gap_s:.1f} s; what was typed does not count")
+                if not ready:
+                    continue
                 piece = os.read(self.fd, 4096)
             except OSError:
                 return None

@@ -80,11 +80,11 @@ for name, place in COMMANDS.items():
 
 def main() -> None:
     """Run the command line; ends the process with one of the four exit codes."""
-    INTERRUPTS.listen()  # a closed terminal must leave the arm standing, too
     code = 1
     try:
+        INTERRUPTS.listen()  # a closed terminal must leave the arm standing, too
         code = run(sys.argv[1:])
-    except KeyboardInterrupt:  # while the last line was printed
+    except KeyboardInterrupt:  # before the first instruction of a command, or while its last line was printed
         pass
     finally:
         INTERRUPTS.end()

@@ -22,8 +22,15 @@ class Interrupts:
         self._raised_s = float("-inf")
         self._terminals: tuple[int, ...] = ()
 
+    def load(self) -> None:
+        """While libraries are loaded Ctrl-C ends the process at once: nothing has begun that needs a clean-up.
+
+        KeyboardInterrupt would not do: extension modules turn it into import errors, or print it themselves.
+        """
+        signal.signal(signal.SIGINT, _leave)
+
     def listen(self) -> None:
-        """From now on. To be called before anything else: a Ctrl-C before it has the system's own effect."""
+        """From now on. To be called before anything begins; SIGTERM and SIGHUP before it have the system's effect."""
         self._terminals = tuple(fd for fd in (0, 1, 2) if _is_terminal(fd))
         for number in ENDING:
             signal.signal(number, self.came)
@@ -57,6 +64,11 @@ class Interrupts:
         """The exit code is decided: no signal changes it while the interpreter ends."""
         for number in ENDING:
             signal.signal(number, signal.SIG_IGN)
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    os.write(2, b"stopped by Ctrl-C\n")
+    os._exit(1)
 
 
 def _is_terminal(fd: int) -> bool:

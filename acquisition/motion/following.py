@@ -145,19 +145,25 @@ class Following:
 
     def _wait(self) -> float:
         """Until a set-point is due; by how much (s) the path has to wait because cycles were missed."""
-        late_s = self._clock.now_s() - (self._begin_s + self._cycle * self._period_s)
+        late_s = self._late_s()
         if late_s < 0.0:
             self._clock.sleep_s(-late_s)
+            self._late_s()  # a freeze of this program may have fallen into the wait: then nothing more is sent
         if late_s <= self._period_s:
             return 0.0
-        if late_s > self._stream.late_s:
-            raise InterruptedMotionError(
-                f"set-point {self._cycle} came {1e3 * late_s:.0f} ms late (limit {1e3 * self._stream.late_s:.0f} ms); "
-                "the arm was stopped: free this machine of other work, or lower the solving rate"
-            )
         self.followed.missed += int(late_s / self._period_s)
         self.followed.worst_late_s = max(self.followed.worst_late_s, late_s)
         self._begin_s += late_s
+        return late_s
+
+    def _late_s(self) -> float:
+        """Since the next set-point was due; negative before. InterruptedMotionError: late by more than the limit."""
+        late_s = self._clock.now_s() - (self._begin_s + self._cycle * self._period_s)
+        if late_s > self._stream.late_s:
+            raise InterruptedMotionError(
+                f"set-point {self._cycle} came {1e3 * late_s:.0f} ms late (limit {1e3 * self._stream.late_s:.0f} ms); "
+                "the arm was stopped: this program was suspended, or the machine has too much other work"
+            )
         return late_s
 
     def _send(self, q_rad: Floats) -> None:

@@ -70,11 +70,16 @@ class Keys:
 
     def _listen(self, asking: Asking) -> None:
         """Until the motion goes on or ends; the end of input means nothing, for Ctrl-C is still heard."""
-        while self._gate.state in (State.HELD, State.PAUSING):
-            line = asking.ask(WORDS, "> ")
-            if line is None:
+
+        def over() -> bool:
+            return self._gate.state not in (State.HELD, State.PAUSING)
+
+        while not over():
+            line = asking.ask(WORDS, "> ", over)
+            if line is not None:
+                self.word(line)
+            elif not over():
                 return
-            self.word(line)
 
 
 @contextmanager

@@ -127,7 +127,7 @@ class SupervisedChild:
                 return False
             ended = self._stops.next_answer(STOP_LIMIT_S)
             return isinstance(ended, Ended) and ended.outcome not in UNREACHED
-        except OSError:
+        except (OSError, ValueError):  # ValueError: another thread has given the child up, and closed the line
             return False
 
     def end(self) -> None:

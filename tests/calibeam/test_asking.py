@@ -255,3 +255,35 @@ def _prompts(called: ast.expr) -> bool:
     if isinstance(called, ast.Name):
         return called.id == "input"
     return isinstance(called, ast.Attribute) and called.attr == "input"
+
+
+class FreezingClock:
+    """The program is frozen once, at its third look at the clock after a cue; `meanwhile` happens in the freeze."""
+
+    def __init__(self, meanwhile: Callable[[], None]) -> None:
+        self._meanwhile, self._looks, self._t_s = meanwhile, 0, 0.0
+
+    def now_s(self) -> float:
+        self._looks += 1
+        if self._looks == 3:
+            self._meanwhile()
+            self._t_s += 5.0
+        return self._t_s
+
+    def sleep_s(self, seconds: float) -> None: ...
+
+
+def test_what_is_typed_while_the_program_is_frozen_is_no_answer(typist) -> None:
+    typist.answers(CUE, "", "no\n")
+    clock = FreezingClock(lambda: typist.ahead("go\n"))
+    with pytest.raises(NotAgreedError, match="the answer was 'no'"):
+        Asking(typist.terminal, clock).may_move()
+    assert f"This program did not run for 5.0 s; what was typed does not count. {asking.CELL}" in typist.screen
+
+
+def test_who_waits_no_longer_leaves_the_keyboard_to_the_next_one(typist) -> None:
+    over: list[bool] = []
+    clock = FreezingClock(lambda: over.append(True))
+    assert Asking(typist.terminal, clock).ask("held", "> ", lambda: bool(over)) is None
+    typist.ahead("x\n")
+    assert os.read(typist.terminal, 16) == b"x\n"

@@ -27,6 +27,27 @@ cli.main()
 """
 
 
+# Ctrl-C when a module is about to be loaded.
+LOADS = """
+import os, signal, sys
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == sys.argv[-1]:
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Finder())
+from calibeam.__main__ import main
+main()
+"""
+
+
+@pytest.mark.parametrize("module", ["calibeam.cli", "numpy._core.multiarray", "calibeam.commands.identify"])
+def test_ctrl_c_while_the_program_loads_is_one_sentence(module) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", LOADS, "identify", module], capture_output=True, text=True, timeout=60.0
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", "stopped by Ctrl-C\n")
+
+
 @pytest.mark.parametrize(
     ("number", "name"), [(signal.SIGINT, ""), (signal.SIGTERM, "SIGTERM"), (signal.SIGHUP, "SIGHUP")]
 )

@@ -406,3 +406,27 @@ def test_what_was_not_planned_or_stands_elsewhere_is_refused() -> None:
     gate.plan(HOME_RAD, there(0.0, 0.1, 0.0))
     with pytest.raises(RefusedMotionError, match="not the last one"):
         gate.run(made, HOME_RAD)
+
+
+@pytest.mark.parametrize("word", ["resume", "pause", "stop", "hold"])
+@pytest.mark.parametrize("held", [True, False])
+def test_nothing_is_sent_after_a_freeze_whatever_was_typed_in_it(word: str, held: bool) -> None:
+    """The program is suspended for 5 s while it waits for the time of a set-point, moving or held."""
+    clock, sent = JumpingClock(), list[int]()
+    arm = Arm(lambda n: gate.hold() if held and n == 20 else None)
+    gate = gate_of(arm, clock)
+
+    def sleep(seconds: float) -> None:
+        clock.t_s += seconds
+        if len(arm.q_rad) == 60 and not sent:
+            sent.append(len(arm.q_rad))
+            assert gate.state is (State.HELD if held else State.MOVING)
+            clock.t_s += 5.0
+            getattr(gate, word)()
+
+    clock.sleep_s = sleep  # type: ignore[method-assign]
+    with pytest.raises(InterruptedMotionError, match="this program was suspended"):
+        gate.run(gate.plan(HOME_RAD, there(0.15, 0.05, 0.0)), HOME_RAD)
+    assert len(arm.q_rad) == sent[0]
+    assert arm.stops == ["stop"]
+    assert gate.state is State.ABORTED

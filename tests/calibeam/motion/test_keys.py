@@ -1,12 +1,14 @@
 """What Ctrl-C and words at the keyboard tell the gate."""
 
 import io
+import signal
 
 import pytest
 
 from acquisition.motion.states import Event, State, after
 from calibeam.asking import Asking
-from calibeam.motion.keys import WORDS, Keys
+from calibeam.interrupts import INTERRUPTS
+from calibeam.motion.keys import WORDS, Keys, keys_of
 
 PATIENCE_S = 30.0
 
@@ -82,3 +84,26 @@ def test_a_closed_terminal_gives_up() -> None:
     gate = Told(State.MOVING)
     Keys(gate, None, io.StringIO()).ended()  # type: ignore[arg-type]
     assert gate.state is State.ENDING
+
+
+@pytest.mark.parametrize(
+    ("number", "told"), [(signal.SIGINT, "pause"), (signal.SIGTERM, "abort"), (signal.SIGHUP, "abort")]
+)
+def test_signals_reach_the_gate_while_it_is_followed_and_no_longer(monkeypatch, number, told) -> None:
+    monkeypatch.setattr(INTERRUPTS, "leave_terminal", lambda: None)
+    before, gate = signal.getsignal(number), Told(State.MOVING)
+    with keys_of(gate):  # type: ignore[arg-type]
+        signal.raise_signal(number)
+    assert gate.told == [told]
+    assert signal.getsignal(number) is before
+
+
+def test_the_keyboard_is_left_when_the_held_motion_ends(typist) -> None:
+    gate = Told(State.MOVING)
+    keys = Keys(gate, Asking(typist.terminal), io.StringIO())  # type: ignore[arg-type]
+    keys.interrupted()
+    assert typist.shows("> ")
+    keys.ended()
+    assert keys._thread is not None
+    keys._thread.join(PATIENCE_S)
+    assert not keys._thread.is_alive()

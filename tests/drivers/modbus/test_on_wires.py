@@ -97,7 +97,7 @@ def test_a_move_that_crosses_a_stop_on_the_way_never_runs(cell, arm) -> None:
     stops = arm._stops
     arm.stop()
     with pytest.raises(DeviceRefused, match="before it began"):
-        arm._order(stops)
+        arm._order(stops, arm._clock.now_s())
     assert cell.emulators.ask("robot.standing")
 
 
