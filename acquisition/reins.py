@@ -28,8 +28,8 @@ class Reins:
 
     `failure`: what has gone wrong with a device, so that a pause does not outlast it. `hold_arm`: stops for good, after
     abort and halt. `undelivered`: told of a stop that could not be delivered; None: there is none of these any more.
-    `rests_in_s`: when the motion under way ends; 0: nothing moves. `ease_arm`: brakes softly. `pausing`: told when the
-    arm rests after a pause (s, at most), and whether it brakes for that.
+    `rests_in_s`: when the motion under way ends; 0: nothing moves. `ease_arm`: brakes softly. `pausing`: called with
+    the time until the arm rests after a pause (s, at most), and whether it brakes for that.
     """
 
     def __init__(
@@ -48,6 +48,8 @@ class Reins:
         self._hold_arm, self._undelivered = hold_arm or stop_arm, undelivered
         self._rests_in_s, self._ease_arm, self._pausing = rests_in_s, ease_arm or stop_arm, pausing
         self._eased = False  # the motion under way was braked softly, and the session has not taken note
+        self._easing: threading.Thread | None = None
+        self._early: Event | None = None  # pause or abort, from before measuring began
         self._interrupts, self._interrupted_s = 0, float("-inf")
         self._why = ""
         self._clock: Clock = clock or SystemClock()
@@ -77,11 +79,11 @@ class Reins:
         now_s, before = self._clock.now_s(), self._state
         again = now_s - self._paused_s <= PAUSE_AGAIN_S
         self._paused_s = now_s
-        if again and before in (State.PAUSING, State.ENDING):
+        if again and before is State.PAUSING:
             self.tell(Event.BREAK)
             return
         self.tell(Event.PAUSE)
-        if before is State.RUNNING:
+        if before in (State.RUNNING, State.ENDING):
             rests_in_s = self._rests_in_s()
             self._pausing(rests_in_s, rests_in_s > REST_S)
             self._ease(rests_in_s)
@@ -117,8 +119,15 @@ class Reins:
     def tell(self, event: Event) -> None:
         """Any event; where it stops the arm, the arm has been told when this returns."""
         with self._news:
-            before, self._state = self._state, after(self._state, event)
-            now = self._state
+            before, now = self._state, after(self._state, event)
+            if before in (State.IDLE, State.DONE):
+                if now is State.RUNNING and self._early is not None:
+                    now = after(now, self._early)
+                if event in (Event.START, Event.RESUME):
+                    self._early = None
+                elif event is Event.ABORT or (event is Event.PAUSE and self._early is None):
+                    self._early = event
+            self._state = now
             self._news.notify_all()
         if event is Event.HALT or (now in BROKEN and now is not before):
             self._brake(now)
@@ -132,6 +141,9 @@ class Reins:
 
         EndedEarlyError, StoppedError when a person has ended the session; and whatever a device has failed with.
         """
+        if self._easing is not None:
+            self._easing.join()  # a stop that arrives late would end the next motion
+            self._easing = None
         self.tell(Event.CHECKPOINT)
         self._eased = waited = False
         with self._news:
@@ -175,7 +187,8 @@ class Reins:
         if not self._eased and (rests_in_s > REST_S or outlasts):
             self._eased = True  # before the arm stops, for the session notices that at once
             # A thread of its own: whoever says so must be heard again while the arm brakes.
-            threading.Thread(target=self._deliver, args=(self._ease_arm,), name="ease", daemon=True).start()
+            self._easing = threading.Thread(target=self._deliver, args=(self._ease_arm,), name="ease", daemon=True)
+            self._easing.start()
 
     def _brake(self, state: State) -> None:
         self._deliver(self._stop_arm if state is State.BREAKING else self._hold_arm)

@@ -2,8 +2,9 @@
 
 pause: the arm rests within REST_S, at the end of the motion under way or braked softly, and no further motion begins;
 the pose is taken again later. Again within PAUSE_AGAIN_S: at once, the arm is stopped. resume goes on from the last
-checkpoint. stop: ends at the next checkpoint, as a success. abort: the arm is stopped and held, what
-was taken is kept, the session has failed to end as asked. halt: the arm is stopped and held, whatever the state.
+checkpoint. stop: ends at the next checkpoint, as a success; a pause takes precedence over it. abort: the arm is stopped
+and held, what was taken is kept, the session has failed to end as asked. halt: the arm is stopped and held, whatever
+the state. A pause or an abort from before measuring begins takes effect at its beginning.
 Source of words and keys: bluesky, "Interrupting" (first Ctrl-C: pause at the next checkpoint; second within 10 s: now).
 """
 
@@ -70,7 +71,7 @@ _TABLE: dict[State, dict[Event, State]] = {
         Event.HALT: State.HALTED,
         Event.FAULT: State.ABORTED,
     },
-    State.ENDING: {**_UNDER_WAY, Event.CHECKPOINT: State.DONE},
+    State.ENDING: {**_UNDER_WAY, Event.PAUSE: State.PAUSING, Event.CHECKPOINT: State.DONE},
     State.ABORTING: {
         Event.HALT: State.HALTED,
         Event.CHECKPOINT: State.ABORTED,

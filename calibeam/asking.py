@@ -149,7 +149,7 @@ class Asking:
             if over():
                 return None
             try:
-                ready = select.select([self.fd], [], [], LISTEN_S)[0]
+                ready = select.select([self.fd] if in_foreground(self.fd) else [], [], [], LISTEN_S)[0]
                 now_s = self.clock.now_s()
                 gap_s, turned_s = now_s - turned_s, now_s
                 if gap_s > FROZEN_S + LISTEN_S:
@@ -185,11 +185,21 @@ class Asking:
 
 def at_terminal() -> Asking | None:
     """Standard input, where it is a terminal that this process may read."""
+    if sys.stdin is None:  # it was closed before the program began
+        return None
     try:
         fd = sys.stdin.fileno()
         return Asking(fd) if os.isatty(fd) and os.tcgetpgrp(fd) == os.getpgrp() else None
     except (OSError, ValueError):
         return None
+
+
+def in_foreground(fd: int) -> bool:
+    """Whether this process may read the terminal now: in the background a read would stop it."""
+    try:
+        return os.tcgetpgrp(fd) == os.getpgrp()
+    except OSError:
+        return True  # the terminal is gone, which reading reports
 
 
 def someone(asking: Asking | None, whether: str, remedy: str) -> Asking:

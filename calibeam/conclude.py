@@ -14,7 +14,7 @@ from acquisition.recording.recording import Recording
 from calibeam.diagnosis import diagnosed_to
 from calibeam.diagnosis_lines import print_diagnosis
 from calibeam.identification import Identified, identify_recording, write_identified
-from calibeam.outcome import PartialResult
+from calibeam.outcome import PartialResult, interruption
 from calibeam.reporting import write_zero_report
 from calibeam.terminal import print_identified
 from calibrate.diagnose.schema import DiagnosisFile
@@ -36,7 +36,7 @@ def recording_kept(recording_path: Path) -> Generator[None]:
     try:
         yield
     except (KeyboardInterrupt, DataError, OSError) as why:
-        reason = "Ctrl-C" if isinstance(why, KeyboardInterrupt) else str(why)
+        reason = interruption(why) if isinstance(why, KeyboardInterrupt) else str(why)
         raise PartialResult(
             f"{reason}; the recording is whole: {recording_path}; "
             "`calibeam identify`, `diagnose` and `report` go on from there"

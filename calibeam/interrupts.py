@@ -33,7 +33,10 @@ class Interrupts:
         """From now on. To be called before anything begins; SIGTERM and SIGHUP before it have the system's effect."""
         self._terminals = tuple(fd for fd in (0, 1, 2) if _is_terminal(fd))
         for number in ENDING:
-            signal.signal(number, self.came)
+            if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:  # `nohup` outlives a terminal
+                signal.signal(number, self.came)
+        # A program that was frozen may find itself in the background; discarding what was typed would stop it again.
+        signal.signal(signal.SIGTTOU, signal.SIG_IGN)
 
     def came(self, number: int, frame: FrameType | None) -> None:
         """The handler. KeyboardInterrupt, with the signal's name where it is not Ctrl-C."""

@@ -28,7 +28,7 @@ from acquisition.session import Session, Summary
 from calibeam.emulation import EmulationError
 from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
-from calibeam.outcome import PartialResult
+from calibeam.outcome import PartialResult, interruption
 from calibeam.software import SOFTWARE
 from drivers.clock import Clock
 from drivers.errors import DeviceError
@@ -126,7 +126,7 @@ def _ended_early(
 
     The readers still run: whoever opened the recording closes it after them.
     """
-    reason = (str(why) or "Ctrl-C") if isinstance(why, KeyboardInterrupt) else str(why)
+    reason = interruption(why) if isinstance(why, KeyboardInterrupt) else str(why)
     also: list[str] = []
     with uninterrupted():
         try:

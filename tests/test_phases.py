@@ -1,6 +1,7 @@
-"""`make test` reports every phase, whatever happened in those before."""
+"""`make test` runs every test in one of its phases and reports each, whatever happened in those before."""
 
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 
 from tests import phases
 
+ROOT = Path(__file__).parents[1]
 BODIES = {"fails": "def test_it(): assert False\n", "passes": "def test_it(): pass\n", "nothing": ""}
 
 
@@ -43,6 +45,22 @@ def test_every_phase_runs_and_one_failure_fails_the_whole(failing, monkeypatch, 
     assert phases.main() == failing
     assert ran == [phase.name for phase in phases.DAILY]
     assert capsys.readouterr().out.splitlines()[-1] == f"total: 9 passed, {failing} failed, 0 skipped"
+
+
+def test_no_test_falls_between_the_phases(request):
+    conftest = next(p for p in request.config.pluginmanager.get_plugins() if hasattr(p, "WIRED"))
+    everywhere, *wired = (phase.arguments for phase in phases.DAILY)
+    assert "not endure and not wired" in everywhere
+    assert not [word for word in everywhere if word.startswith("tests")]
+    assert all("wired and not endure" in words for words in wired)
+    named = {Path(word).name for words in wired for word in words if word.startswith("tests/")}
+    assert {Path(wired).parts[0] for wired in conftest.WIRED} == named
+
+
+@pytest.mark.parametrize("path", [".ci/run", "README.md"])
+def test_it_is_what_ci_and_newcomers_run(path):
+    assert re.search(r"make[ \w]* test\b", (ROOT / path).read_text())
+    assert "tests/phases.py daily" in (ROOT / "Makefile").read_text()
 
 
 def test_other_rounding_is_asked_for_by_environment():

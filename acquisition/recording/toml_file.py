@@ -20,7 +20,7 @@ T = TypeVar("T")
 
 LARGEST_BYTES = 4_000_000  # a plan of 20,000 poses; the largest rig files have 10,000 bytes
 # tomllib keeps every beginning of a dotted key, which is without bound in memory: no file of ours has more than 6
-_LONG_KEY = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*\.[ \t]*){32}""")
+_LONG_KEY = re.compile(r"""(?m)(?:^[ \t]*\[{0,2}|[{,])[ \t]*((?:[\w"'-]++[ \t]*\.[ \t]*){32})""")
 
 
 @dataclass(frozen=True)
@@ -64,8 +64,8 @@ def parse_toml(text: str, name: str, fault: type[Exception]) -> TomlFile:
     """The content of a TOML text, a byte order mark left out. `fault` with line and column for what is no TOML."""
     text = text.removeprefix("\ufeff")
     if long := _LONG_KEY.search(text):
-        line = text.count("\n", 0, long.start()) + 1
-        raise fault(f"{name} line {line}: '{shown(long[0], 40)}' is a key of more than 32 names; correct the line")
+        line = text.count("\n", 0, long.start(1)) + 1
+        raise fault(f"{name} line {line}: '{shown(long[1], 40)}' is a key of more than 32 names; correct the line")
     try:
         return TomlFile(name, tomllib.loads(text), key_lines(text), fault)
     except tomllib.TOMLDecodeError as error:

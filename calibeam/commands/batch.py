@@ -76,9 +76,9 @@ def batch_command(
         task = bar.add_task("recordings", total=None)
         ran = run(folder, out, wanted, lambda done, total, _: bar.update(task, completed=done, total=total))
     fleet = Fleet(ran.rows)
+    page = write_fleet_page(out / PAGE, fleet, folder.resolve().name)
     if ran.stopped and not json:
         _end(ran, fleet, out, again=again)
-    page = write_fleet_page(out / PAGE, fleet, folder.resolve().name)
     if json:
         print(msgspec.json.encode(record(ran, fleet, str(out / TABLE), str(page))).decode())
     else:

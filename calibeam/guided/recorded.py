@@ -22,7 +22,7 @@ from acquisition.supervisor import Supervisor
 from calibeam.encoders import VIEWED, emulated_encoders, encoder_driver, identities_of
 from calibeam.guided.arm import BelievedGuidedArm
 from calibeam.guided.judge import FittedJudge
-from calibeam.outcome import PartialResult
+from calibeam.outcome import PartialResult, interruption
 from calibeam.recorded import Interrupted, uninterrupted
 from drivers.clock import Clock
 
@@ -131,7 +131,7 @@ def record_guided(
 
 def _ended_early(writer: RecordingWriter, clock: Clock, session: GuidedSession, why: BaseException) -> PartialResult:
     """Put what there is on the disk; a second Ctrl-C may not get in between."""
-    reason = "Ctrl-C" if isinstance(why, KeyboardInterrupt) else str(why)
+    reason = interruption(why) if isinstance(why, KeyboardInterrupt) else str(why)
     with uninterrupted():
         try:
             writer.event(Event(clock.now_s(), "ended early", {"why": reason}))

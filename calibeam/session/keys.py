@@ -23,6 +23,7 @@ from acquisition.errors import StoppedError
 from acquisition.reins import Reins
 from acquisition.session_states import BROKEN, OVER, State
 from acquisition.supervisor import FROZEN_S
+from calibeam.asking import in_foreground
 from calibeam.interrupts import INTERRUPTS
 from calibeam.session.key_stream import KeyStream
 from drivers.clock import Clock, SystemClock
@@ -128,7 +129,8 @@ class Keys:
     def _listen(self) -> None:
         sources = [self._woken] + ([] if self._terminal is None else [self._terminal])
         while True:
-            ready = select.select(sources, [], [], LISTEN_S)[0]
+            heard = [fd for fd in sources if fd != self._terminal or in_foreground(fd)]
+            ready = select.select(heard, [], [], LISTEN_S)[0]
             frozen = self._was_frozen()
             if self._woken in ready:
                 for code in os.read(self._woken, 64):

@@ -4,11 +4,13 @@ What a person decides is asked where there is one; a script gets what is safe: n
 devices are emulated, and a fixture that nobody vouches for counts as moved.
 """
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 
 from rich.console import Console
 
+from acquisition.errors import AcquisitionError
 from acquisition.planned_session import check_planned
 from acquisition.recording.parts import next_part, parts
 from acquisition.recording.rig_schema import Placement
@@ -19,7 +21,7 @@ from calibeam.device_check import DeviceCheck, check_devices
 from calibeam.interrupts import INTERRUPTS
 from calibeam.learner import FittedLearner
 from calibeam.live.feed import SILENT, Feed
-from calibeam.outcome import PartialResult
+from calibeam.outcome import PartialResult, interruption
 from calibeam.session.ahead import ahead_of_blocks, ahead_of_plan
 from calibeam.session.earlier import Earlier, earlier_of
 from calibeam.session.job import Job, Part, more_at, moved, part_of, with_place
@@ -61,23 +63,25 @@ class OnSite:
         `stands`: the fixture has not been touched since the earlier parts.
         """
         self._devices()
-        earlier, agreed = self._since(earlier, stands=stands), False
+        earlier, agreed, broken = self._since(earlier, stands=stands), False, False
         while True:
-            part = part_of(self._job, earlier, self._half_size_m)
-            if part.left == 0:
-                self.teller.said("everything that was planned is taken")
-                break
-            self._plan(part)
-            if not agreed:
-                self.teller.step("arm")
-                self._person.arm()
-                agreed = True
+            with self._kept() if broken else nullcontext():
+                part = part_of(self._job, earlier, self._half_size_m)
+                if part.left == 0:
+                    self.teller.said("everything that was planned is taken")
+                    break
+                self._plan(part)
+                if not agreed:
+                    self.teller.step("arm")
+                    self._person.arm()
+                    agreed = True
             try:
                 place = self._measure(part)
             except PartialResult as early:
                 if not self._goes_on(early):
                     raise
-                agreed, earlier = False, self._again()
+                with self._kept():
+                    agreed, broken, earlier = False, True, self._again()
                 continue
             if place is None:
                 break
@@ -85,6 +89,16 @@ class OnSite:
         self.teller.step("result")
         files = parts(self._job.out)
         conclude(files[0] if len(files) == 1 else self._job.out, self._console)
+
+    @contextmanager
+    def _kept(self) -> Generator[None]:
+        """After a first part there is something to keep: what ends the session ends it in part."""
+        try:
+            yield
+        except (AcquisitionError, DeviceError, KeyboardInterrupt) as why:
+            INTERRUPTS.close()
+            reason = interruption(why) if isinstance(why, KeyboardInterrupt) else str(why)
+            raise PartialResult(f"{reason}; what was taken is kept in {self._job.out}; {GO_ON}") from why
 
     def _devices(self) -> None:
         """One line each; goes on when all are good, or a person says so. DeviceRefused where one cannot be had."""
@@ -128,6 +142,8 @@ class OnSite:
             return False
         finally:
             self.teller.asked("")
+        if answer != "g":
+            INTERRUPTS.close()  # the exit code is decided
         return answer == "g"
 
     def _again(self) -> Earlier:
@@ -187,7 +203,7 @@ class OnSite:
                     summary = session.take(more_at(part, session.placement, self._half_size_m, part.options, rounds))
         except KeyboardInterrupt as why:  # at a question, while the arm stands
             INTERRUPTS.close()
-            raise PartialResult(f"{str(why) or 'Ctrl-C'}; what was taken is kept in {path}; {GO_ON}") from why
+            raise PartialResult(f"{interruption(why)}; what was taken is kept in {path}; {GO_ON}") from why
         except PartialResult as early:
             raise PartialResult(f"{early}; {GO_ON}") from early.__cause__
         self.teller.said(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {path}")

@@ -267,6 +267,17 @@ def test_a_pause_lets_a_short_motion_arrive_and_brakes_a_long_one_softly(clock, 
         reins.check()
 
 
+def test_a_pause_while_the_session_ends_rests_the_arm_as_any_other(clock) -> None:
+    eased = threading.Event()
+    reins = running(clock=clock, rests_in_s=lambda: 8.0, ease_arm=eased.set)
+    reins.stop()
+    reins.interrupt()
+    assert reins.state is State.PAUSING
+    assert eased.wait(10.0)
+    with pytest.raises(BrokenOffError):
+        reins.check(begins=True)
+
+
 def test_a_motion_that_outlasts_its_pause_is_braked(clock) -> None:
     """An operator has slowed the arm down, or the motion had not begun yet when the pause was said."""
     eased, left_s = threading.Event(), [0.5]

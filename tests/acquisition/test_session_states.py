@@ -2,7 +2,7 @@
 
 import pytest
 
-from acquisition.reins import Reins
+from acquisition.reins import BrokenOffError, Reins
 from acquisition.session_states import BROKEN, OVER, Event, State, after
 
 IDLE, RUNNING, PAUSING, BREAKING, PAUSED, ENDING, ABORTING, DONE, ABORTED, HALTED = State
@@ -13,7 +13,7 @@ TABLE = {
     PAUSING: (PAUSING, PAUSING, BREAKING, RUNNING, ENDING, ABORTING, HALTED, PAUSED, DONE, ABORTED),
     BREAKING: (BREAKING, BREAKING, BREAKING, BREAKING, BREAKING, ABORTING, HALTED, PAUSED, DONE, ABORTED),
     PAUSED: (PAUSED, PAUSED, PAUSED, RUNNING, DONE, ABORTED, HALTED, PAUSED, PAUSED, ABORTED),
-    ENDING: (ENDING, ENDING, BREAKING, ENDING, ENDING, ABORTING, HALTED, DONE, DONE, ABORTED),
+    ENDING: (ENDING, PAUSING, BREAKING, ENDING, ENDING, ABORTING, HALTED, DONE, DONE, ABORTED),
     ABORTING: (ABORTING, ABORTING, ABORTING, ABORTING, ABORTING, ABORTING, HALTED, ABORTED, ABORTED, ABORTED),
     DONE: (RUNNING, DONE, DONE, DONE, DONE, DONE, HALTED, DONE, DONE, DONE),
     ABORTED: (ABORTED, ABORTED, ABORTED, ABORTED, ABORTED, ABORTED, HALTED, ABORTED, ABORTED, ABORTED),
@@ -69,3 +69,25 @@ def test_however_often_ctrl_c_comes_no_motion_begins_by_it_and_three_end_a_sessi
         assert reins.state is not RUNNING
         assert not (now in BROKEN and reins.state not in BROKEN)
     assert reins.state in (OVER if state in OVER else (ABORTING, ABORTED, HALTED))
+
+
+@pytest.mark.parametrize("state", [IDLE, DONE])
+@pytest.mark.parametrize("times", [1, 2, 3])
+def test_ctrl_c_before_measuring_begins_holds_it_before_its_first_motion(state: State, times: int) -> None:
+    reins = Reins(lambda: None)
+    for before in WAYS[state]:
+        reins.tell(before)
+    for _ in range(times):
+        reins.interrupt()
+    reins.tell(Event.START)
+    assert reins.state is (PAUSING if times < 3 else ABORTING)
+    with pytest.raises(BrokenOffError):
+        reins.check(begins=True)
+
+
+def test_a_pause_that_was_taken_back_before_measuring_begins_holds_nothing() -> None:
+    reins = Reins(lambda: None)
+    reins.pause()
+    reins.resume()
+    reins.tell(Event.START)
+    assert reins.state is RUNNING

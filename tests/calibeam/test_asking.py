@@ -4,6 +4,7 @@ import ast
 import os
 import sys
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -29,6 +30,7 @@ ASKS = {
     "calibeam/commands/session.py",
     "calibeam/motion/by_hand.py",
     "calibeam/motion/keys.py",
+    "calibeam/session/keys.py",
     "calibeam/session/person.py",
     "calibeam/session/run.py",
 }
@@ -128,8 +130,8 @@ def test_enter_after_the_question_measures_the_place(command, typist, capsys) ->
 @pytest.mark.parametrize("name", [*MOVING, "psd-check"])
 def test_without_a_terminal_nobody_is_asked(command, monkeypatch, capsys, tmp_path, name) -> None:
     (tmp_path / "answers").write_text("go\ny\n\n")
-    for source in (os.devnull, tmp_path / "answers"):
-        with Path(source).open() as standard_input:
+    for source in (os.devnull, tmp_path / "answers", None):  # None: closed before the program began
+        with nullcontext() if source is None else Path(source).open() as standard_input:
             monkeypatch.setattr(sys, "stdin", standard_input)
             assert run(command(name)) == 1
         said = capsys.readouterr().err.splitlines()

@@ -151,9 +151,9 @@ def test_every_solver_agrees_with_scipy_on_every_full_rank_problem(method, name,
     problem = named(name, request)
     fit = solve(problem, method=method, tolerance=1e-20, max_steps=500, rules=TIGHT)
     assert fit.status is Status.CONVERGED
-    # Solvers compare costs. The rounding of a metre (2e-16 m) before noise of a micrometre leaves 2e-10 of every whitened
-    # row open, hence 2 sqrt(chi2) 2e-10 = 4e-9 of a cost of 80 and its root, 6e-5 sigma, of the solution: on which side
-    # of that two solvers stop depends on the processor. Without noise sigma is 0, and the digits of theta count.
+    # Solvers compare costs. The rounding of a metre (2e-16 m) before noise of a micrometre leaves 2e-10 of a whitened
+    # row open, hence 2 sqrt(chi2) 2e-10 = 4e-9 of a cost of 80 and its root, 6e-5 sigma, of the solution: where within
+    # that two solvers stop depends on the processor. Without noise sigma is 0, and the digits of theta count.
     sigma = np.sqrt(np.diag(fit.covariance) * min(fit.chi2_per_dof if fit.dof else 0.0, 1.0))
     close = 1e-9 * np.maximum(np.abs(fit.theta), plausible_sizes(problem.parameters)) + 1e-4 * sigma
     for peer in ("trf", "dogbox"):
