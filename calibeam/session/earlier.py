@@ -43,8 +43,8 @@ def earlier_of(folder: Path, rig: Rig) -> Earlier:
         return _of_parts(each, folder, rig)
     except (KeyError, TypeError, ValueError) as error:  # events and samples of another program, or damaged
         raise RecordingError(
-            f"{folder}: its recordings do not say which poses are done ({shown(str(error))}); begin a new session with "
-            "another --out"
+            f"{folder}: its recordings do not contain which poses are done ({shown(str(error))}); "
+            "begin a new session with another --out"
         ) from error
 
 

@@ -1,7 +1,7 @@
 """Power and safety of the controller: which modes follow which, after how much emulated time.
 
 What is not imitated: reduced, recovery, safeguard and three-position modes; the joints' own voltages while booting.
-The times are those that feel right; real ones are seconds and depend on the arm.
+The times are assumed; real ones are seconds and depend on the arm.
 """
 
 from simulators.ur.states import RobotMode, SafetyMode

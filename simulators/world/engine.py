@@ -21,7 +21,7 @@ class Engine:
     def __init__(self, mjcf: str) -> None:
         self._model: Any = _mujoco.MjModel.from_xml_string(mjcf)
         self._data: Any = _mujoco.MjData(self._model)
-        self._elsewhere: Any = _mujoco.MjData(self._model)  # for questions about states that the mechanism is not in
+        self._scratch: Any = _mujoco.MjData(self._model)  # for questions about states that the mechanism is not in
         self.n_freedoms = int(self._model.nv)
         self.qpos: Floats = self._data.qpos
         self.qvel: Floats = self._data.qvel
@@ -64,15 +64,15 @@ class Engine:
     def inertia_at(self, qpos: Floats) -> Floats:
         """M(q), (n_freedoms, n_freedoms), at any position, without the armature of the rotors."""
         full = np.empty((self.n_freedoms, self.n_freedoms))
-        self._put_elsewhere(qpos, np.zeros(self.n_freedoms))
-        _mujoco.mj_fullM(self._model, self._elsewhere, full)
+        self._put_scratch(qpos, np.zeros(self.n_freedoms))
+        _mujoco.mj_fullM(self._model, self._scratch, full)
         return full - np.diag(self._model.dof_armature)
 
     def bias_at(self, qpos: Floats, qvel: Floats) -> Floats:
         """Gravity, Coriolis and centrifugal forces, (n_freedoms,), in any state."""
-        self._put_elsewhere(qpos, qvel)
-        return self._elsewhere.qfrc_bias.copy()
+        self._put_scratch(qpos, qvel)
+        return self._scratch.qfrc_bias.copy()
 
-    def _put_elsewhere(self, qpos: Floats, qvel: Floats) -> None:
-        self._elsewhere.qpos[:], self._elsewhere.qvel[:] = qpos, qvel
-        _mujoco.mj_step1(self._model, self._elsewhere)
+    def _put_scratch(self, qpos: Floats, qvel: Floats) -> None:
+        self._scratch.qpos[:], self._scratch.qvel[:] = qpos, qvel
+        _mujoco.mj_step1(self._model, self._scratch)
