@@ -41,10 +41,16 @@ WIRED = (
 )
 
 
+# Folders whose tests share what one long session left: on one worker it is made once. Others keep their file together.
+TOGETHER = ("calibrate/report",)
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if on_wires(item.path):
             item.add_marker("wired")
+        folder = next((name for name in TOGETHER if item.path.is_relative_to(HERE / name)), "")
+        item.add_marker(pytest.mark.xdist_group(folder or str(item.path.relative_to(HERE))))
 
 
 @cache

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-TWO_AT_A_TIME = ("-n", "2", "--dist", "loadfile")
+TWO_AT_A_TIME = ("-n", "2", "--dist", "loadgroup")  # groups: tests/conftest.py
 CALCULATING = ("-m", "not endure and not wired", *TWO_AT_A_TIME)
 
 

@@ -52,6 +52,7 @@ def test_a_late_encoder_a_slip_a_drifting_clock_and_lost_frames_in_one_session(t
     assert size(usual["duplicated-samples"], "samples_count") == 1
 
 
+@pytest.mark.endure  # the longest of three
 def test_a_swinging_column_and_a_clock_that_was_set(tmp_path):
     trouble = Trouble(swing_hz=7.0, swing_damping=0.03, swing_rad=6e-5)
     told, file = diagnosed(tmp_path, trouble, Clocks(step_s=0.25, step_at_s=15.0))

@@ -125,6 +125,7 @@ def test_a_controller_that_goes_quiet_ends_the_session(takes: Takes) -> None:
     assert len(takes.recording().samples) >= 2
 
 
+@pytest.mark.endure  # half a minute of searching; in process: tests/acquisition/test_session.py
 def test_a_light_that_is_gone_for_good_ends_the_session(takes: Takes) -> None:
     takes.emulation.place_fixture = lambda placement: takes.emulation.ask("fixture.place", id=0)
     with pytest.raises(PartialResult, match="check that the laser is on"):
@@ -145,6 +146,7 @@ def test_ctrl_c_in_mid_session_leaves_a_readable_recording_and_a_standing_arm(ta
     assert len(takes.recording().samples) == 2
 
 
+@pytest.mark.endure  # a quarter of a minute
 def test_a_box_at_its_slowest_rate_serves_a_session(takes: Takes) -> None:
     """At 100 Hz every frame holds one sample, and a glance few."""
     psd = msgspec.structs.replace(takes.rig.devices.psd, rate_hz=100.0)

@@ -27,8 +27,10 @@ MUTATORS: dict[str, tuple[Mutator, ...]] = {
 }  # fmt: skip
 REFUSED = {"bad_utf8": ("toml", "json", "csv")}  # what no reader of these kinds may take
 DAILY, ENDURE = 20, 300
-SLOW = 4  # daily, of commands that take a second and more of a core on a small valid input
-DAILY_OF = {"report": SLOW, "diagnose": SLOW, "compare": SLOW, "simulate-errors": SLOW, "design": SLOW}
+FEW, FEWER = 8, 4  # daily, of commands that take a tenth, or a whole second, of a core on a small valid input
+DAILY_OF = dict.fromkeys(("identify", "verify", "live", "batch"), FEW) | dict.fromkeys(
+    ("report", "diagnose", "compare", "simulate-errors", "design"), FEWER
+)
 
 
 @dataclass(frozen=True)

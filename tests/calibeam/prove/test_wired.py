@@ -11,6 +11,7 @@ from simulators.conceal.observe import observe
 from simulators.conceal.wanted import Wanted
 
 
+@pytest.mark.endure  # most of a minute; `make prove` holds sessions on wires, too
 @pytest.mark.timeout(600)
 def test_a_session_on_the_wires_is_that_of_the_fast_path_within_noise(tmp_path: Path) -> None:
     wanted = Wanted("dual-psd", seed=31, defects=("soft-joint",), enr=5.0, samples=16, places=1)
