@@ -21,7 +21,8 @@ from acquisition.recording.writer import RecordingWriter
 from acquisition.reopening import Reopening
 from acquisition.streams import Pump
 from calibeam.encoders import VIEWED, encoder_driver, identities_of, names_of
-from calibeam.recorded import ENDING, uninterrupted
+from calibeam.interrupts import ENDING
+from calibeam.recorded import uninterrupted
 from calibeam.software import SOFTWARE
 from drivers.clock import Clock
 from drivers.device import Block

@@ -11,7 +11,7 @@ import time
 from types import FrameType
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-AGAIN_S = 10.0  # a clean-up that takes longer may be interrupted once more
+AGAIN_S = 2.0  # a clean-up is shorter; an arm that still moves after it has to be stopped by the next one
 
 
 class Interrupts:

@@ -26,6 +26,7 @@ from acquisition.recording.writer import RecordingWriter
 from acquisition.servo.centring import Limits
 from acquisition.session import Session, Summary
 from calibeam.emulation import EmulationError
+from calibeam.interrupts import ENDING
 from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibeam.outcome import PartialResult, interruption
@@ -36,7 +37,6 @@ from drivers.errors import DeviceError
 Result = TypeVar("Result")
 
 Interrupted = (DeviceError, AcquisitionError, RecordingError, EmulationError, KeyboardInterrupt)
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # all of them end a session as Ctrl-C does, see calibeam.cli
 
 
 @contextmanager

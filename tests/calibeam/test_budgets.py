@@ -1,0 +1,70 @@
+"""What a command may take for an input of ordinary size: 300 readings, a shipped rig, the options' defaults.
+
+The budgets are those of docs/commands.md: seconds of processor time and memory. They are several times what is needed,
+so that they catch a loop without end or a table that grows with the wrong power, and no slow machine.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from simulators.conceal.case import conceal
+from simulators.conceal.wanted import Wanted
+from simulators.conceal.write import write_case
+
+ROOT = Path(__file__).parents[2]
+RIG = ROOT / "rigs" / "ur5e-dual-psd.toml"
+BUDGETS = {  # command line: seconds of processor time, MB
+    "identify case/recording --out model.json": (30, 600),
+    "report case/recording --out report.html": (60, 1000),
+    "diagnose case/recording --out diagnosis.json": (90, 2000),
+    "compare case/recording case/recording": (60, 1000),
+    "predict model.json case/recording/samples.csv --out predicted.csv": (15, 600),
+    "check case/recording": (15, 600),
+    "import case/recording --out imported.mcap": (15, 600),
+    "export imported.mcap --out exported": (15, 600),
+    "recover imported.mcap --out recovered.mcap": (15, 600),
+    f"design {RIG} --out plan.toml": (120, 1000),
+    f"simulate-errors {RIG} --out errors": (120, 1000),
+    "batch sessions --out fleet --jobs 1": (60, 1000),
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("ordinary")
+    for name, seed in (("case", 7), ("other", 8)):
+        write_case(conceal(Wanted("dual-psd", seed, samples=300, places=3)), made / name)
+    (made / "sessions").mkdir()
+    for name in ("case", "other"):
+        shutil.copytree(made / name / "recording", made / "sessions" / name)
+    return made
+
+
+@pytest.mark.endure
+@pytest.mark.parametrize("words", BUDGETS)
+def test_an_ordinary_input_stays_within_its_budget(words: str, folder: Path, record_property) -> None:
+    with (folder / "printed.txt").open("w+") as printed:
+        command = [sys.executable, "-m", "calibeam", *words.split()]
+        process = subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=printed, stderr=printed)
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        printed.seek(0)
+        assert process.returncode in (0, 3), printed.read()[-2000:]
+    took_s, held_mb = used.ru_utime + used.ru_stime, used.ru_maxrss * 1024 / 1e6
+    record_property("processor_s", took_s)
+    record_property("memory_mb", held_mb)
+    print(f"{words}: {took_s:.1f} s, {held_mb:.0f} MB")
+    limit_s, limit_mb = BUDGETS[words]
+    assert took_s < limit_s
+    assert held_mb < limit_mb
+
+
+def test_the_budgets_are_those_of_the_documentation() -> None:
+    page = (ROOT / "docs" / "commands.md").read_text()
+    for words, (limit_s, limit_mb) in BUDGETS.items():
+        assert f"| `{words.split()[0]}` | {limit_s} s | {limit_mb} MB |" in page
