@@ -114,11 +114,12 @@ class Staged:
         path = self.folder / "out" / "session.log"
         return path.read_text() if path.exists() else ""
 
-    def until(self, happened: Callable[[], bool], patience_s: float = PATIENCE_S) -> bool:
+    def until(self, happened: Callable[[], bool], patience_s: float = PATIENCE_S, *, ended: bool = False) -> bool:
+        """Whether it happened; `ended`: it may happen after the session's process has ended."""
         end_s = time.monotonic() + patience_s
         while not happened():
             _ = self.screen  # a terminal that nobody reads fills
-            if time.monotonic() > end_s or self.process.poll() is not None:
+            if time.monotonic() > end_s or not (ended or self.process.poll() is None):
                 return happened()
             time.sleep(0.002)
         return True
@@ -361,18 +362,19 @@ EVENTS: dict[str, Callable[[Staged], float]] = {
     "controller silent": silent,
     "control child frozen 5 s": frozen(lambda s: s.child()),
     "session frozen 5 s, r typed": frozen(lambda s: s.process.pid, "r"),
+    "session frozen 5 s, go typed": frozen(lambda s: s.process.pid, "go\n"),
     "PSD cable pulled": unplugged,
     "protective stop": protective_stop,
     "disk full": disk_full,
 }
-NEEDS_ARM = {"control child killed", "control child frozen 5 s", "STOP of the page", "disk full"}
 CELLS: tuple[tuple[str, str], ...] = (
-    *(("travelling", event) for event in EVENTS),
+    *(("travelling", event) for event in EVENTS if event != "session frozen 5 s, go typed"),
     *(("centring", event) for event in ("Ctrl-C", "Ctrl-C twice", "SIGTERM", "control child killed",
       "control child frozen 5 s", "session frozen 5 s, r typed", "controller and devices frozen 5 s")),
     *(("reading", event) for event in ("Ctrl-C", "SIGTERM", "control child killed", "session frozen 5 s, r typed")),
     *(("paused", event) for event in ("Ctrl-C", "SIGTERM", "control child killed", "session frozen 5 s, r typed")),
-    *(("question", event) for event in ("Ctrl-C", "SIGTERM", "session frozen 5 s, r typed")),
+    *(("question", event) for event in ("Ctrl-C", "SIGTERM", "SIGHUP, terminal closed",
+      "session frozen 5 s, go typed")),
 )  # fmt: skip
 
 

@@ -4,7 +4,7 @@ from calibeam.interrupts import INTERRUPTS
 
 
 def main() -> None:
-    """Loads the command line, which takes about a second, and runs it."""
+    """Loads the command line, which takes up to a second, and runs it."""
     INTERRUPTS.load()
     from calibeam.cli import main as run
 

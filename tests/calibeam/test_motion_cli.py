@@ -2,13 +2,18 @@
 
 import json
 import re
-from collections.abc import Generator
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Generator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from acquisition.recording.rig import load_rig
+from benchmarks.stops import MOVES_RAD_S, Watch
 from calibeam.cli import run
 from calibeam.emulation import Emulation
 from calibeam.motion.robot import streamed_robot
@@ -16,6 +21,7 @@ from drivers.clock import SystemClock
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
 HOME_DEG = np.degrees([0.3, -1.4, 1.6, -0.5, 0.5, 0.0])
+PATIENCE_S = 60.0
 WALL = '[[motion.keep_out]]\nname = "wall"\nlower_m = [-2.0, -2.0, 0.75]\nupper_m = [2.0, 2.0, 0.9]\n'
 
 
@@ -67,6 +73,41 @@ def test_a_motion_into_a_keep_out_box_is_refused(rig: Path, tmp_path: Path, caps
     up = ["0", "-90", "0", "-90", "0", "0"]
     assert run(["move", str(rig), "--joints-deg", *up, "--yes", "--out", str(tmp_path / "plan.svg")]) == 1
     assert "keep-out box 'wall'" in capsys.readouterr().err
+
+
+def until(happened: Callable[[], bool]) -> bool:
+    end_s = time.monotonic() + PATIENCE_S
+    while not happened() and time.monotonic() < end_s:
+        time.sleep(0.01)
+    return happened()
+
+
+def test_a_move_whose_program_was_frozen_is_given_up(rig: Path, tmp_path: Path) -> None:
+    target = [*(f"{value:.6f}" for value in HOME_DEG[:5]), "120"]
+    command = [sys.executable, "-m", "calibeam", "move", str(rig), "--joints-deg", *target, "--yes"]
+    device = load_rig(rig).devices.robot
+    assert device is not None
+    assert device.host is not None
+    watch = Watch(device.host)
+    with subprocess.Popen(
+        [*command, "--out", str(tmp_path / "plan.svg")], stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    ) as program:
+        try:
+            assert until(lambda: watch.newest()[1] > 0.5)
+            program.send_signal(signal.SIGSTOP)
+            assert until(lambda: watch.newest()[1] < MOVES_RAD_S)
+            stood_s = watch.newest()[0]
+            program.send_signal(signal.SIGCONT)
+            _, said = program.communicate(timeout=PATIENCE_S)
+        finally:
+            program.kill()
+    ended_s = watch.newest()[0]
+    assert until(lambda: watch.newest()[0] > ended_s + 1.0)
+    watch.close()
+    assert watch.since(stood_s)[1].max() < MOVES_RAD_S
+    assert program.returncode == 1
+    assert said.startswith("error: ")
+    assert said.count("\n") == 1
 
 
 @pytest.mark.parametrize(

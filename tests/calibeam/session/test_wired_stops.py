@@ -20,7 +20,7 @@ CLOSED = "the recording is closed"
 def moves_for(s: Staged, seconds: float) -> bool:
     """Whether a joint moves in so much emulated time, once an arm that brakes now has come to rest."""
     begin_s = s.now_s() + BRAKES_S
-    assert s.until(lambda: s.watch.newest()[0] > begin_s + seconds)
+    assert s.until(lambda: s.watch.newest()[0] > begin_s + seconds, ended=True)
     return bool((s.watch.since(begin_s)[1] > MOVES_RAD_S).any())
 
 

@@ -174,6 +174,20 @@ def test_a_call_after_a_freeze_of_the_parent_is_not_begun(child) -> None:
     assert child.notes.done == ["stop"]
 
 
+def test_the_end_of_a_motion_is_answered_at_the_next_look_a_millisecond_later(child, monkeypatch) -> None:
+    """So a small move costs little more than its motion: nothing else is waited for."""
+    waits_s: list[float] = []
+    take = child.child._take_stop
+    monkeypatch.setattr(child.child, "_take_stop", lambda timeout_s: waits_s.append(timeout_s) or take(timeout_s))
+    looks: list[int] = []
+    child.notes.looked, child.notes.looks_left = lambda: looks.append(1), 5
+    child.calls.send(Call(1, MOVE))
+    child.turn()
+    assert child.calls.next_answer(0.0) == Ended(Outcome.DONE)
+    assert len(looks) == 6
+    assert waits_s == [0.0] + 5 * [0.001]
+
+
 def _ended(child) -> object:
     answer = child.calls.next_answer(1.0)
     while isinstance(answer, Alive):
