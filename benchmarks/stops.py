@@ -41,6 +41,7 @@ WATCHED_S = 4.0  # from the event, or from the thaw
 ENDS_S = 15.0
 PATIENCE_S = 45.0
 SEED = 5
+GO_CUE = "Type go to move"  # what is typed before it does not count
 
 
 class Watch:
@@ -213,7 +214,7 @@ def _own_terminal(theirs: int) -> Callable[[], None]:
 
 
 def asking(s: Staged) -> bool:
-    return s.until(lambda: "Is the cell clear" in s.screen)
+    return s.until(lambda: GO_CUE in s.screen)
 
 
 def travelling(s: Staged) -> bool:

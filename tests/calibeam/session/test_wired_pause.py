@@ -16,6 +16,7 @@ from acquisition.recording.read import read
 from acquisition.recording.rig import load_rig
 from acquisition.sample import Sample
 from acquisition.session_states import State
+from benchmarks.stops import emulated_rig, without_encoders
 from calibeam.cli import run
 from calibeam.emulation import Emulation
 from calibeam.session.ahead import ahead_of_blocks
@@ -40,19 +41,12 @@ def plan(rig, tmp_path) -> Path:
 
 @pytest.fixture
 def arguments(tmp_path, plan) -> Iterator[list[str]]:
-    with Emulation(RIG_FILE, seed=5, time_scale=4.0) as emulation:
-        text, where = RIG_FILE.read_text(), emulation.address
-        for old, new in (
-            ("out/emulated/psd", where["psd"]["port"]),
-            ("out/emulated/can", where["can"]["channel"]),
-            ('host = "127.0.0.2"', f'host = "{where["robot"]["host"]}"'),
-        ):
-            assert old in text
-            text = text.replace(old, new, 1)
-        (tmp_path / "rig.toml").write_text(text)
-        control = f"{where['control']['host']}:{where['control']['port']}"
-        yield ["session", str(tmp_path / "rig.toml"), "--out", str(tmp_path / "out"), "--plan", str(plan),
-               "--control", control, "--time-scale", "4"]  # fmt: skip
+    alone = tmp_path / "alone.toml"
+    alone.write_text(without_encoders(RIG_FILE.read_text()))
+    with Emulation(alone, seed=5, time_scale=4.0) as emulation:
+        rig_file, where = emulated_rig(alone, emulation, tmp_path), emulation.address["control"]
+        yield ["session", str(rig_file), "--out", str(tmp_path / "out"), "--plan", str(plan),
+               "--control", f"{where['host']}:{where['port']}", "--time-scale", "4"]  # fmt: skip
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import time
 import pytest
 
 from acquisition.recording.read import read
-from benchmarks.stops import CRUISES_RAD_S, MOVES_RAD_S, Staged, staged, travelling
+from benchmarks.stops import CRUISES_RAD_S, GO_CUE, MOVES_RAD_S, Staged, staged, travelling
 
 from .conftest import RIG_FILE
 
@@ -43,7 +43,7 @@ def test_a_killed_control_child_is_reported_and_a_person_decides() -> None:
         s.type("g\n")
         assert s.until(lambda: "does the fixture still stand" in s.screen)
         s.type("y\n")
-        assert s.until(lambda: s.screen.count("Is the cell clear") == 2)
+        assert s.until(lambda: s.screen.count(GO_CUE) == 2)
         assert not moves_for(s, 1.0)
         s.type("go\n")
         assert s.until(lambda: s.watch.newest()[1] > CRUISES_RAD_S)
