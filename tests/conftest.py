@@ -45,6 +45,7 @@ WIRED = (
 TOGETHER = ("calibrate/report",)
 
 
+@pytest.hookimpl(tryfirst=True)  # before pytest-xdist reads the groups
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if on_wires(item.path):

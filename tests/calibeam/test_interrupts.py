@@ -12,6 +12,7 @@ from calibeam.interrupts import Interrupts
 ENDS = """
 import atexit, os, signal, sys
 from calibeam import cli
+signal.signal(signal.SIGHUP, signal.SIG_IGN if "nohup" in sys.argv else signal.SIG_DFL)
 def ten(): [os.kill(os.getpid(), signal.SIGINT) for _ in range(10)]
 def run(arguments):
     try:
@@ -66,6 +67,13 @@ def test_nothing_is_heard_while_a_command_closes_but_a_question_hears_again() ->
     interrupts.heed()
     with pytest.raises(KeyboardInterrupt):
         interrupts.came(signal.SIGINT, None)
+
+
+def test_a_command_that_was_started_to_outlive_its_terminal_does() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", ENDS, "SIGHUP", "nohup"], stdin=subprocess.DEVNULL, capture_output=True, timeout=60.0
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")
 
 
 @pytest.mark.parametrize(("name", "said"), [("SIGINT", "Ctrl-C"), ("SIGTERM", "SIGTERM"), ("SIGHUP", "SIGHUP")])
