@@ -147,7 +147,7 @@ def test_a_program_that_takes_no_command_is_stale(cell, arm) -> None:
         ("silence", DeviceStale, "no good answer"),
         ("checksum", DeviceStale, "no good answer"),
         ("junk", DeviceStale, "no good answer"),
-        ("error", DeviceRefused, ""),
+        ("error", DeviceRefused, "is refused, code"),
     ],
 )
 def test_a_line_in_trouble_is_one_kind_of_error_after_the_tries_of_one_request(cell, arm, kind, raised, reason) -> None:
