@@ -133,10 +133,17 @@ def repeated(step: dict[str, Any], objects: Objects, makers: dict[str, Callable[
         while objects["receive"].getTimestamp() < until_s:
             value = once(step, objects, makers)
             time.sleep(0.005)
+    while "reaches" in step and not _near(plain(value), *step["reaches"]):
+        time.sleep(0.005)
+        value = once(step, objects, makers)
     while "until" in step and step["until"] not in json.dumps(plain(value)):
         time.sleep(0.005)
         value = once(step, objects, makers)
     return value
+
+
+def _near(value: Any, expected: list[float], tolerance: float) -> bool:
+    return isinstance(value, list) and all(abs(v - e) <= tolerance for v, e in zip(value, expected, strict=True))
 
 
 def once(step: dict[str, Any], objects: Objects, makers: dict[str, Callable[[], Any]]) -> Any:

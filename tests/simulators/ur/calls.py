@@ -46,11 +46,15 @@ class Row:
     gives: Any = None
     again: bool = False
     until: str | None = None
+    reaches: tuple[list[float], float] | None = (
+        None  # asked until all numbers are that near: the arm comes to rest first
+    )
 
     @property
     def step(self) -> dict[str, Any]:
         step = {"on": self.on, "call": self.call, "args": list(self.args), "again": self.again}
-        return step if self.until is None else {**step, "until": self.until}
+        more = {"until": self.until, "reaches": self.reaches}
+        return {**step, **{key: value for key, value in more.items() if value is not None}}
 
     def agrees(self, result: dict[str, Any]) -> bool:
         if isinstance(self.gives, Refused):
@@ -68,6 +72,12 @@ def verb(verb_name: str, /, **arguments: Any) -> Row:
 
 def near(expected: Any, tolerance: float) -> Check:
     return lambda value: value == pytest.approx(expected, abs=tolerance)
+
+
+def arrives(on: str, call: str, expected: Sequence[float], tolerance: float, args: tuple[Any, ...] = ()) -> Row:
+    """A position that the arm is on its way to."""
+    reaches = (list(expected), tolerance)
+    return Row(on, call, args, gives=near(list(expected), tolerance), again=on != "realtime", reaches=reaches)
 
 
 def between(low: float, high: float) -> Check:

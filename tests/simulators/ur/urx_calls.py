@@ -15,6 +15,7 @@ from tests.simulators.ur.calls import (
     ZEROS,
     Refused,
     Row,
+    arrives,
     holds,
     near,
     numbers,
@@ -41,7 +42,7 @@ SECONDARY = [
 ]
 REALTIME = [
     Row("realtime", "wait"),
-    Row("realtime", "q_actual", (True,), gives=near(HOME, ARRIVED_RAD), until="-1.5"),
+    arrives("realtime", "q_actual", HOME, ARRIVED_RAD, (True,)),
     Row("realtime", "getActual", (True,), gives=numbers(6)),
     Row("realtime", "q_target", (True,), gives=numbers(6)),
     Row("realtime", "getTarget", (True,), gives=numbers(6)),
