@@ -3,10 +3,10 @@
     python call_clients.py ur_rtde|urx HOST CONTROL_PORT < steps.json > results
 
 The first line names the public methods of the client's classes; the others are results. A step is
-{"on": object, "call": method, "args": [...], "again": bool, "until": text}; a result {"value": ...}, {"error": "..."}
-or {"hangs": true}, after which nothing more is called. On "world" a call is a verb of the side channel. With "again" a
-call is repeated for 0.2 s of the controller's time, because ur_rtde returns from some questions before the answer has
-arrived; with "until", until the result contains that text. The last result counts.
+{"on": object, "call": method, "args": [...]}; a result {"value": ...}, {"error": "..."} or {"hangs": true}, after which
+nothing more is called. On "world" a call is a verb of the side channel. A step may ask to be repeated, the last result
+counts: with "again": true for 0.2 s of the controller's time, with "until": text until the result contains it, with
+"reaches": [value, tolerance] until it is that (calls.py says why).
 """
 
 import collections
@@ -128,7 +128,7 @@ def take(step: dict[str, Any], objects: Objects, makers: dict[str, Callable[[], 
 
 def repeated(step: dict[str, Any], objects: Objects, makers: dict[str, Callable[[], Any]]) -> Any:
     value = once(step, objects, makers)
-    if step.get("again"):
+    if step.get("again") and "receive" in objects:  # of ur_rtde
         until_s = objects["receive"].getTimestamp() + AGAIN_S
         while objects["receive"].getTimestamp() < until_s:
             value = once(step, objects, makers)
@@ -142,8 +142,10 @@ def repeated(step: dict[str, Any], objects: Objects, makers: dict[str, Callable[
     return value
 
 
-def _near(value: Any, expected: list[float], tolerance: float) -> bool:
-    return isinstance(value, list) and all(abs(v - e) <= tolerance for v, e in zip(value, expected, strict=True))
+def _near(value: Any, expected: Any, tolerance: float) -> bool:
+    if isinstance(expected, list):
+        return all(_near(v, e, tolerance) for v, e in zip(value, expected, strict=True))
+    return value == expected if not tolerance else abs(value - expected) <= tolerance
 
 
 def once(step: dict[str, Any], objects: Objects, makers: dict[str, Callable[[], Any]]) -> Any:

@@ -38,7 +38,12 @@ Check = Callable[[Any], bool]
 
 @dataclass(frozen=True)
 class Row:
-    """One call; `gives` is a check, a value to compare with, or how it is refused."""
+    """One call; `gives` is a check, a value to compare with, or how it is refused.
+
+    `again`: the value is on its way (the arm comes to rest first, ur_rtde returns before the answer has arrived), so
+    the call is repeated for 0.2 s of the controller, and then until it gives what it has to, where that is a value.
+    `until`: repeated until the result contains that text.
+    """
 
     on: str
     call: str
@@ -46,15 +51,17 @@ class Row:
     gives: Any = None
     again: bool = False
     until: str | None = None
-    reaches: tuple[list[float], float] | None = (
-        None  # asked until all numbers are that near: the arm comes to rest first
-    )
 
     @property
     def step(self) -> dict[str, Any]:
-        step = {"on": self.on, "call": self.call, "args": list(self.args), "again": self.again}
-        more = {"until": self.until, "reaches": self.reaches}
-        return {**step, **{key: value for key, value in more.items() if value is not None}}
+        step = {"on": self.on, "call": self.call, "args": list(self.args)}
+        if self.until is not None:
+            return step | {"until": self.until}
+        if not self.again:
+            return step
+        wanted = self.gives if isinstance(self.gives, Near) else Near(self.gives, 0.0)
+        reaches = {"reaches": [wanted.expected, wanted.tolerance]} if not callable(wanted.expected) else {}
+        return step | {"again": True} | reaches
 
     def agrees(self, result: dict[str, Any]) -> bool:
         if isinstance(self.gives, Refused):
@@ -70,14 +77,24 @@ def verb(verb_name: str, /, **arguments: Any) -> Row:
     return Row("world", "do", (verb_name, arguments), gives=lambda answer: not str(answer).startswith("refused"))
 
 
-def near(expected: Any, tolerance: float) -> Check:
-    return lambda value: value == pytest.approx(expected, abs=tolerance)
+@dataclass(frozen=True)
+class Near:
+    """A check: a number, or all numbers of a list."""
+
+    expected: Any
+    tolerance: float
+
+    def __call__(self, value: Any) -> bool:
+        return bool(value == pytest.approx(self.expected, abs=self.tolerance))
+
+
+def near(expected: Any, tolerance: float) -> Near:
+    return Near(expected, tolerance)
 
 
 def arrives(on: str, call: str, expected: Sequence[float], tolerance: float, args: tuple[Any, ...] = ()) -> Row:
     """A position that the arm is on its way to."""
-    reaches = (list(expected), tolerance)
-    return Row(on, call, args, gives=near(list(expected), tolerance), again=on != "realtime", reaches=reaches)
+    return Row(on, call, args, gives=Near(list(expected), tolerance), again=True)
 
 
 def between(low: float, high: float) -> Check:

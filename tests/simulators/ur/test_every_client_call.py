@@ -64,7 +64,6 @@ def session(family: str, fresh_emulated, tmp_path_factory: pytest.TempPathFactor
     return Session(results, members)
 
 
-@pytest.mark.endure  # on a machine with several times its load an arm in real time is late for some of the calls
 def test_every_call_works_or_is_refused_at_once(family: str, session: Session) -> None:
     table = TABLES[family][0]
     wrong = [
