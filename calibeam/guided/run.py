@@ -10,7 +10,6 @@ from rich.console import Console
 from acquisition.guided.guide import Guide
 from acquisition.guided.plan import GuidedOptions, Visit, by_kind, calibration_plan, verification_plan
 from acquisition.recording.rig_schema import Rig
-from calibeam.guided.conclude import conclude_guided
 from calibeam.guided.hand import EmulatedHand
 from calibeam.guided.recorded import EncoderAddress, record_guided, watching
 from calibeam.guided.view import PersonGuide
@@ -66,6 +65,8 @@ def run_guided(
         highlight=False,
     )
     if conclude:
+        from calibeam.guided.conclude import conclude_guided  # a second of libraries that no device waits for
+
         conclude_guided(recording, console)
     else:
         console.print(f"next: calibeam verify {recording} --model model.json", highlight=False, markup=False)

@@ -29,8 +29,8 @@ from calibeam.session.key_stream import KeyStream
 from drivers.clock import Clock, SystemClock
 
 LISTEN_S = 0.2  # between two times at which a stop that was not heard is said again
-INTERRUPT, SUSPEND, GO_ON, TERMINATE, HANG_UP, END = b"i", b"z", b"c", b"t", b"u", b"e"
-ENDED_BY = {TERMINATE: "SIGTERM", HANG_UP: "the terminal was closed"}
+END = 0  # beside the numbers of signals
+ENDED_BY = {signal.SIGTERM: "SIGTERM", signal.SIGHUP: "the terminal was closed"}
 ENTER = "\n"
 
 
@@ -79,10 +79,9 @@ class Keys:
         elif key == "s":
             self._reins.stop()
 
-    def signalled(self, what: bytes) -> None:
-        """From a signal handler: one byte down a pipe, and nothing else."""
-        with suppress(OSError):
-            os.write(self._wake, what)
+    def signalled(self, number: int) -> None:
+        """A signal, as if the system had delivered it now."""
+        os.write(self._wake, bytes([number]))
 
     def wait(self, allowed: str) -> str:
         """One of these keys, pressed from now on. StoppedError when given up (a, Ctrl-C); what a device failed with."""
@@ -103,10 +102,10 @@ class Keys:
     def __enter__(self) -> Self:
         """From now on keys and signals go to the reins; at the end terminal and signals are as they were."""
         with ExitStack() as opened:
-            self._woken, self._wake = os.pipe()
+            self._woken, self._wake = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
             self._turned_s = self._clock.now_s()
             opened.callback(self._close)
-            opened.enter_context(_handled(self))
+            opened.enter_context(_written_to(self._wake, continued=not self.heard))
             opened.enter_context(_one_by_one(self._terminal))
             thread = threading.Thread(target=self._listen, name="keys", daemon=True)
             thread.start()
@@ -133,11 +132,11 @@ class Keys:
             ready = select.select(heard, [], [], LISTEN_S)[0]
             frozen = self._was_frozen()
             if self._woken in ready:
-                for code in os.read(self._woken, 64):
-                    if bytes([code]) == END:
+                for number in os.read(self._woken, 64):
+                    if number == END:
                         return
-                    if not (frozen and bytes([code]) == GO_ON):
-                        self._told(bytes([code]))
+                    if not (frozen and number == signal.SIGCONT):
+                        self._told(number)
             # What was typed during a freeze is discarded; the terminal that was ready is empty then.
             if self._terminal in ready and not frozen and not self._read(self._terminal):
                 sources.remove(self._terminal)
@@ -176,17 +175,19 @@ class Keys:
             with suppress(termios.error):
                 termios.tcflush(self._terminal, termios.TCIFLUSH)
 
-    def _told(self, code: bytes) -> None:
-        if code in ENDED_BY:
-            self._ended_by = self._ended_by or ENDED_BY[code]
+    def _told(self, number: int) -> None:
+        if number in ENDED_BY:
+            if number == signal.SIGHUP:
+                INTERRUPTS.leave_terminal()
+            self._ended_by = self._ended_by or ENDED_BY[signal.Signals(number)]
             self._reins.abort(self._ended_by)
-        elif code == GO_ON:
+        elif number == signal.SIGCONT:
             self._reins.resume()
         elif self._question is not None:
             self._reins.abort()
-        elif code == SUSPEND:
+        elif number == signal.SIGTSTP:
             self._reins.pause()
-        else:
+        elif number == signal.SIGINT:
             self._reins.interrupt()
 
 
@@ -213,24 +214,23 @@ def _one_by_one(fd: int | None) -> Generator[None]:
 
 
 @contextmanager
-def _handled(keys: Keys) -> Generator[None]:
-    codes = {
-        signal.SIGINT: INTERRUPT,
-        signal.SIGTSTP: SUSPEND,
-        signal.SIGTERM: TERMINATE,
-        signal.SIGHUP: HANG_UP,
-    }
-    if not keys.heard:  # in a terminal SIGCONT comes with every `fg`, and must not set an arm going
-        codes[signal.SIGCONT] = GO_ON
+def _written_to(wake: int, *, continued: bool) -> Generator[None]:
+    """The number of each signal goes to this descriptor as it is delivered, not when the main thread has time for it.
 
-    def tell(number: int, frame: FrameType | None) -> None:
-        if number == signal.SIGHUP:
-            INTERRUPTS.leave_terminal()
-        keys.signalled(codes[signal.Signals(number)])
-
-    before = {number: signal.signal(number, tell) for number in codes}
+    Python's own handlers run between two instructions of the main thread, once for all that came during one of them.
+    `continued`: SIGCONT, too. In a terminal it comes with every `fg`, and must not set an arm going.
+    """
+    numbers = [signal.SIGINT, signal.SIGTSTP, signal.SIGTERM, signal.SIGHUP]
+    numbers += [signal.SIGCONT] if continued else []
+    earlier = signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
+    before = {number: signal.signal(number, _nothing_more) for number in numbers}
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+        signal.set_wakeup_fd(earlier)
+
+
+def _nothing_more(number: int, frame: FrameType | None) -> None:
+    """Of Python: the listening thread has heard it."""

@@ -169,7 +169,7 @@ def test_a_signal_that_ends_the_session_aborts_it(followed, number, why) -> None
 def test_a_signal_that_came_when_nothing_was_under_way_ends_the_program(followed) -> None:
     followed.reins.finish()
     with pytest.raises(KeyboardInterrupt, match="SIGTERM"), Keys(followed.reins, None) as keys:
-        keys.signalled(b"t")
+        keys.signalled(signal.SIGTERM)
 
 
 class JumpingClock:
