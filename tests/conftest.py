@@ -10,7 +10,7 @@ import calibeam  # noqa: F401 - sets the thread count before numpy is loaded
 HERE = Path(__file__).parent
 # Several processes talk in real time here: beside hard work they starve, and rightly say that a device is silent. Two
 # files of drivers and simulators at a time leave each other room enough, for most of their time is waiting; those of
-# calibeam are whole sessions, whose emulators, readers and servo want both cores. The Makefile names these folders.
+# calibeam are whole sessions, whose emulators, readers and servo want both cores. tests/phases.py names these folders.
 WIRED = (
     "calibeam/fleet/test_engine.py",
     "calibeam/guided/test_wired_guided.py",
@@ -41,17 +41,10 @@ WIRED = (
 )
 
 
-# Folders whose tests share what one long session left: on one worker it is made once. Others keep their file together.
-TOGETHER = ("calibrate/report",)
-
-
-@pytest.hookimpl(tryfirst=True)  # before pytest-xdist reads the groups
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if on_wires(item.path):
             item.add_marker("wired")
-        folder = next((name for name in TOGETHER if item.path.is_relative_to(HERE / name)), "")
-        item.add_marker(pytest.mark.xdist_group(folder or str(item.path.relative_to(HERE))))
 
 
 @cache

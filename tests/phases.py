@@ -15,8 +15,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-TWO_AT_A_TIME = ("-n", "2", "--dist", "loadgroup")  # groups: tests/conftest.py
+TWO_AT_A_TIME = ("-n", "2", "--dist", "loadfile")  # what the tests of a file share is made once
+ON_WIRES = ("-m", "wired and not endure")
 CALCULATING = ("-m", "not endure and not wired", *TWO_AT_A_TIME)
+
+
+# Of the program's tests on wires those without a servo loop: pages, workers, refusals. They leave others room, too.
+PATIENT = tuple(
+    f"tests/calibeam/{name}" for name in ("fleet", "live/test_browser.py", "live/test_page.py", "test_cli.py")
+)
 
 
 @dataclass(frozen=True)
@@ -42,8 +49,8 @@ class Outcome:
 
 DAILY = (
     Phase("calculating", CALCULATING),
-    Phase("devices on wires", ("-m", "wired and not endure", *TWO_AT_A_TIME, "tests/drivers", "tests/simulators")),
-    Phase("sessions on wires", ("-m", "wired and not endure", "tests/calibeam")),
+    Phase("devices on wires", (*ON_WIRES, *TWO_AT_A_TIME, "tests/drivers", "tests/simulators", *PATIENT)),
+    Phase("sessions on wires", (*ON_WIRES, "tests/calibeam", *(f"--ignore={name}" for name in PATIENT))),
 )
 
 

@@ -49,12 +49,16 @@ def test_every_phase_runs_and_one_failure_fails_the_whole(failing, monkeypatch, 
 
 def test_no_test_falls_between_the_phases(request):
     conftest = next(p for p in request.config.pluginmanager.get_plugins() if hasattr(p, "WIRED"))
-    everywhere, *wired = (phase.arguments for phase in phases.DAILY)
+    everywhere, devices, sessions = (phase.arguments for phase in phases.DAILY)
     assert "not endure and not wired" in everywhere
     assert not [word for word in everywhere if word.startswith("tests")]
-    assert all("wired and not endure" in words for words in wired)
-    named = {Path(word).name for words in wired for word in words if word.startswith("tests/")}
-    assert {Path(wired).parts[0] for wired in conftest.WIRED} == named
+    assert "wired and not endure" in devices
+    assert "wired and not endure" in sessions
+    ignored = {word.removeprefix("--ignore=") for word in sessions if word.startswith("--ignore=")}
+    for path in (Path("tests") / name for name in conftest.WIRED):
+        beside_others = any(path.is_relative_to(word) for word in devices if word.startswith("tests/"))
+        alone = path.is_relative_to("tests/calibeam") and not any(path.is_relative_to(word) for word in ignored)
+        assert beside_others is not alone, path
 
 
 @pytest.mark.parametrize("path", [".ci/run", "README.md"])
