@@ -1,0 +1,11 @@
+"""Every parameter of the arm, by each instrument and several together, by each arm model, and by a plan's every key."""
+
+import pytest
+
+from . import answers
+from .agreement import parameter_differences
+
+
+@pytest.mark.parametrize("name", answers.FITTED)
+def test_the_parameters_are_as_frozen_and_the_same_are_not_determined(frozen, tmp_path, name):
+    assert parameter_differences(answers.fitted(name, tmp_path), frozen("fitted")[name]) == []
