@@ -45,8 +45,8 @@ def tool_axes_command(
 
     The rows in which one joint alone turns are found from the joint readings. Needed are rotations of the last joint
     and of the one before it, at least 20 degrees and 5 rows each, with all joints before them left where they were.
-    The target is fitted to the rows with those joints there; all other rows are a check. The uncertainty includes what
-    the arm's own errors add, as far as the rotations do not show them.
+    The target is fitted to the rows with those joints there; all other rows are a check: turn a joint before the
+    wrist, too. The uncertainty includes what the arm's own errors add, as far as the rotations do not show them.
 
     Example: calibeam tool-axes session/ --out tool.json
 

@@ -21,7 +21,7 @@ from calibrate.tool_axes.circle import fit_circle
 from calibrate.tool_axes.flange_frame import flange_frame
 from calibrate.tool_axes.flange_seen import FlangeSeen, flange_seen
 from calibrate.tool_axes.orientation import Orientation, orientation_of
-from calibrate.tool_axes.segments import STILL_RAD, single_axis_segments
+from calibrate.tool_axes.segments import SHORTEST_RAD, STILL_RAD, single_axis_segments
 from calibrate.tool_axes.wrist import AxisFound, wrist
 from calibrate.tool_axes.wrist_fit import Noise, TargetRows, WristFit, WristProblem, target_names
 
@@ -31,6 +31,10 @@ Indices = NDArray[np.intp]
 # Beyond this multiple of the prior the recording does not belong to this arm, or the prior does not: wrong joint signs,
 # another table. A scale that a few combinations of parameters show would then carry all of the uncertainty.
 REFUSED = 5.0
+# The last two axes look the same from a wrist that counts the other way: its target is the mirrored one, and fits.
+UNCHECKED = (
+    "only the last two joints turn, so a wrong sign of one of them would not be noticed; turn a joint before them, too"
+)
 OTHER_ARM = "check the arm's table and the joint signs, or state larger errors of the arm"
 
 
@@ -104,7 +108,10 @@ def calibrate_tool(arm: KinematicModel, targets: Sequence[TargetRows], prior: Ar
         found = problem.fit(prior.scaled(widened), found.noise)
         why = _undetermined(found, ())
     factor = f"the assumed uncertainties of the arm are multiplied by {widened:.1f}"
-    cautions = tuple(f"{says}; {factor}" for w, says in witnesses if w.contradicts)
+    cautions = (
+        *(f"{says}; {factor}" for w, says in witnesses if w.contradicts),
+        *(() if any(map(_moved_farther, begun)) else (UNCHECKED,)),
+    )
     points = tuple(_found(found, k, b, start_m[k], why is None) for k, b in enumerate(begun))
     turn = "its point is not determined" if why else orientation_of(found, used, _points(found, begun, start_m))
     return ToolCalibration(
@@ -134,6 +141,13 @@ def _begin(arm: KinematicModel, prior: ArmPrior, target: TargetRows) -> _Begun:
     away = np.abs(q_rad - held)[:, : q_rad.shape[1] - 2]
     used = np.flatnonzero(np.all(away <= STILL_RAD, axis=1))
     return _Begun(target, axes, last, flange_frame(arm, prior.mean, before.circle, last.circle, held), used)
+
+
+def _moved_farther(begun: _Begun) -> bool:
+    """Whether a joint before the wrist turned far enough to check the signs."""
+    q_rad = begun.rows.q_rad
+    away = np.abs(q_rad - begun.last.segment.held(q_rad))[:, : q_rad.shape[1] - 2]
+    return bool(np.any(away >= SHORTEST_RAD))
 
 
 def _base_device(arm: KinematicModel, prior: ArmPrior, begun: _Begun) -> Floats:

@@ -26,14 +26,14 @@ def spanned():
 
 def three(errors, seed, points=POINTS):
     rng = np.random.default_rng(seed)
-    arm, truth, q = nominal(UR5, errors.links), draw(UR5, errors, rng), turns(5, 6)
+    arm, truth, q = nominal(UR5, errors.links), draw(UR5, errors, rng), turns(4, 5, 6)
     rows = tuple(TargetRows(q, measured(truth, q, rng, p), number=k + 1) for k, p in enumerate(points))
     return calibrate_tool(arm, rows, assumed_prior(arm, errors.zero_sigma_rad))
 
 
 def six_d(errors, seed):
     rng = np.random.default_rng(seed)
-    arm, truth, q = nominal(UR5, errors.links), draw(UR5, errors, rng), turns(5, 6)
+    arm, truth, q = nominal(UR5, errors.links), draw(UR5, errors, rng), turns(4, 5, 6)
     tracker = Rotation.random(random_state=5)  # as in `measured`
     seen = tracker * Rotation.from_matrix(truth.flange(q)[:, :3, :3]) * TURN
     noise = Rotation.from_rotvec(rng.normal(0, TURN_NOISE_RAD, (len(q), 3)))
