@@ -1,136 +1,219 @@
-"""Tool calibration by turning one axis at a time: circles, axis lines, flange, and the tool by distances.
+"""Tool calibration by turning one axis at a time: circles, axis lines, flange, and the targets from the wrist's rows.
 
-Source: patent CN114523474B, step 3. The circles of the last two joints place the flange, hence a start for the target
-in it; the target is then fitted to the distances of point pairs, which need no frame. The arm is taken as drawn.
+Source: patent CN114523474B, step 3. The circles of the last two joints place the flange, hence a start for the targets
+in it; these are then fitted to the rows in which the joints before the last two stand still (wrist_fit.py).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.arms.model import KinematicModel
-from calibrate.fit import Status, solve
-from calibrate.identifiability import Identifiability, analyse
+from calibrate.fit import Status
+from calibrate.identifiability import analyse
 from calibrate.parameters import hold
-from calibrate.problem import Problem
 from calibrate.rigid import inverse
-from calibrate.sensors.pair import PairChain
-from calibrate.sensors.target import UNKNOWN_PLAUSIBLE_M, Target
-from calibrate.sensors.tip_distance import TipDistance
+from calibrate.tool_axes.arm_evidence import Witness, other_rows_witness, wrist_witness
+from calibrate.tool_axes.arm_prior import ArmPrior
 from calibrate.tool_axes.circle import fit_circle
-from calibrate.tool_axes.flange_frame import FlangeFrame, flange_frame
-from calibrate.tool_axes.segments import Segment, single_axis_segments
+from calibrate.tool_axes.flange_frame import flange_frame
+from calibrate.tool_axes.flange_seen import FlangeSeen, flange_seen
+from calibrate.tool_axes.orientation import Orientation, orientation_of
+from calibrate.tool_axes.segments import SHORTEST_RAD, STILL_RAD, single_axis_segments
 from calibrate.tool_axes.wrist import AxisFound, wrist
+from calibrate.tool_axes.wrist_fit import Noise, TargetRows, WristFit, WristProblem, target_names
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-STRIDES = (1, 2, 3, 5, 8, 13)  # partners of each row: near and far ones, without the square of all pairs
-SHORTEST_SHARE = 0.05  # of the longest distance: shorter pairs have no direction worth having
+# Beyond this multiple of the prior the recording does not belong to this arm, or the prior does not: wrong joint signs,
+# another table. A scale that a few combinations of parameters show would then carry all of the uncertainty.
+REFUSED = 5.0
+# The last two axes look the same from a wrist that counts the other way: its target is the mirrored one, and fits.
+UNCHECKED = (
+    "only the last two joints turn, so a wrong sign of one of them would not be noticed; turn a joint before them, too"
+)
+OTHER_ARM = "check the arm's table and the joint signs, or state larger errors of the arm"
+
+
+@dataclass(frozen=True)
+class TargetFound:
+    """One target: where it was measured, and its point in the flange with one sigma; None where not determined."""
+
+    rows: TargetRows
+    axes: tuple[AxisFound, ...]
+    used: Indices  # of `rows`: in which only the wrist turns
+    by_axes_m: Floats  # (3,) from the axis lines of the nominal arm alone
+    point_m: Floats | None  # (3,) in the flange
+    sigma_m: Floats | None  # (3,) of all sources
+    instrument_sigma_m: Floats | None  # (3,) the measuring device's part of it
+    arm_sigma_m: Floats | None  # (3,) the arm's part of it
 
 
 @dataclass(frozen=True)
 class ToolCalibration:
-    """The target in the flange with its doubt, and what it was found from."""
+    """The targets in the flange, and what they were found from."""
 
     status: Status
-    tool_m: Floats | None  # (3,) in the flange; None where these rotations do not tell it
-    tool_sigma_m: Floats | None  # (3,) from the scatter of the distances about the drawn arm
-    why: str | None  # why not determined
-    by_axes_m: Floats  # (3,) as the axis lines alone say
-    flange: FlangeFrame
+    why: str | None  # why nothing is determined
+    cautions: tuple[str, ...]  # what speaks for care
+    targets: tuple[TargetFound, ...]
+    orientation: Orientation | None
+    orientation_why: str | None
+    flange: FlangeSeen | None
+    prior: ArmPrior  # as used
+    widened: float  # factor of the prior's sigmas
+    noise: Noise
+    other_rows: int
+    other_rms_m: float | None  # of a coordinate, in the rows that took no part; None: there are none
+
+    @property
+    def trust(self) -> str:
+        """On the scale of trust of all reports."""
+        if self.why is not None:
+            return "no"
+        return "with care" if self.cautions else "yes"
+
+
+@dataclass(frozen=True)
+class _Begun:
+    """A target with its circles and its rows of the wrist."""
+
+    rows: TargetRows
     axes: tuple[AxisFound, ...]
-    identifiability: Identifiability  # of the three coordinates by distances
-    distance_rms_m: float
+    last: AxisFound
+    T_device_flange: Floats  # (4, 4) at the readings of `last`, from the axis lines
+    used: Indices
 
 
-def calibrate_tool(
-    arm: KinematicModel, q_rad: Floats, position_m: Floats, file_rows: Indices | None = None
-) -> ToolCalibration:
-    """From readings (row, joint) and positions (row, 3) in any frame.
+def calibrate_tool(arm: KinematicModel, targets: Sequence[TargetRows], prior: ArmPrior) -> ToolCalibration:
+    """From the readings of one or more targets of one tool, seen by one device in a frame of its own.
 
-    `file_rows` (row,), from 0, says where these rows stand in the file, for errors. DataError without the rotations
-    it needs.
+    DataError for a target without the rotations it needs.
     """
-    where = np.arange(len(q_rad)) if file_rows is None else file_rows
-    axes = tuple(
-        AxisFound(s, fit_circle(position_m[s.rows], q_rad[s.rows, s.joint - 1])) for s in single_axis_segments(q_rad)
+    begun = tuple(_begin(arm, prior, target) for target in targets)
+    T_base_device = _base_device(arm, prior, begun[0])
+    start_m = np.array([_in_flange(arm, prior, b, T_base_device) for b in begun])
+    used = tuple(b.rows.select(b.used) for b in begun)
+    others = tuple(b.rows.select(np.setdiff1d(np.arange(len(b.rows.q_rad)), b.used)) for b in begun)
+    scatter_m = float(np.median([a.circle.scatter_m for b in begun for a in b.axes]))
+    problem = WristProblem.of(arm, prior.mean, used, start_m, T_base_device)
+    found = problem.fit(prior, problem.noise(prior, scatter_m))
+    witnesses, other_rms_m = _witnesses(found, others, T_base_device)
+    widened = max((w.ratio for w, _ in witnesses if w.contradicts), default=1.0)
+    why = _undetermined(found, witnesses)
+    if why is None and widened > 1.0:
+        found = problem.fit(prior.scaled(widened), found.noise)
+        why = _undetermined(found, ())
+    factor = f"the assumed uncertainties of the arm are multiplied by {widened:.1f}"
+    cautions = (
+        *(f"{says}; {factor}" for w, says in witnesses if w.contradicts),
+        *(() if any(map(_moved_farther, begun)) else (UNCHECKED,)),
     )
-    before, last = wrist(axes, q_rad, lambda row: int(where[row]) + 1)
-    flange = flange_frame(arm, before.circle, last.circle, last.segment.held(q_rad))
-    by_axes_m = _seen_from_flange(arm, flange, last.segment, q_rad, position_m)
-    rows = np.unique(np.concatenate([axis.segment.rows for axis in axes]))
-    return _by_distances(arm, q_rad[rows], position_m[rows], by_axes_m, flange, axes)
-
-
-def _seen_from_flange(
-    arm: KinematicModel, flange: FlangeFrame, segment: Segment, q_rad: Floats, position_m: Floats
-) -> Floats:
-    """(3,) mean of the target in the flange over the last joint's rotation."""
-    theta = np.array([p.start for p in arm.parameters])
-    T_base_flange = arm.flange(theta, np.concatenate([flange.q_rad[None], q_rad[segment.rows]]))
-    T_device_base = flange.T_device_flange @ inverse(T_base_flange[0])
-    T_flange_device = inverse(T_device_base @ T_base_flange[1:])
-    seen = np.einsum("nij,nj->ni", T_flange_device[:, :3, :3], position_m[segment.rows]) + T_flange_device[:, :3, 3]
-    return seen.mean(axis=0)
-
-
-def _by_distances(
-    arm: KinematicModel,
-    q_rad: Floats,
-    position_m: Floats,
-    start_m: Floats,
-    flange: FlangeFrame,
-    axes: tuple[AxisFound, ...],
-) -> ToolCalibration:
-    a, b = _pairs(position_m)
-    length_m = np.linalg.norm(position_m[a] - position_m[b], axis=1)[:, None]
-    chain = PairChain(arm, TipDistance(Target(start_m, UNKNOWN_PLAUSIBLE_M)))
-    parameters = hold(chain.parameters, [p.name for p in arm.parameters])
-    size_m = np.sqrt(2.0) * float(np.median([axis.circle.scatter_m for axis in axes]))
-    size_m = max(size_m, 1e-12)  # exact data: any weight will do
-    weight = np.full((len(a), 1, 1), 1.0 / size_m)
-    problem = Problem(chain, parameters, np.concatenate([q_rad[a], q_rad[b]], axis=1), length_m, weight)
-    fit = solve(problem)
-    scatter = max(fit.chi2_per_dof, 1.0)  # the drawn arm misfits more than the instrument: that is doubt, too
-    seen = analyse(problem.jacobian(fit.theta) / np.sqrt(scatter), parameters)
-    told = fit.status is Status.CONVERGED and not seen.combinations
-    why = None if told else "; ".join(c.says for c in seen.combinations) or fit.status.value
+    points = tuple(_found(found, k, b, start_m[k], why is None) for k, b in enumerate(begun))
+    turn = "its point is not determined" if why else orientation_of(found, used, _points(found, begun, start_m))
     return ToolCalibration(
-        Status.RANK_DEFICIENT if seen.combinations and fit.status is Status.CONVERGED else fit.status,
-        start_m + fit.theta[-3:] if told else None,
-        np.sqrt(np.diag(_covariance(problem, fit.theta, position_m, a, b))) if told else None,
+        Status.RANK_DEFICIENT if why and found.fit.status is Status.CONVERGED else found.fit.status,
         why,
-        start_m,
-        flange,
-        axes,
-        seen,
-        float(np.sqrt(np.mean(problem.misfit(fit.theta) ** 2))),
+        cautions if why is None else (),
+        points,
+        None if isinstance(turn, str) else turn,
+        turn if isinstance(turn, str) else None,
+        None if why else flange_seen(found, T_base_device, begun[0].last.segment.held(begun[0].rows.q_rad)),
+        found.prior,
+        widened if why is None else 1.0,
+        found.noise,
+        sum(len(o.q_rad) for o in others),
+        other_rms_m,
     )
 
 
-def _pairs(position_m: Floats) -> tuple[Indices, Indices]:
-    n = len(position_m)
-    a = np.concatenate([np.arange(n - s) for s in STRIDES if s < n])
-    b = np.concatenate([np.arange(s, n) for s in STRIDES if s < n])
-    length_m = np.linalg.norm(position_m[a] - position_m[b], axis=1)
-    far = length_m > SHORTEST_SHARE * length_m.max()
-    return a[far], b[far]
+def _begin(arm: KinematicModel, prior: ArmPrior, target: TargetRows) -> _Begun:
+    q_rad = target.q_rad
+    axes = tuple(
+        AxisFound(s, fit_circle(target.position_m[s.rows], q_rad[s.rows, s.joint - 1]))
+        for s in single_axis_segments(q_rad)
+    )
+    before, last = wrist(axes, q_rad, lambda row: int(target.in_file[row]) + 1)
+    held = last.segment.held(q_rad)
+    away = np.abs(q_rad - held)[:, : q_rad.shape[1] - 2]
+    used = np.flatnonzero(np.all(away <= STILL_RAD, axis=1))
+    return _Begun(target, axes, last, flange_frame(arm, prior.mean, before.circle, last.circle, held), used)
 
 
-def _covariance(problem: Problem, theta: Floats, position_m: Floats, a: Indices, b: Indices) -> Floats:
-    """(3, 3) of the target by equal independent noise of all positions, each of which is in many pairs.
+def _moved_farther(begun: _Begun) -> bool:
+    """Whether a joint before the wrist turned far enough to check the signs."""
+    q_rad = begun.rows.q_rad
+    away = np.abs(q_rad - begun.last.segment.held(q_rad))[:, : q_rad.shape[1] - 2]
+    return bool(np.any(away >= SHORTEST_RAD))
 
-    Its size is that of the misfit, so what the drawn arm misses counts as doubt, too.
-    """
-    gain = np.linalg.pinv(problem.jacobian(theta)[:, -3:]) * problem.whitener[0, 0, 0]  # (3, pair) d target / d length
-    span = position_m[b] - position_m[a]
-    along = span / np.linalg.norm(span, axis=1, keepdims=True)
-    by_length = gain.T[:, :, None] * along[:, None]  # (pair, 3, 3)
-    by_position = np.zeros((len(position_m), 3, 3))
-    np.add.at(by_position, b, by_length)
-    np.add.at(by_position, a, -by_length)
-    degrees = max(len(a) - 3, 1)
-    noise_m2 = float(np.sum(problem.misfit(theta) ** 2)) / degrees / 2.0  # a length has the noise of two positions
-    return noise_m2 * np.einsum("pij,pkj->ik", by_position, by_position)
+
+def _base_device(arm: KinematicModel, prior: ArmPrior, begun: _Begun) -> Floats:
+    held = begun.last.segment.held(begun.rows.q_rad)
+    return arm.flange(prior.mean, held[None])[0] @ inverse(begun.T_device_flange)
+
+
+def _in_flange(arm: KinematicModel, prior: ArmPrior, begun: _Begun, T_base_device: Floats) -> Floats:
+    """(3,) mean of the target in the flange over the last joint's rotation."""
+    rows = begun.last.segment.rows
+    T = inverse(arm.flange(prior.mean, begun.rows.q_rad[rows])) @ T_base_device
+    return (np.einsum("nij,nj->ni", T[:, :3, :3], begun.rows.position_m[rows]) + T[:, :3, 3]).mean(axis=0)
+
+
+def _witnesses(
+    found: WristFit, others: tuple[TargetRows, ...], T_base_device: Floats
+) -> tuple[tuple[tuple[Witness, str], ...], float | None]:
+    """What speaks about the size of the arm's errors, each in a sentence, and the rms of the rows without part."""
+    if not np.all(np.isfinite(found.fit.covariance)):
+        return (), None
+    out: list[tuple[Witness, str]] = []
+    axes = wrist_witness(found)
+    if axes is not None:
+        says = f"the last two axes differ from the arm's table by {axes.ratio:.1f} times the assumed uncertainty"
+        out.append((axes, says))
+    rest = other_rows_witness(found, others, T_base_device)
+    if rest is not None:
+        says = (
+            f"the rows in which other joints moved differ from the arm by {1e3 * rest[1]:.2g} mm rms, "
+            f"{rest[0].ratio:.1f} times the assumed uncertainty"
+        )
+        out.append((rest[0], says))
+    return tuple(out), None if rest is None else rest[1]
+
+
+def _undetermined(found: WristFit, witnesses: tuple[tuple[Witness, str], ...]) -> str | None:
+    fit = found.fit
+    if fit.status is not Status.CONVERGED or not np.all(np.isfinite(fit.covariance)):
+        return fit.status.value
+    arm = [p.name for p in found.arm.parameters]  # known to its prior; what the rows determine beside it is asked here
+    seen = analyse(found.problem.jacobian(fit.theta)[: found.data_rows], hold(found.problem.parameters, arm))
+    if seen.combinations:
+        return "; ".join(c.says for c in seen.combinations)
+    refused = [says for w, says in witnesses if w.contradicts and w.ratio > REFUSED]
+    return f"{'; '.join(refused)}: {OTHER_ARM}" if refused else None
+
+
+def _points(found: WristFit, begun: tuple[_Begun, ...], start_m: Floats) -> Floats:
+    """(target, 3) in the flange."""
+    names = (target_names(b.rows.number)[:3] for b in begun)
+    return np.array([start_m[k] + found.fit.theta[found.columns(n)] for k, n in enumerate(names)])
+
+
+def _found(found: WristFit, k: int, begun: _Begun, start_m: Floats, determined: bool) -> TargetFound:
+    if not determined:
+        return TargetFound(begun.rows, begun.axes, begun.used, start_m, None, None, None, None)
+    columns = found.columns(target_names(begun.rows.number)[:3])
+    variance = np.diag(found.fit.covariance)[columns]
+    instrument = np.diag(found.covariance_of_exact_arm())[columns]
+    return TargetFound(
+        begun.rows,
+        begun.axes,
+        begun.used,
+        start_m,
+        start_m + found.fit.theta[columns],
+        np.sqrt(variance),
+        np.sqrt(instrument),
+        np.sqrt(np.maximum(variance - instrument, 0.0)),
+    )

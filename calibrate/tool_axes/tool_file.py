@@ -1,4 +1,4 @@
-"""tool.json: a tool found by turning one axis at a time, with its doubt, version 1. docs/formats.md explains every key.
+"""tool.json: a tool found by turning one axis at a time, with its uncertainty, version 2. docs/formats.md has the keys.
 
 Angles are rad, lengths m.
 """
@@ -11,7 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.model_file import RigIdentity
-from calibrate.tool_axes.tool import ToolCalibration
+from calibrate.tool_axes.arm_prior import ArmErrors
+from calibrate.tool_axes.flange_seen import FlangeSeen
+from calibrate.tool_axes.orientation import Orientation
+from calibrate.tool_axes.tool import TargetFound, ToolCalibration
 from calibrate.tool_axes.wrist import AxisFound
 
 Floats = NDArray[np.float64]
@@ -31,6 +34,7 @@ class FlangeRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class AxisRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One joint's circle."""
 
+    target: int
     joint: int
     rows: tuple[int, int]  # first and last, from 1
     span_rad: float
@@ -44,49 +48,92 @@ class AxisRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     scatter_m: float
 
 
+class TargetRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One target in the flange."""
+
+    target: int
+    point_m: Numbers | None
+    sigma_m: Numbers | None
+    instrument_sigma_m: Numbers | None
+    arm_sigma_m: Numbers | None
+    by_axes_m: Numbers
+    rows_used: tuple[int, ...]  # from 1
+
+
+class OrientationRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The tool's axes in the flange."""
+
+    rotation_rad: Numbers
+    sigma_rad: Numbers
+    frame: str
+
+
+class ArmErrorsRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What was assumed of the arm's own errors, one sigma."""
+
+    zero_sigma_rad: float
+    length_sigma_m: float
+    angle_sigma_rad: float
+    source: str
+    model: str | None
+    widened_by: float
+
+
 class ToolFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Content of tool.json; the module's text explains each field."""
 
-    schema: Literal[1]
+    schema: Literal[2]
     kind: Literal["calibeam-tool"]
     software: str
     rig: RigIdentity
+    trust: str
     status: str
     says: str
+    undetermined: str | None
+    cautions: tuple[str, ...]
     tool_m: Numbers | None
     tool_sigma_m: Numbers | None
-    undetermined: str | None
-    by_axes_m: Numbers
-    distance_rms_m: float
-    flange: FlangeRecord
+    orientation: OrientationRecord | None
+    orientation_undetermined: str | None
+    arm_errors: ArmErrorsRecord
+    position_noise_m: float
+    turn_noise_rad: float | None
+    other_rows: int
+    other_rows_rms_m: float | None
+    targets: tuple[TargetRecord, ...]
+    flange: FlangeRecord | None
     axes: tuple[AxisRecord, ...]
 
 
 def tool_record(
-    found: ToolCalibration, q_rad: Floats, file_rows: NDArray[np.intp], rig: RigIdentity, software: str
+    found: ToolCalibration, errors: ArmErrors, model: str | None, rig: RigIdentity, software: str
 ) -> ToolFile:
-    """The record to write. `q_rad` (row, joint) it was found from, which stand at `file_rows` (row,), from 0."""
-    flange = found.flange
+    """The record to write; `errors` were assumed of the arm, beside those of the `model` file, if there is one."""
+    targets = tuple(_target(t) for t in found.targets)
     return ToolFile(
-        schema=1,
+        schema=2,
         kind="calibeam-tool",
         software=software,
         rig=rig,
+        trust=found.trust,
         status=found.status.name,
         says=found.status.value,
-        tool_m=None if found.tool_m is None else _numbers(found.tool_m),
-        tool_sigma_m=None if found.tool_sigma_m is None else _numbers(found.tool_sigma_m),
         undetermined=found.why,
-        by_axes_m=_numbers(found.by_axes_m),
-        distance_rms_m=found.distance_rms_m,
-        flange=FlangeRecord(
-            _numbers(flange.q_rad),
-            _numbers(flange.T_device_flange[:3, 3]),
-            _numbers(flange.T_device_flange[:3, 2]),
-            _numbers(flange.origin_sigma_m),
-            flange.z_sigma_rad,
+        cautions=found.cautions,
+        tool_m=targets[0].point_m,
+        tool_sigma_m=targets[0].sigma_m,
+        orientation=_orientation(found.orientation),
+        orientation_undetermined=found.orientation_why,
+        arm_errors=ArmErrorsRecord(
+            errors.zero_sigma_rad, errors.length_sigma_m, errors.angle_sigma_rad, errors.source, model, found.widened
         ),
-        axes=tuple(_axis(axis, q_rad, file_rows) for axis in found.axes),
+        position_noise_m=found.noise.position_m,
+        turn_noise_rad=None if found.targets[0].rows.rotation is None else found.noise.turn_rad,
+        other_rows=found.other_rows,
+        other_rows_rms_m=found.other_rms_m,
+        targets=targets,
+        flange=_flange(found.flange),
+        axes=tuple(_axis(axis, target) for target in found.targets for axis in target.axes),
     )
 
 
@@ -98,22 +145,54 @@ def write_tool(path: Path, tool: ToolFile) -> None:
     partial.replace(path)
 
 
-def _axis(axis: AxisFound, q_rad: Floats, file_rows: NDArray[np.intp]) -> AxisRecord:
-    circle, segment = axis.circle, axis.segment
-    told = bool(np.all(np.isfinite(circle.covariance)))
+def _target(target: TargetFound) -> TargetRecord:
+    return TargetRecord(
+        target.rows.number,
+        _or_none(target.point_m),
+        _or_none(target.sigma_m),
+        _or_none(target.instrument_sigma_m),
+        _or_none(target.arm_sigma_m),
+        _numbers(target.by_axes_m),
+        tuple((target.rows.in_file[target.used] + 1).tolist()),
+    )
+
+
+def _orientation(found: Orientation | None) -> OrientationRecord | None:
+    if found is None:
+        return None
+    return OrientationRecord(_numbers(found.rotation_rad), _numbers(found.sigma_rad), found.frame)
+
+
+def _flange(seen: FlangeSeen | None) -> FlangeRecord | None:
+    if seen is None:
+        return None
+    T = seen.T_device_flange
+    return FlangeRecord(
+        _numbers(seen.q_rad), _numbers(T[:3, 3]), _numbers(T[:3, 2]), _numbers(seen.origin_sigma_m), seen.z_sigma_rad
+    )
+
+
+def _axis(axis: AxisFound, target: TargetFound) -> AxisRecord:
+    circle, segment, file_rows = axis.circle, axis.segment, target.rows.in_file
+    determined = bool(np.all(np.isfinite(circle.covariance)))
     return AxisRecord(
+        target.rows.number,
         segment.joint,
         (int(file_rows[segment.rows[0]]) + 1, int(file_rows[segment.rows[-1]]) + 1),
-        segment.span_rad(q_rad),
+        segment.span_rad(target.rows.q_rad),
         circle.status.name,
         _numbers(circle.centre_m),
-        _numbers(circle.centre_sigma_m) if told else None,
+        _numbers(circle.centre_sigma_m) if determined else None,
         _numbers(circle.normal),
-        circle.normal_sigma_rad if told else None,
+        circle.normal_sigma_rad if determined else None,
         circle.radius_m,
-        circle.radius_sigma_m if told else None,
+        circle.radius_sigma_m if determined else None,
         circle.scatter_m,
     )
+
+
+def _or_none(values: Floats | None) -> Numbers | None:
+    return None if values is None else _numbers(values)
 
 
 def _numbers(values: Floats) -> Numbers:

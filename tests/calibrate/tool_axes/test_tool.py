@@ -9,8 +9,10 @@ from acquisition.recording.rig_schema import Arm, ArmModel, Joint, Rig
 from calibrate.arms.catalogue import arm_of
 from calibrate.errors import DataError
 from calibrate.fit import Status
+from calibrate.tool_axes.arm_prior import assumed_prior
 from calibrate.tool_axes.segments import single_axis_segments
 from calibrate.tool_axes.tool import calibrate_tool
+from calibrate.tool_axes.wrist_fit import TargetRows
 
 TOOL = np.array([0.035, -0.02, 0.11])
 HOME = np.array([0.3, -1.2, 1.4, -0.4, 1.2, 0.5])
@@ -26,6 +28,12 @@ def turns(*joints, steps=15, span=1.6):
             q[joint - 1] += angle
             rows.append(q)
     return np.array(rows)
+
+
+def calibrated(arm, q_rad, position_m, file_rows=None, zero_sigma_rad=0.0):
+    """Of an arm that is taken as exact, or whose zeros are not."""
+    rows = TargetRows(q_rad, position_m, None, file_rows)
+    return calibrate_tool(arm, (rows,), assumed_prior(arm, zero_sigma_rad))
 
 
 @pytest.fixture
@@ -61,15 +69,15 @@ def test_free_motion_has_no_segments():
 
 def test_exact_data_give_the_tool_exactly_by_lines_and_by_distances(arm, positions):
     q = turns(4, 5, 6)
-    found = calibrate_tool(arm, q, positions(q))
+    found = calibrated(arm, q, positions(q))
     assert found.status is Status.CONVERGED
-    assert_allclose(found.by_axes_m, TOOL, atol=1e-8)
-    assert_allclose(found.tool_m, TOOL, atol=1e-8)
+    assert_allclose(found.targets[0].by_axes_m, TOOL, atol=1e-8)
+    assert_allclose(found.targets[0].point_m, TOOL, atol=1e-8)
 
 
 def test_axis_lines_are_those_of_the_arm_in_the_tracker_s_frame(arm, positions, ur5e_exact):
     q = turns(5, 6)
-    found = calibrate_tool(arm, q, positions(q))
+    found = calibrated(arm, q, positions(q))
     T = ur5e_exact().flange(found.flange.q_rad)
     assert_allclose(found.flange.T_device_flange[:3, :3], TURN.as_matrix() @ T[:3, :3], atol=1e-8)
     assert_allclose(found.flange.T_device_flange[:3, 3], TURN.apply(T[:3, 3]) + SHIFT, atol=1e-8)
@@ -78,10 +86,10 @@ def test_axis_lines_are_those_of_the_arm_in_the_tracker_s_frame(arm, positions, 
 def test_with_noise_the_errors_are_as_large_as_stated(arm, positions):
     q = turns(4, 5, 6)
     errors, flange = [], []
-    truth = calibrate_tool(arm, q, positions(q)).flange.T_device_flange
+    truth = calibrated(arm, q, positions(q)).flange.T_device_flange
     for seed in range(25):
-        found = calibrate_tool(arm, q, positions(q, 20e-6, seed))
-        errors.append((found.tool_m - TOOL) / found.tool_sigma_m)
+        found = calibrated(arm, q, positions(q, 20e-6, seed))
+        errors.append((found.targets[0].point_m - TOOL) / found.targets[0].sigma_m)
         flange.append((found.flange.T_device_flange[:3, 3] - truth[:3, 3]) / found.flange.origin_sigma_m)
     assert 0.75 < np.sqrt(np.mean(np.square(errors))) < 1.3
     assert 0.75 < np.sqrt(np.mean(np.square(flange))) < 1.3
@@ -90,24 +98,24 @@ def test_with_noise_the_errors_are_as_large_as_stated(arm, positions):
 def test_the_wrist_s_last_joint_alone_is_not_enough(arm, positions):
     q = turns(4, 6)
     with pytest.raises(DataError, match="joint 5 alone and 6 alone are needed") as told:
-        calibrate_tool(arm, q, positions(q))
+        calibrated(arm, q, positions(q))
     assert str(told.value).endswith("found single rotations of joint 4 (rows 1-16), 6 (rows 17-31)")
 
 
 def test_an_arc_that_is_too_short_is_told_with_its_rows(arm, positions):
     q = np.concatenate([turns(6), turns(5, span=0.1)])
     with pytest.raises(DataError, match=r"joint 5 alone turns only 11\.5 deg .*; 20 deg and 5 rows are needed"):
-        calibrate_tool(arm, q, positions(q))
+        calibrated(arm, q, positions(q))
 
 
 def test_a_joint_that_was_moved_between_both_rotations_is_named(arm, positions):
     q = turns(5, 6)
     q[16:, 1] += 0.1
     with pytest.raises(DataError, match=r"joint 2 stands 5\.7 deg apart between rows 1-16 and rows 17-31"):
-        calibrate_tool(arm, q, positions(q))
+        calibrated(arm, q, positions(q))
 
 
 def test_errors_count_rows_as_the_file_does(arm, positions):
     q = turns(4, 6)
     with pytest.raises(DataError, match=r"found single rotations of joint 4 \(rows 11-26\)"):
-        calibrate_tool(arm, q, positions(q), np.arange(10, 10 + len(q)))
+        calibrated(arm, q, positions(q), np.arange(10, 10 + len(q)))
