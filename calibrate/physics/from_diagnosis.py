@@ -39,7 +39,7 @@ from calibrate.model_file import (
     Unseen,
     covariance_record,
 )
-from calibrate.parameters import Parameter, without_assumed
+from calibrate.parameters import Parameter, plausible_sizes, priors, without_assumed
 from calibrate.physics.acting import MOVED_COLUMNS, drivers_under, listed, range_of
 from calibrate.physics.conditions import kept_conditions, needed_columns, recorded_conditions
 from calibrate.physics.records import Effect, EffectCurve, EffectParameter, SessionRecord
@@ -49,6 +49,9 @@ Floats = NDArray[np.float64]
 
 SOFTWARE = f"calibeam {version('calibeam')}"
 CUT = 0.99
+STEP = 1e-6  # m, rad or a factor
+INNER_STEP = 1e-2  # of a plausible size, of what enters non-linearly
+LEAST_CURVED = 0.1  # of a t law: with more wild rows than good ones nothing is known
 TURNS = 30
 KNOTS = 33  # of a curve: a wave of the finest of eight eigenfunctions has eight of them
 UNITS = ("rad_nm", "per_k", "rad", "m", "s", "nm", "share", "k")
@@ -61,7 +64,7 @@ def model_of_diagnosis(found: Diagnosed, recording: Recording) -> ModelFile:
     fit, before = found.physics.model, found.physics.geometry
     names = _names(fit.accepted)
     parameters = _parameters(fit, names)
-    covariance = fit.covariance / max(curvature_of(fit.rows), 0.1)
+    covariance = _covariance(fit)
     seen = _seen(fit, names)
     conditions, needs = _conditions(fit)
     model = ModelFile(
@@ -123,6 +126,33 @@ def _parameters(fit: Fitted, names: tuple[str, ...]) -> tuple[Parameter, ...]:
         _, _, value = p.name.partition(".")
         out.append(replace(p, name=f"{names[owner]}.{value}"))
     return tuple(out)
+
+
+def _covariance(fit: Fitted) -> Floats:
+    """(value, value) posterior, from difference quotients at the very values of the model.
+
+    Where base and fixture stand together, or a joint's zero beside what is mounted on it, is held by wide beliefs only.
+    A prediction is free of that as far as its derivative is that of the covariance; the derivative that the fit takes
+    leaves out how effects turn what geometry does (1e-5 of it, and metres of it are not known).
+    """
+    parameters = fit.problem.parameters
+    free, scale, belief = np.flatnonzero([p.free for p in parameters]), plausible_sizes(parameters), priors(parameters)
+    columns = [_slope(fit, int(i), float(scale[i])) * scale[i] for i in free]
+    beliefs = np.diag(np.where(np.isfinite(belief[free]), scale[free] / belief[free], 0.0))
+    _, s, Vt = np.linalg.svd(np.concatenate([np.stack(columns, axis=1), beliefs]), full_matrices=False)
+    root = scale[free, None] * Vt.T / s
+    out = np.zeros((len(parameters), len(parameters)))
+    out[np.ix_(free, free)] = root @ root.T / max(curvature_of(fit.rows), LEAST_CURVED)
+    return out
+
+
+def _slope(fit: Fitted, i: int, plausible: float) -> Floats:
+    """(row,) of the whitened residual by one value."""
+    inner = fit.problem.owner[i] >= 0 and ".c" not in fit.problem.parameters[i].name
+    step = INNER_STEP * plausible if inner else min(STEP, plausible)
+    up, down = fit.values.copy(), fit.values.copy()
+    up[i], down[i] = up[i] + step, down[i] - step
+    return np.asarray((fit.problem.residual(up) - fit.problem.residual(down)) / (2.0 * step), dtype=np.float64)
 
 
 def _seen(fit: Fitted, names: tuple[str, ...]) -> Identifiability:
