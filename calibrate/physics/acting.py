@@ -5,7 +5,7 @@ means, knots and largest torques are those of the session, and a coefficient kee
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from calibrate.effects.drivers import Drivers, Readout
 from calibrate.effects.form import Form
 from calibrate.effects.gravity import likely_torque_nm
 from calibrate.effects.ports import Perturbation, Port
-from calibrate.effects.term import Term
+from calibrate.effects.term import Shape, Term
 from calibrate.errors import DataError
 from calibrate.physics.records import Effect
 from calibrate.predict import TIP, Predictor, readings
@@ -70,6 +70,8 @@ class Acting:
 def listed(effects: Sequence[Effect], drivers: Drivers) -> tuple[Carried, ...]:
     """Each effect with its term. DataError for one that the catalogue does not list for this session."""
     wanted = {effect.listed or effect.physics for effect in effects}
+    derived = any(effect.shape == Shape.HYSTERESIS.value for effect in effects)  # the file holds it as a column
+    drivers = replace(drivers, approach_derived=derived)
     terms = [t for e in EFFECTS if e.physics in wanted for t in e.terms(drivers)]
     return tuple(Carried(effect, _accepted(effect, _term(effect, terms, drivers))) for effect in effects)
 
