@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from acquisition.recording.columns import ORIENTATION, POSITION, SPOTS
 from acquisition.recording.samples import Samples
@@ -243,8 +244,8 @@ def _beyond(carried: Carried, old: Drivers, new: Drivers) -> tuple[NDArray[np.bo
     low, high = a.min(axis=0), a.max(axis=0)
     outside = np.any((b < low) | (b > high), axis=1)
     scale = np.maximum(high - low, 1e-300)
-    apart = np.linalg.norm((b[outside, None] - a[None]) / scale, axis=2)
-    return outside, np.argmin(apart, axis=1) if len(apart) else np.zeros(0, dtype=np.intp)
+    nearest = KDTree(a / scale).query(b[outside] / scale)[1]
+    return outside, np.asarray(nearest, dtype=np.intp)
 
 
 def _readouts(predictor: Predictor, samples: Samples, frames: Floats, by: Perturbation) -> dict[str, Readout]:
