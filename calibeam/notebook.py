@@ -8,6 +8,7 @@
 The same functions stand behind the command line; docs/python.md has all of it as examples.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
+from acquisition.recording.samples import Samples
 from calibrate.errors import DataError
 
 if TYPE_CHECKING:
@@ -57,6 +59,19 @@ class Model:
         from calibrate.predict import Predictor
 
         return Predictor.of(self.file).flange(np.atleast_2d(np.asarray(q_rad, dtype=np.float64)))
+
+    def predict(self, samples: Mapping[str, NDArray[np.generic]], *, same_session: bool = False) -> dict[str, Floats]:
+        """Columns of predicted.csv, name -> (row,), for columns of samples.csv; effects of the model are applied.
+
+        `same_session`: the samples are of the recording that the model was found in. DataError where an effect cannot
+        be evaluated, SamplesError where joint angles or t_s are missing.
+        """
+        from acquisition.recording.rig import parse_rig
+        from calibrate.physics.predicting import predict_with_physics
+
+        joints = parse_rig(self.file.rig.text or "", "rig.toml in the model").n_joints
+        table = Samples({name: np.asarray(values) for name, values in samples.items()}, joints)
+        return predict_with_physics(self.file, table, same_session).columns
 
     def save(self, path: Path | str) -> Path:
         """Write model.json; returns the path. OSError where it cannot be written."""

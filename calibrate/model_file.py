@@ -1,4 +1,4 @@
-"""model.json: an identified model with its doubt, version 1. docs/formats.md explains every key.
+"""model.json: an identified model with its doubt; schema 2 carries physics, too. docs/formats.md explains every key.
 
 Angles are rad, lengths m. A joint's true angle is its reading plus `joint<i>.zero`.
 """
@@ -28,6 +28,7 @@ from acquisition.recording.errors import shown
 from acquisition.recording.json_file import JsonKind, read_json
 from calibrate.errors import DataError
 from calibrate.parameters import Parameter
+from calibrate.physics.records import Effect, SessionRecord, check_physics
 from calibrate.zeros.result import ZeroResult
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 Fields = dict[Name, Statistic | Whole | Sentence | bool | None]
 ArmName = Annotated[str, msgspec.Meta(pattern="^(dh|mdh|local-poe)$")]
 About = dict[Name, tuple[Metres, ...]]
-SCHEMA = 1
+SCHEMA, WITH_PHYSICS = 1, 2
 KIND = JsonKind("model.json", "give the model.json of an identification", "identify the recording again", DataError)
 
 
@@ -144,7 +145,7 @@ class BootstrapRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Content of model.json; the module's text explains each field."""
 
-    schema: Literal[1]
+    schema: Literal[1, 2]
     kind: Literal["calibeam-model"]
     software: Label
     rig: RigIdentity
@@ -176,8 +177,12 @@ class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     bootstrap: BootstrapRecord | None = None
     plan: FileText | None = None
     readings_sha256: Label | None = None  # which readings it was made of (acquisition/recording/fingerprint.py)
+    effects: Many[Effect] = ()
+    needs: Many[Name] = ()
+    session: SessionRecord | None = None
 
     def __post_init__(self) -> None:
+        check_physics(self.schema, self.effects, self.session)
         for name, numbers in self.about.items():
             sizes = (6,) if name == "device" else (3, 6) if name == "tool" else (3,)
             if len(numbers) not in sizes:
@@ -226,9 +231,9 @@ def read_model(path: Path) -> ModelFile:
 
 def _other(content: dict[str, Any]) -> str | None:
     kind, schema = content.get("kind"), content.get("schema")
-    if kind == "calibeam-model" and schema == SCHEMA:
+    if kind == "calibeam-model" and schema in (SCHEMA, WITH_PHYSICS):
         return None
-    return f"kind '{shown(kind)}', schema {shown(schema)}; expected 'calibeam-model', schema {SCHEMA}"
+    return f"kind '{shown(kind)}', schema {shown(schema)}; expected 'calibeam-model', schema {SCHEMA} or {WITH_PHYSICS}"
 
 
 def corrections(model: ModelFile) -> dict[str, float]:

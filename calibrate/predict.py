@@ -1,6 +1,6 @@
 """What an identified model says the instruments should read: one prediction a sample, under the columns' own names."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,7 +16,7 @@ from calibrate.arms.catalogue import arm_of
 from calibrate.arms.eccentric import with_discs
 from calibrate.arms.model import KinematicModel
 from calibrate.converted_rig import rig_in_model
-from calibrate.dual_psd_rig import dual_psd_chain
+from calibrate.dual_psd_rig import dual_psd_of
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
 from calibrate.parameters import Parameter, values_by_name
@@ -51,11 +51,15 @@ class Predictor:
 
     def flange(self, q_rad: Floats) -> Floats:
         """T_base_flange (pose, 4, 4)."""
-        return self._arm.flange(self._of(self._arm.parameters), q_rad)
+        return self._arm.flange(self.values_of(self._arm.parameters), q_rad)
 
     def tip_m(self, q_rad: Floats) -> Floats:
-        """(pose, 3) target or probe tip in the base."""
-        return self._target.in_base(self._of(self._target.parameters), self.flange(q_rad))
+        """(pose, 3) target or probe tip in the base, at joint readings (pose, joint)."""
+        return self.tip_at(self.flange(q_rad))
+
+    def tip_at(self, T_base_flange: Floats) -> Floats:
+        """(pose, 3) target or probe tip in the base, for flange poses (pose, 4, 4)."""
+        return self._target.in_base(self.values_of(self._target.parameters), T_base_flange)
 
     @cached_property
     def T_base_device(self) -> Floats:
@@ -64,7 +68,7 @@ class Predictor:
         if place is None:
             raise DataError(f"rig {self.rig.name}: no [device] and none in the model; fit positions or a wire first")
         device = Device(transform(place[:3], place[3:]))
-        return device.T_base_device_at(self._of(device.parameters))
+        return device.T_base_device_at(self.values_of(device.parameters))
 
     def turn_of_target(self) -> Floats:
         """(3, 3) orientation of a 6-D target in the flange."""
@@ -74,9 +78,19 @@ class Predictor:
         return (believed * Rotation.from_rotvec(found)).as_matrix()
 
     def spots_m(self, q_rad: Floats, placement: NDArray[np.int64], first_psd: NDArray[np.int64]) -> Floats:
-        """(pose, 4) psd1 x, y, psd2 x, y."""
-        chain = dual_psd_chain(self.rig, placement, first_psd)
-        return chain.expect(self._of(chain.parameters), q_rad)
+        """(pose, 4) psd1 x, y, psd2 x, y, at joint readings (pose, joint)."""
+        return self.spots_at(self.flange(q_rad), placement, first_psd)
+
+    def spots_at(self, T_base_flange: Floats, placement: NDArray[np.int64], first_psd: NDArray[np.int64]) -> Floats:
+        """(pose, 4) psd1 x, y, psd2 x, y, for flange poses (pose, 4, 4)."""
+        sensor = dual_psd_of(self.rig, placement, first_psd)
+        return sensor.expect(self.values_of(sensor.parameters), T_base_flange)
+
+    def seat_m(self, seat: int) -> Floats | None:
+        """(3,) of a cone in the base; None for one that the model does not know."""
+        start = self.about.get(f"seat{seat}")
+        shift = [self.values.get(f"seat{seat}.{axis}", 0.0) for axis in "xyz"]
+        return None if start is None else np.array(start) + shift
 
     @cached_property
     def _arm(self) -> KinematicModel:
@@ -87,7 +101,8 @@ class Predictor:
         drawn = self.rig.tool.point_m if self.rig.tool.point_m is not None else NOWHERE[:3]
         return Target(np.array(self.about.get("tool", drawn)[:3]))
 
-    def _of(self, parameters: tuple[Parameter, ...]) -> Floats:
+    def values_of(self, parameters: tuple[Parameter, ...]) -> Floats:
+        """Values of these parameters, corrections where the model has them."""
         names = {p.name for p in parameters}
         return values_by_name(parameters, {n: v for n, v in self.values.items() if n in names})
 
@@ -98,14 +113,50 @@ def predict(predictor: Predictor, samples: Samples) -> Columns:
     Predicted are the instruments whose columns the samples have, or those of the model where the samples have none.
     NaN where a row cannot say (a spot without placement), and in `r_...` where the row holds no observation.
     """
-    asked = [i for i in INSTRUMENTS if any(c in samples for c in i.asks)]
+    read = readings(predictor, predictor.flange(samples.joints()), samples)
+    return {"t_s": samples.column("t_s")} | read | residuals(predictor, read, samples)
+
+
+def readings(
+    predictor: Predictor, T_base_flange: Floats, samples: Samples, instruments: Collection[str] | None = None
+) -> Columns:
+    """What each instrument should read at flange poses (row, 4, 4) of the samples; those named, or as in `predict`."""
+    asked = [i for i in INSTRUMENTS if any(c in samples for c in i.asks)] if instruments is None else []
     if not asked:
-        asked = [i for i in INSTRUMENTS if set(i.names) & set(predictor.instruments)]
-    out: Columns = {"t_s": samples.column("t_s")}
+        named = set(predictor.instruments if instruments is None else instruments)
+        asked = [i for i in INSTRUMENTS if set(i.names) & named]
+    out: Columns = {}
     for instrument in asked:
-        out |= instrument.predict(predictor, samples)
-    for name in [name for name in out if name != "t_s" and name in samples]:
-        out[f"r_{name}"] = out[name] - samples.column(name)
+        out |= instrument.predict(predictor, T_base_flange, samples)
+    return out
+
+
+def residuals(predictor: Predictor, read: Columns, samples: Samples) -> Columns:
+    """`r_...`: predicted less observed; of a tip in a cone that the model knows, less the cone."""
+    out = {f"r_{name}": read[name] - samples.column(name) for name in read if name in samples}
+    if TIP[0] in read and (at := _cones_m(predictor, samples)) is not None:
+        out |= {f"r_{name}": read[name] - cone for name, cone in zip(TIP, at.T, strict=True)}
+    return out
+
+
+def less_cones(predictor: Predictor, read: Columns, samples: Samples) -> Columns:
+    """The same readings, tips in cones that the model knows told from their cone."""
+    at = _cones_m(predictor, samples) if TIP[0] in read else None
+    if at is None:
+        return read
+    return {**read, **{name: read[name] - np.nan_to_num(cone) for name, cone in zip(TIP, at.T, strict=True)}}
+
+
+def _cones_m(predictor: Predictor, samples: Samples) -> Floats | None:
+    """(row, 3) in the base, NaN without one that the model knows; None where it knows none."""
+    if "seat" not in samples or not any(name.startswith("seat") for name in predictor.about):
+        return None
+    seat = samples.integers("seat", 0)
+    out = np.full((len(seat), 3), np.nan)
+    for k in set(seat.tolist()):
+        place = predictor.seat_m(k)
+        if place is not None:
+            out[seat == k] = place
     return out
 
 
@@ -115,37 +166,37 @@ class Instrument:
 
     names: tuple[str, ...]
     asks: tuple[str, ...]
-    predict: Callable[[Predictor, Samples], Columns]
+    predict: Callable[[Predictor, Floats, Samples], Columns]  # at flange poses (row, 4, 4)
 
 
-def _position(predictor: Predictor, samples: Samples) -> Columns:
+def _position(predictor: Predictor, flange: Floats, samples: Samples) -> Columns:
     T = predictor.T_base_device
-    return _columns(POSITION, (predictor.tip_m(samples.joints()) - T[:3, 3]) @ T[:3, :3])
+    return _columns(POSITION, (predictor.tip_at(flange) - T[:3, 3]) @ T[:3, :3])
 
 
-def _rotation(predictor: Predictor, samples: Samples) -> Columns:
-    turns = predictor.T_base_device[:3, :3].T @ predictor.flange(samples.joints())[:, :3, :3]
+def _rotation(predictor: Predictor, flange: Floats, samples: Samples) -> Columns:
+    turns = predictor.T_base_device[:3, :3].T @ flange[:, :3, :3]
     vectors = Rotation.from_matrix(turns @ predictor.turn_of_target()).as_rotvec()
     if all(name in samples for name in ORIENTATION):
         vectors = _nearer_form(vectors, np.stack([samples.column(name) for name in ORIENTATION], axis=1))
     return _columns(ORIENTATION, vectors)
 
 
-def _wire(predictor: Predictor, samples: Samples) -> Columns:
-    span = predictor.tip_m(samples.joints()) - predictor.T_base_device[:3, 3]
+def _wire(predictor: Predictor, flange: Floats, samples: Samples) -> Columns:
+    span = predictor.tip_at(flange) - predictor.T_base_device[:3, 3]
     return {"wire_m": np.linalg.norm(span, axis=1)}
 
 
-def _spots(predictor: Predictor, samples: Samples) -> Columns:
+def _spots(predictor: Predictor, flange: Floats, samples: Samples) -> Columns:
     placement, first_psd = samples.integers("placement", 0), samples.integers("first_psd", 0)
     known = np.flatnonzero((placement > 0) & (first_psd > 0))
     spots = np.full((len(samples), 4), np.nan)
-    spots[known] = predictor.spots_m(samples.joints()[known], placement[known], first_psd[known])
+    spots[known] = predictor.spots_at(flange[known], placement[known], first_psd[known])
     return _columns(SPOTS, spots)
 
 
-def _tip(predictor: Predictor, samples: Samples) -> Columns:
-    tip = predictor.tip_m(samples.joints())
+def _tip(predictor: Predictor, flange: Floats, samples: Samples) -> Columns:
+    tip = predictor.tip_at(flange)
     named = [np.isfinite(samples.column(name)) for name in ("seat", "bar") if name in samples]
     if named:
         tip[~np.logical_or.reduce(named)] = np.nan

@@ -18,8 +18,8 @@ ORIENTATION = ("rx_rad", "ry_rad", "rz_rad")  # beside a position: a full pose
 COMPLETE_PER_JOINT = (("q", "_rad"), ("cmd", "_rad"), ("enc", "_rad"))  # one column for every joint, or none
 
 _INTEGERS = re.compile(r"placement|first_psd|seat|bar|repeat|approach[1-9][0-9]*")
-_PER_JOINT = re.compile(r"(?P<stem>q|cmd|enc|approach|qd)(?P<joint>[0-9]{1,4})(?P<unit>_rad_s|_rad|)")
-_UNITS = {"q": "_rad", "cmd": "_rad", "enc": "_rad", "qd": "_rad_s", "approach": ""}
+_PER_JOINT = re.compile(r"(?P<stem>q|cmd|enc|approach|qd|last_move)(?P<joint>[0-9]{1,4})(?P<unit>_rad_s|_rad|)")
+_UNITS = {"q": "_rad", "cmd": "_rad", "enc": "_rad", "qd": "_rad_s", "approach": "", "last_move": "_rad"}
 
 
 def kind_of(column: str) -> Kind:

@@ -9,8 +9,10 @@ from acquisition.recording.read import read
 from calibeam.diagnosis import diagnose_recording, plan_next, refuse_wrong_file
 from calibeam.diagnosis_lines import print_diagnosis
 from calibeam.ending import naming
+from calibeam.geometry_only import read_geometry
 from calibrate.diagnose.file import write_diagnosis
-from calibrate.model_file import read_model
+from calibrate.model_file import write_model
+from calibrate.physics.from_diagnosis import model_of_diagnosis
 from calibrate.report.diagnosis.page import write_diagnosis_report
 
 
@@ -19,6 +21,7 @@ def diagnose_command(
     *,
     model: Path | None = None,
     out: Path = Path("diagnosis.json"),
+    model_out: Path | None = None,
     report: Path | None = None,
     plan_out: Path | None = None,
     json: bool = False,
@@ -37,6 +40,8 @@ def diagnose_command(
         An identified model of the same rig: the comparison starts from it.
     out
         Where to write the diagnosis.
+    model_out
+        Where to write the model: geometry fitted together with the physics found, which `calibeam predict` uses.
     report
         Where to write the pages for a person; beside the diagnosis, if not said otherwise.
     plan_out
@@ -45,7 +50,7 @@ def diagnose_command(
         Print the diagnosis as it stands in the file, on one line, and nothing else.
 
     """
-    known = None if model is None else read_model(model)
+    known = None if model is None else read_geometry(model)
     source, console = read(recording), Console()
     with naming(recording):
         found, file = diagnose_recording(source, known)
@@ -55,9 +60,12 @@ def diagnose_command(
         else:
             print_diagnosis(console, file)
         refuse_wrong_file(found, out)
+        if model_out is not None:
+            write_model(model_out, model_of_diagnosis(found, source))
         planned = "" if plan_out is None else plan_next(found, plan_out)
     told = msgspec.structs.replace(file, next=(*file.next, planned)) if planned else file
     page = write_diagnosis_report(out.with_suffix(".html") if report is None else report, source, told)
+    modelled = "" if model_out is None else f"model: {model_out}"
     if not json:
-        for line in filter(None, (planned, f"diagnosis: {out}", f"report: {page}")):
+        for line in filter(None, (planned, f"diagnosis: {out}", modelled, f"report: {page}")):
             console.print(line, markup=False, highlight=False)

@@ -9,8 +9,9 @@ from cyclopts import Parameter
 
 from acquisition.recording.rig import load_rig
 from acquisition.recording.rig_schema import Rig
+from calibeam.geometry_only import read_geometry
 from calibrate.errors import DataError
-from calibrate.model_file import corrections, read_model
+from calibrate.model_file import corrections
 from drivers.clock import SystemClock
 
 
@@ -64,7 +65,7 @@ def live_command(
 
 
 def _corrections(model: Path, rig: Rig) -> dict[str, float]:
-    identified = read_model(model)
+    identified = read_geometry(model)
     if identified.rig.name != rig.name:
         raise DataError(f"{model}: this model is of rig '{identified.rig.name}', not of '{rig.name}'; take its own")
     return corrections(identified)

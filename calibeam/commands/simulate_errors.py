@@ -10,12 +10,12 @@ from rich.console import Console
 from acquisition.recording.rig import load_rig
 from acquisition.recording.rig_schema import Rig
 from calibeam.error_lines import print_simulation
+from calibeam.geometry_only import read_geometry
 from calibeam.progress_bar import progress_bar
 from calibeam.software import SOFTWARE
 from calibrate.error_simulation.machine import Machine, identified_machine, machine_of
 from calibrate.error_simulation.plan import NOTHING_STATED, read_error_plan
 from calibrate.error_simulation.stated import sources_of
-from calibrate.model_file import read_model
 
 Count = Annotated[int, Parameter(validator=validators.Number(gte=1))]
 
@@ -88,6 +88,6 @@ def simulate_errors_command(
 
 def _machine(path: Path) -> tuple[Machine, Rig, bool]:
     if path.suffix == ".json":
-        return *identified_machine(read_model(path)), True
+        return *identified_machine(read_geometry(path)), True
     rig = load_rig(path)
     return machine_of(rig), rig, False

@@ -9,9 +9,9 @@ from rich.console import Console
 from rich.table import Table
 
 from acquisition.recording.read import read
+from calibeam.geometry_only import read_geometry
 from calibeam.outcome import CheckFailed
 from calibeam.software import SOFTWARE
-from calibrate.model_file import read_model
 from calibrate.report.quantities import DASH, length
 from calibrate.report.verification_page import SAYS, write_verification_page
 from calibrate.verification.file import verification_file, write_verification
@@ -46,7 +46,7 @@ def verify_command(
 
     """
     source = read(recording)
-    found = verify(source, read_model(model))
+    found = verify(source, read_geometry(model))
     file = verification_file(found, rig=source.rig.name, recording=recording.name, model=model.name, software=SOFTWARE)
     write_verification(out, file)
     report.parent.mkdir(parents=True, exist_ok=True)

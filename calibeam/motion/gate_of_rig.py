@@ -15,9 +15,10 @@ from acquisition.motion.paths.segments import Pace
 from acquisition.motion.setpoints import solve_rate_hz
 from acquisition.recording.rig_schema import ArmModel, Rig
 from acquisition.streams import Pump
+from calibeam.geometry_only import read_geometry
 from calibeam.motion.arm import motion_arm
 from calibrate.errors import DataError
-from calibrate.model_file import corrections, read_model
+from calibrate.model_file import corrections
 from drivers.clock import Clock
 from drivers.device import Movable
 
@@ -32,7 +33,7 @@ def solver_of(rig: Rig, model: Path | None = None) -> Solver:
     """Inverse kinematics of the rig's arm as drawn, or as identified. DataError for a model of another arm."""
     if model is None:
         return Solver(motion_arm(rig), closed_form(motion_arm(rig)))
-    identified = read_model(model)
+    identified = read_geometry(model)
     if identified.rig.name != rig.name:
         raise DataError(f"{model}: this model is of rig '{identified.rig.name}', not of '{rig.name}'; take its own")
     return Solver(motion_arm(rig, corrections(identified)), closed_form(motion_arm(rig)))

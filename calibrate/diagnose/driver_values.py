@@ -7,11 +7,13 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from acquisition.recording.columns import ORIENTATION, POSITION, SPOTS, joint_of, per_joint
+from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.chain import Chain
 from calibrate.diagnose.session import Session
 from calibrate.effects.drivers import Drivers, Readout
 from calibrate.sensors.dual_psd import DualPsd
+from calibrate.sensors.model import Sensor
 from calibrate.sensors.seat import Seat
 from calibrate.weighting import Measured
 
@@ -33,23 +35,30 @@ def drivers_of(session: Session, frames: Floats, expected: Mapping[str, Floats],
     """At frames (sample, joint + 1, 4, 4) and expected readings (row, k) of each instrument, with the values of its own
     parameters.
     """
-    samples, n = session.samples, session.arm.n_joints
-    q = samples.joints()
-    moves, direction = _moves(q, samples.column("t_s"))
+    readouts = {m.name: _readout(m, expected[m.name], own[m.name], frames) for m in session.measured}
+    return drivers_at(session.rig, session.samples, frames, readouts, temperatures_of(session.samples))
+
+
+def drivers_at(
+    rig: Rig, samples: Samples, frames: Floats, readouts: Mapping[str, Readout], temperatures_degC: Mapping[str, Floats]
+) -> Drivers:
+    """Of any table of samples, with what the model predicts at them; temperatures (sample,) by place."""
+    n, q = samples.n_joints, samples.joints()
+    moves, direction = moves_of(samples)
     recorded = _per_joint(samples, "approach", "", n)
     commanded = samples.commanded()
     return Drivers(
-        rig=session.rig,
+        rig=rig,
         q_rad=q,
         t_s=samples.column("t_s"),
         frames=frames,
-        readouts={m.name: _readout(m, expected[m.name], own[m.name], frames) for m in session.measured},
+        readouts=readouts,
         approach=direction if recorded is None else recorded,
         approach_derived=recorded is None,
         last_move_rad=moves,
         qd_rad_s=_per_joint(samples, "qd", "_rad_s", n),
         cmd_minus_q_rad=None if commanded is None or np.isnan(commanded).all() else np.nan_to_num(commanded - q),
-        temperatures_degC=_temperatures(samples),
+        temperatures_degC=temperatures_degC,
         payload_kg=np.nan_to_num(samples.column("payload_kg")) if _recorded(samples, "payload_kg") else None,
         payload_com_m=_stacked(samples, ("payload_com_x_m", "payload_com_y_m", "payload_com_z_m")),
         psd_sum_v=_stacked(samples, ("psd1_sum_v", "psd2_sum_v")),
@@ -59,25 +68,32 @@ def drivers_of(session: Session, frames: Floats, expected: Mapping[str, Floats],
 
 
 def _readout(measured: Measured, expected: Floats, own: Floats, frames: Floats) -> Readout:
-    n, rows = len(frames), measured.sample_rows[:, -1]
-    predicted, seen = np.full((n, expected.shape[1]), np.nan), np.zeros(n, dtype=bool)
-    predicted[rows], seen[rows] = expected, True
     chain = measured.problem.chain
     sensor = chain.sensor if isinstance(chain, Chain) else None
+    phi = own[len(chain.model.parameters) :] if isinstance(chain, Chain) else own
+    return readout_at(measured.name, sensor, phi, expected, measured.sample_rows[:, -1], frames)
+
+
+def readout_at(
+    name: str, sensor: Sensor | None, phi: Floats, expected: Floats, rows: NDArray[np.intp], frames: Floats
+) -> Readout:
+    """Of an instrument that sees these rows of the samples, with the values `phi` of its own parameters."""
+    n = len(frames)
+    predicted, seen = np.full((n, expected.shape[1]), np.nan), np.zeros(n, dtype=bool)
+    predicted[rows], seen[rows] = expected, True
     if isinstance(sensor, DualPsd):
-        phi = own[len(chain.model.parameters) :]
         incidence, first, place = np.full((n, 2), np.nan), np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
         hit = sensor.strike(phi, frames[rows, -1])
         incidence[rows] = np.arccos(np.clip(np.abs(hit.facing), 0.0, 1.0))
         first[rows], place[rows] = sensor.first_psd, sensor.placement
         lean = np.zeros((n, 2, 2))
         lean[rows] = sensor.leans(phi, frames[rows, -1])
-        return Readout(measured.name, predicted, seen, incidence, lean, first, place)
+        return Readout(name, predicted, seen, incidence, lean, first, place)
     if isinstance(sensor, Seat):
         place = np.zeros(n, dtype=np.int64)
         place[rows] = sensor.seat
-        return Readout(measured.name, predicted, seen, place=place)
-    return Readout(measured.name, predicted, seen)
+        return Readout(name, predicted, seen, place=place)
+    return Readout(name, predicted, seen)
 
 
 def _per_joint(samples: Samples, stem: str, unit: str, n: int) -> Floats | None:
@@ -87,6 +103,18 @@ def _per_joint(samples: Samples, stem: str, unit: str, n: int) -> Floats | None:
         return None
     zero = np.zeros(len(samples))
     return np.stack([np.nan_to_num(samples.column(c)) if c in samples else zero for c in names], axis=1)
+
+
+def moves_of(samples: Samples) -> tuple[Floats, Floats]:
+    """(sample, joint) last move, and the sign of the last one that was a move: by the order in time where no column
+    holds it.
+    """
+    moves, direction = _moves(samples.joints(), samples.column("t_s"))
+    names = per_joint("last_move", "_rad", samples.n_joints)
+    for joint, name in enumerate(names):
+        if _recorded(samples, name):
+            moves[:, joint] = np.nan_to_num(samples.column(name))
+    return moves, direction
 
 
 def _moves(q_rad: Floats, t_s: Floats) -> tuple[Floats, Floats]:
@@ -101,7 +129,7 @@ def _moves(q_rad: Floats, t_s: Floats) -> tuple[Floats, Floats]:
     return moves, direction
 
 
-def _temperatures(samples: Samples) -> dict[str, Floats]:
+def temperatures_of(samples: Samples) -> dict[str, Floats]:
     """Smoothed in the order of time, but not across a pause: what cooled meanwhile is no noise.
 
     A thermometer that is read now and then says between two readings what they say.

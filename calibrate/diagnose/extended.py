@@ -26,15 +26,23 @@ NEARLY = 0.05  # of a term's size: columns that are chosen by the poses may leav
 def extended(drivers: Drivers, q_rad: Floats, frames: Floats, like: Ints, copies: int = 1) -> Drivers:
     """With poses (new, joint) and their frames behind; of everything else the new ones are like measured poses."""
     measured = np.tile(np.arange(len(drivers.q_rad)), copies)
-    order = np.concatenate([measured, like])
+    return replace(
+        rearranged(drivers, np.concatenate([measured, like])),
+        q_rad=np.concatenate([drivers.q_rad[measured], q_rad]),
+        frames=np.concatenate([drivers.frames[measured], frames]),
+    )
+
+
+def rearranged(drivers: Drivers, order: Ints) -> Drivers:
+    """Some of the poses, in this order."""
 
     def more(values: Floats | None) -> Floats | None:
         return None if values is None else values[order]
 
     return replace(
         drivers,
-        q_rad=np.concatenate([drivers.q_rad[measured], q_rad]),
-        frames=np.concatenate([drivers.frames[measured], frames]),
+        q_rad=drivers.q_rad[order],
+        frames=drivers.frames[order],
         t_s=drivers.t_s[order],
         readouts={name: _more_readout(readout, order) for name, readout in drivers.readouts.items()},
         approach=more(drivers.approach),

@@ -20,7 +20,7 @@ MOST_FITTED = 0.2  # of the rows that are left over, at least, when noise is jud
 
 def scatters_of(problem: Augmented, fit: Fit) -> tuple[Scatter, ...]:
     """Noise of every instrument at the values of a fit."""
-    at, larger = problem.around(fit.theta), _freedom(problem, fit)
+    at, larger = problem.around(fit.theta), freedom(problem, fit.covariance)
     out: list[Scatter] = []
     for i, (m, rows) in enumerate(zip(problem.session.measured, problem.rows, strict=True)):
         residual = m.problem.observed[rows] - at.expected[i][rows]
@@ -29,13 +29,13 @@ def scatters_of(problem: Augmented, fit: Fit) -> tuple[Scatter, ...]:
     return tuple(out)
 
 
-def _freedom(problem: Augmented, fit: Fit) -> float:
+def freedom(problem: Augmented, covariance: Floats) -> float:
     """Rows over rows less what was fitted to them: residuals of a fit are smaller than the noise."""
     rows = sum(
         len(r) * m.problem.observed.shape[1] for m, r in zip(problem.session.measured, problem.rows, strict=True)
     )
     free = np.array([p.free for p in problem.parameters])
-    believed = np.diag(fit.covariance)[free] / priors(problem.parameters)[free] ** 2
+    believed = np.diag(covariance)[free] / priors(problem.parameters)[free] ** 2
     fitted = float(np.sum(1.0 - np.clip(np.nan_to_num(believed), 0.0, 1.0)))
     return rows / max(rows - fitted, MOST_FITTED * rows)
 

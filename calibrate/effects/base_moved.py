@@ -4,7 +4,7 @@ from calibrate.effects import time_laws
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.kind import Kind
 from calibrate.effects.moved import drifts, motion
-from calibrate.effects.term import Shape, Term
+from calibrate.effects.term import Holds, Shape, Term
 
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
@@ -20,4 +20,5 @@ EFFECT = Kind(
     ("device-drift", "fixture-moved", "link-thermal-growth"),
     "mismatch catalogue: base or table drift, bump",
     _terms,
+    holds=Holds.SESSION,
 )

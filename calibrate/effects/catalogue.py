@@ -38,7 +38,7 @@ from calibrate.effects import (
     tool_sag,
 )
 from calibrate.effects.drivers import Drivers
-from calibrate.effects.term import Effect, Missing, Term
+from calibrate.effects.term import Effect, Holds, Missing, Term
 
 EFFECTS: tuple[Effect, ...] = (
     encoder_eccentricity.EFFECT,
@@ -87,3 +87,10 @@ def terms_of(drivers: Drivers) -> tuple[Term, ...]:
 def missing_of(drivers: Drivers) -> tuple[Missing, ...]:
     """What was not recorded and would let an effect be told."""
     return tuple(m for effect in EFFECTS for m in effect.missing(drivers))
+
+
+def holds_of(term: Term) -> Holds:
+    """Whether a term is true of the machine, or of the session that it was found in: all that follows the clock is."""
+    by_clock = term.slow or "t" in term.depends_on
+    of_session = any(e.physics == term.physics and e.holds is Holds.SESSION for e in EFFECTS)
+    return Holds.SESSION if by_clock or of_session else Holds.ALWAYS

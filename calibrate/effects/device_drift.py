@@ -4,7 +4,7 @@ from calibrate.effects import time_laws
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.kind import Kind
 from calibrate.effects.moved import drifts, motion
-from calibrate.effects.term import Shape, Term
+from calibrate.effects.term import Holds, Shape, Term
 
 INSTRUMENTS = ("position", "full-pose", "wire")
 
@@ -26,4 +26,5 @@ EFFECT = Kind(
     ("base-moved",),
     "ASME B89.4.19-2006, app. D (drift of laser trackers); motion of the base looks exactly the same",
     _terms,
+    holds=Holds.SESSION,
 )

@@ -4,7 +4,7 @@ from calibrate.effects import time_laws
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.form import Form, at_joint
 from calibrate.effects.kind import Kind
-from calibrate.effects.term import Shape, Term
+from calibrate.effects.term import Holds, Shape, Term
 
 LIMIT_RAD = 5e-2
 
@@ -41,4 +41,5 @@ EFFECT = Kind(
     ("base-moved", "fixture-moved"),
     "mismatch catalogue: encoder jump",
     _terms,
+    holds=Holds.SESSION,
 )

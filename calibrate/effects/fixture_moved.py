@@ -6,7 +6,7 @@ from calibrate.effects import time_laws
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.kind import Kind
 from calibrate.effects.moved import in_use, motion
-from calibrate.effects.term import Shape, Term
+from calibrate.effects.term import Holds, Shape, Term
 
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
@@ -56,4 +56,5 @@ EFFECT = Kind(
     ("base-moved", "encoder-slip"),
     "mismatch catalogue: fixture k bump",
     _terms,
+    holds=Holds.SESSION,
 )

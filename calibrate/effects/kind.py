@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from calibrate.effects.drivers import Drivers
-from calibrate.effects.term import Missing, Term
+from calibrate.effects.term import Holds, Missing, Term
 
 
 def nothing_missing(drivers: Drivers) -> tuple[Missing, ...]:
@@ -22,3 +22,4 @@ class Kind:
     source: str
     terms: Callable[[Drivers], tuple[Term, ...]]
     missing: Callable[[Drivers], tuple[Missing, ...]] = nothing_missing
+    holds: Holds = Holds.ALWAYS

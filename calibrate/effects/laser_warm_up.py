@@ -4,7 +4,7 @@ from calibrate.effects import time_laws
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.kind import Kind
 from calibrate.effects.laser_pointing import pointing, shifting
-from calibrate.effects.term import Shape, Term
+from calibrate.effects.term import Holds, Shape, Term
 
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
@@ -23,4 +23,5 @@ EFFECT = Kind(
     ("base-moved", "laser-thermal-drift"),
     "pointing stability of diode modules, 5 to 50 urad over the first half hour (makers' data sheets)",
     _terms,
+    holds=Holds.SESSION,
 )

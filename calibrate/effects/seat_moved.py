@@ -6,7 +6,7 @@ from calibrate.effects import time_laws
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.kind import Kind
 from calibrate.effects.moved import in_use, motion
-from calibrate.effects.term import Shape, Term
+from calibrate.effects.term import Holds, Shape, Term
 
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
@@ -43,4 +43,5 @@ EFFECT = Kind(
     ("base-moved", "encoder-slip"),
     "mismatch catalogue; ISO 10360-12:2016, 6.2 asks for a rigid fixing of the seat",
     _terms,
+    holds=Holds.SESSION,
 )

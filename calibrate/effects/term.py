@@ -95,6 +95,13 @@ class Term(ABC):
         return (self.port.where, self.depends_on, self.shape.value, self.order, self.physics, self.variant)
 
 
+class Holds(Enum):
+    """Of which rows an effect is true."""
+
+    ALWAYS = "always"  # of the machine, on any day
+    SESSION = "session"  # of one recording's clock only
+
+
 @dataclass(frozen=True)
 class Missing:
     """A driver that an effect needs and the session does not hold."""
@@ -123,6 +130,11 @@ class Effect(Protocol):
     @property
     def source(self) -> str:
         """Paper, section, manual page."""
+        ...
+
+    @property
+    def holds(self) -> Holds:
+        """Of a term that does not follow the clock; one that does is true of its session only."""
         ...
 
     def terms(self, drivers: Drivers, /) -> tuple[Term, ...]:

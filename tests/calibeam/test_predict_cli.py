@@ -44,6 +44,7 @@ ARMS = {
 Q = ((0.0, 0.0), (0.5, 0.0), (0.5, -0.5))
 TIPS = np.array([[0.3 * np.cos(a) + 0.3 * np.cos(a + b), 0.3 * np.sin(a) + 0.3 * np.sin(a + b), 0.3] for a, b in Q])
 SPOTS = ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")
+XYZ = ("x_m", "y_m", "z_m")
 TIP = ("tip_x_m", "tip_y_m", "tip_z_m")
 
 
@@ -98,7 +99,7 @@ def predicted(model, columns, suffix=".csv"):
 def test_positions_and_residuals_where_there_is_an_observation(model):
     x = [repr(float(TIPS[0, 0] - 2.0)), "", repr(float(TIPS[2, 0] - 2.001))]
     out = predicted(model, {"x_m": x, "y_m": ["0.0", "", "0.0"], "z_m": ["0.3", "", "0.3"]})
-    assert list(out) == ["t_s", "x_m", "y_m", "z_m", "r_x_m", "r_y_m", "r_z_m"]
+    assert list(out) == ["t_s", *XYZ, *(f"s_{c}" for c in XYZ), *(f"r_{c}" for c in XYZ), "outside"]
     assert out["t_s"] == ("0.0", "1.0", "2.0")
     np.testing.assert_allclose([float(v) for v in out["x_m"]], TIPS[:, 0] - 2.0, atol=1e-12)
     assert out["r_x_m"][1] == out["r_y_m"][1] == ""
@@ -107,13 +108,13 @@ def test_positions_and_residuals_where_there_is_an_observation(model):
 
 def test_a_wire_has_one_column(model):
     out = predicted(model, {"wire_m": ["1.0", "", "1.0"]})
-    assert list(out) == ["t_s", "wire_m", "r_wire_m"]
+    assert list(out) == ["t_s", "wire_m", "s_wire_m", "r_wire_m", "outside"]
     np.testing.assert_allclose([float(v) for v in out["wire_m"]], np.linalg.norm(TIPS - [2, 0, 0], axis=1), atol=1e-12)
 
 
 def test_cones_and_bars_get_the_tip_in_the_base_and_no_residual(model):
     out = predicted(model, {"seat": ["1", "", ""], "bar": ["", "4", ""], "bar_end": ["", "a", ""]})
-    assert list(out) == ["t_s", *TIP]
+    assert list(out) == ["t_s", *TIP, *(f"s_{c}" for c in TIP), "outside"]
     np.testing.assert_allclose([[float(out[c][i]) for c in TIP] for i in (0, 1)], TIPS[:2], atol=1e-12)
     assert [out[c][2] for c in TIP] == ["", "", ""]
 
@@ -122,7 +123,7 @@ def test_spots_stand_where_the_fixture_is_named(model):
     """The beam of the stretched arm runs along x through the origin of PSD 1."""
     named = {"placement": ["1", "", "1"], "first_psd": ["1", "", "1"]}
     out = predicted(model, named | {c: ["0.001", "", ""] for c in SPOTS})
-    assert list(out) == ["t_s", *SPOTS, *(f"r_{c}" for c in SPOTS)]
+    assert list(out) == ["t_s", *SPOTS, *(f"s_{c}" for c in SPOTS), *(f"r_{c}" for c in SPOTS), "outside"]
     assert [float(out[c][0]) for c in SPOTS[:2]] == pytest.approx([0.0, 0.0], abs=1e-12)
     assert [float(out[f"r_{c}"][0]) for c in SPOTS[:2]] == pytest.approx([-1e-3, -1e-3], abs=1e-12)
     assert {out[c][1] for c in out if c != "t_s"} == {""}
@@ -134,8 +135,8 @@ def test_several_instruments_at_once_and_samples_without_any(model):
     both = predicted(
         model, {"x_m": ["0.0", "", ""], "y_m": ["0.0", "", ""], "z_m": ["0.0", "", ""], "seat": ["", "2", ""]}
     )
-    assert list(both) == ["t_s", "x_m", "y_m", "z_m", *TIP, "r_x_m", "r_y_m", "r_z_m"]
-    assert list(predicted(model, {"note": ["1", "2", "3"]})) == ["t_s", "x_m", "y_m", "z_m"]
+    assert list(both) == ["t_s", *XYZ, *TIP, *(f"s_{c}" for c in (*XYZ, *TIP)), *(f"r_{c}" for c in XYZ), "outside"]
+    assert list(predicted(model, {"note": ["1", "2", "3"]})) == ["t_s", *XYZ, *(f"s_{c}" for c in XYZ), "outside"]
 
 
 def test_a_parquet_table_is_read_as_well(model, monkeypatch):

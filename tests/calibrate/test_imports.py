@@ -11,6 +11,7 @@ LATER = (
     "calibrate.report",
     "calibrate.diagnose",
     "calibrate.effects",
+    "calibrate.physics",
     "calibrate.error_simulation",
     "calibrate.pose_design",
     "calibrate.tool_axes",

@@ -76,7 +76,7 @@ def test_corrections_of_the_file_predict_the_spots(identified, written):
     ("text", "says"),
     [
         ("{", "not a model.json"),
-        ('{"schema": 2, "kind": "calibeam-model"}', "schema 2; expected 'calibeam-model', schema 1"),
+        ('{"schema": 3, "kind": "calibeam-model"}', "schema 3; expected 'calibeam-model', schema 1 or 2"),
         ('{"schema": 1, "kind": "else"}', "kind 'else'"),
         ('{"schema": 1, "kind": "calibeam-model"}', "damaged model.json"),
     ],

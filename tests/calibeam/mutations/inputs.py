@@ -251,6 +251,7 @@ def _made_by_calibeam(folder: Path, run: Run) -> None:
         if code := run(words):
             raise RuntimeError(f"calibeam {' '.join(words)}: exit code {code}")
     _with_a_finding(folder / "diagnosis.json")
+    _with_effects(folder)
     for name in ("model.json", "diagnosis.json"):
         earlier.mkdir(exist_ok=True)
         shutil.copy(folder / name, earlier)
@@ -263,6 +264,28 @@ def _made_by_calibeam(folder: Path, run: Run) -> None:
     row = judged(Task.of(recordings(folder / "fleet-of-one", fleet)[0], diagnose=False))
     write_rows(fleet / "fleet.parquet", [row])
     (fleet / "fleet.rows.jsonl").write_bytes(msgspec.json.encode(row) + b"\n")
+
+
+def _with_effects(folder: Path) -> None:
+    """physics.json: the model with two effects, one of them by a curve, and the session that they are stated about."""
+    file = json.loads((folder / "model.json").read_bytes())
+    with (folder / "tracker" / "samples.csv").open(encoding="utf-8", newline="") as table:
+        rows = list(csv.DictReader(table))
+    kept = ("t_s", *(f"q{i}_rad" for i in range(1, 4)))
+    conditions = {name: [float(row[name]) for row in rows] for name in kept}
+    size = {"value": 1e-4, "sigma": 1e-6, "unit": "rad"}
+    disc = {"name": "joint2-eccentricity", "where": "joint2.angle", "physics": "encoder-eccentricity"}
+    disc |= {"depends_on": "q2", "shape": "harmonic", "order": 1, "variant": "", "parameters": {"amplitude_rad": size}}
+    disc |= {"coefficients": {"disc.c0": 1e-4, "disc.c1": 2e-4}, "inner": {}, "about": {}, "holds": "always"}
+    disc |= {"range": {"q2": [min(conditions["q2_rad"]), max(conditions["q2_rad"])]}, "confidence": 0.9}
+    unknown = disc | {"name": "joint3-unknown", "where": "joint3.angle", "physics": "unknown", "depends_on": "t"}
+    unknown |= {"shape": "smooth", "order": None, "component": 2, "waves": 2, "holds": "session", "range": {}}
+    unknown |= {"coefficients": {"u.c0": 1e-5, "u.c1": 1e-5}, "parameters": {}}
+    unknown |= {"curve": {"driver": "t", "unit": "rad", "knots": [0.0], "values": [0.0], "sigma": [1e-6]}}
+    file |= {"schema": 2, "effects": [disc, unknown], "needs": []}
+    file["session"] = {"started_utc": "", "first_t_s": 0.0, "last_t_s": 99.0, "readings_sha256": "0" * 64}
+    file["session"]["conditions"] = conditions
+    (folder / "physics.json").write_text(json.dumps(file, indent=1), encoding="utf-8")
 
 
 def _with_a_finding(path: Path) -> None:

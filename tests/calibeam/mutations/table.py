@@ -120,6 +120,9 @@ OTHER_SESSIONS = (
 )
 MODELS = (
     Pair("model.json", "predict model.json tracker/samples.csv"),
+    Pair("physics.json", "predict physics.json tracker/samples.csv --same-session"),
+    Pair("physics.json", "report tracker --model physics.json"),
+    Pair("tracker/samples.csv", "predict physics.json tracker/samples.csv --same-session"),
     Pair("model.json", "simulate-errors model.json --errors errors.toml --arms 500 --poses 2 --out made"),
     Pair("model.json", "report tracker --model model.json"),
     Pair("model.json", "report tracker --against model.json"),

@@ -1,0 +1,333 @@
+"""A diagnosis as model.json, schema 2: geometry refitted together with the effects that were found."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from importlib.metadata import version
+
+import numpy as np
+from msgspec import structs
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from acquisition.recording.fingerprint import readings_sha256
+from acquisition.recording.recording import Recording
+from acquisition.recording.rig import rig_sha256
+from acquisition.recording.samples import Samples
+from calibrate.diagnose.curve import Curve
+from calibrate.diagnose.diagnosis import UNKNOWN, Diagnosis, Finding
+from calibrate.diagnose.extended import NEARLY, alike
+from calibrate.diagnose.findings import named
+from calibrate.diagnose.fitted import Fitted
+from calibrate.diagnose.from_recording import Diagnosed
+from calibrate.diagnose.linearised import Accepted
+from calibrate.diagnose.noise_law import curvature_of
+from calibrate.diagnose.noise_of_fit import freedom
+from calibrate.effects.catalogue import holds_of
+from calibrate.effects.drivers import Drivers
+from calibrate.effects.ports import Perturbation
+from calibrate.effects.term import Size
+from calibrate.errors import DataError
+from calibrate.identifiability import Identifiability, analyse
+from calibrate.identification.record import left_out
+from calibrate.identification.session import about_of
+from calibrate.model_file import (
+    WITH_PHYSICS,
+    Fields,
+    ModelFile,
+    ModelParameter,
+    RigIdentity,
+    Unseen,
+    covariance_record,
+)
+from calibrate.parameters import Parameter, plausible_sizes, priors, without_assumed
+from calibrate.physics.acting import MOVED_COLUMNS, drivers_under, listed, range_of
+from calibrate.physics.conditions import kept_conditions, needed_columns, recorded_conditions
+from calibrate.physics.records import Effect, EffectCurve, EffectParameter, SessionRecord
+from calibrate.predict import TIP, Predictor
+
+Floats = NDArray[np.float64]
+
+SOFTWARE = f"calibeam {version('calibeam')}"
+CUT = 0.99
+STEP = 1e-6  # m, rad or a factor
+INNER_STEP = 1e-2  # of a plausible size, of what enters non-linearly
+LEAST_CURVED = 0.1  # of a t law: with more wild rows than good ones nothing is known
+TURNS = 30
+KNOTS = 33  # of a curve: a wave of the finest of eight eigenfunctions has eight of them
+UNITS = ("rad_nm", "per_k", "rad", "m", "s", "nm", "share", "k")
+
+
+def model_of_diagnosis(found: Diagnosed, recording: Recording) -> ModelFile:
+    """The record to write. DataError where the file is wrong as a whole, or an effect cannot be carried."""
+    if found.physics is None:
+        raise DataError("no model: the whole file is wrong; diagnosis.json says how")
+    fit, before = found.physics.model, found.physics.geometry
+    names = _names(fit.accepted)
+    parameters = _parameters(fit, names)
+    covariance = _covariance(fit)
+    seen = _seen(fit, names)
+    conditions, needs = _conditions(fit)
+    model = ModelFile(
+        schema=WITH_PHYSICS,
+        kind="calibeam-model",
+        software=SOFTWARE,
+        rig=RigIdentity(recording.rig.name, rig_sha256(recording.rig_text), recording.rig_text),
+        arm_model=recording.rig.arm.model.value,
+        status="CONVERGED",
+        says="geometry and effects fitted together by the diagnosis",
+        poses=fit.samples,
+        rank=seen.rank,
+        free=seen.n_free,
+        condition=seen.condition if np.isfinite(seen.condition) else None,
+        singular_values=tuple(seen.singular_values.tolist()),
+        unseen=tuple(Unseen(c.words, c.members, c.structural) for c in seen.combinations),
+        parameters=_records(fit, covariance, seen),
+        chain={p.name: float(v) for p, v in zip(fit.session.parameters, fit.geometry, strict=True)},
+        covariance=covariance_record(parameters, covariance),
+        noise=_noise(fit),
+        repeats=None,
+        held_out=None,
+        rms_before_m=_rms(before),
+        rms_after_m=_rms(fit),
+        instruments=tuple(m.name for m in fit.session.measured),
+        about=about_of(fit.session.weighting),
+        blunders=tuple(left_out(b) for b in found.blunders),
+        readings_sha256=readings_sha256(recording.samples),
+        effects=_effects(fit, found.physics.diagnosis, names, covariance),
+        needs=needs,
+        session=SessionRecord(
+            started_utc=recording.started_utc,
+            first_t_s=float(fit.drivers.t_s.min()),
+            last_t_s=float(fit.drivers.t_s.max()),
+            readings_sha256=readings_sha256(recording.samples),
+            conditions={c: tuple(map(_number, v.tolist())) for c, v in conditions.items()},
+        ),
+    )
+    return _as_listed(model, fit, parameters, covariance, conditions)
+
+
+def _names(accepted: tuple[Accepted, ...]) -> tuple[str, ...]:
+    """Unique: "joint2-compliance", "base-moved", "base-moved-2"."""
+    out: list[str] = []
+    for a in accepted:
+        place = a.term.port.where.split(".")[0]
+        physics = UNKNOWN if a.term.open else a.term.physics
+        kind = place.rstrip("0123456789")
+        plain = f"{place}-{physics.removeprefix(f'{kind}-')}"
+        count = sum(name == plain or name.startswith(f"{plain}-") for name in out)
+        out.append(plain if count == 0 else f"{plain}-{count + 1}")
+    return tuple(out)
+
+
+def _parameters(fit: Fitted, names: tuple[str, ...]) -> tuple[Parameter, ...]:
+    """Those of the fit, of effects under the names of the file."""
+    n, out = len(fit.session.parameters), list(fit.session.parameters)
+    for p, owner in zip(fit.problem.parameters[n:], fit.problem.owner[n:].tolist(), strict=True):
+        _, _, value = p.name.partition(".")
+        out.append(replace(p, name=f"{names[owner]}.{value}"))
+    return tuple(out)
+
+
+def _covariance(fit: Fitted) -> Floats:
+    """(value, value) posterior, from difference quotients at the very values of the model.
+
+    Where base and fixture stand together, or a joint's zero beside what is mounted on it, is held by wide beliefs only.
+    A prediction is free of that as far as its derivative is that of the covariance; the derivative that the fit takes
+    leaves out how effects turn what geometry does (1e-5 of it, and metres of it are not known).
+    """
+    parameters = fit.problem.parameters
+    free, scale, belief = np.flatnonzero([p.free for p in parameters]), plausible_sizes(parameters), priors(parameters)
+    columns = [_slope(fit, int(i), float(scale[i])) * scale[i] for i in free]
+    beliefs = np.diag(np.where(np.isfinite(belief[free]), scale[free] / belief[free], 0.0))
+    _, s, Vt = np.linalg.svd(np.concatenate([np.stack(columns, axis=1), beliefs]), full_matrices=False)
+    root = scale[free, None] * Vt.T / s
+    out = np.zeros((len(parameters), len(parameters)))
+    out[np.ix_(free, free)] = root @ root.T / max(curvature_of(fit.rows), LEAST_CURVED)
+    return out
+
+
+def _slope(fit: Fitted, i: int, plausible: float) -> Floats:
+    """(row,) of the whitened residual by one value."""
+    inner = fit.problem.owner[i] >= 0 and ".c" not in fit.problem.parameters[i].name
+    step = INNER_STEP * plausible if inner else min(STEP, plausible)
+    up, down = fit.values.copy(), fit.values.copy()
+    up[i], down[i] = up[i] + step, down[i] - step
+    return np.asarray((fit.problem.residual(up) - fit.problem.residual(down)) / (2.0 * step), dtype=np.float64)
+
+
+def _seen(fit: Fitted, names: tuple[str, ...]) -> Identifiability:
+    """By the data and the priors that somebody stated."""
+    n = len(fit.session.parameters)
+    asked = (*without_assumed(fit.session.weighting.parameters), *_parameters(fit, names)[n:])
+    return analyse(fit.problem.jacobian(fit.values), asked)
+
+
+def _records(fit: Fitted, covariance: Floats, seen: Identifiability) -> tuple[ModelParameter, ...]:
+    """Of geometry; effects have their own sizes."""
+    out: list[ModelParameter] = []
+    for i, (p, value) in enumerate(zip(fit.session.parameters, fit.geometry, strict=True)):
+        if p.free:
+            why, sigma = seen.reason(p.name), float(np.sqrt(covariance[i, i]))
+            told = why is None
+            out.append(ModelParameter(p.name, p.unit, float(value) if told else None, sigma if told else None, why))
+    return tuple(out)
+
+
+def _conditions(fit: Fitted) -> tuple[dict[str, Floats], tuple[str, ...]]:
+    every = recorded_conditions(fit.drivers, fit.session.samples)
+    needs = needed_columns((d for a in fit.accepted for d in ",".join(a.term.depends_on).split(",")), every)
+    return kept_conditions(every, needs) if fit.accepted else {}, needs
+
+
+def _effects(fit: Fitted, said: Diagnosis, names: tuple[str, ...], covariance: Floats) -> tuple[Effect, ...]:
+    out: list[Effect] = []
+    n = len(fit.session.parameters)
+    for i, (a, name) in enumerate(zip(fit.accepted, names, strict=True)):
+        mine = n + np.flatnonzero(fit.problem.owner[n:] == i)
+        finding = _finding_of(a, said)
+        known = not a.term.open and finding is not None and finding.name.physics != UNKNOWN
+        m, smooth = len(a.coefficients), [s.name for s in a.term.inner if not s.discrete]
+        own = covariance[np.ix_(mine, mine)]
+        inner_sigma = np.zeros(len(a.inner))
+        inner_sigma[[not s.discrete for s in a.term.inner]] = np.sqrt(np.maximum(np.diag(own)[m:], 0.0))
+        sizes = finding.parameters if known and finding is not None else None
+        if sizes is None:
+            sizes = a.term.sizes(a.coefficients, own[:m, :m], a.inner, inner_sigma)
+        drivers = ",".join(a.term.depends_on).split(",")
+        ranges = {d: (float(v.min()), float(v.max())) for d in drivers if (v := range_of(fit.drivers, d)) is not None}
+        physics = UNKNOWN if a.term.open or (finding is not None and not known) else a.term.physics
+        out.append(
+            Effect(
+                name=name,
+                where=a.term.port.where,
+                physics=physics,
+                depends_on=",".join(a.term.depends_on),
+                shape=a.term.shape.value,
+                order=a.term.order,
+                variant=a.term.variant,
+                parameters={k: _parameter(k, size) for k, size in sizes.items()},
+                coefficients={f"{name}.c{j}": float(c) for j, c in enumerate(a.coefficients)},
+                inner={s.name: float(v) for s, v in zip(a.term.inner, a.inner, strict=True)},
+                about=_about(a, fit.drivers),
+                holds=holds_of(a.term).value,
+                range=ranges,
+                confidence=None if finding is None else finding.confidence,
+                listed="" if physics == a.term.physics else a.term.physics,
+                curve=_curve(a, fit.drivers, own[:m, :m]) if a.term.open and not smooth else None,
+                component=a.term.component if isinstance(a.term, Curve) else None,
+                waves=a.term.waves if isinstance(a.term, Curve) else None,
+            )
+        )
+    return tuple(out)
+
+
+def _finding_of(a: Accepted, said: Diagnosis) -> Finding | None:
+    """The one that names it, else the unknown cause at its port that has taken it in."""
+    for finding in said.findings:
+        if finding.name == named(a.term):
+            return finding
+    return next((f for f in said.findings if f.name.physics == UNKNOWN and f.name.where == a.term.port.where), None)
+
+
+def _about(a: Accepted, drivers: Drivers) -> dict[str, float]:
+    """For a person: what times and temperatures are counted from."""
+    out: dict[str, float] = {}
+    for name in a.term.depends_on:
+        if name == "t":
+            out["start_t_s"] = float(drivers.t_s.min())
+        if (T := drivers.temperatures_degC.get(name.removeprefix("temp_"))) is not None:
+            out["reference_degC"] = float(T.mean())
+    return out
+
+
+def _parameter(name: str, size: Size) -> EffectParameter:
+    sigma = _number(size.sigma)
+    unit = next((u for u in UNITS if name.endswith(f"_{u}")), "1")
+    return EffectParameter(None if sigma is None else _number(size.value), sigma, unit)
+
+
+def _curve(a: Accepted, drivers: Drivers, covariance: Floats) -> EffectCurve | None:
+    """Of an unknown cause of one driver, the component of its port that it moves most."""
+    x = range_of(drivers, a.term.depends_on[0]) if len(a.term.depends_on) == 1 else None
+    if x is None:
+        return None
+    basis = a.term.basis(drivers, a.inner)
+    amount = basis @ a.coefficients
+    component = int(np.argmax(np.ptp(amount, axis=0)))
+    order = np.argsort(x, kind="stable")
+    knots = np.linspace(float(x.min()), float(x.max()), KNOTS)
+    sigma = np.sqrt(np.maximum(np.sum((basis[:, component] @ covariance) * basis[:, component], axis=1), 0.0))
+    unit = "rad" if a.term.port.where.endswith(("angle", "tilt", "twist", "direction")) else "m"
+    values, doubt = (np.interp(knots, x[order], v[order]) for v in (amount[:, component], sigma))
+    return EffectCurve(a.term.depends_on[0], unit, *(tuple(v.tolist()) for v in (knots, values, doubt)))
+
+
+def _noise(fit: Fitted) -> Fields:
+    """One sigma of a reading by column; of joint noise seen through the arm, at the middle row."""
+    out: Fields = {}
+    larger = freedom(fit.problem, fit.covariance)
+    for i, (m, scatter) in enumerate(zip(fit.session.measured, fit.scatters, strict=True)):
+        misfit = m.problem.observed[fit.problem.rows[i]] - fit.around.expected[i][fit.problem.rows[i]]
+        white = np.linalg.solve(np.linalg.cholesky(scatter.covariance), misfit[..., None])[..., 0]
+        size = larger * _normal_size(np.sum(white**2, axis=1), misfit.shape[1])
+        sigma = np.sqrt(size * np.median(np.diagonal(scatter.covariance, axis1=1, axis2=2), axis=0))
+        names = TIP if m.name == "seat" else MOVED_COLUMNS.get(m.name, (m.name,))
+        out |= {name: float(s) for name, s in zip(names, sigma, strict=True)}
+    return out
+
+
+def _normal_size(squares: Floats, k: int) -> float:
+    """Variance, in units of what whitened them, under which squares (row,) of k values are normal but for wild rows.
+
+    Source: Huber, Robust Statistics, 1981, section 6.4 (proposal 2), with squares cut at 99 % of chi-square.
+    """
+    cut = float(chi2.ppf(CUT, k))
+    kept = k * float(chi2.cdf(cut, k + 2)) + cut * (1.0 - CUT)  # mean of the cut chi-square
+    size = float(np.median(squares) / chi2.median(k))
+    for _ in range(TURNS):
+        size = max(float(np.mean(np.minimum(squares, cut * size))) / kept, 1e-300)
+    return size
+
+
+def _rms(fit: Fitted) -> float:
+    """Of the lengths of the misfits of the first instrument."""
+    m, rows = fit.session.measured[0], fit.problem.rows[0]
+    misfit = m.problem.observed[rows] - fit.around.expected[0][rows]
+    return float(np.sqrt(np.mean(np.sum(misfit**2, axis=1))))
+
+
+def _as_listed(
+    model: ModelFile,
+    fit: Fitted,
+    parameters: tuple[Parameter, ...],
+    covariance: Floats,
+    conditions: Mapping[str, Floats],
+) -> ModelFile:
+    """With coefficients that belong to the terms as a reader of the file lists them.
+
+    Columns of unknown masses are chosen anew from the conditions of the file; they span the same.
+    """
+    if not model.effects:
+        return model
+    predictor, recorded = Predictor.of(model), Samples(conditions, fit.session.arm.n_joints)
+    nothing = Perturbation.none(len(recorded), recorded.n_joints)
+    terms = listed(model.effects, drivers_under(predictor, recorded, nothing))
+    turn, effects, at = np.eye(len(parameters)), list(model.effects), len(fit.session.parameters)
+    for i, (a, read) in enumerate(zip(fit.accepted, terms, strict=True)):
+        was, now = a.term.basis(fit.drivers, a.inner), read.accepted.term.basis(fit.drivers, a.inner)
+        m = len(a.coefficients)
+        same, _ = alike(now, was)
+        left = float(np.linalg.norm((was - now @ same) @ a.coefficients))
+        if now.shape != was.shape or left > NEARLY * float(np.linalg.norm(was @ a.coefficients)):
+            raise DataError(f"no model: effect {effects[i].name} cannot be told from the conditions of the file alone")
+        turn[at : at + m, at : at + m] = same
+        turned = dict(zip(effects[i].coefficients, (same @ a.coefficients).tolist(), strict=True))
+        effects[i] = structs.replace(effects[i], coefficients=turned)
+        at += m + sum(not s.discrete for s in a.term.inner)
+    turned_covariance = covariance_record(parameters, turn @ covariance @ turn.T)
+    return structs.replace(model, effects=tuple(effects), covariance=turned_covariance)
+
+
+def _number(value: float) -> float | None:
+    """JSON has no word for what is not a number."""
+    return value if np.isfinite(value) else None

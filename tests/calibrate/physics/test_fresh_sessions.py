@@ -1,0 +1,45 @@
+"""Fresh concealed sessions through the commands alone: half of the rows diagnosed, the other half predicted."""
+
+import numpy as np
+import pytest
+
+from .halves import OBSERVED, diagnosed_and_predicted, inside_95, judged, written_halves
+
+FIRST = 3000  # seeds that nobody has looked at while this was made
+SESSIONS = 12  # of each family
+
+
+def ratio_and_share(folder, family, seed, samples):
+    """Rms of the residuals on unseen rows over the noise that was really added, and the share inside 95 %.
+
+    Of cones, whose noise is in the encoders, over the noise that the fit found.
+    """
+    recording, unseen, case, rows = written_halves(
+        folder, family=family, seed=seed, defects=("any",), enr=2.0, samples=samples
+    )
+    model, table = diagnosed_and_predicted(folder, recording, unseen)
+    residual, sigma = judged(model, table, family)
+    if family == "cones":
+        noise = np.array([model["noise"][name] for name in OBSERVED[family]])
+    else:
+        noise = (case.values_m - case.exact.values_m)[rows]
+    return float(np.sqrt(np.nanmean(residual**2) / np.mean(noise**2))), inside_95(residual, sigma)
+
+
+def test_a_session_of_two_detectors_is_predicted_to_its_noise(tmp_path):
+    ratio, inside = ratio_and_share(tmp_path, "dual-psd", 2012, 200)
+    assert ratio < 1.15
+    assert inside > 0.9
+
+
+@pytest.mark.endure
+@pytest.mark.parametrize(("family", "median", "most"), [("tracker", 1.06, 1.25), ("dual-psd", 1.08, 1.25)])
+def test_unseen_rows_are_predicted_to_the_noise_in_most_sessions(tmp_path, family, median, most):
+    """Half of 360 samples holds some 60 values against 540 or 720 readings: 1.04 is what the least that is to be
+    fitted costs. Wider than the aim of 1.04 and 1.15 by what a diagnosis of so few rows misses.
+    """
+    each = [ratio_and_share(tmp_path / str(k), family, FIRST + k, 360) for k in range(SESSIONS)]
+    ratios, shares = np.array(each).T
+    assert np.median(ratios) <= median
+    assert np.quantile(ratios, 0.8) <= most
+    assert 0.93 <= np.median(shares) <= 0.97
