@@ -20,6 +20,7 @@ FLAT = 1e-6  # of the largest extent of a set of points: below it lies on a line
 ROUNDS = 10  # of leaving out shots far off; two or three are enough where most of the shots are good
 FAR = 5.0  # medians of the residual: one good shot of 1e4 lies farther off (Maxwell law), so few good ones are lost
 CLEARLY = 0.5  # of the other rms: a flat set of points with noise prefers one hand by a hair only
+GROSS = 0.05  # of the usual distance from the middle: more than an arm beside its drawing explains
 
 
 @dataclass(frozen=True)
@@ -28,14 +29,19 @@ class Alignment:
 
     T_a_b: Floats  # (4, 4)
     rms_m: float  # of the distances, of the points used
-    mirrored_rms_m: float  # the same if one axis of b were reversed; far below `rms_m`: b is left-handed
+    mirrored_rms_m: float  # the same for the mirror image of b's points; `T_a_b` is always a rotation
     determinant: float  # +1 or -1: the best orthogonal map is a rotation or a mirror; 0: points in a plane cannot tell
     used: Bools  # (point,) False: so far off that it was left out of the start
+    spread_m: float  # usual distance of the points from their middle
 
     @property
     def mirrored(self) -> bool:
-        """Whether b looks left-handed."""
-        return self.determinant < 0.0 and self.mirrored_rms_m < CLEARLY * self.rms_m
+        """Whether no rotation brings the points together, but their mirror image fits.
+
+        No instrument is left-handed: joints count the other way, or columns are negated or exchanged.
+        """
+        gross = self.rms_m > GROSS * self.spread_m
+        return self.determinant < 0.0 and gross and self.mirrored_rms_m < CLEARLY * self.rms_m
 
 
 def align(points_a_m: Floats, points_b_m: Floats) -> Alignment:
@@ -127,7 +133,8 @@ def _judged(a: Floats, b: Floats, used: Bools) -> Alignment:
     T_mirrored = _kabsch(a, b @ mirror)
     U, s, Vt = np.linalg.svd((a - a.mean(axis=0)).T @ (b - b.mean(axis=0)))
     determinant = float(np.sign(np.linalg.det(U @ Vt))) if s[2] > FLAT**2 * s[0] else 0.0
-    return Alignment(T_a_b, _rms(T_a_b, a, b), _rms(T_mirrored, a, b @ mirror), determinant, used)
+    spread_m = float(np.median(np.linalg.norm(b - b.mean(axis=0), axis=1)))
+    return Alignment(T_a_b, _rms(T_a_b, a, b), _rms(T_mirrored, a, b @ mirror), determinant, used, spread_m)
 
 
 def _rms(T_a_b: Floats, a: Floats, b: Floats) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.blunders import coupling, degrees, offsets, signs
-from calibrate.blunders.finding import Blunder
+from calibrate.blunders.finding import Blunder, BlunderKind
 from calibrate.blunders.hypothesis import Hypothesis
 from calibrate.blunders.witness import Otherwise, Strain, Witness
 
@@ -27,6 +27,7 @@ RIVAL = 1.5  # times the winner's strain: as good an explanation
 NOTHING_M = 2e-5  # no instrument says less: perfect data must not tell conventions apart by their rounding
 GROSS = 0.05  # of the reach: more than joint zeros 2 deg off explain, so that something else is wrong, or two things
 CARRIED_M = 0.3  # from the flange, along each of its axes: a beam's usual travel, a long probe
+NAMED = 3  # other explanations in a message; the rest is counted
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,30 @@ class _Account:
         """Whether more than an arm beside its drawing is left; one that would hardly move satisfies cones, too."""
         return self.strain.typical_m > GROSS * self.reach_m
 
+    @property
+    def reflected(self) -> bool:
+        """Whether the readings of a device are mirrored."""
+        return any(one.kind is BlunderKind.MIRRORED_AXIS for one in self.said)
+
+    @property
+    def signs(self) -> tuple[int, ...]:
+        """Joints whose sign it changes."""
+        return tuple(j for one in self.said if isinstance(one, Hypothesis) for j in one.signs)
+
+    @property
+    def besides(self) -> tuple[str, ...]:
+        """What it says apart from joint signs and reflection."""
+        return tuple(
+            f"{one.column}: {one.what}"
+            for one in self.said
+            if one.kind not in (BlunderKind.JOINT_SIGN, BlunderKind.MIRRORED_AXIS)
+        )
+
+    @property
+    def mistakes(self) -> int:
+        """How many things are otherwise than written; every sign is one."""
+        return sum(max(len(one.signs), 1) if isinstance(one, Hypothesis) else 1 for one in self.said)
+
 
 def wrong_convention(flange: Flange, witnesses: Sequence[Witness]) -> Blunder | None:
     """The convention (or two) that explains the readings when those of the rig do not; None if they do.
@@ -56,11 +81,15 @@ def wrong_convention(flange: Flange, witnesses: Sequence[Witness]) -> Blunder | 
     for family in (search.singles, search.doubles):
         if family == search.doubles and not found.gross:
             break
-        accounts = [account for account in family() if not account.gross]
+        accounts = [account for account in family(before) if not account.gross]
         best = min(accounts, key=_compared, default=found)
         if _explains(best, found):
-            found, tried = best, accounts
-    return None if found is before else _named(found, tried, before)
+            found, tried = _simplest(best, accounts), accounts
+    if found is before:
+        return None
+    if found.reflected:
+        found, tried = _signs_first(search, found, tried)
+    return _named(found, tried, before)
 
 
 def strain_of(flange: Flange, witnesses: Sequence[Witness]) -> Strain:
@@ -87,18 +116,26 @@ class _Search:
             reach_m = max(reach_m, _reach_m(T_base_flange))
         return _Account((*hypotheses, *besides), strain, reach_m)
 
-    def singles(self) -> Iterator[_Account]:
+    def singles(self, before: _Account) -> Iterator[_Account]:
+        """One mistake; several joint signs are one where the file as written is far off, or its mirror image fits."""
+        mirrored = False
+        for other, witnesses in _of_readings(self.witnesses):
+            account = self.account(witnesses, besides=(other,))
+            mirrored |= account.reflected and _explains(account, before)
+            yield account
         for hypothesis in self._of_angles():
             yield self.account(self.witnesses, hypothesis)
-        for other, witnesses in _of_readings(self.witnesses):
-            yield self.account(witnesses, besides=(other,))
+        if before.gross or mirrored:
+            for hypothesis in signs.sets(self._joints):
+                yield self.account(self.witnesses, hypothesis)
 
-    def doubles(self) -> Iterator[_Account]:
+    def doubles(self, before: _Account) -> Iterator[_Account]:
         """Degrees are undone first, then signs, then zeros, then couplings."""
+        del before
         angles = list(self._of_angles())
         for i, first in enumerate(angles):
             for second in angles[i + 1 :]:
-                if (first.kind, first.column) != (second.kind, second.column):
+                if (first.kind, first.column) != (second.kind, second.column) and not (first.signs and second.signs):
                     yield self.account(self.witnesses, first, second)
         for other, witnesses in _of_readings(self.witnesses):
             for hypothesis in angles:
@@ -107,15 +144,37 @@ class _Search:
                 if second.kind is not other.kind:
                     yield self.account(both, besides=(other, second))
 
+    def unreflected(self, account: _Account) -> Iterator[_Account]:
+        """What this account says, with one sign or several in place of its reflection."""
+        angles = [one for one in account.said if isinstance(one, Hypothesis)]
+        kept = [one for one in account.said if isinstance(one, Otherwise) and not _mirrors(one)]
+        witnesses = self.witnesses
+        for wanted in kept:
+            witnesses = next(w for other, w in _of_readings(witnesses) if _same(other, wanted))
+        for hypothesis in (*signs.hypotheses(self._joints), *signs.sets(self._joints)):
+            yield self.account(witnesses, *angles, hypothesis, besides=tuple(kept))
+
+    @property
+    def _joints(self) -> int:
+        return self.witnesses[0].q_rad.shape[1]
+
     def _of_angles(self) -> Iterator[Hypothesis]:
         for family in KNOWN:
-            yield from family(self.witnesses[0].q_rad.shape[1])
+            yield from family(self._joints)
 
 
 def _of_readings(witnesses: tuple[Witness, ...]) -> Iterator[tuple[Otherwise, tuple[Witness, ...]]]:
     for i, witness in enumerate(witnesses):
         for other in witness.otherwise():
             yield other, (*witnesses[:i], other.witness, *witnesses[i + 1 :])
+
+
+def _mirrors(other: Otherwise) -> bool:
+    return other.kind is BlunderKind.MIRRORED_AXIS
+
+
+def _same(one: Otherwise, other: Otherwise) -> bool:
+    return (one.kind, one.column) == (other.kind, other.column)
 
 
 def _reach_m(T_base_flange: Floats) -> float:
@@ -139,18 +198,69 @@ def _ratio(before_m: float, after_m: float) -> float:
     return (before_m + NOTHING_M) / (after_m + NOTHING_M)
 
 
+def _as_good(account: _Account, best: _Account) -> bool:
+    """Whether arm and readings agree as well, with drawn things as near to where they are drawn."""
+    return _ratio(account.strain.compared_m, best.strain.compared_m) < RIVAL
+
+
+def _fits_as_well(account: _Account, best: _Account) -> bool:
+    """Whether arm and readings agree as well, wherever the target then sits: a mirrored arm mirrors it, too."""
+    return _ratio(account.strain.typical_m, best.strain.typical_m) < RIVAL
+
+
+def _simplest(best: _Account, accounts: list[_Account]) -> _Account:
+    """Of those that explain as much the one with the fewest mistakes: the sign of a joint that nobody sees is none."""
+    return min((a for a in accounts if _as_good(a, best)), key=lambda a: (a.mistakes, a.strain.compared_m))
+
+
+def _signs_first(search: _Search, found: _Account, tried: list[_Account]) -> tuple[_Account, list[_Account]]:
+    """The joint signs that do what a reflection does, and all that fits as well; the reflection where there are none.
+
+    A target drawn beside the plane of the arm may have to move for it, which the message gives.
+    """
+    equal = [a for a in search.unreflected(found) if not a.gross and _fits_as_well(a, found)]
+    if not equal:
+        return found, tried
+    return _simplest(min(equal, key=_compared), equal), [*equal, found]
+
+
 def _named(best: _Account, tried: list[_Account], before: _Account) -> Blunder:
-    """The winner; others that explain the file as well are told in the same breath."""
-    winners = [a for a in tried if _ratio(a.strain.compared_m, best.strain.compared_m) < RIVAL and a is not best]
-    others = "".join(f"; or {_in_words(a)}" for a in winners)
+    """The winner; others that explain the file as well are named in the same message."""
     after_mm, before_mm = 1e3 * best.strain.typical_m, 1e3 * before.strain.typical_m
     figures = f"(arm and readings agree to {after_mm:.2g} mm then, to {before_mm:.3g} mm as written)"
     if _ratio(before_mm, after_mm) < GAIN:
         figures = "(only then is what the rig draws where it is drawn)"
+    figures += "; no set of joint signs explains it" if best.reflected else ""
     first = best.said[0]
     besides = "".join(f"; and {other.column}: {other.what}" for other in best.said[1:])
+    what = f"{first.what}{besides} {figures}{_others(best, tried)}"
     remedy = "; and ".join(one.remedy for one in best.said)
-    return Blunder(first.kind, (), first.column, f"{first.what}{besides} {figures}{others}", remedy)
+    return Blunder(first.kind, (), first.column, what, f"{remedy}{_mirror_image(best, tried)}")
+
+
+def _others(best: _Account, tried: list[_Account]) -> str:
+    """What explains the file as well, joints whose sign changes nothing put together."""
+    as_good = [a for a in tried if a is not best and not a.reflected and _as_good(a, best)]
+    wider = [a for a in as_good if best.signs and set(best.signs) < set(a.signs) and a.besides == best.besides]
+    unseen = sorted({j for a in wider for j in a.signs} - set(best.signs))
+    out = f"; these readings leave the sign of {signs.in_words(tuple(unseen))} open" if unseen else ""
+    rest = [a for a in as_good if a not in wider]
+    out += "".join(f"; or {_in_words(a)}" for a in sorted(rest, key=_compared)[:NAMED])
+    return out + (f"; or {len(rest) - NAMED} other explanations" if len(rest) > NAMED else "")
+
+
+def _mirror_image(best: _Account, tried: list[_Account]) -> str:
+    """The second explanation of a mirrored arm: the device's columns. Mended wrongly, they give a mirrored model."""
+    if not best.signs:
+        return ""
+    twin = next((a for a in tried if a.reflected and a.besides == best.besides and _fits_as_well(a, best)), None)
+    if twin is None:
+        return ""
+    column = next(one.column for one in twin.said if one.kind is BlunderKind.MIRRORED_AXIS)
+    moved_mm, instead_mm = 1e3 * best.strain.moved_m, 1e3 * twin.strain.moved_m
+    target = f" (that moves the target by {instead_mm:.2g} mm, the signs by {moved_mm:.2g} mm)"
+    told = "" if _as_good(best, twin) else target
+    return f"; second, if the device's file is known to be wrong: negate one of {column}, or exchange two{told}"
 
 
 def _in_words(account: _Account) -> str:

@@ -20,3 +20,4 @@ class Hypothesis:
     what: str
     remedy: str
     angles: Callable[[Floats], Floats]  # (pose, joint) as written -> as meant, rad
+    signs: tuple[int, ...] = ()  # joints, from 1, whose sign it changes

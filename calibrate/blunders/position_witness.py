@@ -33,12 +33,15 @@ class PositionWitness:
         return Strain(found.typical_m, 0.0 if drawn is None else float(np.linalg.norm(found.point_m - drawn)))
 
     def otherwise(self) -> Iterator[Otherwise]:
-        """Left-handed axes (one sign, or two axes exchanged; which cannot be told), and millimetres."""
+        """Columns that mirror the readings (one sign, or two of them exchanged; which is open), and millimetres.
+
+        No instrument is left-handed: conventions.py looks for joint signs first.
+        """
         yield Otherwise(
             BlunderKind.MIRRORED_AXIS,
             COLUMNS,
-            "the frame between arm and device has determinant -1: the device's axes are left-handed",
-            "change the sign of one of the three columns, or exchange two of them",
+            "only the mirror image of the readings fits the arm (determinant -1), and no instrument is left-handed",
+            "change the sign of one of the three columns, or exchange two of them, as the device's export shows",
             replace(self, mirrored=not self.mirrored),
         )
         yield Otherwise(

@@ -74,6 +74,7 @@ def without_blunders(
     refuse_wrong_file(rig, samples)
     early = _with_left_alone(samples, (*impossible_rows(rig, samples), *_sessions_apart(rig, samples)))
     instruments = _instruments_without(rig, samples, early, plan)
+    _refuse_mirrored(instruments)
     weighting, late = clean(instruments.weighting, instruments.start)
     every = _with_left_alone(samples, early + late)
     if len(every) > len(early) + len(late):
@@ -85,6 +86,18 @@ def refuse_wrong_file(rig: Rig, samples: Samples) -> None:
     """DataError that says which conventions the file is written by, where they are not those of the rig."""
     if blunders := wrong_file(rig, samples):
         raise DataError("; besides, ".join(blunder.says for blunder in blunders))
+
+
+def _refuse_mirrored(instruments: Instruments) -> None:
+    """DataError where positions, too few for `wrong_file`, fit only as their mirror image."""
+    if (found := instruments.alignment) is None or not found.mirrored:
+        return
+    raise DataError(
+        f"all rows, columns {', '.join(POSITION)}: only the mirror image of the positions fits the arm "
+        f"({1e3 * found.mirrored_rms_m:.2g} mm, as written {1e3 * found.rms_m:.3g} mm): joints count against the rig's "
+        "sense, or a column of the device is negated; correct the signs (docs/formats.md, Joint signs), or measure "
+        "more poses to have the joints named"
+    )
 
 
 def wrong_file(rig: Rig, samples: Samples) -> tuple[Blunder, ...]:

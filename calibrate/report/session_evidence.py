@@ -16,6 +16,7 @@ from calibrate.parameters import Parameter
 from calibrate.problem import Problem
 from calibrate.report.as_modelled import noise_of, values_of, weighting_of
 from calibrate.report.quantities import angle, length
+from calibrate.uncertainty.redundancy import spare_readings
 from calibrate.weighting import Weighting
 
 Floats = NDArray[np.float64]
@@ -92,6 +93,17 @@ class SessionEvidence:
     def q_rad(self) -> Floats:
         """(row, joint) of the samples that took part."""
         return self.recording.samples.joints()[self.rows]
+
+    @cached_property
+    def spare(self) -> float:
+        """Readings that are left over to check the fit; nan where the model has no covariance."""
+        found, names = self.model.covariance, [p.name for p in self.parameters]
+        if found is None or not set(found.names) <= set(names):
+            return float("nan")
+        at = [names.index(name) for name in found.names]
+        covariance = np.zeros((len(names), len(names)))
+        covariance[np.ix_(at, at)] = found.rows
+        return spare_readings(self.problem, self.theta, covariance)
 
     @property
     def left_out(self) -> int:

@@ -11,8 +11,9 @@ from calibrate.report.model_tests import Repeated, Scatter, proofs, repeated, sc
 from calibrate.report.patterns import Pattern, patterns
 from calibrate.report.quantities import significant
 from calibrate.report.session_evidence import SessionEvidence
-from calibrate.report.verdict import AGAIN, NOISIER, WORSE_UNSEEN, Doubt, Trust, Verdict
+from calibrate.report.verdict import AGAIN, MORE_POSES, NOISIER, UNCHECKED, WORSE_UNSEEN, Doubt, Trust, Verdict
 from calibrate.uncertainty.chi_square import Alarm
+from calibrate.uncertainty.redundancy import checks_nothing
 
 MANY_LEFT_OUT = 0.05  # of the rows: beyond, it is worth asking what went wrong while measuring
 NO_BETTER = 0.95  # of the error as drawn on unseen rows: above, the identification has gained nothing
@@ -38,6 +39,8 @@ def session_verdict(evidence: SessionEvidence) -> Verdict:
     advice = tuple(dict.fromkeys((*(do for _, do in doubts if do), *_harmless(scatter(model)))))
     if model.status in FAILED:
         return Verdict(Trust.NONE, f"No usable model: {model.says}.", reasons, (AGAIN, *advice))
+    if checks_nothing(evidence.spare):
+        return Verdict(Trust.NONE, f"{UNCHECKED} Do not use this model.", reasons, (MORE_POSES, *advice))
     first = next(iter(proofs(model)), None)
     if first is not None and first.rms_after > NO_BETTER * first.rms_before:
         keep = "Keep the drawing; find out what is wrong with arm, instrument or poses, and measure again."

@@ -7,6 +7,7 @@ from enum import Enum
 from calibrate.fit import Status
 from calibrate.report.evidence import Evidence
 from calibrate.report.quantities import length, significant
+from calibrate.uncertainty.redundancy import checks_nothing
 from calibrate.zeros.result import JointZero, ZeroResult
 
 UNLIKELY = 0.01  # lack of fit: the usual level (Draper, Smith, Applied Regression Analysis, 1998, ch. 2.1)
@@ -16,6 +17,9 @@ READY = "Put the zeros into the controller, or use model.json as it is (calibeam
 AGAIN = "Measure again, with more and more different poses."
 SMALL_SHARE = 0.5  # measurement under this share of sigma: something else limits the zero
 
+
+UNCHECKED = "There are as many unknowns as readings, or nearly so: any arm would fit, and nothing checks the result."
+MORE_POSES = "Measure more poses: at least 15, better 50, all over the workspace."
 
 Doubt = tuple[str, str]  # what speaks against trust, and what to do about it
 
@@ -47,6 +51,8 @@ def verdict(evidence: Evidence) -> Verdict:
     advice = tuple(dict.fromkeys(do for _, do in doubts if do))
     if not found or result.status in (Status.NOT_FINITE, Status.OUT_OF_STEPS, Status.STALLED):
         return Verdict(Trust.NONE, "No joint zero was determined.", (result.status.value, *reasons), (AGAIN, *advice))
+    if checks_nothing(result.spare):
+        return Verdict(Trust.NONE, f"{UNCHECKED} Do not use the zeros.", reasons, (MORE_POSES, *advice))
     explained = (
         f"The model explains the spots to {length(result.rms_after_m)} rms (before: {length(result.rms_before_m)})"
     )

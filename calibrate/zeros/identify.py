@@ -23,6 +23,7 @@ from calibrate.noise import NoiseModel, VarianceFactors
 from calibrate.observations import Observations
 from calibrate.parameters import Parameter, hold, priors, start_values
 from calibrate.problem import Problem, whitener_of
+from calibrate.uncertainty.redundancy import spare_readings
 from calibrate.zeros.estimates import estimates, seen_by_data
 from calibrate.zeros.held_out import held_out_error
 from calibrate.zeros.ranked_fit import COARSE, FAR, NEAR, by_joint, fitted, noisy_rows, ranked_fit
@@ -230,6 +231,7 @@ def _result(
         fit.theta,
         fit.covariance,
         len(data),
+        spare_readings(problem, fit.theta, fit.covariance),
         weighted.steps,
         f"calibeam {version('calibeam')}",
     )

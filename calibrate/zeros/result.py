@@ -97,5 +97,6 @@ class ZeroResult:
     theta: Floats  # (param,) predicts; alone, an entry that is not determined means nothing
     covariance: Floats  # (param, param) posterior; rows of held parameters are zero
     n_poses: int
+    spare: float  # readings that are left over to check the fit (uncertainty/redundancy.py); nan: not known
     steps: int
     software: str  # "calibeam 0.1.0"

@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from acquisition.recording.rig import parse_rig
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_verdict import session_verdict
 from calibrate.report.verdict import Trust
@@ -88,3 +89,24 @@ def test_a_recording_that_was_cut_short_calls_for_care(healthy):
     judged = session_verdict(replace(healthy, recording=replace(healthy.recording, complete=False)))
     assert judged.trust is Trust.CARE
     assert "cut short" in judged.reasons[0]
+
+
+@pytest.mark.parametrize(("poses", "tolerance"), [(8, True), (9, False), (10, False)])
+def test_as_many_unknowns_as_readings_is_no_trust_whatever_the_fit_says(arm_session, poses, tolerance):
+    session = arm_session(poses)
+    recording = session.recording(session.positions())
+    if not tolerance:  # 27 unknowns that 27 or 30 equations have to find
+        text = recording.rig_text.replace("[tolerance]\nlength_m = 3e-4\nangle_rad = 5e-4\n", "")
+        recording = replace(recording, rig_text=text, rig=parse_rig(text, "rig"))
+        assert recording.rig.tolerance is None
+    judged = session_verdict(session_evidence(recording, session.model(recording)))
+    assert judged.trust is Trust.NONE
+    assert judged.sentence.startswith("There are as many unknowns as readings, or nearly so")
+    assert any("at least 15, better 50" in do for do in judged.advice)
+
+
+def test_readings_to_spare_are_counted_without_the_rows_of_the_tolerance(healthy):
+    model = healthy.model
+    assert healthy.spare < 3 * len(healthy.rows)
+    assert healthy.spare == pytest.approx(3 * len(healthy.rows) - 30, abs=6.0)  # 27 of a UR5e, and what priors leave
+    assert healthy.spare < model.noise["dof"]

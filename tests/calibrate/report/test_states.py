@@ -75,6 +75,12 @@ def test_a_recording_that_was_cut_short_calls_for_care(identified: Identified) -
     assert "cut short" in said
 
 
+def test_as_many_unknowns_as_readings_is_no_trust(identified: Identified) -> None:
+    trust, said = judged(identified.used, replace(sound(identified.zeros), spare=2.0))
+    assert trust is Trust.NONE
+    assert "as many unknowns as readings" in said
+
+
 @pytest.mark.parametrize("status", [Status.NOT_FINITE, Status.OUT_OF_STEPS, Status.STALLED])
 def test_a_fit_that_did_not_end_is_no_result(identified: Identified, status: Status) -> None:
     result = replace(identified.zeros, status=status, zeros=tuple(unknown(z) for z in identified.zeros.zeros))
