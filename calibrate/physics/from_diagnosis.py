@@ -181,44 +181,45 @@ def _conditions(fit: Fitted) -> tuple[dict[str, Floats], tuple[str, ...]]:
 
 def _effects(fit: Fitted, said: Diagnosis, names: tuple[str, ...], covariance: Floats) -> tuple[Effect, ...]:
     out: list[Effect] = []
-    n = len(fit.session.parameters)
     for i, (a, name) in enumerate(zip(fit.accepted, names, strict=True)):
-        mine = n + np.flatnonzero(fit.problem.owner[n:] == i)
-        finding = _finding_of(a, said)
-        known = not a.term.open and finding is not None and finding.name.physics != UNKNOWN
-        m, smooth = len(a.coefficients), [s.name for s in a.term.inner if not s.discrete]
-        own = covariance[np.ix_(mine, mine)]
-        inner_sigma = np.zeros(len(a.inner))
-        inner_sigma[[not s.discrete for s in a.term.inner]] = np.sqrt(np.maximum(np.diag(own)[m:], 0.0))
-        sizes = finding.parameters if known and finding is not None else None
-        if sizes is None:
-            sizes = a.term.sizes(a.coefficients, own[:m, :m], a.inner, inner_sigma)
-        drivers = ",".join(a.term.depends_on).split(",")
-        ranges = {d: (float(v.min()), float(v.max())) for d in drivers if (v := range_of(fit.drivers, d)) is not None}
-        physics = UNKNOWN if a.term.open or (finding is not None and not known) else a.term.physics
-        out.append(
-            Effect(
-                name=name,
-                where=a.term.port.where,
-                physics=physics,
-                depends_on=",".join(a.term.depends_on),
-                shape=a.term.shape.value,
-                order=a.term.order,
-                variant=a.term.variant,
-                parameters={k: _parameter(k, size) for k, size in sizes.items()},
-                coefficients={f"{name}.c{j}": float(c) for j, c in enumerate(a.coefficients)},
-                inner={s.name: float(v) for s, v in zip(a.term.inner, a.inner, strict=True)},
-                about=_about(a, fit.drivers),
-                holds=holds_of(a.term).value,
-                range=ranges,
-                confidence=None if finding is None else finding.confidence,
-                listed="" if physics == a.term.physics else a.term.physics,
-                curve=_curve(a, fit.drivers, own[:m, :m]) if a.term.open and not smooth else None,
-                component=a.term.component if isinstance(a.term, Curve) else None,
-                waves=a.term.waves if isinstance(a.term, Curve) else None,
-            )
-        )
+        mine = np.flatnonzero(fit.problem.owner == i)
+        out.append(_effect(a, name, _finding_of(a, said), fit.drivers, covariance[np.ix_(mine, mine)]))
     return tuple(out)
+
+
+def _effect(a: Accepted, name: str, finding: Finding | None, drivers: Drivers, own: Floats) -> Effect:
+    """`own` (value, value) covariance of its coefficients and smooth inner values."""
+    m, term = len(a.coefficients), a.term
+    named_so = finding is not None and not term.open and finding.name.physics != UNKNOWN
+    physics = UNKNOWN if term.open or (finding is not None and not named_so) else term.physics
+    if finding is not None and named_so:
+        sizes = finding.parameters
+    else:
+        inner_sigma = np.zeros(len(a.inner))
+        inner_sigma[[not s.discrete for s in term.inner]] = np.sqrt(np.maximum(np.diag(own)[m:], 0.0))
+        sizes = term.sizes(a.coefficients, own[:m, :m], a.inner, inner_sigma)
+    depends_on = ",".join(term.depends_on)
+    values = {driver: range_of(drivers, driver) for driver in depends_on.split(",")}
+    return Effect(
+        name=name,
+        where=term.port.where,
+        physics=physics,
+        depends_on=depends_on,
+        shape=term.shape.value,
+        order=term.order,
+        variant=term.variant,
+        parameters={k: _parameter(k, size) for k, size in sizes.items()},
+        coefficients={f"{name}.c{j}": float(c) for j, c in enumerate(a.coefficients)},
+        inner={s.name: float(v) for s, v in zip(term.inner, a.inner, strict=True)},
+        about=_about(a, drivers),
+        holds=holds_of(term).value,
+        range={driver: (float(v.min()), float(v.max())) for driver, v in values.items() if v is not None},
+        confidence=None if finding is None else finding.confidence,
+        listed="" if physics == term.physics else term.physics,
+        curve=_curve(a, drivers, own) if term.open and len(own) == m else None,
+        component=term.component if isinstance(term, Curve) else None,
+        waves=term.waves if isinstance(term, Curve) else None,
+    )
 
 
 def _finding_of(a: Accepted, said: Diagnosis) -> Finding | None:

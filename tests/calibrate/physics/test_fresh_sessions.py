@@ -5,7 +5,7 @@ import pytest
 
 from .halves import OBSERVED, diagnosed_and_predicted, inside_95, judged, written_halves
 
-FIRST = 3000  # seeds that nobody has looked at while this was made
+FIRST = 3000  # seeds by which nothing was chosen while this was made
 SESSIONS = 12  # of each family
 
 
