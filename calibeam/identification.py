@@ -16,7 +16,7 @@ from calibrate.dual_psd_rig import believed_noise, drawing_doubt, dual_psd_chain
 from calibrate.fit import Status
 from calibrate.identification.evidence import Asked
 from calibrate.identification.evidence_record import evidence_fields
-from calibrate.identification.record import left_out
+from calibrate.identification.record import fit_record, left_out
 from calibrate.identification.result import Identification
 from calibrate.identification.spots import proved, without_blunders
 from calibrate.model_file import ModelFile, RigIdentity, model_of, write_model
@@ -77,7 +77,8 @@ def identified_model(identified: Identified, recording: Recording) -> ModelFile:
     if identified.proved is None:
         return model
     proofs = evidence_fields(identified.proved.evidence)
-    return msgspec.structs.replace(model, alarms=identified.proved.alarms, **proofs)
+    end = replace(identified.proved.end, iterations=identified.zeros.steps, stop=identified.zeros.stop)
+    return msgspec.structs.replace(model, alarms=identified.proved.alarms, fit=fit_record(end), **proofs)
 
 
 def _four_poses(rig: Rig, data: Observations) -> PointConstraintResult | None:

@@ -8,14 +8,14 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Literal
 
-from msgspec import Meta, Struct
+from msgspec import Meta, Struct, field
 
 from acquisition.recording.bounds import Count, Few, Name, Positive
 from acquisition.recording.rig_lines import KeyPath
 from acquisition.recording.rig_schema import ArmModel
 from acquisition.recording.toml_file import parse_toml, read_text
 from calibrate.errors import DataError
-from calibrate.fit import Loss, Method
+from calibrate.fit import DogLegRules, Loss, Method
 from calibrate.redundant import Redundant
 from calibrate.uncertainty.splits import SplitKind
 
@@ -58,6 +58,20 @@ class InstrumentName(enum.Enum):
     BAR = "bar"
 
 
+Limit = Annotated[float, Meta(ge=0.0, le=1e12)]  # whitened and scaled, so that 1 is a noise or a plausible size
+
+
+class DogLeg(Struct, frozen=True, forbid_unknown_fields=True):
+    """The numbers of Dog-Leg (calibrate/solvers/dogleg.py), each absent one as it is without a plan."""
+
+    e1: Limit = DogLegRules.e1
+    e2: Limit = DogLegRules.e2
+    e3: Limit = DogLegRules.e3
+    kmax: Annotated[int, Meta(ge=1, le=100_000)] = DogLegRules.kmax
+    delta0: Annotated[float, Meta(ge=1e-12, le=1e12)] = DogLegRules.radius
+    sigma: Annotated[float, Meta(ge=0.0, le=0.25)] = DogLegRules.sigma  # above 1/4 a refused step would be tried again
+
+
 class FitPlan(Struct, frozen=True, forbid_unknown_fields=True):
     """A whole plan; every key but `schema` may be absent and then leaves things as they are without a plan."""
 
@@ -69,6 +83,7 @@ class FitPlan(Struct, frozen=True, forbid_unknown_fields=True):
     hold: Few[Name] = ()  # as drawn; wins over `free` and `priors`
     loss: LossName = LossName.LEAST_SQUARES
     solver: SolverName = SolverName.LEVENBERG
+    dog_leg: DogLeg | None = field(name="dog-leg", default=None)
     redundant: RedundantName = RedundantName.REMOVED
     splits: Few[SplitKind] = tuple(SplitKind)
     share: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.2  # of the rows, held out; 0: no proof
@@ -82,6 +97,12 @@ class FitPlan(Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def method(self) -> Method:
         return METHODS[self.solver]
+
+    @property
+    def rules(self) -> DogLegRules | None:
+        """Of Dog-Leg; None: the usual ones."""
+        own = self.dog_leg
+        return None if own is None else DogLegRules(own.e1, own.e2, own.e3, own.kmax, own.delta0, own.sigma)
 
     @property
     def of_redundant(self) -> Redundant:
@@ -124,5 +145,7 @@ def _contradictions(plan: FitPlan) -> Iterator[tuple[KeyPath, str]]:
     for one, other in pairs:
         if {one, other} <= set(plan.instruments):
             yield ("instruments",), f"'{one.value}' and '{other.value}' are the same readings; choose one of them"
+    if plan.dog_leg is not None and plan.solver is not SolverName.DOGLEG:
+        yield ("dog-leg",), f"[dog-leg] has no meaning for solver = '{plan.solver.value}'; write solver = 'dog-leg'"
     if plan.share == 0.0 and plan.splits != tuple(SplitKind):
         yield ("share",), "share = 0 holds nothing out, so that `splits` has no meaning; leave one of them out"

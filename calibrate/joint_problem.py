@@ -23,6 +23,11 @@ class Block(LeastSquares, Protocol):
         """Observation rows: poses, pairs or known lengths; residuals stand row by row."""
         ...
 
+    @property
+    def log_det_noise(self) -> float:
+        """Logarithm of the determinant of the covariance of all its residual values, in the units of the readings."""
+        ...
+
     def select(self, rows: Indices) -> Self:
         """The same block over some of its rows."""
         ...

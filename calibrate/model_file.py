@@ -142,6 +142,17 @@ class BootstrapRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     failed: Count
 
 
+class FitRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How the fit was made and what ended it."""
+
+    method: Label  # as in a fit plan: "levenberg-marquardt", "dog-leg"
+    loss: Label
+    iterations: Count
+    ended_by: Label  # name of the rule
+    says: Sentence
+    minus_2_log_likelihood: Statistic | None  # of the readings, normal law, noise found
+
+
 class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Content of model.json; the module's text explains each field."""
 
@@ -176,6 +187,7 @@ class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     free_space: FreeSpaceRecord | None = None
     bootstrap: BootstrapRecord | None = None
     plan: FileText | None = None
+    fit: FitRecord | None = None  # absent in models of earlier versions
     readings_sha256: Label | None = None  # which readings it was made of (acquisition/recording/fingerprint.py)
     effects: Many[Effect] = ()
     needs: Many[Name] = ()

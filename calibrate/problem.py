@@ -53,6 +53,15 @@ class Problem:
         """(pose,) residual values of each: they are of one observation, for a robust loss."""
         return np.full(self.rows, self.observed.shape[1], dtype=np.intp)
 
+    @property
+    def log_det_noise(self) -> float:
+        """Logarithm of the determinant of the covariance of all rows, as whitened; inf without weights."""
+        whitened = -2.0 * float(np.sum(np.linalg.slogdet(self.whitener)[1]))
+        if self.correlation is None or self.rows < 2:
+            return whitened
+        factor = cholesky_banded(np.stack([np.ones(self.rows), self.correlation]), lower=True)
+        return whitened + 2.0 * float(np.sum(np.log(factor[0])))
+
     def residual(self, theta: Floats) -> Floats:
         rows = np.einsum("nij,nj->ni", self.whitener, self.misfit(theta)).ravel()
         return rows if self.correlation is None else decorrelated(rows, self.correlation)

@@ -15,11 +15,12 @@ from calibrate.identifiability import Identifiability
 from calibrate.identification.evidence import Asked, evidence_of, rows_used
 from calibrate.identification.held_out import lengths
 from calibrate.identification.pull import TOLD, pull_along
-from calibrate.identification.result import Identification, InstrumentFound, Noise
+from calibrate.identification.result import FitEnd, Identification, InstrumentFound, Noise
 from calibrate.identification.rounds import Fitted
 from calibrate.identification.session import NEGLIGIBLE_RAD, about_of
 from calibrate.parameters import Parameter, hold, plausible_sizes, start_values, without_assumed
 from calibrate.uncertainty.chi_square import RepeatNoise, against_repeats, against_stated
+from calibrate.uncertainty.likelihood import minus_2_log_likelihood
 from calibrate.unseen_along import analyse_along
 from calibrate.weighting import JOINT
 from calibrate.zeros.estimates import estimate_of, untold
@@ -59,7 +60,13 @@ def result_of(
         fit.covariance,
         about_of(fitted.weighting),
         len(rows_used(fitted)),
-        fitted.steps,
+        FitEnd(
+            fitted.by.method,
+            fitted.by.loss.kind,
+            fitted.steps,
+            fitted.fit.stop,
+            minus_2_log_likelihood(fitted.problem, fitted.fit.theta),
+        ),
         f"calibeam {version('calibeam')}",
     )
 
@@ -69,13 +76,13 @@ def fit_places_only(fitted: Fitted) -> Fit:
     arm = {p.name for m in fitted.weighting.measured for p in m.problem.chain.model.parameters}
     parameters = hold(fitted.fit.parameters, arm)
     start = np.where([p.name in arm for p in parameters], start_values(parameters), fitted.fit.theta)
-    return fitted.by.fit(fitted.problem.with_parameters(parameters), start, FAR_START)
+    return fitted.by.with_usual_rules.fit(fitted.problem.with_parameters(parameters), start, FAR_START)
 
 
 def _as_stated(fitted: Fitted) -> Fit:
     """The fit under the noise as believed, for its chi-square."""
     problem = fitted.weighting.problem(fitted.fit.theta).with_parameters(fitted.fit.parameters)
-    return fitted.by.fit(problem, fitted.fit.theta)
+    return fitted.by.with_usual_rules.fit(problem, fitted.fit.theta)
 
 
 def _estimates(fitted: Fitted, seen: Identifiability) -> tuple[Estimate, ...]:

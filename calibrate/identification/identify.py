@@ -59,7 +59,7 @@ def identify(
     """
     rig, samples = rig_as_planned(rig, plan), samples_as_planned(samples, plan)
     weighting, start, blunders = without_blunders(rig, samples, plan)
-    by = Estimator(plan.method, plan.robust_loss)
+    by = Estimator(plan.method, plan.robust_loss, plan.rules)
     fitted = settled_fit(weighting, start, plan.of_redundant, by)
     share = plan.share if held_out_share is None else held_out_share
     rounds = plan.bootstrap if bootstrap_rounds is None else bootstrap_rounds

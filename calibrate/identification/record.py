@@ -3,11 +3,13 @@
 import numpy as np
 
 from calibrate.blunders.finding import Blunder
+from calibrate.fit_plan import LOSSES, METHODS
 from calibrate.identification.evidence_record import evidence_fields, parameter_records
-from calibrate.identification.result import Identification
+from calibrate.identification.result import FitEnd, Identification
 from calibrate.model_file import (
     SCHEMA,
     Fields,
+    FitRecord,
     LeftOut,
     ModelFile,
     RigIdentity,
@@ -47,7 +49,21 @@ def record_of(result: Identification, rig: RigIdentity, arm_model: str, plan: st
         blunders=tuple(left_out(b) for b in result.blunders),
         alarms=result.alarms,
         plan=plan,
+        fit=fit_record(result.end),
         **evidence_fields(result.evidence),
+    )
+
+
+def fit_record(end: FitEnd) -> FitRecord:
+    """Method and loss in the words of a fit plan."""
+    value = end.minus_2_log_likelihood
+    return FitRecord(
+        next(name.value for name, method in METHODS.items() if method is end.method),
+        next(name.value for name, loss in LOSSES.items() if loss.kind is end.loss),
+        end.iterations,
+        end.stop.name,
+        end.stop.value,
+        value if np.isfinite(value) else None,
     )
 
 

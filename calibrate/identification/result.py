@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.blunders.finding import Blunder
-from calibrate.fit import Status
+from calibrate.fit import LossKind, Method, Status, Stop
 from calibrate.identifiability import Identifiability
 from calibrate.identification.scale import scale_alarms
 from calibrate.observability import Observability
@@ -84,6 +84,17 @@ class Evidence:
 
 
 @dataclass(frozen=True)
+class FitEnd:
+    """How the fit was made and what ended it."""
+
+    method: Method
+    loss: LossKind
+    iterations: int  # of all rounds of fit and weights
+    stop: Stop  # the rule that ended the last round
+    minus_2_log_likelihood: float  # of the readings under the noise found; nan where it is not finite
+
+
+@dataclass(frozen=True)
 class Identification:
     """Outcome of the identification of an arm by any instruments."""
 
@@ -101,7 +112,7 @@ class Identification:
     covariance: Floats  # (param, param) posterior; rows of held parameters are zero
     about: dict[str, tuple[float, ...]]  # frames and points found in closed form, that `theta` corrects
     n_samples: int  # rows that took part
-    steps: int
+    end: FitEnd
     software: str
 
     @property

@@ -37,7 +37,7 @@ class Fitted:
     fit: Fit
     seen: Identifiability
     factors: VarianceFactors  # noise found over believed, of weighting.sources
-    steps: int
+    steps: int  # of all rounds
     by: Estimator = LEAST_SQUARES
 
 

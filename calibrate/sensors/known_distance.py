@@ -37,6 +37,11 @@ class KnownDistances:
     def rows(self) -> int:
         return len(self.length_m)
 
+    @property
+    def log_det_noise(self) -> float:
+        """Logarithm of the determinant of the covariance of all lengths."""
+        return 2.0 * float(np.sum(np.log(self.sigma_m)))
+
     def residual(self, theta: Floats) -> Floats:
         return (np.linalg.norm(self._span(theta), axis=1) - self.length_m) / self.sigma_m
 

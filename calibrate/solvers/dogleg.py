@@ -20,13 +20,14 @@ Bools = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class DogLegRules:
-    """The numbers of the patent's stopping rules, in units of noise and of plausible size."""
+    """The numbers of the patent's algorithm, in units of noise and of plausible size; a fit plan may set each."""
 
     e1: float = 1e-10  # of the largest element of the gradient
     e2: float = 1e-8  # of step and radius, relative to the parameters; below, gains are lost in rounding of the sum
-    e3: float = 1e-13  # of the largest residual: a ten-trillionth of the noise
+    e3: float = 1e-13  # of the 2-norm of the residual: a ten-trillionth of the noise of one reading
     kmax: int = 100
     radius: float = 1.0  # initial; 1 = the deviation to be expected
+    sigma: float = 0.0  # a step is taken where its gain ratio is above this: 0 in the source, below 1/4 in theory
 
 
 def dogleg(rows: Rows, theta: Floats, rules: DogLegRules) -> Ended:
@@ -51,7 +52,7 @@ def dogleg(rows: Rows, theta: Floats, rules: DogLegRules) -> Ended:
         trial = rows.moved(theta, step)
         new = rows.residual(trial)
         gain = gain_ratio(residual, new, local.slope @ rows.taken(theta, trial))
-        if gain > 0.0:
+        if gain > rules.sigma:
             theta, residual = trial, new
             local = _Local.at(rows, theta, residual)
         radius = next_radius(radius, gain, length)
@@ -112,6 +113,6 @@ def _stop_before(rules: DogLegRules, gradient: Floats, residual: Floats, radius:
     """The rule that holds before a step is tried, None to go on."""
     if np.max(np.abs(gradient), initial=0.0) <= rules.e1:
         return Stop.GRADIENT
-    if np.max(np.abs(residual), initial=0.0) <= rules.e3:
+    if np.linalg.norm(residual) <= rules.e3:
         return Stop.RESIDUAL
     return Stop.RADIUS if radius <= small else None

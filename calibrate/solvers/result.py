@@ -28,7 +28,7 @@ class Stop(Enum):
     GAIN = "a full step promises less than the tolerance"
     DAMPING = "damping reached its limit: the residual is at its rounding floor"
     GRADIENT = "largest element of the gradient is at most e1"
-    RESIDUAL = "largest residual is at most e3"
+    RESIDUAL = "2-norm of the residual is at most e3"
     RADIUS = "trust radius shrank to e2 of the parameters"
     STEP = "step is no longer than e2 of the parameters"
     STEPS = "all allowed steps were made"

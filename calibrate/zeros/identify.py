@@ -233,5 +233,6 @@ def _result(
         len(data),
         spare_readings(problem, fit.theta, fit.covariance),
         weighted.steps,
+        fit.stop,
         f"calibeam {version('calibeam')}",
     )

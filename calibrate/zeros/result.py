@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.fit import Status
+from calibrate.fit import Status, Stop
 from calibrate.identifiability import Identifiability
 from calibrate.parameters import Parameter
 
@@ -99,4 +99,5 @@ class ZeroResult:
     n_poses: int
     spare: float  # readings that are left over to check the fit (uncertainty/redundancy.py); nan: not known
     steps: int
+    stop: Stop  # the rule that ended the last round
     software: str  # "calibeam 0.1.0"

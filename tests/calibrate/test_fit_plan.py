@@ -6,7 +6,7 @@ import pytest
 
 from acquisition.recording.rig_schema import ArmModel
 from calibrate.errors import DataError
-from calibrate.fit import Loss, Method
+from calibrate.fit import DogLegRules, Loss, Method
 from calibrate.fit_plan import DEFAULT, InstrumentName, parse_plan, read_plan
 from calibrate.redundant import Redundant
 from calibrate.uncertainty.splits import SplitKind
@@ -21,6 +21,20 @@ def test_the_example_of_the_documentation_is_a_plan(request):
     assert (plan.method, plan.robust_loss, plan.of_redundant) == (Method.DOGLEG, Loss.HUBER, Redundant.REMOVED)
     assert plan.splits == (SplitKind.RANDOM, SplitKind.LAST)
     assert plan.priors == {"link*.x": 5e-4, "link2.*": 1e-3}
+
+
+def test_the_documented_numbers_of_dog_leg_are_the_usual_ones(request):
+    text = (request.config.rootpath / "docs" / "formats.md").read_text()
+    (example,) = re.findall(r"```toml\n(.*?)```", text[text.index("## The fit plan") :], re.DOTALL)
+    assert parse_plan(example, "fit.toml").rules == DogLegRules()
+
+
+def test_every_number_of_dog_leg_reaches_the_solver():
+    text = 'schema = 1\nsolver = "dog-leg"\n[dog-leg]\n'
+    numbers = "e1 = 1e-3\ne2 = 2e-3\ne3 = 3e-3\nkmax = 7\ndelta0 = 0.5\nsigma = 0.1\n"
+    assert parse_plan(text + numbers, "fit.toml").rules == DogLegRules(1e-3, 2e-3, 3e-3, 7, 0.5, 0.1)
+    assert parse_plan(text, "fit.toml").rules == DogLegRules()
+    assert DEFAULT.rules is None
 
 
 def test_a_plan_that_says_nothing_is_the_default():
@@ -38,6 +52,16 @@ def test_a_plan_that_says_nothing_is_the_default():
         ('[priors]\n"link1.length" = -1.0', r"line 3: link1.length = -1.0 in \[priors\]: expected float >= 1e-20"),
         ('instruments = ["position", "distance"]', "line 2: 'position' and 'distance' are the same readings"),
         ('share = 0\nsplits = ["last"]', "line 2: share = 0 holds nothing out"),
+        ('solver = "dog-leg"\n[dog-leg]\ne3 = -1.0', r"line 4: e3 = -1.0 in \[dog-leg\]: expected float >= 0.0"),
+        ('solver = "dog-leg"\n[dog-leg]\nkmax = 0', r"line 4: kmax = 0 in \[dog-leg\]: expected int >= 1"),
+        ('solver = "dog-leg"\n[dog-leg]\ndelta0 = 0', r"line 4: delta0 = 0 in \[dog-leg\]: expected float >= 1e-12"),
+        ('solver = "dog-leg"\n[dog-leg]\nsigma = 0.5', r"line 4: sigma = 0.5 in \[dog-leg\]: expected float <= 0.25"),
+        (
+            'solver = "dog-leg"\n[dog-leg]\ne2 = "small"',
+            r"line 4: e2 = 'small' in \[dog-leg\]: expected float, got str",
+        ),
+        ('solver = "dog-leg"\n[dog-leg]\nradius = 1', r"line 4: unknown key 'radius' in \[dog-leg\]"),
+        ("[dog-leg]\nkmax = 5", r"line 2: \[dog-leg\] has no meaning for solver = 'levenberg-marquardt'"),
         ("free = [", "not TOML"),
     ],
 )

@@ -61,6 +61,21 @@ def test_a_vanishing_residual_stops_by_e3():
     assert (fit.stop, fit.status) == (Stop.RESIDUAL, Status.CONVERGED)
 
 
+def test_e3_is_a_bound_of_the_2_norm_as_in_the_source():
+    four = line([[1.0]] * 4, [2.0] * 4, start=2.0 + 1e-6)  # each residual 1e-6, their 2-norm 2e-6
+    longer, shorter = stops(four, e1=0.0, e3=2.1e-6), stops(four, e1=0.0, e3=1.5e-6)
+    assert (longer.stop, longer.steps) == (Stop.RESIDUAL, 0)
+    assert shorter.steps == 1  # the largest of the four is below the limit, their norm is not
+
+
+def test_sigma_refuses_a_step_that_gains_too_little():
+    kink = Kink((Parameter("p0", "1", 1.0, start=0.01),))
+    taken = stops(kink, kmax=1, radius=0.015, sigma=0.0)  # across the kink: 0.4 of what the slope promises
+    refused = stops(kink, kmax=1, radius=0.015, sigma=0.5)
+    assert taken.theta[0] == pytest.approx(-0.005)
+    assert refused.theta[0] == 0.01
+
+
 def test_a_small_step_stops_by_e2():
     fit = stops(line([[1.0], [1.0]], [1.0, 1.0 + 1e-9], start=1.0), e1=0.0, e2=1e-6, e3=0.0)
     assert (fit.stop, fit.steps) == (Stop.STEP, 0)
