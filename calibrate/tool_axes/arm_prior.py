@@ -110,6 +110,11 @@ class PriorRows:
     def rows(self) -> int:
         return len(self.parameters)
 
+    @property
+    def log_det_noise(self) -> float:
+        """Logarithm of the determinant of the prior's covariance."""
+        return -float(np.linalg.slogdet(self.whitener @ self.whitener.T)[1])
+
     def residual(self, theta: Floats) -> Floats:
         return self.whitener @ (theta - self.mean)
 
