@@ -16,6 +16,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 TWO_AT_A_TIME = ("-n", "2", "--dist", "loadfile")  # what the tests of a file share is made once
+ENDURING, MUTATIONS = ("-m", "endure", "--timeout", "3600"), "tests/calibeam/mutations"  # half of the time of all
 ON_WIRES = ("-m", "wired and not endure")
 CALCULATING = ("-m", "not endure and not wired", *TWO_AT_A_TIME)
 
@@ -65,7 +66,8 @@ def endure() -> tuple[Phase, ...]:
     kernels = [("Haswell", "avx2", narrow), ("Zen", "avx2", {}), ("SkylakeX", "avx512f", {})]
     able = _processor_flags()
     return (
-        Phase("marked endure", ("-m", "endure", "--timeout", "3600")),
+        Phase("mutated files", (*ENDURING, "-n", "2", "--dist", "load", MUTATIONS)),
+        Phase("marked endure", (*ENDURING, f"--ignore={MUTATIONS}")),
         Phase("calculating, 2 threads", CALCULATING, {"OPENBLAS_NUM_THREADS": "2"}),
         *(
             Phase(f"calculating, {name}", CALCULATING, {"OPENBLAS_CORETYPE": name, **more})
