@@ -67,6 +67,11 @@ class JointProblem:
         one = [getattr(block, "row_widths", np.ones(block.rows, dtype=np.intp)) for block in self.blocks]
         return np.concatenate(one)
 
+    @property
+    def log_det_noise(self) -> float:
+        """Logarithm of the determinant of the covariance of all residual values; blocks are independent."""
+        return sum(block.log_det_noise for block in self.blocks)
+
     def residual(self, theta: Floats) -> Floats:
         parts = [block.residual(theta[columns]) for block, columns in zip(self.blocks, self._columns, strict=True)]
         return np.concatenate(parts)

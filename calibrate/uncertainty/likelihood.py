@@ -7,14 +7,13 @@ priors are not part of it. Values compare between fits of the same readings.
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.joint_problem import JointProblem
+from calibrate.joint_problem import Block
 
 Floats = NDArray[np.float64]
 
 
-def minus_2_log_likelihood(problem: JointProblem, theta: Floats) -> float:
+def minus_2_log_likelihood(problem: Block, theta: Floats) -> float:
     """At theta (param,); nan where it is not finite."""
     residual = problem.residual(theta)
-    scale = sum(block.log_det_noise for block in problem.blocks)
-    value = float(residual @ residual) + scale + len(residual) * float(np.log(2.0 * np.pi))
+    value = float(residual @ residual) + problem.log_det_noise + len(residual) * float(np.log(2.0 * np.pi))
     return value if np.isfinite(value) else float("nan")
