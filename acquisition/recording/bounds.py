@@ -9,6 +9,10 @@ from typing import Annotated, TypeVar
 from msgspec import Meta
 
 LENGTH_M = 1e3  # 1 km; the longest laser trackers measure 160 m
+# Of a rig file, closer than LENGTH_M: its usual slip are millimetres, which make a length a thousand times too long
+ROOM_M = 200.0  # what stands about an arm: the longest laser trackers measure 160 m
+ARM_M = 20.0  # a link, or what a flange or fixture carries: the longest arm (Canadarm2) measures 17.6 m stretched out
+PART_M = 1.0  # a detector's face, a probe's ball, a marker: the largest are some 0.3 m
 ANGLE_RAD = 1e5  # 16,000 turns: an encoder on the motor, over the whole travel of an axis with a gear
 TIME_S = 9e9  # s since 1970 until 2255, or since the start; nanoseconds of it fit into 64 bits
 SETTING_S = 1e5  # a day: of a setting such as a latency
@@ -52,12 +56,19 @@ _BY_LENGTH = sorted(BY_UNIT, key=len, reverse=True)
 Metres = Annotated[float, Meta(ge=-LENGTH_M, le=LENGTH_M)]
 MetresOrNone = Annotated[float, Meta(ge=0.0, le=LENGTH_M)]  # 0: there is none of it
 Size = Annotated[float, Meta(ge=SMALLEST_M, le=LENGTH_M)]  # m
+RoomSize = Annotated[float, Meta(ge=SMALLEST_M, le=ROOM_M)]
+PartSize = Annotated[float, Meta(ge=SMALLEST_M, le=PART_M)]
+PartSizeOrNone = Annotated[float, Meta(ge=0.0, le=PART_M)]  # 0: a point
+RoomMetres = Annotated[float, Meta(ge=-ROOM_M, le=ROOM_M)]
+ArmMetres = Annotated[float, Meta(ge=-ARM_M, le=ARM_M)]
 Radians = Annotated[float, Meta(ge=-ANGLE_RAD, le=ANGLE_RAD)]
 RadiansAbove = Annotated[float, Meta(ge=SMALLEST_RATE, le=ANGLE_RAD)]
 RadiansOrNone = Annotated[float, Meta(ge=0.0, le=ANGLE_RAD)]
 SigmaMetres = Annotated[float, Meta(ge=SMALLEST_SIGMA, le=LENGTH_M)]
 SigmaRadians = Annotated[float, Meta(ge=SMALLEST_SIGMA, le=ANGLE_RAD)]
 Vector = tuple[Metres, Metres, Metres]
+RoomVector = tuple[RoomMetres, RoomMetres, RoomMetres]
+ArmVector = tuple[ArmMetres, ArmMetres, ArmMetres]
 Rotation = tuple[Radians, Radians, Radians]  # rotation vector
 Direction = tuple[Metres, Metres, Metres]  # of any length but 0; made a unit vector where it is used
 ZERO: Vector = (0.0, 0.0, 0.0)

@@ -22,6 +22,8 @@ _PLACE = re.compile(r"^(?P<says>.*?)(?: - at (?P<key>`key` in )?`\$(?P<path>[^`]
 _STEP = re.compile(r"\.([A-Za-z0-9_-]+)|\[([0-9]+)\]|\[(\.\.\.)\]")
 _UNKNOWN = re.compile(r"unknown field `(.*)`", re.DOTALL)
 _MISSING = re.compile(r"missing required field `(.*)`")
+_BOUND = re.compile(r"[<>]= ?(-?[0-9.e+-]+)")
+MILLIMETRES = 1000  # in a metre
 LONGEST_KEY = 100  # characters that are compared with known words
 
 
@@ -149,7 +151,7 @@ def _wrong_value(path: KeyPath, says: str, value: Any, found: Any) -> str:
     key = names[-1] if names else "the file"
     written = f"{shown(key)} = {spelled(value)}" if not isinstance(value, Mapping) else f"'{shown(key)}'"
     where = section(path[: path.index(key)] if key in path else ())
-    return f"{written} in {where}: {plain(says)}{_remedy(key, found, value)}"
+    return f"{written} in {where}: {plain(says)}{_remedy(key, found, value, says)}"
 
 
 def spelled(value: object) -> str:
@@ -162,7 +164,14 @@ def plain(says: str) -> str:
     return says.replace("`", "").replace("Expected", "expected").replace("Invalid enum value", "unknown value")
 
 
-def _remedy(key: str, found: Any, value: Any) -> str:
+def in_metres(value: float, most_m: float) -> str:
+    """The remedy for a length beyond a bound: millimetres, where they would make sense of it."""
+    if most_m < abs(value) <= MILLIMETRES * most_m:
+        return f"; it looks like millimetres: divide by {MILLIMETRES} ({value / MILLIMETRES:g}), the file is in m"
+    return "; write it in m"
+
+
+def _remedy(key: str, found: Any, value: Any, says: str) -> str:
     if isinstance(found, type) and issubclass(found, enum.Enum):
         choices = [str(member.value) for member in found]
         near = difflib.get_close_matches(str(value)[:LONGEST_KEY], choices, n=1)
@@ -171,4 +180,7 @@ def _remedy(key: str, found: Any, value: Any) -> str:
     if key == "schema":
         return "; this version reads schema 1"
     suffix = suffix_of(key)
+    bound = _BOUND.search(says)
+    if suffix == "m" and bound and isinstance(value, float | int):
+        return in_metres(float(value), abs(float(bound[1])))
     return f"; write it in {spelt(suffix)}" if suffix else "; correct it"

@@ -6,13 +6,23 @@ Every rule yields faults as (key path, what is wrong and what to do); the reader
 import math
 from collections.abc import Iterator
 
+from acquisition.recording.bounds import ARM_M
 from acquisition.recording.rig_artefacts import artefact_faults
+from acquisition.recording.rig_faults import in_metres, section
 from acquisition.recording.rig_instruments import instrument_faults
 from acquisition.recording.rig_lines import KeyPath
 from acquisition.recording.rig_robot import robot_faults
-from acquisition.recording.rig_schema import ArmModel, Joint, Rig
+from acquisition.recording.rig_schema import ArmModel, Joint, Pose, Rig
 
 Fault = tuple[KeyPath, str]
+
+# Frames of what an arm or a fixture carries; those of what stands in the room may be farther away.
+_CARRIED: tuple[KeyPath, ...] = (
+    ("arm", "flange"),
+    ("fixture", "psd2_in_psd1"),
+    ("camera", "in_flange"),
+    ("camera", "board", "in_psd1"),
+)
 
 _DH_KEYS = ("a_m", "alpha_rad", "d_m", "theta_offset_rad")
 _POE_KEYS = ("origin_m", "rotation_rad")
@@ -22,6 +32,7 @@ def faults(rig: Rig) -> Iterator[Fault]:
     """All that contradicts itself in a rig whose types are right, in the order of the file's sections."""
     for index, joint in enumerate(rig.arm.joints):
         yield from _joint_faults(("arm", "joint", index), joint, rig.arm.model)
+    yield from _carried_faults(rig)
     yield from _laser_faults(rig)
     yield from _placement_faults(rig)
     yield from artefact_faults(rig)
@@ -47,6 +58,18 @@ def _joint_faults(path: KeyPath, joint: Joint, model: ArmModel) -> Iterator[Faul
             (*path, "lower_rad"),
             f"lower_rad = {joint.lower_rad!r} is not below upper_rad = {joint.upper_rad!r}; exchange or correct them",
         )
+
+
+def _carried_faults(rig: Rig) -> Iterator[Fault]:
+    """Origins too far away to be carried."""
+    for path in _CARRIED:
+        frame: object = rig
+        for key in path:
+            frame = getattr(frame, str(key), None)
+        for index, value in enumerate(frame.origin_m if isinstance(frame, Pose) else ()):
+            if abs(value) > ARM_M:
+                says = f"origin_m = {value!r} in {section(path)}: expected at most {ARM_M:g} m"
+                yield (*path, "origin_m", index), f"{says}{in_metres(value, ARM_M)}"
 
 
 def _motion_faults(rig: Rig) -> Iterator[Fault]:
@@ -114,10 +137,10 @@ def _twice(section: KeyPath, ids: tuple[int, ...]) -> Iterator[Fault]:
 def _tolerance_faults(rig: Rig) -> Iterator[Fault]:
     if (tolerance := rig.tolerance) is None:
         return
-    for what, section in (("psd2", "fixture"), ("device", "device")):
+    for what, owner in (("psd2", "fixture"), ("device", "device")):
         sizes = {key: getattr(tolerance, key) for key in (f"{what}_m", f"{what}_rad")}
         missing = [key for key, value in sizes.items() if value is None]
         if len(missing) == 1:
             yield ("tolerance",), f"[tolerance] says only half of how well {what} is known: add '{missing[0]}'"
-        elif not missing and getattr(rig, section) is None:
-            yield ("tolerance", f"{what}_m"), f"{what}_m is there, but there is no [{section}] that it is the sigma of"
+        elif not missing and getattr(rig, owner) is None:
+            yield ("tolerance", f"{what}_m"), f"{what}_m is there, but there is no [{owner}] that it is the sigma of"

@@ -14,6 +14,8 @@ from acquisition.recording.bounds import (
     JOINTS,
     ZERO,
     Acceleration,
+    ArmMetres,
+    ArmVector,
     Count,
     Direction,
     Few,
@@ -24,22 +26,24 @@ from acquisition.recording.bounds import (
     Identity,
     Kilograms,
     Markers,
-    Metres,
     MetresOrNone,
     Name,
     Number,
+    PartSize,
+    PartSizeOrNone,
     PerJoint,
     Pixels,
     Positive,
     Radians,
     RadiansAbove,
+    RoomSize,
+    RoomVector,
     Rotation,
     Seconds,
     SecondsAbove,
     Share,
     SigmaMetres,
     SigmaRadians,
-    Size,
     Speed,
     Vector,
 )
@@ -57,7 +61,7 @@ class ArmModel(enum.Enum):
 class Pose(Struct, frozen=True, forbid_unknown_fields=True):
     """A frame in another one: its origin (m) and its rotation vector (rad)."""
 
-    origin_m: Vector = ZERO
+    origin_m: RoomVector = ZERO
     rotation_rad: Rotation = ZERO
 
 
@@ -66,16 +70,16 @@ class Joint(Struct, frozen=True, forbid_unknown_fields=True):
 
     lower_rad: Radians
     upper_rad: Radians
-    a_m: Metres | None = None
+    a_m: ArmMetres | None = None
     alpha_rad: Radians | None = None
-    d_m: Metres | None = None
+    d_m: ArmMetres | None = None
     theta_offset_rad: Radians | None = None  # None in a D-H arm counts as 0: parse_rig fills it in
-    origin_m: Vector | None = None
+    origin_m: ArmVector | None = None
     rotation_rad: Rotation | None = None
     gear_ratio: GearRatio | None = None
     encoder_counts: Identity | None = None
     mass_kg: Kilograms | None = None
-    com_m: Vector | None = None
+    com_m: ArmVector | None = None
 
 
 class Arm(Struct, frozen=True, forbid_unknown_fields=True):
@@ -92,17 +96,17 @@ class Tool(Struct, frozen=True, forbid_unknown_fields=True):
     """What hangs at the flange, in the flange frame. `laser_direction` has length 1 after reading."""
 
     mass_kg: Kilograms | None = None
-    com_m: Vector | None = None
-    point_m: Vector | None = None
-    laser_origin_m: Vector | None = None
+    com_m: ArmVector | None = None
+    point_m: ArmVector | None = None
+    laser_origin_m: ArmVector | None = None
     laser_direction: Direction | None = None
-    probe_diameter_m: MetresOrNone | None = None  # of the ball whose centre is `point_m`
+    probe_diameter_m: PartSizeOrNone | None = None  # of the ball whose centre is `point_m`
 
 
 class Fixture(Struct, frozen=True, forbid_unknown_fields=True):
     """Two square detectors that see each other."""
 
-    half_size_m: Size
+    half_size_m: PartSize
     psd2_in_psd1: Pose
 
 
@@ -118,7 +122,7 @@ class KnownDistance(Struct, frozen=True, forbid_unknown_fields=True):
 
     from_placement: Identity = field(name="from")
     to_placement: Identity = field(name="to")
-    length_m: Size
+    length_m: RoomSize
     sigma_m: SigmaMetres
 
 
@@ -126,7 +130,7 @@ class Bar(Struct, frozen=True, forbid_unknown_fields=True):
     """A calibrated length artefact."""
 
     id: Identity
-    length_m: Size
+    length_m: RoomSize
 
 
 class BarPosition(Struct, frozen=True, forbid_unknown_fields=True):
@@ -134,7 +138,7 @@ class BarPosition(Struct, frozen=True, forbid_unknown_fields=True):
 
     id: Identity
     bar: Identity
-    middle_m: Vector
+    middle_m: RoomVector
     direction: Direction
 
 
@@ -142,15 +146,15 @@ class Seat(Struct, frozen=True, forbid_unknown_fields=True):
     """A cone for the probe's ball, about where it stands."""
 
     id: Identity
-    origin_m: Vector
+    origin_m: RoomVector
 
 
 class Sphere(Struct, frozen=True, forbid_unknown_fields=True):
     """A calibrated sphere, about where its centre is."""
 
     id: Identity
-    origin_m: Vector
-    diameter_m: Size
+    origin_m: RoomVector
+    diameter_m: PartSize
 
 
 class PermissibleErrors(Struct, frozen=True, forbid_unknown_fields=True):
@@ -195,8 +199,8 @@ class CameraBoard(Struct, frozen=True, forbid_unknown_fields=True):
     Its frame: origin in the middle of the markers, x right and y up as printed, z towards who reads it.
     """
 
-    side_m: Size  # of the black square of one marker
-    gap_m: Size  # of white between two
+    side_m: PartSize  # of the black square of one marker
+    gap_m: PartSize  # of white between two
     in_psd1: Pose
     columns: Markers = 2
     rows: Markers = 2

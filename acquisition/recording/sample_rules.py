@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.bounds import most_of
+from acquisition.recording.bounds import LENGTH_M, most_of
 from acquisition.recording.columns import (
     COMPLETE_PER_JOINT,
     ORIENTATION,
@@ -115,9 +115,11 @@ def _array(name: str, cells: Sequence[Cell]) -> NDArray[Any]:
             infinite[0], f"{array[infinite[0]]} is not a finite number; leave the cell empty if it is missing"
         )
     if beyond := np.flatnonzero(np.abs(array) > most_of(name)).tolist():
+        metres = most_of(name) == LENGTH_M
+        remedy = "write metres (millimetres divided by 1000)" if metres else "correct it"
         raise _BadCellError(
             beyond[0],
-            f"{array[beyond[0]]:g} is beyond {most_of(name):g}, the most that such a column holds; correct it, "
+            f"{array[beyond[0]]:g} is beyond {most_of(name):g}, the most that such a column holds; {remedy}, "
             "or leave the cell empty if it is missing",
         )
     if kind_of(name) is Kind.INTEGER:

@@ -227,15 +227,15 @@ def _signs_first(search: _Search, found: _Account, tried: list[_Account]) -> tup
 def _named(best: _Account, tried: list[_Account], before: _Account) -> Blunder:
     """The winner; others that explain the file as well are named in the same message."""
     after_mm, before_mm = 1e3 * best.strain.typical_m, 1e3 * before.strain.typical_m
-    figures = f"(arm and readings agree to {after_mm:.2g} mm then, to {before_mm:.3g} mm as written)"
+    figures = f"(misfit {after_mm:.2g} mm, as written {before_mm:.3g} mm)"
     if _ratio(before_mm, after_mm) < GAIN:
         figures = "(only then is what the rig draws where it is drawn)"
     figures += "; no set of joint signs explains it" if best.reflected else ""
     first = best.said[0]
     besides = "".join(f"; and {other.column}: {other.what}" for other in best.said[1:])
-    what = f"{first.what}{besides} {figures}{_others(best, tried)}"
+    what = f"{first.what}{besides} {figures}{_others(best, tried)}{_mirror_image(best, tried)}"
     remedy = "; and ".join(one.remedy for one in best.said)
-    return Blunder(first.kind, (), first.column, what, f"{remedy}{_mirror_image(best, tried)}")
+    return Blunder(first.kind, (), first.column, what, remedy)
 
 
 def _others(best: _Account, tried: list[_Account]) -> str:
@@ -256,11 +256,11 @@ def _mirror_image(best: _Account, tried: list[_Account]) -> str:
     twin = next((a for a in tried if a.reflected and a.besides == best.besides and _fits_as_well(a, best)), None)
     if twin is None:
         return ""
-    column = next(one.column for one in twin.said if one.kind is BlunderKind.MIRRORED_AXIS)
+    column = next(one.column for one in twin.said if one.kind is BlunderKind.MIRRORED_AXIS).removeprefix("columns ")
     moved_mm, instead_mm = 1e3 * best.strain.moved_m, 1e3 * twin.strain.moved_m
-    target = f" (that moves the target by {instead_mm:.2g} mm, the signs by {moved_mm:.2g} mm)"
+    target = f" (target {instead_mm:.2g} mm off its drawing then, {moved_mm:.2g} mm by the signs)"
     told = "" if _as_good(best, twin) else target
-    return f"; second, if the device's file is known to be wrong: negate one of {column}, or exchange two{told}"
+    return f"; less likely: one of {column} is negated in the device's file, or two exchanged{told}"
 
 
 def _in_words(account: _Account) -> str:

@@ -41,7 +41,7 @@ class PositionWitness:
             BlunderKind.MIRRORED_AXIS,
             COLUMNS,
             "only the mirror image of the readings fits the arm (determinant -1), and no instrument is left-handed",
-            "change the sign of one of the three columns, or exchange two of them, as the device's export shows",
+            "change the sign of one of these columns, or exchange two, as the device's export shows",
             replace(self, mirrored=not self.mirrored),
         )
         yield Otherwise(

@@ -48,8 +48,8 @@ def _turned(joints: tuple[int, ...], n_joints: int) -> Hypothesis:
         BlunderKind.JOINT_SIGN,
         f"{'column' if one else 'columns'} {columns}",
         f"{in_words(joints)} {'turns' if one else 'turn'} against the rig's sense",
-        f"change the sign of {'the column' if one else 'these columns'}, or turn "
-        f"{'this axis' if one else 'these axes'} round in the rig (docs/formats.md, Joint signs)",
+        f"change the sign of {'the column' if one else 'these columns'} or turn "
+        f"{'this axis' if one else 'these axes'} (docs/formats.md, Joint signs)",
         lambda q: q * sign,
         joints,
     )

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from acquisition.recording.bounds import ARM_M
 from acquisition.recording.columns import POSITION
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
@@ -74,7 +75,7 @@ def without_blunders(
     refuse_wrong_file(rig, samples)
     early = _with_left_alone(samples, (*impossible_rows(rig, samples), *_sessions_apart(rig, samples)))
     instruments = _instruments_without(rig, samples, early, plan)
-    _refuse_mirrored(instruments)
+    _refuse_positions(instruments)
     weighting, late = clean(instruments.weighting, instruments.start)
     every = _with_left_alone(samples, early + late)
     if len(every) > len(early) + len(late):
@@ -88,9 +89,16 @@ def refuse_wrong_file(rig: Rig, samples: Samples) -> None:
         raise DataError("; besides, ".join(blunder.says for blunder in blunders))
 
 
-def _refuse_mirrored(instruments: Instruments) -> None:
-    """DataError where positions, too few for `wrong_file`, fit only as their mirror image."""
-    if (found := instruments.alignment) is None or not found.mirrored:
+def _refuse_positions(instruments: Instruments) -> None:
+    """DataError where positions, too few for `wrong_file`, are in millimetres or fit only as their mirror image."""
+    if (found := instruments.alignment) is None:
+        return
+    if found.rms_m > ARM_M:
+        raise DataError(
+            f"all rows, columns {', '.join(POSITION)}: arm and positions are {found.rms_m:.3g} m apart wherever the "
+            "device stands: positions in millimetres; write metres (millimetres times 0.001)"
+        )
+    if not found.mirrored:
         return
     raise DataError(
         f"all rows, columns {', '.join(POSITION)}: only the mirror image of the positions fits the arm "

@@ -45,7 +45,7 @@ tremor_rad = 1e-5
             "gear_ratio = 1e308",
             "line 11: gear_ratio = 1e+308 in [[arm.joint]]: expected float <=",
         ),
-        ("d_m = 0.1", "d_m = 1e5", "line 8: d_m = 100000.0 in [[arm.joint]]: expected float <= 1000.0; write it in m"),
+        ("d_m = 0.1", "d_m = 1e5", "line 8: d_m = 100000.0 in [[arm.joint]]: expected float <= 20.0; write it in m"),
         ("tremor_rad = 1e-5", "tremor_rad = 1e200", "line 19: tremor_rad = 1e+200 in [emulation]: expected at most"),
         ("two-joint", "x" * 10**6, "line 2: name = 'xxxxx"),
         ("tremor_rad", "x" * 10**6, "line 19: unknown key 'xxxxx"),

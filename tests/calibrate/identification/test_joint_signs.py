@@ -69,7 +69,7 @@ def test_a_kuka_is_refused_by_its_joints_and_good_once_these_are_mended(planar_r
 
 def test_a_negated_column_of_the_device_is_refused_too(planar_rig):
     samples = session(planar_rig)
-    with pytest.raises(DataError, match="if the device's file is known to be wrong: negate one of columns x_m"):
+    with pytest.raises(DataError, match=r"joints 1, 4 and 6.*less likely: one of x_m, y_m, z_m is negated"):
         run(planar_rig, negated(samples, "x_m"))
     assert run(planar_rig, samples).instruments[0].rms_after < 2.0 * NOISE_M
 
@@ -79,6 +79,14 @@ def test_few_poses_do_not_pass_as_a_mirror_image(planar_rig, wrong):
     samples = session(planar_rig, 11, (1, 4, 6)) if wrong == "joints" else negated(session(planar_rig, 11), "x_m")
     with pytest.raises(DataError, match="only the mirror image of the positions fits"):
         run(planar_rig, samples)
+
+
+@pytest.mark.parametrize("poses", [6, 40])
+def test_millimetres_are_refused_however_few_the_poses(planar_rig, poses):
+    samples = session(planar_rig, poses)
+    millimetres = changed(samples, **{name: 1e3 * samples.column(name) for name in POSITION})
+    with pytest.raises(DataError, match=r"positions in millimetres.*write metres"):
+        run(planar_rig, millimetres)
 
 
 @pytest.mark.parametrize("joints", [(), (1, 4, 6), (2,)])
