@@ -83,7 +83,7 @@ def test_a_design_of_places_out_of_reach_gives_up_after_a_stated_number_of_tries
 
     monkeypatch.setattr(reachable, "all_solutions", none)
     far = tmp_path / "rig.toml"
-    far.write_text(ROBOT.read_text().replace("d_m = 0.1625", "d_m = 1000.0", 1))
+    far.write_text(ROBOT.read_text().replace("d_m = 0.1625", "d_m = 19.0", 1))
     places = len(load_rig(far).placements)
     assert run(["design", str(far), "--out", str(tmp_path / "plan.toml")]) == 1
     assert len(tried) == 2 * places * reachable.FUTILE  # each place, with either face first

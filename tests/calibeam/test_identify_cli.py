@@ -85,7 +85,13 @@ def test_a_session_folder_becomes_a_model_that_predicts_unseen_poses_by_itself(f
     write_samples(tmp_path / "new.csv", q, seen)
     assert run(["predict", str(model), str(tmp_path / "new.csv"), "--out", str(out)]) == 0
     predicted = rows(out)
-    assert list(predicted[0]) == ["t_s", "x_m", "y_m", "z_m", "r_x_m", "r_y_m", "r_z_m"]
+    assert list(predicted[0]) == [
+        "t_s",
+        *POSITION,
+        *(f"s_{c}" for c in POSITION),
+        *(f"r_{c}" for c in POSITION),
+        "outside",
+    ]
     found = np.array([[float(row[c]) for c in POSITION] for row in predicted])
     residual = np.array([[float(row[f"r_{c}"]) for c in POSITION] for row in predicted])
     assert np.sqrt(np.mean((found - seen) ** 2)) < 2e-5
@@ -98,7 +104,7 @@ def test_samples_without_observations_are_predicted_too(folder, tmp_path, capsys
     assert json.loads(capsys.readouterr().out) == json.loads(model.read_text())  # one line for scripts
     write_samples(tmp_path / "new.csv", np.zeros((4, 5)))
     assert run(["predict", str(model), str(tmp_path / "new.csv"), "--out", str(out)]) == 0
-    assert [list(row) for row in rows(out)] == [["t_s", "x_m", "y_m", "z_m"]] * 4
+    assert [list(row) for row in rows(out)] == [["t_s", *POSITION, *(f"s_{c}" for c in POSITION), "outside"]] * 4
 
 
 @pytest.mark.parametrize(("form", "suffix"), [("urdf", ".urdf"), ("dh-csv", ".dh.csv"), ("matlab", ".m")])

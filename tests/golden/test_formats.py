@@ -51,7 +51,10 @@ def test_a_recording_with_streams_frames_and_events_is_read_whole(frozen, tmp_pa
 
 @pytest.mark.parametrize("name", answers.PREDICTED)
 def test_a_model_of_schema_1_predicts_as_frozen(frozen, tmp_path, name):
-    assert column_differences(answers.prediction(name, tmp_path), frozen("predicted")[name]) == []
+    """Columns that a later version adds, such as a sigma, take nothing away from who reads by name."""
+    expected = frozen("predicted")[name]
+    now = {column: values for column, values in answers.prediction(name, tmp_path).items() if column in expected}
+    assert column_differences(now, expected) == []
 
 
 def test_model_and_diagnosis_of_schema_1_go_into_a_report(tmp_path):
