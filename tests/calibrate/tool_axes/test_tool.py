@@ -1,4 +1,4 @@
-"""A tool point found from single-axis rotations, by axis lines and by distances, in a tracker frame nobody knows."""
+"""A tool point found from single-axis rotations, by axis lines and by the fit of all wrist rows, in a tracker frame nobody knows."""
 
 import numpy as np
 import pytest
@@ -67,7 +67,7 @@ def test_free_motion_has_no_segments():
     assert single_axis_segments(np.random.default_rng(2).uniform(-1, 1, (40, 6))) == ()
 
 
-def test_exact_data_give_the_tool_exactly_by_lines_and_by_distances(arm, positions):
+def test_exact_data_give_the_tool_exactly_by_lines_and_by_the_fit(arm, positions):
     q = turns(4, 5, 6)
     found = calibrated(arm, q, positions(q))
     assert found.status is Status.CONVERGED
