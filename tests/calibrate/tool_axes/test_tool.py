@@ -1,4 +1,4 @@
-"""A tool point found from single-axis rotations, by axis lines and by the fit of all wrist rows, in a tracker frame nobody knows."""
+"""A tool found from single-axis rotations, by axis lines and by the fit of the wrist, in an unknown tracker frame."""
 
 import numpy as np
 import pytest
