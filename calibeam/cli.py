@@ -6,12 +6,13 @@
 import sys
 from importlib.metadata import version
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, Group
 from rich.console import Console
 from rich.markup import escape
 
 from acquisition.errors import AcquisitionError
 from acquisition.recording.errors import RecordingError, RigFileError, SamplesError, brief
+from calibeam.command_list import COMMANDS, GROUPS
 from calibeam.emulation import EmulationError
 from calibeam.interrupts import INTERRUPTS
 from calibeam.outcome import CheckFailed, PartialResult, interruption
@@ -38,42 +39,18 @@ TOLD = (
     WorldError,
 )
 
-app = App(
-    name="calibeam",
-    version=version("calibeam"),
-    help="Record, calibrate and diagnose robot arms with a laser and two position-sensitive detectors.",
-    suppress_keyboard_interrupt=False,  # it would end with 130 and no word
-)
+
+def _new_app() -> App:
+    return App(
+        name="calibeam",
+        version=version("calibeam"),
+        help="Record, calibrate and diagnose robot arms with a laser and two position-sensitive detectors.",
+        suppress_keyboard_interrupt=False,  # cyclopts would end with 130 and no message
+    )
+
+
+app = _new_app()
 # Loaded when it is called: emulators, for one, start three seconds sooner without the others' libraries.
-COMMANDS = {
-    "demo": "demo:demo",
-    "session": "session:session",
-    "emulate": "emulate:emulate",
-    "check": "check:check_command",
-    "log": "log:log",
-    "identify": "identify:identify_command",
-    "diagnose": "diagnose:diagnose_command",
-    "compare": "compare:compare_command",
-    "predict": "predict:predict_command",
-    "design": "design:design_command",
-    "simulate-errors": "simulate_errors:simulate_errors_command",
-    "prove": "prove:prove_command",
-    "report": "report:report_command",
-    "verify": "verify:verify_command",
-    "tool-axes": "tool_axes:tool_axes_command",
-    "psd-check": "psd_check:psd_check_command",
-    "move": "move:move_command",
-    "jog": "jog:jog_command",
-    "motion": "motion:motion_command",
-    "camera": "camera:camera_command",
-    "live": "live:live_command",
-    "export": "export:export_command",
-    "import": "export:import_command",
-    "recover": "recover:recover_command",
-    "batch": "batch:batch_command",
-    "layouts": "layouts:layouts_command",
-    "completion": "completion:completion_command",
-}
 for name, place in COMMANDS.items():
     app.command(f"calibeam.commands.{place}", name=name)
 
@@ -94,11 +71,9 @@ def main() -> None:
 def run(arguments: list[str]) -> int:
     """The exit code of one command line."""
     errors = Console(stderr=True, soft_wrap=True, highlight=False)
-    if not arguments or arguments[0] in app.help_flags:
-        for name in COMMANDS:
-            app[name]  # loads it, so that the list of all says what each does
+    asked = _list_of_commands() if not arguments or arguments[0] in app.help_flags else app
     try:
-        app(arguments, exit_on_error=False, print_error=True, result_action="return_value")
+        asked(arguments, exit_on_error=False, print_error=True, result_action="return_value")
     except CycloptsError:
         return 2  # cyclopts has printed what was wrong
     except PartialResult as partial:
@@ -116,3 +91,13 @@ def run(arguments: list[str]) -> int:
         )
         return 1
     return 0
+
+
+def _list_of_commands() -> App:
+    """All commands in their groups, none of them loaded."""
+    listed = _new_app()
+    for title, commands in GROUPS.items():
+        group = Group.create_ordered(title)
+        for command in commands:
+            listed.command(f"calibeam.commands.{command.place}", name=command.name, help=command.summary, group=group)
+    return listed

@@ -7,7 +7,8 @@ from pathlib import Path
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.pages import Page
 
-from calibeam.cli import COMMANDS, app
+from calibeam.cli import app
+from calibeam.command_list import COMMANDS
 from calibrate.effects.catalogue import EFFECTS
 
 OPEN = "unknown"

@@ -32,7 +32,9 @@ def batch_command(
     robot_by_folder: bool = False,
     json: bool = False,
 ) -> None:
-    """Identify every recording and session folder below a folder; one table, and a page of what drifts and why.
+    """Identify every recording below a folder; table and drift page.
+
+    One table of all, and a page of what drifts and which causes robots have in common.
 
     A file that is broken, crashes its process or never ends becomes a row with the reason. What was done stands when
     the same command runs again; only what is new or changed is done. Ends with 3 when some failed.

@@ -16,7 +16,9 @@ from drivers.clock import SystemClock
 def camera_command(
     rig: Path, *, out: Path = Path("camera"), placement: int | None = None, time_scale: float = 1.0, yes: bool = False
 ) -> None:
-    """Measure the camera: the arm goes round the board, then into the light in both orders. Clear the cell first.
+    """Calibrate the camera with a tour of the arm round a board.
+
+    The arm goes round the board, then into the light in both beam orders. Clear the cell first.
 
     Example: calibeam camera rigs/ur5e-dual-psd-camera.toml --out out/camera
 

@@ -15,7 +15,9 @@ from drivers.clock import SystemClock
 
 
 def check_command(what: Path, *, json_: Annotated[bool, Parameter(name="--json")] = False) -> None:
-    """Try every device of a rig file and print one line each; the arm does not move. Or check a recording.
+    """Check every device of a rig, or check a recording; no motion.
+
+    One line a device; the arm does not move. A recording is checked for missing samples, clocks and gross errors.
 
     Example: calibeam check rigs/ur5e-dual-psd.toml
 

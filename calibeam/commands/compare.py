@@ -20,7 +20,9 @@ def compare_command(
     diagnose: bool = True,
     json: bool = False,
 ) -> None:
-    """Say which link of the chain differs first, by how much and since when; seek the physics of readings that differ.
+    """Find where a simulation and a measurement disagree.
+
+    Which link of the chain differs first, by how much and since when; then the physics of readings that differ.
 
     Samples are matched by pose and order, streams by their motion: clocks may differ and drift, rows may be missing.
 

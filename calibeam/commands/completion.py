@@ -3,6 +3,7 @@
 from typing import Literal
 
 from calibeam import cli
+from calibeam.command_list import COMMANDS
 
 
 def completion_command(shell: Literal["bash", "zsh", "fish"]) -> None:
@@ -20,6 +21,6 @@ def completion_command(shell: Literal["bash", "zsh", "fish"]) -> None:
         The shell that reads it.
 
     """
-    for name in cli.COMMANDS:
+    for name in COMMANDS:
         cli.app[name]  # loads it: its options are completed, too
     print(cli.app.generate_completion(prog_name="calibeam", shell=shell))

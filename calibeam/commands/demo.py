@@ -23,7 +23,10 @@ RESULTS = (RECORDING, "model.json", "diagnosis.json", "report.html", TRUTH)
 
 
 def demo(*, out: Path = Path("out/demo"), rig: Path = RIG, seed: int = 1, time_scale: float = 8.0) -> None:
-    """Emulated rig, whole session, report; then the concealed truth. Under a minute.
+    """Run a whole session on emulated devices and show the truth.
+
+    Starts the emulators, records a session, identifies, diagnoses and reports; the truth is opened only after the
+    fit.
 
     Example: calibeam demo --out out/demo
 

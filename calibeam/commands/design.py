@@ -38,7 +38,9 @@ def design_command(
     report: Path | None = None,
     json_: Annotated[bool, Parameter(name="--json")] = False,
 ) -> None:
-    """Choose the poses of a session before it: reachable, clear, lit; the best of them, in an order that time forgives.
+    """Choose the poses of a session before it is run.
+
+    Reachable, clear of obstacles, lit; the best of them, ordered so that drift is not mistaken for geometry.
 
     Prints the predicted error in free space, how many poses are enough, and which causes a diagnosis could find.
 

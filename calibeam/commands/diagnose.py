@@ -26,7 +26,9 @@ def diagnose_command(
     plan_out: Path | None = None,
     json: bool = False,
 ) -> None:
-    """Say where recording and model part, which physics is missing, how large it is, and prove it on unseen samples.
+    """Find the physics that the geometric model leaves out.
+
+    Where model and measurement disagree, which physics is missing, its size, and the proof on unseen samples.
 
     Faults of the file come first; a file that is wrong as a whole ends with code 1, and diagnosis.json says why.
 

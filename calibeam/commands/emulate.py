@@ -23,7 +23,7 @@ def emulate(
     control_host: str = "127.0.0.1",
     end_with_stdin: Annotated[bool, Parameter(show=False)] = False,
 ) -> None:
-    """Emulate every device of a rig file on real wires, and stay up until Ctrl-C.
+    """Emulate every device of a rig on real wires until Ctrl-C.
 
     Example: calibeam emulate rigs/ur5e-dual-psd.toml
 

@@ -16,7 +16,7 @@ STREAMS = "streams"  # folder of the tables beside samples and rig
 
 
 def export_command(recording: Path, *, out: Path, table: TableFormat = TableFormat.CSV, streams: bool = False) -> None:
-    """Write a recording as a session folder of tables, or its raw CAN frames as a CAN log.
+    """Write a recording as tables, or its CAN frames as a CAN log.
 
     Example: calibeam export out/demo/recording.mcap --out session
 
@@ -49,7 +49,7 @@ def export_command(recording: Path, *, out: Path, table: TableFormat = TableForm
 
 
 def import_command(source: Path, *, out: Path, rig: Path | None = None) -> None:
-    """Make a recording of a session folder (rig.toml and samples.csv or samples.parquet), or of a CAN log.
+    """Make a recording of a session folder or of a CAN log.
 
     Example: calibeam import session --out session.mcap
 

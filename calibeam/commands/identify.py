@@ -40,7 +40,9 @@ def identify_command(
     export: tuple[ExportForm, ...] = (),
     json: bool = False,
 ) -> None:
-    """Identify the arm: blunders of the file, rank and what cannot be determined first, then numbers with their sigma.
+    """Identify the arm's geometry from a recording.
+
+    Checks the data and what can be determined, then fits. Every number has an uncertainty.
 
     Spots of the dual PSD alone give joint zeros; positions, wire, cones, bars, full poses (several at once) the arm.
     With a plan, or with --bootstrap, spots alone are fitted in the same way as all others.

@@ -34,7 +34,10 @@ def jog_command(
     dry_run: bool = False,
     yes: bool = False,
 ) -> None:
-    """Step one joint, or shift or turn the flange along an axis, slowly and through the gate.
+    """Step one joint, or move the flange along an axis, slowly.
+
+    The flange is shifted or turned along an axis; every step passes the same checks as a move. Clear the cell
+    first.
 
     Example: calibeam jog rigs/ur5e-dual-psd.toml --axis z --by-mm 5
 

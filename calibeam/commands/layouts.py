@@ -12,7 +12,9 @@ FOXGLOVE, PLOTJUGGLER = "foxglove.json", "plotjuggler.xml"
 
 
 def layouts_command(recording: Path, *, out: Path = Path("layouts")) -> None:
-    """Write a Foxglove and a PlotJuggler layout that draw what this recording holds: faces, spots, joints, encoders.
+    """Write Foxglove and PlotJuggler layouts for a recording.
+
+    They show what this recording holds: detectors, spots, joints, encoders.
 
     Foxglove: open the recording, then Layouts, Import from file. PlotJuggler: Data, then Layout, Load. They fit every
     recording of the same rig.

@@ -25,7 +25,9 @@ def live_command(
     for_s: float | None = None,
     json_: Annotated[bool, Parameter(name="--json")] = False,
 ) -> None:
-    """Show a rig's devices in the browser until Ctrl-C: detectors, robot with its beam, joints, health, STOP.
+    """Show a rig's devices live in the browser, with a STOP button.
+
+    Detectors, robot with its beam, joints and the state of every device.
 
     Example: calibeam live rigs/ur5e-dual-psd.toml
 

@@ -17,7 +17,10 @@ from calibeam.outcome import PartialResult
 from drivers.clock import Clock, SystemClock
 from drivers.errors import DeviceError, DeviceRefused
 
-log = App(name="log", help="Record a device for as long as it takes. Example: calibeam log encoders RIG.toml")
+log = App(
+    name="log",
+    help="Log the encoders until Ctrl-C, with every CAN frame.\n\nExample: calibeam log encoders rig.toml",
+)
 
 MEGABYTE = 1e6
 

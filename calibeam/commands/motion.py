@@ -23,7 +23,9 @@ def motion_command(
     only: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = (),
     json_: Annotated[bool, Parameter(name="--json")] = False,
 ) -> None:
-    """Run the motion examples on an emulated controller: joints, straight lines, blend, belt, two pins with teaching.
+    """Run the motion examples on an emulated controller.
+
+    Joint moves, straight lines, blends, a belt, two pins with teaching.
 
     Each leaves its plan as drawn before the arm moved (plan-NAME.svg), and what the controller then said beside it.
 

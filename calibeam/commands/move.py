@@ -33,7 +33,9 @@ def move_command(
     dry_run: bool = False,
     yes: bool = False,
 ) -> None:
-    """Move the arm: planned and drawn first, refused where limits or boxes forbid it, then asked for. Clear the cell.
+    """Move the arm to a pose: planned, shown, confirmed, then executed.
+
+    Refused where joint limits or forbidden boxes are in the way. Clear the cell first.
 
     The arm moves once `go` is typed. Ctrl-C rests at the next place, or brakes where that is more than a second away;
     again brakes at once, then gives up.

@@ -13,7 +13,9 @@ from calibrate.predict import Predictor
 def predict_command(
     model: Path, samples: Path, *, out: Path = Path("predicted.csv"), same_session: bool = False
 ) -> None:
-    """Write one row per sample, in order: the predicted observation, its sigma, and residuals where it was observed.
+    """Predict readings with a model, each with its uncertainty.
+
+    One row a sample, in input order: predicted reading, its sigma, and the residual where it was measured.
 
     Example: calibeam predict model.json samples.csv --out predicted.csv
 

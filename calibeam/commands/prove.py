@@ -36,7 +36,9 @@ def prove_command(
     publish: bool = False,
     json: bool = False,
 ) -> None:
-    """Hide physics in emulated sessions, diagnose them in processes that know nothing of it, open the seals, count.
+    """Test the diagnosis on sessions with hidden physics.
+
+    Physics is hidden in emulated sessions, diagnosed in processes that cannot see it, then revealed and counted.
 
     Example: calibeam prove --cases 300 --out out/proof
 

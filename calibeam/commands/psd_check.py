@@ -40,7 +40,9 @@ class Seen:
 
 
 def psd_check_command(rig: Path, *, points: Path, unit: int = 1, out: Path | None = None, wait: bool = True) -> None:
-    """Measure a detector against known places of the spot: x sign, sum scale (KPA101), error map.
+    """Check a detector against known spot positions.
+
+    Finds the sign of x, the scale of the sum signal (KPA101) and an error map.
 
     Example: calibeam psd-check rig.toml --points points.csv --unit 1 --out psd1.json
 

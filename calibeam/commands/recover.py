@@ -10,7 +10,9 @@ from calibeam.outcome import PartialResult
 
 
 def recover_command(recording: Path, *, out: Path, rig: Path | None = None, json: bool = False) -> None:
-    """Write what can be read of a torn or damaged recording into a new, whole file.
+    """Save what is readable of a damaged recording.
+
+    What can be read of a damaged or cut-off recording goes into a new, complete file.
 
     Example: calibeam recover session-1/recording.mcap --out recovered.mcap
 

@@ -24,7 +24,9 @@ def report_command(
     out: Path = Path("report.html"),
     json: bool = False,
 ) -> None:
-    """Write one self-contained HTML file: how good the arm is now, whether to trust it, what to do; then the detail.
+    """Write the report of a recording: one self-contained HTML file.
+
+    How accurate the arm is now, whether to trust the result, what to do; then the details.
 
     Of the dual PSD alone: rig, spots, centring, residuals, joint zeros. Of any other session: errors by instrument,
     proof on unseen rows, what was identified and what was refused and why. How to read it: docs/report.md.

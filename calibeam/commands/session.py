@@ -64,7 +64,10 @@ def session(
     lengths: int = GuidedOptions.lengths,
     verify: bool = False,
 ) -> None:
-    """Check devices, draw the plan, ask, then aim, centre, collect, record, identify, diagnose, report.
+    """Run a session: check, plan, align, centre, measure, report.
+
+    Checks the devices, shows the pose plan, asks for confirmation, then aligns, centres, measures, identifies,
+    diagnoses and reports.
 
     Example: calibeam session rigs/ur5e-dual-psd.toml --out session-1
     The arm moves: clear the cell first. SPACE or Ctrl-C pauses, r resumes, s finishes, a aborts, h halts.

@@ -32,7 +32,9 @@ def simulate_errors_command(
     out: Path | None = None,
     json_: Annotated[bool, Parameter(name="--json")] = False,
 ) -> None:
-    """Perturb an arm, singly and jointly, and say what the probe makes of it: linear, drawn, Sobol, worst postures.
+    """Propagate an arm's errors to its tool.
+
+    Each error alone and all together: linear, by Monte Carlo, by Sobol indices, and the worst postures.
 
     Example: calibeam simulate-errors rigs/arm-cmm-reference.toml --errors rigs/errors/arm-cmm.toml --out out/errors
 

@@ -41,7 +41,9 @@ def tool_axes_command(
     out: Path = Path("tool.json"),
     json: bool = False,
 ) -> None:
-    """Find the target in the flange: circles of single-axis rotations, axis lines, flange, then the wrist's rows.
+    """Locate the target on the flange by single-axis turns.
+
+    Circles of single-axis rotations, axis lines, flange, then the rows of the wrist.
 
     The rows in which one joint alone turns are found from the joint readings. Needed are rotations of the last joint
     and of the one before it, at least 20 degrees and 5 rows each, with all joints before them left where they were.

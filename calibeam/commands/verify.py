@@ -26,7 +26,9 @@ def verify_command(
     report: Path = Path("verification.html"),
     json_: Annotated[bool, Parameter(name="--json")] = False,
 ) -> None:
-    """Judge a measuring arm by spheres, cones and bars against the permissible errors in the rig's [mpe].
+    """Verify a measuring arm by spheres, cones and length bars.
+
+    Compares each figure with the permissible error in the rig's [mpe].
 
     Example: calibeam verify check/recording.mcap --model session/model.json
     Exit code 1 when a figure is beyond its limit; the files are written all the same.

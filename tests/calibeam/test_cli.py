@@ -46,7 +46,7 @@ def test_help_is_good_and_an_unknown_command_is_usage(capsys: pytest.CaptureFixt
     assert run(["--help"]) == 0
     said = capsys.readouterr().out
     assert "identify" in said
-    assert "Emulated rig, whole session, report" in said  # of commands that are loaded when they are called
+    assert "Run a whole session on emulated devices" in said
     assert run(["calibrateeverything"]) == 2
 
 

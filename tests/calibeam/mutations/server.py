@@ -94,7 +94,8 @@ class Server:
 
 
 def serve(folder: Path) -> None:
-    from calibeam.cli import COMMANDS, run
+    from calibeam.cli import run
+    from calibeam.command_list import COMMANDS
     from tests.calibeam.mutations.inputs import write_inputs
 
     answers = os.fdopen(os.dup(1), "w", buffering=1)

@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from calibeam.cli import COMMANDS
+from calibeam.command_list import COMMANDS
 from tests.calibeam.mutations.json_mutators import JSON
 from tests.calibeam.mutations.recording_mutators import RECORDING
 from tests.calibeam.mutations.table_mutators import CSV, PARQUET

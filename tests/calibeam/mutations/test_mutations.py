@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from calibeam.cli import COMMANDS
+from calibeam.command_list import COMMANDS
 from tests.calibeam.mutations.cases import Fault, faults, lay_out, run_case
 from tests.calibeam.mutations.recording_mutators import rewritten
 from tests.calibeam.mutations.server import Ran, Server, watched
