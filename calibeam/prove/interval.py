@@ -1,10 +1,12 @@
-"""Shares with their doubt. Wilson, J. Am. Stat. Assoc. 22, 1927: keeps its level for shares near 0 and 1, and few."""
+"""Shares with their uncertainty: Wilson, J. Am. Stat. Assoc. 22, 1927; the level also holds for shares near 0 and 1."""
 
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-Z = 1.959964  # 95 %
+from scipy.stats import binomtest
+
+LEVEL = 0.95
 NO_BREAK = "\u00a0"
 TO = "\u2011"  # a hyphen at which no line ends
 
@@ -22,13 +24,11 @@ class Share:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """95 %; (0, 1) of nothing."""
+        """95 % interval; (0, 1) where n is 0."""
         if not self.n:
             return (0.0, 1.0)
-        p, n = self.value, self.n
-        middle = (p + Z**2 / (2 * n)) / (1 + Z**2 / n)
-        half = Z * math.sqrt(p * (1 - p) / n + Z**2 / (4 * n**2)) / (1 + Z**2 / n)
-        return (max(0.0, middle - half), min(1.0, middle + half))
+        found = binomtest(self.k, self.n).proportion_ci(LEVEL, method="wilson")
+        return (float(found.low), float(found.high))
 
     @property
     def brief(self) -> str:
