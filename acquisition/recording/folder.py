@@ -9,6 +9,7 @@ from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
 from acquisition.recording.samples_csv import read_csv, write_csv
 from acquisition.recording.samples_parquet import read_parquet, write_parquet
+from acquisition.recording.stream_tables import with_streams
 from acquisition.recording.tables import TableFormat
 
 RIG = "rig.toml"
@@ -17,12 +18,13 @@ PARQUET = "samples.parquet"
 
 
 def read_folder(folder: Path) -> Recording:
-    """A session folder as a recording without streams. RecordingError, RigFileError, SamplesError for what is wrong."""
+    """A session folder as a recording. RecordingError, RigFileError, SamplesError for what is wrong."""
     if not (folder / RIG).is_file():
         raise RecordingError(f"{folder}: no {RIG} in the folder; a session folder holds {RIG} and {CSV}")
     text = rig_text(folder / RIG)
     rig = parse_rig(text, str(folder / RIG))
-    return Recording(path=folder, rig_text=text, rig=rig, samples=_read_samples(folder, rig), complete=True)
+    recording = Recording(path=folder, rig_text=text, rig=rig, samples=_read_samples(folder, rig), complete=True)
+    return with_streams(recording, folder)
 
 
 def export(recording: Recording, folder: Path | str, table: TableFormat = TableFormat.CSV) -> None:

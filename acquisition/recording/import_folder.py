@@ -3,29 +3,78 @@
 Apart from `folder`, because writing loads what reading does without: a fit must not load socket libraries.
 """
 
+import heapq
+from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
+from acquisition.recording.errors import RecordingError, shown
 from acquisition.recording.folder import read_folder
+from acquisition.recording.recording import Recording
+from acquisition.recording.stream import Stream
 from acquisition.recording.writer import RecordingWriter
+
+WAITING = 50_000  # rows given to the writer before it is waited for: it measures against no clock here
+BLOCK = 1000  # rows of a stream at a time; a viewer loads little more than the time it shows
 
 
 def import_folder(folder: Path | str, path: Path | str, *, software: str, started_utc: datetime | None = None) -> None:
-    """Make a recording of a session folder: rig and samples, no streams; session time 0 is host time 0.
+    """Make a recording of a session folder: rig, samples, and the streams, events and gaps of its folder `streams`.
 
-    RecordingError if `path` exists or `folder` is no session folder, RigFileError, SamplesError.
+    Without streams.json there, session time 0 is host time 0. RecordingError if `path` exists or `folder` is no session
+    folder, RigFileError, SamplesError.
     """
     source = read_folder(Path(folder))
     with RecordingWriter(
         path,
         rig_text=source.rig_text,
-        software=software,
+        software=source.software or software,
         clock=_SessionStart(),
-        notes={"imported_from": Path(folder).name},
-        started_utc=datetime.now(UTC) if started_utc is None else started_utc,
+        notes={"imported_from": Path(folder).name} | source.notes,
+        host_s0=source.host_s0,
+        started_utc=_started(source, Path(folder)) or started_utc or datetime.now(UTC),
+        host=source.host or None,
     ) as writer:
         for row in source.samples.rows():
             writer.sample(row)
+        _write_streams(writer, source)
+        for event in source.events:
+            writer.event(event)
+        writer.close(complete=source.complete)
+
+
+def _write_streams(writer: RecordingWriter, source: Recording) -> None:
+    """In blocks ordered by time over all streams, so that a viewer finds what belongs to one instant in one place."""
+    inlets = {name: writer.stream(name, s.channels, find_gaps=False) for name, s in source.streams.items()}
+    given = 0
+    for _, name, rows in heapq.merge(*(_blocks(stream) for stream in source.streams.values())):
+        stream = source.streams[name]
+        block = slice(*rows)
+        values = {channel: array[block] for channel, array in stream.values.items()}
+        inlets[name].append(stream.host_s[block], stream.device_s[block], stream.sequence[block], values)
+        given += rows[1] - rows[0]
+        if given >= WAITING:
+            writer.flush()
+            given = 0
+    for name, stream in source.streams.items():
+        for gap in stream.gaps:
+            inlets[name].gap(gap)
+
+
+def _blocks(stream: Stream) -> Iterator[tuple[float, str, tuple[int, int]]]:
+    for first in range(0, len(stream.host_s), BLOCK):
+        yield float(stream.host_s[first]), stream.name, (first, min(first + BLOCK, len(stream.host_s)))
+
+
+def _started(source: Recording, folder: Path) -> datetime | None:
+    if not source.started_utc:
+        return None
+    try:
+        return datetime.fromisoformat(source.started_utc)
+    except ValueError as error:
+        raise RecordingError(
+            f"{folder}: streams.json: started_utc = {shown(source.started_utc)} is no ISO 8601 time; correct it"
+        ) from error
 
 
 class _SessionStart:

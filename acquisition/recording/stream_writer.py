@@ -27,9 +27,11 @@ class StreamWriter:
         put: Callable[[Piece], None],
         put_gap: Callable[[Gap], None],
         after: tuple[int, float] | None = None,
+        *,
+        find_gaps: bool = True,
     ) -> None:
         self.name, self.channels = name, channels
-        self._put, self._put_gap = put, put_gap
+        self._put, self._put_gap, self._find_gaps = put, put_gap, find_gaps
         self._turn = threading.Lock()
         self._kinds: dict[str, str] = {}  # channel -> "i" or "f", from the first block
         self._last = after  # sequence and host time of the last sample
@@ -59,7 +61,7 @@ class StreamWriter:
             return
         with self._turn:
             self._check_kinds(piece)
-            gaps = self._gaps(piece)
+            gaps = self._gaps(piece) if self._find_gaps else []
             self._put(piece)
             self._last = int(piece.sequence[-1]), float(piece.host_s[-1])
             for gap in gaps:

@@ -34,7 +34,7 @@ def write_tables(recording: Recording, folder: Path, kind: TableFormat) -> list[
     Streams named "events" or "gaps" get a trailing underscore.
     """
     pa = _pyarrow("pyarrow")
-    tables = {_file_name(stream.name): stream_table(stream) for stream in recording.streams.values()}
+    tables = {table_name(stream.name): stream_table(stream) for stream in recording.streams.values()}
     tables[EVENTS] = pa.table(
         {
             "host_s": pa.array([event.host_s for event in recording.events], pa.float64()),
@@ -85,7 +85,8 @@ def _columns(pa: Any, stream: Stream, channel: Channel) -> Iterable[tuple[Any, n
         )
 
 
-def _file_name(stream: str) -> str:
+def table_name(stream: str) -> str:
+    """The table of a stream, without suffix."""
     return f"{stream}_" if stream in (EVENTS, GAPS) else stream
 
 

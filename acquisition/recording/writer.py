@@ -114,10 +114,13 @@ class RecordingWriter:
         channels: tuple[Channel, ...],
         viewer: tuple[str, ...] | None = None,
         after: tuple[int, float] | None = None,
+        *,
+        find_gaps: bool = True,
     ) -> StreamWriter:
         """Declare a device's stream. `viewer` names the channels of the thinned 20 Hz view; None: all.
 
         `after`: sequence and host time of the last sample in the file before, where this one goes on with it.
+        `find_gaps=False`: gaps are recorded as the caller states them, none is found from the sequence.
         ValueError for names that cannot stand in a file, stand twice, or are not declared.
         """
         channels = tuple(channels)
@@ -133,7 +136,7 @@ class RecordingWriter:
             self._spool.put(partial(self._begin_stream, name=name, channels=channels, encoder=encoder), 0)
             self._streams.add(name)
             put = partial(self._put_piece, encoder)
-            return StreamWriter(name, channels, put, partial(self._put_gap, name), after)
+            return StreamWriter(name, channels, put, partial(self._put_gap, name), after, find_gaps=find_gaps)
 
     def sample(self, row: Mapping[str, Cell], host_s: float | None = None) -> None:
         """One settled sample: column -> value, None (or NaN) where missing; names of the session-folder format.

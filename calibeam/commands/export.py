@@ -8,11 +8,10 @@ from acquisition.recording.folder import export
 from acquisition.recording.import_folder import import_folder
 from acquisition.recording.read import read
 from acquisition.recording.rig import rig_text
-from acquisition.recording.tables import TableFormat, write_tables
+from acquisition.recording.stream_tables import write_streams
+from acquisition.recording.tables import TableFormat
 from calibeam.outcome import PartialResult
 from calibeam.software import SOFTWARE
-
-STREAMS = "streams"  # folder of the tables beside samples and rig
 
 
 def export_command(recording: Path, *, out: Path, table: TableFormat = TableFormat.CSV, streams: bool = False) -> None:
@@ -43,8 +42,7 @@ def export_command(recording: Path, *, out: Path, table: TableFormat = TableForm
     export(source, out, table)
     print(f"{out}: rig.toml and samples.{table.value} with {len(source.samples)} samples")
     if streams:
-        (out / STREAMS).mkdir()
-        for path in write_tables(source, out / STREAMS, table):
+        for path in write_streams(source, out, table):
             print(f"{path}: {path.stat().st_size} bytes")
 
 
@@ -58,7 +56,7 @@ def import_command(source: Path, *, out: Path, rig: Path | None = None) -> None:
     Parameters
     ----------
     source
-        The session folder; or a CAN log: .blf, .asc, .csv or .log (candump).
+        The session folder, with its folder "streams" if it has one; or a CAN log: .blf, .asc, .csv or .log (candump).
     out
         The recording to make.
     rig

@@ -247,6 +247,8 @@ def _made_by_calibeam(folder: Path, run: Run) -> None:
         ["import", f"{folder}/tracker", "--out", f"{folder}/recording.mcap"],
         ["import", f"{folder}/turned", "--out", f"{folder}/turned.mcap"],
         ["import", f"{folder}/guided", "--out", f"{folder}/guided.mcap"],
+        ["export", f"{folder}/streams.mcap", "--streams", "--out", f"{folder}/streamed"],
+        ["export", f"{folder}/streams.mcap", "--streams", "--table", "parquet", "--out", f"{folder}/columned"],
     ):
         if code := run(words):
             raise RuntimeError(f"calibeam {' '.join(words)}: exit code {code}")

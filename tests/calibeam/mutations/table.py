@@ -116,6 +116,11 @@ OTHER_SESSIONS = (
     Pair("streams.mcap", "export streams.mcap --out made.blf"),
     Pair("streams.mcap", "layouts streams.mcap"),
     Pair("streams.mcap", "compare streams.mcap streams.mcap"),
+    Pair("streamed/streams/streams.json", "import streamed --out made.mcap"),
+    Pair("streamed/streams/encoders.csv", "import streamed --out made.mcap"),
+    Pair("streamed/streams/events.csv", "import streamed --out made.mcap"),
+    Pair("streamed/streams/gaps.csv", "import streamed --out made.mcap"),
+    Pair("columned/streams/encoders.parquet", "import columned --out made.mcap"),
     Pair("begun/recording.mcap", "session rig.toml --continue --out begun --yes"),
 )
 MODELS = (
