@@ -65,7 +65,7 @@ class Host:
         self._first_tick = round(world.time_s / TICK_S)
         self.ticks = 0
         tick_wall_s = TICK_S / time_scale
-        self._patience_s = (min(CATCH_UP_TICKS, max(1, int(TURN_S / tick_wall_s))) - 1) * tick_wall_s
+        self._patience_s = (min(CATCH_UP_TICKS, max(1, int(TURN_S / tick_wall_s + 1e-9))) - 1) * tick_wall_s
         self.pace = Pace(tick_wall_s, now_s())
 
     def serial_address(self, name: str) -> str:
