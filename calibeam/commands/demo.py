@@ -23,7 +23,7 @@ RESULTS = (RECORDING, "model.json", "diagnosis.json", "report.html", TRUTH)
 
 
 def demo(*, out: Path = Path("out/demo"), rig: Path = RIG, seed: int = 1, time_scale: float = 8.0) -> None:
-    """Emulated rig, whole session, report; then the concealed truth. Under a minute.
+    """Emulated rig, whole session, report; then the concealed truth. About a minute on two quiet cores.
 
     Example: calibeam demo --out out/demo
 
