@@ -48,8 +48,13 @@ class Pump:
 
     def recent(self, after_host_s: float) -> list[Block]:
         """Blocks of the memory that arrived after this host time, oldest first."""
+        newest_first: list[Block] = []
         with self._news:
-            return [block for block in self._blocks if block.host_s[-1] > after_host_s]
+            for block in reversed(self._blocks):  # they arrived in order: mostly few are wanted of many
+                if block.host_s[-1] <= after_host_s:
+                    break
+                newest_first.append(block)
+        return newest_first[::-1]
 
     def latest(self) -> Block | None:
         with self._news:

@@ -18,7 +18,7 @@ from drivers.errors import DeviceError
 
 Floats = NDArray[np.float64]
 
-LATENESS_S = 2.0  # of host time looked back on, to learn how early a PSD sample can arrive at all
+LATENESS_S = 2.0  # of device time looked back on, to learn how early a PSD sample can arrive at all
 SOFT_S = 0.8  # within which a pause brakes at most: rigs with a gentler acceleration are braked harder
 SILENCE_S = 0.5  # host time without a sample after which a wait gives up
 
@@ -115,9 +115,11 @@ class WiredBench:
         """What the PSD box's clock showed, or later, at `host_s`: earlier samples may be of before the motion ended.
 
         The promptest sample of the last seconds ties both clocks; every other one came later than it could have, by
-        the line, this machine's load, or an emulator that fell behind. So the guess is late rather than early.
+        the line, this machine's load, or an emulator that fell behind. So the guess is late rather than early. The
+        seconds are of the device: an emulator that does not keep its pace falls behind all the time, and each look
+        waits for as much as it lost in them.
         """
-        blocks = self.pumps.psd.recent(host_s - LATENESS_S) or self.pumps.psd.wait(-np.inf, SILENCE_S)
+        blocks = self.pumps.psd.recent(host_s - LATENESS_S / self.hurry) or self.pumps.psd.wait(-np.inf, SILENCE_S)
         prompt_s = min(float(block.host_s[-1]) - float(block.device_s[-1]) / self.hurry for block in blocks)
         return (host_s - prompt_s) * self.hurry
 

@@ -26,7 +26,7 @@ def demo(*, out: Path = Path("out/demo"), rig: Path = RIG, seed: int = 1, time_s
     """Run a whole session on emulated devices and show the truth.
 
     Starts the emulators, records a session, identifies, diagnoses and reports; the truth is opened only after the
-    fit.
+    fit. About a minute on two quiet cores.
 
     Example: calibeam demo --out out/demo
 

@@ -84,6 +84,8 @@ class Injector:
     def before_step(self, t_s: float) -> None:
         """Faults that last: one cycle less."""
         self._now_s = t_s
+        if not self._faults:
+            return
         for fault in self._faults:
             if fault.kind in STATE_KINDS:
                 fault.strike()

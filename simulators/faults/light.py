@@ -37,7 +37,8 @@ class DisturbedLight:
 
     def photocurrents_a(self, times_s: Sequence[float] | Floats) -> Floats:
         """(sample, 8) A, as the world's `photocurrents_a`."""
-        return math.prod(self._gains.values()) * self._world.photocurrents_a(times_s)
+        current_a = self._world.photocurrents_a(times_s)
+        return math.prod(self._gains.values()) * current_a if self._gains else current_a
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._world, name)

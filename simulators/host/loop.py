@@ -2,7 +2,8 @@
 
 Each turn waits for bytes until the next tick is due, serves them, and runs it, in the order that simulators/wire.py
 gives. When the machine is late it runs up to CATCH_UP_TICKS and sends what became due in all of them at once: half of
-a tick's cost is the system's, for waking every client. A client that is slow, gone or talks rubbish holds up nobody.
+a tick's cost is the system's, for waking every client. So it does with time scales at which ticks follow faster than
+TURN_S. A client that is slow, gone or talks rubbish holds up nobody.
 """
 
 import selectors
@@ -20,6 +21,7 @@ from simulators.host.tcp import Connection, Listener
 from simulators.wire import TICK_S, Bench, SerialPort, TcpPort
 
 CATCH_UP_TICKS = 4  # 8 ms, less than the 10 ms that devices gather in a frame
+TURN_S = 0.5e-3  # ticks that a high time scale makes due within it run in one turn, if no more than CATCH_UP_TICKS
 STOP_LATENCY_S = 0.1  # a turn never waits longer, so that a stop is noticed whatever the time scale
 
 
@@ -62,7 +64,9 @@ class Host:
             raise
         self._first_tick = round(world.time_s / TICK_S)
         self.ticks = 0
-        self.pace = Pace(TICK_S / time_scale, now_s())
+        tick_wall_s = TICK_S / time_scale
+        self._patience_s = (min(CATCH_UP_TICKS, max(1, int(TURN_S / tick_wall_s + 1e-9))) - 1) * tick_wall_s
+        self.pace = Pace(tick_wall_s, now_s())
 
     def serial_address(self, name: str) -> str:
         """The path where clients reach a serial port: its link, or the pseudo-terminal itself."""
@@ -83,10 +87,12 @@ class Host:
 
     def turn(self, wait_limit_s: float) -> None:
         """Serves the bytes that have come, waiting for them until the next tick at most; then runs what is due."""
-        wait_s = min(wait_limit_s, max(0.0, self.pace.next_s - self._now_s()))
+        wait_s = min(wait_limit_s, max(0.0, self.pace.next_s + self._patience_s - self._now_s()))
         for key, _ in self._selector.select(wait_s):
             key.data()
         now_s, ran = self._now_s(), 0
+        if now_s < self.pace.next_s + self._patience_s:
+            return
         while ran < CATCH_UP_TICKS and self.pace.take(now_s):
             self._tick()
             ran += 1

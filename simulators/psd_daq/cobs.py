@@ -5,6 +5,8 @@ Source: S. Cheshire, M. Baker, "Consistent Overhead Byte Stuffing", IEEE/ACM Tra
 
 LONGEST_RUN = 254  # data bytes behind one code byte; code 0xFF stands for such a run without a zero after it
 
+CODES = [bytes((length + 1,)) for length in range(LONGEST_RUN)]  # by the length of the run that follows
+
 
 class StuffingError(ValueError):
     """Bytes that no encoder makes: a code byte points over the end."""
@@ -12,8 +14,10 @@ class StuffingError(ValueError):
 
 def stuff(content: bytes) -> bytes:
     """Encoded `content`, without the delimiter."""
-    out = bytearray()
     segments = content.split(b"\0")
+    if max(map(len, segments)) < LONGEST_RUN:  # nearly every frame of this box
+        return b"".join([part for segment in segments for part in (CODES[len(segment)], segment)])
+    out = bytearray()
     for number, segment in enumerate(segments):
         last = number == len(segments) - 1
         while len(segment) >= LONGEST_RUN:

@@ -36,7 +36,7 @@ class LitFaces(Protocol):
 
     def psd_rate(self, rate_hz: float) -> None: ...
 
-    def photocurrents_a(self, times_s: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def photocurrents_a(self, times_s: list[float]) -> NDArray[np.float64]: ...
 
 
 class PsdDaqBox:
@@ -124,14 +124,14 @@ class PsdDaqBox:
         """Take the samples that fell into the step that ended at the world's time, and send full frames."""
         if self._period_ns == 0:
             return
-        count = (_nanoseconds(self._world.time_s) - self._next_ns) // self._period_ns + 1
+        now_s = self._world.time_s
+        count = (_nanoseconds(now_s) - self._next_ns) // self._period_ns + 1
         if count <= 0:
             return
-        times_ns = [self._next_ns + i * self._period_ns for i in range(count)]
+        times_ns = range(self._next_ns, self._next_ns + count * self._period_ns, self._period_ns)
         self._next_ns += count * self._period_ns
-        times_s = np.minimum(np.array(times_ns) * 1e-9, self._world.time_s)
         self._waiting_ns += times_ns
-        self._waiting_a += list(self._world.photocurrents_a(times_s))
+        self._waiting_a += list(self._world.photocurrents_a([min(time_ns * 1e-9, now_s) for time_ns in times_ns]))
         while len(self._waiting_ns) >= self._samples_per_frame:
             self._send_frame()
 

@@ -16,6 +16,8 @@ from simulators.wire import TICK_S
 TORQUE_PER_CURRENT_NM_A = (11.7, 11.7, 11.7, 7.0, 7.0, 7.0)
 # at the joint: gear 101 x motor constants of the size 3 and size 1 joints, about; only the ratio of joints matters here
 ELBOW = 2  # the third axis
+POWERED = (RobotMode.POWER_ON, RobotMode.IDLE, RobotMode.RUNNING)
+POWERED_BIT, RUNNING_BIT = int(RobotStatus.POWER_ON), int(RobotStatus.PROGRAM_RUNNING)  # flags combine slowly
 
 T = TypeVar("T")
 
@@ -143,9 +145,8 @@ class Readout:
 
     @once
     def robot_bits(self) -> int:
-        powered = self.arm.power.robot_mode in (RobotMode.POWER_ON, RobotMode.IDLE, RobotMode.RUNNING)
-        bits = RobotStatus.POWER_ON if powered else RobotStatus(0)
-        return int(bits | RobotStatus.PROGRAM_RUNNING if self.runtime is RuntimeState.PLAYING else bits)
+        bits = POWERED_BIT if self.arm.power.robot_mode in POWERED else 0
+        return bits | RUNNING_BIT if self.runtime is RuntimeState.PLAYING else bits
 
     @once
     def tool_offset(self) -> Pose:

@@ -10,6 +10,13 @@ from dataclasses import dataclass, field
 N_REGISTERS = 48  # of each number type (RTDE guide: 0..23 and, from 3.9 / 5.3 on, 24..47)
 N_BITS = 128
 Value = float | int | bool | tuple[float, ...]
+MASKS = frozenset(  # a setting counts in the cycle in which its mask comes
+    (
+        *(f"{which}_digital_output_mask" for which in ("standard", "configurable", "tool")),
+        "standard_analog_output_mask",
+        "speed_slider_mask",
+    )
+)
 
 
 def _zeros() -> list[float]:
@@ -83,6 +90,8 @@ class Memory:
 
     def apply_outputs(self) -> None:
         """Digital outputs and the speed slider from what the clients have set; once per cycle."""
+        if MASKS.isdisjoint(self.settings):
+            return
         for prefix, low, width in (("standard", 0, 8), ("configurable", 8, 8), ("tool", 16, 2)):
             mask = self._take(f"{prefix}_digital_output_mask") & ((1 << width) - 1)
             if mask:

@@ -54,8 +54,13 @@ class Photodetectors:
         )
 
 
-def sample_a(seen: Floats, rate_hz: float, rng: np.random.Generator) -> Floats:
-    """Noisy, clipped currents (sample, 8) A for what was seen, (sample, 2, 8) A; draws 8 numbers a sample, in order."""
-    noise = rng.standard_normal((len(seen), ELECTRODES))
-    noisy_a = seen[:, 0] + (rate_hz / NOISE_RATE_HZ) ** 0.5 * seen[:, 1] * noise
-    return np.minimum(np.maximum(noisy_a, -SATURATION_A), SATURATION_A)
+def sample_a(seen: Floats, rate_hz: float, rng: np.random.Generator, count: int | None = None) -> Floats:
+    """Noisy, clipped currents (sample, 8) A for what was seen, (sample, 2, 8) A; draws 8 numbers a sample, in order.
+
+    With a `count`, `seen` is (1, 2, 8) and all samples see the same.
+    """
+    noisy_a = rng.standard_normal((len(seen) if count is None else count, ELECTRODES))
+    noisy_a *= (rate_hz / NOISE_RATE_HZ) ** 0.5 * seen[:, 1]
+    noisy_a += seen[:, 0]
+    np.maximum(noisy_a, -SATURATION_A, out=noisy_a)
+    return np.minimum(noisy_a, SATURATION_A, out=noisy_a)

@@ -162,7 +162,7 @@ class World:
         The noise is drawn in order of the samples, so the same sequence of times gives the same numbers however the
         calls are grouped. WorldError for a time that is not between the previous advance and now.
         """
-        times = [float(time_s) for time_s in times_s]
+        times = times_s if isinstance(times_s, list) else [float(time_s) for time_s in times_s]
         if not times:
             return np.empty((0, ELECTRODES))
         first_s, last_s = min(times), max(times)
@@ -171,6 +171,8 @@ class World:
                 f"photocurrents from {first_s:.6f} to {last_s:.6f} s are not within the last advance "
                 f"({self._knots_start_s:.6f} to {self.time_s:.6f} s); sample after every advance"
             )
+        if len(self._knots) == 1:  # the arm stands
+            return sample_a(self._knots[0].seen(self._see)[None], self._rate_hz, self._noise, len(times))
         return sample_a(interpolate(self._knots, self._knots_start_s, times, self._see), self._rate_hz, self._noise)
 
     def _see(self, beam: Ray) -> Floats:

@@ -53,11 +53,11 @@ class EchoWire:
 class Stage:
     """A host under test: `turns` serves it for a number of ticks of a clock that the test owns."""
 
-    def __init__(self, bench: Bench, diary: Diary) -> None:
+    def __init__(self, bench: Bench, diary: Diary, time_scale: float = 1.0) -> None:
         self.now_s = 0.0
         self.logged: list[str] = []
         self.diary = diary
-        self.host = Host(bench, diary, now_s=lambda: self.now_s, log=self.logged.append)
+        self.host = Host(bench, diary, time_scale=time_scale, now_s=lambda: self.now_s, log=self.logged.append)
 
     def turns(self, count: int = 1) -> None:
         for _ in range(count):
@@ -79,9 +79,9 @@ class Stage:
 def stage() -> Iterator[Callable[..., Stage]]:
     stages: list[Stage] = []
 
-    def make(*ports, start_s: float = 0.0) -> Stage:
+    def make(*ports, start_s: float = 0.0, time_scale: float = 1.0) -> Stage:
         diary = Diary(start_s)
-        stages.append(Stage(Bench([diary], ports), diary))
+        stages.append(Stage(Bench([diary], ports), diary, time_scale))
         return stages[-1]
 
     with contextlib.ExitStack() as cleanup:

@@ -48,6 +48,17 @@ def test_a_late_host_catches_up_four_ticks_a_turn(stage):
     assert on.host.pace.stalls == 0
 
 
+def test_ticks_that_follow_faster_than_half_a_millisecond_share_a_turn(stage):
+    on = stage(time_scale=8.0)
+    ticks = []
+    for due in (0.9, 1.1, 2.9, 3.1):  # in ticks
+        on.now_s = due * TICK_S / 8.0
+        on.host.turn(0.0)
+        ticks.append(on.host.ticks)
+    assert ticks == [0, 2, 2, 4]
+    assert [call for call, _ in on.diary.calls] == ["before", "advance", "after"] * 4
+
+
 def test_world_that_ran_before_goes_on_from_its_time(stage):
     on = stage(start_s=5 * TICK_S)
     on.turns()

@@ -24,8 +24,8 @@ class SetWorld:
     def psd_rate(self, rate_hz: float) -> None:
         self.rate_hz = rate_hz
 
-    def photocurrents_a(self, times_s: np.ndarray) -> np.ndarray:
-        self.asked_s += times_s.tolist()
+    def photocurrents_a(self, times_s: list[float]) -> np.ndarray:
+        self.asked_s += times_s
         return np.array([self.currents_a(t_s) for t_s in times_s])
 
 
