@@ -1,12 +1,7 @@
 """Proofs of an identification as lines for a terminal."""
 
-from calibrate.identification.result import Evidence, FreeSpace, Identification, Unseen
+from calibrate.identification.result import Evidence, FreeSpace, Unseen
 from calibrate.observability import Observability
-
-
-def told_lines(proved: Identification) -> list[str]:
-    """Alarms, then all proofs."""
-    return [*(f"ALARM: {alarm}" for alarm in proved.alarms), *lines_of(proved.evidence)]
 
 
 def lines_of(evidence: Evidence) -> list[str]:

@@ -29,7 +29,6 @@ from acquisition.recording.json_file import JsonKind, read_json
 from calibrate.errors import DataError
 from calibrate.parameters import Parameter
 from calibrate.physics.records import Effect, SessionRecord, check_physics
-from calibrate.zeros.result import ZeroResult
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -199,34 +198,6 @@ class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             sizes = (6,) if name == "device" else (3, 6) if name == "tool" else (3,)
             if len(numbers) not in sizes:
                 raise ValueError(f"about.{shown(name)} holds {len(numbers)} numbers instead of {max(sizes)}")
-
-
-def model_of(result: ZeroResult, rig: RigIdentity, arm_model: str) -> ModelFile:
-    """The record to write for a result."""
-    seen = result.identifiability
-    return ModelFile(
-        schema=SCHEMA,
-        kind="calibeam-model",
-        software=result.software,
-        rig=rig,
-        arm_model=arm_model,
-        status=result.status.name,
-        says=result.status.value,
-        poses=result.n_poses,
-        rank=seen.rank,
-        free=seen.n_free,
-        condition=seen.condition if np.isfinite(seen.condition) else None,
-        singular_values=tuple(seen.singular_values.tolist()),
-        unseen=tuple(Unseen(c.words, c.members, c.structural) for c in seen.combinations),
-        parameters=tuple(ModelParameter(e.name, e.unit, e.value, e.sigma, e.why) for e in result.estimates),
-        chain={p.name: float(v) for p, v in zip(result.parameters, result.theta, strict=True)},
-        covariance=covariance_record(result.parameters, result.covariance),
-        noise=fields_of(result.noise),
-        repeats=None if result.repeats is None else fields_of(result.repeats),
-        held_out=None if result.held_out is None else fields_of(result.held_out),
-        rms_before_m=result.rms_before_m,
-        rms_after_m=result.rms_after_m,
-    )
 
 
 def write_model(path: Path, model: ModelFile) -> None:

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.identifiability import Identifiability
+from calibrate.identification.estimates import Estimate
 from calibrate.identification.result import Evidence, FreeSpace
 from calibrate.model_file import BootstrapRecord, FreeSpaceRecord, ModelParameter, ObservabilityRecord, UnseenRows
 from calibrate.observability import Observability
 from calibrate.uncertainty.bootstrap import Bootstrap
-from calibrate.zeros.result import Estimate
 
 REACH_95 = 1.959963984540054  # of a normal law: half of a 95 % interval in sigmas
 

@@ -68,14 +68,18 @@ def fit_record(end: FitEnd) -> FitRecord:
 
 
 def _noise(result: Identification) -> Fields:
-    """Flat: `<source>_believed`, `<source>`, `<source>_sigma`, and chi-square against the noise as stated."""
+    """Flat: `<source>_believed`, `<source>`, `<source>_sigma`, `<source>_at_zero`, and chi-square as stated."""
     out: Fields = {}
     for noise in result.noise:
         out |= {f"{noise.source}_believed": noise.believed, noise.source: noise.found}
-        out[f"{noise.source}_sigma"] = noise.sigma
+        out |= {f"{noise.source}_sigma": noise.sigma, f"{noise.source}_at_zero": noise.at_zero}
     stated = result.stated_noise
     p = stated.p_above if np.isfinite(stated.p_above) else None
-    return out | {"chi2_stated": stated.chi2, "dof": stated.dof, "p_stated": p, "alarm": stated.alarm.name}
+    return (
+        out
+        | {"chi2_stated": stated.chi2, "dof": stated.dof, "p_stated": p, "alarm": stated.alarm.name}
+        | {"settled": result.noise_settled}
+    )
 
 
 def _held_out(result: Identification) -> Fields | None:

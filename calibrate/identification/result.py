@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 from calibrate.blunders.finding import Blunder
 from calibrate.fit import LossKind, Method, Status, Stop
 from calibrate.identifiability import Identifiability
+from calibrate.identification.estimates import Estimate, JointZero, joint_zeros
+from calibrate.identification.point_constraint import PointConstraints
 from calibrate.identification.scale import scale_alarms
 from calibrate.observability import Observability
 from calibrate.parameters import Parameter
 from calibrate.uncertainty.bootstrap import Bootstrap
 from calibrate.uncertainty.chi_square import Alarm, RepeatNoise, StatedNoise
 from calibrate.uncertainty.free_space import FreeSpaceError, Scatter
-from calibrate.zeros.result import Estimate
 
 Floats = NDArray[np.float64]
 
@@ -27,6 +28,7 @@ class Noise:
     believed: float
     found: float
     sigma: float
+    at_zero: bool = False  # too small to be told from none: `found` is no size, only small
 
 
 @dataclass(frozen=True)
@@ -104,6 +106,7 @@ class Identification:
     identifiability: Identifiability
     instruments: tuple[InstrumentFound, ...]
     noise: tuple[Noise, ...]
+    noise_settled: bool  # False: the sizes of the noise did not converge, and every sigma is a guess
     stated_noise: StatedNoise  # chi-square under the noise as believed
     repeats: RepeatNoise | None  # of the first instrument that repeated poses
     evidence: Evidence
@@ -114,6 +117,12 @@ class Identification:
     n_samples: int  # rows that took part
     end: FitEnd
     software: str
+    point_constraints: PointConstraints | None = None  # the method beside the fit, where the plan asks for it
+
+    @property
+    def zeros(self) -> tuple[JointZero, ...]:
+        """Joint zeros; none where the arm has no such parameters."""
+        return joint_zeros(self.estimates, self.parameters, self.covariance)
 
     @property
     def held_out(self) -> tuple[Unseen, ...]:

@@ -87,6 +87,8 @@ def _doubts(evidence: SessionEvidence) -> Iterator[Doubt]:
         yield f"{Status.AT_BOUND.value}.", "Look up which parameter it is below, and check the rig file's drawing."
     yield from _doubts_of_scatter(scatter(model), repeated(model))
     yield from _noisy_sources(model.noise)
+    if model.noise.get("settled") is False:
+        yield "The size of the noise did not settle, and every sigma is a guess.", "Measure more poses."
     worst = worst_pattern(evidence)
     if worst is not None and worst.share > WORTH_SAYING:
         along = "changes in the session" if worst.factor.startswith("order") else f"follows {worst.factor}"

@@ -82,8 +82,8 @@ def test_a_number_that_cannot_be_told_is_a_dash_with_its_reason(known):
     assert "something moves the target" in number.about
 
 
-def test_no_letter_of_a_figure_is_smaller_than_seven_points_on_paper(session_html, zero_html):
-    for page in (session_html, zero_html):
+def test_no_letter_of_a_figure_is_smaller_than_seven_points_on_paper(session_html, spots_html):
+    for page in (session_html, spots_html):
         letters = Letters()
         letters.feed(page)
         assert len(letters.printed) >= 6
