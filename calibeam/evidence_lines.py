@@ -20,8 +20,9 @@ def lines_of(evidence: Evidence) -> list[str]:
 
 def _held_out(unseen: Unseen) -> str:
     return (
-        f"held out ({unseen.split}): {unseen.name}, {unseen.observations} rows, {1e3 * unseen.rms_before:.4g} mm "
-        f"rms before, {1e3 * unseen.rms_after:.4g} mm after"
+        f"held out ({unseen.split}): {unseen.name}, {unseen.observations} rows, "
+        f"{1e3 * unseen.rms_distance_before_m:.4g} mm rms distance before, "
+        f"{1e3 * unseen.rms_distance_after_m:.4g} mm after"
     )
 
 

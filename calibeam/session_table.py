@@ -131,7 +131,8 @@ def _cell(value: float | None, factor: float, sign: str = "") -> str:
 
 def _figures(result: Identification) -> list[str]:
     out = [
-        f"{one.name}: {1e3 * one.rms_before:.4g} mm rms with the arm as drawn, {1e3 * one.rms_after:.4g} mm after"
+        f"{one.name}: {1e3 * one.rms_distance_before_m:.4g} mm rms distance with the arm as drawn, "
+        f"{1e3 * one.rms_distance_after_m:.4g} mm after"
         for one in result.instruments
     ]
     for noise in result.noise:

@@ -27,6 +27,7 @@ from acquisition.recording.bounds import (
 from acquisition.recording.errors import shown
 from acquisition.recording.json_file import JsonKind, read_json
 from calibrate.errors import DataError
+from calibrate.older_models import with_present_names
 from calibrate.parameters import Parameter
 from calibrate.physics.records import Effect, SessionRecord, check_physics
 
@@ -99,8 +100,8 @@ class UnseenRows(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     split: Label
     instrument: Label
     observations: Count
-    rms_before: Statistic
-    rms_after: Statistic
+    rms_distance_before_m: Statistic
+    rms_distance_after_m: Statistic
     chi_after: Statistic
 
 
@@ -174,8 +175,10 @@ class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     noise: Fields
     repeats: Fields | None
     held_out: Fields | None
-    rms_before_m: Statistic
-    rms_after_m: Statistic
+    rms_coordinate_before_m: Statistic
+    rms_coordinate_after_m: Statistic
+    rms_distance_before_m: Statistic
+    rms_distance_after_m: Statistic
     instruments: Many[Name] = ("dual-psd",)
     about: About = msgspec.field(default_factory=dict[Name, tuple[Metres, ...]])
     blunders: Many[LeftOut] = ()
@@ -209,7 +212,7 @@ def write_model(path: Path, model: ModelFile) -> None:
 
 def read_model(path: Path) -> ModelFile:
     """Read model.json. DataError naming file, place and remedy where it is none or of another version."""
-    return read_json(path, KIND, ModelFile, _other)
+    return read_json(path, KIND, ModelFile, _other, with_present_names)
 
 
 def _other(content: dict[str, Any]) -> str | None:

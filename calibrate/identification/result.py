@@ -1,6 +1,7 @@
 """An identified arm with everything that must travel with it."""
 
 from dataclasses import dataclass
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,8 @@ from calibrate.uncertainty.free_space import FreeSpaceError, Scatter
 
 Floats = NDArray[np.float64]
 
+POSE, POSITION = 6, 3  # values of a reading: x, y, z (m), then a turn (rad), which does not add to a length
+
 
 @dataclass(frozen=True)
 class Noise:
@@ -33,25 +36,40 @@ class Noise:
 
 @dataclass(frozen=True)
 class InstrumentFound:
-    """One instrument in the fit. An rms is over observations, of the length of the misfit (3-D error of a position)."""
+    """One instrument in the fit. A distance is the length of an observation's misfit (3-D error of a position)."""
 
     name: str
     observations: int
-    rms_before: float  # arm nominal, places and target refitted
-    rms_after: float
+    rms_distance_before_m: float  # arm nominal, places and target refitted
+    rms_distance_after_m: float
     rows: NDArray[np.intp]  # (obs, m) of the samples, from 0
     misfit: Floats  # (obs, k) expected minus observed, after
+
+    @property
+    def coordinates(self) -> int:
+        """That make up a distance: of a pose those of its position."""
+        k = self.misfit.shape[1]
+        return POSITION if k == POSE else k
+
+    @property
+    def rms_coordinate_before_m(self) -> float:
+        """The same of single coordinates."""
+        return self.rms_distance_before_m / sqrt(self.coordinates)
+
+    @property
+    def rms_coordinate_after_m(self) -> float:
+        return self.rms_distance_after_m / sqrt(self.coordinates)
 
 
 @dataclass(frozen=True)
 class Unseen:
-    """Error of one instrument on observations that the fit has not seen; rms as in InstrumentFound."""
+    """Error of one instrument on observations that the fit has not seen; distances as in InstrumentFound."""
 
     name: str
     split: str
     observations: int
-    rms_before: float
-    rms_after: float
+    rms_distance_before_m: float
+    rms_distance_after_m: float
     chi_after: float  # rms of the whitened prediction error of all instruments together, near 1
 
 

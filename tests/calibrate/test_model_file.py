@@ -59,7 +59,7 @@ def test_the_file_names_rig_software_rank_noise_and_proof(written):
     assert content["software"].startswith("calibeam ")
     assert content["free"] - content["rank"] == len(content["unseen"]) == 2
     assert content["noise"]["joint"] > 0.0
-    assert content["held_out"]["dual-psd_rms_after"] < content["held_out"]["dual-psd_rms_before"]
+    assert content["held_out"]["dual-psd_rms_distance_after_m"] < content["held_out"]["dual-psd_rms_distance_before_m"]
     assert len(content["covariance"]["rows"]) == len(content["covariance"]["names"]) == 47
 
 

@@ -48,7 +48,7 @@ def answers(evidence: SessionEvidence) -> Answers:
         f"{model.poses} samples used of {len(evidence.recording.samples)}; {evidence.left_out} left out as faulty",
         f"{known} of {len(model.parameters)} parameters determined{rest}",
         *([determined(evidence)] if limits else []),
-        f"rows of the fit: {first.says(_rms(first.error_after))} rms",
+        f"rows of the fit: {first.says(_rms(first.error_after))} rms distance",
     )
     return Answers(session_verdict(evidence), (*_errors(evidence), anywhere(model.free_space)), limits, also)
 
@@ -58,10 +58,10 @@ def _errors(evidence: SessionEvidence) -> tuple[Number, Number]:
     first, proof = evidence.readings[0], next(iter(proofs(evidence.model)), None)
     if proof is None:
         before, after = _rms(first.error_before), _rms(first.error_after)
-        on = f"rms of {_what(first)}, those of the fit itself"
+        on = f"rms distance of {_what(first)}, those of the fit itself"
     else:
-        before, after = proof.rms_before, proof.rms_after
-        on = f"rms of {proof.observations} {_what(first)} that the fit has not seen"
+        before, after = proof.rms_distance_before_m, proof.rms_distance_after_m
+        on = f"rms distance of {proof.observations} {_what(first)} that the fit has not seen"
     gain = f"; {significant(before / after)} times better" if after > 0.0 else ""
     return (
         Number("as_drawn", "As drawn", before, first.unit, first.says(before), f"{on}; arm as the drawing says"),

@@ -71,7 +71,7 @@ def of_zeros(estimates, session):
 def test_a_bent_bracket_and_the_zeros_are_found_within_sigma(request, which, bent, seed):
     session = bent(seed)
     found = found_in(request.getfixturevalue(which), session)
-    assert found.instruments[0].rms_after < 1e-5
+    assert found.instruments[0].rms_distance_after_m < 1e-5
     assert np.all(np.abs(of_bracket(found.estimates)) < 4.5)
     zeros = of_zeros(found.estimates, session)
     assert set(zeros) == {2, 3, 4, 5}
@@ -80,7 +80,7 @@ def test_a_bent_bracket_and_the_zeros_are_found_within_sigma(request, which, ben
 
 def test_a_bracket_that_is_stated_exact_is_held_and_leaves_what_it_is_off(rig, bent):
     found = found_in(rig, bent(51))
-    assert found.instruments[0].rms_after > 3e-5
+    assert found.instruments[0].rms_distance_after_m > 3e-5
     assert not any(p.free for p in found.parameters if p.name in BRACKET)
 
 
@@ -100,7 +100,7 @@ def test_where_a_zero_has_a_links_turn_as_its_other_name_it_has_none(silent, ben
     found = found_in(silent, session, plan)
     why = {e.name: e.why for e in found.estimates}
     assert "only in combination: joint5.zero + link5." in why["joint5.zero"]
-    assert found.instruments[0].rms_after < 1e-5
+    assert found.instruments[0].rms_distance_after_m < 1e-5
 
 
 def test_a_plan_that_states_a_belief_makes_it_one(silent, bent):

@@ -59,7 +59,7 @@ def test_identified_predicted_and_exported_alike(rig, session, samples):
         assert result.status in USABLE, model
         values = {p.name: float(v) for p, v in zip(result.parameters, result.theta, strict=True)}
         (instrument,) = result.instruments
-        left[model] = instrument.rms_after
+        left[model] = instrument.rms_distance_after_m
         predicted = predict(Predictor(own, values, result.about, (instrument.name,)), seen)
         told[model] = np.stack([predicted[c] for c in sorted(set(predicted) - {"t_s"})])
         for form in ExportForm:
@@ -87,5 +87,5 @@ def test_zeros_by_the_dual_psd_do_not_depend_on_the_writing_but_what_they_are_me
         assert b.sigma_rad == pytest.approx(a.sigma_rad, rel=1e-3)
         assert c.value_rad == pytest.approx(a.value_rad, abs=1e-6)
         assert c.sigma_rad > 100.0 * a.sigma_rad  # six errors a link: x of a link is drawn, not the common normal
-    rms = [result.instruments[0].rms_after for result in found.values()]
+    rms = [result.instruments[0].rms_distance_after_m for result in found.values()]
     np.testing.assert_allclose(rms, rms[0], rtol=5e-3)

@@ -64,7 +64,7 @@ def test_spots_are_proved_by_every_split_and_raise_no_alarm(rig, samples):
         "each of 3 places in turn",
         "last 20% of the session",
     ]
-    assert all(u.rms_after < 1.2e-5 < 1e-3 < u.rms_before for u in found.held_out)
+    assert all(u.rms_distance_after_m < 1.2e-5 < 1e-3 < u.rms_distance_before_m for u in found.held_out)
     assert found.evidence.observability.n_free > 30
     assert found.alarms == ()
 

@@ -67,8 +67,8 @@ def test_three_numbers_as_drawn_now_and_anywhere(known):
     answers, proof = session_answers(known), known.model.proofs[0]
     assert [n.key for n in answers.numbers] == ["as_drawn", "now", "anywhere"]
     assert [n.value for n in answers.numbers] == [
-        proof.rms_before,
-        proof.rms_after,
+        proof.rms_distance_before_m,
+        proof.rms_distance_after_m,
         known.model.free_space.pose_p95_m,
     ]
 
