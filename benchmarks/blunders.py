@@ -17,13 +17,11 @@ from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
 from benchmarks.blundered import ROWS, WHOLE_FILE, Made, Mistake
 from benchmarks.healthy import INSTRUMENTS, Drawn
-from calibeam.any_session import asks_for_zeros
 from calibrate.arms.catalogue import arm_of
 from calibrate.blunders.conventions import strain_of
 from calibrate.blunders.witnesses import witnesses_of
 from calibrate.errors import DataError
 from calibrate.identification.identify import refuse_wrong_file, without_blunders
-from calibrate.identification.spots import without_blunders as without_bad_spots
 from calibrate.parameters import start_values
 
 REAL = ("ur5-tracker", "ur10-leica-a", "ur10-leica-b", "ur10-leica-d")
@@ -75,9 +73,7 @@ def told(rig: Rig, samples: Samples, *, rows: bool) -> tuple[str, frozenset[int]
         if not rows:
             refuse_wrong_file(rig, samples)
             return "", frozenset()
-        found = (
-            without_bad_spots(rig, samples)[1] if asks_for_zeros(rig, samples) else without_blunders(rig, samples)[2]
-        )
+        found = without_blunders(rig, samples)[2]
     except DataError as error:
         return str(error), frozenset()
     return "; ".join(b.says for b in found), frozenset(row for b in found for row in b.rows)

@@ -18,15 +18,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from acquisition.recording.columns import SPOTS
 from acquisition.recording.rig import load_rig
 from acquisition.recording.rig_schema import Placement, Pose, Rig
+from acquisition.recording.samples import Samples
 from benchmarks import rival_pinocchio
 from benchmarks.drawn_sessions import T_BASE_DEVICE, TARGET_M, Bench, frame
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.serial import SerialArm
 from calibrate.chain import Chain
-from calibrate.dual_psd_rig import believed_noise, dual_psd_chain
 from calibrate.fit import NEAR_START, solve
+from calibrate.identification.identify import identify
+from calibrate.identification.rounds import coarse_start, settled_fit
+from calibrate.identification.session import instruments_for_fit
 from calibrate.kernels import ready, serial
 from calibrate.kernels.__main__ import main as compile_loops
 from calibrate.kernels.position_fit import identify_positions
@@ -37,14 +41,13 @@ from calibrate.rigid import cross_matrix
 from calibrate.sensors.device import Device
 from calibrate.sensors.position import Position
 from calibrate.sensors.target import Target
-from calibrate.zeros.identify import fit_weighted, identify
 
 Floats = NDArray[np.float64]
 
 SIGMA_M = 20e-6
 JOINT_SIGMA_RAD = 3e-6
 UNITS = {"ns a pose": 1e9, "ms": 1e3, "s": 1.0}
-IMPORTS = "calibrate.identification.identify, calibrate.zeros.identify, calibrate.predict, calibrate.export.export"
+IMPORTS = "calibrate.identification.identify, calibrate.predict, calibrate.export.export"
 
 
 @dataclass(frozen=True)
@@ -210,20 +213,23 @@ def six_places(rig_file: Path, rig: Rig) -> tuple[Rig, Observations]:
 
 def _dual_psd(rig_file: Path, rig: Rig) -> Iterator[Row]:
     rig, data = six_places(rig_file, rig)
-    chain, believed = dual_psd_chain(rig, data.placement, data.first_psd), believed_noise(rig)
-    steady = replace(data, q_rad=np.concatenate([data.q_rad[:150], data.q_rad[:150]]))  # repeats of the same readings
-    kinds: dict[str, tuple[float | None, Callable[[], object]]] = {
-        "fit, rank and noise, 300 dual-PSD samples, 6 places": (20.0, lambda: fit_weighted(chain, data, believed)),
-        "the same, joints as if they had no noise": (None, lambda: fit_weighted(chain, steady, believed)),
-        "the first with what was before and held-out proof": (
-            None,
-            lambda: identify(chain, data, believed, rng=np.random.default_rng(0)),
-        ),
-    }
-    for what, (aim, work) in kinds.items():
-        with patch.object(ready, "worth", return_value=False):
-            by_numpy = {"by numpy": 1e3 * cpu_s(work, 7, 1)}
-        yield Row(what, "ms", 1e3 * cpu_s(work, 31, 3), aim, by_numpy)
+    samples = _spots_table(data)
+    instruments = instruments_for_fit(rig, samples)
+    weighting, start = instruments.weighting, instruments.start
+
+    def fitted() -> object:
+        return settled_fit(weighting, coarse_start(weighting, start))
+
+    yield Row("fit, rank and noise, 300 dual-PSD samples, 6 places", "ms", 1e3 * cpu_s(fitted, 7, 1), None, {})
+    whole = 1e3 * cpu_s(lambda: identify(rig, samples, rng=np.random.default_rng(0)), 3, 1)
+    yield Row("the same with gross errors, proofs and report figures", "ms", whole, None, {})
+
+
+def _spots_table(data: Observations) -> Samples:
+    columns = dict(zip(SPOTS, data.spots_m.T, strict=True))
+    columns |= {f"q{i}_rad": column for i, column in enumerate(data.q_rad.T, start=1)}
+    columns |= {"placement": data.placement.astype(np.float64), "first_psd": data.first_psd.astype(np.float64)}
+    return Samples({"t_s": np.arange(len(data), dtype=np.float64), **columns}, data.q_rad.shape[1])
 
 
 def _starting() -> Iterator[Row]:

@@ -13,8 +13,8 @@ from acquisition.recording.read import read
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
+from calibeam.any_session import identify_session
 from calibeam.direct import direct_bench
-from calibeam.identification import identify_recording
 from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibeam.reveal import Revealed, reveal
@@ -48,7 +48,7 @@ def _one(rig: Rig, plain_rig: Mapping[str, Any], rig_text: str, seed: int, folde
         home_rad = np.array(rig.motion.home_rad)
         session = Session(bench, FittedLearner(rig), journal, PlanOptions(seed=seed), home_rad)
         summary = session.run(tuple(rig.placements))
-    zeros = identify_recording(read(folder / "r.mcap")).zeros
+    zeros = identify_session(read(folder / "r.mcap")).zeros
     return SeedResult(seed, len(summary.samples), summary.skipped, reveal(zeros, folder / "truth.json"))
 
 

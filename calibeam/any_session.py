@@ -6,28 +6,14 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from acquisition.recording.columns import POSITION, SPOTS
 from acquisition.recording.fingerprint import readings_sha256
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import rig_sha256
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
 from calibrate.fit_plan import DEFAULT, FitPlan, read_plan
 from calibrate.identification.identify import identify
 from calibrate.identification.record import record_of
 from calibrate.identification.result import Identification
 from calibrate.model_file import ModelFile, RigIdentity, write_model
-
-OTHERS = (POSITION[0], "wire_m", "seat", "bar")  # columns of the instruments beside the dual PSD
-
-
-def asks_for_zeros(rig: Rig, samples: Samples) -> bool:
-    """Whether spots are all there is: such a session shows joint zeros but no length, and has a method of its own.
-
-    A known distance between placements gives the scale, so it is worth the whole fit.
-    """
-    others = any(name in samples and bool(np.any(np.isfinite(samples.column(name)))) for name in OTHERS)
-    return SPOTS[0] in samples and not others and not rig.known_distances
 
 
 @dataclass(frozen=True)
@@ -52,15 +38,20 @@ def identify_session(
     return identify(recording.rig, recording.samples, rng=rng, plan=plan, bootstrap_rounds=bootstrap_rounds)
 
 
-def write_session_model(
-    result: Identification, recording: Recording, path: Path, planned: Planned | None = None
-) -> ModelFile:
-    """model.json, with the rig in it."""
+def session_model(result: Identification, recording: Recording, planned: Planned | None = None) -> ModelFile:
+    """What model.json holds, with the rig in it."""
     text, rig = recording.rig_text, recording.rig
     told = Planned() if planned is None else planned
     arm_model = (told.plan.model or rig.arm.model).value
     identity, readings = RigIdentity(rig.name, rig_sha256(text), text), readings_sha256(recording.samples)
-    model = msgspec.structs.replace(record_of(result, identity, arm_model, told.text), readings_sha256=readings)
+    return msgspec.structs.replace(record_of(result, identity, arm_model, told.text), readings_sha256=readings)
+
+
+def write_session_model(
+    result: Identification, recording: Recording, path: Path, planned: Planned | None = None
+) -> ModelFile:
+    """Write model.json; returns its content."""
+    model = session_model(result, recording, planned)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_model(path, model)
     return model

@@ -11,17 +11,20 @@ from rich.console import Console
 
 from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
+from calibeam.any_session import identify_session, write_session_model
 from calibeam.diagnosis import diagnosed_to
 from calibeam.diagnosis_lines import print_diagnosis
-from calibeam.identification import Identified, identify_recording, write_identified
 from calibeam.outcome import PartialResult, interruption
-from calibeam.reporting import write_zero_report
-from calibeam.terminal import print_identified
+from calibeam.reporting import write_any_report
+from calibeam.session_table import print_identification
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.errors import DataError
+from calibrate.identification.result import Identification
+from calibrate.report.session_evidence import session_evidence
+from calibrate.report.session_verdict import session_verdict
 
 
-def conclude(recording_path: Path, console: Console) -> Identified:
+def conclude(recording_path: Path, console: Console) -> Identification:
     """Model, diagnosis, report into the recording's folder, which may be given for all its parts.
 
     PartialResult when that cannot be done.
@@ -43,15 +46,16 @@ def recording_kept(recording_path: Path) -> Generator[None]:
         ) from why
 
 
-def _concluded(recording_path: Path, console: Console) -> Identified:
+def _concluded(recording_path: Path, console: Console) -> Identification:
     recording, folder = read(recording_path), _folder_of(recording_path)
-    identified = identify_recording(recording)
-    write_identified(identified, recording, folder / "model.json")
-    print_identified(console, identified)
+    result = identify_session(recording)
+    model = write_session_model(result, recording, folder / "model.json")
+    print_identification(console, result, session_verdict(session_evidence(recording, model)), recording.rig)
+    console.print(f"model: {folder / 'model.json'}", markup=False)
     diagnosis = diagnosed(recording, folder / "diagnosis.json", console)
-    write_zero_report(identified, folder / "report.html", diagnosis)
+    write_any_report(recording, model, folder / "report.html", diagnosis)
     console.print(f"report: {folder / 'report.html'}", markup=False)
-    return identified
+    return result
 
 
 def _folder_of(recording_path: Path) -> Path:

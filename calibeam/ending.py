@@ -7,7 +7,7 @@ from pathlib import Path
 from calibeam.outcome import PartialResult
 from calibrate.errors import DataError
 from calibrate.fit import Status
-from calibrate.zeros.result import Estimate
+from calibrate.identification.estimates import Estimate
 
 UNFINISHED = (Status.OUT_OF_STEPS, Status.STALLED, Status.AT_BOUND)
 

@@ -1,12 +1,7 @@
 """Proofs of an identification as lines for a terminal."""
 
-from calibrate.identification.result import Evidence, FreeSpace, Identification, Unseen
+from calibrate.identification.result import Evidence, FreeSpace, Unseen
 from calibrate.observability import Observability
-
-
-def told_lines(proved: Identification) -> list[str]:
-    """Alarms, then all proofs."""
-    return [*(f"ALARM: {alarm}" for alarm in proved.alarms), *lines_of(proved.evidence)]
 
 
 def lines_of(evidence: Evidence) -> list[str]:
@@ -25,8 +20,9 @@ def lines_of(evidence: Evidence) -> list[str]:
 
 def _held_out(unseen: Unseen) -> str:
     return (
-        f"held out ({unseen.split}): {unseen.name}, {unseen.observations} rows, {1e3 * unseen.rms_before:.4g} mm "
-        f"rms before, {1e3 * unseen.rms_after:.4g} mm after"
+        f"held out ({unseen.split}): {unseen.name}, {unseen.observations} rows, "
+        f"{1e3 * unseen.rms_distance_before_m:.4g} mm rms distance before, "
+        f"{1e3 * unseen.rms_distance_after_m:.4g} mm after"
     )
 
 

@@ -6,19 +6,26 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from acquisition.recording.rig_schema import Rig
 from calibeam.evidence_lines import lines_of
 from calibeam.verdict_line import print_verdict
+from calibrate.default_belief import said_of
+from calibrate.identification.estimates import ONLY_BELIEVED, JointZero
 from calibrate.identification.evidence_record import parameter_records
+from calibrate.identification.point_constraint import PointConstraints
 from calibrate.identification.result import Identification
 from calibrate.model_file import ModelParameter
 from calibrate.report.verdict import Verdict
-from calibrate.zeros.result import ONLY_BELIEVED
 
+SPOTS = "dual-psd"
 UNITS = {"m": ("um", 1e6), "rad": ("urad", 1e6)}
 
 
-def print_identification(console: Console, result: Identification, judged: Verdict) -> None:
+def print_identification(console: Console, result: Identification, judged: Verdict, rig: Rig) -> None:
     """What was wrong with the file comes first, since all that follows is without these rows; last the verdict."""
+    of_spots = any(one.name == SPOTS for one in result.instruments)
+    if of_spots and (said := said_of(rig)) is not None:
+        console.print(said, highlight=False, markup=False)
     for blunder in result.blunders:
         console.print(f"left out: {blunder.says}", highlight=False, markup=False)
     for alarm in result.alarms:
@@ -36,7 +43,12 @@ def print_identification(console: Console, result: Identification, judged: Verdi
     believed = [e.name for e in result.estimates if e.why is not None and e.why.startswith(ONLY_BELIEVED)]
     if believed:
         console.print(f"  only the drawing speaks of: {', '.join(believed)}", highlight=False, markup=False)
-    _print_parameters(console, parameter_records(result.estimates, seen, result.evidence.bootstrap))
+    if of_spots:
+        _print_zeros(console, result.zeros)
+    listed = parameter_records(result.estimates, seen, result.evidence.bootstrap)
+    _print_parameters(console, tuple(p for p in listed if not (of_spots and p.name.endswith(".zero"))))
+    if result.point_constraints is not None:
+        _print_point_constraints(console, result.point_constraints)
     for line in (*_figures(result), *lines_of(result.evidence)):
         console.print(line, highlight=False, markup=False)
     print_verdict(console, judged)
@@ -51,6 +63,38 @@ def _print_parameters(console: Console, parameters: tuple[ModelParameter, ...]) 
     drawn = [p for p in known if p.bootstrap_sigma is not None]
     if drawn:
         _print_table(console, ("bootstrap sigma", "bootstrap 95 %"), drawn, _by_bootstrap)
+
+
+def _print_zeros(console: Console, zeros: tuple[JointZero, ...]) -> None:
+    """Of a session with spots, which is made for them; true angle = reading + zero."""
+    table = Table()
+    for heading in ("joint", "zero (deg)", "sigma (deg)", "sigma (urad)", "measurement alone (urad)"):
+        table.add_column(heading, justify="right")
+    for zero in zeros:
+        if zero.value_rad is None or zero.sigma_rad is None:
+            table.add_row(f"J{zero.joint}", "not determined", "-", "-", "-")
+            continue
+        alone = "-" if zero.measurement_sigma_rad is None else f"{1e6 * zero.measurement_sigma_rad:.1f}"
+        degrees, sigma = f"{np.degrees(zero.value_rad):+.5f}", f"{np.degrees(zero.sigma_rad):.5f}"
+        table.add_row(f"J{zero.joint}", degrees, sigma, f"{1e6 * zero.sigma_rad:.1f}", alone)
+    console.print(table)
+    for zero in zeros:
+        if zero.value_rad is None:
+            console.print(f"  J{zero.joint} not determined: {zero.why}", highlight=False, markup=False)
+
+
+def _print_point_constraints(console: Console, found: PointConstraints) -> None:
+    """The method beside the fit, in both forms."""
+    console.print("\nfor comparison: point constraint, Deng, Ding, Zhang 2019; links and laser as drawn")
+    at = f"at placement {found.placement}"
+    forms = (
+        (f"four poses {at}, as published", found.four_poses),
+        (f"all {found.poses} centred poses {at}", found.all_poses),
+    )
+    for says, result in forms:
+        seen = result.identifiability
+        console.print(f"{says}: rank {seen.rank} of {seen.n_free} unknowns", highlight=False)
+        _print_zeros(console, result.zeros)
 
 
 def _print_table(
@@ -87,7 +131,8 @@ def _cell(value: float | None, factor: float, sign: str = "") -> str:
 
 def _figures(result: Identification) -> list[str]:
     out = [
-        f"{one.name}: {1e3 * one.rms_before:.4g} mm rms with the arm as drawn, {1e3 * one.rms_after:.4g} mm after"
+        f"{one.name}: {1e3 * one.rms_distance_before_m:.4g} mm rms distance with the arm as drawn, "
+        f"{1e3 * one.rms_distance_after_m:.4g} mm after"
         for one in result.instruments
     ]
     for noise in result.noise:

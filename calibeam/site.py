@@ -19,12 +19,12 @@ from acquisition.streams import Pump
 from acquisition.supervisor import Supervisor
 from acquisition.wired import Pumps, Speeds, WiredBench
 from calibeam.encoders import emulated_encoders, encoder_driver
-from calibeam.identification import check_identifiable
 from calibeam.live.feed import PAGE_STOP, SILENT, Feed
 from calibeam.motion.gate_of_rig import gated_arm
 from calibeam.psd import PsdInstrument, emulated_psd, psd_driver, psd_view
 from calibeam.recorded import uninterrupted
 from calibeam.robot import emulated_robot, robot_of
+from calibrate.dual_psd_rig import fixture_of, laser_of
 from drivers.clock import Clock
 from drivers.device import Block, Device, Movable
 from drivers.errors import DeviceError, DeviceRefused
@@ -61,7 +61,8 @@ class Kept:
 
 def check_session(rig: Rig) -> None:
     """What a session needs of a rig beyond what every rig file has. DataError, RigFileError; no device is touched."""
-    check_identifiable(rig)
+    fixture_of(rig)  # said before an hour of measuring that could not be identified
+    laser_of(rig)
     if rig.motion.home_rad is None:
         raise RigFileError(
             f"rig {rig.name}: [motion] has no home_rad; give joint readings that are clear of everything"

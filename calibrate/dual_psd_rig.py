@@ -1,5 +1,7 @@
 """From the rig file to the dual-PSD chain that is fitted, and to the noise that is believed."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,13 +13,19 @@ from calibrate.errors import DataError
 from calibrate.rigid import transform
 from calibrate.sensors.dual_psd import DualPsd, Fixture
 from calibrate.sensors.laser import LaserMount
-from calibrate.zeros.identify import BelievedNoise
-from calibrate.zeros.point_constraint import DrawingDoubt
 
 PSD_BELIEVED_M = 2e-6  # a PSD in shop conditions (Deng, Ding, Zhang, Food & Machinery 2019(3))
 JOINT_BELIEVED_RAD = (
     1e-5  # 10 um at 1 m reach: repeatability class of small arms (calibration data sheets: 0.01-0.03 mm)
 )
+
+
+@dataclass(frozen=True)
+class BelievedNoise:
+    """One sigma as the rig file states it; a start value only."""
+
+    joint_rad: float
+    psd_m: float  # of a spot, where the samples state none
 
 
 def fixture_of(rig: Rig) -> Fixture:
@@ -48,12 +56,6 @@ def dual_psd_of(rig: Rig, placement: NDArray[np.int64], first_psd: NDArray[np.in
     """The instrument alone; gains and PSD 2 in PSD 1 free under the [tolerance] that doubts them."""
     gain = None if rig.tolerance is None else rig.tolerance.gain
     return DualPsd(laser_of(rig), fixture_of(rig), placement, first_psd, gain, pair_of(rig))
-
-
-def drawing_doubt(rig: Rig, line_m: float = 5e-6) -> DrawingDoubt:
-    """What the point constraint takes on trust; 5 um is how well the servo centres."""
-    links = links_of(rig)
-    return DrawingDoubt(line_m, links.length_sigma_m, links.angle_sigma_rad)
 
 
 def believed_noise(rig: Rig) -> BelievedNoise:

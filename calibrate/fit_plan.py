@@ -61,6 +61,14 @@ class InstrumentName(enum.Enum):
 Limit = Annotated[float, Meta(ge=0.0, le=1e12)]  # whitened and scaled, so that 1 is a noise or a plausible size
 
 
+class BesideName(enum.Enum):
+    """A method beside the fit, for comparison; the model stays that of the fit."""
+
+    POINT_CONSTRAINT = (
+        "point-constraint"  # joint zeros from centred poses: calibrate/identification/point_constraint.py
+    )
+
+
 class DogLeg(Struct, frozen=True, forbid_unknown_fields=True):
     """The numbers of Dog-Leg (calibrate/solvers/dogleg.py), each absent one as it is without a plan."""
 
@@ -81,6 +89,7 @@ class FitPlan(Struct, frozen=True, forbid_unknown_fields=True):
     free: Few[Name] = ()  # without an opinion of the drawing
     priors: Mapping[Name, Positive] = {}  # pattern -> one sigma about the drawing, m or rad; a later one wins
     hold: Few[Name] = ()  # as drawn; wins over `free` and `priors`
+    method: BesideName | None = None
     loss: LossName = LossName.LEAST_SQUARES
     solver: SolverName = SolverName.LEVENBERG
     dog_leg: DogLeg | None = field(name="dog-leg", default=None)
@@ -95,7 +104,7 @@ class FitPlan(Struct, frozen=True, forbid_unknown_fields=True):
         return LOSSES[self.loss]
 
     @property
-    def method(self) -> Method:
+    def algorithm(self) -> Method:
         return METHODS[self.solver]
 
     @property

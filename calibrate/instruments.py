@@ -32,6 +32,7 @@ from calibrate.sensors.bar import bar_pairs, consecutive_pairs, shared_correlati
 from calibrate.sensors.dual_psd import DualPsd
 from calibrate.sensors.full_pose import FullPose
 from calibrate.sensors.known_distance import KnownDistances
+from calibrate.sensors.lines import CENTRED_M
 from calibrate.sensors.pair import PairChain
 from calibrate.sensors.point_line import PointLine, meeting_points
 from calibrate.sensors.position import Position
@@ -39,7 +40,6 @@ from calibrate.sensors.seat import Seat, mean_tips
 from calibrate.sensors.tip_distance import TipDistance
 from calibrate.sensors.wire import Wire
 from calibrate.weighting import Measured, Weighting
-from calibrate.zeros.point_constraint import CENTRED_M
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -27,9 +27,9 @@ from acquisition.recording.bounds import (
 from acquisition.recording.errors import shown
 from acquisition.recording.json_file import JsonKind, read_json
 from calibrate.errors import DataError
+from calibrate.older_models import with_present_names
 from calibrate.parameters import Parameter
 from calibrate.physics.records import Effect, SessionRecord, check_physics
-from calibrate.zeros.result import ZeroResult
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -100,8 +100,8 @@ class UnseenRows(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     split: Label
     instrument: Label
     observations: Count
-    rms_before: Statistic
-    rms_after: Statistic
+    rms_distance_before_m: Statistic
+    rms_distance_after_m: Statistic
     chi_after: Statistic
 
 
@@ -175,8 +175,10 @@ class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     noise: Fields
     repeats: Fields | None
     held_out: Fields | None
-    rms_before_m: Statistic
-    rms_after_m: Statistic
+    rms_coordinate_before_m: Statistic
+    rms_coordinate_after_m: Statistic
+    rms_distance_before_m: Statistic
+    rms_distance_after_m: Statistic
     instruments: Many[Name] = ("dual-psd",)
     about: About = msgspec.field(default_factory=dict[Name, tuple[Metres, ...]])
     blunders: Many[LeftOut] = ()
@@ -201,34 +203,6 @@ class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 raise ValueError(f"about.{shown(name)} holds {len(numbers)} numbers instead of {max(sizes)}")
 
 
-def model_of(result: ZeroResult, rig: RigIdentity, arm_model: str) -> ModelFile:
-    """The record to write for a result."""
-    seen = result.identifiability
-    return ModelFile(
-        schema=SCHEMA,
-        kind="calibeam-model",
-        software=result.software,
-        rig=rig,
-        arm_model=arm_model,
-        status=result.status.name,
-        says=result.status.value,
-        poses=result.n_poses,
-        rank=seen.rank,
-        free=seen.n_free,
-        condition=seen.condition if np.isfinite(seen.condition) else None,
-        singular_values=tuple(seen.singular_values.tolist()),
-        unseen=tuple(Unseen(c.words, c.members, c.structural) for c in seen.combinations),
-        parameters=tuple(ModelParameter(e.name, e.unit, e.value, e.sigma, e.why) for e in result.estimates),
-        chain={p.name: float(v) for p, v in zip(result.parameters, result.theta, strict=True)},
-        covariance=covariance_record(result.parameters, result.covariance),
-        noise=fields_of(result.noise),
-        repeats=None if result.repeats is None else fields_of(result.repeats),
-        held_out=None if result.held_out is None else fields_of(result.held_out),
-        rms_before_m=result.rms_before_m,
-        rms_after_m=result.rms_after_m,
-    )
-
-
 def write_model(path: Path, model: ModelFile) -> None:
     """Write model.json, whole or not at all. OSError where the folder cannot be written."""
     partial = path.with_name(path.name + ".partial")
@@ -238,7 +212,7 @@ def write_model(path: Path, model: ModelFile) -> None:
 
 def read_model(path: Path) -> ModelFile:
     """Read model.json. DataError naming file, place and remedy where it is none or of another version."""
-    return read_json(path, KIND, ModelFile, _other)
+    return read_json(path, KIND, ModelFile, _other, with_present_names)
 
 
 def _other(content: dict[str, Any]) -> str | None:

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from calibrate import variance
 from calibrate.errors import naming_undetermined
 from calibrate.joint_problem import Block, JointProblem
-from calibrate.noise import parts_of
 from calibrate.parameters import Parameter, priors, start_values
 from calibrate.problem import Problem
 from calibrate.variance import FIXED, NoisyRows, VarianceFactors, as_believed, covariance_of
@@ -172,6 +171,15 @@ class Weighting:
             one = np.ones((1, block.rows, 1, 1))
             rows.append(NoisyRows(block.residual(own)[:, None], spread, one, (FIXED,)))
         return information, deviation, tuple(rows)
+
+
+def parts_of(by_joint: Floats, joint_rad: float, own_sigma: Floats) -> Floats:
+    """(2, row, k, k) covariance by joints, from d reading / d joints, and by the instrument's own sigmas (row, k)."""
+    arm = joint_rad**2 * by_joint @ np.swapaxes(by_joint, 1, 2)
+    own = np.zeros_like(arm)
+    each = range(own_sigma.shape[1])
+    own[:, each, each] = own_sigma**2
+    return np.stack([arm, own])
 
 
 def _thinned(instrument: Measured) -> Measured:

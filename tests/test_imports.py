@@ -29,8 +29,8 @@ def test_a_command_loads_no_library_of_another() -> None:
 def test_calibrate_loads_no_library_of_a_wire() -> None:
     """A fit runs where no port, bus or socket library is installed."""
     script = (
-        "import sys, calibrate.zeros.identify, calibrate.zeros.point_constraint, calibrate.dual_psd_rig, "
-        "calibrate.read_samples, acquisition.recording.read\n"
+        "import sys, calibrate.identification.identify, calibrate.identification.point_constraint, "
+        "calibrate.dual_psd_rig, calibrate.read_samples, acquisition.recording.read\n"
         f"print([name for name in {WIRE_LIBRARIES!r} if name in sys.modules])"
     )
     result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)

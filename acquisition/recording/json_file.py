@@ -14,6 +14,7 @@ T = TypeVar("T")
 
 LARGEST_BYTES = 32_000_000  # a model of 1,000 parameters has a covariance of 20 MB
 Check = Callable[[dict[str, Any]], str | None]
+Renewal = Callable[[dict[str, Any]], dict[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -26,10 +27,11 @@ class JsonKind:
     fault: type[Exception]
 
 
-def read_json(path: Path, kind: JsonKind, records: type[T], other: Check) -> T:
+def read_json(path: Path, kind: JsonKind, records: type[T], other: Check, renewed: Renewal | None = None) -> T:
     """The records of a file. `kind.fault` where it cannot be read, is damaged, or out of the bounds of its records.
 
     `other` is given the top level and returns what is wrong with it as a whole: another kind, another version.
+    `renewed` gives the top level of an earlier version its present keys.
     """
     data = _read(path, kind)
     try:
@@ -47,6 +49,8 @@ def read_json(path: Path, kind: JsonKind, records: type[T], other: Check) -> T:
     content = cast("dict[str, Any]", document)
     if (says := other(content)) is not None:
         raise kind.fault(f"{path}: {says}")
+    if renewed is not None:
+        content = renewed(content)
     try:
         return msgspec.convert(content, type=records)
     except msgspec.ValidationError as error:

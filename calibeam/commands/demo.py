@@ -12,9 +12,8 @@ from acquisition.recording.rig import load_rig, rig_text
 from calibeam.emulation import Emulation
 from calibeam.progress_bar import progress_bar
 from calibeam.recorded import new_recording, record_session
-from calibeam.reveal import reveal
+from calibeam.reveal import print_revealed, reveal
 from calibeam.site import addresses_of, check_session, connected
-from calibeam.terminal import print_revealed
 from drivers.clock import SystemClock
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"

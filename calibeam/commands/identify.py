@@ -8,15 +8,12 @@ from cyclopts import Parameter, validators
 from rich.console import Console
 
 from acquisition.recording.read import read
-from calibeam.any_session import Planned, asks_for_zeros, identify_session, write_session_model
+from calibeam.any_session import Planned, identify_session, write_session_model
 from calibeam.ending import naming, refuse_nothing, tell_unfinished
-from calibeam.identification import identify_recording, write_identified
 from calibeam.session_table import print_identification
-from calibeam.terminal import print_identified, print_unasked
 from calibrate.export.export import ExportForm, export_model
 from calibrate.fit import Status
-from calibrate.identification.planned import rig_as_planned, samples_as_planned
-from calibrate.identification.session import holds_spots
+from calibrate.identification.planned import rig_as_planned
 from calibrate.model_file import corrections, read_model
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_verdict import session_verdict
@@ -44,8 +41,8 @@ def identify_command(
 
     Checks the data and what can be determined, then fits. Every number has an uncertainty.
 
-    Spots of the dual PSD alone give joint zeros; positions, wire, cones, bars, full poses (several at once) the arm.
-    With a plan, or with --bootstrap, spots alone are fitted in the same way as all others.
+    Spots of the dual PSD show joint zeros, but no length; positions, wire, cones, bars, full poses (several at once)
+    the whole arm.
 
     Example: calibeam identify out/demo/recording.mcap --out model.json
 
@@ -83,23 +80,13 @@ def _identify(
     export: tuple[ExportForm, ...],
 ) -> Status:
     source = read(recording)
-    if asks_for_zeros(source.rig, source.samples) and planned.text is None and not bootstrap:
-        identified = identify_recording(source)
-        status = identified.zeros.status
-        refuse_nothing(status, identified.zeros.estimates)
-        write_identified(identified, source, out)
-        print_identified(console, identified)
-    else:
-        result = identify_session(source, planned, bootstrap)
-        status = result.status
-        refuse_nothing(status, result.estimates)
-        model = write_session_model(result, source, out, planned)
-        if holds_spots(samples_as_planned(source.samples, planned.plan)):
-            print_unasked(console, source.rig)
-        print_identification(console, result, session_verdict(session_evidence(source, model)))
+    result = identify_session(source, planned, bootstrap)
+    refuse_nothing(result.status, result.estimates)
+    model = write_session_model(result, source, out, planned)
+    print_identification(console, result, session_verdict(session_evidence(source, model)), source.rig)
     console.print(f"model: {out}", markup=False)
     for form in export:
         beside = out.with_name(out.stem + SUFFIX[form])
         export_model(beside, rig_as_planned(source.rig, planned.plan), corrections(read_model(out)), form)
         console.print(f"{form.value}: {beside}", markup=False)
-    return status
+    return result.status

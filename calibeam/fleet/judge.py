@@ -104,7 +104,7 @@ def _noise(fields: Fields) -> list[tuple[str, float]]:
 def _held_out(model: ModelFile) -> tuple[float | None, float | None]:
     """Of the first instrument under the first split, before and after."""
     first = next((p for p in model.proofs if p.instrument == model.instruments[0]), None)
-    return (None, None) if first is None else (first.rms_before, first.rms_after)
+    return (None, None) if first is None else (first.rms_distance_before_m, first.rms_distance_after_m)
 
 
 def _diagnosed(recording: Recording) -> dict[str, Any]:

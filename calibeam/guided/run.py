@@ -65,8 +65,8 @@ def run_guided(
         highlight=False,
     )
     if conclude:
-        from calibeam.guided.conclude import conclude_guided  # a second of libraries that no device waits for
+        from calibeam.conclude import conclude as concluded  # a second of libraries that no device waits for
 
-        conclude_guided(recording, console)
+        concluded(recording, console)
     else:
         console.print(f"next: calibeam verify {recording} --model model.json", highlight=False, markup=False)

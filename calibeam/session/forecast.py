@@ -1,7 +1,7 @@
 """What a session's samples tell so far, and how many more of its poses make it accurate enough.
 
 The error is that of the beam in free space, as the covariance of the fit so far predicts it: the same fit, noise and
-target as identification and pose design have (calibrate/zeros/identify.py, calibrate/pose_design), at the values and
+target as identification and pose design have (calibrate/identification, calibrate/pose_design), at the values and
 under the noise found so far. What these samples cannot tell is said instead of a number.
 """
 
@@ -15,18 +15,17 @@ from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
 from acquisition.sample import Sample
 from calibrate.arms.catalogue import arm_of
-from calibrate.dual_psd_rig import believed_noise, dual_psd_chain
 from calibrate.fit import Status
 from calibrate.identifiability import Identifiability, analyse
+from calibrate.identification.rounds import Fitted, coarse_start, settled_fit
 from calibrate.identification.session import instruments_for_fit
 from calibrate.parameters import Parameter, index_of, priors, start_values
 from calibrate.pose_design.candidates import Candidates
 from calibrate.pose_design.information import NO_OPINION, Information
 from calibrate.pose_design.target import target_of
-from calibrate.read_samples import SIGMA_COLUMNS, observations
+from calibrate.read_samples import SIGMA_COLUMNS
 from calibrate.uncertainty.free_space import FELT_M
 from calibrate.variance import VarianceFactors
-from calibrate.zeros.identify import Weighted, fit_weighted
 
 Floats = NDArray[np.float64]
 
@@ -75,7 +74,7 @@ def forecast(rig: Rig, taken: list[Sample], ahead: Candidates, goal_m: float) ->
         return replace(nothing, why="these poses are too few, or too alike")
 
 
-def _told(rig: Rig, rows: Samples, fitted: Weighted, nothing: Forecast) -> Forecast:
+def _told(rig: Rig, rows: Samples, fitted: Fitted, nothing: Forecast) -> Forecast:
     """The numbers, or why there is none."""
     names = {p.name: float(v) for p, v in zip(fitted.fit.parameters, fitted.fit.theta, strict=True)}
     found, seen, felt_m = _information(rig, rows, names, fitted.factors, nothing.samples)
@@ -130,9 +129,9 @@ def _falling(found: Information, taken: int) -> Floats:
     return np.array(out)
 
 
-def _fitted(rig: Rig, samples: Samples) -> Weighted:
-    data = observations(samples)
-    return fit_weighted(dual_psd_chain(rig, data.placement, data.first_psd), data, believed_noise(rig))
+def _fitted(rig: Rig, samples: Samples) -> Fitted:
+    instruments = instruments_for_fit(rig, samples)
+    return settled_fit(instruments.weighting, coarse_start(instruments.weighting, instruments.start))
 
 
 def _table(taken: list[Sample], ahead: Candidates) -> Samples:

@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 from acquisition.recording.columns import SPOTS
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
+from calibrate.arms.catalogue import arm_of
 from calibrate.blunders.finding import Blunder, BlunderKind
 from calibrate.blunders.witness import thinned
-from calibrate.dual_psd_rig import believed_noise, dual_psd_chain
-from calibrate.observations import Observations
-from calibrate.read_samples import observations
-from calibrate.zeros.identify import fit_weighted
+from calibrate.default_belief import links_of
+from calibrate.identification.rounds import coarse_start, settled_fit
+from calibrate.instruments import instruments_of
+from calibrate.parameters import start_values
+from calibrate.weighting import Weighting
 
 Floats = NDArray[np.float64]
 
@@ -32,15 +34,16 @@ def mirrored_axes(rig: Rig, samples: Samples) -> Blunder | None:
     """The axes whose other sign explains the spots when those of the file do not; None if they do, or without spots."""
     if not all(name in samples for name in SPOTS):
         return None
-    data = observations(samples)
-    if len(data) < FEWEST_POSES:
+    spots = samples.spots()
+    lit = np.flatnonzero(np.all(np.isfinite(np.zeros((0, 4)) if spots is None else spots), axis=1))
+    if len(lit) < FEWEST_POSES:
         return None
-    data = data.select(thinned(np.arange(len(data))))
-    before_m = _usual_misfit_m(rig, data)
+    weighting = _spots_alone(rig, samples.take(lit[thinned(np.arange(len(lit)))]))
+    before_m = _usual_misfit_m(weighting, np.ones(len(SPOTS)))
     if before_m < GROSS_M:
         return None
     patterns = [signs for signs in product((1.0, -1.0), repeat=len(SPOTS)) if min(signs) < 0.0]
-    left_m = [_usual_misfit_m(rig, replace(data, spots_m=data.spots_m * np.array(signs))) for signs in patterns]
+    left_m = [_usual_misfit_m(weighting, np.array(signs)) for signs in patterns]
     best_m = min(left_m)
     if not before_m > GAIN * best_m:
         return None
@@ -51,13 +54,20 @@ def mirrored_axes(rig: Rig, samples: Samples) -> Blunder | None:
     return Blunder(BlunderKind.MIRRORED_AXIS, (), f"column {best}", f"{what} as written){rivals}", remedy)
 
 
-def _usual_misfit_m(rig: Rig, data: Observations) -> float:
+def _spots_alone(rig: Rig, samples: Samples) -> Weighting:
+    found = instruments_of(samples, rig, arm=arm_of(rig, links_of(rig))).weighting
+    return replace(found, measured=tuple(m for m in found.measured if m.name == "dual-psd"), known=())
+
+
+def _usual_misfit_m(weighting: Weighting, signs: Floats) -> float:
     """Median length of what the best fit leaves of two spots; infinite where no light goes that way."""
-    chain = dual_psd_chain(rig, data.placement, data.first_psd)
-    theta = fit_weighted(chain, data, believed_noise(rig)).fit.theta
-    if not np.all(np.isfinite(theta)):
+    (spots,) = weighting.measured
+    problem = replace(spots.problem, observed=spots.problem.observed * signs)
+    turned = replace(weighting, measured=(replace(spots, problem=problem),))
+    fitted = settled_fit(turned, coarse_start(turned, start_values(turned.parameters)))
+    if not np.all(np.isfinite(fitted.fit.theta)):
         return float("inf")
-    misfit = np.linalg.norm(chain.expect(theta, data.q_rad) - data.spots_m, axis=1)
+    misfit = np.linalg.norm(problem.misfit(fitted.problem.of_block(0, fitted.fit.theta)), axis=1)
     return float(np.median(misfit)) if np.all(np.isfinite(misfit)) else float("inf")
 
 

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.identifiability import Identifiability
+from calibrate.identification.estimates import Estimate
 from calibrate.identification.result import Evidence, FreeSpace
 from calibrate.model_file import BootstrapRecord, FreeSpaceRecord, ModelParameter, ObservabilityRecord, UnseenRows
 from calibrate.observability import Observability
 from calibrate.uncertainty.bootstrap import Bootstrap
-from calibrate.zeros.result import Estimate
 
 REACH_95 = 1.959963984540054  # of a normal law: half of a 95 % interval in sigmas
 
@@ -29,7 +29,7 @@ def evidence_fields(evidence: Evidence) -> EvidenceFields:
     """All of it, as written."""
     drawn, shown, room = evidence.bootstrap, evidence.observability, evidence.free_space
     proofs = tuple(
-        UnseenRows(u.split, u.name, u.observations, u.rms_before, u.rms_after, u.chi_after)
+        UnseenRows(u.split, u.name, u.observations, u.rms_distance_before_m, u.rms_distance_after_m, u.chi_after)
         for u in evidence.proven.held_out
     )
     return EvidenceFields(

@@ -12,6 +12,7 @@ from acquisition.recording.samples import Samples
 from calibrate.blunders.finding import Blunder
 from calibrate.fit import FAR_START, Fit, Status
 from calibrate.identifiability import Identifiability
+from calibrate.identification.estimates import HELD, ONLY_BELIEVED, Estimate, estimate_of, untold
 from calibrate.identification.evidence import Asked, evidence_of, rows_used
 from calibrate.identification.held_out import lengths
 from calibrate.identification.pull import TOLD, pull_along
@@ -23,13 +24,11 @@ from calibrate.uncertainty.chi_square import RepeatNoise, against_repeats, again
 from calibrate.uncertainty.likelihood import minus_2_log_likelihood
 from calibrate.unseen_along import analyse_along
 from calibrate.weighting import JOINT
-from calibrate.zeros.estimates import estimate_of, untold
-from calibrate.zeros.identify import LEAST_DOF
-from calibrate.zeros.result import HELD, ONLY_BELIEVED, Estimate
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+LEAST_DOF = 3.0  # a Satterthwaite number below this is itself a guess
 ONLY_PRIOR = 2.0 / np.sqrt(5.0)  # of a prior sigma: the data alone know it to twice that, see identifiability.WEAK
 
 
@@ -52,6 +51,7 @@ def result_of(
         seen,
         tuple(_found(fitted, i, before.theta) for i in range(len(fitted.weighting.measured))),
         noise,
+        fitted.factors.converged,
         against_stated(_as_stated(fitted)),
         _repeats(fitted, samples.integers("repeat", -1) if "repeat" in samples else None),
         evidence_of(fitted, seen, before, noise, rig, samples, asked, rng),
@@ -129,8 +129,10 @@ def _noise(fitted: Fitted) -> tuple[Noise, ...]:
     if weighting.joint_rad > NEGLIGIBLE_RAD:
         believed[JOINT] = weighting.joint_rad
     return tuple(
-        Noise(name, believed[name], believed[name] * float(f), believed[name] * float(s))
-        for name, f, s in zip(weighting.sources, factors.factor, factors.factor_sigma, strict=True)
+        Noise(name, believed[name], believed[name] * float(f), believed[name] * float(s), at_zero)
+        for name, f, s, at_zero in zip(
+            weighting.sources, factors.factor, factors.factor_sigma, factors.at_zero, strict=True
+        )
         if name in believed
     )
 

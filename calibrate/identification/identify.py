@@ -27,14 +27,15 @@ from calibrate.blunders.spot_signs import mirrored_axes
 from calibrate.blunders.witnesses import witnesses_of
 from calibrate.errors import DataError
 from calibrate.estimator import Estimator
-from calibrate.fit_plan import DEFAULT, FitPlan
+from calibrate.fit_plan import DEFAULT, BesideName, FitPlan
 from calibrate.identification.clean import clean, refuse_most, rows_of
 from calibrate.identification.evidence import Asked
 from calibrate.identification.fit_report import result_of
 from calibrate.identification.held_out import Splitting
 from calibrate.identification.planned import rig_as_planned, samples_as_planned
+from calibrate.identification.point_constraint import point_constraints
 from calibrate.identification.result import Identification
-from calibrate.identification.rounds import settled_fit
+from calibrate.identification.rounds import coarse_start, settled_fit
 from calibrate.identification.session import instruments_for_fit, standing_at
 from calibrate.instruments import Instruments
 from calibrate.parameters import start_values
@@ -60,12 +61,16 @@ def identify(
     """
     rig, samples = rig_as_planned(rig, plan), samples_as_planned(samples, plan)
     weighting, start, blunders = without_blunders(rig, samples, plan)
-    by = Estimator(plan.method, plan.robust_loss, plan.rules)
-    fitted = settled_fit(weighting, start, plan.of_redundant, by)
+    by = Estimator(plan.algorithm, plan.robust_loss, plan.rules)
+    fitted = settled_fit(weighting, coarse_start(weighting, start), plan.of_redundant, by)
     share = plan.share if held_out_share is None else held_out_share
     rounds = plan.bootstrap if bootstrap_rounds is None else bootstrap_rounds
     asked = Asked(Splitting(share, plan.splits), rounds)
-    return result_of(fitted, blunders, rig, samples, asked=asked, rng=rng)
+    result = result_of(fitted, blunders, rig, samples, asked=asked, rng=rng)
+    if plan.method is not BesideName.POINT_CONSTRAINT:
+        return result
+    kept = np.setdiff1d(np.arange(len(samples)), rows_of(blunders))
+    return replace(result, point_constraints=point_constraints(rig, samples.take(kept)))
 
 
 def without_blunders(
@@ -76,7 +81,7 @@ def without_blunders(
     early = _with_left_alone(samples, (*impossible_rows(rig, samples), *_sessions_apart(rig, samples)))
     instruments = _instruments_without(rig, samples, early, plan)
     _refuse_positions(instruments)
-    weighting, late = clean(instruments.weighting, instruments.start)
+    weighting, late = clean(instruments.weighting, coarse_start(instruments.weighting, instruments.start))
     every = _with_left_alone(samples, early + late)
     if len(every) > len(early) + len(late):
         weighting = weighting.take(np.setdiff1d(np.arange(len(samples)), rows_of(every)))

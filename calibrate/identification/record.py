@@ -7,7 +7,7 @@ from calibrate.fit_plan import LOSSES, METHODS
 from calibrate.identification.evidence_record import evidence_fields, parameter_records
 from calibrate.identification.result import FitEnd, Identification
 from calibrate.model_file import (
-    SCHEMA,
+    WITH_PHYSICS,
     Fields,
     FitRecord,
     LeftOut,
@@ -23,7 +23,7 @@ def record_of(result: Identification, rig: RigIdentity, arm_model: str, plan: st
     """The record to write. Of several instruments, `rms_...` are of the first; `plan` is the text of the fit plan."""
     seen, first = result.identifiability, result.instruments[0]
     return ModelFile(
-        schema=SCHEMA,
+        schema=WITH_PHYSICS,
         kind="calibeam-model",
         software=result.software,
         rig=rig,
@@ -42,8 +42,10 @@ def record_of(result: Identification, rig: RigIdentity, arm_model: str, plan: st
         noise=_noise(result),
         repeats=None if result.repeats is None else _plain(fields_of(result.repeats)),
         held_out=_held_out(result),
-        rms_before_m=first.rms_before,
-        rms_after_m=first.rms_after,
+        rms_coordinate_before_m=first.rms_coordinate_before_m,
+        rms_coordinate_after_m=first.rms_coordinate_after_m,
+        rms_distance_before_m=first.rms_distance_before_m,
+        rms_distance_after_m=first.rms_distance_after_m,
         instruments=tuple(i.name for i in result.instruments),
         about=result.about,
         blunders=tuple(left_out(b) for b in result.blunders),
@@ -68,25 +70,30 @@ def fit_record(end: FitEnd) -> FitRecord:
 
 
 def _noise(result: Identification) -> Fields:
-    """Flat: `<source>_believed`, `<source>`, `<source>_sigma`, and chi-square against the noise as stated."""
+    """Flat: `<source>_believed`, `<source>`, `<source>_sigma`, `<source>_at_zero`, and chi-square as stated."""
     out: Fields = {}
     for noise in result.noise:
         out |= {f"{noise.source}_believed": noise.believed, noise.source: noise.found}
-        out[f"{noise.source}_sigma"] = noise.sigma
+        out |= {f"{noise.source}_sigma": noise.sigma, f"{noise.source}_at_zero": noise.at_zero}
     stated = result.stated_noise
     p = stated.p_above if np.isfinite(stated.p_above) else None
-    return out | {"chi2_stated": stated.chi2, "dof": stated.dof, "p_stated": p, "alarm": stated.alarm.name}
+    return (
+        out
+        | {"chi2_stated": stated.chi2, "dof": stated.dof, "p_stated": p, "alarm": stated.alarm.name}
+        | {"settled": result.noise_settled}
+    )
 
 
 def _held_out(result: Identification) -> Fields | None:
-    """Flat, of the first split: its words once, then `<instrument>_rms_before`, `_rms_after`, `_observations`."""
+    """Flat, of the first split: its words once, then count and distances before and after of each instrument."""
     if not result.held_out:
         return None
     first = result.held_out[0]
     out: Fields = {"split": first.split, "chi_after": first.chi_after}
     for one in (unseen for unseen in result.held_out if unseen.split == first.split):
-        out |= {f"{one.name}_observations": one.observations, f"{one.name}_rms_before": one.rms_before}
-        out[f"{one.name}_rms_after"] = one.rms_after
+        out[f"{one.name}_observations"] = one.observations
+        out[f"{one.name}_rms_distance_before_m"] = one.rms_distance_before_m
+        out[f"{one.name}_rms_distance_after_m"] = one.rms_distance_after_m
     return out
 
 

@@ -1,6 +1,7 @@
 """An identified arm with everything that must travel with it."""
 
 from dataclasses import dataclass
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,15 +9,18 @@ from numpy.typing import NDArray
 from calibrate.blunders.finding import Blunder
 from calibrate.fit import LossKind, Method, Status, Stop
 from calibrate.identifiability import Identifiability
+from calibrate.identification.estimates import Estimate, JointZero, joint_zeros
+from calibrate.identification.point_constraint import PointConstraints
 from calibrate.identification.scale import scale_alarms
 from calibrate.observability import Observability
 from calibrate.parameters import Parameter
 from calibrate.uncertainty.bootstrap import Bootstrap
 from calibrate.uncertainty.chi_square import Alarm, RepeatNoise, StatedNoise
 from calibrate.uncertainty.free_space import FreeSpaceError, Scatter
-from calibrate.zeros.result import Estimate
 
 Floats = NDArray[np.float64]
+
+POSE, POSITION = 6, 3  # values of a reading: x, y, z (m), then a turn (rad), which does not add to a length
 
 
 @dataclass(frozen=True)
@@ -27,29 +31,45 @@ class Noise:
     believed: float
     found: float
     sigma: float
+    at_zero: bool = False  # too small to be told from none: `found` is no size, only small
 
 
 @dataclass(frozen=True)
 class InstrumentFound:
-    """One instrument in the fit. An rms is over observations, of the length of the misfit (3-D error of a position)."""
+    """One instrument in the fit. A distance is the length of an observation's misfit (3-D error of a position)."""
 
     name: str
     observations: int
-    rms_before: float  # arm nominal, places and target refitted
-    rms_after: float
+    rms_distance_before_m: float  # arm nominal, places and target refitted
+    rms_distance_after_m: float
     rows: NDArray[np.intp]  # (obs, m) of the samples, from 0
     misfit: Floats  # (obs, k) expected minus observed, after
+
+    @property
+    def coordinates(self) -> int:
+        """That make up a distance: of a pose those of its position."""
+        k = self.misfit.shape[1]
+        return POSITION if k == POSE else k
+
+    @property
+    def rms_coordinate_before_m(self) -> float:
+        """The same of single coordinates."""
+        return self.rms_distance_before_m / sqrt(self.coordinates)
+
+    @property
+    def rms_coordinate_after_m(self) -> float:
+        return self.rms_distance_after_m / sqrt(self.coordinates)
 
 
 @dataclass(frozen=True)
 class Unseen:
-    """Error of one instrument on observations that the fit has not seen; rms as in InstrumentFound."""
+    """Error of one instrument on observations that the fit has not seen; distances as in InstrumentFound."""
 
     name: str
     split: str
     observations: int
-    rms_before: float
-    rms_after: float
+    rms_distance_before_m: float
+    rms_distance_after_m: float
     chi_after: float  # rms of the whitened prediction error of all instruments together, near 1
 
 
@@ -104,6 +124,7 @@ class Identification:
     identifiability: Identifiability
     instruments: tuple[InstrumentFound, ...]
     noise: tuple[Noise, ...]
+    noise_settled: bool  # False: the sizes of the noise did not converge, and every sigma is a guess
     stated_noise: StatedNoise  # chi-square under the noise as believed
     repeats: RepeatNoise | None  # of the first instrument that repeated poses
     evidence: Evidence
@@ -114,6 +135,12 @@ class Identification:
     n_samples: int  # rows that took part
     end: FitEnd
     software: str
+    point_constraints: PointConstraints | None = None  # the method beside the fit, where the plan asks for it
+
+    @property
+    def zeros(self) -> tuple[JointZero, ...]:
+        """Joint zeros; none where the arm has no such parameters."""
+        return joint_zeros(self.estimates, self.parameters, self.covariance)
 
     @property
     def held_out(self) -> tuple[Unseen, ...]:

@@ -1,4 +1,7 @@
-"""Fit and weights in turn: rank, what is redundant, least squares, and the noise that the residuals then show."""
+"""Fit and weights in turn: rank, what is redundant, least squares, and the noise that the residuals then show.
+
+There are two starts: first what no prior speaks of (zeros, places, targets), with the links as drawn, then everything.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -6,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.estimator import LEAST_SQUARES, Estimator
-from calibrate.fit import FAR_START, NEAR_START, Fit, Status
+from calibrate.fit import FAR_START, NEAR_START, Fit, Status, solve
 from calibrate.identifiability import Identifiability, analyse
 from calibrate.joint_problem import Block, JointProblem
 from calibrate.kernels.position_fit import short_jacobian
-from calibrate.parameters import plausible_sizes
+from calibrate.parameters import hold, plausible_sizes
 from calibrate.problem import Problem
 from calibrate.redundant import Redundant, reduced
 from calibrate.solvers.loss import Loss
@@ -20,6 +23,7 @@ from calibrate.weighting import Weighting
 Floats = NDArray[np.float64]
 
 ROUNDS = 6  # of weights and fit in turn
+COARSE = 1e-2  # of chi2, a tenth of a sigma: a start need not be better
 SETTLED = 0.02  # of every log variance between two rounds: 1 % of a sigma
 BLUNT_ROUNDS = 8  # of least distances, to come away from a start that bad rows have pulled
 WARY_ROUNDS = 12  # of letting go of far rows
@@ -58,6 +62,22 @@ def settled_fit(
         if change < SETTLED and fitted.seen.rank == rank:
             break
     return replace(fitted, steps=steps)
+
+
+def coarse_start(weighting: Weighting, start: Floats) -> Floats:
+    """(param,) large errors without small ones to hide in: what a prior speaks of stays at `start` (param,).
+
+    A joint zero of degrees must not be explained by links that are off their drawing. `start` as it is where nothing
+    has a prior, or where the fit is not finite.
+    """
+    problem = weighting.problem(start)
+    believed = {p.name for p in problem.parameters if p.free and np.isfinite(p.prior)}
+    rest = problem.with_parameters(hold(problem.parameters, believed))
+    if not believed or not any(p.free for p in rest.parameters):
+        return start
+    seen = analyse(short_jacobian(rest.fulfilled(start), start, rest.parameters), rest.parameters)
+    fit = solve(rest.with_parameters(reduced(rest.parameters, seen)), start=start, tolerance=COARSE)
+    return start if fit.status is Status.NOT_FINITE else fit.theta
 
 
 def wary_fit(weighting: Weighting, start: Floats) -> Floats:

@@ -10,7 +10,7 @@ from calibrate.kernels.ready import available, state_ready
 
 def compile_all() -> None:
     """Call every compiled loop on one pose of an arm of one joint; numba keeps what it compiled."""
-    from calibrate.kernels import compiled, dual_psd_loops
+    from calibrate.kernels import compiled
 
     fixed, offset, q = np.tile(np.eye(4), (2, 1, 1)), np.zeros(1), np.zeros((1, 1))
     frames, twists, point = np.zeros(1, dtype=np.intp), np.zeros((1, 6)), np.zeros(3)
@@ -21,11 +21,6 @@ def compile_all() -> None:
     for add_up, shape in ((True, (12, 12)), (False, (33, 1))):
         out = np.zeros(shape)
         compiled.position_rows(fixed, offset, frames, twists, point, device, deviation, q, seen, weight, out, add_up)
-    arm, beam = (fixed, np.ones((1, 1)), np.zeros((1, 1)), frames, twists), (point, point, np.zeros((0, 3)), np.ones(4))
-    faces, group = np.tile(np.eye(4), (2, 2, 1, 1)), np.zeros(1, dtype=np.int64)
-    motions = np.empty((0, 2, 0, 6)), np.empty((0, 0), dtype=np.intp), False
-    spots, whitener, out = np.zeros((1, 4)), np.eye(4)[None].copy(), np.zeros((2, 4, 1))
-    dual_psd_loops.rows(*arm, *beam, faces, *motions, group, whitener, spots, out)
     _compile_error_simulation()
 
 

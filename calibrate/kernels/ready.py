@@ -9,7 +9,7 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
-SOURCES = tuple(Path(__file__).with_name(name) for name in ("compiled.py", "dual_psd_loops.py", "perturbed_loops.py"))
+SOURCES = tuple(Path(__file__).with_name(name) for name in ("compiled.py", "perturbed_loops.py"))
 
 WORTH_POSES = 256  # below, a single fit is over before numba is imported (0.3 to 0.4 s, once a process)
 

@@ -29,6 +29,7 @@ from calibrate.effects.term import Size
 from calibrate.errors import DataError
 from calibrate.identifiability import Identifiability, analyse
 from calibrate.identification.record import left_out
+from calibrate.identification.result import POSE, POSITION
 from calibrate.identification.session import about_of
 from calibrate.model_file import (
     WITH_PHYSICS,
@@ -87,8 +88,10 @@ def model_of_diagnosis(found: Diagnosed, recording: Recording) -> ModelFile:
         noise=_noise(fit),
         repeats=None,
         held_out=None,
-        rms_before_m=_rms(before),
-        rms_after_m=_rms(fit),
+        rms_coordinate_before_m=_rms(before)[0],
+        rms_coordinate_after_m=_rms(fit)[0],
+        rms_distance_before_m=_rms(before)[1],
+        rms_distance_after_m=_rms(fit)[1],
         instruments=tuple(m.name for m in fit.session.measured),
         about=about_of(fit.session.weighting),
         blunders=tuple(left_out(b) for b in found.blunders),
@@ -290,11 +293,13 @@ def _normal_size(squares: Floats, k: int) -> float:
     return size
 
 
-def _rms(fit: Fitted) -> float:
-    """Of the lengths of the misfits of the first instrument."""
+def _rms(fit: Fitted) -> tuple[float, float]:
+    """Of single coordinates and of the lengths of the misfits, of the first instrument."""
     m, rows = fit.session.measured[0], fit.problem.rows[0]
     misfit = m.problem.observed[rows] - fit.around.expected[0][rows]
-    return float(np.sqrt(np.mean(np.sum(misfit**2, axis=1))))
+    misfit = misfit[:, :POSITION] if misfit.shape[1] == POSE else misfit
+    distance = float(np.sqrt(np.mean(np.sum(misfit**2, axis=1))))
+    return distance / float(np.sqrt(misfit.shape[1])), distance
 
 
 def _as_listed(

@@ -41,7 +41,7 @@ def proofs(model: ModelFile) -> tuple[UnseenRows, ...]:
         return model.proofs
     out: list[UnseenRows] = []
     for name in model.instruments:
-        before, after = _number(held, f"{name}_rms_before"), _number(held, f"{name}_rms_after")
+        before, after = _number(held, f"{name}_rms_distance_before_m"), _number(held, f"{name}_rms_distance_after_m")
         if before is None or after is None:
             continue
         count, chi = int(_number(held, f"{name}_observations") or 0), _number(held, "chi_after")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from calibrate.believed import BelievedRig
 from calibrate.dual_psd_rig import fixture_of
 from calibrate.observations import Observations
-from calibrate.report.evidence import Evidence
+from calibrate.report.spot_session import SpotSession
 from calibrate.rigid import pose_offset
 from calibrate.sensors.dual_psd import AXES
 
@@ -37,9 +37,9 @@ class FittedRig:
         return points if first_psd == 1 else points[::-1]
 
 
-def fitted_rig(evidence: Evidence) -> FittedRig:
+def fitted_rig(session: SpotSession) -> FittedRig:
     """DataError for a rig without laser or fixture."""
-    rig, corrections = evidence.recording.rig, evidence.corrections
+    rig, corrections = session.rig, session.corrections
     fixture = fixture_of(rig)
     pair = pose_offset(np.array([corrections.get(f"psd2.{axis}", 0.0) for axis in AXES]))
     return FittedRig(BelievedRig(rig, corrections), fixture.T_psd1_psd2 @ pair, fixture.half_size_m)

@@ -119,9 +119,10 @@ def session_evidence(recording: Recording, model: ModelFile) -> SessionEvidence:
     before = _places_only(weighting, problem, model, theta)
     readings = tuple(r for i in range(len(weighting.measured)) for r in _readings(weighting, problem, i, before, theta))
     rms = float(np.sqrt(np.mean(readings[0].error_after ** 2)))
-    if abs(rms - model.rms_after_m) > SAME * model.rms_after_m + 1e-12:
+    if abs(rms - model.rms_distance_after_m) > SAME * model.rms_distance_after_m + 1e-12:
         raise DataError(
-            f"report: the model says {length(model.rms_after_m)} rms, but misses the {model.instruments[0]} rows of "
+            f"report: the model says {length(model.rms_distance_after_m)} rms distance, but misses the "
+            f"{model.instruments[0]} rows of "
             f"{recording.path.name} by {length(rms)}; give the model of this recording, or identify it again"
         )
     arm = weighting.measured[0].problem.chain.model

@@ -21,11 +21,16 @@ from calibrate.report.sections import (
     arm_parameters,
     arm_proofs,
     arm_summary,
+    centring,
+    point,
     provenance,
+    rig,
+    spots,
     workspace,
 )
 from calibrate.report.session_evidence import SessionEvidence
 from calibrate.report.session_workspace import NOT_IN_SPACE, session_arm, session_measured
+from calibrate.report.spot_session import spot_session
 
 
 def session_page(
@@ -67,9 +72,22 @@ def _chapters(
     yield "workspace", (workspace.TITLE, workspace.workspace(arm, measured, NOT_IN_SPACE))
     if interactive:
         yield "interactive", (INTERACTIVE, interactive_chapter(session_figures(known)))
+    yield from _chapters_of_spots(known)
     yield "errors", (arm_errors.TITLE, arm_errors.errors_chapter(known))
     yield "proofs", (arm_proofs.TITLE, arm_proofs.proofs_chapter(known))
     yield "parameters", (arm_parameters.TITLE, arm_parameters.parameters_chapter(known))
     yield "data", (arm_data.TITLE, arm_data.data_chapter(known))
     made = provenance.provenance(recording, model.poses, "took part in the fit", model.software)
     yield "provenance", (provenance.TITLE, made)
+
+
+def _chapters_of_spots(known: SessionEvidence) -> Iterator[tuple[str, tuple[str, Html]]]:
+    """The rig with its beams, the faces, the centring; none for a session without spots."""
+    session = spot_session(known)
+    if session is None:
+        return
+    yield "rig", (rig.TITLE, rig.rig(session))
+    yield "spots", (spots.TITLE, spots.spots(session))
+    yield "centring", (centring.TITLE, centring.centring(session))
+    if point.asked_for(known):
+        yield "point", (point.TITLE, point.point(known))

@@ -42,7 +42,7 @@ def session_verdict(evidence: SessionEvidence) -> Verdict:
     if checks_nothing(evidence.spare):
         return Verdict(Trust.NONE, f"{UNCHECKED} Do not use this model.", reasons, (MORE_POSES, *advice))
     first = next(iter(proofs(model)), None)
-    if first is not None and first.rms_after > NO_BETTER * first.rms_before:
+    if first is not None and first.rms_distance_after_m > NO_BETTER * first.rms_distance_before_m:
         keep = "Keep the drawing; find out what is wrong with arm, instrument or poses, and measure again."
         return Verdict(Trust.NONE, f"{_how_good(evidence, first)} Do not use this model.", reasons, (keep, *advice))
     if not doubts:
@@ -72,12 +72,13 @@ def _how_good(evidence: SessionEvidence, proof: UnseenRows | None) -> str:
     if proof is None:
         after, before = (float(np.sqrt(np.mean(e**2))) for e in (readings.error_after, readings.error_before))
         return (
-            f"The identified arm misses the {noun} it was fitted to by {readings.says(after)} rms; "
+            f"The identified arm misses the {noun} it was fitted to by {readings.says(after)} rms distance; "
             f"as drawn it misses them by {readings.says(before)}."
         )
     return (
-        f"The identified arm misses {noun} that the fit has not seen by {readings.says(proof.rms_after)} rms; "
-        f"as drawn it misses them by {readings.says(proof.rms_before)}."
+        f"The identified arm misses {noun} that the fit has not seen by "
+        f"{readings.says(proof.rms_distance_after_m)} rms distance; "
+        f"as drawn it misses them by {readings.says(proof.rms_distance_before_m)}."
     )
 
 
@@ -87,6 +88,8 @@ def _doubts(evidence: SessionEvidence) -> Iterator[Doubt]:
         yield f"{Status.AT_BOUND.value}.", "Look up which parameter it is below, and check the rig file's drawing."
     yield from _doubts_of_scatter(scatter(model), repeated(model))
     yield from _noisy_sources(model.noise)
+    if model.noise.get("settled") is False:
+        yield "The size of the noise did not settle, and every sigma is a guess.", "Measure more poses."
     worst = worst_pattern(evidence)
     if worst is not None and worst.share > WORTH_SAYING:
         along = "changes in the session" if worst.factor.startswith("order") else f"follows {worst.factor}"

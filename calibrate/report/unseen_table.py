@@ -13,7 +13,7 @@ def unseen_rows(found: Sequence[UnseenRows], unproven: Sequence[str]) -> list[Ht
     reasons = [tag("p", f"No proof by {why}.") for why in unproven]
     if not found:
         return [tag("p", "No rows were kept out of the fit: too few, or it was not asked for."), *reasons]
-    head = ("Left out", "reading", "count", "as drawn, rms", "identified, rms", "over the noise")
+    head = ("Left out", "reading", "count", "as drawn, rms distance", "identified, rms distance", "over the noise")
     caption = "Rows that the fit has not seen, predicted from the others"
     return [table(head, (_proof(p) for p in found), numeric=(2, 3, 4, 5), caption=caption), *reasons]
 
@@ -24,7 +24,7 @@ def _proof(proof: UnseenRows) -> tuple[str, ...]:
         proof.split,
         name,
         str(proof.observations),
-        length(proof.rms_before),
-        length(proof.rms_after),
+        length(proof.rms_distance_before_m),
+        length(proof.rms_distance_after_m),
         fixed(proof.chi_after, 2),
     )

@@ -15,8 +15,8 @@ from calibrate.errors import DataError
 from calibrate.parameters import Parameter
 from calibrate.rigid import cross
 from calibrate.sensors.laser import LaserMount
+from calibrate.sensors.lines import Lines, nearest_point
 from calibrate.sensors.shared_points import SharedPoints
-from calibrate.zeros.lines import Lines, nearest_point
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

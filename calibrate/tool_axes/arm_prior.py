@@ -89,7 +89,7 @@ def prior_of_model(arm: KinematicModel, model: ModelFile, assumed: ArmPrior) -> 
         full[put, :], full[:, put] = 0.0, 0.0
         full[np.ix_(put, put)] = np.array(model.covariance.rows)[np.ix_(own, own)]
     columns = np.flatnonzero(np.diag(full) > 0.0)
-    return ArmPrior(mean, columns, full[np.ix_(columns, columns)], model.rms_after_m)
+    return ArmPrior(mean, columns, full[np.ix_(columns, columns)], model.rms_distance_after_m)
 
 
 @dataclass(frozen=True)

@@ -125,7 +125,7 @@ def test_ctrl_c_while_identifying_says_that_the_recording_is_whole(
     def interrupted(recording: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("calibeam.conclude.identify_recording", interrupted)
+    monkeypatch.setattr("calibeam.conclude.identify_session", interrupted)
     with pytest.raises(PartialResult, match=r"^Ctrl-C; the recording is whole"):
         conclude(unfinished, Console(quiet=True))
     assert read(unfinished).complete

@@ -31,8 +31,10 @@ MODEL = ModelFile(
     noise={"psd": 2e-6},
     repeats=None,
     held_out=None,
-    rms_before_m=1e-3,
-    rms_after_m=1e-6,
+    rms_coordinate_before_m=1e-3,
+    rms_distance_before_m=1e-3,
+    rms_coordinate_after_m=1e-6,
+    rms_distance_after_m=1e-6,
     about={"tool": (0.0, 0.0, 0.1), "device": (0.0,) * 6},
 )
 FINDING = FindingRecord(
@@ -84,7 +86,7 @@ MODELS = {
         changed(MODEL, "parameters", 0, "value", 1e308),
         "parameters.0.value = 1e+308: expected float <= 1000000",
     ),
-    "rms": (changed(MODEL, "rms_after_m", 1e308), "rms_after_m = 1e+308: expected float <="),
+    "rms": (changed(MODEL, "rms_distance_after_m", 1e308), "rms_distance_after_m = 1e+308: expected float <="),
     "arm": (changed(MODEL, "arm_model", "scara"), "arm_model = scara: expected str matching regex"),
     "type": (changed(MODEL, "poses", ["x" * 10**6]), "poses: expected int, got array"),
 }

@@ -29,7 +29,7 @@ def test_such_a_folder_is_identified_predicted_and_reported(folder, tmp_path, ca
     said = " ".join(capsys.readouterr().out.split())
     assert "no [tolerance]: links believed to ± 5 mm, 10 mrad, PSD 2 in PSD 1 to ± 1 mm, 5 mrad" in said
     found = read_model(model)
-    assert found.rms_after_m < 5e-6
+    assert found.rms_distance_after_m < 5e-6
     told = {p.name: p.undetermined for p in found.parameters}
     assert told["link6.twist"].startswith("only its prior speaks of it")
     assert [name for name, why in told.items() if name.endswith(".zero") and why is None] == [

@@ -77,8 +77,10 @@ def model_file(rig, arm_model):
         noise={},
         repeats=None,
         held_out=None,
-        rms_before_m=0.0,
-        rms_after_m=0.0,
+        rms_coordinate_before_m=0.0,
+        rms_distance_before_m=0.0,
+        rms_coordinate_after_m=0.0,
+        rms_distance_after_m=0.0,
         instruments=("position",),
     )
 

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from acquisition.recording.samples import Samples
+
 RIG = tomllib.loads((Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml").read_text())
 UR5E = np.array([[j["d_m"], j["a_m"], j["alpha_rad"]] for j in RIG["arm"]["joint"]])  # all theta offsets are zero
 LASER_ORIGIN = np.array(RIG["tool"]["laser_origin_m"])
@@ -19,6 +21,7 @@ LASER_DIRECTION = np.array(RIG["tool"]["laser_direction"])
 HALF_SIZE = RIG["fixture"]["half_size_m"]
 PLACES = {k["id"]: tuple(k["psd1_in_base"].values()) for k in RIG["placement"]}
 PSD2 = tuple(RIG["fixture"]["psd2_in_psd1"].values())
+SPOTS = ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")
 LENGTH_SIGMA, ANGLE_SIGMA = RIG["tolerance"]["length_m"], RIG["tolerance"]["angle_rad"]
 
 
@@ -161,6 +164,18 @@ def draw_session(
     q_rad = true_angles - truth.zeros - rng.normal(0, joint_noise, true_angles.shape)
     spots = np.array([truth.spots(*row) for row in zip(true_angles, place, first, strict=True)])
     return Session(truth, q_rad, first, place, spots + rng.normal(0, psd_noise, spots.shape), repeat)
+
+
+def spot_samples(session, *, sigma_m=None, q_rad=None):
+    """The session as a table of samples; `q_rad` (pose, joint): other readings than those that were drawn."""
+    columns = dict(zip(SPOTS, session.spots_m.T, strict=True))
+    if sigma_m is not None:
+        columns |= {name.replace("_m", "_sigma_m"): np.full(len(session.q_rad), sigma_m) for name in SPOTS}
+    whole = {"placement": session.placement, "first_psd": session.first_psd, "repeat": session.repeat}
+    columns |= {name: values.astype(float) for name, values in whole.items()}
+    readings = session.q_rad if q_rad is None else q_rad
+    columns |= {f"q{i}_rad": column for i, column in enumerate(readings.T, start=1)}
+    return Samples({"t_s": np.arange(len(readings), dtype=float), **columns}, 6)
 
 
 @pytest.fixture(scope="session")

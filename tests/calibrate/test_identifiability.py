@@ -10,12 +10,12 @@ from calibrate.arms.catalogue import arm_of
 from calibrate.dual_psd_rig import laser_of
 from calibrate.fit import Status, solve
 from calibrate.identifiability import analyse, in_words
+from calibrate.identification.point_constraint import BOUND_RAD, Form, PointConstraint
 from calibrate.observability import observability
 from calibrate.parameters import Parameter
 from calibrate.redundant import Redundant, reduced
 from calibrate.unseen_along import analyse_along
 from calibrate.words import plainly
-from calibrate.zeros.point_constraint import BOUND_RAD, Form, PointConstraint
 
 
 def names(*which, prior=np.inf):

@@ -7,11 +7,12 @@ import pytest
 
 from acquisition.recording.rig import load_rig, rig_sha256, rig_text
 from calibrate.believed import BelievedRig
-from calibrate.dual_psd_rig import believed_noise, dual_psd_chain
 from calibrate.errors import DataError
-from calibrate.model_file import RigIdentity, corrections, model_of, read_model, write_model
-from calibrate.observations import Observations
-from calibrate.zeros.identify import identify
+from calibrate.identification.identify import identify
+from calibrate.identification.record import record_of
+from calibrate.model_file import RigIdentity, corrections, read_model, write_model
+
+from .conftest import spot_samples
 
 
 @pytest.fixture(scope="module")
@@ -22,16 +23,14 @@ def rig_path(request):
 @pytest.fixture(scope="module")
 def identified(rig_path, sessions):
     session, rig = sessions(41, n=60, repeats=6), load_rig(rig_path)
-    data = Observations(session.q_rad, session.first_psd, session.placement, session.spots_m, None, session.repeat)
-    chain = dual_psd_chain(rig, session.placement, session.first_psd)
-    result = identify(chain, data, believed_noise(rig), rng=np.random.default_rng(0))
+    result = identify(rig, spot_samples(session), rng=np.random.default_rng(0))
     return session, rig, result
 
 
 @pytest.fixture
 def written(identified, rig_path, tmp_path):
     _, rig, result = identified
-    model = model_of(result, RigIdentity(rig.name, rig_sha256(rig_text(rig_path))), rig.arm.model.value)
+    model = record_of(result, RigIdentity(rig.name, rig_sha256(rig_text(rig_path))), rig.arm.model.value)
     path = tmp_path / "model.json"
     write_model(path, model)
     return path, model
@@ -59,8 +58,8 @@ def test_the_file_names_rig_software_rank_noise_and_proof(written):
     assert len(content["rig"]["sha256"]) == 64
     assert content["software"].startswith("calibeam ")
     assert content["free"] - content["rank"] == len(content["unseen"]) == 2
-    assert content["noise"]["joint_rad"] > 0.0
-    assert content["held_out"]["rms_after_m"] < content["held_out"]["rms_before_m"]
+    assert content["noise"]["joint"] > 0.0
+    assert content["held_out"]["dual-psd_rms_distance_after_m"] < content["held_out"]["dual-psd_rms_distance_before_m"]
     assert len(content["covariance"]["rows"]) == len(content["covariance"]["names"]) == 47
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from calibrate import variance
-from calibrate.noise import NoiseModel
 from calibrate.variance import NoisyRows
+from calibrate.weighting import parts_of
 
 
 def draw(rng, n, joint_rad, psd_m, columns=10):
@@ -20,7 +20,7 @@ def draw(rng, n, joint_rad, psd_m, columns=10):
 @pytest.mark.parametrize(("joint_rad", "psd_m"), [(3e-6, 2e-6), (1e-5, 4e-7), (8e-7, 8e-6)])
 def test_both_components_are_found_from_a_wrong_belief(joint_rad, psd_m):
     misfit, J, by_joint = draw(np.random.default_rng(7), 300, joint_rad, psd_m)
-    parts = NoiseModel(3e-6, np.full((300, 4), 2e-6)).parts(by_joint)
+    parts = parts_of(by_joint, 3e-6, np.full((300, 4), 2e-6))
     found = variance.estimate((NoisyRows(misfit, J, parts, (0, 1)),), 2, np.zeros(10), np.zeros(10))
     assert found.converged
     truth = np.array([joint_rad / 3e-6, psd_m / 2e-6])
@@ -33,7 +33,7 @@ def test_restricted_likelihood_is_not_biased_by_many_parameters():
     factors = []
     for seed in range(60):
         misfit, J, by_joint = draw(np.random.default_rng(seed), 20, 3e-6, 2e-6, columns=40)
-        parts = NoiseModel(3e-6, np.full((20, 4), 2e-6)).parts(by_joint)
+        parts = parts_of(by_joint, 3e-6, np.full((20, 4), 2e-6))
         rows = NoisyRows(misfit, J, parts, (0, 1))
         factors.append(variance.estimate((rows,), 2, np.zeros(40), np.zeros(40)).log_variance)
     total_power = np.mean(np.sum(np.exp(factors), axis=1)) / 2.0
@@ -48,6 +48,6 @@ def test_few_residuals_leave_the_noise_in_doubt_and_widen_sigma():
 
 def _degrees_of_freedom(n):
     misfit, J, by_joint = draw(np.random.default_rng(8), n, 3e-6, 2e-6)
-    parts = NoiseModel(3e-6, np.full((n, 4), 2e-6)).parts(by_joint)
+    parts = parts_of(by_joint, 3e-6, np.full((n, 4), 2e-6))
     found = variance.estimate((NoisyRows(misfit, J, parts, (0, 1)),), 2, np.zeros(10), np.zeros(10))
     return float(np.median(variance.doubt((NoisyRows(misfit, J, parts, (0, 1)),), np.zeros(10), found)))

@@ -6,12 +6,13 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording.rig import load_rig, rig_sha256, rig_text
 from acquisition.recording.samples import Samples
-from calibrate.dual_psd_rig import believed_noise, dual_psd_chain
 from calibrate.errors import DataError
-from calibrate.model_file import RigIdentity, model_of
-from calibrate.observations import Observations
+from calibrate.identification.identify import identify
+from calibrate.identification.record import record_of
+from calibrate.model_file import RigIdentity
 from calibrate.predict import Predictor, predict
-from calibrate.zeros.identify import identify
+
+from .conftest import spot_samples
 
 Q = np.array([[0.1, -1.2, 1.3, -0.8, 0.4, 0.2], [0.5, -1.0, 1.1, -0.3, 0.9, -0.6], [-0.7, -1.4, 0.9, 0.2, 0.3, 1.0]])
 TURN = (0.3, -0.4, 2.2)
@@ -99,11 +100,9 @@ def test_seat_and_bar_rows_get_the_tip_in_the_base_and_others_none(predictor, ti
 
 def test_spots_come_from_the_model_file_alone(sessions, rig, rig_path):
     session = sessions(41, n=60, repeats=6)
-    data = Observations(session.q_rad, session.first_psd, session.placement, session.spots_m, None, session.repeat)
-    chain = dual_psd_chain(rig, session.placement, session.first_psd)
-    result = identify(chain, data, believed_noise(rig), rng=np.random.default_rng(0), held_out_share=0.0)
+    result = identify(rig, spot_samples(session), rng=np.random.default_rng(0), held_out_share=0.0)
     text = rig_text(rig_path)
-    predictor = Predictor.of(model_of(result, RigIdentity(rig.name, rig_sha256(text), text), "dh"))
+    predictor = Predictor.of(record_of(result, RigIdentity(rig.name, rig_sha256(text), text), "dh"))
     placement = session.placement.astype(float)
     placement[3] = np.nan
     names = ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")
@@ -117,11 +116,9 @@ def test_spots_come_from_the_model_file_alone(sessions, rig, rig_path):
 
 def test_a_model_without_its_rig_is_refused(sessions, rig):
     session = sessions(41, n=60, repeats=6)
-    data = Observations(session.q_rad, session.first_psd, session.placement, session.spots_m, None, session.repeat)
-    chain = dual_psd_chain(rig, session.placement, session.first_psd)
-    result = identify(chain, data, believed_noise(rig), rng=np.random.default_rng(0), held_out_share=0.0)
+    result = identify(rig, spot_samples(session), rng=np.random.default_rng(0), held_out_share=0.0)
     with pytest.raises(DataError, match="the rig's text is not in the file"):
-        Predictor.of(model_of(result, RigIdentity(rig.name, "0" * 64), "dh"))
+        Predictor.of(record_of(result, RigIdentity(rig.name, "0" * 64), "dh"))
 
 
 def test_a_device_that_nobody_knows_is_refused(rig):

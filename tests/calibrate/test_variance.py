@@ -5,10 +5,10 @@ import pytest
 from scipy.optimize import minimize
 
 from calibrate import variance
-from calibrate.noise import NoiseModel
 from calibrate.noisy_rows import NoisyRows, independent
 from calibrate.restricted_score import score_at
 from calibrate.variance import LOG_VARIANCE_PRIOR, MAX_STEPS
+from calibrate.weighting import parts_of
 
 
 def drawn(joint_rad, psd_m, believed=(3e-6, 2e-6), n=200, columns=12, seed=1):
@@ -17,7 +17,7 @@ def drawn(joint_rad, psd_m, believed=(3e-6, 2e-6), n=200, columns=12, seed=1):
     by_joint = rng.normal(0, 0.5, (n, 4, 6))
     J = rng.normal(size=(n, 4, columns))
     misfit = np.einsum("nij,nj->ni", by_joint, rng.normal(0, joint_rad, (n, 6))) + rng.normal(0, psd_m, (n, 4))
-    parts = NoiseModel(believed[0], np.full((n, 4), believed[1])).parts(by_joint)
+    parts = parts_of(by_joint, believed[0], np.full((n, 4), believed[1]))
     return NoisyRows(misfit + J @ rng.normal(0, 1e-6, columns), J, parts, (0, 1))
 
 

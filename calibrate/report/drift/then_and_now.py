@@ -46,7 +46,7 @@ def _rows(one: Calibration) -> Iterator[tuple[str, str]]:
         yield "observability O1", significant(model.observability.o1)
     yield from _noise(model)
     for proof in proofs(model)[:1]:
-        yield f"unseen {proof.instrument} readings, rms", length(proof.rms_after)
+        yield f"unseen {proof.instrument} readings, rms distance", length(proof.rms_distance_after_m)
     if model.free_space is not None and model.free_space.pose_p95_m is not None:
         yield "anywhere, 95 %, predicted", length(model.free_space.pose_p95_m)
     yield "software", model.software

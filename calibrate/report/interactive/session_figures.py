@@ -20,7 +20,9 @@ from calibrate.report.interactive.plots import (
     posture,
     space,
 )
+from calibrate.report.interactive.spot_figures import spots_in_space
 from calibrate.report.session_evidence import Readings, SessionEvidence
+from calibrate.report.spot_session import spot_session
 
 Floats = NDArray[np.float64]
 
@@ -30,8 +32,9 @@ SCALES = {"m": (1e6, "µm"), "rad": (1e6, "µrad")}
 
 def session_figures(evidence: SessionEvidence) -> tuple[Plot, ...]:
     """The workspace of the first instrument, and what remains of its readings."""
-    first = evidence.readings[0]
-    return _in_space(evidence, first), _one_by_one(evidence, first)
+    first, spots = evidence.readings[0], spot_session(evidence)
+    drawn = spots_in_space(spots) if spots is not None and spots.readings is first else None
+    return (_in_space(evidence, first) if drawn is None else drawn), _one_by_one(evidence, first)
 
 
 def _in_space(evidence: SessionEvidence, readings: Readings) -> Plot:

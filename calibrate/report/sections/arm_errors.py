@@ -20,7 +20,7 @@ def errors_chapter(evidence: SessionEvidence) -> Html:
         "Identified: everything fitted. An error is the length of the difference, 3-D for a position."
     )
     rows = [row for readings in evidence.readings for row in _figures(readings)]
-    head = ("Reading", "state", "count", "rms", "mean", "95 %", "largest")
+    head = ("Reading", "state", "count", "rms distance", "mean", "95 %", "largest")
     each = (part for i in range(len(evidence.readings)) for part in _instrument(evidence, i))
     return section("errors", TITLE, lead, table(head, rows, numeric=(2, 3, 4, 5, 6)), *each)
 

@@ -13,6 +13,7 @@ from calibrate.report.unseen_table import unseen_rows
 from calibrate.uncertainty.chi_square import Alarm
 
 TITLE = "Proof and doubt"
+NONE = "too small to be told from none"
 ANGULAR = ("joint", "orientation")
 STATED = {"joint": "joint_rad", "psd": "psd_m", "position": "position_m", "wire": "wire_m", "seat": "seat_m"}
 
@@ -49,6 +50,9 @@ def _noise(model: ModelFile, rig: Rig) -> Html:
         says, doubted = (angle, doubted_angle) if name in ANGULAR else (length, doubted_length)
         stated = getattr(rig.noise, STATED.get(name, ""), None) is not None
         source = "rig file" if stated else "assumed: the rig file states none"
+        if model.noise.get(f"{name}_at_zero"):
+            rows.append((name, says(believed), source, NONE, ""))
+            continue
         rows.append((name, says(believed), source, doubted(found, sigma), fixed(found / believed, 2)))
     head = ("Noise of", "believed", "by", "found in the residuals", "found / believed")
     return table(head, rows, numeric=(1, 3, 4), caption="Noise, one sigma of one coordinate")

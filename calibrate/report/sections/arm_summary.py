@@ -1,17 +1,14 @@
 """The first page of a session's report: verdict, what to do, figures, joint zeros."""
 
-from math import degrees
-
 import numpy as np
 
-from calibrate.model_file import ModelParameter
 from calibrate.report.answers import Answers, Number, first_screen
 from calibrate.report.anywhere import anywhere
-from calibrate.report.elements import Html, figure, panels, table, tag
+from calibrate.report.elements import Html, figure, panels, tag
 from calibrate.report.error_figures import by_sample, errors
 from calibrate.report.model_tests import proofs
-from calibrate.report.quantities import aligned, decimals_of, fixed, significant
-from calibrate.report.reasons import reason_among
+from calibrate.report.quantities import significant
+from calibrate.report.sections.zeros import determined, limits_of_zeros, zeros_part
 from calibrate.report.session_evidence import SAID, Readings, SessionEvidence
 from calibrate.report.session_verdict import session_verdict
 
@@ -38,7 +35,7 @@ def summary(said: Answers, evidence: SessionEvidence) -> Html:
         figure(errors(first), "Every reading, before and after, on a logarithmic axis."),
         figure(by_sample(first), "The same in the order of the file: a drift or a knock would show here."),
     )
-    return tag("div", first_screen(said), pictures, *_zeros(evidence), id="summary")
+    return tag("div", first_screen(said), pictures, *zeros_part(evidence), id="summary")
 
 
 def answers(evidence: SessionEvidence) -> Answers:
@@ -46,12 +43,14 @@ def answers(evidence: SessionEvidence) -> Answers:
     model, first = evidence.model, evidence.readings[0]
     known = sum(p.value is not None for p in model.parameters)
     rest = ", the others only in combinations" if known < len(model.parameters) else ""
+    limits = tuple(limits_of_zeros(evidence))
     also = (
         f"{model.poses} samples used of {len(evidence.recording.samples)}; {evidence.left_out} left out as faulty",
-        f"{known} of {len(model.parameters)} parameters told{rest}",
-        f"rows of the fit: {first.says(_rms(first.error_after))} rms",
+        f"{known} of {len(model.parameters)} parameters determined{rest}",
+        *([determined(evidence)] if limits else []),
+        f"rows of the fit: {first.says(_rms(first.error_after))} rms distance",
     )
-    return Answers(session_verdict(evidence), (*_errors(evidence), anywhere(model.free_space)), also=also)
+    return Answers(session_verdict(evidence), (*_errors(evidence), anywhere(model.free_space)), limits, also)
 
 
 def _errors(evidence: SessionEvidence) -> tuple[Number, Number]:
@@ -59,10 +58,10 @@ def _errors(evidence: SessionEvidence) -> tuple[Number, Number]:
     first, proof = evidence.readings[0], next(iter(proofs(evidence.model)), None)
     if proof is None:
         before, after = _rms(first.error_before), _rms(first.error_after)
-        on = f"rms of {_what(first)}, those of the fit itself"
+        on = f"rms distance of {_what(first)}, those of the fit itself"
     else:
-        before, after = proof.rms_before, proof.rms_after
-        on = f"rms of {proof.observations} {_what(first)} that the fit has not seen"
+        before, after = proof.rms_distance_before_m, proof.rms_distance_after_m
+        on = f"rms distance of {proof.observations} {_what(first)} that the fit has not seen"
     gain = f"; {significant(before / after)} times better" if after > 0.0 else ""
     return (
         Number("as_drawn", "As drawn", before, first.unit, first.says(before), f"{on}; arm as the drawing says"),
@@ -76,26 +75,3 @@ def _what(readings: Readings) -> str:
 
 def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
-
-
-def _zeros(evidence: SessionEvidence) -> list[Html]:
-    """Value and sigma in degrees, one line a joint; none where the arm's zeros were no unknowns."""
-    zeros = [p for p in evidence.model.parameters if p.name.startswith("joint") and p.name.endswith(".zero")]
-    if not zeros:
-        return []
-    known = [(p, degrees(p.value), degrees(p.sigma)) for p in zeros if p.value is not None and p.sigma is not None]
-    values = aligned([fixed(value, decimals_of(sigma)) for _, value, sigma in known])
-    sigmas = aligned([fixed(sigma, decimals_of(sigma)) for _, _, sigma in known])
-    micro = aligned([significant(1e6 * (p.sigma or 0.0), 2) for p, _, _ in known])
-    numbers = {p.name: row for (p, _, _), *row in zip(known, values, sigmas, micro, strict=True)}
-    rows = [_zero(p, numbers.get(p.name), evidence) for p in zeros]
-    head = ("Joint", "zero (°)", "± sigma (°)", "± sigma (µrad)")
-    lead = "True joint angle = reading + zero. Sigma is one standard deviation. All other parameters are further down."
-    return [tag("h3", "Joint zeros"), tag("p", lead, cls="lead"), table(head, rows, numeric=(1, 2, 3))]
-
-
-def _zero(zero: ModelParameter, numbers: list[str] | None, evidence: SessionEvidence) -> tuple[str, ...]:
-    joint = f"J{zero.name.removeprefix('joint').removesuffix('.zero')}"
-    if numbers is None:
-        return joint, f"not determined: {reason_among(zero.name, evidence.model.unseen, zero.undetermined)}"
-    return (joint, *numbers)

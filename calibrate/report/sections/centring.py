@@ -9,23 +9,23 @@ from calibrate.report.centring_figures import courses, step_counts
 from calibrate.report.centring_traces import Trace, Traces, traces_of
 from calibrate.report.colour_key import colour_key
 from calibrate.report.elements import Html, figure, panels, section, table, tag
-from calibrate.report.evidence import Evidence
 from calibrate.report.quantities import stated
+from calibrate.report.spot_session import SpotSession
 
 TITLE = "Laser centring"
 PICTURED = 3  # tolerances, the finest first; all are in the table
 
 
-def centring(evidence: Evidence) -> Html:
+def centring(session: SpotSession) -> Html:
     """Courses, steps, endings."""
-    traces = traces_of(evidence.recording.events)
+    traces = traces_of(session.recording.events)
     if not traces.runs:
         return section("centring", TITLE, "The recording holds no centring run.", *_unreadable(traces))
     lead = "The servo loop moves the arm until all four spot coordinates are within the tolerance of their target."
     groups = traces.by_tolerance()
-    drawings = [_pictures(runs, wanted, evidence.places) for wanted, runs in list(groups.items())[:PICTURED]]
+    drawings = [_pictures(runs, wanted, session.places) for wanted, runs in list(groups.items())[:PICTURED]]
     return section(
-        "centring", TITLE, lead, colour_key(evidence.places), *drawings, _endings(groups), *_unreadable(traces)
+        "centring", TITLE, lead, colour_key(session.places), *drawings, _endings(groups), *_unreadable(traces)
     )
 
 

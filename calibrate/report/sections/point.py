@@ -1,37 +1,62 @@
-"""The chapter with the paper's four-pose point constraint, beside the full identification."""
+"""The chapter with the point constraint, beside the fit, where the fit plan asked for it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import degrees, hypot
 
-from calibrate.report.elements import Html, figure, panels, section, table, tag
+from calibrate.fit_plan import BesideName, parse_plan
+from calibrate.identification.estimates import JointZero
+from calibrate.identification.planned import rig_as_planned
+from calibrate.identification.point_constraint import PointConstraintResult, point_constraints
+from calibrate.report.elements import Html, bullets, figure, panels, section, table, tag
 from calibrate.report.quantities import decimals_of, fixed, length, significant
 from calibrate.report.rank_figures import spectrum
-from calibrate.report.reasons import plain_reason
-from calibrate.report.sections.zeros import rank_words
-from calibrate.zeros.point_constraint import PointConstraintResult
-from calibrate.zeros.result import JointZero
+from calibrate.report.reasons import in_plain_words, plain_reason
+from calibrate.report.sections.zeros import zeros_of
+from calibrate.report.session_evidence import SessionEvidence
 
-TITLE = "Four-pose point constraint"
+TITLE = "Point constraint"
 LEAD = (
     "The method of Deng, Ding, Zhang (Food & Machinery 2019(3)), for comparison: the laser lines of centred poses meet "
-    "in one point of the fixture; only joint zeros are unknown."
+    "in one point of the fixture; only joint zeros are unknown. Links and laser are as drawn."
 )
 
 
-def point(result: PointConstraintResult | None, full: Sequence[JointZero], why_not: str) -> Html:
-    """Rank, then zeros beside those of the full model; without a result the reason."""
-    if result is None:
-        return section("point", TITLE, LEAD, tag("p", f"Not done: {why_not}."))
+def asked_for(evidence: SessionEvidence) -> bool:
+    """Whether the plan of the model names this method."""
+    plan = evidence.model.plan
+    return plan is not None and parse_plan(plan, "fit plan in the model").method is BesideName.POINT_CONSTRAINT
+
+
+def point(evidence: SessionEvidence) -> Html:
+    """Both forms, each with its rank and its zeros beside those of the fit."""
+    recording, plan = evidence.recording, parse_plan(evidence.model.plan or "", "fit plan in the model")
+    found = point_constraints(rig_as_planned(recording.rig, plan), recording.samples.take(evidence.rows))
+    full = zeros_of(evidence)
+    return section(
+        "point",
+        TITLE,
+        LEAD,
+        tag("h3", f"Four poses at place {found.placement}, as published"),
+        *_one(found.four_poses, full, "four"),
+        tag("h3", f"All {found.poses} centred poses at place {found.placement}"),
+        *_one(found.all_poses, full, "all"),
+    )
+
+
+def _one(result: PointConstraintResult, full: Sequence[JointZero], name: str) -> Iterator[Html]:
     seen = result.identifiability
     caption = "Singular values of the point constraint: few poses see few combinations."
-    drawing = figure(spectrum(seen.singular_values, seen.rank, "point-spectrum", with_drawing=False), caption)
-    words = tag("div", tag("h3", f"Rank {seen.rank} of {seen.n_free} zeros"), rank_words(seen))
-    met = (
-        f"The lines miss their common point by {length(result.rms_before_m)} rms before the fit. That almost nothing "
-        f"is left after it ({length(result.rms_after_m)}) proves nothing: four poses hardly have more equations than "
-        f"unknowns. Fit: {result.status.value}."
+    drawing = figure(spectrum(seen.singular_values, seen.rank, f"point-{name}", with_drawing=False), caption)
+    words = [tag("h3", f"Rank {seen.rank} of {seen.n_free} zeros")]
+    if seen.combinations:
+        words.append(bullets(in_plain_words(c.words) for c in seen.combinations))
+    yield panels(drawing, tag("div", *words))
+    yield tag(
+        "p",
+        f"The lines miss their common point by {length(result.rms_distance_before_m)} rms distance before the fit, by "
+        f"{length(result.rms_distance_after_m)} after it. Fit: {result.status.value}.",
     )
-    return section("point", TITLE, LEAD, panels(drawing, words), tag("p", met), _beside(result, full))
+    yield _beside(result, full)
 
 
 def _beside(result: PointConstraintResult, full: Sequence[JointZero]) -> Html:
@@ -43,15 +68,9 @@ def _beside(result: PointConstraintResult, full: Sequence[JointZero]) -> Html:
             rows.append((f"J{zero.joint}", f"not determined: {reason}"))
             continue
         digits = decimals_of(degrees(zero.sigma_rad))
-        rows.append(
-            (
-                f"J{zero.joint}",
-                fixed(degrees(zero.value_rad), digits),
-                fixed(degrees(zero.sigma_rad), digits),
-                *_difference(zero, others.get(zero.joint)),
-            )
-        )
-    head = ("Joint", "zero (°)", "± sigma (°)", "full model (°)", "difference (°)", "in sigma of both")
+        value, sigma = fixed(degrees(zero.value_rad), digits), fixed(degrees(zero.sigma_rad), digits)
+        rows.append((f"J{zero.joint}", value, sigma, *_difference(zero, others.get(zero.joint))))
+    head = ("Joint", "zero (°)", "± sigma (°)", "by the fit (°)", "difference (°)", "in sigma of both")
     return table(head, rows, numeric=(1, 2, 3, 4, 5))
 
 

@@ -4,26 +4,26 @@ import numpy as np
 
 from calibrate.report.colour_key import colour_key
 from calibrate.report.elements import Html, figure, panels, section
-from calibrate.report.evidence import Evidence
+from calibrate.report.spot_session import SpotSession
 from calibrate.report.spots_figure import face
 
 TITLE = "Spots on the faces"
 
 
-def spots(evidence: Evidence) -> Html:
+def spots(session: SpotSession) -> Html:
     """Both faces, and how much of them was used."""
-    fixture = evidence.recording.rig.fixture
+    fixture = session.rig.fixture
     if fixture is None:
         return section("spots", TITLE, "The rig has no fixture.")
-    half_m, data = fixture.half_size_m, evidence.data
+    half_m, data = fixture.half_size_m, session.data
     lead = (
         "Every settled sample. Circles: the face was struck directly; triangles: by light that the other face reflects."
     )
     figures = [
-        figure(face(data, psd, half_m, evidence.places), _reach(data.spots_m[:, 2 * psd - 2 : 2 * psd], half_m))
+        figure(face(data, psd, half_m, session.places), _reach(data.spots_m[:, 2 * psd - 2 : 2 * psd], half_m))
         for psd in (1, 2)
     ]
-    return section("spots", TITLE, lead, colour_key(evidence.places), panels(*figures))
+    return section("spots", TITLE, lead, colour_key(session.places), panels(*figures))
 
 
 def _reach(spots_m: np.ndarray, half_m: float) -> str:

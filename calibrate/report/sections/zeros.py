@@ -1,131 +1,114 @@
-"""The chapter with the full table of zeros and the rank that stands before it."""
+"""The table of joint zeros, and what limits each of them."""
 
 from collections.abc import Iterator, Sequence
 from math import degrees
 
-import numpy as np
-
-from calibrate.default_belief import links_of, said_of
-from calibrate.identifiability import WEAK, Identifiability
-from calibrate.parameters import Parameter
-from calibrate.report.elements import Html, bullets, figure, folded, join, panels, section, table, tag
-from calibrate.report.evidence import Evidence
+from calibrate.default_belief import links_of
+from calibrate.identification.estimates import Estimate, JointZero, joint_zeros
+from calibrate.report.elements import Html, figure, table, tag
 from calibrate.report.quantities import DASH, aligned, angle, decimals_of, fixed, significant
-from calibrate.report.rank_figures import spectrum
-from calibrate.report.reasons import kind_of, plain_reason
-from calibrate.zeros.result import Estimate, JointZero
+from calibrate.report.reasons import reason_among
+from calibrate.report.session_evidence import SessionEvidence
+from calibrate.report.workspace.known_arm import whole_covariance
+from calibrate.report.zero_figure import doubts
 
-TITLE = "Joint zeros and rank"
-LEARNED = 0.9  # sigma over drawing tolerance: above, these data taught nothing about the parameter
-
-
-def zeros(evidence: Evidence) -> Html:
-    """Rank first, then numbers, then every parameter for who wants it."""
-    result, seen = evidence.result, evidence.result.identifiability
-    lead = (
-        f"Rank {seen.rank} of {seen.n_free}: what the data can see comes before any number. Fit: {result.status.value}."
-    )
-    return section(
-        "zeros",
-        TITLE,
-        lead,
-        panels(
-            figure(
-                spectrum(seen.singular_values, seen.rank, "spectrum"),
-                "Singular values of the weighted Jacobian. Each says how many times better than a plausible guess one "
-                "combination of parameters is known. The drop below the dashed line is the rank gap.",
-            ),
-            tag("div", tag("h3", "Unseen combinations"), rank_words(seen)),
-        ),
-        tag("h3", "Zeros"),
-        table_of_zeros(result.zeros, seen),
-        tag("p", _reading(evidence), cls="lead"),
-        folded(f"All {len(result.estimates)} parameters", _parameters(evidence)),
-    )
+SMALL_SHARE = 0.5  # measurement under this share of sigma: something else limits the zero
+SPOTS = "dual-psd"
 
 
-def rank_words(seen: Identifiability) -> Html:
-    """Unseen combinations in words, and the gap in numbers."""
-    s, rank = seen.singular_values, seen.rank
-    said = [
-        tag(
-            "p",
-            f"{rank} of {seen.n_free} combinations are seen; the largest singular value is {significant(float(s[0]))}.",
+def zeros_of(evidence: SessionEvidence) -> tuple[JointZero, ...]:
+    """Joint zeros of the model; none where the arm has no such parameters."""
+    parameters = evidence.parameters
+    stated = (Estimate(p.name, p.unit, p.value, p.sigma, p.undetermined) for p in evidence.model.parameters)
+    return joint_zeros(stated, parameters, whole_covariance(evidence.model.covariance, parameters))
+
+
+def limited_by_measurement(zero: JointZero) -> bool:
+    """Whether more poses would make the zero better; False: the tolerance of the links is the limit."""
+    if zero.measurement_sigma_rad is None or zero.sigma_rad is None:
+        return True
+    return zero.measurement_sigma_rad >= SMALL_SHARE * zero.sigma_rad
+
+
+def zeros_part(evidence: SessionEvidence) -> Iterator[Html]:
+    """Heading and table; with spots of the dual PSD also what the measurement alone leaves of each sigma."""
+    zeros = zeros_of(evidence)
+    if not zeros:
+        return
+    lead = "True joint angle = reading + zero. Sigma is one standard deviation. All other parameters are further down."
+    yield tag("h3", "Joint zeros")
+    yield tag("p", lead, cls="lead")
+    if SPOTS not in evidence.model.instruments:
+        yield table(("Joint", "zero (°)", "± sigma (°)", "± sigma (µrad)"), _rows(evidence, zeros), numeric=(1, 2, 3))
+        return
+    head = ("Joint", "zero (°)", "± sigma (°)", "± sigma (µrad)", "of measurement alone (µrad)", "limited by")
+    yield table(head, _rows(evidence, zeros, limits=True), numeric=(1, 2, 3, 4))
+    yield tag("p", _reading(evidence), cls="lead")
+    if any(z.sigma_rad is not None for z in zeros):
+        caption = (
+            "How well each zero is known, on a logarithmic axis. A long line means that measuring more will not help: "
+            "the tolerance of the drawing is the limit, because these data cannot separate the zero from the links."
         )
-    ]
-    if 0 < rank < len(s):
-        seen_last, unseen_first = significant(float(s[rank - 1])), significant(float(s[rank]), 2)
-        gap = f"The smallest seen is {seen_last}, the largest unseen {unseen_first}; the limit is {WEAK:g}."
-        said.append(tag("p", gap))
-    if not seen.combinations:
-        return join(*said, tag("p", "Every parameter can be told from every other."))
-    return join(*said, bullets(join(tag("code", c.words), f": {kind_of(c)}.") for c in seen.combinations))
+        yield figure(doubts(zeros), caption)
 
 
-def table_of_zeros(listed: Sequence[JointZero], seen: Identifiability) -> Html:
-    """Value, sigma, sigma of the measurement alone; never a number without the right to it."""
-    known = [z for z in listed if z.value_rad is not None and z.sigma_rad is not None]
+def limits_of_zeros(evidence: SessionEvidence) -> Iterator[str]:
+    """What a reader must know before using the zeros of a session with spots; nothing for other instruments."""
+    if SPOTS not in evidence.model.instruments:
+        return
+    zeros = zeros_of(evidence)
+    loose = [z for z in zeros if z.value_rad is not None and not limited_by_measurement(z)]
+    if loose:
+        worst = max(z.sigma_rad or 0.0 for z in loose)
+        limit = "limited by the drawing's tolerance, not by the measurement"
+        yield f"{_names(loose)}: known to {angle(worst)} only, {limit}."
+    for z in zeros:
+        if z.value_rad is None:
+            yield f"J{z.joint}: not determined; {_reason(z, evidence)}."
+
+
+def determined(evidence: SessionEvidence) -> str:
+    """How many zeros have a number, and which."""
+    zeros = zeros_of(evidence)
+    found = [z for z in zeros if z.value_rad is not None]
+    return f"{len(found)} of {len(zeros)} zeros determined: {_names(found) or 'none'}"
+
+
+def _rows(evidence: SessionEvidence, zeros: Sequence[JointZero], *, limits: bool = False) -> list[tuple[str, ...]]:
+    """Value and sigma in degrees, one line a joint; never a number for what is not determined."""
+    known = [z for z in zeros if z.value_rad is not None and z.sigma_rad is not None]
     columns = [
-        aligned([fixed(scale(z.value_rad or 0.0), decimals_of(scale(z.sigma_rad or 0.0))) for z in known])
-        for scale in (degrees, _mrad)
+        aligned([fixed(degrees(z.value_rad or 0.0), _decimals(z)) for z in known]),
+        aligned([fixed(degrees(z.sigma_rad or 0.0), _decimals(z)) for z in known]),
+        aligned([significant(1e6 * (z.sigma_rad or 0.0), 2) for z in known]),
     ]
-    sigmas = [
-        aligned([fixed(scale(z.sigma_rad or 0.0), decimals_of(scale(z.sigma_rad or 0.0))) for z in known])
-        for scale in (degrees, _mrad)
-    ]
-    alone = aligned([_alone(z) for z in known])
-    numbers = {
-        z.joint: (columns[0][i], sigmas[0][i], columns[1][i], sigmas[1][i], alone[i]) for i, z in enumerate(known)
-    }
-    rows = [(f"J{z.joint}", *numbers.get(z.joint, (f"not determined: {_why(z, seen)}",))) for z in listed]
-    head = ("Joint", "zero (°)", "± sigma (°)", "zero (mrad)", "± sigma (mrad)", "of measurement alone (µrad)")
-    return table(head, rows, numeric=(1, 2, 3, 4, 5))
+    if limits:
+        columns.append(aligned([_alone(z) for z in known]))
+        columns.append(["measurement" if limited_by_measurement(z) else "tolerance of the links" for z in known])
+    numbers = {z.joint: row for z, *row in zip(known, *columns, strict=True)}
+    return [(f"J{z.joint}", *numbers.get(z.joint, [f"not determined: {_reason(z, evidence)}"])) for z in zeros]
 
 
-def _mrad(value_rad: float) -> float:
-    return 1e3 * value_rad
+def _reading(evidence: SessionEvidence) -> str:
+    links = links_of(evidence.recording.rig)
+    return (
+        f"Sigma includes what the links may be off the drawing ({links.length_sigma_m * 1e3:g} mm, "
+        f"{angle(links.angle_sigma_rad)}) as far as these data do not determine it. “Of measurement alone” is what "
+        "would remain if links and bracket were exactly as now fitted."
+    )
+
+
+def _decimals(zero: JointZero) -> int:
+    return decimals_of(degrees(zero.sigma_rad or 0.0))
 
 
 def _alone(zero: JointZero) -> str:
     return DASH if zero.measurement_sigma_rad is None else significant(1e6 * zero.measurement_sigma_rad, 2)
 
 
-def _why(zero: JointZero, seen: Identifiability) -> str:
-    return plain_reason(f"joint{zero.joint}.zero", seen, zero.why)
+def _names(zeros: Sequence[JointZero]) -> str:
+    return ", ".join(f"J{z.joint}" for z in zeros)
 
 
-def _reading(evidence: Evidence) -> str:
-    rig = evidence.recording.rig
-    links, unasked = links_of(rig), said_of(rig)
-    return (
-        ("" if unasked is None else f"The rig file has {unasked}. ")
-        + f"Sigma holds what the links may be off the drawing ({links.length_sigma_m * 1e3:g} mm, "
-        f"{angle(links.angle_sigma_rad)}) as far as the data do not tell. The last column is what would remain "
-        "if links and bracket were exactly as now fitted."
-    )
-
-
-def _parameters(evidence: Evidence) -> Html:
-    result = evidence.result
-    head = ("Parameter", "correction", "± sigma", "unit", "tolerance", "known from")
-    rows = _parameter_rows(result.estimates, {p.name: p for p in result.parameters}, result.identifiability)
-    return table(head, rows, numeric=(1, 2, 4))
-
-
-def _parameter_rows(
-    estimates: Sequence[Estimate], parameters: dict[str, Parameter], seen: Identifiability
-) -> Iterator[tuple[str, ...]]:
-    for e in estimates:
-        name = tag("code", e.name)
-        if e.value is None or e.sigma is None:
-            yield (
-                name,
-                f"not determined: {plain_reason(e.name, seen, e.why)}" if parameters[e.name].free else e.why or "held",
-            )
-            continue
-        prior = parameters[e.name].prior
-        scale, unit = {"m": (1e3, "mm"), "rad": (1e3, "mrad")}.get(e.unit, (1.0, e.unit))
-        digits = decimals_of(scale * e.sigma)
-        tolerance = significant(prior * scale) if np.isfinite(prior) else "none"
-        source = "data" if e.sigma < LEARNED * prior else "drawing"
-        yield (name, fixed(scale * e.value, digits), fixed(scale * e.sigma, digits), unit, tolerance, source)
+def _reason(zero: JointZero, evidence: SessionEvidence) -> str:
+    return reason_among(f"joint{zero.joint}.zero", evidence.model.unseen, zero.why)

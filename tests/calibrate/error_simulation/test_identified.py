@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig import load_rig, rig_sha256, rig_text
-from calibrate.dual_psd_rig import believed_noise, dual_psd_chain
 from calibrate.error_simulation.machine import identified_machine, machine_of
 from calibrate.errors import DataError
-from calibrate.model_file import RigIdentity, model_of
-from calibrate.observations import Observations
+from calibrate.identification.identify import identify
+from calibrate.identification.record import record_of
+from calibrate.model_file import RigIdentity
 from calibrate.predict import Predictor
-from calibrate.zeros.identify import identify
 
+from ..conftest import spot_samples
 from .conftest import RIGS
 
 RIG = RIGS / "ur5e-dual-psd.toml"
@@ -20,14 +20,12 @@ RIG = RIGS / "ur5e-dual-psd.toml"
 @pytest.fixture(scope="module")
 def result(sessions):
     rig, session = load_rig(RIG), sessions(41, n=60, repeats=6)
-    data = Observations(session.q_rad, session.first_psd, session.placement, session.spots_m, None, session.repeat)
-    chain = dual_psd_chain(rig, session.placement, session.first_psd)
-    return identify(chain, data, believed_noise(rig), rng=np.random.default_rng(0), held_out_share=0.0)
+    return identify(rig, spot_samples(session), rng=np.random.default_rng(0), held_out_share=0.0)
 
 
 def test_an_identified_arm_puts_its_probe_where_it_is_predicted(result):
     rig, text = load_rig(RIG), rig_text(RIG)
-    model = model_of(result, RigIdentity(rig.name, rig_sha256(text), text), "dh")
+    model = record_of(result, RigIdentity(rig.name, rig_sha256(text), text), "dh")
     machine, _ = identified_machine(model)
     q = machine.drawn_poses(20, np.random.default_rng(1))
     np.testing.assert_allclose(machine.probe_m(q), Predictor.of(model).tip_m(q), atol=1e-14)
@@ -36,4 +34,4 @@ def test_an_identified_arm_puts_its_probe_where_it_is_predicted(result):
 
 def test_a_model_without_its_rig_is_refused(result):
     with pytest.raises(DataError, match="identify again"):
-        identified_machine(model_of(result, RigIdentity("ur5e-dual-psd", "0" * 64), "dh"))
+        identified_machine(record_of(result, RigIdentity("ur5e-dual-psd", "0" * 64), "dh"))

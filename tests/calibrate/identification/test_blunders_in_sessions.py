@@ -41,7 +41,9 @@ def test_a_typed_digit_is_named_and_changes_nothing(rig, samples):
     (found,) = result.blunders
     assert (found.kind, found.rows, found.column) == (BlunderKind.WRONG_VALUE, (33,), "y_m")
     assert result.n_samples == 149
-    assert result.instruments[0].rms_after == pytest.approx(clean.instruments[0].rms_after, rel=0.05)
+    assert result.instruments[0].rms_distance_after_m == pytest.approx(
+        clean.instruments[0].rms_distance_after_m, rel=0.05
+    )
 
 
 def test_several_kinds_at_once_are_each_named(rig, samples):
@@ -65,7 +67,7 @@ def test_rows_of_another_session_are_one_blunder(rig, samples, turn, shift):
     rows = {row for b in result.blunders for row in b.rows}
     assert {b.kind for b in result.blunders} == {BlunderKind.OTHER_SESSION}
     assert rows == set(range(40, 80))
-    assert result.instruments[0].rms_after < 2.5e-5
+    assert result.instruments[0].rms_distance_after_m < 2.5e-5
 
 
 def test_bad_rows_after_a_copied_one_keep_their_numbers(rig, samples):

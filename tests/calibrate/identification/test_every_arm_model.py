@@ -6,14 +6,12 @@ import pytest
 
 from acquisition.recording.rig_schema import ArmModel
 from calibrate.arms.convert import convert
-from calibrate.dual_psd_rig import believed_noise, dual_psd_chain
 from calibrate.export.export import ExportForm, export_text
 from calibrate.fit import Status
 from calibrate.identification.identify import identify
-from calibrate.observations import Observations
 from calibrate.predict import Predictor, predict
-from calibrate.zeros.identify import identify as identify_zeros
 
+from ..conftest import spot_samples
 from .conftest import BAR_M, table
 
 USABLE = (Status.CONVERGED, Status.RANK_DEFICIENT)
@@ -61,7 +59,7 @@ def test_identified_predicted_and_exported_alike(rig, session, samples):
         assert result.status in USABLE, model
         values = {p.name: float(v) for p, v in zip(result.parameters, result.theta, strict=True)}
         (instrument,) = result.instruments
-        left[model] = instrument.rms_after
+        left[model] = instrument.rms_distance_after_m
         predicted = predict(Predictor(own, values, result.about, (instrument.name,)), seen)
         told[model] = np.stack([predicted[c] for c in sorted(set(predicted) - {"t_s"})])
         for form in ExportForm:
@@ -77,12 +75,10 @@ def test_identified_predicted_and_exported_alike(rig, session, samples):
 
 def test_zeros_by_the_dual_psd_do_not_depend_on_the_writing_but_what_they_are_measured_from_does(rig, sessions):
     session = sessions(7, n=100, repeats=8)
-    data = Observations(session.q_rad, session.first_psd, session.placement, session.spots_m, None, session.repeat)
-    found = {}
+    samples, found = spot_samples(session), {}
     for model in ArmModel:
         own = msgspec.structs.replace(rig, arm=convert(rig.arm, model).arm)
-        chain = dual_psd_chain(own, data.placement, data.first_psd)
-        found[model] = identify_zeros(chain, data, believed_noise(own), rng=np.random.default_rng(1))
+        found[model] = identify(own, samples, rng=np.random.default_rng(1), held_out_share=0.0)
     table, craig, six = (found[model].zeros[1:5] for model in (ArmModel.DH, ArmModel.MDH, ArmModel.LOCAL_POE))
     off = [(z.value_rad - true) / z.sigma_rad for z, true in zip(table, session.truth.zeros[1:5], strict=True)]
     assert max(map(abs, off)) < 3.5
@@ -91,5 +87,5 @@ def test_zeros_by_the_dual_psd_do_not_depend_on_the_writing_but_what_they_are_me
         assert b.sigma_rad == pytest.approx(a.sigma_rad, rel=1e-3)
         assert c.value_rad == pytest.approx(a.value_rad, abs=1e-6)
         assert c.sigma_rad > 100.0 * a.sigma_rad  # six errors a link: x of a link is drawn, not the common normal
-    rms = [result.rms_after_m for result in found.values()]
+    rms = [result.instruments[0].rms_distance_after_m for result in found.values()]
     np.testing.assert_allclose(rms, rms[0], rtol=5e-3)

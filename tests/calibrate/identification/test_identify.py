@@ -53,8 +53,8 @@ def test_links_without_tolerance_are_free_and_the_noise_is_found(rig, session):
     assert (random.split, last.split) == ("random 20% of the rows", "last 20% of the session")
     for unseen in (random, last):
         assert unseen.observations == 50
-        assert unseen.rms_before > 5e-4
-        assert unseen.rms_after < 2.2 * TRACKER_M
+        assert unseen.rms_distance_before_m > 5e-4
+        assert unseen.rms_distance_after_m < 2.2 * TRACKER_M
 
 
 def test_what_is_said_with_a_sigma_is_true(rig, session):
@@ -93,7 +93,7 @@ def test_wire_alone_is_fitted_and_its_drum_found(rig, session):
     result = run(rig, table(q, wire_m=wire))
     (instrument,) = result.instruments
     assert (instrument.name, instrument.observations) == ("wire", 200)
-    assert instrument.rms_after < 3e-5 < instrument.rms_before
+    assert instrument.rms_distance_after_m < 3e-5 < instrument.rms_distance_before_m
     place = predictor(rig, result).T_base_device[:3, 3]
     assert np.hypot(*place[:2]) == pytest.approx(np.hypot(*drum[:2]), abs=1e-3)  # a turn about axis 1 is nobody's
     assert place[2] == pytest.approx(drum[2], abs=1e-3)
@@ -113,7 +113,7 @@ def test_cones_bring_all_tips_of_a_seat_together(rig, session):
     result = run(rig, table(q, seat=seat))
     (instrument,) = result.instruments
     assert instrument.name == "seat"
-    assert instrument.rms_after < 2.5e-5
+    assert instrument.rms_distance_after_m < 2.5e-5
     predicted = predict(predictor(rig, result), table(q, seat=seat))
     tips = np.stack([predicted[c] for c in ("tip_x_m", "tip_y_m", "tip_z_m")], axis=1)
     for k in (1.0, 2.0):
@@ -151,7 +151,7 @@ def test_a_bar_gives_the_scale_that_cones_do_not_have(rig, session):
     result = run(rig, samples)
     assert [i.name for i in result.instruments] == ["seat", "bar"]
     assert result.instruments[1].observations == m // 2 > 15
-    assert all(i.rms_after < i.rms_before for i in result.instruments)
+    assert all(i.rms_distance_after_m < i.rms_distance_before_m for i in result.instruments)
 
 
 def test_no_observation_at_all_is_refused_by_name(rig, session):

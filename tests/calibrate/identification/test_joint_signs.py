@@ -63,7 +63,7 @@ def test_a_kuka_is_refused_by_its_joints_and_good_once_these_are_mended(planar_r
     assert "change the sign of these columns" in str(refused.value)
     assert "left-handed" not in str(refused.value)
     mended = run(planar_rig, negated(samples, "q1_rad", "q4_rad", "q6_rad"))
-    assert mended.instruments[0].rms_after < 2.0 * NOISE_M
+    assert mended.instruments[0].rms_distance_after_m < 2.0 * NOISE_M
     assert mended.alarms == ()
 
 
@@ -71,7 +71,7 @@ def test_a_negated_column_of_the_device_is_refused_too(planar_rig):
     samples = session(planar_rig)
     with pytest.raises(DataError, match=r"joints 1, 4 and 6.*less likely: one of x_m, y_m, z_m is negated"):
         run(planar_rig, negated(samples, "x_m"))
-    assert run(planar_rig, samples).instruments[0].rms_after < 2.0 * NOISE_M
+    assert run(planar_rig, samples).instruments[0].rms_distance_after_m < 2.0 * NOISE_M
 
 
 @pytest.mark.parametrize("wrong", ["joints", "column"])

@@ -96,8 +96,8 @@ def test_every_instrument_is_proved_in_its_own_unit_by_every_split(mixed):
     floor_m = {"dual-psd": 2e-6 * 2.0, "position": POSITION_M * np.sqrt(3.0), "wire": WIRE_M}
     for name, floor in floor_m.items():
         unseen = by[splits[0], name]
-        assert 0.5 * floor < unseen.rms_after < 3.0 * floor
-        assert unseen.rms_before > 10.0 * unseen.rms_after
+        assert 0.5 * floor < unseen.rms_distance_after_m < 3.0 * floor
+        assert unseen.rms_distance_before_m > 10.0 * unseen.rms_distance_after_m
     assert by[splits[1], "dual-psd"].observations == 90
     assert (splits[1], "position") not in by
     assert [by[splits[2], "wire"].observations, (splits[2], "dual-psd") in by] == [42, False]
@@ -120,7 +120,7 @@ def test_a_known_distance_goes_with_the_place_that_is_left_out(mixed, session):
     length = KnownDistance(1, 2, float(np.linalg.norm(span[1] - span[0])), 1e-5)
     result = run(msgspec.structs.replace(rig, known_distances=(length,)), samples)
     by_place = next(u for u in result.held_out if u.split.startswith("each"))
-    assert by_place.rms_after < 2e-5  # a place that stood where the drawing says would be off by millimetres
+    assert by_place.rms_distance_after_m < 2e-5  # a place that stood where the drawing says would be off by millimetres
 
 
 def test_tolerances_of_gains_second_face_and_device_reach_the_fit_as_beliefs(mixed):

@@ -77,8 +77,8 @@ def test_the_identification_tells_the_unseen_error_and_finds_no_blunder_in_a_goo
     result = run(real(name), share=0.2)
     unseen = result.held_out[0]
     assert "random" in unseen.split
-    assert unseen.rms_before > DRAWN_M[name]
-    assert unseen.rms_after < 1.12 * FIGURES_M[name]  # three times the scatter of one split
+    assert unseen.rms_distance_before_m > DRAWN_M[name]
+    assert unseen.rms_distance_after_m < 1.12 * FIGURES_M[name]  # three times the scatter of one split
     assert result.blunders == ()
 
 
@@ -114,4 +114,4 @@ def test_blunders_made_in_the_ur5_session_are_found_and_no_others(real):
         (BlunderKind.WRONG_VALUE, "q3_rad", (500,)),
         (BlunderKind.OTHER_SESSION, "x_m, y_m, z_m", tuple(range(600, 700))),
     }
-    assert result.instruments[0].rms_after < 0.115e-3
+    assert result.instruments[0].rms_distance_after_m < 0.115e-3

@@ -6,18 +6,12 @@ import pytest
 from acquisition.recording.rig import load_rig
 from acquisition.recording.samples import Samples
 from calibrate.blunders.finding import BlunderKind
-from calibrate.dual_psd_rig import believed_noise, dual_psd_chain
 from calibrate.errors import DataError
 from calibrate.fit_plan import FitPlan
-from calibrate.identification.evidence import Asked
-from calibrate.identification.identify import identify
-from calibrate.identification.spots import proved, without_blunders
-from calibrate.read_samples import observations
-from calibrate.zeros.identify import identify as identify_zeros
+from calibrate.identification.identify import identify, without_blunders
 
-from .conftest import changed, table
-
-SPOTS = ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")
+from ..conftest import spot_samples
+from .conftest import changed
 
 
 @pytest.fixture(scope="module")
@@ -27,32 +21,30 @@ def rig(request):
 
 @pytest.fixture
 def samples(sessions):
-    s = sessions(41, n=60, repeats=6)
-    spots = dict(zip(SPOTS, s.spots_m.T, strict=True))
-    return table(s.q_rad, placement=s.placement.astype(float), first_psd=s.first_psd.astype(float), **spots)
+    return spot_samples(sessions(41, n=60, repeats=6))
 
 
 def test_honest_spots_are_all_kept(rig, samples):
-    kept, blunders = without_blunders(rig, samples)
+    weighting, _, blunders = without_blunders(rig, samples)
     assert blunders == ()
-    assert kept is samples
+    assert weighting.measured[0].problem.rows == len(samples)
 
 
 @pytest.mark.parametrize(("column", "off"), [("psd2_x_m", 1e-3), ("psd1_y_m", -4e-4), ("q3_rad", 0.05)])
 def test_a_typed_digit_is_named_by_row_and_column(rig, samples, column, off):
     values = samples.column(column).copy()
     values[17] += off
-    kept, (found,) = without_blunders(rig, changed(samples, **{column: values}))
+    weighting, _, (found,) = without_blunders(rig, changed(samples, **{column: values}))
     assert (found.kind, found.rows) == (BlunderKind.WRONG_VALUE, (17,))
     assert found.column == column
-    assert len(kept) == len(samples) - 1
+    assert weighting.measured[0].problem.rows == len(samples) - 1
 
 
 def test_a_copied_row_is_left_out_and_later_rows_keep_their_numbers(rig, samples):
     doubled = Samples({k: np.insert(v, 5, v[2]) for k, v in samples.columns.items()}, 6)
     x = doubled.column("psd1_x_m").copy()
     x[40] += 2e-3
-    _, blunders = without_blunders(rig, changed(doubled, psd1_x_m=x))
+    _, _, blunders = without_blunders(rig, changed(doubled, psd1_x_m=x))
     assert {(b.kind, b.rows) for b in blunders} == {
         (BlunderKind.DUPLICATED_ROWS, (5,)),
         (BlunderKind.WRONG_VALUE, (40,)),
@@ -65,21 +57,14 @@ def test_degrees_are_refused_by_name(rig, samples):
         without_blunders(rig, changed(samples, **degrees))
 
 
-def test_zeros_are_proved_as_every_other_fit_is(rig, samples):
-    data = observations(samples)
-    zeros = identify_zeros(
-        dual_psd_chain(rig, data.placement, data.first_psd), data, believed_noise(rig), rng=np.random.default_rng(0)
-    )
-    found = proved(rig, samples, zeros, asked=Asked(), rng=np.random.default_rng(0))
-    np.testing.assert_allclose(
-        [e.value for e in found.estimates if e.name == "joint3.zero"], zeros.zeros[2].value_rad, atol=1e-7
-    )
+def test_spots_are_proved_by_every_split_and_raise_no_alarm(rig, samples):
+    found = identify(rig, samples, rng=np.random.default_rng(0))
     assert [u.split for u in found.held_out] == [
         "random 20% of the rows",
         "each of 3 places in turn",
         "last 20% of the session",
     ]
-    assert all(u.rms_after < 1.2e-5 < 1e-3 < u.rms_before for u in found.held_out)
+    assert all(u.rms_distance_after_m < 1.2e-5 < 1e-3 < u.rms_distance_before_m for u in found.held_out)
     assert found.evidence.observability.n_free > 30
     assert found.alarms == ()
 

@@ -14,18 +14,15 @@ from acquisition.recording.rig import load_rig, parse_rig, plain_rig, rig_sha256
 from acquisition.recording.samples import Samples
 from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
+from calibeam.any_session import identify_session, session_model
 from calibeam.direct import direct_bench
-from calibeam.identification import Identified, identify_recording
 from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
-from calibrate.identification.evidence_record import evidence_fields
 from calibrate.identification.identify import identify
 from calibrate.identification.record import record_of
 from calibrate.model_file import ModelFile, RigIdentity
-from calibrate.report.evidence import evidence
-from calibrate.report.session_evidence import session_evidence
+from calibrate.report.session_evidence import SessionEvidence, session_evidence
 from calibrate.report.session_report import session_page
-from calibrate.report.zero_report import ZeroSession, zero_page
 from drivers.clock import SystemClock
 
 RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
@@ -46,16 +43,15 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recording:
 
 
 @pytest.fixture(scope="session")
-def identified(recorded: Recording) -> Identified:
-    return identify_recording(recorded)
+def spots(recorded: Recording) -> SessionEvidence:
+    """The dual-PSD session and its model."""
+    return session_evidence(recorded, session_model(identify_session(recorded), recorded))
 
 
 @pytest.fixture(scope="session")
-def zero_html(recorded: Recording, identified: Identified) -> str:
-    """The whole report of the dual-PSD session, made once."""
-    proved = None if identified.proved is None else evidence_fields(identified.proved.evidence)
-    known = evidence(recorded, identified.zeros, "reported")
-    return zero_page(ZeroSession(known, identified.four_poses, proved=proved))
+def spots_html(spots: SessionEvidence) -> str:
+    """Its whole report, made once."""
+    return session_page(spots)
 
 
 class ArmSession:

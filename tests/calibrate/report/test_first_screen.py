@@ -67,8 +67,8 @@ def test_three_numbers_as_drawn_now_and_anywhere(known):
     answers, proof = session_answers(known), known.model.proofs[0]
     assert [n.key for n in answers.numbers] == ["as_drawn", "now", "anywhere"]
     assert [n.value for n in answers.numbers] == [
-        proof.rms_before,
-        proof.rms_after,
+        proof.rms_distance_before_m,
+        proof.rms_distance_after_m,
         known.model.free_space.pose_p95_m,
     ]
 
@@ -82,8 +82,8 @@ def test_a_number_that_cannot_be_told_is_a_dash_with_its_reason(known):
     assert "something moves the target" in number.about
 
 
-def test_no_letter_of_a_figure_is_smaller_than_seven_points_on_paper(session_html, zero_html):
-    for page in (session_html, zero_html):
+def test_no_letter_of_a_figure_is_smaller_than_seven_points_on_paper(session_html, spots_html):
+    for page in (session_html, spots_html):
         letters = Letters()
         letters.feed(page)
         assert len(letters.printed) >= 6

@@ -41,10 +41,10 @@ def tab(browser):
     opened.close()
 
 
-def test_the_plain_report_is_quiet_and_asks_for_nothing(tab, zero_html, tmp_path):
+def test_the_plain_report_is_quiet_and_asks_for_nothing(tab, spots_html, tmp_path):
     opened, asked, wrong, said = tab
     path = tmp_path / "report.html"
-    path.write_text(zero_html, encoding="utf-8")
+    path.write_text(spots_html, encoding="utf-8")
     opened.goto(path.as_uri())
     assert opened.get_by_text("Can I trust it?").is_visible()
     assert len(opened.screenshot()) > 20_000

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from calibeam.identification import Identified
 from calibrate.believed import BelievedRig
-from calibrate.report.evidence import Evidence, evidence
 from calibrate.report.rig_scene import FittedRig, Scene, fitted_rig, scene
+from calibrate.report.session_evidence import SessionEvidence
+from calibrate.report.spot_session import SpotSession, spot_session
 
 # The drawn beam ends on observed spots, the computed one does not know them: they differ by the noise (some um) over
 # the distance of the faces (0.08 m).
@@ -14,17 +14,19 @@ BEAM_DOUBT = 1e-3
 
 
 @pytest.fixture(scope="module")
-def known(identified: Identified) -> Evidence:
-    return evidence(identified.used, identified.zeros, "reported")
+def known(spots: SessionEvidence) -> SpotSession:
+    session = spot_session(spots)
+    assert session is not None
+    return session
 
 
 @pytest.fixture(scope="module")
-def rig(known: Evidence) -> FittedRig:
+def rig(known: SpotSession) -> FittedRig:
     return fitted_rig(known)
 
 
 @pytest.fixture(scope="module")
-def drawn(known: Evidence, rig: FittedRig) -> Scene:
+def drawn(known: SpotSession, rig: FittedRig) -> Scene:
     return scene(rig, known.data, known.places)
 
 
@@ -32,7 +34,7 @@ def unit(vector: np.ndarray) -> np.ndarray:
     return vector / np.linalg.norm(vector)
 
 
-def test_there_is_one_arm_and_one_fixture_a_placement(drawn: Scene, known: Evidence) -> None:
+def test_there_is_one_arm_and_one_fixture_a_placement(drawn: Scene, known: SpotSession) -> None:
     assert tuple(arm.placement for arm in drawn.arms) == known.places == tuple(drawn.faces_m)
 
 
@@ -57,8 +59,8 @@ def test_bones_lead_from_the_base_through_every_axis_to_the_laser(drawn: Scene) 
             assert np.linalg.norm(arm.bones_m - point, axis=1).min() < 1e-9
 
 
-def test_without_a_fit_the_rig_is_drawn_as_in_its_file(known: Evidence, rig: FittedRig) -> None:
-    place, plain = known.places[0], BelievedRig(known.recording.rig)
+def test_without_a_fit_the_rig_is_drawn_as_in_its_file(known: SpotSession, rig: FittedRig) -> None:
+    place, plain = known.places[0], BelievedRig(known.rig)
     as_drawn = FittedRig(plain, rig.T_psd1_psd2, rig.half_size_m)
     np.testing.assert_allclose(as_drawn.faces(place)[0], plain.T_base_psd1(place))
     assert np.linalg.norm((as_drawn.faces(place) - rig.faces(place))[:, :3, 3], axis=1).max() > 1e-4

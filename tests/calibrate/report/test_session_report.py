@@ -83,8 +83,8 @@ def test_every_instrument_has_its_errors_before_and_after(page, wire_and_positio
         assert f"{readings.title} as drawn 40" in text
     first = evidence.readings[0]
     model = wire_and_positions[1]
-    assert np.sqrt(np.mean(first.error_after**2)) == pytest.approx(model.rms_after_m, rel=1e-9)
-    assert np.sqrt(np.mean(first.error_before**2)) == pytest.approx(model.rms_before_m, rel=1e-3)
+    assert np.sqrt(np.mean(first.error_after**2)) == pytest.approx(model.rms_distance_after_m, rel=1e-9)
+    assert np.sqrt(np.mean(first.error_before**2)) == pytest.approx(model.rms_distance_before_m, rel=1e-3)
 
 
 def test_residuals_are_whitened_by_the_noise_that_was_found(poses):

@@ -27,7 +27,7 @@ def test_a_healthy_session_is_trusted_and_said_in_one_sentence(healthy):
     judged = session_verdict(healthy)
     assert (judged.trust, judged.reasons) == (Trust.GOOD, ())
     proof = healthy.model.proofs[0]
-    assert f"{1e6 * proof.rms_after:.1f}" in judged.sentence
+    assert f"{1e6 * proof.rms_distance_after_m:.1f}" in judged.sentence
     assert "Trust it" in judged.sentence
     assert judged.advice
 
@@ -60,7 +60,7 @@ def test_unseen_rows_far_beyond_the_noise_call_for_care(healthy):
 
 
 def test_an_arm_no_better_than_its_drawing_is_not_to_be_used(healthy):
-    same = tuple(msgspec.structs.replace(p, rms_after=p.rms_before) for p in healthy.model.proofs)
+    same = tuple(msgspec.structs.replace(p, rms_distance_after_m=p.rms_distance_before_m) for p in healthy.model.proofs)
     judged = session_verdict(changed(healthy, proofs=same))
     assert judged.trust is Trust.NONE
     assert "Do not use this model" in judged.sentence

@@ -55,7 +55,7 @@ def test_errors_of_poses_left_out_are_larger_than_those_of_the_fit(known, arm):
     assert measured is not None
     fitted = known.readings[0].error_after
     assert np.all(measured.found_m > fitted)
-    assert np.sqrt(np.mean(measured.found_m**2)) == pytest.approx(known.model.proofs[0].rms_after, rel=0.35)
+    assert np.sqrt(np.mean(measured.found_m**2)) == pytest.approx(known.model.proofs[0].rms_distance_after_m, rel=0.35)
 
 
 def test_no_pose_beyond_the_angles_or_the_leverage_of_the_session_is_supported(known, arm, room):

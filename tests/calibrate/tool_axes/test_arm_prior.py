@@ -37,8 +37,10 @@ def model(values, covariance, undetermined=()):
         noise={},
         repeats=None,
         held_out=None,
-        rms_before_m=1e-3,
-        rms_after_m=5e-5,
+        rms_coordinate_before_m=1e-3,
+        rms_distance_before_m=1e-3,
+        rms_coordinate_after_m=5e-5,
+        rms_distance_after_m=5e-5,
     )
 
 

@@ -10,10 +10,10 @@ from calibrate.arms.catalogue import arm_of
 from calibrate.dual_psd_rig import laser_of
 from calibrate.fit import Status, solve
 from calibrate.identifiability import analyse
+from calibrate.identification.point_constraint import BOUND_RAD, Form, PointConstraint
 from calibrate.parameters import Parameter, hold
 from calibrate.redundant import Redundant, reduced
 from calibrate.uncertainty.intervals import intervals
-from calibrate.zeros.point_constraint import BOUND_RAD, Form, PointConstraint
 
 
 def by_name(fit, seen):

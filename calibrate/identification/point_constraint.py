@@ -9,6 +9,7 @@ zero and named, and a zero at its bound, or one that only counts together with a
 The middles of the pairs ignore how far the two lines of a pair pass each other, which costs the paper one of its five
 equations once the lines meet (rank 4). `identify_by_point` therefore takes the distances of all lines, four or more,
 from the one point nearest to all (rank 5 with four poses).
+`point_constraints` gives both beside the fit where a fit plan asks for it (`method = "point-constraint"`).
 The laser mount, the links and their tolerance are those of the drawing; sigma carries what they may be off.
 """
 
@@ -19,24 +20,31 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording.rig_schema import Rig
+from acquisition.recording.samples import Samples
+from calibrate.arms.catalogue import arm_of
 from calibrate.arms.model import KinematicModel
+from calibrate.default_belief import links_of
+from calibrate.dual_psd_rig import laser_of
 from calibrate.errors import DataError
 from calibrate.fit import Fit, Status, solve
 from calibrate.identifiability import Identifiability, analyse
+from calibrate.identification.estimates import JointZero
 from calibrate.observations import Observations
 from calibrate.parameters import Parameter, hold, start_values
+from calibrate.read_samples import observations
 from calibrate.rigid import cross
 from calibrate.sensors.laser import LaserMount
-from calibrate.zeros.lines import Lines, distances, nearest_point
-from calibrate.zeros.result import JointZero
+from calibrate.sensors.lines import CENTRED_M, Lines, distances, nearest_point
 
 Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 BOUND_RAD = 0.0785
 MAX_ITERATIONS = 2000
+SAME_POSE_RAD = 0.01  # repeats of one pose are one pose
 # The paper stops at 1e-5 of its objective; that is before the steps show that an equation is lost at the solution.
 TOLERANCE = 1e-12  # of chi2
-CENTRED_M = 1e-4  # a spot farther off moves the line by more than the tolerance of a 5 um centring can explain
 
 
 class Form(Enum):
@@ -71,8 +79,8 @@ class PointConstraintResult:
     zeros: tuple[JointZero, ...]
     identifiability: Identifiability  # of all zeros, bounds aside
     point_m: Floats  # (3,) where the lines meet, in the base of the arm with the held zeros at 0
-    rms_before_m: float  # of the residual vectors
-    rms_after_m: float
+    rms_distance_before_m: float  # of the residual vectors
+    rms_distance_after_m: float
     steps: int
 
 
@@ -141,6 +149,66 @@ class PointConstraint:
         by = by.copy()
         by[:, :, :n] -= np.swapaxes(cross(w.T[None], vectors[:, None]), 1, 2)
         return vectors @ R, R.T @ by
+
+
+@dataclass(frozen=True)
+class PointConstraints:
+    """The method beside a fit: as published, and with every centred pose of one placement."""
+
+    placement: int
+    poses: int  # centred ones there
+    four_poses: PointConstraintResult
+    all_poses: PointConstraintResult
+
+
+def point_constraints(rig: Rig, samples: Samples) -> PointConstraints:
+    """Both forms at the placement with most centred poses. DataError where no placement has two of each beam order."""
+    data = observations(samples)
+    centred = np.all(np.abs(data.spots_m) < CENTRED_M, axis=1)
+    found: list[tuple[int, int, Indices, Indices]] = []
+    for placement in np.unique(data.placement).tolist():
+        here = centred & (data.placement == placement)
+        four = four_centred_poses(data, here)
+        if four is not None:
+            found.append((int(np.sum(here)), -placement, four, np.flatnonzero(here)))
+    if not found:
+        raise DataError(
+            'fit plan: method = "point-constraint" needs two different poses of each beam order, centred within '
+            f"{CENTRED_M} m, at one placement; centre such poses, or leave the method out"
+        )
+    poses, placement, four, every = max(found, key=lambda each: each[:2])
+    arm, mount, doubt = arm_of(rig, links_of(rig)), laser_of(rig), drawing_doubt(rig)
+    return PointConstraints(
+        -placement,
+        poses,
+        identify_by_four_poses(arm, mount, data.select(four), doubt),
+        identify_by_point(arm, mount, data.select(every), doubt),
+    )
+
+
+def four_centred_poses(data: Observations, usable: NDArray[np.bool_]) -> Indices | None:
+    """Rows of two of the usable poses (pose,) of each beam order, the two of an order as different as there are.
+
+    In the order of the source: 1, 2 with PSD 1 first, 3, 4 with PSD 2 first. None where there are no two of each.
+    """
+    one, two = (_most_different(data, np.flatnonzero(usable & (data.first_psd == first))) for first in (1, 2))
+    return None if one is None or two is None else np.array([*one, *two], dtype=np.intp)
+
+
+def _most_different(data: Observations, rows: Indices) -> tuple[int, int] | None:
+    if len(rows) < 2:
+        return None
+    apart = np.linalg.norm(data.q_rad[rows][:, None] - data.q_rad[rows][None], axis=2)
+    i, j = np.unravel_index(int(np.argmax(apart)), apart.shape)
+    if apart[i, j] < SAME_POSE_RAD:
+        return None
+    return int(rows[i]), int(rows[j])
+
+
+def drawing_doubt(rig: Rig, line_m: float = 5e-6) -> DrawingDoubt:
+    """What the point constraint takes from the drawing; 5 um is how well the servo centres."""
+    links = links_of(rig)
+    return DrawingDoubt(line_m, links.length_sigma_m, links.angle_sigma_rad)
 
 
 def identify_by_four_poses(

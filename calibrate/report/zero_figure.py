@@ -1,14 +1,14 @@
-"""The two pictures of the first page: how well each zero is known, and how far the spots are explained."""
+"""How well each joint zero is known, as a figure."""
 
 from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
+from calibrate.identification.estimates import JointZero
 from calibrate.report.elements import Html
-from calibrate.report.quantities import angle, length
+from calibrate.report.quantities import angle
 from calibrate.report.svg import drawn, log_axis
 from calibrate.report.tones import Tone
-from calibrate.zeros.result import JointZero
 
 ROW_IN = 0.3
 
@@ -51,30 +51,3 @@ def _paint_doubts(figure: Figure, zeros: Sequence[JointZero]) -> None:
     axes.set_title("One sigma of each zero")
     if any(z.sigma_rad is not None for z in zeros):
         axes.legend(loc="upper right", bbox_to_anchor=(1.0, -0.16), ncols=2, borderaxespad=0.0)
-
-
-def explained(sizes: Sequence[tuple[str, float]], floor_m: float) -> Html:
-    """Rms of the residuals in several states on a log axis, with the noise floor."""
-    says = "rms of the spot residuals before and after the fit beside the noise floor"
-    return drawn(
-        "spots-explained", says, 4.8, 1.0 + ROW_IN * 6, lambda figure: _paint_explained(figure, sizes, floor_m)
-    )
-
-
-def _paint_explained(figure: Figure, sizes: Sequence[tuple[str, float]], floor_m: float) -> None:
-    axes = figure.add_subplot()
-    axes.axvline(floor_m, color=Tone.INK.value, lw=1.2, linestyle=(0, (4, 3)), zorder=1)
-    floor = f"noise floor {length(floor_m)}"
-    axes.annotate(floor, (floor_m, len(sizes) - 0.5), (5, 4), textcoords="offset points", fontsize=10)
-    for row, (_, rms_m) in enumerate(sizes):
-        axes.plot([floor_m, rms_m], [row, row], color=Tone.SOFT.value, lw=1.6, zorder=1)
-        axes.plot(rms_m, row, "o", ms=8, color=Tone.PLACE_1.value)
-        side, shift = ("right", -8) if rms_m > 30.0 * floor_m else ("left", 8)
-        axes.annotate(length(rms_m), (rms_m, row), (shift, 5), textcoords="offset points", fontsize=10, ha=side)
-    axes.set_yticks(range(len(sizes)), [name for name, _ in sizes])
-    axes.tick_params(axis="y", length=0, colors=Tone.INK.value)
-    axes.set_ylim(len(sizes) - 0.35, -0.6)
-    axes.spines["left"].set_visible(False)
-    axes.grid(visible=False, axis="y")
-    log_axis(axes, "x", [floor_m, *(rms_m for _, rms_m in sizes)], lambda value: length(value, 1))
-    axes.set_title("Spots off, rms")

@@ -5,19 +5,20 @@ import pytest
 
 from acquisition.recording.rig import load_rig
 from calibrate.arms.catalogue import arm_of
-from calibrate.dual_psd_rig import drawing_doubt, laser_of
+from calibrate.dual_psd_rig import laser_of
 from calibrate.errors import DataError
 from calibrate.fit import Status
-from calibrate.observations import Observations
-from calibrate.parameters import Parameter, start_values
-from calibrate.zeros.point_constraint import (
+from calibrate.identification.point_constraint import (
     BOUND_RAD,
     DrawingDoubt,
     Form,
     PointConstraint,
+    drawing_doubt,
     identify_by_four_poses,
     identify_by_point,
 )
+from calibrate.observations import Observations
+from calibrate.parameters import Parameter, start_values
 
 DOUBT = DrawingDoubt(line_m=5e-6, length_m=3e-4, angle_rad=5e-4)
 
@@ -49,7 +50,7 @@ def test_enough_poses_of_an_exact_rig_give_every_zero_but_the_first(rig, exact):
     assert (result.zeros[0].value_rad, result.zeros[0].why) == (None, "the measurement does not depend on it")
     for zero in result.zeros[1:]:
         assert zero.value_rad == pytest.approx(exact.truth.zeros[zero.joint - 1], abs=1e-8)
-    assert result.rms_after_m < 1e-9 < 1e-3 < result.rms_before_m
+    assert result.rms_distance_after_m < 1e-9 < 1e-3 < result.rms_distance_before_m
 
 
 def test_middles_of_the_pairs_lose_an_equation_and_report_no_number(rig, exact):

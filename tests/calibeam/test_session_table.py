@@ -1,0 +1,76 @@
+"""What a person reads after a dual-PSD session: zeros first, all other parameters, the verdict last."""
+
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from acquisition.plan import PlanOptions
+from acquisition.recording.read import read
+from acquisition.recording.rig import load_rig, plain_rig, rig_text
+from acquisition.recording.samples import Samples
+from acquisition.recording.writer import RecordingWriter
+from acquisition.session import Session
+from calibeam.any_session import Planned, identify_session, session_model
+from calibeam.direct import direct_bench
+from calibeam.journal import RecordingJournal
+from calibeam.learner import FittedLearner
+from calibeam.session_table import print_identification
+from calibrate.errors import DataError
+from calibrate.fit_plan import parse_plan
+from calibrate.identification.point_constraint import point_constraints
+from calibrate.report.session_evidence import session_evidence
+from calibrate.report.session_verdict import session_verdict
+from drivers.clock import SystemClock
+
+RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    path, clock, rig = tmp_path_factory.mktemp("terminal") / "r.mcap", SystemClock(), load_rig(RIG)
+    bench = direct_bench(rig, plain_rig(rig_text(RIG), "rig"), seed=12)
+    with RecordingWriter(path, rig_text=rig_text(RIG), software="calibeam", clock=clock) as writer:
+        options = PlanOptions(centred=2, off_centre=4, repeats=1)
+        journal = RecordingJournal(writer, clock)
+        Session(bench, FittedLearner(rig), journal, options, np.array(rig.motion.home_rad)).run((1, 2, 3))
+    return read(path)
+
+
+def printed(recording, plan=None):
+    text = StringIO()
+    planned = None if plan is None else Planned(parse_plan(plan, "fit.toml"), plan)
+    result = identify_session(recording, planned)
+    judged = session_verdict(session_evidence(recording, session_model(result, recording, planned)))
+    print_identification(Console(file=text, width=400), result, judged, recording.rig)
+    return text.getvalue(), judged
+
+
+def test_the_last_lines_are_the_report_s_verdict_and_no_name_of_a_status_is_printed(recording):
+    told, judged = printed(recording)
+    last = [line.strip() for line in told.splitlines() if line.strip()][-1 - len(judged.reasons) :]
+    assert last == [judged.sentence, *judged.reasons]
+    assert "RANK_DEFICIENT" not in told
+
+
+def test_zeros_stand_in_degrees_before_all_other_parameters_and_only_once(recording):
+    told, _ = printed(recording)
+    assert told.index("zero (deg)") < told.index("link2.length")
+    assert "J1 not determined: only in combination" in told
+    assert "joint2.zero" not in told
+    assert "point constraint" not in told
+
+
+def test_the_point_constraint_comes_after_the_zeros_of_the_fit_where_a_plan_names_it(recording):
+    told, _ = printed(recording, 'schema = 1\nmethod = "point-constraint"\nshare = 0\n')
+    assert told.index("link2.length") < told.index("for comparison: point constraint") < told.index("four poses at")
+
+
+def test_a_plan_that_names_the_point_constraint_without_centred_poses_is_refused(recording):
+    off = recording.samples.columns | {"psd1_x_m": recording.samples.column("psd1_x_m") + 2e-4}
+    moved = replace(recording, samples=Samples(off, 6))
+    with pytest.raises(DataError, match='method = "point-constraint" needs two different poses of each beam order'):
+        point_constraints(moved.rig, moved.samples)
