@@ -11,8 +11,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from calibrate.kernels import ready
-from calibrate.kernels import serial as loops
+from calibrate.arms import compiled
 from calibrate.parameters import Parameter
 from calibrate.rigid import cross, turn_twist
 
@@ -57,8 +56,8 @@ class SerialArm(ABC):
         return B
 
     def flange(self, theta: Floats, q_rad: Floats) -> Floats:
-        if ready.worth(len(q_rad)):
-            return loops.flange(loops.ArmConstants.of(self, theta), q_rad)
+        if compiled.worth(len(q_rad)):
+            return compiled.flange(compiled.ArmConstants.of(self, theta), q_rad)
         return self.frames(theta, q_rad)[:, -1].copy()
 
     def joint_twists(self, theta: Floats, q_rad: Floats) -> Floats:
@@ -66,8 +65,8 @@ class SerialArm(ABC):
         return np.swapaxes(turn_twist(before[..., :3, 2], before[..., :3, 3]), 1, 2)
 
     def twists(self, theta: Floats, q_rad: Floats) -> Floats:
-        if ready.worth(len(q_rad)):
-            return loops.twists(loops.ArmConstants.of(self, theta), q_rad)
+        if compiled.worth(len(q_rad)):
+            return compiled.twists(compiled.ArmConstants.of(self, theta), q_rad)
         B = self.frames(theta, q_rad)
         body = self.body_twists(theta).reshape(-1, 2, 3)
         out = np.empty((len(q_rad), len(self.parameters), 6))

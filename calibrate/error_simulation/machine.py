@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from acquisition.recording.rig import parse_rig
 from acquisition.recording.rig_schema import ArmModel, Rig
 from calibrate.arms.catalogue import arm_of
+from calibrate.arms.compiled import PER_PART
 from calibrate.arms.serial import rotation_z
 from calibrate.converted_rig import rig_in_model
 from calibrate.errors import DataError
-from calibrate.kernels.perturbed import PER_PART
 from calibrate.model_file import ModelFile
 from calibrate.parameters import values_by_name
 from calibrate.rigid import cross
@@ -55,7 +55,7 @@ class Machine:
         return T[:, :3, :3] @ self.point_m + T[:, :3, 3]
 
     def by_slot(self, q_rad: Floats) -> Floats:
-        """(pose, 3, slot) derivative of the probe by every slot (calibrate/kernels/perturbed.py), at no error.
+        """(pose, 3, slot) derivative of the probe by every slot (calibrate/arms/compiled.py), at no error.
 
         Shift c of part i moves it by the axis c of B_i, turn c by that axis x (p - o); an angle is a turn about z.
         """

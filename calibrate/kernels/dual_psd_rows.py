@@ -9,10 +9,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.arms.compiled import ArmConstants
 from calibrate.arms.serial import SerialArm
 from calibrate.chain import Chain
 from calibrate.kernels.normal_equations import Normal, Scaled, upper
-from calibrate.kernels.serial import ArmConstants
 from calibrate.problem import Problem
 from calibrate.sensors import laser
 from calibrate.sensors.dual_psd import N_FIXED, PAIR_FIRST, DualPsd

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.arms import compiled as ready
 from calibrate.fit import NEAR_START, Fit, solve
 from calibrate.identifiability import Identifiability, analyse
-from calibrate.kernels import ready
 from calibrate.kernels.dual_psd_rows import DualPsdRows
 from calibrate.kernels.normal_fit import bounded, fit_normal
 from calibrate.noisy_rows import IndependentRows, NoisyRows, common_axes

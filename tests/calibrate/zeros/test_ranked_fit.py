@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig import load_rig
+from calibrate.arms import compiled as ready
 from calibrate.dual_psd_rig import believed_noise, dual_psd_chain
-from calibrate.kernels import ready
 from calibrate.noisy_rows import independent
 from calibrate.observations import Observations
 from calibrate.problem import Problem
