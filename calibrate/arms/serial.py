@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from calibrate.arms import compiled
+from calibrate.arms.model import KinematicModel
 from calibrate.parameters import Parameter
-from calibrate.rigid import cross, turn_twist
+from calibrate.rigid import cross, cross_matrix, turn_twist
 
 Floats = NDArray[np.float64]
 
@@ -67,6 +68,15 @@ class SerialArm(ABC):
             seen[..., :3] += cross(B[:, i, None, :3, 3], seen[..., 3:])
             out[:, columns] = seen
         return np.swapaxes(out, 1, 2)
+
+
+def point_by_parameter(model: KinematicModel, theta: Floats, point_m: Floats, q_rad: Floats) -> tuple[Floats, Floats]:
+    """A point (3,) of the flange in the base (pose, 3), and its derivative by the parameters (pose, 3, param)."""
+    if isinstance(model, SerialArm) and compiled.worth(len(q_rad)):
+        return compiled.point_and_jacobian(compiled.ArmConstants.of(model, theta), point_m, q_rad)
+    T, twists = model.flange(theta, q_rad), model.twists(theta, q_rad)
+    points = T[:, :3, :3] @ point_m + T[:, :3, 3]
+    return points, twists[:, :3] - cross_matrix(points) @ twists[:, 3:]  # v + w x p
 
 
 def chain_frames(

@@ -6,6 +6,7 @@ import pytest
 from acquisition.recording.rig_schema import Arm, ArmModel, Joint, Pose, Rig, Tolerance
 from calibrate.arms import compiled
 from calibrate.arms.catalogue import ARMS, arm_of
+from calibrate.arms.serial import point_by_parameter
 
 BATCHES = (1, 127, 128, 129, 300)
 
@@ -72,6 +73,15 @@ def test_a_tool_point_moves_as_the_twists_of_the_flange_say(arm, poses):
     np.testing.assert_allclose(point, expected, atol=1e-12)
     velocity = twists[:, :3] + np.cross(twists[:, 3:], expected[:, :, None], axis=1)
     np.testing.assert_allclose(jacobian, velocity, atol=1e-12)
+
+
+def test_a_point_and_its_derivatives_are_the_same_by_loops_and_by_numpy(arm, monkeypatch):
+    theta, q = drawn(arm, 300)
+    tool = np.array([0.02, -0.01, 0.08])
+    by_numpy = point_by_parameter(arm, theta, tool, q)
+    monkeypatch.setattr(compiled, "worth", lambda poses: True)
+    for one, other in zip(by_numpy, point_by_parameter(arm, theta, tool, q), strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-12)
 
 
 def test_some_columns_in_any_order_are_those_of_the_whole(arm):
