@@ -15,7 +15,7 @@ $(READY): requirements/all.txt pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/all.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
-	$(BIN)/python -m calibrate.kernels
+	$(BIN)/python -m calibrate.arms
 	@touch $@
 
 demo: $(READY)
@@ -71,7 +71,7 @@ $(BENCH)/.ready: requirements/all.txt requirements/bench.txt pyproject.toml
 	$(PYTHON) -m venv $(BENCH)
 	$(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/all.txt -r requirements/bench.txt
 	$(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
-	$(BENCH)/bin/python -m calibrate.kernels
+	$(BENCH)/bin/python -m calibrate.arms
 	@touch $@
 
 # Renew the pins after changing pyproject.toml (needs pip-tools). Hashes only: no address enters the file.

@@ -1,7 +1,8 @@
 """Speed on one core, in one run beside Pinocchio, scipy and plain numpy: CPU-time medians, ratios, aims.
 
-Every rival is first checked to give the same numbers. Aims are for one core of the kind of machine that is
-described in docs/decisions/0005; a busy machine shows larger figures, so look at the ratios too.
+Every rival is first checked to give the same numbers. Aims of poses and tracker fits are ratios of the same run: a
+flange pose in a tenth of Pinocchio's time, a point with 24 derivatives in an eighth, a fit no slower than scipy's
+dogbox with our Jacobian. A busy machine shows larger times, so look at the ratios.
 """
 
 import subprocess
@@ -24,19 +25,19 @@ from acquisition.recording.rig_schema import Placement, Pose, Rig
 from acquisition.recording.samples import Samples
 from benchmarks import rival_pinocchio
 from benchmarks.drawn_sessions import T_BASE_DEVICE, TARGET_M, Bench, frame
+from calibrate.arms import compiled
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.serial import SerialArm
 from calibrate.chain import Chain
-from calibrate.fit import NEAR_START, solve
+from calibrate.fit import NEAR_START, Fit, solve
+from calibrate.identifiability import analyse
 from calibrate.identification.identify import identify
 from calibrate.identification.rounds import coarse_start, settled_fit
 from calibrate.identification.session import instruments_for_fit
-from calibrate.kernels import ready, serial
-from calibrate.kernels.__main__ import main as compile_loops
-from calibrate.kernels.position_fit import identify_positions
 from calibrate.observations import Observations
 from calibrate.parameters import hold, plausible_sizes
 from calibrate.problem import Problem
+from calibrate.redundant import reduced
 from calibrate.rigid import cross_matrix
 from calibrate.sensors.device import Device
 from calibrate.sensors.position import Position
@@ -69,8 +70,7 @@ class Row:
 
 def lines(rig_file: Path) -> Iterator[str]:
     """The table, line by line as it is measured."""
-    compile_loops()
-    ready.available.cache_clear()
+    compiled.prepare()
     rig = load_rig(rig_file)
     arm = arm_of(rig)
     yield f"{'what':58s} {'ours':>8s} {'':10s} {'aim':>9s} {'':12s} others (times ours)"
@@ -98,26 +98,27 @@ def cpu_s(work: Callable[[], object], samples: int = 31, warm_up: int = 3) -> fl
 def _poses(arm: SerialArm) -> Iterator[Row]:
     rng = np.random.default_rng(0)
     theta = rng.normal(0, 1e-3, len(arm.parameters))
-    everything = serial.ArmConstants.of(arm, theta)
+    everything = compiled.ArmConstants.of(arm, theta)
     four_a_link = everything.of_columns(np.flatnonzero(np.arange(len(theta)) % 5 != 4))
     few = rng.uniform(-2.5, 2.5, (1_000, arm.n_joints))
     flange_rivals, jacobian_rivals = _pose_rivals(arm, theta, everything, four_a_link, few)
-    for poses, flange_aim, jacobian_aim in ((1_000, 25.0, 80.0), (100_000, None, None)):
+    pinocchio = flange_rivals["Pinocchio"] / 10.0, jacobian_rivals["Pinocchio, its 6x36 regressor"] / 8.0
+    for poses, flange_aim, jacobian_aim in ((1_000, *pinocchio), (100_000, None, None)):
         q = rng.uniform(-2.5, 2.5, (poses, arm.n_joints))
         each = 1e9 / poses
-        ours = each * cpu_s(lambda q=q: serial.flange(everything, q))
+        ours = each * cpu_s(lambda q=q: compiled.flange(everything, q))
         yield Row(f"forward kinematics, {poses} poses", "ns a pose", ours, flange_aim, flange_rivals)
-        ours = each * cpu_s(lambda q=q: serial.point_and_jacobian(four_a_link, TARGET_M, q))
+        ours = each * cpu_s(lambda q=q: compiled.point_and_jacobian(four_a_link, TARGET_M, q))
         yield Row(f"point, Jacobian by 24 parameters, {poses} poses", "ns a pose", ours, jacobian_aim, jacobian_rivals)
 
 
 def _pose_rivals(
-    arm: SerialArm, theta: Floats, everything: serial.ArmConstants, four_a_link: serial.ArmConstants, q_rad: Floats
+    arm: SerialArm, theta: Floats, everything: compiled.ArmConstants, four_a_link: compiled.ArmConstants, q_rad: Floats
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Times (ns a pose) of the others for flange and Jacobian at these poses, after a look that all say the same."""
     rival, each = rival_pinocchio.Rival(everything), 1e9 / len(q_rad)
-    np.testing.assert_allclose(serial.flange(everything, q_rad), rival.flanges(q_rad), atol=1e-12)
-    point, jacobian = serial.point_and_jacobian(four_a_link, TARGET_M, q_rad)
+    np.testing.assert_allclose(compiled.flange(everything, q_rad), rival.flanges(q_rad), atol=1e-12)
+    point, jacobian = compiled.point_and_jacobian(four_a_link, TARGET_M, q_rad)
     np.testing.assert_allclose(point, rival.points(TARGET_M, q_rad), atol=1e-12)
     np.testing.assert_allclose(jacobian, _numpy_jacobian(arm, theta, q_rad)[:, :, np.arange(30) % 5 != 4], atol=1e-12)
     flanges = {
@@ -132,7 +133,7 @@ def _pose_rivals(
 
 
 def _numpy_jacobian(arm: SerialArm, theta: Floats, q_rad: Floats) -> Floats:
-    with patch.object(ready, "worth", return_value=False):
+    with patch.object(compiled, "worth", return_value=False):
         T, twists = arm.flange(theta, q_rad), arm.twists(theta, q_rad)
     point = T[:, :3, :3] @ TARGET_M + T[:, :3, 3]
     return twists[:, :3] - cross_matrix(point) @ twists[:, 3:]
@@ -149,23 +150,31 @@ def tracker_problem(rig_file: Path, arm: SerialArm, poses: int) -> Problem:
     return Problem(chain, hold(loose, held), session.q_rad, session.observed, weights)
 
 
+def identify_positions(problem: Problem) -> Fit:
+    """Rank at the drawing, one of every unseen combination held, then the fit."""
+    theta = np.zeros(len(problem.parameters))
+    held = reduced(problem.parameters, analyse(problem.jacobian(theta), problem.parameters))
+    return solve(problem.with_parameters(held), start=theta, damping=NEAR_START)
+
+
 def _tracker(rig_file: Path, arm: SerialArm) -> Iterator[Row]:
     problem = tracker_problem(rig_file, arm, 1_000)
-    ours = identify_positions(problem)
-    reduced = problem.with_parameters(ours.fit.parameters)
-    rivals = {f"scipy {m}, rank known": (lambda m=m: _by_scipy(reduced, m)) for m in ("lm", "dogbox", "trf")}
-    with patch.object(ready, "worth", return_value=False):
-        others = {"calibrate.fit, numpy, rank known": cpu_s(lambda: solve(reduced, damping=NEAR_START), 5, 1)}
-        for name, rival in rivals.items():
-            np.testing.assert_allclose(rival(), ours.fit.chi2, rtol=1e-6)
-            others[name] = cpu_s(rival, 5, 0)
-    what = f"identification, 1000 tracker poses, 30 unknowns (rank {ours.seen.rank if ours.seen else 0})"
+    fit = identify_positions(problem)
+    held = problem.with_parameters(fit.parameters)
+    others = {"fit alone, rank known": cpu_s(lambda: solve(held, damping=NEAR_START), 31)}
+    for method in ("lm", "dogbox", "trf"):
+        np.testing.assert_allclose(_by_scipy(held, method), fit.chi2, rtol=1e-6)
+        others[f"scipy {method}, rank known"] = cpu_s(lambda method=method: _by_scipy(held, method), 9, 0)
+    rank = sum(p.free for p in fit.parameters)
+    what = f"identification, 1000 tracker poses, 30 unknowns (rank {rank})"
     in_ms = {name: 1e3 * t for name, t in others.items()}
-    yield Row(what, "ms", 1e3 * cpu_s(lambda: identify_positions(problem), 51), 2.0, in_ms)
+    yield Row(
+        what, "ms", 1e3 * cpu_s(lambda: identify_positions(problem), 31), in_ms["scipy dogbox, rank known"], in_ms
+    )
 
 
 def _by_scipy(problem: Problem, method: str) -> float:
-    """Chi-square at scipy's end, from the same rows in the same scaled columns."""
+    """Chi-square at scipy's end, from our rows and Jacobian in the same scaled columns."""
     free = np.flatnonzero([p.free for p in problem.parameters])
     scale, theta = plausible_sizes(problem.parameters)[free], np.zeros(len(problem.parameters))
 
@@ -184,8 +193,8 @@ def _by_scipy(problem: Problem, method: str) -> float:
 
 
 def _growth(rig_file: Path, arm: SerialArm) -> Iterator[Row]:
-    whole = tracker_problem(rig_file, arm, 1_000_000)
-    for poses in (10_000, 100_000, 1_000_000):
+    whole = tracker_problem(rig_file, arm, 100_000)
+    for poses in (10_000, 100_000):
         problem = whole.select(np.arange(poses))
         tracemalloc.start()
         identify_positions(problem)
@@ -243,10 +252,10 @@ def _starting() -> Iterator[Row]:
         {"numpy alone": _fresh("import time; t = time.process_time(); import numpy; print(time.process_time() - t)")},
     )
     code = (
-        "import time, numpy as np; from calibrate.kernels import serial; "
-        "arm = serial.ArmConstants(np.tile(np.eye(4), (7, 1, 1)), np.zeros(6), np.zeros(1, int), np.zeros((1, 6))); "
-        "t = time.process_time(); serial.flange(arm, np.zeros((1000, 6))); "
-        "serial.point_and_jacobian(arm, np.zeros(3), np.zeros((1000, 6))); print(time.process_time() - t)"
+        "import time, numpy as np; from calibrate.arms import compiled; "
+        "arm = compiled.ArmConstants(np.tile(np.eye(4), (7, 1, 1)), np.zeros(6), np.zeros(1, int), np.zeros((1, 6))); "
+        "t = time.process_time(); compiled.flange(arm, np.zeros((1000, 6))); "
+        "compiled.point_and_jacobian(arm, np.zeros(3), np.zeros((1000, 6))); print(time.process_time() - t)"
     )
     yield Row("first call of the compiled loops, from the cache", "s", _fresh(code), 1.0)
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.parameters import Parameter, plausible_sizes, priors
+from calibrate.solvers.linear import triangle_of
 from calibrate.words import in_words, plainly
 
 __all__ = ["WEAK", "Combination", "Identifiability", "analyse", "in_words"]
@@ -113,7 +114,7 @@ def directions(jacobian: Floats, belief: Floats) -> tuple[Floats, Floats]:
     beliefs = np.zeros((max(len(believed), n - len(jacobian)), n))  # at least as many rows as columns
     beliefs[range(len(believed)), believed] = belief[believed]
     rows = np.concatenate([jacobian, beliefs])
-    _, s, Vt = np.linalg.svd(np.linalg.qr(rows, mode="r"))  # the triangle has the same values and directions
+    _, s, Vt = np.linalg.svd(triangle_of(rows))  # the triangle has the same values and directions
     return s, Vt
 
 

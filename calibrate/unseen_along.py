@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.identifiability import Identifiability, analyse
-from calibrate.kernels.position_fit import short_jacobian
 from calibrate.parameters import Parameter
 from calibrate.problem import LeastSquares
 
@@ -25,9 +24,9 @@ def analyse_along(problem: LeastSquares, theta: Floats, parameters: tuple[Parame
 
     Values that are held stay as they are; the rest of the answer is that of `analyse` at theta.
     """
-    here = analyse(short_jacobian(problem, theta, parameters), parameters)
+    here = analyse(problem.jacobian(theta), parameters)
     for there in points_along(here, theta, parameters):
-        here = _with_members(here, analyse(short_jacobian(problem, there, parameters), parameters))
+        here = _with_members(here, analyse(problem.jacobian(there), parameters))
     return here
 
 

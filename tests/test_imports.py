@@ -1,5 +1,6 @@
 """The import table: who may import whom, and what a fit must not need."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -35,3 +36,16 @@ def test_calibrate_loads_no_library_of_a_wire() -> None:
     )
     result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)
     assert result.stdout.strip() == "[]"
+
+
+def test_one_file_of_at_most_400_lines_is_compiled() -> None:
+    """numba compiles the forward kinematics and its derivative; everything else is numpy and scipy."""
+    products = ("acquisition", "calibeam", "calibrate", "drivers", "simulators")
+    sources = [path for folder in products for path in (ROOT / folder).rglob("*.py")]
+    users = {
+        str(path.relative_to(ROOT))
+        for path in sources
+        if re.search(r"^\s*(from|import) numba\b", path.read_text(), re.M)
+    }
+    assert users == {"calibrate/arms/fast.py"}
+    assert len((ROOT / "calibrate/arms/fast.py").read_text().splitlines()) <= 400

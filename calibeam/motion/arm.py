@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.rig_schema import Rig
 from calibrate.arms.catalogue import arm_of
-from calibrate.arms.serial import SerialArm
+from calibrate.arms.serial import SerialArm, chain_frames
 from calibrate.parameters import values_by_name
 
 Floats = NDArray[np.float64]
@@ -22,18 +22,8 @@ class MotionArm:
         self._offset_rad = arm.angle_offset_rad(theta)
 
     def frames(self, q_rad: Floats) -> Floats:
-        """As SerialArm.frames, its products flattened: five times faster for batches of inverse kinematics."""
-        angle = q_rad + self._offset_rad
-        c, s = np.cos(angle), np.sin(angle)
-        out = np.empty((len(q_rad), len(self._parts), 4, 4))
-        out[:, 0] = self._parts[0]
-        for i, part in enumerate(self._parts[1:]):
-            before, ci, si = out[:, i], c[:, i, None], s[:, i, None]
-            turned = before.copy()
-            turned[:, :, 0] = ci * before[:, :, 0] + si * before[:, :, 1]
-            turned[:, :, 1] = ci * before[:, :, 1] - si * before[:, :, 0]
-            out[:, i + 1] = (turned.reshape(-1, 4) @ part).reshape(-1, 4, 4)
-        return out
+        """As SerialArm.frames, with what does not depend on the joints worked out once."""
+        return chain_frames(self._parts[0], self._parts[1:], q_rad + self._offset_rad)
 
 
 def motion_arm(rig: Rig, corrections: Mapping[str, float] | None = None) -> MotionArm:

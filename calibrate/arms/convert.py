@@ -16,7 +16,7 @@ from acquisition.recording.rig_schema import Arm, ArmModel, Joint, Pose
 from calibrate.arms.belief import HELD_AS_DRAWN
 from calibrate.arms.catalogue import ARMS
 from calibrate.arms.dh import DhLink
-from calibrate.arms.serial import rotation_x, rotation_z, shift
+from calibrate.arms.serial import chain_frames, rotation_x, rotation_z, shift
 from calibrate.arms.table import NearParallel, Table, dh_table
 from calibrate.parameters import values_by_name
 from calibrate.rigid import inverse
@@ -91,10 +91,7 @@ def _offsets_behind(arm: Arm, corrections: Mapping[str, float], parts: Floats) -
 
 def flange_of_parts(parts: Floats, q_rad: Floats) -> Floats:
     """(pose, 4, 4) of F_0 Rz(q_1) F_1 ... F_n at joint readings (pose, joint)."""
-    out = np.broadcast_to(parts[0], (len(q_rad), 4, 4))
-    for angle, part in zip(q_rad.T, parts[1:], strict=True):
-        out = out @ rotation_z(angle) @ part
-    return out
+    return chain_frames(parts[0], parts[1:], q_rad)[:, -1]
 
 
 def sampled_readings(arm: Arm, n: int = SAMPLED_POSES) -> Floats:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from calibrate.arms.serial import SerialArm
+from calibrate.arms.serial import SerialArm, chain_frames
 from calibrate.chain import Chain
 from calibrate.effects.ports import Perturbation, Place, Port
 from calibrate.rigid import cross_matrix, inverse, turn_twist
@@ -24,20 +24,9 @@ Floats = NDArray[np.float64]
 def perturbed_frames(arm: SerialArm, theta: Floats, q_rad: Floats, by: Perturbation) -> Floats:
     """(pose, joint + 1, 4, 4) B_0 ... B_n as the surroundings see them, for readings (pose, joint)."""
     fixed = arm.fixed_parts(theta)
-    angle = q_rad + by.joints_rad + arm.angle_offset_rad(theta)
-    c, s = np.cos(angle), np.sin(angle)
-    out = np.empty((len(q_rad), arm.n_joints + 1, 4, 4))
-    out[:, 0] = inverse(offsets(by.surroundings)) @ fixed[0]
-    for i in range(arm.n_joints + 1):
-        if np.any(by.frames[:, i]):
-            out[:, i] = out[:, i] @ offsets(by.frames[:, i])
-        if i < arm.n_joints:
-            turned = out[:, i].copy()
-            ci, si = c[:, i, None], s[:, i, None]
-            turned[:, :, 0] = ci * out[:, i, :, 0] + si * out[:, i, :, 1]
-            turned[:, :, 1] = ci * out[:, i, :, 1] - si * out[:, i, :, 0]
-            out[:, i + 1] = turned @ fixed[i + 1]
-    return out
+    angle_rad = q_rad + by.joints_rad + arm.angle_offset_rad(theta)
+    perturbed = {i: offsets(by.frames[:, i]) for i in range(arm.n_joints + 1) if np.any(by.frames[:, i])}
+    return chain_frames(inverse(offsets(by.surroundings)) @ fixed[0], fixed[1:], angle_rad, perturbed)
 
 
 def offsets(twists: Floats) -> Floats:

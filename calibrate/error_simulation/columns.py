@@ -1,14 +1,21 @@
-"""From sources to what the compiled loops want: columns that are drawn, and the weights of columns in slots."""
+"""Sources as columns of drawn numbers, and what those columns do to the probe of the arm at a pose.
+
+Slot 7 i + c (c = 0 ... 5) perturbs part i by a shift and a rotation vector in the frame behind it, slot 7 i + 6 adds to
+the angle of joint i + 1 (calibrate/arms/compiled.py). A column is what is drawn of an arm; at a pose a slot is a sum of
+columns by weights. A phased source has two columns, size times cosine and size times sine of its phase.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
+from calibrate.arms.compiled import PER_PART, perturbed_points
+from calibrate.error_simulation.law import Law
 from calibrate.error_simulation.machine import Machine
 from calibrate.error_simulation.source import Source
-from calibrate.kernels.perturbed import CELLS, NORMAL, TABLE, UNIFORM, ArmAtPoses, DrawnColumns
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -16,40 +23,65 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Columns:
-    """`of_source` (source, 2): the column of each source's value or C, and that of its S, or -1."""
+    """`of_source` (source, 2): the column of each source's value, or of its cosine and its sine; -1 for none."""
 
-    drawn: DrawnColumns
+    laws: tuple[Law, ...]  # of each source
     of_source: Ints
 
     @property
     def count(self) -> int:
-        return len(self.drawn.law)
+        return int(np.count_nonzero(self.of_source >= 0))
+
+    def draw(self, rng: np.random.Generator, arms: int) -> Floats:
+        """(column, arm)"""
+        out = np.empty((self.count, arms))
+        for law, (own, other) in zip(self.laws, self.of_source.tolist(), strict=True):
+            out[own] = law.draw(rng, arms)
+            if other >= 0:
+                half = np.tan(np.pi * rng.random(arms))  # of a phase anywhere in a turn; several times faster than sin
+                share = out[own] / (1.0 + half * half)
+                out[other] = 2.0 * half * share
+                out[own] = (1.0 - half * half) * share
+        return out
+
+
+@dataclass(frozen=True)
+class ArmAtPoses:
+    """The nominal arm at some poses, and the weights of columns in slots there."""
+
+    fixed: Floats  # (joint + 1, 4, 4)
+    angle_rad: Floats  # (pose, joint), offsets added
+    point_m: Floats  # (3,) of the probe behind the last part
+    slots: Ints  # (term,)
+    columns: Ints  # (term,)
+    weights: Floats  # (pose, term)
+
+    @property
+    def moved(self) -> NDArray[np.bool_]:
+        """(part,) whether any term perturbs it, other than by the joint behind it."""
+        out = np.zeros(len(self.fixed), dtype=np.bool_)
+        out[self.slots[self.slots % PER_PART < PER_PART - 1] // PER_PART] = True
+        return out
+
+    def probes_m(self, pose: int, columns: Floats) -> Floats:
+        """(3, arm) in the base, for columns (column, arm)."""
+        places = self.slots, self.columns
+        weights = csr_array((self.weights[pose], places), shape=(PER_PART * len(self.fixed), len(columns)))
+        return perturbed_points(self.fixed, self.angle_rad[pose], self.point_m, self.moved, weights @ columns)
+
+    def nominal_m(self) -> Floats:
+        """(pose, 3) where the probe is without any error, by the same loops."""
+        nothing = np.zeros((int(self.columns.max(initial=0)) + 1, 1))
+        return np.stack([self.probes_m(pose, nothing)[:, 0] for pose in range(len(self.angle_rad))])
 
 
 def columns_of(sources: Sequence[Source]) -> Columns:
-    """Normal columns first and even in number, then the others, then phases."""
-    kinds = np.array([source.law.columns[0] for source in sources])
-    normal = np.flatnonzero(kinds == NORMAL)
-    idle = len(normal) % 2
-    order = [*normal.tolist(), *([-1] * idle), *np.flatnonzero(kinds != NORMAL).tolist()]
+    """Values in the order of the sources, then the second columns of phased ones."""
+    of_source = np.full((len(sources), 2), -1)
+    of_source[:, 0] = np.arange(len(sources))
     phased = [i for i, source in enumerate(sources) if source.phased]
-    n = len(order) + len(phased)
-    law, loc, scale = np.full(n, UNIFORM), np.zeros(n), np.ones(n)
-    of_source, table_of, tables = np.full((len(sources), 2), -1), np.zeros(n, dtype=np.int64), list[Floats]()
-    for column, i in enumerate(order):
-        if i < 0:
-            law[column], scale[column] = NORMAL, 0.0
-            continue
-        of_source[i, 0] = column
-        law[column], loc[column], scale[column] = sources[i].law.columns
-        if law[column] == TABLE:
-            table_of[column] = len(tables)
-            tables.append(sources[i].law.table())
-    of_source[phased, 1] = np.arange(len(order), n)
-    polar = of_source[phased].reshape(-1, 2)
-    stacked = np.stack(tables) if tables else np.zeros((1, 3, CELLS + 1))
-    drawn = DrawnColumns(law.astype(np.int64), loc, scale, stacked, table_of, np.ascontiguousarray(polar))
-    return Columns(drawn, of_source)
+    of_source[phased, 1] = len(sources) + np.arange(len(phased))
+    return Columns(tuple(source.law for source in sources), of_source)
 
 
 def arm_at(machine: Machine, sources: Sequence[Source], columns: Columns, q_rad: Floats) -> ArmAtPoses:
@@ -70,3 +102,8 @@ def arm_at(machine: Machine, sources: Sequence[Source], columns: Columns, q_rad:
         np.array(index, dtype=np.int64),
         np.ascontiguousarray(np.stack(weights, axis=1)),
     )
+
+
+def probe_errors(arm: ArmAtPoses, pose: int, columns: Floats, nominal_m: Floats) -> Floats:
+    """(arm, 3) m of given columns (arm, column), at one of the poses."""
+    return (arm.probes_m(pose, np.ascontiguousarray(columns.T)) - nominal_m[:, None]).T

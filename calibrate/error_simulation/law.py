@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from calibrate.errors import DataError
-from calibrate.kernels.perturbed import CELLS, CONSTANT, NORMAL, TABLE, TAIL, UNIFORM
 
 Floats = NDArray[np.float64]
 
-OWN = {"normal": NORMAL, "uniform": UNIFORM, "constant": CONSTANT}
+OWN = ("normal", "uniform", "constant")
+CELLS = 1024  # of a table of quantiles; the two outer ones have as many of their own
+TAIL = 2.0**-33  # shares beyond are not drawn: some laws are infinite there
 
 
 @dataclass(frozen=True)
@@ -64,14 +65,20 @@ class Law:
         """Mean of the square."""
         return self.mean**2 + self.variance
 
-    @property
-    def columns(self) -> tuple[int, float, float]:
-        """Law, loc and scale of a column of calibrate/kernels/perturbed.py, which draws uniforms in 0 ... 1."""
-        if self.name == "uniform":
-            return UNIFORM, self.loc - self.scale, 2.0 * self.scale
-        if self.name == "constant":
-            return CONSTANT, self.loc + self.scale, 0.0
-        return OWN.get(self.name, TABLE), self.loc, self.scale
+    def draw(self, rng: np.random.Generator, count: int) -> Floats:
+        """(count,) values; those of a scipy law by linear interpolation between quantiles."""
+        match self.name:
+            case "normal":
+                standard = rng.standard_normal(count)
+            case "uniform":
+                standard = rng.uniform(-1.0, 1.0, count)
+            case "constant":
+                standard = np.ones(count)
+            case _:
+                standard = self._by_table(rng.random(count))
+        standard *= self.scale
+        standard += self.loc
+        return standard
 
     def quantiles(self, shares: Floats) -> Floats:
         """Values that are exceeded with probability 1 - share."""
@@ -86,6 +93,20 @@ class Law:
                 standard = self._standard.ppf(shares)
         return self.loc + self.scale * np.asarray(standard, dtype=np.float64)
 
+    def _by_table(self, shares: Floats) -> Floats:
+        part, at = np.zeros(len(shares), dtype=np.intp), shares * CELLS
+        outer = np.flatnonzero(np.abs(at - 0.5 * CELLS) >= 0.5 * CELLS - 1.0)
+        high = at[outer] >= 1.0
+        part[outer] = 1 + high
+        at[outer] = (at[outer] - high * (CELLS - 1)) * CELLS
+        cell = at.astype(np.intp)
+        below = part * (CELLS + 1) + cell
+        low = self.table.ravel()[below]
+        at -= cell
+        at *= self.table.ravel()[below + 1] - low
+        return low + at
+
+    @cached_property
     def table(self) -> Floats:
         """(3, CELLS + 1) quantiles of X: all cells, then the lowest and the highest cell in as many."""
         shares = np.linspace(0.0, 1.0, CELLS + 1)

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from acquisition.recording.rig import parse_rig
 from acquisition.recording.rig_schema import ArmModel, Rig
 from calibrate.arms.catalogue import arm_of
-from calibrate.arms.serial import rotation_z
+from calibrate.arms.compiled import PER_PART
+from calibrate.arms.serial import chain_frames
 from calibrate.converted_rig import rig_in_model
 from calibrate.errors import DataError
-from calibrate.kernels.perturbed import PER_PART
 from calibrate.model_file import ModelFile
 from calibrate.parameters import values_by_name
 from calibrate.rigid import cross
@@ -43,11 +43,7 @@ class Machine:
 
     def frames(self, q_rad: Floats) -> Floats:
         """(pose, joint + 1, 4, 4) B_i behind fixed part i: joint i + 1 turns about its z, B_n is the flange."""
-        B = np.empty((len(q_rad), self.n_joints + 1, 4, 4))
-        B[:, 0] = self.fixed[0]
-        for i, angle in enumerate((q_rad + self.offset_rad).T):
-            B[:, i + 1] = B[:, i] @ rotation_z(angle) @ self.fixed[i + 1]
-        return B
+        return chain_frames(self.fixed[0], self.fixed[1:], q_rad + self.offset_rad)
 
     def probe_m(self, q_rad: Floats) -> Floats:
         """(pose, 3) in the base."""
@@ -55,7 +51,7 @@ class Machine:
         return T[:, :3, :3] @ self.point_m + T[:, :3, 3]
 
     def by_slot(self, q_rad: Floats) -> Floats:
-        """(pose, 3, slot) derivative of the probe by every slot (calibrate/kernels/perturbed.py), at no error.
+        """(pose, 3, slot) derivative of the probe by every slot (calibrate/arms/compiled.py), at no error.
 
         Shift c of part i moves it by the axis c of B_i, turn c by that axis x (p - o); an angle is a turn about z.
         """

@@ -10,10 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.error_simulation.columns import arm_at, columns_of
+from calibrate.error_simulation.columns import arm_at, columns_of, probe_errors
 from calibrate.error_simulation.machine import Machine
 from calibrate.error_simulation.source import Source
-from calibrate.kernels.perturbed import probe_errors
 
 Floats = NDArray[np.float64]
 

@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc, sobol_indices
 
-from calibrate.error_simulation.columns import Columns, arm_at, columns_of
+from calibrate.error_simulation.columns import ArmAtPoses, Columns, arm_at, columns_of, probe_errors
 from calibrate.error_simulation.linear import ROUNDING_M
 from calibrate.error_simulation.machine import Machine
 from calibrate.error_simulation.source import Source
-from calibrate.kernels.perturbed import ArmAtPoses, probe_errors
 
 Floats = NDArray[np.float64]
 

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.identifiability import STRUCTURAL, WEAK, Identifiability
-from calibrate.kernels.position_fit import short_jacobian
 from calibrate.parameters import Parameter, plausible_sizes, priors
 from calibrate.problem import LeastSquares
+from calibrate.solvers.linear import triangle_of
 from calibrate.unseen_along import points_along
 
 Floats = NDArray[np.float64]
@@ -28,7 +28,7 @@ def pull_of_unseen(jacobian: Floats, parameters: tuple[Parameter, ...]) -> Float
     free = np.flatnonzero([p.free for p in parameters])
     scale, prior = plausible_sizes(parameters)[free], priors(parameters)[free]
     rows = np.concatenate([jacobian[:, free] * scale, np.diag(scale / prior)])
-    _, s, Vt = np.linalg.svd(np.linalg.qr(rows, mode="r"))
+    _, s, Vt = np.linalg.svd(triangle_of(rows))
     unseen = Vt[s <= max(WEAK, STRUCTURAL * s[0])]
     out = np.zeros(len(parameters))
     out[free] = FAR * scale * np.linalg.norm(unseen, axis=0)
@@ -40,4 +40,4 @@ def pull_along(
 ) -> Floats:
     """(param,) the same, the largest at `theta` and on the way along what is `seen` as unseen there."""
     points = (theta, *points_along(seen, theta, parameters))
-    return np.max([pull_of_unseen(short_jacobian(problem, point, parameters), parameters) for point in points], axis=0)
+    return np.max([pull_of_unseen(problem.jacobian(point), parameters) for point in points], axis=0)

@@ -12,7 +12,6 @@ from calibrate.estimator import LEAST_SQUARES, Estimator
 from calibrate.fit import FAR_START, NEAR_START, Fit, Status, solve
 from calibrate.identifiability import Identifiability, analyse
 from calibrate.joint_problem import Block, JointProblem
-from calibrate.kernels.position_fit import short_jacobian
 from calibrate.parameters import hold, plausible_sizes
 from calibrate.problem import Problem
 from calibrate.redundant import Redundant, reduced
@@ -75,7 +74,7 @@ def coarse_start(weighting: Weighting, start: Floats) -> Floats:
     rest = problem.with_parameters(hold(problem.parameters, believed))
     if not believed or not any(p.free for p in rest.parameters):
         return start
-    seen = analyse(short_jacobian(rest.fulfilled(start), start, rest.parameters), rest.parameters)
+    seen = analyse(rest.fulfilled(start).jacobian(start), rest.parameters)
     fit = solve(rest.with_parameters(reduced(rest.parameters, seen)), start=start, tolerance=COARSE)
     return start if fit.status is Status.NOT_FINITE else fit.theta
 
@@ -117,10 +116,10 @@ def _solved(
     problem: JointProblem, start: Floats, damping: float, redundant: Redundant, by: Estimator = LEAST_SQUARES
 ) -> tuple[Fit, Identifiability]:
     """Least squares of what can be determined at the start, and the rank at the end."""
-    seen = analyse(short_jacobian(problem.fulfilled(start), start, problem.parameters), problem.parameters)
+    seen = analyse(problem.fulfilled(start).jacobian(start), problem.parameters)
     fit = by.fit(problem.with_parameters(reduced(problem.parameters, seen, redundant)), start, damping)
     if fit.status is not Status.NOT_FINITE:
-        seen = analyse(short_jacobian(problem.fulfilled(fit.theta), fit.theta, problem.parameters), problem.parameters)
+        seen = analyse(problem.fulfilled(fit.theta).jacobian(fit.theta), problem.parameters)
     return fit, seen
 
 

@@ -62,12 +62,15 @@ class Rows:
 
     def jacobian(self, theta: Floats) -> Floats:
         """(row + believed, free) by the scaled free parameters."""
-        data = self.problem.jacobian(theta)[:, self.free] * self.scale
+        data = self.problem.jacobian(theta)
+        out = np.zeros((len(data) + len(self.believed), len(self.free)))
+        rows, beliefs = out[: len(data)], out[len(data) :]
+        np.take(data, self.free, axis=1, out=rows, mode="clip")
+        rows *= self.scale
         if self.root_weight is not None:
-            data = self.root_weight[:, None] * data
-        beliefs = np.zeros((len(self.believed), len(self.free)))
+            rows *= self.root_weight[:, None]
         beliefs[range(len(self.believed)), self.believed] = self.scale[self.believed] / self.prior
-        return np.concatenate([data, beliefs])
+        return out
 
     def scaled(self, theta: Floats) -> Floats:
         """(free,) values in units of plausible size."""

@@ -17,6 +17,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from calibrate.arms.model import KinematicModel
+from calibrate.arms.serial import point_by_parameter
 from calibrate.fit import Fit
 from calibrate.identifiability import Identifiability
 from calibrate.parameters import Parameter, index_of
@@ -144,13 +145,10 @@ def target_by_parameter(model: KinematicModel, fit: Valued, point_m: Floats, q_r
     column = index_of(fit.parameters)
     own = [column[p.name] for p in model.parameters]
     theta = fit.theta[own]
-    T = model.flange(theta, q_rad)
     tool = [column[name] for name in TOOL if name in column]
     shift_m = fit.theta[tool] if tool else np.zeros(3)
-    points = T[:, :3, :3] @ (point_m + shift_m) + T[:, :3, 3]
-    twists = model.twists(theta, q_rad)
     out = np.zeros((len(q_rad), 3, len(fit.parameters)))
-    out[:, :, own] = twists[:, :3] - cross_matrix(points) @ twists[:, 3:]  # v + w x p
+    points, out[:, :, own] = point_by_parameter(model, theta, point_m + shift_m, q_rad)
     if tool:
-        out[:, :, tool] = T[:, :3, :3]
+        out[:, :, tool] = model.flange(theta, q_rad)[:, :3, :3]
     return points, out

@@ -20,8 +20,8 @@ LATER = (
 MOST_MODULES = 850  # 692 with CPython 3.11, of which 144 are numpy and 175 scipy; scipy.stats alone would add 300
 PROGRAM = """
 import pkgutil, sys, importlib, calibrate
-from calibrate.kernels.ready import SOURCES
-later = (*sys.argv[1:], *(f"calibrate.kernels.{source.stem}" for source in SOURCES))
+COMPILED = ("calibrate.arms.fast",)
+later = (*sys.argv[1:], *COMPILED)
 for module in pkgutil.walk_packages(calibrate.__path__, "calibrate."):
     if not module.name.startswith(later):
         importlib.import_module(module.name)

@@ -4,11 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from calibrate.error_simulation.columns import columns_of
 from calibrate.error_simulation.law import Law
-from calibrate.error_simulation.source import Source, Term
 from calibrate.errors import DataError
-from calibrate.kernels.perturbed import draw_block
 
 LAWS = [
     Law("normal", 2.0, 1.0),
@@ -23,9 +20,7 @@ LAWS = [
 
 
 def drawn(law):
-    columns = columns_of([Source("one", "group", "m", law, (Term(0),))])
-    own = columns.of_source[0, 0]
-    return np.concatenate([draw_block(columns.drawn, 128 * i, seed=3)[:, own] for i in range(800)])
+    return law.draw(np.random.default_rng(3), 102_400)
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
@@ -44,7 +39,7 @@ def test_what_is_drawn_follows_the_law(law):
 
 
 def test_tails_of_a_table_are_the_laws_own():
-    table = Law("norm", 1.0).table()
+    table = Law("norm", 1.0).table
     assert table[1, 1] == pytest.approx(stats.norm.ppf(1.0 / 1024**2))
     assert table[2, -2] == pytest.approx(-stats.norm.ppf(1.0 / 1024**2), rel=1e-6)
 

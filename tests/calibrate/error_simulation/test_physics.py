@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from calibrate.error_simulation.columns import arm_at, columns_of
+from calibrate.error_simulation.columns import arm_at, columns_of, probe_errors
 from calibrate.error_simulation.linear import propagate
 from calibrate.error_simulation.single import alone
-from calibrate.kernels.perturbed import probe_errors
 
 
 def errors(machine, sources, q_rad, values):

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from calibrate.kernels import ready
+from calibrate.arms import compiled as ready
 
 
 @pytest.fixture
@@ -13,8 +13,7 @@ def source(tmp_path, monkeypatch):
     """A source elsewhere, never compiled."""
     path = tmp_path / "compiled.py"
     path.write_text("x = 1\n")
-    (tmp_path / "other.py").write_text("y = 1\n")
-    monkeypatch.setattr(ready, "SOURCES", (tmp_path / "other.py", path))
+    monkeypatch.setattr(ready, "SOURCE", path)
     ready.available.cache_clear()
     yield path
     ready.available.cache_clear()
@@ -44,6 +43,6 @@ def test_the_mark_of_another_processor_does_not_count(source, monkeypatch):
 
 
 def test_importing_calibrate_and_its_arms_loads_no_compiler():
-    code = "import sys, calibrate.arms.catalogue, calibrate.kernels.position_fit; print('numba' in sys.modules)"
+    code = "import sys, calibrate.arms.catalogue, calibrate.fit; print('numba' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"

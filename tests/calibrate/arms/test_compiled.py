@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig_schema import Arm, ArmModel, Joint, Pose, Rig, Tolerance
+from calibrate.arms import compiled
 from calibrate.arms.catalogue import ARMS, arm_of
-from calibrate.kernels import ready, serial
+from calibrate.arms.serial import point_by_parameter
 
 BATCHES = (1, 127, 128, 129, 300)
 
@@ -39,7 +40,7 @@ def arm(request):
 @pytest.fixture(autouse=True)
 def numpy_models(monkeypatch):
     """The models under comparison never use the loops themselves."""
-    monkeypatch.setattr(ready, "worth", lambda poses: False)
+    monkeypatch.setattr(compiled, "worth", lambda poses: False)
 
 
 def drawn(arm, poses, seed=0):
@@ -50,21 +51,23 @@ def drawn(arm, poses, seed=0):
 @pytest.mark.parametrize("poses", BATCHES)
 def test_flange_poses_agree(arm, poses):
     theta, q = drawn(arm, poses)
-    found = serial.flange(serial.ArmConstants.of(arm, theta), q)
+    found = compiled.flange(compiled.ArmConstants.of(arm, theta), q)
     np.testing.assert_allclose(found, arm.flange(theta, q), atol=1e-12)
 
 
 @pytest.mark.parametrize("poses", BATCHES)
 def test_twists_agree(arm, poses):
     theta, q = drawn(arm, poses)
-    np.testing.assert_allclose(serial.twists(serial.ArmConstants.of(arm, theta), q), arm.twists(theta, q), atol=1e-12)
+    np.testing.assert_allclose(
+        compiled.twists(compiled.ArmConstants.of(arm, theta), q), arm.twists(theta, q), atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("poses", BATCHES)
 def test_a_tool_point_moves_as_the_twists_of_the_flange_say(arm, poses):
     theta, q = drawn(arm, poses)
     tool = np.array([0.02, -0.01, 0.08])
-    point, jacobian = serial.point_and_jacobian(serial.ArmConstants.of(arm, theta), tool, q)
+    point, jacobian = compiled.point_and_jacobian(compiled.ArmConstants.of(arm, theta), tool, q)
     T, twists = arm.flange(theta, q), arm.twists(theta, q)
     expected = T[:, :3, :3] @ tool + T[:, :3, 3]
     np.testing.assert_allclose(point, expected, atol=1e-12)
@@ -72,34 +75,43 @@ def test_a_tool_point_moves_as_the_twists_of_the_flange_say(arm, poses):
     np.testing.assert_allclose(jacobian, velocity, atol=1e-12)
 
 
+def test_a_point_and_its_derivatives_are_the_same_by_loops_and_by_numpy(arm, monkeypatch):
+    theta, q = drawn(arm, 300)
+    tool = np.array([0.02, -0.01, 0.08])
+    by_numpy = point_by_parameter(arm, theta, tool, q)
+    monkeypatch.setattr(compiled, "worth", lambda poses: True)
+    for one, other in zip(by_numpy, point_by_parameter(arm, theta, tool, q), strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-12)
+
+
 def test_some_columns_in_any_order_are_those_of_the_whole(arm):
     theta, q = drawn(arm, 70)
     chosen = np.random.default_rng(1).permutation(len(arm.parameters))[:3]
-    whole, tool = serial.ArmConstants.of(arm, theta), np.array([0.1, 0.2, 0.3])
-    _, some = serial.point_and_jacobian(whole.of_columns(chosen), tool, q)
-    _, all_columns = serial.point_and_jacobian(whole, tool, q)
+    whole, tool = compiled.ArmConstants.of(arm, theta), np.array([0.1, 0.2, 0.3])
+    _, some = compiled.point_and_jacobian(whole.of_columns(chosen), tool, q)
+    _, all_columns = compiled.point_and_jacobian(whole, tool, q)
     np.testing.assert_array_equal(some, all_columns[:, :, chosen])
 
 
 def test_no_poses_give_empty_answers(arm):
     theta, q = drawn(arm, 0)
-    constants = serial.ArmConstants.of(arm, theta)
-    assert serial.flange(constants, q).shape == (0, 4, 4)
-    assert serial.twists(constants, q).shape == (0, 6, len(arm.parameters))
+    constants = compiled.ArmConstants.of(arm, theta)
+    assert compiled.flange(constants, q).shape == (0, 4, 4)
+    assert compiled.twists(constants, q).shape == (0, 6, len(arm.parameters))
 
 
 def test_readings_that_lie_across_memory_are_read_rightly(arm):
     theta, q = drawn(arm, 100)
-    constants = serial.ArmConstants.of(arm, theta)
-    np.testing.assert_array_equal(serial.flange(constants, np.asfortranarray(q)), serial.flange(constants, q))
+    constants = compiled.ArmConstants.of(arm, theta)
+    np.testing.assert_array_equal(compiled.flange(constants, np.asfortranarray(q)), compiled.flange(constants, q))
 
 
 def test_a_reading_that_is_no_number_spoils_its_own_pose_only(arm):
     theta, q = drawn(arm, 100)
-    constants = serial.ArmConstants.of(arm, theta)
-    clean = serial.flange(constants, q)
+    constants = compiled.ArmConstants.of(arm, theta)
+    clean = compiled.flange(constants, q)
     q[17, 0] = np.nan
-    found = serial.flange(constants, q)
+    found = compiled.flange(constants, q)
     assert np.isnan(found[17, :3]).any()
     keep = np.arange(100) != 17
     np.testing.assert_array_equal(found[keep], clean[keep])
@@ -107,9 +119,9 @@ def test_a_reading_that_is_no_number_spoils_its_own_pose_only(arm):
 
 def test_a_large_batch_goes_through_the_loops_and_a_small_one_does_not(arm, monkeypatch):
     seen = []
-    monkeypatch.setattr(ready, "worth", lambda poses: seen.append(poses) or poses >= 100)
+    monkeypatch.setattr(compiled, "worth", lambda poses: seen.append(poses) or poses >= 100)
     theta, q = drawn(arm, 100)
     through_loops = arm.flange(theta, q)
     assert seen == [100]
-    np.testing.assert_array_equal(through_loops, serial.flange(serial.ArmConstants.of(arm, theta), q))
+    np.testing.assert_array_equal(through_loops, compiled.flange(compiled.ArmConstants.of(arm, theta), q))
     np.testing.assert_allclose(arm.flange(theta, q[:9]), through_loops[:9], atol=1e-12)
