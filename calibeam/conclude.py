@@ -19,6 +19,8 @@ from calibeam.reporting import write_zero_report
 from calibeam.terminal import print_identified
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.errors import DataError
+from calibrate.model_file import write_model
+from calibrate.physics.from_diagnosis import model_of_diagnosis
 
 
 def conclude(recording_path: Path, console: Console) -> Identified:
@@ -48,7 +50,7 @@ def _concluded(recording_path: Path, console: Console) -> Identified:
     identified = identify_recording(recording)
     write_identified(identified, recording, folder / "model.json")
     print_identified(console, identified)
-    diagnosis = diagnosed(recording, folder / "diagnosis.json", console)
+    diagnosis = diagnosed(recording, folder, console)
     write_zero_report(identified, folder / "report.html", diagnosis)
     console.print(f"report: {folder / 'report.html'}", markup=False)
     return identified
@@ -59,13 +61,21 @@ def _folder_of(recording_path: Path) -> Path:
     return recording_path if recording_path.is_dir() else recording_path.parent
 
 
-def diagnosed(recording: Recording, path: Path, console: Console) -> DiagnosisFile | None:
-    """None, and said, where there is too little to diagnose: what was identified stands all the same."""
+def diagnosed(recording: Recording, folder: Path, console: Console) -> DiagnosisFile | None:
+    """Writes diagnosis.json, and model.json with the physics found in place of the identified geometry.
+
+    None, with the reason printed, where there is too little to diagnose: model.json then stays as identified.
+    """
+    path = folder / "diagnosis.json"
     try:
-        file = diagnosed_to(recording, None, path)
+        found, file = diagnosed_to(recording, path)
     except DataError as why:
         console.print(f"no diagnosis: {why}", highlight=False, markup=False)
         return None
     print_diagnosis(console, file)
     console.print(f"diagnosis: {path}", markup=False)
+    try:
+        write_model(folder / "model.json", model_of_diagnosis(found, recording))
+    except DataError as why:
+        console.print(f"model.json holds the identified geometry only: {why}", highlight=False, markup=False)
     return file

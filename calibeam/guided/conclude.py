@@ -25,6 +25,6 @@ def _concluded(recording_path: Path, console: Console, diagnose: bool) -> None:
     model = write_session_model(result, recording, folder / "model.json")
     print_identification(console, result, session_verdict(session_evidence(recording, model)))
     console.print(f"model: {folder / 'model.json'}", markup=False)
-    diagnosis = diagnosed(recording, folder / "diagnosis.json", console) if diagnose else None
+    diagnosis = diagnosed(recording, folder, console) if diagnose else None
     write_any_report(recording, model, folder / "report.html", diagnosis)
     console.print(f"report: {folder / 'report.html'}", markup=False)

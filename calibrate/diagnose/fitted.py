@@ -21,7 +21,7 @@ from calibrate.diagnose.unmet_places import places_found
 from calibrate.effects.catalogue import terms_of
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.term import Term
-from calibrate.fit import FAR_START, Loss, solve
+from calibrate.fit import FAR_START, Loss, Stop, solve
 from calibrate.identification.session import believed_sigma
 from calibrate.parameters import plausible_sizes, priors, start_values
 from calibrate.problem import whitener_of
@@ -53,6 +53,8 @@ class Fitted:
     values: Floats  # of the problem's parameters
     scatters: tuple[Scatter, ...]  # of each instrument, over its active rows
     covariance: Floats  # (value, value) posterior; zero for held ones
+    steps: int = 0  # of the solver, in all rounds of weights
+    stop: Stop = Stop.ROUNDS  # the rule that ended the last round
 
     @cached_property
     def _split(self) -> tuple[Floats, tuple[Accepted, ...]]:
@@ -216,9 +218,10 @@ def _settled(fitted: Fitted) -> Fitted:
         last, problem = fitted.minus_two_log_likelihood, fitted.problem
         if fitted.accepted and turn <= REFRESHED:
             problem = problem.refreshed(fitted.drivers)
-        fitted = _turn(problem, fitted.active, fitted.values, fitted.scatters, FEW_STEPS)
+        new = _turn(problem, fitted.active, fitted.values, fitted.scatters, FEW_STEPS)
+        fitted = replace(new, steps=fitted.steps + new.steps)
         if turn + 1 >= FEWEST_TURNS and abs(last - fitted.minus_two_log_likelihood) < SETTLED:
-            break
+            return replace(fitted, stop=Stop.LIKELIHOOD)
     return fitted
 
 
@@ -226,7 +229,7 @@ def _turn(problem: Augmented, active: Ints, start: Floats, scatters: tuple[Scatt
     """Least squares under the noise so far, then the noise that is left."""
     problem = problem.under(whiteners_of(scatters))
     fit = solve(problem, start=start, damping=DAMPING, max_steps=steps, tolerance=TOLERANCE)
-    return Fitted(problem.session, active, problem, fit.theta, scatters_of(problem, fit), fit.covariance)
+    return Fitted(problem.session, active, problem, fit.theta, scatters_of(problem, fit), fit.covariance, fit.steps)
 
 
 def _cut(state: Fitted, active: Ints) -> Fitted:

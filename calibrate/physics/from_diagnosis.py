@@ -25,14 +25,16 @@ from calibrate.diagnose.noise_of_fit import freedom
 from calibrate.effects.catalogue import holds_of
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.ports import Perturbation
-from calibrate.effects.term import Size
+from calibrate.effects.term import Shape, Size
 from calibrate.errors import DataError
+from calibrate.fit_plan import LossName, SolverName
 from calibrate.identifiability import Identifiability, analyse
 from calibrate.identification.record import left_out
 from calibrate.identification.session import about_of
 from calibrate.model_file import (
     WITH_PHYSICS,
     Fields,
+    FitRecord,
     ModelFile,
     ModelParameter,
     RigIdentity,
@@ -91,8 +93,9 @@ def model_of_diagnosis(found: Diagnosed, recording: Recording) -> ModelFile:
         rms_after_m=_rms(fit),
         instruments=tuple(m.name for m in fit.session.measured),
         about=about_of(fit.session.weighting),
-        blunders=tuple(left_out(b) for b in found.blunders),
+        blunders=tuple(left_out(b) for b in found.cleared.blunders),
         readings_sha256=readings_sha256(recording.samples),
+        fit=_fit_record(fit),
         effects=_effects(fit, found.physics.diagnosis, names, covariance),
         needs=needs,
         session=SessionRecord(
@@ -104,6 +107,19 @@ def model_of_diagnosis(found: Diagnosed, recording: Recording) -> ModelFile:
         ),
     )
     return _as_listed(model, fit, parameters, covariance, conditions)
+
+
+def _fit_record(fit: Fitted) -> FitRecord:
+    """Diagnosis has one estimator: Student's t with the noise found, by Levenberg and Marquardt."""
+    value = float(sum(s.minus_two_log_likelihood for s in fit.scatters))
+    return FitRecord(
+        SolverName.LEVENBERG.value,
+        LossName.STUDENT_T.value,
+        fit.steps,
+        fit.stop.name,
+        fit.stop.value,
+        _number(value),
+    )
 
 
 def _names(accepted: tuple[Accepted, ...]) -> tuple[str, ...]:
@@ -184,7 +200,22 @@ def _effects(fit: Fitted, said: Diagnosis, names: tuple[str, ...], covariance: F
     for i, (a, name) in enumerate(zip(fit.accepted, names, strict=True)):
         mine = np.flatnonzero(fit.problem.owner == i)
         out.append(_effect(a, name, _finding_of(a, said), fit.drivers, covariance[np.ix_(mine, mine)]))
-    return tuple(out)
+    return (*out, *(_aftermath(effect) for effect in out if effect.shape == Shape.STEP.value))
+
+
+def _aftermath(effect: Effect) -> Effect:
+    """What a slip or a bump leaves: from the end of its session on it is true of the machine."""
+    return structs.replace(
+        effect,
+        name=f"{effect.name}-left",
+        depends_on="",
+        shape=Shape.CONSTANT.value,
+        parameters={k: p for k, p in effect.parameters.items() if k not in effect.inner},
+        holds="always",
+        range={},
+        curve=None,
+        after=effect.name,
+    )
 
 
 def _effect(a: Accepted, name: str, finding: Finding | None, drivers: Drivers, own: Floats) -> Effect:
@@ -312,7 +343,7 @@ def _as_listed(
         return model
     predictor, recorded = Predictor.of(model), Samples(conditions, fit.session.arm.n_joints)
     nothing = Perturbation.none(len(recorded), recorded.n_joints)
-    terms = listed(model.effects, drivers_under(predictor, recorded, nothing))
+    terms = listed(model.effects[: len(fit.accepted)], drivers_under(predictor, recorded, nothing))
     turn, effects, at = np.eye(len(parameters)), list(model.effects), len(fit.session.parameters)
     for i, (a, read) in enumerate(zip(fit.accepted, terms, strict=True)):
         was, now = a.term.basis(fit.drivers, a.inner), read.accepted.term.basis(fit.drivers, a.inner)
@@ -323,7 +354,9 @@ def _as_listed(
             raise DataError(f"no model: effect {effects[i].name} cannot be told from the conditions of the file alone")
         turn[at : at + m, at : at + m] = same
         turned = dict(zip(effects[i].coefficients, (same @ a.coefficients).tolist(), strict=True))
-        effects[i] = structs.replace(effects[i], coefficients=turned)
+        effects = [
+            structs.replace(e, coefficients=turned) if effects[i].name in (e.name, e.after) else e for e in effects
+        ]
         at += m + sum(not s.discrete for s in a.term.inner)
     turned_covariance = covariance_record(parameters, turn @ covariance @ turn.T)
     return structs.replace(model, effects=tuple(effects), covariance=turned_covariance)
