@@ -13,8 +13,9 @@ from acquisition.recording.fingerprint import readings_sha256
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import rig_sha256
 from acquisition.recording.samples import Samples
+from calibrate.diagnose.blunders_first import Cleared
 from calibrate.diagnose.curve import Curve
-from calibrate.diagnose.diagnosis import UNKNOWN, Diagnosis, Finding
+from calibrate.diagnose.diagnosis import UNKNOWN, Finding
 from calibrate.diagnose.extended import NEARLY, alike
 from calibrate.diagnose.findings import named
 from calibrate.diagnose.fitted import Fitted
@@ -63,7 +64,26 @@ def model_of_diagnosis(found: Diagnosed, recording: Recording) -> ModelFile:
     """The record to write. DataError where the file is wrong as a whole, or an effect cannot be carried."""
     if found.physics is None:
         raise DataError("no model: the whole file is wrong; diagnosis.json says how")
-    fit, before = found.physics.model, found.physics.geometry
+    if found.physics.model.problem.assumed is not None:
+        raise DataError(
+            "no model: beside a model of another recording a diagnosis fits changes only; `calibeam identify --model` "
+            "refits that model to this recording"
+        )
+    fit, findings = found.physics.model, found.physics.diagnosis.findings
+    says = "geometry and effects fitted together by the diagnosis"
+    return model_of_fit(fit, found.physics.geometry, found.cleared, recording, says, findings)
+
+
+def model_of_fit(
+    fit: Fitted,
+    before: Fitted,
+    cleared: Cleared,
+    recording: Recording,
+    says: str,
+    findings: tuple[Finding, ...] = (),
+) -> ModelFile:
+    """The record of geometry and effects fitted together; `before`: geometry alone. DataError as above."""
+    fit = replace(fit, problem=replace(fit.problem, given=0))
     names = _names(fit.accepted)
     parameters = _parameters(fit, names)
     covariance = _covariance(fit)
@@ -76,7 +96,7 @@ def model_of_diagnosis(found: Diagnosed, recording: Recording) -> ModelFile:
         rig=RigIdentity(recording.rig.name, rig_sha256(recording.rig_text), recording.rig_text),
         arm_model=recording.rig.arm.model.value,
         status="CONVERGED",
-        says="geometry and effects fitted together by the diagnosis",
+        says=says,
         poses=fit.samples,
         rank=seen.rank,
         free=seen.n_free,
@@ -93,10 +113,10 @@ def model_of_diagnosis(found: Diagnosed, recording: Recording) -> ModelFile:
         rms_after_m=_rms(fit),
         instruments=tuple(m.name for m in fit.session.measured),
         about=about_of(fit.session.weighting),
-        blunders=tuple(left_out(b) for b in found.cleared.blunders),
+        blunders=tuple(left_out(b) for b in cleared.blunders),
         readings_sha256=readings_sha256(recording.samples),
         fit=_fit_record(fit),
-        effects=_effects(fit, found.physics.diagnosis, names, covariance),
+        effects=_effects(fit, findings, names, covariance),
         needs=needs,
         session=SessionRecord(
             started_utc=recording.started_utc,
@@ -195,11 +215,13 @@ def _conditions(fit: Fitted) -> tuple[dict[str, Floats], tuple[str, ...]]:
     return kept_conditions(every, needs) if fit.accepted else {}, needs
 
 
-def _effects(fit: Fitted, said: Diagnosis, names: tuple[str, ...], covariance: Floats) -> tuple[Effect, ...]:
+def _effects(
+    fit: Fitted, findings: tuple[Finding, ...], names: tuple[str, ...], covariance: Floats
+) -> tuple[Effect, ...]:
     out: list[Effect] = []
     for i, (a, name) in enumerate(zip(fit.accepted, names, strict=True)):
         mine = np.flatnonzero(fit.problem.owner == i)
-        out.append(_effect(a, name, _finding_of(a, said), fit.drivers, covariance[np.ix_(mine, mine)]))
+        out.append(_effect(a, name, _finding_of(a, findings), fit.drivers, covariance[np.ix_(mine, mine)]))
     return (*out, *(_aftermath(effect) for effect in out if effect.shape == Shape.STEP.value))
 
 
@@ -253,12 +275,12 @@ def _effect(a: Accepted, name: str, finding: Finding | None, drivers: Drivers, o
     )
 
 
-def _finding_of(a: Accepted, said: Diagnosis) -> Finding | None:
+def _finding_of(a: Accepted, findings: tuple[Finding, ...]) -> Finding | None:
     """The one that names it, else the unknown cause at its port that has taken it in."""
-    for finding in said.findings:
+    for finding in findings:
         if finding.name == named(a.term):
             return finding
-    return next((f for f in said.findings if f.name.physics == UNKNOWN and f.name.where == a.term.port.where), None)
+    return next((f for f in findings if f.name.physics == UNKNOWN and f.name.where == a.term.port.where), None)
 
 
 def _about(a: Accepted, drivers: Drivers) -> dict[str, float]:

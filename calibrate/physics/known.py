@@ -75,12 +75,15 @@ def with_structure(effects: tuple[Effect, ...], session: Session) -> tuple[Fitte
     DataError where an effect needs what the recording does not hold.
     """
     geometry = fit_geometry(session)
-    terms = tuple(_term(effect, geometry.drivers) for effect in effects)
+    terms = tuple(term_of(effect, geometry.drivers) for effect in effects)
     return geometry, geometry.refitted(terms) if terms else geometry
 
 
-def _term(effect: Effect, drivers: Drivers) -> Accepted:
-    """Of the catalogue, as these drivers allow it, with the values of the model to start from."""
+def term_of(effect: Effect, drivers: Drivers) -> Accepted:
+    """Of the catalogue, as these drivers allow it, with the values of the model to start from.
+
+    DataError where the recording does not hold what the effect needs.
+    """
     (carried,) = listed([effect], drivers)
     accepted = carried.accepted
     basis = accepted.term.basis(drivers, accepted.inner)
