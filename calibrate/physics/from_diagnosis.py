@@ -13,6 +13,7 @@ from acquisition.recording.fingerprint import readings_sha256
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import rig_sha256
 from acquisition.recording.samples import Samples
+from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.blunders_first import Cleared
 from calibrate.diagnose.curve import Curve
 from calibrate.diagnose.diagnosis import UNKNOWN, Finding
@@ -23,6 +24,7 @@ from calibrate.diagnose.from_recording import Diagnosed
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.noise_law import curvature_of
 from calibrate.diagnose.noise_of_fit import freedom
+from calibrate.diagnose.stated_sizes import sizes_of
 from calibrate.effects.catalogue import holds_of
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.ports import Perturbation
@@ -218,10 +220,11 @@ def _conditions(fit: Fitted) -> tuple[dict[str, Floats], tuple[str, ...]]:
 def _effects(
     fit: Fitted, findings: tuple[Finding, ...], names: tuple[str, ...], covariance: Floats
 ) -> tuple[Effect, ...]:
-    out: list[Effect] = []
+    out, bench = list[Effect](), Bench(fit)
     for i, (a, name) in enumerate(zip(fit.accepted, names, strict=True)):
-        mine = np.flatnonzero(fit.problem.owner == i)
-        out.append(_effect(a, name, _finding_of(a, findings), fit.drivers, covariance[np.ix_(mine, mine)]))
+        mine, finding = np.flatnonzero(fit.problem.owner == i), _finding_of(a, findings)
+        sizes = sizes_of(bench, i) if finding is None and not a.term.open else None
+        out.append(_effect(a, name, finding, fit.drivers, covariance[np.ix_(mine, mine)], sizes))
     return (*out, *(_aftermath(effect) for effect in out if effect.shape == Shape.STEP.value))
 
 
@@ -240,13 +243,22 @@ def _aftermath(effect: Effect) -> Effect:
     )
 
 
-def _effect(a: Accepted, name: str, finding: Finding | None, drivers: Drivers, own: Floats) -> Effect:
-    """`own` (value, value) covariance of its coefficients and smooth inner values."""
+def _effect(
+    a: Accepted,
+    name: str,
+    finding: Finding | None,
+    drivers: Drivers,
+    own: Floats,
+    stated: Mapping[str, Size] | None,
+) -> Effect:
+    """`own` (value, value) covariance of its coefficients and smooth inner values; `stated` sizes without a finding."""
     m, term = len(a.coefficients), a.term
     named_so = finding is not None and not term.open and finding.name.physics != UNKNOWN
     physics = UNKNOWN if term.open or (finding is not None and not named_so) else term.physics
     if finding is not None and named_so:
         sizes = finding.parameters
+    elif stated is not None:
+        sizes = stated
     else:
         inner_sigma = np.zeros(len(a.inner))
         inner_sigma[[not s.discrete for s in term.inner]] = np.sqrt(np.maximum(np.diag(own)[m:], 0.0))
