@@ -16,6 +16,7 @@ from calibrate.effects.ports import Perturbation, Port
 from calibrate.model_file import ModelFile
 from calibrate.physics.acting import Acting, arm_in, flange_frames, moved_columns
 from calibrate.physics.applied import Applied, effects_at
+from calibrate.physics.flanges import Flanges
 from calibrate.predict import Columns, Predictor, less_cones, readings, residuals
 
 Floats = NDArray[np.float64]
@@ -46,10 +47,10 @@ def predict_with_physics(model: ModelFile, samples: Samples, same_session: bool 
 
 def _with_sigma(model: ModelFile, predictor: Predictor, samples: Samples, applied: Applied) -> Columns:
     """t_s, predicted columns, `s_...`, `r_...`."""
-    arm, q = arm_in(predictor), samples.joints()
+    flange = _flange(predictor, applied, samples.joints())
 
     def reading(predictor: Predictor, by: Perturbation) -> Columns:
-        frames = flange_frames(arm, predictor, q, by)[:, -1] if applied.found else predictor.flange(q)
+        frames = flange(predictor, by)
         read, moved = readings(predictor, frames, samples), moved_columns(by)
         return {c: v + moved[c] if c in moved else v for c, v in read.items()}
 
@@ -63,6 +64,21 @@ def _with_sigma(model: ModelFile, predictor: Predictor, samples: Samples, applie
     variance = _variance(model, predictor, applied, at, tuple(read))
     sigma = {f"s_{c}": np.where(np.isfinite(read[c]), np.sqrt(np.maximum(v, 0.0)), np.nan) for c, v in variance.items()}
     return {"t_s": samples.column("t_s")} | read | sigma | residuals(predictor, read, samples)
+
+
+def _flange(predictor: Predictor, applied: Applied, q_rad: Floats) -> Callable[[Predictor, Perturbation], Floats]:
+    """(row, 4, 4) of the flange at any values and perturbation; under that of the effects, only what changed anew."""
+    if not applied.found:
+        return lambda other, by: other.flange(q_rad)
+    arm = arm_in(predictor)
+    known = Flanges.of(arm, predictor.values_of(arm.parameters), q_rad, applied.by)
+
+    def at(other: Predictor, by: Perturbation) -> Floats:
+        if by is applied.by:
+            return known.at(other.values_of(arm.parameters))
+        return flange_frames(arm, other, q_rad, by)[:, -1]
+
+    return at
 
 
 def _variance(
@@ -139,11 +155,7 @@ def placed(model: ModelFile, samples: Samples, same_session: bool = False) -> Pl
     """Flange and tip with the effects of the model, at joints and conditions of samples. DataError as above."""
     predictor = Predictor.of(model)
     applied = effects_at(model, predictor, samples, same_session)
-    arm, q = arm_in(predictor), samples.joints()
-
-    def flange(predictor: Predictor, by: Perturbation) -> Floats:
-        return flange_frames(arm, predictor, q, by)[:, -1] if applied.found else predictor.flange(q)
-
+    flange = _flange(predictor, applied, samples.joints())
     T = flange(predictor, applied.by)
 
     def at(predictor: Predictor, by: Perturbation) -> Columns:
