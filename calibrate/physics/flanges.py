@@ -34,13 +34,13 @@ class Flanges:
         """(row, 4, 4) at other values (param,), the perturbation being the same."""
         was, now = self.arm.fixed_parts(self.theta), self.arm.fixed_parts(theta)
         turned = self.arm.angle_offset_rad(theta) - self.arm.angle_offset_rad(self.theta)
-        T = self.frames[:, -1]
+        flange = self.frames[:, -1]
         for k in range(self.arm.n_joints, -1, -1):  # from the flange: frames in front of a change are as they were
             if np.any(was[k] != now[k]):
-                T = _behind(self._before_offset(k), inverse(was[k]) @ now[k], T)
+                flange = _behind(self._before_offset(k), inverse(was[k]) @ now[k], flange)
             if k > 0 and turned[k - 1] != 0.0:
-                T = _behind(self.frames[:, k - 1], _about_z(float(turned[k - 1])), T)
-        return T
+                flange = _behind(self.frames[:, k - 1], _about_z(float(turned[k - 1])), flange)
+        return flange
 
     def _before_offset(self, k: int) -> Floats:
         """(row, 4, 4) frame k without what effects add there."""
