@@ -98,6 +98,8 @@ class SessionEvidence:
     @cached_property
     def spare(self) -> float:
         """Readings that are left over to check the fit; nan where the model has no covariance."""
+        if self.model.session is not None:  # its covariance is of the noise that the diagnosis found, not of `problem`
+            return float(sum(r.after.size for r in self.readings) - self.model.rank)
         found, names = self.model.covariance, [p.name for p in self.parameters]
         if found is None or not set(found.names) <= set(names):
             return float("nan")
