@@ -20,6 +20,8 @@ from calibeam.session_table import print_identification
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.errors import DataError
 from calibrate.identification.result import Identification
+from calibrate.model_file import write_model
+from calibrate.physics.from_diagnosis import model_of_diagnosis
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_verdict import session_verdict
 
@@ -52,7 +54,7 @@ def _concluded(recording_path: Path, console: Console) -> Identification:
     model = write_session_model(result, recording, folder / "model.json")
     print_identification(console, result, session_verdict(session_evidence(recording, model)), recording.rig)
     console.print(f"model: {folder / 'model.json'}", markup=False)
-    diagnosis = diagnosed(recording, folder / "diagnosis.json", console)
+    diagnosis = diagnosed(recording, folder, console)
     write_any_report(recording, model, folder / "report.html", diagnosis)
     console.print(f"report: {folder / 'report.html'}", markup=False)
     return result
@@ -63,13 +65,21 @@ def _folder_of(recording_path: Path) -> Path:
     return recording_path if recording_path.is_dir() else recording_path.parent
 
 
-def diagnosed(recording: Recording, path: Path, console: Console) -> DiagnosisFile | None:
-    """None, and said, where there is too little to diagnose: what was identified stands all the same."""
+def diagnosed(recording: Recording, folder: Path, console: Console) -> DiagnosisFile | None:
+    """Writes diagnosis.json, and model.json with the physics found in place of the identified geometry.
+
+    None, with the reason printed, where there is too little to diagnose: model.json then stays as identified.
+    """
+    path = folder / "diagnosis.json"
     try:
-        file = diagnosed_to(recording, None, path)
+        found, file = diagnosed_to(recording, path)
     except DataError as why:
         console.print(f"no diagnosis: {why}", highlight=False, markup=False)
         return None
     print_diagnosis(console, file)
     console.print(f"diagnosis: {path}", markup=False)
+    try:
+        write_model(folder / "model.json", model_of_diagnosis(found, recording))
+    except DataError as why:
+        console.print(f"model.json holds the identified geometry only: {why}", highlight=False, markup=False)
     return file

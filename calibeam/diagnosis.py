@@ -16,13 +16,15 @@ from calibrate.diagnose.streams.from_recording import streams_of
 from calibrate.diagnose.streams.to_file import with_streams
 from calibrate.diagnose.to_file import file_of
 from calibrate.errors import DataError
-from calibrate.model_file import ModelFile, corrections
+from calibrate.model_file import ModelFile
+from calibrate.physics.known import known_before
+from calibrate.physics.news import beside_known, only_new
 
 SEED = 1  # of nulls, splits and bootstraps: the same recording always gives the same diagnosis
 
 
 def diagnose_recording(recording: Recording, model: ModelFile | None = None) -> tuple[Diagnosed, DiagnosisFile]:
-    """Both as records and as the file says it; `model` is where the comparison starts.
+    """Both as records and as the file says it; with a `model` only what is new to it.
 
     DataError where the recording holds too little, or the model is of another rig.
     """
@@ -31,10 +33,18 @@ def diagnose_recording(recording: Recording, model: ModelFile | None = None) -> 
             f"the model is of rig '{model.rig.name}', whose file is another than that of {recording.path.name}; "
             "give the model that was identified with this rig, or none"
         )
-    start = None if model is None else corrections(model)
-    found = diagnose_samples(recording.rig, recording.samples, np.random.default_rng(SEED), start)
+    rng = np.random.default_rng(SEED)
+    if model is None:
+        found = diagnose_samples(recording.rig, recording.samples, rng)
+        fitted = None if found.physics is None else found.physics.model
+        return found, with_streams(file_of(found, recording), streams_of(recording, fitted))
+    known = known_before(model, recording.samples)
+    found = diagnose_samples(recording.rig, recording.samples, rng, known.begin)
+    if known.same_recording:
+        found = only_new(found)  # what its streams show is no part of a model, and not new either
+        return found, beside_known(file_of(found, recording), known)
     fitted = None if found.physics is None else found.physics.model
-    return found, with_streams(file_of(found, recording), streams_of(recording, fitted))
+    return found, with_streams(beside_known(file_of(found, recording), known), streams_of(recording, fitted))
 
 
 def plan_next(found: Diagnosed, path: Path) -> str:
@@ -45,6 +55,8 @@ def plan_next(found: Diagnosed, path: Path) -> str:
     if found.physics is None:
         return "no plan: the file is to be put right first"
     physics = found.physics
+    if physics.model.problem.given:
+        return "no plan: beside the effects of a model none is made; diagnose without --model"
     chosen = separating(physics.diagnosis, np.random.default_rng(SEED))
     if chosen is None:
         return "no plan: no finding has a rival that more poses could tell from it"
@@ -63,9 +75,9 @@ def refuse_wrong_file(found: Diagnosed, path: Path) -> None:
         raise DataError(f"{said} (also in {path}); no physics is sought before that is put right")
 
 
-def diagnosed_to(recording: Recording, model: ModelFile | None, path: Path) -> DiagnosisFile:
+def diagnosed_to(recording: Recording, path: Path) -> tuple[Diagnosed, DiagnosisFile]:
     """diagnosis.json at `path`. DataError as above; OSError where it cannot be written."""
-    found, file = diagnose_recording(recording, model)
+    found, file = diagnose_recording(recording)
     write_diagnosis(path, file)
     refuse_wrong_file(found, path)
-    return file
+    return found, file

@@ -27,6 +27,8 @@ def print_diagnosis(console: Console, file: DiagnosisFile) -> None:
     for number, finding in enumerate(file.findings, start=1):
         for line in _finding(number, finding):
             console.print(line, highlight=False, markup=False)
+    for line in _changes(file):
+        console.print(line, highlight=False, markup=False)
     for line in _doubt(file):
         console.print(line, highlight=False, markup=False)
     if file.splits:
@@ -43,6 +45,15 @@ def _finding(number: int, finding: FindingRecord) -> Iterator[str]:
     yield f"   {place_words(finding)}; {found}; confidence {finding.confidence:.3f}"
     for rival in finding.rivals:
         yield f"   or: {rival_words(rival)}"
+
+
+def _changes(file: DiagnosisFile) -> Iterator[str]:
+    """Beside a model: which of its values are others now, and which of its effects took no part."""
+    for one in file.changed:
+        known = "" if one.known is None else f" (known: {one.known:.6g})"
+        yield f"changed: {one.parameter} by {one.by:+.3g} ± {one.sigma:.2g}{known}"
+    if file.known is not None and file.known.left_out:
+        yield f"not applied, true of another recording only: {', '.join(file.known.left_out)}"
 
 
 def _doubt(file: DiagnosisFile) -> Iterator[str]:

@@ -8,6 +8,7 @@
 The same functions stand behind the command line; docs/python.md has all of it as examples.
 """
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from calibeam.modelled import Modelled
     from calibrate.diagnose.schema import DiagnosisFile
     from calibrate.model_file import ModelFile, ModelParameter
+    from calibrate.physics.predicting import Placed
 
 Floats = NDArray[np.float64]
 
@@ -54,11 +56,38 @@ class Model:
                 return parameter
         raise KeyError(f"'{name}': no parameter of the model; it has {', '.join(p.name for p in self.file.parameters)}")
 
-    def flange(self, q_rad: Floats) -> Floats:
-        """T_base_flange (pose, 4, 4), m, at joint readings (pose, joint) or (joint,), rad."""
-        from calibrate.predict import Predictor
+    def flange(
+        self, q_rad: Floats, conditions: "Mapping[str, Floats | float] | None" = None, *, same_session: bool = False
+    ) -> Floats:
+        """T_base_flange (pose, 4, 4), m, at joint readings (pose, joint) or (joint,), rad, with the model's effects.
 
-        return Predictor.of(self.file).flange(np.atleast_2d(np.asarray(q_rad, dtype=np.float64)))
+        `conditions`: columns of samples.csv by name, (pose,) or one value for all poses: payload_kg, approach2,
+        temp_arm_degC, ... (`file.needs` lists those that the effects need). A missing one is named in a UserWarning,
+        taken as the mean of the model's session, and widens `flange_sigma`. `same_session`: as of `predict`. DataError
+        where an effect cannot be evaluated.
+        """
+        return self._placed(q_rad, conditions, same_session).T_base_flange
+
+    def flange_sigma(
+        self, q_rad: Floats, conditions: "Mapping[str, Floats | float] | None" = None, *, same_session: bool = False
+    ) -> Floats:
+        """(pose, 6) one sigma of `flange`: m along x, y, z of the base, rad about them. NaN without a covariance."""
+        return self._placed(q_rad, conditions, same_session).flange_sigma
+
+    def tip(
+        self, q_rad: Floats, conditions: "Mapping[str, Floats | float] | None" = None, *, same_session: bool = False
+    ) -> Floats:
+        """(pose, 3) target or probe tip in the base, m; arguments, warnings and errors as of `flange`.
+
+        Where neither rig nor model knows a tip, the centre of the flange.
+        """
+        return self._placed(q_rad, conditions, same_session).tip_m
+
+    def tip_sigma(
+        self, q_rad: Floats, conditions: "Mapping[str, Floats | float] | None" = None, *, same_session: bool = False
+    ) -> Floats:
+        """(pose, 3) one sigma of `tip`, m. NaN without a covariance."""
+        return self._placed(q_rad, conditions, same_session).tip_sigma_m
 
     def predict(self, samples: Mapping[str, NDArray[np.generic]], *, same_session: bool = False) -> dict[str, Floats]:
         """Columns of predicted.csv, name -> (row,), for columns of samples.csv; effects of the model are applied.
@@ -72,6 +101,17 @@ class Model:
         joints = parse_rig(self.file.rig.text or "", "rig.toml in the model").n_joints
         table = Samples({name: np.asarray(values) for name, values in samples.items()}, joints)
         return predict_with_physics(self.file, table, same_session).columns
+
+    def _placed(self, q_rad: Floats, conditions: "Mapping[str, Floats | float] | None", same_session: bool) -> "Placed":
+        from calibrate.physics.predicting import placed
+
+        q = np.atleast_2d(np.asarray(q_rad, dtype=np.float64))
+        columns = {name: np.broadcast_to(value, len(q)) for name, value in (conditions or {}).items()}
+        joints = {f"q{i + 1}_rad": column for i, column in enumerate(q.T)}
+        found = placed(self.file, Samples({"t_s": np.zeros(len(q))} | columns | joints, q.shape[1]), same_session)
+        for note in found.notes:
+            warnings.warn(note, stacklevel=3)
+        return found
 
     def save(self, path: Path | str) -> Path:
         """Write model.json; returns the path. OSError where it cannot be written."""

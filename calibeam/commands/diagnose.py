@@ -9,9 +9,8 @@ from acquisition.recording.read import read
 from calibeam.diagnosis import diagnose_recording, plan_next, refuse_wrong_file
 from calibeam.diagnosis_lines import print_diagnosis
 from calibeam.ending import naming
-from calibeam.geometry_only import read_geometry
 from calibrate.diagnose.file import write_diagnosis
-from calibrate.model_file import write_model
+from calibrate.model_file import read_model, write_model
 from calibrate.physics.from_diagnosis import model_of_diagnosis
 from calibrate.report.diagnosis.page import write_diagnosis_report
 
@@ -39,7 +38,8 @@ def diagnose_command(
     recording
         A recording, or a session folder with rig.toml and samples.csv.
     model
-        An identified model of the same rig: the comparison starts from it.
+        A model of the same rig, with or without physics: only what is new beside it is asked. On a later recording
+        its values enter with their covariance, and what has changed is named.
     out
         Where to write the diagnosis.
     model_out
@@ -52,7 +52,7 @@ def diagnose_command(
         Print the diagnosis as it stands in the file, on one line, and nothing else.
 
     """
-    known = None if model is None else read_geometry(model)
+    known = None if model is None else read_model(model)
     source, console = read(recording), Console()
     with naming(recording):
         found, file = diagnose_recording(source, known)

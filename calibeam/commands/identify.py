@@ -8,13 +8,17 @@ from cyclopts import Parameter, validators
 from rich.console import Console
 
 from acquisition.recording.read import read
+from acquisition.recording.rig_schema import Rig
 from calibeam.any_session import Planned, identify_session, write_session_model
 from calibeam.ending import naming, refuse_nothing, tell_unfinished
+from calibeam.refitted_lines import refitted_lines
 from calibeam.session_table import print_identification
+from calibrate.errors import DataError
 from calibrate.export.export import ExportForm, export_model
 from calibrate.fit import Status
 from calibrate.identification.planned import rig_as_planned
-from calibrate.model_file import corrections, read_model
+from calibrate.model_file import ModelFile, corrections, read_model, write_model
+from calibrate.physics.refitted import refit
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_verdict import session_verdict
 
@@ -32,6 +36,7 @@ def identify_command(
     recording: Path,
     *,
     plan: Path | None = None,
+    model: Path | None = None,
     bootstrap: Annotated[int, Parameter(validator=validators.Number(gte=0))] | None = None,
     out: Path = Path("model.json"),
     export: tuple[ExportForm, ...] = (),
@@ -46,12 +51,17 @@ def identify_command(
 
     Example: calibeam identify out/demo/recording.mcap --out model.json
 
+    Example: calibeam identify now/recording.mcap --model last-year/model.json --out now/model.json
+
     Parameters
     ----------
     recording
         A recording, or a session folder with rig.toml and samples.csv.
     plan
         A fit plan (fit.toml): what is free, held or believed, which instruments, loss, solver, proofs.
+    model
+        A known model with physics: its structure, geometry and effects, is fitted to this recording, and nothing is
+        searched. Not with --plan or --bootstrap.
     bootstrap
         Also refit so many times to drawn rows: intervals that trust no law of noise.
     out
@@ -63,6 +73,14 @@ def identify_command(
         Print the model as it stands in the file, on one line, and nothing else.
 
     """
+    if model is not None:
+        if plan is not None or bootstrap:
+            raise DataError("--model refits a known structure; give it without --plan and --bootstrap")
+        with naming(recording):
+            _refit(Console(quiet=json), recording, read_model(model), out, export)
+        if json:
+            print(msgspec.json.encode(read_model(out)).decode())
+        return
     planned = Planned.read(plan)
     with naming(recording):
         status = _identify(Console(quiet=json), recording, planned, bootstrap, out, export)
@@ -85,8 +103,22 @@ def _identify(
     model = write_session_model(result, source, out, planned)
     print_identification(console, result, session_verdict(session_evidence(source, model)), source.rig)
     console.print(f"model: {out}", markup=False)
+    _export(console, rig_as_planned(source.rig, planned.plan), out, export)
+    return result.status
+
+
+def _refit(console: Console, recording: Path, known: ModelFile, out: Path, export: tuple[ExportForm, ...]) -> None:
+    source = read(recording)
+    found = refit(known, source)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    write_model(out, found.model)
+    for line in (*refitted_lines(found.model), *found.notes, f"model: {out}"):
+        console.print(line, markup=False, highlight=False)
+    _export(console, source.rig, out, export)
+
+
+def _export(console: Console, rig: Rig, out: Path, export: tuple[ExportForm, ...]) -> None:
     for form in export:
         beside = out.with_name(out.stem + SUFFIX[form])
-        export_model(beside, rig_as_planned(source.rig, planned.plan), corrections(read_model(out)), form)
+        export_model(beside, rig, corrections(read_model(out)), form)
         console.print(f"{form.value}: {beside}", markup=False)
-    return result.status

@@ -7,11 +7,11 @@ import msgspec
 from acquisition.recording.read import read
 from calibeam.earlier import earlier_calibration
 from calibeam.ending import naming
-from calibeam.geometry_only import read_geometry
 from calibeam.reporting import write_any_report
 from calibeam.summary_record import summary_of
 from calibeam.verdict_line import verdict_words
 from calibrate.diagnose.file import read_diagnosis
+from calibrate.model_file import read_model
 
 
 def report_command(
@@ -40,7 +40,8 @@ def report_command(
     recording
         A recording, or a session folder.
     model
-        The model.json of this recording; without it the recording is identified anew.
+        The model.json of this recording, also one with physics, whose effects are then taken out of the readings;
+        without it the recording is identified anew.
     diagnosis
         The diagnosis.json of this recording: its pages are added.
     against
@@ -54,7 +55,7 @@ def report_command(
         Print the first screen as one line of JSON, and nothing else.
 
     """
-    known = None if model is None else read_geometry(model)
+    known = None if model is None else read_model(model)
     found = None if diagnosis is None else read_diagnosis(diagnosis)
     earlier = None if against is None else earlier_calibration(against)
     with naming(recording):

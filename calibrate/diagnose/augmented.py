@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.diagnose.assumed import Assumed
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.ported import Look, flange_twists, joint_turns, look, perturbed_frames, through
 from calibrate.diagnose.session import Session
@@ -46,6 +47,8 @@ class Augmented:
     rows: tuple[Ints, ...]  # of each instrument, the active ones
     whiteners: tuple[Floats, ...]  # (active row, k, k) robust weights included
     sizes: tuple[Floats, ...]  # of each term (coefficient,) that would be plain to see; inf where it does nothing
+    given: int = 0  # terms, the first ones, that a model brought along: to a search they are geometry
+    assumed: Assumed | None = None  # what that model states of the values
     last: dict[bytes, Around] = field(default_factory=dict[bytes, Around])
     slopes: dict[bytes, list[Floats]] = field(default_factory=dict[bytes, list[Floats]])
 
@@ -81,11 +84,11 @@ class Augmented:
 
     @cached_property
     def owner(self) -> Ints:
-        """(parameter,) index of the term that it belongs to, -1: geometry."""
+        """(parameter,) index of the term that it belongs to, those given not counted, -1: geometry or given."""
         out = [np.full(len(self.session.parameters), -1, dtype=np.intp)]
         for i, accepted in enumerate(self.terms):
             smooth = sum(not inner.discrete for inner in accepted.term.inner)
-            out.append(np.full(len(accepted.coefficients) + smooth, i, dtype=np.intp))
+            out.append(np.full(len(accepted.coefficients) + smooth, max(i - self.given, -1), dtype=np.intp))
         return np.concatenate(out)
 
     @property
@@ -130,6 +133,7 @@ class Augmented:
         parts += [
             block.residual(joint.of_block(first + i, geometry)) for i, block in enumerate(self.session.weighting.known)
         ]
+        parts += [] if self.assumed is None else [self.assumed.residual(theta)]
         return np.concatenate(parts)
 
     def jacobian(self, theta: Floats) -> Floats:
@@ -142,6 +146,7 @@ class Augmented:
         for i, block in enumerate(self.session.weighting.known, start=len(self.session.measured)):
             known = joint.spread(i, block.jacobian(joint.of_block(i, geometry)))
             parts.append(np.concatenate([known, np.zeros((len(known), extra))], axis=1))
+        parts += [] if self.assumed is None else [self.assumed.jacobian(len(theta))]
         return np.concatenate(parts)
 
     def _slopes(self, theta: Floats) -> list[Floats]:

@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.diagnose.assumed import Assumed
 from calibrate.diagnose.augmented import Around, Augmented, plain_sizes
 from calibrate.diagnose.driver_values import drivers_of
 from calibrate.diagnose.linearised import Accepted, Rows, Unseen
@@ -20,8 +21,9 @@ from calibrate.diagnose.session import Session
 from calibrate.diagnose.unmet_places import places_found
 from calibrate.effects.catalogue import terms_of
 from calibrate.effects.drivers import Drivers
+from calibrate.effects.since_model import changes
 from calibrate.effects.term import Term
-from calibrate.fit import FAR_START, Loss, solve
+from calibrate.fit import FAR_START, Loss, Stop, solve
 from calibrate.identification.session import believed_sigma
 from calibrate.parameters import plausible_sizes, priors, start_values
 from calibrate.problem import whitener_of
@@ -53,6 +55,8 @@ class Fitted:
     values: Floats  # of the problem's parameters
     scatters: tuple[Scatter, ...]  # of each instrument, over its active rows
     covariance: Floats  # (value, value) posterior; zero for held ones
+    steps: int = 0  # of the solver, in all rounds of weights
+    stop: Stop = Stop.ROUNDS  # the rule that ended the last round
 
     @cached_property
     def _split(self) -> tuple[Floats, tuple[Accepted, ...]]:
@@ -65,7 +69,7 @@ class Fitted:
 
     @property
     def accepted(self) -> tuple[Accepted, ...]:
-        return self._split[1]
+        return self._split[1][self.problem.given :]
 
     @property
     def samples(self) -> int:
@@ -107,6 +111,7 @@ class Fitted:
         believed = free[np.isfinite(priors(parameters)[free])]
         scale, sigma = plausible_sizes(parameters), priors(parameters)
         known = sum(block.rows for block in self.session.weighting.known)
+        known += 0 if self.problem.assumed is None else len(self.problem.assumed.at)
         residual = np.concatenate(
             [-self.problem.residual(self.values), -(self.values - start_values(parameters))[believed] / sigma[believed]]
         )
@@ -153,7 +158,8 @@ class Fitted:
         return np.concatenate([*data, np.zeros((rest, data[0].shape[1]))])
 
     def candidates(self) -> Sequence[Term]:
-        return terms_of(self.drivers)
+        since = () if self.problem.assumed is None else changes(self.drivers)
+        return (*terms_of(self.drivers), *since)
 
     def refitted(self, accepted: Sequence[Accepted]) -> "Fitted":
         kept = {a.term.key for a in self.accepted}
@@ -179,9 +185,11 @@ class Fitted:
         return tuple(out)
 
     def _refitted(self, accepted: tuple[Accepted, ...], scatters: tuple[Scatter, ...]) -> "Fitted":
-        drivers, whiteners, rows = self.drivers if accepted else None, whiteners_of(scatters), self.problem.rows
-        sizes = plain_sizes(self.session, accepted, drivers, whiteners, rows)
-        problem = Augmented(self.session, accepted, drivers, rows, whiteners, sizes)
+        given, assumed = self.problem.given, self.problem.assumed
+        terms = (*self._split[1][:given], *accepted)
+        drivers, whiteners, rows = self.drivers if terms else None, whiteners_of(scatters), self.problem.rows
+        sizes = plain_sizes(self.session, terms, drivers, whiteners, rows)
+        problem = Augmented(self.session, terms, drivers, rows, whiteners, sizes, given, assumed)
         start = np.concatenate([self.geometry, problem.start[len(self.geometry) :]])
         return _settled(_turn(problem, self.active, start, scatters))
 
@@ -205,6 +213,22 @@ def fit_geometry(session: Session, active: Ints | None = None) -> Fitted:
     return min(fits, key=lambda fit: fit.minus_two_log_likelihood)
 
 
+def given(fit: Fitted) -> Fitted:
+    """The same fit, its terms from now on taken as geometry: a search asks what there is beside them."""
+    return replace(fit, problem=replace(fit.problem, given=len(fit.problem.terms)))
+
+
+def fit_from_model(
+    session: Session, geometry: Fitted, terms: tuple[Accepted, ...], assumed: Assumed, start: Floats
+) -> Fitted:
+    """A recording under what a model states of it, from `start` (value,). `geometry`: the same recording, alone."""
+    scatters = trusted(geometry.scatters)
+    whiteners, rows = whiteners_of(scatters), geometry.problem.rows
+    sizes = plain_sizes(session, terms, geometry.drivers, whiteners, rows)
+    problem = Augmented(session, terms, geometry.drivers, rows, whiteners, sizes, len(terms), assumed)
+    return _settled(_turn(problem, geometry.active, start, scatters))
+
+
 def _makes_outliers(term: Term) -> bool:
     """Whether data without the term may look like wild rows: few of them follow it."""
     return term.slow or term.open
@@ -214,11 +238,12 @@ def _settled(fitted: Fitted) -> Fitted:
     """Weights and least squares in turns, until neither changes the likelihood."""
     for turn in range(1, TURNS):
         last, problem = fitted.minus_two_log_likelihood, fitted.problem
-        if fitted.accepted and turn <= REFRESHED:
+        if fitted.problem.terms and turn <= REFRESHED:
             problem = problem.refreshed(fitted.drivers)
-        fitted = _turn(problem, fitted.active, fitted.values, fitted.scatters, FEW_STEPS)
+        new = _turn(problem, fitted.active, fitted.values, fitted.scatters, FEW_STEPS)
+        fitted = replace(new, steps=fitted.steps + new.steps)
         if turn + 1 >= FEWEST_TURNS and abs(last - fitted.minus_two_log_likelihood) < SETTLED:
-            break
+            return replace(fitted, stop=Stop.LIKELIHOOD)
     return fitted
 
 
@@ -226,7 +251,7 @@ def _turn(problem: Augmented, active: Ints, start: Floats, scatters: tuple[Scatt
     """Least squares under the noise so far, then the noise that is left."""
     problem = problem.under(whiteners_of(scatters))
     fit = solve(problem, start=start, damping=DAMPING, max_steps=steps, tolerance=TOLERANCE)
-    return Fitted(problem.session, active, problem, fit.theta, scatters_of(problem, fit), fit.covariance)
+    return Fitted(problem.session, active, problem, fit.theta, scatters_of(problem, fit), fit.covariance, fit.steps)
 
 
 def _cut(state: Fitted, active: Ints) -> Fitted:

@@ -1,6 +1,6 @@
 """From the samples of a recording to a diagnosis, by whatever instruments they hold: blunders, fit, physics."""
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,7 +27,6 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 FEWEST = 20  # samples: below, no term can be told from noise, whatever it is
-STANDING = ("device.", "tool.", "seat")  # corrections about frames that were found anew: not those of another fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +48,13 @@ class Diagnosed:
     physics: Physics | None
 
 
-def diagnose_samples(rig: Rig, samples: Samples, rng: Generator, start: Mapping[str, float] | None = None) -> Diagnosed:
-    """`start`: corrections of an identified model, by name. DataError where there is too little to diagnose."""
+def diagnose_samples(
+    rig: Rig, samples: Samples, rng: Generator, begin: Callable[[Session], Fitted] = fit_geometry
+) -> Diagnosed:
+    """`begin`: the fit beside which something is sought, geometry alone or what a model knows already.
+
+    DataError where there is too little to diagnose.
+    """
     cleared = blunders_first(rig, samples)
     if cleared.whole_file:
         return Diagnosed(cleared, cleared.blunders, None)
@@ -59,12 +63,12 @@ def diagnose_samples(rig: Rig, samples: Samples, rng: Generator, start: Mapping[
             f"{len(cleared.rows)} samples are left to diagnose, fewer than {FEWEST}: no cause can be told from noise; "
             "measure more poses"
         )
-    session = _started(session_of(rig, cleared.samples), start or {})
-    geometry = fit_geometry(session)
+    geometry = begin(session_of(rig, cleared.samples))
     diagnosis = diagnose(geometry, rng, missing_of(geometry.drivers))
     model = geometry if not diagnosis.findings else _fitted(diagnosis)
     diagnosis = _with_scatter(diagnosis, model)
-    physics = Physics(diagnosis, geometry, model, free_space_change(geometry, model, rng))
+    change = None if geometry.problem.given else free_space_change(geometry, model, rng)
+    physics = Physics(diagnosis, geometry, model, change)
     return Diagnosed(cleared, cleared.blunders + _left(model, cleared), physics)
 
 
@@ -81,14 +85,6 @@ def _fitted(diagnosis: Diagnosis) -> Fitted:
     if not isinstance(diagnosis.model, Fitted):
         raise TypeError(f"a diagnosis of {type(diagnosis.model).__name__}, which is no fit to a recording")
     return diagnosis.model
-
-
-def _started(session: Session, start: Mapping[str, float]) -> Session:
-    values = session.start.copy()
-    for i, p in enumerate(session.parameters):
-        if p.free and p.name in start and not p.name.startswith(STANDING):
-            values[i] = start[p.name]
-    return replace(session, start=values)
 
 
 def _left(model: Fitted, cleared: Cleared) -> tuple[Blunder, ...]:

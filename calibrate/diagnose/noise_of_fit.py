@@ -37,6 +37,7 @@ def freedom(problem: Augmented, covariance: Floats) -> float:
     free = np.array([p.free for p in problem.parameters])
     believed = np.diag(covariance)[free] / priors(problem.parameters)[free] ** 2
     fitted = float(np.sum(1.0 - np.clip(np.nan_to_num(believed), 0.0, 1.0)))
+    fitted -= 0.0 if problem.assumed is None else problem.assumed.holds(covariance)
     return rows / max(rows - fitted, MOST_FITTED * rows)
 
 

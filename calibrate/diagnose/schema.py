@@ -174,6 +174,23 @@ class BlunderRecord(Record, frozen=True):
     says: Sentence
 
 
+class KnownRecord(Record, frozen=True):
+    """The model that a diagnosis asked beside: names of effects that entered, and that hold for its session only."""
+
+    same_recording: bool
+    effects: Many[Name]
+    left_out: Many[Name]
+
+
+class ChangedRecord(Record, frozen=True):
+    """A value of the known model that is another now; `known` null where the model has no such number."""
+
+    parameter: Name
+    known: Number | None
+    by: Number
+    sigma: Statistic
+
+
 class RigRecord(Record, frozen=True):
     """Which rig the session was made with."""
 
@@ -211,3 +228,5 @@ class DiagnosisFile(Record, frozen=True):
     derived: Many[Sentence] = ()
     blunders: Many[BlunderRecord] = ()
     streams: StreamsRecord | None = None
+    known: KnownRecord | None = None  # of a diagnosis beside a model
+    changed: Many[ChangedRecord] = ()

@@ -36,6 +36,7 @@ class Session:
     arm: SerialArm
     weighting: Weighting
     start: Floats  # (param,)
+    stated: frozenset[str] = frozenset()  # parameters of which a model has a covariance: no other belief
 
     @property
     def measured(self) -> tuple[Measured, ...]:
@@ -44,7 +45,8 @@ class Session:
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """Geometry, every free one with a belief."""
-        return tuple(_believed(p) for p in self.weighting.parameters)
+        each = (replace(p, prior=np.inf) if p.name in self.stated else _believed(p) for p in self.weighting.parameters)
+        return tuple(each)
 
 
 def session_of(rig: Rig, samples: Samples) -> Session:

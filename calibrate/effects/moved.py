@@ -38,14 +38,15 @@ def motion(
     width: int = 6,
     variant: str = "",
     open_family: bool = False,
+    told: bool = True,
 ) -> Term:
     """Shift and turn by a law of drivers, about the middle of what the arm reached (turns and shifts stay apart).
 
-    `among` (pose, 1) is one where the thing that moved was in use.
+    `among` (pose, 1) is one where the thing that moved was in use; `told`: the sentence names a driver but time.
     """
     per = "_per_k" if driver.startswith("temp_") and not open_family else ""
     names = tuple(name + per for name in SIX[:width])
-    told = [", ".join(f"{{{name}}}" for name in names[k : k + 3]) for k in (0, 3)]
+    sizes = [", ".join(f"{{{name}}}" for name in names[k : k + 3]) for k in (0, 3)]
 
     def function(drivers: Drivers, values: Floats) -> Floats:
         amount = law(drivers, values) * (1.0 if among is None else among(drivers, values))
@@ -68,9 +69,9 @@ def motion(
         function=function,
         names=names,
         limit=LIMIT,
-        sentence=f"{what} moved by {told[0]} in x, y, z of the base"
-        + (f" and turned by {told[1]}" if width == 6 else "")
-        + ("" if driver == "t" else f" with {driver}"),
+        sentence=f"{what} moved by {sizes[0]} in x, y, z of the base"
+        + (f" and turned by {sizes[1]}" if width == 6 else "")
+        + (f" with {driver}" if told and driver != "t" else ""),
     )
 
 

@@ -13,8 +13,10 @@ from acquisition.recording.fingerprint import readings_sha256
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import rig_sha256
 from acquisition.recording.samples import Samples
+from calibrate.diagnose.bench import Bench
+from calibrate.diagnose.blunders_first import Cleared
 from calibrate.diagnose.curve import Curve
-from calibrate.diagnose.diagnosis import UNKNOWN, Diagnosis, Finding
+from calibrate.diagnose.diagnosis import UNKNOWN, Finding
 from calibrate.diagnose.extended import NEARLY, alike
 from calibrate.diagnose.findings import named
 from calibrate.diagnose.fitted import Fitted
@@ -22,11 +24,13 @@ from calibrate.diagnose.from_recording import Diagnosed
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.noise_law import curvature_of
 from calibrate.diagnose.noise_of_fit import freedom
+from calibrate.diagnose.stated_sizes import sizes_of
 from calibrate.effects.catalogue import holds_of
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.ports import Perturbation
-from calibrate.effects.term import Size
+from calibrate.effects.term import Shape, Size
 from calibrate.errors import DataError
+from calibrate.fit_plan import LossName, SolverName
 from calibrate.identifiability import Identifiability, analyse
 from calibrate.identification.record import left_out
 from calibrate.identification.result import POSE, POSITION
@@ -34,6 +38,7 @@ from calibrate.identification.session import about_of
 from calibrate.model_file import (
     WITH_PHYSICS,
     Fields,
+    FitRecord,
     ModelFile,
     ModelParameter,
     RigIdentity,
@@ -62,7 +67,26 @@ def model_of_diagnosis(found: Diagnosed, recording: Recording) -> ModelFile:
     """The record to write. DataError where the file is wrong as a whole, or an effect cannot be carried."""
     if found.physics is None:
         raise DataError("no model: the whole file is wrong; diagnosis.json says how")
-    fit, before = found.physics.model, found.physics.geometry
+    if found.physics.model.problem.assumed is not None:
+        raise DataError(
+            "no model: beside a model of another recording a diagnosis fits changes only; `calibeam identify --model` "
+            "refits that model to this recording"
+        )
+    fit, findings = found.physics.model, found.physics.diagnosis.findings
+    says = "geometry and effects fitted together by the diagnosis"
+    return model_of_fit(fit, found.physics.geometry, found.cleared, recording, says, findings)
+
+
+def model_of_fit(
+    fit: Fitted,
+    before: Fitted,
+    cleared: Cleared,
+    recording: Recording,
+    says: str,
+    findings: tuple[Finding, ...] = (),
+) -> ModelFile:
+    """The record of geometry and effects fitted together; `before`: geometry alone. DataError as above."""
+    fit = replace(fit, problem=replace(fit.problem, given=0))
     names = _names(fit.accepted)
     parameters = _parameters(fit, names)
     covariance = _covariance(fit)
@@ -75,7 +99,7 @@ def model_of_diagnosis(found: Diagnosed, recording: Recording) -> ModelFile:
         rig=RigIdentity(recording.rig.name, rig_sha256(recording.rig_text), recording.rig_text),
         arm_model=recording.rig.arm.model.value,
         status="CONVERGED",
-        says="geometry and effects fitted together by the diagnosis",
+        says=says,
         poses=fit.samples,
         rank=seen.rank,
         free=seen.n_free,
@@ -94,9 +118,10 @@ def model_of_diagnosis(found: Diagnosed, recording: Recording) -> ModelFile:
         rms_distance_after_m=_rms(fit)[1],
         instruments=tuple(m.name for m in fit.session.measured),
         about=about_of(fit.session.weighting),
-        blunders=tuple(left_out(b) for b in found.blunders),
+        blunders=tuple(left_out(b) for b in cleared.blunders),
         readings_sha256=readings_sha256(recording.samples),
-        effects=_effects(fit, found.physics.diagnosis, names, covariance),
+        fit=_fit_record(fit),
+        effects=_effects(fit, findings, names, covariance),
         needs=needs,
         session=SessionRecord(
             started_utc=recording.started_utc,
@@ -107,6 +132,19 @@ def model_of_diagnosis(found: Diagnosed, recording: Recording) -> ModelFile:
         ),
     )
     return _as_listed(model, fit, parameters, covariance, conditions)
+
+
+def _fit_record(fit: Fitted) -> FitRecord:
+    """Diagnosis has one estimator: Student's t with the noise found, by Levenberg and Marquardt."""
+    value = float(sum(s.minus_two_log_likelihood for s in fit.scatters))
+    return FitRecord(
+        SolverName.LEVENBERG.value,
+        LossName.STUDENT_T.value,
+        fit.steps,
+        fit.stop.name,
+        fit.stop.value,
+        _number(value),
+    )
 
 
 def _names(accepted: tuple[Accepted, ...]) -> tuple[str, ...]:
@@ -182,21 +220,48 @@ def _conditions(fit: Fitted) -> tuple[dict[str, Floats], tuple[str, ...]]:
     return kept_conditions(every, needs) if fit.accepted else {}, needs
 
 
-def _effects(fit: Fitted, said: Diagnosis, names: tuple[str, ...], covariance: Floats) -> tuple[Effect, ...]:
-    out: list[Effect] = []
+def _effects(
+    fit: Fitted, findings: tuple[Finding, ...], names: tuple[str, ...], covariance: Floats
+) -> tuple[Effect, ...]:
+    out, bench = list[Effect](), Bench(fit)
     for i, (a, name) in enumerate(zip(fit.accepted, names, strict=True)):
-        mine = np.flatnonzero(fit.problem.owner == i)
-        out.append(_effect(a, name, _finding_of(a, said), fit.drivers, covariance[np.ix_(mine, mine)]))
-    return tuple(out)
+        mine, finding = np.flatnonzero(fit.problem.owner == i), _finding_of(a, findings)
+        sizes = sizes_of(bench, i) if finding is None and not a.term.open else None
+        out.append(_effect(a, name, finding, fit.drivers, covariance[np.ix_(mine, mine)], sizes))
+    return (*out, *(_aftermath(effect) for effect in out if effect.shape == Shape.STEP.value))
 
 
-def _effect(a: Accepted, name: str, finding: Finding | None, drivers: Drivers, own: Floats) -> Effect:
-    """`own` (value, value) covariance of its coefficients and smooth inner values."""
+def _aftermath(effect: Effect) -> Effect:
+    """What a slip or a bump leaves: from the end of its session on it is true of the machine."""
+    return structs.replace(
+        effect,
+        name=f"{effect.name}-left",
+        depends_on="",
+        shape=Shape.CONSTANT.value,
+        parameters={k: p for k, p in effect.parameters.items() if k not in effect.inner},
+        holds="always",
+        range={},
+        curve=None,
+        after=effect.name,
+    )
+
+
+def _effect(
+    a: Accepted,
+    name: str,
+    finding: Finding | None,
+    drivers: Drivers,
+    own: Floats,
+    stated: Mapping[str, Size] | None,
+) -> Effect:
+    """`own` (value, value) covariance of its coefficients and smooth inner values; `stated` sizes without a finding."""
     m, term = len(a.coefficients), a.term
     named_so = finding is not None and not term.open and finding.name.physics != UNKNOWN
     physics = UNKNOWN if term.open or (finding is not None and not named_so) else term.physics
     if finding is not None and named_so:
         sizes = finding.parameters
+    elif stated is not None:
+        sizes = stated
     else:
         inner_sigma = np.zeros(len(a.inner))
         inner_sigma[[not s.discrete for s in term.inner]] = np.sqrt(np.maximum(np.diag(own)[m:], 0.0))
@@ -225,12 +290,12 @@ def _effect(a: Accepted, name: str, finding: Finding | None, drivers: Drivers, o
     )
 
 
-def _finding_of(a: Accepted, said: Diagnosis) -> Finding | None:
+def _finding_of(a: Accepted, findings: tuple[Finding, ...]) -> Finding | None:
     """The one that names it, else the unknown cause at its port that has taken it in."""
-    for finding in said.findings:
+    for finding in findings:
         if finding.name == named(a.term):
             return finding
-    return next((f for f in said.findings if f.name.physics == UNKNOWN and f.name.where == a.term.port.where), None)
+    return next((f for f in findings if f.name.physics == UNKNOWN and f.name.where == a.term.port.where), None)
 
 
 def _about(a: Accepted, drivers: Drivers) -> dict[str, float]:
@@ -317,7 +382,7 @@ def _as_listed(
         return model
     predictor, recorded = Predictor.of(model), Samples(conditions, fit.session.arm.n_joints)
     nothing = Perturbation.none(len(recorded), recorded.n_joints)
-    terms = listed(model.effects, drivers_under(predictor, recorded, nothing))
+    terms = listed(model.effects[: len(fit.accepted)], drivers_under(predictor, recorded, nothing))
     turn, effects, at = np.eye(len(parameters)), list(model.effects), len(fit.session.parameters)
     for i, (a, read) in enumerate(zip(fit.accepted, terms, strict=True)):
         was, now = a.term.basis(fit.drivers, a.inner), read.accepted.term.basis(fit.drivers, a.inner)
@@ -328,7 +393,9 @@ def _as_listed(
             raise DataError(f"no model: effect {effects[i].name} cannot be told from the conditions of the file alone")
         turn[at : at + m, at : at + m] = same
         turned = dict(zip(effects[i].coefficients, (same @ a.coefficients).tolist(), strict=True))
-        effects[i] = structs.replace(effects[i], coefficients=turned)
+        effects = [
+            structs.replace(e, coefficients=turned) if effects[i].name in (e.name, e.after) else e for e in effects
+        ]
         at += m + sum(not s.discrete for s in a.term.inner)
     turned_covariance = covariance_record(parameters, turn @ covariance @ turn.T)
     return structs.replace(model, effects=tuple(effects), covariance=turned_covariance)

@@ -4,38 +4,26 @@ One sigma of a prediction is that of the covariance of geometry, frames and effe
 readings, and of the conditions that a row lacks; the instrument's own noise is apart.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from acquisition.recording.columns import required
 from acquisition.recording.samples import Samples
 from calibrate.effects.ports import Perturbation, Port
-from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
-from calibrate.physics.acting import (
-    Acting,
-    Carried,
-    acting,
-    arm_in,
-    drivers_under,
-    flange_frames,
-    listed,
-    moved_columns,
-    range_of,
-)
-from calibrate.physics.conditions import Completed, completed, joined, needed_columns
+from calibrate.physics.acting import Acting, arm_in, flange_frames, moved_columns
+from calibrate.physics.applied import Applied, effects_at
+from calibrate.physics.flanges import Flanges
 from calibrate.predict import Columns, Predictor, less_cones, readings, residuals
 
 Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 At = Callable[[Predictor, Perturbation], Columns]
 
-FEWEST = 2  # rows of a session, to have a spread
+PLACED = ("x", "y", "z", "about_x", "about_y", "about_z", "tip_x", "tip_y", "tip_z")
 STEP = 1e-6  # m, rad or a factor: readings are linear over it, and 1e-10 of a derivative is lost to rounding
-BEYOND = 1e-9  # of the recorded range: rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,56 +41,16 @@ def predict_with_physics(model: ModelFile, samples: Samples, same_session: bool 
     DataError for a model without its rig, and for rows at which an effect of the model cannot be evaluated.
     """
     predictor = Predictor.of(model)
-    used = [e for e in model.effects if e.holds == "always" or same_session]
-    left_out = [f"left out, true of its own session only: {e.name}" for e in model.effects if e not in used]
-    nothing = Perturbation.none(len(samples), samples.n_joints)
-    if model.session is None or not used:
-        columns = _with_sigma(model, predictor, samples, (), (), nothing, samples)
-        return Predicted(columns, ("",) * len(samples), tuple(left_out))
-    recorded = recorded_samples(model, samples.n_joints)
-    carried = listed(used, drivers_under(predictor, recorded, Perturbation.none(len(recorded), samples.n_joints)))
-    needs = needed_columns((d for c in carried for d in c.drivers), recorded.names)
-    filled = completed(samples, recorded, needs, same_session)
-    found = acting(carried, predictor, recorded, joined(recorded, filled.samples))
-    by = nothing
-    for one in found:
-        by = by.plus(one.port, one.amount)
-    doubts = [*_of_missing(carried, found, predictor, recorded, filled), *_of_range(found)]
-    columns = _with_sigma(model, predictor, samples, found, doubts, by, filled.samples)
-    notes = [*left_out, *(_lacks(name, rows, carried) for name, rows in filled.missing.items())]
-    both = joined(recorded, filled.samples)
-    return Predicted(columns, _outside(carried, predictor, both, len(recorded), filled), tuple(notes))
+    applied = effects_at(model, predictor, samples, same_session)
+    return Predicted(_with_sigma(model, predictor, samples, applied), applied.outside, applied.notes)
 
 
-def recorded_samples(model: ModelFile, n_joints: int) -> Samples:
-    """The conditions of the model's session as a table. DataError where a column that every row has is missing."""
-    given = {} if model.session is None else model.session.conditions
-    table = {c: np.array(values, dtype=np.float64) for c, values in given.items()}
-    for name in (*required(n_joints), *model.needs):
-        values = table.get(name, np.zeros(0))
-        if (
-            len(values) < FEWEST
-            or not np.isfinite(values).any()
-            or (name not in model.needs and np.isnan(values).any())
-        ):
-            raise DataError(f"session.conditions.{name}: missing or empty; diagnose the recording again")
-    return Samples(table, n_joints)
-
-
-def _with_sigma(
-    model: ModelFile,
-    predictor: Predictor,
-    samples: Samples,
-    found: Sequence[Acting],
-    doubts: Sequence[tuple[Port, Floats]],
-    by: Perturbation,
-    filled: Samples,
-) -> Columns:
+def _with_sigma(model: ModelFile, predictor: Predictor, samples: Samples, applied: Applied) -> Columns:
     """t_s, predicted columns, `s_...`, `r_...`."""
-    arm, q = arm_in(predictor), samples.joints()
+    flange = _flange(predictor, applied, samples.joints())
 
     def reading(predictor: Predictor, by: Perturbation) -> Columns:
-        frames = flange_frames(arm, predictor, q, by)[:, -1] if found else predictor.flange(q)
+        frames = flange(predictor, by)
         read, moved = readings(predictor, frames, samples), moved_columns(by)
         return {c: v + moved[c] if c in moved else v for c, v in read.items()}
 
@@ -111,13 +59,37 @@ def _with_sigma(
         read = reading(predictor, by)
         return less_cones(predictor, read, samples)
 
+    by = applied.by
     read = reading(predictor, by)
-    variance = _of_values(model, predictor, found, by, at, tuple(read))
-    for port, amount in doubts:
-        for c, felt in _felt(at, predictor, by, port, amount).items():
-            variance[c] += felt**2
+    variance = _variance(model, predictor, applied, at, tuple(read))
     sigma = {f"s_{c}": np.where(np.isfinite(read[c]), np.sqrt(np.maximum(v, 0.0)), np.nan) for c, v in variance.items()}
     return {"t_s": samples.column("t_s")} | read | sigma | residuals(predictor, read, samples)
+
+
+def _flange(predictor: Predictor, applied: Applied, q_rad: Floats) -> Callable[[Predictor, Perturbation], Floats]:
+    """(row, 4, 4) of the flange at any values and perturbation; under that of the effects, only what changed anew."""
+    if not applied.found:
+        return lambda other, by: other.flange(q_rad)
+    arm = arm_in(predictor)
+    known = Flanges.of(arm, predictor.values_of(arm.parameters), q_rad, applied.by)
+
+    def at(other: Predictor, by: Perturbation) -> Floats:
+        if by is applied.by:
+            return known.at(other.values_of(arm.parameters))
+        return flange_frames(arm, other, q_rad, by)[:, -1]
+
+    return at
+
+
+def _variance(
+    model: ModelFile, predictor: Predictor, applied: Applied, at: At, columns: tuple[str, ...]
+) -> dict[str, Floats]:
+    """Column -> (row,) by the covariance of the model, and by conditions that are missing or beyond their range."""
+    out = _of_values(model, predictor, applied.found, applied.by, at, columns)
+    for port, amount in applied.doubts:
+        for c, felt in _felt(at, predictor, applied.by, port, amount).items():
+            out[c] = out[c] + felt**2
+    return out
 
 
 def _of_values(
@@ -168,55 +140,30 @@ def _felt(at: At, predictor: Predictor, by: Perturbation, port: Port, amount: Fl
     return {c: (up[c] - down[c]) / (2.0 * scale) for c in up}
 
 
-def _of_missing(
-    carried: Sequence[Carried], found: Sequence[Acting], predictor: Predictor, recorded: Samples, filled: Completed
-) -> list[tuple[Port, Floats]]:
-    """What each effect would add if a condition that a row lacks were one standard deviation off its middle."""
-    out: list[tuple[Port, Floats]] = []
-    for name, rows in filled.missing.items():
-        off = np.where(rows, float(np.nanstd(recorded.column(name))), 0.0)
-        columns = {**filled.samples.columns, name: filled.samples.column(name) + off}
-        other = acting(carried, predictor, recorded, joined(recorded, Samples(columns, recorded.n_joints)))
-        out += [(a.port, b.amount - a.amount) for a, b in zip(found, other, strict=True)]
-    return out
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """Where the arm holds flange and tip in its base, each row with one sigma; `notes` as in `Predicted`."""
+
+    T_base_flange: Floats  # (row, 4, 4)
+    flange_sigma: Floats  # (row, 6) m along x, y, z of the base, rad about them; NaN without a covariance
+    tip_m: Floats  # (row, 3)
+    tip_sigma_m: Floats  # (row, 3)
+    notes: tuple[str, ...]
 
 
-def _of_range(found: Sequence[Acting]) -> list[tuple[Port, Floats]]:
-    """Beyond its recorded range an unknown cause may add anything that it has added within."""
-    out: list[tuple[Port, Floats]] = []
-    for one in found:
-        if one.outside.any():
-            w, V = np.linalg.eigh(one.spread)
-            ways = (V * np.sqrt(np.maximum(w, 0.0))).T
-            out += [(one.port, one.outside[:, None] * way) for way in ways if np.any(way != 0.0)]
-    return out
+def placed(model: ModelFile, samples: Samples, same_session: bool = False) -> Placed:
+    """Flange and tip with the effects of the model, at joints and conditions of samples. DataError as above."""
+    predictor = Predictor.of(model)
+    applied = effects_at(model, predictor, samples, same_session)
+    flange = _flange(predictor, applied, samples.joints())
+    T = flange(predictor, applied.by)
 
+    def at(predictor: Predictor, by: Perturbation) -> Columns:
+        now = flange(predictor, by)
+        turn = Rotation.from_matrix(now[:, :3, :3] @ np.swapaxes(T[:, :3, :3], 1, 2)).as_rotvec()
+        table = np.concatenate([now[:, :3, 3], turn, predictor.tip_at(now)], axis=1)
+        return dict(zip(PLACED, table.T, strict=True))
 
-def _outside(
-    carried: Sequence[Carried], predictor: Predictor, both: Samples, first: int, filled: Completed
-) -> tuple[str, ...]:
-    """Names of drivers that are beyond their recorded range, one text a row."""
-    drivers = drivers_under(predictor, both, Perturbation.none(len(both), both.n_joints))
-    known: dict[str, tuple[float, float]] = {}
-    for c in carried:
-        known |= dict(c.record.range)
-    beyond: Mapping[str, Bools] = {
-        name: _beyond(values[first:], *known[name])
-        for name, values in ((name, range_of(drivers, name)) for name in known)
-        if values is not None
-    }
-    rows = range(len(filled.samples))
-    return tuple(",".join(name for name, where in beyond.items() if where[row]) for row in rows)
-
-
-def _beyond(values: Floats, low: float, high: float) -> Bools:
-    slack = BEYOND * max(high - low, 1e-12)
-    return np.asarray((values < low - slack) | (values > high + slack), dtype=np.bool_)
-
-
-def _lacks(column: str, rows: Bools, carried: Sequence[Carried]) -> str:
-    names = [c.record.name for c in carried if column in needed_columns(c.drivers, (column,))]
-    return (
-        f"{column} is missing in {int(rows.sum())} of {len(rows)} rows: taken as the mean of the session, sigma "
-        f"widened ({', '.join(names)})"
-    )
+    variance = _variance(model, predictor, applied, at, PLACED)
+    sigma = np.sqrt(np.maximum(np.stack([variance[c] for c in PLACED], axis=1), 0.0))
+    return Placed(T, sigma[:, :6], predictor.tip_at(T), sigma[:, 6:], applied.notes)

@@ -63,6 +63,7 @@ class Effect(Record, frozen=True):
     curve: EffectCurve | None = None
     component: Component | None = None  # of the port, of an unknown cause that is a curve
     waves: Waves | None = None
+    after: Label = ""  # name of the effect of the session that left this behind, from the end of that session on
 
     def __post_init__(self) -> None:
         for driver, (low, high) in self.range.items():
@@ -98,3 +99,8 @@ def check_physics(schema: int, effects: Sequence[Effect], session: SessionRecord
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise ValueError(f"effects: two are named {shown(twice)}; each name stands once")
+    for effect in effects:
+        if effect.after and (effect.after not in names or effect.holds != "always"):
+            raise ValueError(
+                f"effect {shown(effect.name)} is left behind by {shown(effect.after)}, which is not listed"
+            )

@@ -46,7 +46,8 @@ def weighting_of(recording: Recording, model: ModelFile) -> Weighting:
     rows = len(np.unique(np.concatenate([m.sample_rows.ravel() for m in weighting.measured])))
     if rows != model.poses:
         raise _strangers(recording, f"it is of {model.poses} samples, here are {rows}")
-    unlike = {p.name for p in weighting.parameters} ^ set(model.chain)
+    names_here = {p.name for p in weighting.parameters}
+    unlike = names_here ^ set(model.chain) if model.session is None else set(model.chain) - names_here
     if unlike:
         raise _strangers(recording, f"one of them alone has the parameters {', '.join(sorted(unlike)[:4])}")
     return weighting
@@ -56,7 +57,7 @@ def values_of(weighting: Weighting, model: ModelFile) -> Floats:
     """(param,) the model's values."""
     out = start_values(weighting.parameters)
     for name, column in index_of(weighting.parameters).items():
-        out[column] = model.chain[name]
+        out[column] = model.chain.get(name, out[column])  # a diagnosis holds what it names as effects: encoder discs
     return out
 
 

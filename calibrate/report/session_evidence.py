@@ -13,6 +13,7 @@ from calibrate.fit import solve
 from calibrate.joint_problem import JointProblem
 from calibrate.model_file import ModelFile
 from calibrate.parameters import Parameter
+from calibrate.physics.taken_out import without_effects
 from calibrate.problem import Problem
 from calibrate.report.as_modelled import noise_of, values_of, weighting_of
 from calibrate.report.quantities import angle, length
@@ -97,6 +98,8 @@ class SessionEvidence:
     @cached_property
     def spare(self) -> float:
         """Readings that are left over to check the fit; nan where the model has no covariance."""
+        if self.model.session is not None:  # its covariance is of the noise that the diagnosis found, not of `problem`
+            return float(sum(r.after.size for r in self.readings) - self.model.rank)
         found, names = self.model.covariance, [p.name for p in self.parameters]
         if found is None or not set(found.names) <= set(names):
             return float("nan")
@@ -115,6 +118,7 @@ def session_evidence(recording: Recording, model: ModelFile) -> SessionEvidence:
     """DataError where the model was not made from this recording."""
     weighting = weighting_of(recording, model)
     theta = values_of(weighting, model)
+    weighting = without_effects(weighting, theta, recording.samples, model)
     problem = weighting.problem(theta, noise_of(weighting, model))
     before = _places_only(weighting, problem, model, theta)
     readings = tuple(r for i in range(len(weighting.measured)) for r in _readings(weighting, problem, i, before, theta))

@@ -98,7 +98,7 @@ def _doubts(evidence: SessionEvidence) -> Iterator[Doubt]:
             "Look for the missing physics where the figures along the joints, below, show it; `calibeam diagnose` says "
             "what it is.",
         )
-    yield from _doubts_of_proofs(proofs(model))
+    yield from _doubts_of_proofs(proofs(model), by_diagnosis=model.session is not None)
     share = evidence.left_out / max(len(recording.samples), 1)
     if share > MANY_LEFT_OUT:
         yield (
@@ -152,8 +152,10 @@ def _noisy_sources(noise: Fields) -> Iterator[Doubt]:
             yield f"The noise of {name} is {times} times what was believed.", f"Check the instrument: {name}."
 
 
-def _doubts_of_proofs(found: tuple[UnseenRows, ...]) -> Iterator[Doubt]:
-    if not found:
+def _doubts_of_proofs(found: tuple[UnseenRows, ...], *, by_diagnosis: bool) -> Iterator[Doubt]:
+    if by_diagnosis:
+        yield "The model is of a diagnosis: its proof on unseen rows is in diagnosis.json.", ""
+    elif not found:
         yield (
             "There is no proof on unseen rows: too few rows, or it was not asked for.",
             "Measure at least 15 poses, better 50, so that some can be kept for the proof.",

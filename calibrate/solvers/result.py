@@ -32,6 +32,7 @@ class Stop(Enum):
     RADIUS = "trust radius shrank to e2 of the parameters"
     STEP = "step is no longer than e2 of the parameters"
     STEPS = "all allowed steps were made"
+    LIKELIHOOD = "a further round of weights changes -2 log L by less than 0.1"
     ROUNDS = "all allowed rounds of weights were made"
     NOT_FINITE = "residual or derivative is not finite"
 

@@ -23,6 +23,11 @@ def verdict_words(file: DiagnosisFile) -> str:
     if any(not blunder.rows for blunder in file.blunders):
         return "The file is wrong as a whole: nothing can be said about the arm."
     match file.verdict:
+        case "mismatch" if file.known is not None:
+            n = len(file.findings)
+            return f"Recording and model differ: {n} change{'s' if n > 1 else ''} found{_how_far(file)}."
+        case "consistent" if file.known is not None:
+            return f"Nothing new: recording and model agree to within the noise{_tested(file)}."
         case "mismatch":
             n = len(file.findings)
             return f"Recording and model part: {n} cause{'s' if n > 1 else ''} found{_how_far(file)}."

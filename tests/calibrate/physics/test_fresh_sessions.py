@@ -32,14 +32,17 @@ def test_a_session_of_two_detectors_is_predicted_to_its_noise(tmp_path):
     assert inside > 0.9
 
 
+# Rows in all: half are diagnosed and half predicted. A wire gives one number a row: 540 of them need 1080 rows, where a
+# tracker needs 360. With 33 to 50 values to be fitted, 180 readings cost a factor of 1.06 even if the diagnosis finds
+# all there is, 540 cost 1.03; two detectors with their fixture have some 60 values.
+ROWS = {"tracker": 360, "dual-psd": 480, "wire": 1080, "cones": 360}
+
+
 @pytest.mark.endure
-@pytest.mark.parametrize(("family", "median", "most"), [("tracker", 1.06, 1.25), ("dual-psd", 1.08, 1.25)])
-def test_unseen_rows_are_predicted_to_the_noise_in_most_sessions(tmp_path, family, median, most):
-    """Half of 360 samples holds some 60 values against 540 or 720 readings: 1.04 is what the least that is to be
-    fitted costs. Wider than the aim of 1.04 and 1.15 by what a diagnosis of so few rows misses.
-    """
-    each = [ratio_and_share(tmp_path / str(k), family, FIRST + k, 360) for k in range(SESSIONS)]
+@pytest.mark.parametrize("family", ROWS)
+def test_unseen_rows_are_predicted_to_the_noise_in_most_sessions(tmp_path, family):
+    each = [ratio_and_share(tmp_path / str(k), family, FIRST + k, ROWS[family]) for k in range(SESSIONS)]
     ratios, shares = np.array(each).T
-    assert np.median(ratios) <= median
-    assert np.quantile(ratios, 0.8) <= most
-    assert 0.93 <= np.median(shares) <= 0.97
+    assert np.median(ratios) <= 1.04
+    assert np.quantile(ratios, 0.9) <= 1.15
+    assert 0.93 <= np.mean(shares) <= 0.97

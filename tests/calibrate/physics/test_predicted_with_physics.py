@@ -24,11 +24,20 @@ def test_what_was_found_is_in_the_model_with_its_kind(slipped):
     _, _, model, _, case, _ = slipped
     (hidden,) = case.hidden
     assert model["schema"] == 2
-    (effect,) = model["effects"]
+    effect, left = model["effects"]
     assert (effect["physics"], effect["where"]) == (hidden.defect.PHYSICS, hidden.defect.port)
     assert effect["holds"] == "session"
     assert set(effect["coefficients"]) <= set(model["covariance"]["names"])
     assert all(p["unit"] for p in effect["parameters"].values())
+    assert (left["after"], left["holds"], left["depends_on"]) == (effect["name"], "always", "")
+
+
+def test_the_file_says_how_the_fit_was_made(slipped):
+    fit = slipped[2]["fit"]
+    assert (fit["method"], fit["loss"]) == ("levenberg-marquardt", "student-t")
+    assert fit["iterations"] > 0
+    assert fit["ended_by"] in ("LIKELIHOOD", "ROUNDS")
+    assert np.isfinite(fit["minus_2_log_likelihood"])
 
 
 def test_unseen_rows_are_predicted_to_the_noise(slipped):
@@ -46,7 +55,10 @@ def test_an_effect_of_a_session_is_left_out_and_named_elsewhere(slipped, capsys)
     assert f"left out, true of its own session only: {model['effects'][0]['name']}" in capsys.readouterr().out
     without, _ = judged(model, table_of(out), "tracker")
     with_it, _ = judged(model, table, "tracker")
-    assert np.sqrt(np.mean(without**2)) > 1.5 * np.sqrt(np.mean(with_it**2))
+    late = numbers(table["t_s"]) >= model["effects"][0]["inner"]["time_s"]
+    assert np.sqrt(np.mean(without[~late] ** 2)) > 1.5 * np.sqrt(np.mean(with_it[~late] ** 2))
+    # What the slip left behind holds on.
+    assert np.allclose(without[late], with_it[late], atol=1e-9)
 
 
 def test_what_the_model_was_given_is_predicted_as_the_fit_has_it(slipped):

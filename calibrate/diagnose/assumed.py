@@ -1,0 +1,72 @@
+"""What a model says of a later recording: its values and their covariance, and effects that it brings along."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.effects.drivers import Drivers
+from calibrate.effects.term import Size, Term
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+# Of the largest variance, in plausible sizes: below, a file of double precision cannot tell it from rounding. It is
+# then taken as larger than it is.
+ROUNDING = 1e-14
+
+
+@dataclass(frozen=True, eq=False)
+class Assumed:
+    """A normal prior over some values of a fit; other parts of the covariance of the model are averaged out."""
+
+    at: Ints  # (k,) index of each value in the fit
+    mean: Floats  # (k,)
+    root: Floats  # (k, k) root' root is the inverse covariance
+
+    @classmethod
+    def of(cls, at: Ints, mean: Floats, covariance: Floats, plausible: Floats) -> "Assumed":
+        """`covariance` (k, k), `plausible` (k,) sizes by which it is scaled."""
+        w, V = np.linalg.eigh(covariance / np.outer(plausible, plausible))
+        w = np.maximum(w, ROUNDING * max(float(w.max(initial=0.0)), 1e-300))
+        return cls(at, mean, (V / np.sqrt(w)).T / plausible)
+
+    def residual(self, values: Floats) -> Floats:
+        """(k,)"""
+        return np.asarray(self.root @ (values[self.at] - self.mean))
+
+    def jacobian(self, count: int) -> Floats:
+        """(k, count)"""
+        out = np.zeros((len(self.at), count))
+        out[:, self.at] = self.root
+        return out
+
+    def holds(self, covariance: Floats) -> float:
+        """Values that it, and not the data, has fixed, of a fit with this covariance (value, value)."""
+        own = self.root @ np.nan_to_num(covariance[np.ix_(self.at, self.at)]) @ self.root.T
+        return float(np.clip(np.trace(own), 0.0, len(self.at)))
+
+
+@dataclass(frozen=True)
+class Stated(Term):
+    """An effect as a model states it, at the rows of one recording: its values keep the meaning of the model's file."""
+
+    columns: Floats = field(kw_only=True)  # (row, width, value)
+    added: Floats = field(kw_only=True)  # (row, width) at the values `about`
+    about: Floats = field(kw_only=True)  # (value,)
+
+    def basis(self, drivers: Drivers, inner: Floats) -> Floats:
+        return self.columns
+
+    def amount(self, drivers: Drivers, coefficients: Floats, inner: Floats) -> Floats:
+        return self.added + self.columns @ (coefficients - self.about)
+
+    def sizes(self, coefficients: Floats, covariance: Floats, inner: Floats, inner_sigma: Floats) -> Mapping[str, Size]:
+        return {}
+
+    def plausible(self, coefficients: Floats, inner: Floats, noise_rad: float) -> bool:
+        return True
+
+    def says(self, sizes: Mapping[str, Size]) -> str:
+        return ""

@@ -1,0 +1,135 @@
+"""Beside a known model: nothing new on its own recording, changes on a later one, and a refit of its structure.
+
+The later recording is the half of a concealed session that the model has not seen, with what a change does to it.
+"""
+
+import csv
+import json
+import shutil
+
+import pytest
+
+from calibeam.cli import run
+
+from .halves import diagnosed_and_predicted, written_halves
+
+JOINT, MOVED_RAD = 5, 2e-4
+
+
+@pytest.fixture(scope="module")
+def soft(tmp_path_factory):
+    """A tracker's session of an arm with a soft joint: folder, model, hidden defect."""
+    folder = tmp_path_factory.mktemp("soft")
+    recording, unseen, case, _ = written_halves(folder, **wanted(4.0))
+    model, _ = diagnosed_and_predicted(folder, recording, unseen)
+    return folder, model, case.hidden[0].defect
+
+
+def wanted(enr):
+    return {"family": "tracker", "seed": 11, "defects": ("soft-joint",), "enr": enr, "samples": 240}
+
+
+def later(folder, name, samples, joint_off_rad=0.0):
+    """A recording of the rig in `folder` with these samples; one joint reads otherwise by so much."""
+    out = folder / name
+    out.mkdir()
+    shutil.copy(folder / "recording" / "rig.toml", out)
+    header, *rows = list(csv.reader(samples.read_text().splitlines()))
+    column = header.index(f"q{JOINT}_rad")
+    for row in rows:
+        row[column] = repr(float(row[column]) + joint_off_rad)
+    with (out / "samples.csv").open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([header, *rows])
+    return out
+
+
+def asked(folder, recording):
+    """diagnosis.json of a recording beside the model of the folder."""
+    out = folder / f"{recording.name}.json"
+    assert run(["diagnose", str(recording), "--model", str(folder / "model.json"), "--out", str(out)]) == 0
+    return json.loads(out.read_text())
+
+
+def test_its_own_recording_holds_nothing_new(soft, capsys):
+    folder, model, _ = soft
+    found = asked(folder, folder / "recording")
+    assert "Nothing new" in capsys.readouterr().out
+    assert (found["verdict"], found["findings"], found["changed"]) == ("consistent", [], [])
+    assert found["known"] == {"same_recording": True, "effects": [e["name"] for e in model["effects"]], "left_out": []}
+
+
+def test_a_later_recording_of_the_same_machine_holds_nothing_new(soft):
+    folder, _, _ = soft
+    found = asked(folder, later(folder, "unchanged", folder / "unseen.csv"))
+    assert (found["verdict"], found["changed"]) == ("consistent", [])
+    assert found["known"]["same_recording"] is False
+
+
+def test_a_joint_zero_that_has_moved_is_named_with_its_size(soft, capsys):
+    """A joint that reads more than before has its zero moved the other way."""
+    folder, _, _ = soft
+    found = asked(folder, later(folder, "moved", folder / "unseen.csv", MOVED_RAD))
+    (finding,) = found["findings"]
+    assert (finding["where"], finding["physics"]) == (f"joint{JOINT}.angle", "joint-zero-moved")
+    (changed,) = found["changed"]
+    assert changed["parameter"] == f"joint{JOINT}.zero"
+    assert changed["by"] == pytest.approx(-MOVED_RAD, abs=4.0 * changed["sigma"])
+    assert changed["sigma"] < 0.2 * MOVED_RAD
+    assert f"changed: joint{JOINT}.zero by" in capsys.readouterr().out
+
+
+def test_a_joint_that_has_become_softer_is_named_with_its_size(soft, tmp_path):
+    folder, model, before = soft
+    _, unseen, case, _ = written_halves(tmp_path, **wanted(6.0))
+    after = case.hidden[0].defect
+    found = asked(folder, later(folder, "softer", unseen))
+    (changed,) = found["changed"]
+    (effect,) = model["effects"]
+    assert changed["parameter"] == f"{effect['name']}.compliance_rad_nm"
+    truth = after.compliance_rad_nm - before.compliance_rad_nm
+    assert changed["by"] == pytest.approx(truth, abs=4.0 * changed["sigma"])
+    assert changed["known"] == effect["parameters"]["compliance_rad_nm"]["value"]
+
+
+def test_a_known_structure_is_refitted_to_another_recording(soft, capsys):
+    folder, model, defect = soft
+    recording, out = later(folder, "refit", folder / "unseen.csv"), folder / "refit.json"
+    assert run(["identify", str(recording), "--model", str(folder / "model.json"), "--out", str(out)]) == 0
+    assert "1 effects refitted" in capsys.readouterr().out
+    refitted = json.loads(out.read_text())
+    assert refitted["schema"] == 2
+    assert refitted["readings_sha256"] != model["readings_sha256"]
+    (effect,) = refitted["effects"]
+    size = effect["parameters"]["compliance_rad_nm"]
+    assert effect["name"] == model["effects"][0]["name"]
+    assert size["value"] == pytest.approx(defect.compliance_rad_nm, abs=4.0 * size["sigma"])
+    predicted = folder / "refit.csv"
+    assert run(["predict", str(out), str(recording / "samples.csv"), "--out", str(predicted)]) == 0
+
+
+def test_a_plan_beside_a_known_structure_is_refused(soft, tmp_path, capsys):
+    folder, _, _ = soft
+    (tmp_path / "fit.toml").write_text("schema = 1\n")
+    arguments = ["identify", str(folder / "recording"), "--model", str(folder / "model.json")]
+    assert run([*arguments, "--plan", str(tmp_path / "fit.toml"), "--out", str(tmp_path / "m.json")]) == 1
+    assert "without --plan" in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_model_without_covariance_cannot_tell_what_has_changed(soft, capsys):
+    folder, model, _ = soft
+    bare = folder / "bare.json"
+    bare.write_text(json.dumps(model | {"covariance": None}))
+    recording = later(folder, "asked-of-bare", folder / "unseen.csv")
+    assert run(["diagnose", str(recording), "--model", str(bare), "--out", str(folder / "none.json")]) == 1
+    assert "no covariance" in " ".join(capsys.readouterr().err.split())
+
+
+def test_changes_are_not_a_model(soft, capsys):
+    """Beside a model of another recording only changes are fitted; the remedy is named."""
+    folder, _, _ = soft
+    recording = later(folder, "asked-for-model", folder / "unseen.csv")
+    known, out = folder / "model.json", folder / "no-model.json"
+    arguments = ["diagnose", str(recording), "--model", str(known), "--out", str(folder / "no-diagnosis.json")]
+    assert run([*arguments, "--model-out", str(out)]) == 1
+    assert "calibeam identify --model" in " ".join(capsys.readouterr().err.split())
+    assert not out.exists()
