@@ -6,7 +6,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from acquisition.recording.columns import POSITION, SPOTS
+from acquisition.recording.columns import SPOTS
 from acquisition.recording.fingerprint import readings_sha256
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import rig_sha256
@@ -17,8 +17,12 @@ from calibrate.identification.identify import identify
 from calibrate.identification.record import record_of
 from calibrate.identification.result import Identification
 from calibrate.model_file import ModelFile, RigIdentity, write_model
+from calibrate.sensors.catalogue import SENSORS
+from calibrate.sensors.kind import Trait
 
-OTHERS = (POSITION[0], "wire_m", "seat", "bar")  # columns of the instruments beside the dual PSD
+OTHERS = tuple(
+    k.columns[0] for k in SENSORS if Trait.TARGET in k.traits
+)  # columns of the instruments beside the dual PSD
 
 
 def asks_for_zeros(rig: Rig, samples: Samples) -> bool:

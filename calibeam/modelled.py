@@ -16,9 +16,10 @@ from calibrate.fit import Status
 from calibrate.identification.record import record_of
 from calibrate.model_file import ModelFile, RigIdentity
 from calibrate.report.evidence import evidence
-from calibrate.report.session_evidence import SAID, session_evidence
+from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_verdict import session_verdict
 from calibrate.report.verdict import Verdict, verdict
+from calibrate.sensors import spots
 
 Floats = NDArray[np.float64]
 
@@ -68,5 +69,5 @@ def _zeros(recording: Recording) -> Modelled:
     refuse_nothing(found.zeros.status, found.zeros.estimates)
     told = verdict(evidence(found.used, found.zeros, "reported"))
     before, after = (np.linalg.norm(r, axis=1) for r in (found.zeros.residual_before_m, found.zeros.residual_after_m))
-    errors = ReadingErrors(SAID["dual-psd"], "m", np.asarray(before), np.asarray(after))
+    errors = ReadingErrors(spots.KIND.title, "m", np.asarray(before), np.asarray(after))
     return Modelled(identified_model(found, recording), told, (errors,))

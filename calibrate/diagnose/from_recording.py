@@ -21,13 +21,14 @@ from calibrate.diagnose.wild_rows import unexplained_rows
 from calibrate.effects.catalogue import missing_of
 from calibrate.errors import DataError
 from calibrate.identification.session import columns_of
+from calibrate.sensors import seat
 from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 FEWEST = 20  # samples: below, no term can be told from noise, whatever it is
-STANDING = ("device.", "tool.", "seat")  # corrections about frames that were found anew: not those of another fit
+STANDING = ("device.", "tool.", seat.POINTS)  # corrections about frames that were found anew: not those of another fit
 
 
 @dataclass(frozen=True, eq=False)
