@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from calibrate.sensors import bar, distance, full_pose, point_line, position, seat, spots, wire
+from calibrate.sensors import bar, camera, distance, full_pose, point_line, position, seat, spots, wire
 from calibrate.sensors.kind import NoiseSource, SensorKind, Trait
 
 SENSORS: tuple[SensorKind, ...] = (
@@ -14,6 +14,7 @@ SENSORS: tuple[SensorKind, ...] = (
     wire.KIND,
     seat.KIND,
     bar.KIND,
+    camera.KIND,
 )
 BY_NAME = {kind.name: kind for kind in SENSORS}
 SOURCES: dict[str, NoiseSource] = {source.name: source for kind in SENSORS for source in kind.noise}
