@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 from acquisition.recording.rig_schema import Rig
 from calibrate.believed_arm import BelievedArm, turned
 from calibrate.believed_fixture import BelievedFixture, FixtureView, Light
-from calibrate.dual_psd_rig import dual_psd_chain
+from calibrate.dual_psd_rig import dual_psd_chain, dual_psd_of
 from calibrate.errors import DataError
 from calibrate.parameters import values_by_name
-from calibrate.sensors.dual_psd import DualPsd
 
 Floats = NDArray[np.float64]
 
@@ -32,11 +31,8 @@ class BelievedRig:
     def __init__(self, rig: Rig, corrections: Mapping[str, float] | None = None) -> None:
         """DataError for a rig without laser or fixture, KeyError for a correction that no parameter has."""
         ids = np.array(sorted(rig.placements), dtype=np.int64)
-        chain = dual_psd_chain(rig, ids, np.ones_like(ids))
+        sensor, chain = dual_psd_of(rig, ids, np.ones_like(ids)), dual_psd_chain(rig, ids, np.ones_like(ids))
         phi = values_by_name(chain.parameters, corrections or {})[len(chain.model.parameters) :]
-        sensor = chain.sensor
-        if not isinstance(sensor, DualPsd):  # the chain above is built with one; this tells the type checker
-            raise DataError(f"rig {rig.name}: no dual PSD")
         pair, half_size_m = sensor.T_psd1_psd2(phi), sensor.fixture.half_size_m
         self.arm = BelievedArm(rig, corrections)
         self.fixture = BelievedFixture(pair, half_size_m)

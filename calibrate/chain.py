@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from calibrate.arms.model import KinematicModel
 from calibrate.parameters import Parameter
-from calibrate.sensors.model import Sensor
+from calibrate.sensors.model import About, Sensor
 
 Floats = NDArray[np.float64]
 
@@ -49,6 +49,21 @@ class Chain:
     def select(self, rows: NDArray[np.intp]) -> "Chain":
         """The same chain at some of the poses."""
         return replace(self, sensor=self.sensor.select(rows))
+
+    def placed(self, about: About) -> "Chain":
+        return replace(self, sensor=self.sensor.placed(about))
+
+    def facing(self, expected: Floats) -> "Chain":
+        return replace(self, sensor=self.sensor.facing(expected))
+
+    def at_flanges(self, own: Floats, flanges: tuple[Floats, ...]) -> Floats:
+        return self.sensor.expect(own, flanges[0])
+
+    def by_flanges(self, own: Floats, flanges: tuple[Floats, ...]) -> tuple[Floats, ...]:
+        return (self.sensor.by_twist(own, flanges[0]),)
+
+    def by_own(self, own: Floats, flanges: tuple[Floats, ...]) -> Floats:
+        return self.sensor.by_parameter(own, flanges[0])
 
     def _split(self, theta: Floats) -> tuple[Floats, Floats]:
         n = len(self.model.parameters)

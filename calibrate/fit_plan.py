@@ -17,6 +17,7 @@ from acquisition.recording.toml_file import parse_toml, read_text
 from calibrate.errors import DataError
 from calibrate.fit import DogLegRules, Loss, Method
 from calibrate.redundant import Redundant
+from calibrate.sensors.catalogue import BY_NAME, SENSORS
 from calibrate.uncertainty.splits import SplitKind
 
 Rounds = Annotated[int, Meta(ge=0, le=100_000)]  # some seconds each
@@ -43,19 +44,6 @@ class RedundantName(enum.Enum):
 
     REMOVED = "removed"
     PRIORS = "priors"
-
-
-class InstrumentName(enum.Enum):
-    """Instruments by the columns of the samples; `distance` and `point` are other ways to use positions and spots."""
-
-    DUAL_PSD = "dual-psd"
-    POINT = "point"  # centred spots only, as lines through one point of each placement
-    POSITION = "position"
-    FULL_POSE = "full-pose"
-    DISTANCE = "distance"  # positions as distances between consecutive poses, without the device's frame
-    WIRE = "wire"
-    SEAT = "seat"
-    BAR = "bar"
 
 
 Limit = Annotated[float, Meta(ge=0.0, le=1e12)]  # whitened and scaled, so that 1 is a noise or a plausible size
@@ -85,7 +73,7 @@ class FitPlan(Struct, frozen=True, forbid_unknown_fields=True):
 
     schema: Literal[1]
     model: ArmModel | None = None  # the rig's arm is written anew in this model
-    instruments: Few[InstrumentName] = ()  # none: all that the samples allow
+    instruments: Few[Name] = ()  # sensors by name, of calibrate/sensors/catalogue.py; none: all that the samples allow
     free: Few[Name] = ()  # without an opinion of the drawing
     priors: Mapping[Name, Positive] = {}  # pattern -> one sigma about the drawing, m or rad; a later one wins
     hold: Few[Name] = ()  # as drawn; wins over `free` and `priors`
@@ -146,14 +134,14 @@ def parse_plan(text: str, name: str) -> FitPlan:
 
 
 def _contradictions(plan: FitPlan) -> Iterator[tuple[KeyPath, str]]:
-    pairs = (
-        (InstrumentName.POSITION, InstrumentName.DISTANCE),
-        (InstrumentName.FULL_POSE, InstrumentName.DISTANCE),
-        (InstrumentName.DUAL_PSD, InstrumentName.POINT),
-    )
-    for one, other in pairs:
-        if {one, other} <= set(plan.instruments):
-            yield ("instruments",), f"'{one.value}' and '{other.value}' are the same readings; choose one of them"
+    asked = plan.instruments
+    for name in asked:
+        if name not in BY_NAME:
+            yield ("instruments",), f"instruments = '{name}' in the file: known are {', '.join(BY_NAME)}"
+    for kind in SENSORS:
+        for other in kind.instead_of:
+            if {kind.name, other} <= set(asked):
+                yield ("instruments",), f"'{other}' and '{kind.name}' are the same readings; choose one of them"
     if plan.dog_leg is not None and plan.solver is not SolverName.DOGLEG:
         yield ("dog-leg",), f"[dog-leg] has no meaning for solver = '{plan.solver.value}'; write solver = 'dog-leg'"
     if plan.share == 0.0 and plan.splits != tuple(SplitKind):

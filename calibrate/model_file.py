@@ -30,6 +30,7 @@ from calibrate.errors import DataError
 from calibrate.older_models import with_present_names
 from calibrate.parameters import Parameter
 from calibrate.physics.records import Effect, SessionRecord, check_physics
+from calibrate.sensors.catalogue import FRAMES
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -198,7 +199,8 @@ class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def __post_init__(self) -> None:
         check_physics(self.schema, self.effects, self.session)
         for name, numbers in self.about.items():
-            sizes = (6,) if name == "device" else (3, 6) if name == "tool" else (3,)
+            own = next((f.numbers for f in FRAMES if f.prefix == name.rstrip("0123456789")), 3)
+            sizes = (6,) if name == "device" else (3, 6) if name == "tool" else (own,)
             if len(numbers) not in sizes:
                 raise ValueError(f"about.{shown(name)} holds {len(numbers)} numbers instead of {max(sizes)}")
 

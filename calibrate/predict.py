@@ -1,6 +1,6 @@
 """What an identified model says the instruments should read: one prediction a sample, under the columns' own names."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.columns import ORIENTATION, POSITION, SPOTS
 from acquisition.recording.rig import parse_rig
 from acquisition.recording.rig_schema import ArmModel, Rig
 from acquisition.recording.samples import Samples
@@ -20,14 +19,15 @@ from calibrate.dual_psd_rig import dual_psd_of
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
 from calibrate.parameters import Parameter, values_by_name
-from calibrate.rigid import transform
-from calibrate.sensors.device import Device
+from calibrate.sensors.catalogue import SENSORS
+from calibrate.sensors.kind import Columns
+from calibrate.sensors.position import device_of
+from calibrate.sensors.seat import TIP as TIP
+from calibrate.sensors.seat import cone_m
 from calibrate.sensors.target import Target
 
 Floats = NDArray[np.float64]
-Columns = dict[str, Floats]
 
-TIP = ("tip_x_m", "tip_y_m", "tip_z_m")
 NOWHERE = (0.0,) * 6
 
 
@@ -64,11 +64,7 @@ class Predictor:
     @cached_property
     def T_base_device(self) -> Floats:
         """(4, 4) the measuring device. DataError where neither model nor rig knows a place."""
-        place = self.about.get("device", _drawn_device(self.rig))
-        if place is None:
-            raise DataError(f"rig {self.rig.name}: no [device] and none in the model; fit positions or a wire first")
-        device = Device(transform(place[:3], place[3:]))
-        return device.T_base_device_at(self.values_of(device.parameters))
+        return device_of(self)
 
     def turn_of_target(self) -> Floats:
         """(3, 3) orientation of a 6-D target in the flange."""
@@ -88,9 +84,7 @@ class Predictor:
 
     def seat_m(self, seat: int) -> Floats | None:
         """(3,) of a cone in the base; None for one that the model does not know."""
-        start = self.about.get(f"seat{seat}")
-        shift = [self.values.get(f"seat{seat}.{axis}", 0.0) for axis in "xyz"]
-        return None if start is None else np.array(start) + shift
+        return cone_m(self, seat)
 
     @cached_property
     def _arm(self) -> KinematicModel:
@@ -121,112 +115,33 @@ def readings(
     predictor: Predictor, T_base_flange: Floats, samples: Samples, instruments: Collection[str] | None = None
 ) -> Columns:
     """What each instrument should read at flange poses (row, 4, 4) of the samples; those named, or as in `predict`."""
-    asked = [i for i in INSTRUMENTS if any(c in samples for c in i.asks)] if instruments is None else []
+    asked = [k for k in SENSORS if any(c in samples for c in k.asks)] if instruments is None else []
     if not asked:
         named = set(predictor.instruments if instruments is None else instruments)
-        asked = [i for i in INSTRUMENTS if set(i.names) & named]
+        asked = [kind for kind in SENSORS if kind.name in named]
     out: Columns = {}
-    for instrument in asked:
-        out |= instrument.predict(predictor, T_base_flange, samples)
+    for kind in asked:
+        if kind.predict is not None:
+            out |= kind.predict(predictor, T_base_flange, samples)
     return out
 
 
 def residuals(predictor: Predictor, read: Columns, samples: Samples) -> Columns:
     """`r_...`: predicted less observed; of a tip in a cone that the model knows, less the cone."""
     out = {f"r_{name}": read[name] - samples.column(name) for name in read if name in samples}
-    if TIP[0] in read and (at := _cones_m(predictor, samples)) is not None:
-        out |= {f"r_{name}": read[name] - cone for name, cone in zip(TIP, at.T, strict=True)}
-    return out
+    return out | {f"r_{name}": read[name] - at for name, at in _fixed(predictor, read, samples).items()}
 
 
 def less_cones(predictor: Predictor, read: Columns, samples: Samples) -> Columns:
     """The same readings, tips in cones that the model knows told from their cone."""
-    at = _cones_m(predictor, samples) if TIP[0] in read else None
-    if at is None:
-        return read
-    return {**read, **{name: read[name] - np.nan_to_num(cone) for name, cone in zip(TIP, at.T, strict=True)}}
+    fixed = _fixed(predictor, read, samples)
+    return {**read, **{name: read[name] - np.nan_to_num(at) for name, at in fixed.items()}}
 
 
-def _cones_m(predictor: Predictor, samples: Samples) -> Floats | None:
-    """(row, 3) in the base, NaN without one that the model knows; None where it knows none."""
-    if "seat" not in samples or not any(name.startswith("seat") for name in predictor.about):
-        return None
-    seat = samples.integers("seat", 0)
-    out = np.full((len(seat), 3), np.nan)
-    for k in set(seat.tolist()):
-        place = predictor.seat_m(k)
-        if place is not None:
-            out[seat == k] = place
+def _fixed(predictor: Predictor, read: Columns, samples: Samples) -> Columns:
+    """What was observed of readings that no column holds: where the cones are."""
+    out: Columns = {}
+    for kind in SENSORS:
+        if kind.reads and kind.reads[0] in read:
+            out |= kind.observed(predictor, samples) or {}
     return out
-
-
-@dataclass(frozen=True)
-class Instrument:
-    """How one instrument is predicted: fits by these names, samples that have one of these columns."""
-
-    names: tuple[str, ...]
-    asks: tuple[str, ...]
-    predict: Callable[[Predictor, Floats, Samples], Columns]  # at flange poses (row, 4, 4)
-
-
-def _position(predictor: Predictor, flange: Floats, samples: Samples) -> Columns:
-    T = predictor.T_base_device
-    return _columns(POSITION, (predictor.tip_at(flange) - T[:3, 3]) @ T[:3, :3])
-
-
-def _rotation(predictor: Predictor, flange: Floats, samples: Samples) -> Columns:
-    turns = predictor.T_base_device[:3, :3].T @ flange[:, :3, :3]
-    vectors = Rotation.from_matrix(turns @ predictor.turn_of_target()).as_rotvec()
-    if all(name in samples for name in ORIENTATION):
-        vectors = _nearer_form(vectors, np.stack([samples.column(name) for name in ORIENTATION], axis=1))
-    return _columns(ORIENTATION, vectors)
-
-
-def _wire(predictor: Predictor, flange: Floats, samples: Samples) -> Columns:
-    span = predictor.tip_at(flange) - predictor.T_base_device[:3, 3]
-    return {"wire_m": np.linalg.norm(span, axis=1)}
-
-
-def _spots(predictor: Predictor, flange: Floats, samples: Samples) -> Columns:
-    placement, first_psd = samples.integers("placement", 0), samples.integers("first_psd", 0)
-    known = np.flatnonzero((placement > 0) & (first_psd > 0))
-    spots = np.full((len(samples), 4), np.nan)
-    spots[known] = predictor.spots_at(flange[known], placement[known], first_psd[known])
-    return _columns(SPOTS, spots)
-
-
-def _tip(predictor: Predictor, flange: Floats, samples: Samples) -> Columns:
-    tip = predictor.tip_at(flange)
-    named = [np.isfinite(samples.column(name)) for name in ("seat", "bar") if name in samples]
-    if named:
-        tip[~np.logical_or.reduce(named)] = np.nan
-    return _columns(TIP, tip)
-
-
-def _nearer_form(vectors: Floats, observed: Floats) -> Floats:
-    """(row, 3) the same rotations: of turns near half a turn the vector that is next to the observed one.
-
-    A turn by an angle about an axis is one by the angle less 2 pi about the same axis.
-    """
-    angle = np.linalg.norm(vectors, axis=1, keepdims=True)
-    turned_back = vectors * (1.0 - 2.0 * np.pi / np.maximum(angle, np.finfo(float).eps))
-    nearer = np.linalg.norm(turned_back - observed, axis=1) < np.linalg.norm(vectors - observed, axis=1)
-    return np.where(nearer[:, None], turned_back, vectors)
-
-
-def _columns(names: tuple[str, ...], values: Floats) -> Columns:
-    return dict(zip(names, values.T, strict=True))
-
-
-def _drawn_device(rig: Rig) -> tuple[float, ...] | None:
-    """Origin and rotation vector in the base, as in `about`."""
-    return None if rig.device is None else (*rig.device.origin_m, *rig.device.rotation_rad)
-
-
-INSTRUMENTS = (
-    Instrument(("dual-psd",), SPOTS, _spots),
-    Instrument(("position", "full-pose", "distance"), POSITION, _position),
-    Instrument(("full-pose",), ORIENTATION, _rotation),
-    Instrument(("wire",), ("wire_m",), _wire),
-    Instrument(("seat", "bar"), ("seat", "bar"), _tip),
-)

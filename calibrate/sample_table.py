@@ -1,8 +1,7 @@
 """A session's samples beside the arm as drawn: readings, filled rows, and frames and points found in closed form."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from enum import Enum
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 from acquisition.recording.columns import POSITION
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
-from calibrate.alignment import Alignment, align, align_with_tool, pivot, trilaterate
+from calibrate.alignment import Alignment, align, align_with_tool
 from calibrate.arms.model import KinematicModel
 from calibrate.errors import DataError
 from calibrate.observation_model import ObservationModel
@@ -27,20 +26,6 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 
-class Positions(Enum):
-    """How measured positions are used."""
-
-    FRAME = "in the device's frame, which is found"
-    DISTANCE = "as distances between consecutive poses, without a frame"
-
-
-class Spots(Enum):
-    """How spots on the dual PSD are used."""
-
-    REFLECTION = "as spots of a beam that both faces reflect"
-    POINT = "centred ones only, as lines through one point of each placement"
-
-
 @dataclass(frozen=True)
 class SampleTable:
     """Nothing here is iterated or guessed. DataError where samples and rig do not hold what a property needs."""
@@ -49,8 +34,8 @@ class SampleTable:
     rig: Rig
     arm: KinematicModel
     angles: Angles
-    positions: Positions
-    spots: Spots
+    framed: bool  # whether positions are used in the device's frame, which is found
+    points: tuple[Callable[["SampleTable"], Floats | None], ...] = ()  # ways to find the target where the rig has none
 
     @cached_property
     def q_rad(self) -> Floats:
@@ -83,23 +68,17 @@ class SampleTable:
         return np.stack([self.samples.column(name) for name in names], axis=1)
 
     @cached_property
-    def _placed(self) -> tuple[Alignment | None, Target]:
-        """Device frame and target: the target as the rig says, else found with the frame or with the seats."""
+    def _aligned(self) -> tuple[Alignment | None, Floats | None]:
+        """Device frame, and the target (3,) in the flange where it had to be found with the frame."""
         rows = self.filled(*POSITION)
-        framed = len(rows) > 0 and self.positions is Positions.FRAME
+        if len(rows) == 0:
+            return None, None
         point = self.rig.tool.point_m
         if point is not None:
-            target = Target(np.array(point))
-            tips = target.in_base(np.zeros(3), self.T_base_flange)
-            return (align(tips[rows], self.position_m[rows]) if framed else None), target
-        if len(rows) > 0:
-            found, tool_m = align_with_tool(self.T_base_flange[rows], self.position_m[rows])
-            return (found if framed else None), Target(tool_m, UNKNOWN_PLAUSIBLE_M)
-        rows = self.filled("seat")
-        if len(rows) > 0:
-            tool_m, _ = pivot(self.T_base_flange[rows], self.samples.integers("seat", 0)[rows])
-            return None, Target(tool_m, UNKNOWN_PLAUSIBLE_M)
-        raise DataError(f"rig {self.rig.name}: wire and bar rows need tool.point_m, the target in the flange frame")
+            tips = Target(np.array(point)).in_base(np.zeros(3), self.T_base_flange)
+            return (align(tips[rows], self.position_m[rows]) if self.framed else None), None
+        found, tool_m = align_with_tool(self.T_base_flange[rows], self.position_m[rows])
+        return (found if self.framed else None), tool_m
 
     @cached_property
     def position_m(self) -> Floats:
@@ -107,19 +86,32 @@ class SampleTable:
 
     @property
     def alignment(self) -> Alignment | None:
-        return self._placed[0] if len(self.filled(*POSITION)) else None
+        """Of the positions with the arm as drawn."""
+        return self._aligned[0]
 
     @property
+    def tool_seen_m(self) -> Floats | None:
+        """(3,) the target as found with the device's frame; None where the rig says it, or without positions."""
+        return self._aligned[1]
+
+    @cached_property
     def target(self) -> Target:
-        return self._placed[1]
+        """As the rig says, else as the first of the sensors that can finds it."""
+        point = self.rig.tool.point_m
+        if point is not None:
+            return Target(np.array(point))
+        for find in self.points:
+            found_m = find(self)
+            if found_m is not None:
+                return Target(found_m, UNKNOWN_PLAUSIBLE_M)
+        raise DataError(f"rig {self.rig.name}: wire and bar rows need tool.point_m, the target in the flange frame")
 
     @cached_property
     def tips_m(self) -> Floats:
         return self.target.in_base(np.zeros(3), self.T_base_flange)
 
-    @cached_property
-    def device(self) -> Device:
-        """As the rig says, else as found; of a drum alone only the origin is found, and its axes are the base's."""
+    def device(self, origin_m: Callable[[], Floats] | None = None) -> Device:
+        """As the rig says, else as the positions have it, else about an origin (3,) in the axes of the base."""
         if (given := self.rig.device) is not None:
             tolerance = self.rig.tolerance
             prior = None
@@ -128,9 +120,9 @@ class SampleTable:
             return Device(transform(given.origin_m, given.rotation_rad), prior)
         if self.alignment is not None:
             return Device(self.alignment.T_a_b)
-        rows = self.filled("wire_m")
         T_base_device = np.eye(4)
-        T_base_device[:3, 3] = trilaterate(self.tips_m[rows], self.samples.column("wire_m")[rows])
+        if origin_m is not None:
+            T_base_device[:3, 3] = origin_m()
         return Device(T_base_device)
 
     def measured(

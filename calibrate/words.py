@@ -2,9 +2,12 @@
 
 from collections.abc import Sequence
 
+from calibrate.sensors.catalogue import FRAMES
+
+SINGLE = ("device", "tool", *(f.prefix for f in FRAMES if not f.one))
 SYMBOLS = {"offset": "d", "length": "a", "twist": "alpha", "tilt": "beta"}  # of a D-H table, Hayati's beta included
-FRAMES = {"placement": "fixture", "laser": "laser mount", "device": "base", "seat": "seat"}
-NUMBERED = ("placement", "seat")  # frames of one kind whose number does not matter to the reason
+NOUNS = {"placement": "fixture", "laser": "laser mount", "device": "base", **{f.prefix: f.noun for f in FRAMES}}
+NUMBERED = ("placement", *(f.prefix for f in FRAMES if f.one))  # the number does not matter to the reason
 
 
 def in_words(names: Sequence[str]) -> str:
@@ -21,7 +24,7 @@ def in_words(names: Sequence[str]) -> str:
             owner = kind
         elif owner == "laser":
             owner = "laser mount"
-        elif owner not in ("device", "tool"):
+        elif owner not in SINGLE:
             owner, what = name, ""
         listed = groups.setdefault(owner, [])
         if what and what not in listed:
@@ -59,8 +62,8 @@ def _owner_and_what(name: str) -> tuple[str, str]:
     number = owner.removeprefix(kind)
     if _is_letter(name):
         return f"{SYMBOLS[what]}{number}", ""
-    if kind in FRAMES:
-        return FRAMES[kind], what
+    if kind in NOUNS:
+        return NOUNS[kind], what
     if kind == "joint":
         return f"joint {number} {what}".strip(), ""
     return f"{kind} {number}".strip(), what

@@ -15,6 +15,9 @@ class Kind(enum.Enum):
 SPOTS = ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")
 POSITION = ("x_m", "y_m", "z_m")
 ORIENTATION = ("rx_rad", "ry_rad", "rz_rad")  # beside a position: a full pose
+WIRE = "wire_m"
+SEAT = "seat"
+BAR, BAR_END = "bar", "bar_end"
 COMPLETE_PER_JOINT = (("q", "_rad"), ("cmd", "_rad"), ("enc", "_rad"))  # one column for every joint, or none
 
 _INTEGERS = re.compile(r"placement|first_psd|seat|bar|repeat|approach[1-9][0-9]*")

@@ -177,6 +177,8 @@ class Noise(Struct, frozen=True, forbid_unknown_fields=True):
     position_m: SigmaMetres | None = None
     wire_m: SigmaMetres | None = None
     seat_m: SigmaMetres | None = None
+    camera_m: tuple[SigmaMetres, SigmaMetres, SigmaMetres] | None = None  # along x, y, z of the camera
+    camera_rad: tuple[SigmaRadians, SigmaRadians, SigmaRadians] | None = None  # about x, y, z of the camera
     joint_rad: SigmaRadians | None = None
 
 

@@ -19,9 +19,9 @@ from calibrate.arms.eccentric import with_discs
 from calibrate.arms.model import KinematicModel
 from calibrate.default_belief import SCALELESS
 from calibrate.dual_psd_rig import believed_noise
-from calibrate.instruments import SEAT_BELIEVED_M
 from calibrate.parameters import values_by_name
 from calibrate.rigid import cross_matrix
+from calibrate.sensors.seat import SEAT_BELIEVED_M
 
 Floats = NDArray[np.float64]
 

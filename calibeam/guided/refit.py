@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 
 from acquisition.guided.reading import Reading
 from acquisition.guided.target import Cone
+from acquisition.recording.columns import BAR
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.fit import FAR_START, NEAR_START, solve
 from calibrate.identification.session import instruments_for_fit
 from calibrate.joint_problem import JointProblem
 from calibrate.parameters import Parameter, priors
+from calibrate.sensors import seat
 from calibrate.weighting import Weighting
 
 Floats = NDArray[np.float64]
@@ -42,7 +44,7 @@ class Refit:
 def visits_of(readings: Sequence[Reading]) -> tuple[Visit, ...]:
     """Cones one by one, ends of bars two by two; what is neither has no say."""
     cones = [(reading,) for reading in readings if isinstance(reading.target, Cone)]
-    ends = [reading for reading in readings if "bar" in reading.target.columns]
+    ends = [reading for reading in readings if BAR in reading.target.columns]
     return (*cones, *zip(ends[::2], ends[1::2], strict=True))
 
 
@@ -58,7 +60,9 @@ def refitted(rig: Rig, visits: Sequence[Visit], values: Mapping[str, float]) -> 
         fit = solve(problem, start=start, damping=NEAR_START if values else FAR_START, max_steps=30)
         if not np.all(np.isfinite(fit.covariance)):
             return None
-        values = {p.name: float(v) for p, v in zip(parameters, fit.theta, strict=True) if not p.name.startswith("seat")}
+        values = {
+            p.name: float(v) for p, v in zip(parameters, fit.theta, strict=True) if not p.name.startswith(seat.POINTS)
+        }
         sigmas = _without_itself(problem, weighting, fit.theta, told)
         worst = len(sigmas) - 1 - int(np.argmax(sigmas[::-1]))
         if sigmas[worst] <= LIMIT_SIGMAS or len(dropped) == MOST_DROPPED:

@@ -8,14 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.chain import Chain
 from calibrate.diagnose.extended import carried_over, extended
 from calibrate.diagnose.fitted import Fitted
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.ported import perturbed_frames
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.ports import Perturbation, Place
-from calibrate.sensors.dual_psd import DualPsd
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -107,10 +105,10 @@ def _tool(state: Fitted, T_base_flange: Floats) -> Tool:
     session = state.session
     for block, measured in enumerate(session.measured):
         chain = measured.problem.chain
-        if isinstance(chain, Chain) and isinstance(chain.sensor, DualPsd):
-            own = session.weighting.unweighted.of_block(block, state.geometry)
-            beam = chain.sensor.mount.beam(own[len(chain.model.parameters) :][:4], T_base_flange)
-            return Beam(beam.origin_m, beam.direction)
+        own = session.weighting.unweighted.of_block(block, state.geometry)[len(chain.model.parameters) :]
+        beam = chain.sensor.beam(own, T_base_flange)
+        if beam is not None:
+            return Beam(*beam)
     point_m = _drawn_point_m(state) + _corrections_m(state)
     return T_base_flange[:, :3, :3] @ point_m + T_base_flange[:, :3, 3]
 

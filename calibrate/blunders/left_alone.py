@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from acquisition.recording.columns import BAR, BAR_END, SEAT
 from acquisition.recording.samples import Samples
 from calibrate.blunders.finding import Blunder, BlunderKind
 
@@ -23,21 +24,21 @@ def left_alone(samples: Samples, blunders: Sequence[Blunder]) -> tuple[Blunder, 
 
 def _ends(samples: Samples, copies: set[int], bad: set[int]) -> Iterator[Blunder]:
     """Consecutive rows that have a bar form a pair (calibrate/sensors/bar.py); a copy is none of them."""
-    with_bar = [row for row in np.flatnonzero(samples.integers("bar", -1) >= 0).tolist() if row not in copies]
+    with_bar = [row for row in np.flatnonzero(samples.integers(BAR, -1) >= 0).tolist() if row not in copies]
     for pair in zip(with_bar[::2], with_bar[1::2], strict=False):
         gone = bad.intersection(pair)
         if len(gone) == 1:
             (left,) = set(pair) - gone
             (other,) = gone
             what = f"the other end of this bar, row {other + 1}, is left out"
-            yield Blunder(BlunderKind.LEFT_ALONE, (left,), "bar_end", what, AGAIN)
+            yield Blunder(BlunderKind.LEFT_ALONE, (left,), BAR_END, what, AGAIN)
 
 
 def _last_in_seat(samples: Samples, bad: set[int]) -> Iterator[Blunder]:
     """A cone needs two rows to say anything (calibrate/sensors/seat.py)."""
-    seat = samples.integers("seat", -1)
+    seat = samples.integers(SEAT, -1)
     for k in np.unique(seat[seat >= 0]).tolist():
         rows = set(np.flatnonzero(seat == k).tolist())
         if len(rows - bad) == 1 and len(rows) > 1:
             what = f"the only row of seat {k} when the others are left out"
-            yield Blunder(BlunderKind.LEFT_ALONE, tuple(rows - bad), "seat", what, AGAIN)
+            yield Blunder(BlunderKind.LEFT_ALONE, tuple(rows - bad), SEAT, what, AGAIN)

@@ -11,6 +11,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording.rig_schema import Rig
+from acquisition.recording.samples import Samples
 from calibrate.blunders.finding import BlunderKind
 
 Floats = NDArray[np.float64]
@@ -68,3 +70,20 @@ class Otherwise:
 def thinned(rows: Rows) -> Rows:
     """No more than ENOUGH_POSES of these rows, evenly spread."""
     return np.unique(rows[np.linspace(0, len(rows) - 1, ENOUGH_POSES).astype(np.intp)]) if len(rows) else rows
+
+
+def filled(samples: Samples, *names: str) -> Rows:
+    """Rows in which all of these columns hold a value; none where a column is absent."""
+    if not all(name in samples for name in names):
+        return np.zeros(0, dtype=np.intp)
+    return np.flatnonzero(np.all(np.isfinite(stacked(samples, names)), axis=1))
+
+
+def stacked(samples: Samples, names: tuple[str, ...]) -> Floats:
+    """(row, column)"""
+    return np.stack([samples.column(name) for name in names], axis=1)
+
+
+def drawn_point_m(rig: Rig) -> Floats | None:
+    """(3,) target as drawn in the flange frame."""
+    return None if rig.tool.point_m is None else np.array(rig.tool.point_m)

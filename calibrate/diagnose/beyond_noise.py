@@ -13,8 +13,9 @@ from calibrate.diagnose.fitted import Fitted
 from calibrate.diagnose.tail import LEAST
 from calibrate.effects.term import Missing
 from calibrate.identification.session import believed_sigma
+from calibrate.sensors.catalogue import kind_of
+from calibrate.sensors.kind import Trait
 
-POSITION = "position"
 BELIEVED = 10.0  # times the noise believed: beyond, it is something else
 LENGTHS = 3  # components that are no turns
 HIDDEN = ("cmd_minus_q", "approach", "qd", "payload")  # drivers that make poses scatter when they are not recorded
@@ -27,7 +28,7 @@ def beyond_noise(model: Fitted, missing: Sequence[Missing]) -> Unexplained | Non
     if believed.position_m is None or believed.joint_rad is not None:
         return None  # where joints are said to scatter, too, the fit has found how much of it is theirs
     for measured, scatter, rows in zip(session.measured, model.scatters, model.problem.rows, strict=True):
-        if measured.name != POSITION or len(rows) == 0:
+        if Trait.CERTIFIED not in kind_of(measured.name).traits or len(rows) == 0:
             continue
         stated = float(np.sqrt(np.mean(believed_sigma(measured)[rows][:, :LENGTHS] ** 2)))
         found = np.diagonal(scatter.covariance, axis1=1, axis2=2)[:, :LENGTHS]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.columns import POSITION
+from acquisition.recording.columns import POSITION, SEAT
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.arms.catalogue import arm_of
@@ -26,13 +26,14 @@ from calibrate.identification.identify import impossible_rows, wrong_file
 from calibrate.identification.rounds import distances, wary_fit
 from calibrate.identification.session import columns_of, shots_of
 from calibrate.parameters import start_values
+from calibrate.sensors.catalogue import kind_of
 from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 PASSES = 2  # a row can hide behind a worse one
-PLACES = ("placement", "seat")
+PLACES = ("placement", SEAT)
 
 
 @dataclass(frozen=True)
@@ -143,9 +144,8 @@ def _blocks(measured: Measured, apart: NDArray[np.bool_], place: Ints, away_m: F
 
 
 def _limit_m(session: Session, measured: Measured) -> float:
-    """A spot that should lie beyond the face it was read on is none that a bump moved."""
-    fixture = session.rig.fixture
-    return LIMIT if measured.name != "dual-psd" or fixture is None else min(LIMIT, fixture.half_size_m)
+    """Beyond, no bump has moved a reading."""
+    return min(LIMIT, kind_of(measured.name).far_m(session.rig))
 
 
 def _pair(measured: Measured, i: int, away_m: float) -> Blunder:

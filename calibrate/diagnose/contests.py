@@ -18,10 +18,10 @@ from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.next_poses import COUNT, Contest, Duel, next_poses, reach_of
 from calibrate.diagnose.reachable import reachable
 from calibrate.diagnose.score import scores
+from calibrate.sensors import spots
 
 Floats = NDArray[np.float64]
 
-SPOTS = "dual-psd"
 APART = 6.0  # of BIC: a rival that all poses together cannot drive farther off is no other cause but a richer one
 
 
@@ -86,7 +86,7 @@ def _spots(there: Elsewhere) -> Floats:
     n = len(there.state.session.samples)
     out = np.full((len(there.session.samples) - n, 4), np.nan)
     for m, expected in zip(there.session.measured, there.around.expected, strict=True):
-        if m.name == SPOTS:
+        if m.name == spots.KIND.name:
             sample = m.sample_rows[:, -1]
             out[sample[sample >= n] - n] = expected[sample >= n]
     return out

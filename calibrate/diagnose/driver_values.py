@@ -6,15 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from acquisition.recording.columns import ORIENTATION, POSITION, SPOTS, joint_of, per_joint
+from acquisition.recording.columns import joint_of, per_joint
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
-from calibrate.chain import Chain
 from calibrate.diagnose.session import Session
 from calibrate.effects.drivers import Drivers, Readout
-from calibrate.sensors.dual_psd import DualPsd
-from calibrate.sensors.model import Sensor
-from calibrate.sensors.seat import Seat
+from calibrate.sensors.catalogue import SENSORS
+from calibrate.sensors.model import Standing, Used
 from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
@@ -23,10 +21,8 @@ Ints = NDArray[np.int64]
 MOVED_RAD = 1e-4  # a joint that went less far has not moved: two readings of one standstill
 SMOOTHING = 0.01  # of the samples, at least 3: thermometers are noisy, what they measure is slow
 NAMED = {
-    *SPOTS,
-    *POSITION,
-    *ORIENTATION,
-    *("t_s", "placement", "first_psd", "psd1_sum_v", "psd2_sum_v", "wire_m", "seat", "bar", "bar_end", "repeat"),
+    *(name for kind in SENSORS for name in (*kind.columns, *kind.further)),
+    *("t_s", "placement", "first_psd", "psd1_sum_v", "psd2_sum_v", "repeat"),
     *("payload_kg", "payload_com_x_m", "payload_com_y_m", "payload_com_z_m"),
 }
 
@@ -69,31 +65,41 @@ def drivers_at(
 
 def _readout(measured: Measured, expected: Floats, own: Floats, frames: Floats) -> Readout:
     chain = measured.problem.chain
-    sensor = chain.sensor if isinstance(chain, Chain) else None
-    phi = own[len(chain.model.parameters) :] if isinstance(chain, Chain) else own
-    return readout_at(measured.name, sensor, phi, expected, measured.sample_rows[:, -1], frames)
+    phi = own[len(chain.model.parameters) :]
+    return readout_at(measured.name, chain.sensor, phi, expected, measured.sample_rows[:, -1], frames)
 
 
 def readout_at(
-    name: str, sensor: Sensor | None, phi: Floats, expected: Floats, rows: NDArray[np.intp], frames: Floats
+    name: str, sensor: Used | None, phi: Floats, expected: Floats, rows: NDArray[np.intp], frames: Floats
 ) -> Readout:
     """Of an instrument that sees these rows of the samples, with the values `phi` of its own parameters."""
     n = len(frames)
     predicted, seen = np.full((n, expected.shape[1]), np.nan), np.zeros(n, dtype=bool)
     predicted[rows], seen[rows] = expected, True
-    if isinstance(sensor, DualPsd):
-        incidence, first, place = np.full((n, 2), np.nan), np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
-        hit = sensor.strike(phi, frames[rows, -1])
-        incidence[rows] = np.arccos(np.clip(np.abs(hit.facing), 0.0, 1.0))
-        first[rows], place[rows] = sensor.first_psd, sensor.placement
-        lean = np.zeros((n, 2, 2))
-        lean[rows] = sensor.leans(phi, frames[rows, -1])
-        return Readout(name, predicted, seen, incidence, lean, first, place)
-    if isinstance(sensor, Seat):
-        place = np.zeros(n, dtype=np.int64)
-        place[rows] = sensor.seat
-        return Readout(name, predicted, seen, place=place)
-    return Readout(name, predicted, seen)
+    stood = Standing() if sensor is None else sensor.standing(phi, frames[rows, -1])
+    return Readout(
+        name,
+        predicted,
+        seen,
+        None if stood.incidence_rad is None else _among(n, rows, stood.incidence_rad, np.nan),
+        None if stood.lean is None else _among(n, rows, stood.lean, 0.0),
+        None if stood.first_psd is None else _numbers(n, rows, stood.first_psd),
+        None if stood.place is None else _numbers(n, rows, stood.place),
+    )
+
+
+def _among(n: int, rows: NDArray[np.intp], values: Floats, else_: float) -> Floats:
+    """(sample, ...) of values at some rows."""
+    out = np.full((n, *values.shape[1:]), else_)
+    out[rows] = values
+    return out
+
+
+def _numbers(n: int, rows: NDArray[np.intp], values: Ints) -> Ints:
+    """(sample,) zero elsewhere."""
+    out = np.zeros(n, dtype=np.int64)
+    out[rows] = values
+    return out
 
 
 def _per_joint(samples: Samples, stem: str, unit: str, n: int) -> Floats | None:

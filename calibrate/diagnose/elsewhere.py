@@ -10,11 +10,9 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from acquisition.recording.columns import per_joint
 from acquisition.recording.samples import Samples
-from calibrate.chain import Chain
 from calibrate.diagnose.augmented import Around, Augmented, columns_of, plain_sizes
 from calibrate.diagnose.driver_values import drivers_of
 from calibrate.diagnose.extended import alike
@@ -26,7 +24,6 @@ from calibrate.effects.drivers import Drivers
 from calibrate.effects.term import Term
 from calibrate.parameters import plausible_sizes, priors
 from calibrate.problem import whitener_of
-from calibrate.sensors.full_pose import FullPose
 from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
@@ -165,21 +162,9 @@ def _longer(m: Measured, n: int, poses: NewPoses, state: Fitted, i: int) -> Meas
     out = m.select(np.concatenate([np.arange(m.problem.rows), row_of[poses.like[new]]]))
     q_rad = np.concatenate([m.problem.q_rad, poses.q_rad[new]])
     chain = out.problem.chain
-    if isinstance(chain, Chain) and isinstance(chain.sensor, FullPose):
-        chain = replace(
-            chain, sensor=_facing(chain, state.session.weighting.unweighted.of_block(i, state.geometry), q_rad)
-        )
+    chain = chain.facing(chain.expect(state.session.weighting.unweighted.of_block(i, state.geometry), q_rad))
     problem = replace(out.problem, q_rad=q_rad, chain=chain)
     return replace(out, problem=problem, sample_rows=np.concatenate([m.sample_rows, n + new[:, None]]))
-
-
-def _facing(chain: Chain, theta: Floats, q_rad: Floats) -> FullPose:
-    """The sensor compared with the orientation that is expected: a turn from another pose's may pass half a turn."""
-    sensor = chain.sensor
-    if not isinstance(sensor, FullPose):
-        raise TypeError(f"no orientation is observed by a {type(sensor).__name__}")
-    turn = Rotation.from_rotvec(chain.expect(theta, q_rad)[:, 3:]).as_matrix()
-    return replace(sensor, R_device_target=turn @ sensor.R_device_target)
 
 
 def _whiteners(state: Fitted, i: int, n: int, poses: NewPoses, longer: Measured) -> Floats:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording.columns import SEAT
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
 from calibrate.diagnose.contests import NextPoses
 from calibrate.diagnose.fitted import Fitted
@@ -18,7 +19,7 @@ LOADED_KG = 1e-3  # a payload of less is none
 def plan_of(found: NextPoses, state: Fitted) -> PosePlan:
     """What `calibeam session --plan` takes. Nobody loads an arm on his own: poses are then grouped by payload."""
     samples, like = state.session.samples, found.poses.like
-    whole = [samples.integers(name, -1)[like] for name in ("placement", "first_psd", "seat")]
+    whole = [samples.integers(name, -1)[like] for name in ("placement", "first_psd", SEAT)]
     payload = samples.column("payload_kg")[like] if "payload_kg" in samples else np.zeros(len(like))
     keys = np.column_stack([*whole, np.nan_to_num(payload)])
     blocks = [_block(found, np.flatnonzero((keys == key).all(axis=1)), key) for key in np.unique(keys, axis=0)]

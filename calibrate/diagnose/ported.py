@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from calibrate.arms.serial import SerialArm, chain_frames
-from calibrate.chain import Chain
 from calibrate.effects.ports import Perturbation, Place, Port
+from calibrate.observation_model import ObservationModel
 from calibrate.rigid import cross_matrix, inverse, turn_twist
-from calibrate.sensors.pair import PairChain
 from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
@@ -71,40 +70,29 @@ class Look:
     Reading terms come on top. Each part is computed when it is asked for: a trial step of a solver wants no derivative.
     """
 
-    chain: Chain | PairChain
+    chain: ObservationModel
     own: Floats  # (sensor parameter,)
     flanges: tuple[Floats, ...]  # of each pose of the row (row, 4, 4)
 
     @cached_property
     def expected(self) -> Floats:
         """(row, k)"""
-        if isinstance(self.chain, PairChain):
-            a, b = self.flanges
-            return self.chain.sensor.expect(self.own, a, b)
-        return self.chain.sensor.expect(self.own, self.flanges[0])
+        return self.chain.at_flanges(self.own, self.flanges)
 
     @cached_property
     def by_twists(self) -> tuple[Floats, ...]:
         """Of each pose of the row (row, k, 6)."""
-        if isinstance(self.chain, PairChain):
-            a, b = self.flanges
-            return self.chain.sensor.by_twists(self.own, a, b)
-        return (self.chain.sensor.by_twist(self.own, self.flanges[0]),)
+        return self.chain.by_flanges(self.own, self.flanges)
 
     @cached_property
     def by_sensor(self) -> Floats:
         """(row, k, own parameters of the sensor)"""
-        if isinstance(self.chain, PairChain):
-            a, b = self.flanges
-            return self.chain.sensor.by_parameter(self.own, a, b)
-        return self.chain.sensor.by_parameter(self.own, self.flanges[0])
+        return self.chain.by_own(self.own, self.flanges)
 
 
 def look(measured: Measured, own: Floats, frames: Floats) -> Look:
     """One instrument at frames (sample, joint + 1, 4, 4); `own` (param,) of its chain."""
     chain = measured.problem.chain
-    if not isinstance(chain, Chain | PairChain):
-        raise TypeError(f"instrument {measured.name}: no ports for a {type(chain).__name__}")
     return Look(chain, own[len(chain.model.parameters) :], tuple(frames[rows, -1] for rows in measured.sample_rows.T))
 
 

@@ -9,11 +9,9 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from calibrate.chain import Chain
 from calibrate.diagnose.elsewhere import NewPoses
 from calibrate.diagnose.fitted import Fitted
-from calibrate.sensors.dual_psd import DualPsd
-from calibrate.sensors.seat import Seat
+from calibrate.observation_model import ObservationModel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -22,7 +20,6 @@ Bools = NDArray[np.bool_]
 OFFERED = 400
 TRIES = 3  # as many, since some never land
 SHARE_RECORDED = 0.25
-FACE = 0.8  # of the half face
 BETWEEN = (-0.5, 1.5)  # of the way from one recorded pose to another
 SPREAD_RAD = 0.1
 STEPS, STEP_RAD, DAMPING = 12, 0.3, 1e-8
@@ -48,12 +45,8 @@ def _place(state: Fitted) -> Ints:
     """(sample,) poses with one number stood before the same target in the same order."""
     out = np.zeros(len(state.session.samples), dtype=np.intp)
     for m in state.session.measured:
-        chain = m.problem.chain
-        sensor = chain.sensor if isinstance(chain, Chain) else None
-        if isinstance(sensor, DualPsd):
-            out[m.sample_rows[:, -1]] = 2 * sensor.placement + sensor.first_psd
-        elif isinstance(sensor, Seat):
-            out[m.sample_rows[:, -1]] = 1 + sensor.seat
+        if (spot := m.problem.chain.sensor.spot()) is not None:
+            out[m.sample_rows[:, -1]] = spot
     return out
 
 
@@ -73,7 +66,7 @@ def _landed(state: Fitted, like: Ints, q_rad: Floats, rng: Generator) -> tuple[B
     joint = state.session.weighting.unweighted
     for i, m in enumerate(state.session.measured):
         chain = m.problem.chain
-        if not isinstance(chain, Chain) or not isinstance(chain.sensor, DualPsd | Seat):
+        if chain.sensor.spot() is None:
             continue
         row_of = np.full(len(state.session.samples), -1, dtype=np.intp)
         row_of[m.sample_rows[:, -1]] = np.arange(m.problem.rows)
@@ -84,13 +77,9 @@ def _landed(state: Fitted, like: Ints, q_rad: Floats, rng: Generator) -> tuple[B
     return bound, out
 
 
-def _met(chain: Chain, theta: Floats, q_rad: Floats, rng: Generator) -> Floats:
+def _met(chain: ObservationModel, theta: Floats, q_rad: Floats, rng: Generator) -> Floats:
     """Newton's steps of least length, batch-wise, onto the faces or into the cone."""
-    sensor = chain.sensor
-    target = np.zeros((len(q_rad), 3))
-    if isinstance(sensor, DualPsd):
-        edge_m = FACE * sensor.fixture.half_size_m
-        target = rng.uniform(-edge_m, edge_m, (len(q_rad), 4))
+    target = chain.sensor.aims(chain.expect(theta, q_rad).shape[1], rng)
     with np.errstate(all="ignore"):
         for _ in range(STEPS):
             J, away = chain.by_joint(theta, q_rad), target - chain.expect(theta, q_rad)
@@ -99,9 +88,8 @@ def _met(chain: Chain, theta: Floats, q_rad: Floats, rng: Generator) -> Floats:
             largest = np.max(np.abs(step), axis=1, keepdims=True)
             q_rad = q_rad + np.nan_to_num(step * np.minimum(1.0, STEP_RAD / np.maximum(largest, 1e-12)))
         met = np.max(np.abs(chain.expect(theta, q_rad) - target), axis=1) < LANDED_M
-    if isinstance(sensor, DualPsd):
-        n_arm = len(chain.model.parameters)
-        met &= sensor.lit(theta[n_arm:], chain.model.flange(theta[:n_arm], q_rad)).all(axis=1)
+    n_arm = len(chain.model.parameters)
+    met &= chain.sensor.met(theta[n_arm:], chain.model.flange(theta[:n_arm], q_rad))
     return np.where(met[:, None], q_rad, np.nan)
 
 

@@ -19,6 +19,8 @@ from calibrate.arms.serial import SerialArm
 from calibrate.default_belief import PAIR, SCALELESS, WIDE
 from calibrate.instruments import instruments_of
 from calibrate.parameters import Parameter
+from calibrate.sensors.catalogue import SENSORS
+from calibrate.sensors.kind import Trait
 from calibrate.weighting import Measured, Weighting
 
 Floats = NDArray[np.float64]
@@ -60,8 +62,8 @@ def session_of(rig: Rig, samples: Samples) -> Session:
 def _belief(rig: Rig, samples: Samples) -> LinkBelief | None:
     if rig.tolerance is not None:
         return None
-    scaleless = "seat" in samples and not any(c in samples for c in ("bar", "x_m", "wire_m"))
-    return SCALELESS if scaleless else WIDE
+    held = [k for k in SENSORS if Trait.TARGET in k.traits and k.columns[0] in samples]
+    return SCALELESS if held and all(Trait.SCALELESS in k.traits for k in held) else WIDE
 
 
 def _doubted(rig: Rig, belief: LinkBelief | None) -> Rig:

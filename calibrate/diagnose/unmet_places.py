@@ -11,11 +11,12 @@ from calibrate.diagnose.scatter import Scatter
 from calibrate.fit import NEAR_START, solve
 from calibrate.parameters import Parameter
 from calibrate.problem import whitener_of
+from calibrate.sensors import point_line, seat
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
-PLACES = ("placement", "seat", "point")  # parameters of where something stood; a place may be met unseen
+PLACES = ("placement", seat.POINTS, point_line.POINTS)  # of where something stood; a place may be met unseen
 
 
 def places_found(

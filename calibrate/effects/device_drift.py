@@ -5,12 +5,11 @@ from calibrate.effects.drivers import Drivers
 from calibrate.effects.kind import Kind
 from calibrate.effects.moved import drifts, motion
 from calibrate.effects.term import Holds, Shape, Term
-
-INSTRUMENTS = ("position", "full-pose", "wire")
+from calibrate.sensors.kind import Trait
 
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
-    if not any(name in drivers.readouts for name in INSTRUMENTS):
+    if not drivers.having(Trait.DEVICE):
         return ()
     out = drifts(drivers, "device.pose", "device-drift", "The measuring device")
     if inner := time_laws.step_inner(drivers):

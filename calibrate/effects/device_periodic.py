@@ -3,27 +3,26 @@
 import numpy as np
 
 from calibrate.effects.drivers import Drivers
-from calibrate.effects.form import Floats, Form
+from calibrate.effects.form import Floats, Form, Functions
 from calibrate.effects.kind import Kind
 from calibrate.effects.ports import Place, Port
 from calibrate.effects.term import Inner, Shape, Term
+from calibrate.sensors.kind import Trait
 
 SHORTEST_M, LONGEST_M = 0.05, 1.0  # circumference of drums in use
 LIMIT_M = 5e-3
 LIMIT_RAD = 5e-4  # 20 um on a radius of 40 mm
-TRACKED = ("position", "full-pose")  # in the frame of a device that stands upright
 _CIRCLES = (("azimuth", 1), ("azimuth", 2), ("elevation", 1), ("elevation", 2))
 
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
-    return (*_drum(drivers), *(_circle(name, k) for name in TRACKED if name in drivers.readouts for k in _CIRCLES))
+    circles = [_circle(name, k) for name in drivers.having(Trait.ANGLE_ENCODERS) for k in _CIRCLES]
+    return (*(term for name in drivers.having(Trait.DRUM) for term in _drum(drivers, name)), *circles)
 
 
-def _drum(drivers: Drivers) -> tuple[Term, ...]:
+def _drum(drivers: Drivers, name: str) -> tuple[Term, ...]:
     """An error that repeats with the length read."""
-    if "wire" not in drivers.readouts:
-        return ()
-    reading = drivers.readouts["wire"]
+    reading = drivers.readouts[name]
     span_m = float(np.ptp(reading.predicted[reading.seen]))
     if span_m < SHORTEST_M:
         return ()
@@ -32,13 +31,13 @@ def _drum(drivers: Drivers) -> tuple[Term, ...]:
     grid = tuple(sorted((span_m / turns).tolist()))
     return (
         Form(
-            Port("device.reading", Place.READING, instrument="wire"),
+            Port("device.reading", Place.READING, instrument=name),
             ("reading",),
             Shape.HARMONIC,
             "device-periodic",
             None,
             (Inner("period_m", grid, grid[0] * 0.9, grid[-1] * 1.1),),
-            function=_once_a_drum_turn,
+            function=_once_a_drum_turn(name),
             names=("amplitude_m", "phase_rad"),
             limit=LIMIT_M,
             sentence="The wire reads off by up to {amplitude_m} and repeats every {period_m}: its drum is out of round",
@@ -47,9 +46,12 @@ def _drum(drivers: Drivers) -> tuple[Term, ...]:
     )
 
 
-def _once_a_drum_turn(drivers: Drivers, inner: Floats) -> Floats:
-    angle = 2.0 * np.pi * np.nan_to_num(drivers.readouts["wire"].predicted[:, 0]) / inner[0]
-    return np.stack([np.sin(angle), np.cos(angle)], axis=1)[:, None, :]
+def _once_a_drum_turn(name: str) -> Functions:
+    def function(drivers: Drivers, inner: Floats) -> Floats:
+        angle = 2.0 * np.pi * np.nan_to_num(drivers.readouts[name].predicted[:, 0]) / inner[0]
+        return np.stack([np.sin(angle), np.cos(angle)], axis=1)[:, None, :]
+
+    return function
 
 
 def _circle(name: str, circle: tuple[str, int]) -> Term:

@@ -9,6 +9,7 @@ from calibrate.effects.kind import Kind
 from calibrate.effects.ports import Place, Port
 from calibrate.effects.term import Shape, Term
 from calibrate.effects.time_laws import varies
+from calibrate.sensors.kind import Trait
 
 LIMIT = 1e-2  # a draw wire with the wrong drum
 LIMIT_PER_K = 5e-5  # a polymer wire; steel 12e-6, air 1e-6
@@ -16,10 +17,9 @@ LIMIT_PER_K = 5e-5  # a polymer wire; steel 12e-6, air 1e-6
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
     out: list[Term] = []
-    for name in ("position", "full-pose", "wire"):
-        if name in drivers.readouts:
-            out += [_scale(name), _power(name, 1, Shape.QUADRATIC), _power(name, 2, Shape.CUBIC)]
-            out += [_with_temperature(name, where) for where, T in drivers.temperatures_degC.items() if varies(T)]
+    for name in drivers.having(Trait.DEVICE):
+        out += [_scale(name), _power(name, 1, Shape.QUADRATIC), _power(name, 2, Shape.CUBIC)]
+        out += [_with_temperature(name, where) for where, T in drivers.temperatures_degC.items() if varies(T)]
     return tuple(out)
 
 

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.rig_schema import Rig
+from calibrate.sensors.catalogue import names_with
+from calibrate.sensors.kind import Trait
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -18,7 +20,7 @@ Ints = NDArray[np.int64]
 class Readout:
     """One instrument as the model predicts it; rows (pose,) that it does not see are NaN."""
 
-    name: str  # "dual-psd", "position", "wire", "seat", "bar", "full-pose"
+    name: str  # of a sensor, as in calibrate/sensors/catalogue.py
     predicted: Floats  # (pose, k)
     seen: NDArray[np.bool_]  # (pose,)
     incidence_rad: Floats | None = None  # (pose, 2) of the beam on PSD 1, 2
@@ -51,6 +53,16 @@ class Drivers:
     @property
     def n_joints(self) -> int:
         return self.q_rad.shape[1]
+
+    def having(self, trait: Trait) -> tuple[str, ...]:
+        """Names of the instruments of the session that have it, in the order of the catalogue."""
+        return tuple(name for name in names_with(trait) if name in self.readouts)
+
+    @property
+    def light(self) -> Readout | None:
+        """Of the spots on a dual PSD."""
+        names = self.having(Trait.LIGHT)
+        return self.readouts[names[0]] if names else None
 
     @property
     def gravity_m_s2(self) -> Floats:

@@ -10,7 +10,7 @@ from calibrate.effects.term import Holds, Shape, Term
 
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
-    spots = drivers.readouts.get("dual-psd")
+    spots = drivers.light
     if spots is None or spots.place is None:
         return ()
     out: list[Term] = []

@@ -8,14 +8,14 @@ from calibrate.effects.gravity import point_of
 from calibrate.effects.kind import Kind
 from calibrate.effects.term import Shape, Term
 from calibrate.rigid import cross
+from calibrate.sensors.kind import Trait
 
-TOUCHED = ("seat", "bar")  # instruments that a hand presses the probe into
 FORCE_N = 10.0  # columns are for the hand's usual push; ISO 10360-12:2016 lets the maker state it
 LIMIT_RAD_NM = 1e-3  # as joint_compliance
 
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
-    if not any(name in drivers.readouts for name in TOUCHED):
+    if not drivers.having(Trait.TOUCHED):
         return ()
     return tuple(_term(drivers, joint) for joint in range(1, drivers.n_joints))
 

@@ -9,7 +9,7 @@ from calibrate.effects.time_laws import varies
 
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
-    if "dual-psd" not in drivers.readouts or drivers.rig.tool.laser_direction is None:
+    if drivers.light is None or drivers.rig.tool.laser_direction is None:
         return ()
     return tuple(
         moves(
@@ -26,7 +26,7 @@ def _terms(drivers: Drivers) -> tuple[Term, ...]:
 
 
 def _missing(drivers: Drivers) -> tuple[Missing, ...]:
-    if "dual-psd" not in drivers.readouts or drivers.temperatures_degC:
+    if drivers.light is None or drivers.temperatures_degC:
         return ()
     return (Missing("temp", "temp_<where>_degC", "laser-thermal-drift"),)
 

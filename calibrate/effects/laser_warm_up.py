@@ -8,7 +8,7 @@ from calibrate.effects.term import Holds, Shape, Term
 
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
-    if "dual-psd" not in drivers.readouts or drivers.rig.tool.laser_direction is None:
+    if drivers.light is None or drivers.rig.tool.laser_direction is None:
         return ()
     inner = time_laws.constant_inner(drivers)
     return tuple(

@@ -10,22 +10,22 @@ from calibrate.effects.kind import Kind
 from calibrate.effects.ports import Place, Port
 from calibrate.effects.psd_terms import half_size_m, spot
 from calibrate.effects.term import Inner, Shape, Term
+from calibrate.sensors import spots
+from calibrate.sensors.kind import Trait
 
 ACROSS = np.arange(-7.35, 7.4, 0.7)  # waves over the spots' range: 0.7 apart, a phase is off by 1.1 rad at the edge
 LIMIT_M = 5e-3
 LIMIT = 0.2  # of the spot at the edge, as psd_nonlinearity
 LIMIT_PER_M = 1e-3  # bent light: 100 times the 1e-5 per metre of 10 K per metre
-POSITIONS = ("position", "full-pose")
 
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
     out: list[Term] = []
-    if "dual-psd" in drivers.readouts:
+    if drivers.light is not None:
         for detector in (1, 2):
             out += [_fringes(drivers, detector), _face(detector)]
-    for name in POSITIONS:
-        if name in drivers.readouts:
-            out += [_bent_light(name), _squares(name)]
+    for name in drivers.having(Trait.IN_SPACE):
+        out += [_bent_light(name), _squares(name)]
     return tuple(out)
 
 
@@ -40,7 +40,7 @@ def _fringes(drivers: Drivers, detector: int) -> Term:
             out[:, 2 * detector - 2 + face, 2 * face + 1] = np.cos(angle)
         return out
 
-    seen = drivers.readouts["dual-psd"].seen
+    seen = drivers.readouts[spots.KIND.name].seen
     reach_m = np.maximum(np.ptp(spot(drivers, detector)[seen], axis=0), 1e-6)
     along_x = tuple((ACROSS / reach_m[0]).tolist())
     along_y = tuple((ACROSS[ACROSS > 0.0] / reach_m[1]).tolist())  # the other half of the plane is the same waves
@@ -76,7 +76,7 @@ def _detector(
     inner: tuple[Inner, ...],
 ) -> Term:
     return Form(
-        Port(f"psd{detector}.reading", Place.READING, instrument="dual-psd"),
+        Port(f"psd{detector}.reading", Place.READING, instrument=spots.KIND.name),
         (f"spot{detector}",),
         shape,
         "unknown",

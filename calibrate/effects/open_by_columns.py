@@ -18,11 +18,12 @@ from calibrate.effects.ports import Place, Port
 from calibrate.effects.psd_terms import spot
 from calibrate.effects.term import Shape, Term
 from calibrate.effects.time_laws import Law, varies
+from calibrate.sensors import spots
+from calibrate.sensors.kind import Trait
 
 LIMIT_RAD = 5e-2
 LIMIT_M = 1e-2
 LIMIT = 0.05  # relative
-DEVICES = ("position", "full-pose", "wire")
 
 
 @dataclass(frozen=True)
@@ -69,9 +70,9 @@ def _around(drivers: Drivers, column: Column) -> list[Term]:
     if column.temperature:
         return []
     places = [("base.pose", "The base")]
-    if any(name in drivers.readouts for name in DEVICES):
+    if drivers.having(Trait.DEVICE):
         places.append(("device.pose", "The measuring device"))
-    if "dual-psd" in drivers.readouts:
+    if drivers.light is not None:
         places.append(("fixture.pose", "The fixture"))
     return [
         motion(where, "unknown", column.name, Shape.LINEAR, column.law, what, open_family=True)
@@ -81,10 +82,10 @@ def _around(drivers: Drivers, column: Column) -> list[Term]:
 
 def _at_tool(drivers: Drivers, column: Column) -> list[Term]:
     out: list[Term] = []
-    if "dual-psd" in drivers.readouts and not column.temperature:
+    if drivers.light is not None and not column.temperature:
         for moves in (pointing, shifting):
             out.append(moves(drivers, "unknown", column.name, Shape.LINEAR, column.law, open_family=True))
-    if any(name != "dual-psd" for name in drivers.readouts):
+    if drivers.having(Trait.TARGET):
         names = ("size_x_m", "size_y_m", "size_z_m")
         port = Port("tool.point", Place.FRAME, drivers.n_joints)
         out.append(_open(port, column, column.law, names, LIMIT_M, "The target shifts", np.eye(6)[:, :3]))
@@ -93,11 +94,11 @@ def _at_tool(drivers: Drivers, column: Column) -> list[Term]:
 
 def _at_detectors(drivers: Drivers, column: Column) -> list[Term]:
     """Shift and gain of each detector."""
-    if "dual-psd" not in drivers.readouts:
+    if drivers.light is None:
         return []
     out: list[Term] = []
     for detector in (1, 2):
-        port = Port(f"psd{detector}.reading", Place.READING, instrument="dual-psd")
+        port = Port(f"psd{detector}.reading", Place.READING, instrument=spots.KIND.name)
         both = np.eye(4)[:, 2 * detector - 2 : 2 * detector]
         what = f"PSD {detector}"
         out.append(_open(port, column, column.law, ("size_x_m", "size_y_m"), LIMIT_M, f"{what} shifts", both))
@@ -121,8 +122,7 @@ def _at_devices(drivers: Drivers, column: Column) -> list[Term]:
             None,
             "scale",
         )
-        for name in DEVICES
-        if name in drivers.readouts
+        for name in drivers.having(Trait.DEVICE)
     ]
 
 

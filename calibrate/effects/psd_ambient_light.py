@@ -41,7 +41,7 @@ def _terms(drivers: Drivers) -> tuple[Term, ...]:
 
 
 def _missing(drivers: Drivers) -> tuple[Missing, ...]:
-    if "dual-psd" not in drivers.readouts or drivers.psd_sum_v is not None:
+    if drivers.light is None or drivers.psd_sum_v is not None:
         return ()
     return (Missing("psd1_sum", "psd1_sum_v, psd2_sum_v", "psd-ambient-light"),)
 

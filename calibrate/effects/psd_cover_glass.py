@@ -7,6 +7,7 @@ from calibrate.effects.form import Floats
 from calibrate.effects.kind import Kind
 from calibrate.effects.psd_terms import of_both, readout
 from calibrate.effects.term import Shape, Term
+from calibrate.sensors import spots
 
 INDEX = 1.517  # N-BK7 at 633 nm (Schott data sheet)
 LIMIT_M = 5e-3  # windows of detectors are 0.3 to 2 mm thick
@@ -14,7 +15,7 @@ LIMIT_M = 5e-3  # windows of detectors are 0.3 to 2 mm thick
 
 def _shift(drivers: Drivers, detector: int, spot: Floats) -> Floats:
     """A plate of thickness t lands the beam t (tan r - tan i) short, along its lean."""
-    lean = drivers.readouts["dual-psd"].lean
+    lean = drivers.readouts[spots.KIND.name].lean
     slope = np.zeros_like(spot) if lean is None else lean[:, detector - 1]
     tangent = np.linalg.norm(slope, axis=1, keepdims=True)
     sine = tangent / np.sqrt(1.0 + tangent**2) / INDEX

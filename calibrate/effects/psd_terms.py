@@ -8,13 +8,14 @@ from calibrate.effects.drivers import Drivers
 from calibrate.effects.form import Floats, Form
 from calibrate.effects.ports import Place, Port
 from calibrate.effects.term import Shape, Term
+from calibrate.sensors import spots
 
 Columns = Callable[[Drivers, int, Floats], Floats]  # drivers, detector, its spot (pose, 2) -> (pose, 2, m)
 
 
 def of_both(drivers: Drivers, make: Callable[[int], Term]) -> tuple[Term, ...]:
     """One term for each detector; none without a dual PSD."""
-    return (make(1), make(2)) if "dual-psd" in drivers.readouts else ()
+    return (make(1), make(2)) if drivers.light is not None else ()
 
 
 def readout(
@@ -37,7 +38,7 @@ def readout(
         return out
 
     return Form(
-        Port(f"psd{detector}.reading", Place.READING, instrument="dual-psd"),
+        Port(f"psd{detector}.reading", Place.READING, instrument=spots.KIND.name),
         (depends_on or f"spot{detector}",),
         shape,
         physics,
@@ -51,7 +52,7 @@ def readout(
 
 def spot(drivers: Drivers, detector: int) -> Floats:
     """(pose, 2) m as predicted, zero where the detector was not in use."""
-    return np.nan_to_num(drivers.readouts["dual-psd"].predicted[:, 2 * detector - 2 : 2 * detector])
+    return np.nan_to_num(drivers.readouts[spots.KIND.name].predicted[:, 2 * detector - 2 : 2 * detector])
 
 
 def half_size_m(drivers: Drivers) -> float:

@@ -7,10 +7,11 @@ from calibrate.effects.drivers import Drivers
 from calibrate.effects.kind import Kind
 from calibrate.effects.moved import in_use, motion
 from calibrate.effects.term import Holds, Shape, Term
+from calibrate.sensors.kind import Trait
 
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
-    seats = drivers.readouts.get("seat")
+    seats = next((drivers.readouts[name] for name in drivers.having(Trait.CONES)), None)
     if seats is None or seats.place is None:
         return ()
     out: list[Term] = []

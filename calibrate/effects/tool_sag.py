@@ -11,6 +11,7 @@ from calibrate.effects.laser_pointing import beam_axes
 from calibrate.effects.ports import Place, Port
 from calibrate.effects.term import Shape, Term
 from calibrate.rigid import cross
+from calibrate.sensors.kind import Trait
 
 LIMIT = 1e-2  # rad, m between upright and level: ten times what a bracket that anyone would measure with may give
 SHORTEST_M = 1e-3  # of an overhang that turns anything
@@ -22,11 +23,11 @@ def _terms(drivers: Drivers) -> tuple[Term, ...]:
     if not driver:
         return ()
     out: list[Term] = []
-    if "dual-psd" in drivers.readouts and tool.laser_direction is not None:
+    if drivers.light is not None and tool.laser_direction is not None:
         ports = ("laser.direction", "The laser")
         out += _brackets(drivers, *ports, driver, tool.laser_origin_m)
         out += [_towards_gravity(drivers, driver, tool.laser_direction), _tilting(drivers, driver, *ports)]
-    if any(name != "dual-psd" for name in drivers.readouts):
+    if drivers.having(Trait.TARGET):
         ports = ("tool.point", "The target")
         out += [*_brackets(drivers, *ports, driver, tool.point_m), _hanging(drivers, driver), _spring(drivers, driver)]
     return tuple(out)

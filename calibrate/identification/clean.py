@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from calibrate.blunders.bad_rows import bad_rows
 from calibrate.blunders.finding import Blunder, BlunderKind
-from calibrate.blunders.other_session import rows_of_another_session
 from calibrate.blunders.shots import outlying
 from calibrate.errors import DataError
 from calibrate.identification.rounds import distances, wary_fit
 from calibrate.identification.session import columns_of, shots_of
+from calibrate.sensors.catalogue import kind_of
 from calibrate.weighting import Measured, Weighting
 
 Floats = NDArray[np.float64]
@@ -66,7 +66,7 @@ def _found(weighting: Weighting, theta: Floats) -> list[Blunder]:
         if shots is None:
             out += _bad_pairs(measured, distance, np.linalg.norm(measured.problem.misfit(own), axis=1))
             continue
-        blocks = rows_of_another_session(shots) if measured.name == "position" else ()
+        blocks = kind_of(measured.name).blocks(shots)
         inside = {row for b in blocks for row in b.rows}
         out += [*blocks, *(b for b in bad_rows(shots) if b.rows[0] not in inside)]
     return out

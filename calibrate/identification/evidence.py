@@ -17,6 +17,7 @@ from calibrate.identification.session import about_of
 from calibrate.joint_problem import JointProblem
 from calibrate.observability import Observability, observability
 from calibrate.redundant import reduced
+from calibrate.sensors.catalogue import LENGTHS
 from calibrate.uncertainty.bootstrap import Bootstrap, bootstrap
 from calibrate.uncertainty.free_space import Scatter, Workspace, free_space_error
 from calibrate.weighting import JOINT
@@ -26,7 +27,6 @@ Floats = NDArray[np.float64]
 OF_JOINTS = "the scatter of the joint readings"
 OF_INSTRUMENT = "the scatter of the instrument's readings, which that of the arm's cannot be told from"
 FLANGE = (0.0, 0.0, 0.0)  # stands for the target where nobody names one
-IN_METRES = ("position", "wire", "seat", "line", "psd")  # sources of noise that are lengths
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def _scatter(noise: tuple[Noise, ...]) -> tuple[Scatter, str]:
     found = {n.source: n.found for n in noise}
     if JOINT in found:
         return Scatter(joint_rad=found[JOINT]), OF_JOINTS
-    return Scatter(target_m=max(found.get(source, 0.0) for source in IN_METRES)), OF_INSTRUMENT
+    return Scatter(target_m=max(found.get(source, 0.0) for source in LENGTHS)), OF_INSTRUMENT
 
 
 def _bootstrap(fitted: Fitted, rounds: int, rng: Generator) -> Bootstrap | None:

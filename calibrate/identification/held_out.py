@@ -6,7 +6,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import SPOTS
+from acquisition.recording.columns import SEAT, SPOTS
 from acquisition.recording.samples import Samples
 from calibrate.fit import Fit
 from calibrate.identification.result import Proven, Unseen
@@ -75,7 +75,7 @@ def places_of(samples: Samples) -> Ints:
     if SPOTS[0] in samples:
         lit = np.isfinite(samples.column(SPOTS[0]))
         place[lit] = samples.integers("placement", -1)[lit]
-    seat = samples.integers("seat", -1)
+    seat = samples.integers(SEAT, -1)
     seated = (place < 0) & (seat >= 0)
     place[seated] = seat[seated] + place.max(initial=0) + 1
     return place

@@ -7,27 +7,15 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
-from acquisition.recording.columns import ORIENTATION, POSITION, SPOTS
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.arms.belief import LINK_PLAUSIBLE
 from calibrate.converted_rig import rig_in_model
 from calibrate.errors import DataError
-from calibrate.fit_plan import FitPlan, InstrumentName
+from calibrate.fit_plan import FitPlan
 from calibrate.instruments import Instruments
 from calibrate.parameters import Parameter
-
-# Where a person finds the observations of an instrument in the file.
-COLUMNS = {
-    "dual-psd": SPOTS,
-    "point": SPOTS,
-    "position": POSITION,
-    "full-pose": POSITION,
-    "distance": POSITION,
-    "wire": ("wire_m",),
-    "seat": ("seat",),
-    "bar": ("bar", "bar_end"),
-}
+from calibrate.sensors.catalogue import SENSORS
 
 
 def rig_as_planned(rig: Rig, plan: FitPlan) -> Rig:
@@ -39,9 +27,8 @@ def samples_as_planned(samples: Samples, plan: FitPlan) -> Samples:
     """The samples without the columns of instruments that the plan leaves out."""
     if not plan.instruments:
         return samples
-    listed = {i.value: {*COLUMNS[i.value]} for i in InstrumentName}
-    listed[InstrumentName.FULL_POSE.value] |= {*ORIENTATION}
-    kept = set[str]().union(*(listed[i.value] for i in plan.instruments))
+    listed = {kind.name: {*kind.columns, *kind.further} for kind in SENSORS}
+    kept = set[str]().union(*(listed[name] for name in plan.instruments))
     dropped = set[str]().union(*listed.values()) - kept
     return Samples({name: c for name, c in samples.columns.items() if name not in dropped}, samples.n_joints)
 
@@ -50,7 +37,7 @@ def chosen_instruments(found: Instruments, plan: FitPlan) -> Instruments:
     """Those of the plan. DataError for one that the samples do not have."""
     if not plan.instruments:
         return found
-    wanted = [i.value for i in plan.instruments]
+    wanted = plan.instruments
     there = [m.name for m in found.weighting.measured]
     for name in wanted:
         if name not in there:

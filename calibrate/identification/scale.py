@@ -2,7 +2,10 @@
 
 from collections.abc import Iterable
 
-SCALELESS = {"seat"}  # a probe in cones: an arm half as large would sit in cones half as far apart
+from calibrate.sensors.catalogue import names_with
+from calibrate.sensors.kind import Trait
+
+SCALELESS = set(names_with(Trait.SCALELESS))  # cones: an arm half as large would sit in cones half as far apart
 
 
 def scale_alarms(instruments: Iterable[str]) -> tuple[str, ...]:

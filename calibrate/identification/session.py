@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from acquisition.recording.columns import SPOTS
 from acquisition.recording.rig_schema import Rig
@@ -13,25 +12,21 @@ from calibrate.arms.belief import FREE
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.eccentric import with_discs
 from calibrate.blunders.shots import Shots
-from calibrate.chain import Chain
 from calibrate.default_belief import links_of
-from calibrate.fit_plan import DEFAULT, FitPlan, InstrumentName
-from calibrate.identification.planned import COLUMNS, as_planned, chosen_instruments, samples_as_planned
+from calibrate.fit_plan import DEFAULT, FitPlan
+from calibrate.identification.planned import as_planned, chosen_instruments, samples_as_planned
 from calibrate.instruments import Instruments, instruments_of
-from calibrate.sample_table import Positions, Spots
-from calibrate.sensors.full_pose import FullPose
-from calibrate.sensors.position import Position
-from calibrate.sensors.seat import Seat
-from calibrate.sensors.wire import Wire
+from calibrate.sensors.catalogue import kind_of, names_with
+from calibrate.sensors.kind import Trait
 from calibrate.weighting import Measured, Weighting
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 About = dict[str, tuple[float, ...]]
 
-# Instruments that see a pose from outside. What they see beyond their noise is mostly what the model lacks, and it does
-# not grow as joint noise would: weights by estimated joint noise made the held-out error of a UR10 7 % worse.
-OUTSIDE = ("position", "full-pose", "wire")
+# A device beside the arm sees a pose from outside. What it sees beyond its noise is mostly what the model lacks, and
+# that does not grow as joint noise would: weights by estimated joint noise made the held-out error of a UR10 7 % worse.
+OUTSIDE = names_with(Trait.DEVICE)
 NEGLIGIBLE_RAD = 1e-9  # joint noise, where it is left to the instruments' own: far below any reading
 
 
@@ -42,16 +37,9 @@ def instruments_for_fit(rig: Rig, samples: Samples, plan: FitPlan = DEFAULT) -> 
 
     DataError where no row holds an observation, or where columns, rig and plan contradict each other.
     """
-    as_distance, as_lines = (i in plan.instruments for i in (InstrumentName.DISTANCE, InstrumentName.POINT))
     planned = samples_as_planned(samples, plan)
     links = links_of(rig) if rig.tolerance is not None or holds_spots(planned) else FREE
-    found = instruments_of(
-        planned,
-        rig,
-        arm=with_discs(arm_of(rig, links), rig),
-        positions=Positions.DISTANCE if as_distance else Positions.FRAME,
-        spots=Spots.POINT if as_lines else Spots.REFLECTION,
-    )
+    found = instruments_of(planned, rig, arm=with_discs(arm_of(rig, links), rig), asked=plan.instruments)
     found = as_planned(chosen_instruments(found, plan), plan)
     if all(m.name in OUTSIDE for m in found.weighting.measured):
         return replace(found, weighting=replace(found.weighting, joint_rad=NEGLIGIBLE_RAD))
@@ -70,7 +58,7 @@ def standing_at(weighting: Weighting, rows: Indices) -> Weighting:
 
 def columns_of(measured: Measured) -> tuple[str, ...]:
     """Where a person finds the observations of this instrument in the file."""
-    return COLUMNS[measured.name]
+    return kind_of(measured.name).columns
 
 
 def believed_sigma(measured: Measured) -> Floats:
@@ -84,7 +72,7 @@ def shots_of(measured: Measured, theta: Floats) -> Shots | None:
     None for pairs, whose rows have no reading of their own.
     """
     problem, chain = measured.problem, measured.problem.chain
-    if not isinstance(chain, Chain):
+    if measured.sample_rows.shape[1] > 1:
         return None
 
     def expect(observations: Indices, q_rad: Floats) -> Floats:
@@ -99,16 +87,7 @@ def about_of(weighting: Weighting) -> About:
     """Frames and points that the corrections of a fit are about; names as in model_file.ModelFile.about."""
     out: About = {}
     for measured in weighting.measured:
-        sensor = getattr(measured.problem.chain, "sensor", None)
-        target = getattr(sensor, "target", None)
-        if target is not None:
-            out["tool"] = tuple(target.point_m.tolist())
-        if isinstance(sensor, FullPose):
-            turn = Rotation.from_matrix(sensor.R_flange_target).as_rotvec()
-            out["tool"] = (*sensor.target.point_m.tolist(), *turn.tolist())
-        if isinstance(sensor, FullPose | Position | Wire):
-            T = sensor.device.T_base_device
-            out["device"] = (*T[:3, 3].tolist(), *Rotation.from_matrix(T[:3, :3]).as_rotvec().tolist())
-        if isinstance(sensor, Seat):
-            out |= {f"seat{k}": tuple(point.tolist()) for k, point in sensor.points.start_m.items()}
+        for name, place in measured.problem.chain.sensor.about().items():
+            if len(place) >= len(out.get(name, ())):  # of a target's place and orientation, whoever sees both
+                out[name] = place
     return out

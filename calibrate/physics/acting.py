@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from acquisition.recording.columns import ORIENTATION, POSITION, SPOTS
 from acquisition.recording.samples import Samples
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.serial import SerialArm
@@ -21,7 +20,6 @@ from calibrate.diagnose.driver_values import drivers_at, readout_at, temperature
 from calibrate.diagnose.extended import alike, rearranged
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.ported import perturbed_frames
-from calibrate.dual_psd_rig import dual_psd_of
 from calibrate.effects.catalogue import EFFECTS
 from calibrate.effects.drivers import Drivers, Readout
 from calibrate.effects.form import Form
@@ -30,7 +28,8 @@ from calibrate.effects.ports import Perturbation, Port
 from calibrate.effects.term import Shape, Term
 from calibrate.errors import DataError
 from calibrate.physics.records import Effect
-from calibrate.predict import TIP, Predictor, readings
+from calibrate.predict import Predictor, readings
+from calibrate.sensors.catalogue import kind_of
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +37,6 @@ TURNS = 3  # drivers follow the frames that the effects have moved; each turn le
 STEP = 1e-3  # of an inner value, for its difference quotient
 SAME = 1e-6  # of a basis: then the exact formula has the same meaning as in the session
 CARRIED = 0.05  # of an effect's size: more may not be lost where its columns are chosen anew (diagnose/extended.py)
-MOVED_COLUMNS = {"dual-psd": SPOTS, "position": POSITION, "full-pose": (*POSITION, *ORIENTATION), "wire": ("wire_m",)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,27 +248,19 @@ def _beyond(carried: Carried, old: Drivers, new: Drivers) -> tuple[NDArray[np.bo
 
 def _readouts(predictor: Predictor, samples: Samples, frames: Floats, by: Perturbation) -> dict[str, Readout]:
     """Of the instruments that the model was fitted to, as predicted without their own errors of reading."""
-    asked = {name for name in predictor.instruments if name != "bar"}
-    read = readings(predictor, frames[:, -1], samples, asked)
+    kinds = [kind for kind in map(kind_of, predictor.instruments) if kind.reads]
+    read = readings(predictor, frames[:, -1], samples, [kind.name for kind in kinds])
     out: dict[str, Readout] = {}
-    for name in asked:
-        names = TIP if name == "seat" else MOVED_COLUMNS.get(name, ())
-        if not names:
-            continue
-        table = np.stack([read[c] for c in names], axis=1)
-        if name in by.readings:
-            table = table + by.readings[name]
-        rows = np.flatnonzero(np.isfinite(table).all(axis=1))
-        sensor, phi = None, np.zeros(0)
-        if name == "dual-psd":
-            used = [samples.integers(c, 0)[rows] for c in ("placement", "first_psd")]
-            sensor = dual_psd_of(predictor.rig, used[0], used[1])
-            phi = predictor.values_of(sensor.parameters)
-        out[name] = readout_at(name, sensor, phi, table[rows], rows, frames)
-        if name == "seat":
-            seat = samples.integers("seat", 0)
-            seen = seat > 0
-            out[name] = Readout(name, np.where(seen[:, None], table, np.nan), seen, place=seat)
+    for kind in kinds:
+        table = np.stack([read[c] for c in kind.reads], axis=1)
+        if kind.name in by.readings:
+            table = table + by.readings[kind.name]
+        place = None if kind.place is None else kind.place(samples)
+        there = np.isfinite(table).all(axis=1)
+        rows = np.flatnonzero(there if place is None else there & (place > 0))
+        sensor, phi = (None, np.zeros(0)) if kind.used is None else kind.used(predictor, samples, rows)
+        found = readout_at(kind.name, sensor, phi, table[rows], rows, frames)
+        out[kind.name] = found if found.place is not None else replace(found, place=place)
     return out
 
 
@@ -278,6 +268,6 @@ def moved_columns(by: Perturbation) -> Mapping[str, Floats]:
     """Column -> (row,) that errors of reading add to what an instrument reads."""
     out: dict[str, Floats] = {}
     for name, amount in by.readings.items():
-        for column, values in zip(MOVED_COLUMNS.get(name, ()), amount.T, strict=False):
+        for column, values in zip(kind_of(name).reads, amount.T, strict=False):
             out[column] = out.get(column, np.zeros(len(values))) + values
     return out

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording.columns import SEAT
 from acquisition.recording.samples import Samples
 from calibrate.diagnose.driver_values import moves_of, temperatures_of
 from calibrate.effects.drivers import Drivers
@@ -17,7 +18,7 @@ from calibrate.effects.drivers import Drivers
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-USED_AS = ("placement", "first_psd", "seat")  # how the instrument stood: without it a row has no reading to predict
+USED_AS = ("placement", "first_psd", SEAT)  # how the instrument stood: without it a row has no reading to predict
 BY_JOINT = {
     "approach": "approach{}",
     "last_move": "last_move{}_rad",

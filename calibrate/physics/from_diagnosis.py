@@ -46,10 +46,11 @@ from calibrate.model_file import (
     covariance_record,
 )
 from calibrate.parameters import Parameter, plausible_sizes, priors, without_assumed
-from calibrate.physics.acting import MOVED_COLUMNS, drivers_under, listed, range_of
+from calibrate.physics.acting import drivers_under, listed, range_of
 from calibrate.physics.conditions import kept_conditions, needed_columns, recorded_conditions
 from calibrate.physics.records import Effect, EffectCurve, EffectParameter, SessionRecord
-from calibrate.predict import TIP, Predictor
+from calibrate.predict import Predictor
+from calibrate.sensors.catalogue import kind_of
 
 Floats = NDArray[np.float64]
 
@@ -340,7 +341,7 @@ def _noise(fit: Fitted) -> Fields:
         white = np.linalg.solve(np.linalg.cholesky(scatter.covariance), misfit[..., None])[..., 0]
         size = larger * _normal_size(np.sum(white**2, axis=1), misfit.shape[1])
         sigma = np.sqrt(size * np.median(np.diagonal(scatter.covariance, axis1=1, axis2=2), axis=0))
-        names = TIP if m.name == "seat" else MOVED_COLUMNS.get(m.name, (m.name,))
+        names = kind_of(m.name).reads or (m.name,)
         out |= {name: float(s) for name, s in zip(names, sigma, strict=True)}
     return out
 

@@ -2,28 +2,22 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.recording import Recording
-from calibrate.chain import Chain
 from calibrate.errors import DataError
 from calibrate.fit_plan import DEFAULT, parse_plan
 from calibrate.identification.planned import rig_as_planned, samples_as_planned
 from calibrate.identification.session import instruments_for_fit, standing_at
 from calibrate.model_file import ModelFile
 from calibrate.parameters import index_of, start_values
-from calibrate.rigid import transform
-from calibrate.sensors.pair import PairChain
 from calibrate.variance import VarianceFactors, as_believed
 from calibrate.weighting import Measured, Weighting
 
 Floats = NDArray[np.float64]
 About = Mapping[str, tuple[float, ...]]
-
-POSE = 6  # numbers of a frame: origin and rotation vector
 
 
 def weighting_of(recording: Recording, model: ModelFile) -> Weighting:
@@ -73,26 +67,8 @@ def noise_of(weighting: Weighting, model: ModelFile) -> VarianceFactors:
 
 def _placed(measured: Measured, about: About) -> Measured:
     """The instrument with its target, device and seats where the model's corrections start from."""
-    chain = measured.problem.chain
-    if not isinstance(chain, Chain | PairChain):
-        return measured
-    sensor: Any = chain.sensor
-    known = set(vars(sensor))
-    changed: dict[str, object] = {}
-    if "target" in known and "tool" in about:
-        changed["target"] = replace(sensor.target, point_m=np.array(about["tool"][:3]))
-        if "R_flange_target" in known and len(about["tool"]) == POSE:
-            changed["R_flange_target"] = transform((0.0, 0.0, 0.0), about["tool"][3:])[:3, :3]
-    if "device" in known and "device" in about:
-        place = transform(about["device"][:3], about["device"][3:])
-        changed["device"] = replace(sensor.device, T_base_device=place)
-    if "points" in known:
-        points = sensor.points
-        start_m = {k: np.array(about.get(f"{points.kind}{k}", at)) for k, at in points.start_m.items()}
-        changed["points"] = replace(points, start_m=start_m)
-    if not changed:
-        return measured
-    return replace(measured, problem=replace(measured.problem, chain=replace(chain, sensor=replace(sensor, **changed))))
+    problem = measured.problem
+    return replace(measured, problem=replace(problem, chain=problem.chain.placed(about)))
 
 
 def _strangers(recording: Recording, why: str) -> DataError:

@@ -4,17 +4,18 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from calibrate.identifiability import Identifiability, in_words
+from calibrate.sensors.catalogue import FRAMES
 
 OWNERS = {
     "device": "where the measuring device stands",
     "tool": "where the target sits on the flange",
-    "seat": "where the cones are",
+    **{frame.prefix: frame.where for frame in FRAMES},
     "placement": "where the fixture stands",
     "laser mount": "how the laser sits on the flange",
     "psd1": "the gains of PSD 1",
     "psd2": "how PSD 2 sits to PSD 1",
 }
-NUMBERED = {"seat": "where cone", "placement": "where fixture place"}  # one of them alone
+NUMBERED = {**{f.prefix: f.one for f in FRAMES if f.one}, "placement": "where fixture place"}  # one of them alone
 
 
 class Together(Protocol):

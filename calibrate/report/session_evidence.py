@@ -17,6 +17,7 @@ from calibrate.physics.taken_out import without_effects
 from calibrate.problem import Problem
 from calibrate.report.as_modelled import noise_of, values_of, weighting_of
 from calibrate.report.quantities import angle, length
+from calibrate.sensors.catalogue import kind_of
 from calibrate.uncertainty.redundancy import spare_readings
 from calibrate.weighting import Weighting
 
@@ -24,16 +25,6 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 SAME = 1e-3  # of the rms in the model: beyond, the readings are not those that were fitted
-
-SAID = {
-    "dual-psd": "Spots on the dual PSD",
-    "position": "Measured positions",
-    "full-pose": "Measured poses",
-    "distance": "Distances between positions",
-    "wire": "Wire lengths",
-    "seat": "Probe in the cones",
-    "bar": "Bar lengths",
-}
 
 
 @dataclass(frozen=True)
@@ -50,7 +41,7 @@ class Readings:
 
     @property
     def title(self) -> str:
-        said = SAID.get(self.instrument, self.instrument)
+        said = kind_of(self.instrument).title
         return f"{said}, {self.quantity}" if self.quantity else said
 
     @property
@@ -152,10 +143,8 @@ def _readings(
         return ()
     old, new = (block.misfit(problem.of_block(index, theta)) for theta in (before, after))
     whitened = block.residual(problem.of_block(index, after)).reshape(new.shape)
-    parts = [("", "m", slice(None))]
-    if measured.name == "full-pose":
-        parts = [("position", "m", slice(0, 3)), ("orientation", "rad", slice(3, 6))]
+    rows, every = measured.sample_rows, kind_of(measured.name).quantities
     return tuple(
-        Readings(measured.name, what, unit, measured.sample_rows, old[:, k], new[:, k], whitened[:, k])
-        for what, unit, k in parts
+        Readings(measured.name, q.name, q.unit, rows, old[:, q.part], new[:, q.part], whitened[:, q.part])
+        for q in every
     )

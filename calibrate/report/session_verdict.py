@@ -12,6 +12,7 @@ from calibrate.report.patterns import Pattern, patterns
 from calibrate.report.quantities import significant
 from calibrate.report.session_evidence import SessionEvidence
 from calibrate.report.verdict import AGAIN, MORE_POSES, NOISIER, UNCHECKED, WORSE_UNSEEN, Doubt, Trust, Verdict
+from calibrate.sensors.catalogue import kind_of
 from calibrate.uncertainty.chi_square import Alarm
 from calibrate.uncertainty.redundancy import checks_nothing
 
@@ -19,16 +20,6 @@ MANY_LEFT_OUT = 0.05  # of the rows: beyond, it is worth asking what went wrong 
 NO_BETTER = 0.95  # of the error as drawn on unseen rows: above, the identification has gained nothing
 WORTH_SAYING = 0.1  # of what remains: a pattern of less changes no decision
 FAILED = (Status.NOT_FINITE.name, Status.OUT_OF_STEPS.name, Status.STALLED.name)
-
-NOUNS = {
-    "dual-psd": "spots",
-    "position": "positions",
-    "full-pose": "positions",
-    "distance": "distances",
-    "wire": "wire lengths",
-    "seat": "cones",
-    "bar": "bar lengths",
-}
 
 
 def session_verdict(evidence: SessionEvidence) -> Verdict:
@@ -68,7 +59,7 @@ def patterns_of(evidence: SessionEvidence, index: int) -> tuple[Pattern, ...]:
 
 def _how_good(evidence: SessionEvidence, proof: UnseenRows | None) -> str:
     readings = evidence.readings[0]
-    noun = NOUNS.get(readings.instrument, readings.instrument)
+    noun = kind_of(readings.instrument).noun
     if proof is None:
         after, before = (float(np.sqrt(np.mean(e**2))) for e in (readings.error_after, readings.error_before))
         return (

@@ -8,9 +8,11 @@ from calibrate.report.session_evidence import SessionEvidence
 from calibrate.report.workspace.known_arm import KnownArm, limits_of, scatter_of, unpredicted, whole_covariance
 from calibrate.report.workspace.pictures import Measured
 from calibrate.report.workspace.room import target_at
+from calibrate.sensors.catalogue import names_with
+from calibrate.sensors.kind import Trait
 from calibrate.unseen_along import analyse_along
 
-IN_SPACE = ("position", "full-pose")  # instruments that say where the target is
+IN_SPACE = names_with(Trait.IN_SPACE)  # instruments that measure where the target is
 NOT_IN_SPACE = (
     "No measured errors are drawn: no instrument of this session says where the target is; errors of the readings are "
     "in the next chapter."

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from calibrate.model_file import UnseenRows
 from calibrate.report.elements import Html, table, tag
 from calibrate.report.quantities import fixed, length
-from calibrate.report.session_evidence import SAID
+from calibrate.sensors.catalogue import kind_of
 
 
 def unseen_rows(found: Sequence[UnseenRows], unproven: Sequence[str]) -> list[Html]:
@@ -19,7 +19,7 @@ def unseen_rows(found: Sequence[UnseenRows], unproven: Sequence[str]) -> list[Ht
 
 
 def _proof(proof: UnseenRows) -> tuple[str, ...]:
-    name = SAID.get(proof.instrument, proof.instrument)
+    name = kind_of(proof.instrument).title
     return (
         proof.split,
         name,

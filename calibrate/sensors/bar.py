@@ -1,14 +1,54 @@
-"""Which rows of a session form lengths: both ends of a bar, and consecutive poses of a tracker without a frame."""
+"""Instrument: a bar of known length; the probe sits in its ends in turn, and consecutive rows form one length."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording.columns import BAR, BAR_END
+from acquisition.recording.rig_schema import Rig
+from acquisition.recording.samples import Samples
+from calibrate.blunders.least_distance import least_distance
+from calibrate.blunders.witness import Otherwise, Strain, Witness, drawn_point_m, filled, thinned
 from calibrate.errors import DataError
+from calibrate.sample_table import SampleTable
+from calibrate.sensors.kind import SensorKind, Trait
+from calibrate.sensors.pair import PairChain
+from calibrate.sensors.seat import NOISE, predicted_tips, seat_sigma_m
+from calibrate.sensors.tip_distance import TipDistance
+from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-SHORTEST_M = 1e-3  # shorter distances hardly depend on the arm, and one of zero has no direction
+FEWEST_PAIRS = 15  # one number each; the target has three unknowns
+
+
+@dataclass(frozen=True)
+class BarWitness:
+    """The target is found; a drawn one should not have to move."""
+
+    q_rad: Floats  # (2 pair, joint) all ends a, then all ends b
+    length_m: Floats  # (pair,)
+    point_m: Floats | None  # (3,) target as drawn in the flange frame
+
+    def strain(self, T_base_flange: Floats) -> Strain:
+        a, b = np.split(T_base_flange, 2)
+        turns, apart = b[:, :3, :3] - a[:, :3, :3], b[:, :3, 3] - a[:, :3, 3]
+        drawn = np.zeros(3) if self.point_m is None else self.point_m
+
+        def rows(shift: Floats) -> tuple[Floats, Floats]:
+            span = turns @ (drawn + shift) + apart
+            length = np.maximum(np.linalg.norm(span, axis=1), 1e-9)
+            return length - self.length_m, np.einsum("ni,nij->nj", span / length[:, None], turns)
+
+        shift, distance = least_distance(rows, np.zeros(3))
+        return Strain(float(np.median(distance)), 0.0 if self.point_m is None else float(np.linalg.norm(shift)))
+
+    def otherwise(self) -> Iterator[Otherwise]:
+        """The length stands in the rig, not in the samples."""
+        yield from ()
 
 
 def bar_pairs(rows: Indices, bar: NDArray[np.int64], end: NDArray[np.str_]) -> Indices:
@@ -34,26 +74,48 @@ def bar_pairs(rows: Indices, bar: NDArray[np.int64], end: NDArray[np.str_]) -> I
     return np.array(pairs, dtype=np.intp).reshape(-1, 2)
 
 
-def consecutive_pairs(rows: Indices, position_m: Floats) -> tuple[Indices, Floats]:
-    """(pair, 2) neighbouring rows and their measured distances (pair, 1), from the positions (row, 3) in any frame.
+def _build(table: SampleTable) -> Measured | None:
+    rows = table.filled(BAR)
+    if len(rows) == 0:
+        return None
+    if BAR_END not in table.samples:
+        raise DataError("samples: column bar without bar_end; say which end, a or b, each row is")
+    bar = table.samples.integers(BAR, 0)
+    pairs = bar_pairs(rows, bar[rows], table.samples.columns[BAR_END][rows])
+    lengths = {k: b.length_m for k, b in table.rig.bars.items()}
+    unknown = set(bar[rows].tolist()) - set(lengths)
+    if unknown:
+        raise DataError(f"samples: bar {min(unknown)} is not in the rig; add a [[bar]] with its length")
+    length_m = np.array([[lengths[int(k)]] for k in bar[pairs[:, 0]]])
+    own = {NOISE.name: np.full((len(pairs), 1), np.sqrt(2.0) * seat_sigma_m(table.rig))}
+    return table.measured(KIND.name, PairChain(table.arm, TipDistance(table.target)), pairs, length_m, own)
 
-    Source: patent CN114523474B, step 4. Pairs closer than SHORTEST_M are left out. DataError where none remains.
-    """
-    length_m = np.linalg.norm(np.diff(position_m, axis=0), axis=1)
-    far = np.flatnonzero(length_m > SHORTEST_M)
-    if len(far) == 0:
-        raise DataError(
-            f"distances: {len(rows)} positions, none {SHORTEST_M} m or more from the one before; move the arm"
-        )
-    return np.stack([rows[far], rows[far + 1]], axis=1), length_m[far, None]
+
+def _witness(rig: Rig, samples: Samples, q_rad: Floats) -> Witness | None:
+    """Pairs of neighbouring rows that are ends of one bar; odd rows are told when the instrument is built."""
+    rows = filled(samples, BAR)
+    if len(rows) < 2 or BAR_END not in samples:
+        return None
+    bar, end = samples.integers(BAR, 0)[rows], samples.columns[BAR_END][rows]
+    rows, bar = rows[: len(rows) // 2 * 2].reshape(-1, 2), bar[: len(rows) // 2 * 2].reshape(-1, 2)
+    pair = (bar[:, 0] == bar[:, 1]) & (end[0 : 2 * len(bar) : 2] != end[1 : 2 * len(bar) : 2])
+    pair &= np.isin(bar[:, 0], list(rig.bars))
+    kept = thinned(np.flatnonzero(pair))
+    if len(kept) < FEWEST_PAIRS:
+        return None
+    length_m = np.array([rig.bars[int(k)].length_m for k in bar[kept, 0]])
+    return BarWitness(q_rad[np.concatenate([rows[kept, 0], rows[kept, 1]])], length_m, drawn_point_m(rig))
 
 
-def shared_correlation(position_m: Floats, pairs: Indices) -> Floats:
-    """(pair,) correlation of each distance's noise with the next one's by the position that both share; the last is 0.
-
-    Of equal noise: distance i moves by u_i . e_b - u_i . e_a, so neighbours have -u_i . u_(i+1) of a variance of 2.
-    """
-    span = position_m[pairs[:, 1]] - position_m[pairs[:, 0]]
-    along = span / np.linalg.norm(span, axis=1, keepdims=True)
-    touching = pairs[:-1, 1] == pairs[1:, 0]
-    return np.append(np.where(touching, -0.5 * np.sum(along[:-1] * along[1:], axis=1), 0.0), 0.0)
+KIND = SensorKind(
+    name="bar",
+    columns=(BAR, BAR_END),
+    title="Bar lengths",
+    noun="bar lengths",
+    noise=(NOISE,),
+    traits=frozenset({Trait.TARGET, Trait.TOUCHED}),
+    asks=(BAR,),
+    build=_build,
+    witness=_witness,
+    predict=predicted_tips,
+)

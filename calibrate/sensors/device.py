@@ -3,13 +3,16 @@
 Corrections are shifts along, and a rotation vector about, the device's own believed axes.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from calibrate.parameters import Parameter
-from calibrate.rigid import pose_offset, pose_offset_twists
+from calibrate.rigid import pose_offset, pose_offset_twists, transform
+from calibrate.sensors.model import About
 from calibrate.sensors.target import point_by_twist
 
 Floats = NDArray[np.float64]
@@ -26,6 +29,7 @@ class Device:
 
     T_base_device: Floats  # (4, 4)
     prior: tuple[float, float] | None = None
+    name: str = "device"  # first part of the names of its parameters
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -52,8 +56,18 @@ class Device:
         R = self.T_base_device_at(deviation)[:3, :3]
         return -(R.T @ point_by_twist(point_m) @ pose_offset_twists(self.T_base_device, deviation))
 
+    def about(self) -> About:
+        """Origin and rotation vector in the base that the corrections start from."""
+        T = self.T_base_device
+        return {self.name: (*T[:3, 3].tolist(), *Rotation.from_matrix(T[:3, :3]).as_rotvec().tolist())}
+
+    def placed(self, about: About) -> Self:
+        """The same where a model's corrections start from."""
+        found = about.get(self.name)
+        return self if found is None else replace(self, T_base_device=transform(found[:3], found[3:]))
+
     def _parameter(self, i: int, axis: str) -> Parameter:
         unit, plausible = ("m", PLAUSIBLE_M) if i < 3 else ("rad", PLAUSIBLE_RAD)
         if self.prior is None:
-            return Parameter(f"device.{axis}", unit, plausible)
-        return Parameter(f"device.{axis}", unit, max(plausible, self.prior[i // 3]), prior=self.prior[i // 3])
+            return Parameter(f"{self.name}.{axis}", unit, plausible)
+        return Parameter(f"{self.name}.{axis}", unit, max(plausible, self.prior[i // 3]), prior=self.prior[i // 3])

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -17,6 +18,7 @@ from calibrate.parameters import Parameter
 from calibrate.rigid import adjoint, inverse, pose_offset, pose_offset_twists
 from calibrate.sensors import laser, optics
 from calibrate.sensors.laser import LaserMount
+from calibrate.sensors.model import Standing, Usage
 from calibrate.sensors.optics import Strike
 
 Floats = NDArray[np.float64]
@@ -31,6 +33,7 @@ AXES = ("x", "y", "z", "roll", "pitch", "yaw")  # shifts, then rotation vector, 
 GAINS = ("psd1.gain_x", "psd1.gain_y", "psd2.gain_x", "psd2.gain_y")
 PAIR_FIRST = laser.N_PARAMETERS + len(GAINS)  # column of PSD 2 in PSD 1
 N_FIXED = PAIR_FIRST + len(AXES)  # columns before the placements
+AIMED = 0.8  # of the half face: where new poses are brought to
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ class PairBelief:
 
 
 @dataclass(frozen=True)
-class DualPsd:
+class DualPsd(Usage):
     """Sensor over a data set in which pose j used `placement[j]` and struck `first_psd[j]` first.
 
     Parameters: laser mount 4, PSD gains 4 and PSD 2 in PSD 1 6 (held unless a prior frees them), each placement 6.
@@ -117,6 +120,25 @@ class DualPsd:
     def lit(self, phi: Floats, T_base_flange: Floats) -> NDArray[np.bool_]:
         """(pose, 2) True where light falls on the face of PSD 1, PSD 2."""
         return optics.is_lit(self.strike(phi, T_base_flange), self.first_psd, self.fixture.half_size_m)
+
+    def standing(self, phi: Floats, T_base_flange: Floats) -> Standing:
+        facing = np.clip(np.abs(self.strike(phi, T_base_flange).facing), 0.0, 1.0)
+        return Standing(np.arccos(facing), self.leans(phi, T_base_flange), self.first_psd, self.placement)
+
+    def spot(self) -> Ints:
+        return 2 * self.placement + self.first_psd
+
+    def aims(self, k: int, rng: Generator) -> Floats:
+        """Random points of both faces."""
+        edge_m = AIMED * self.fixture.half_size_m
+        return rng.uniform(-edge_m, edge_m, (len(self.placement), k))
+
+    def met(self, phi: Floats, T_base_flange: Floats) -> NDArray[np.bool_]:
+        return np.asarray(self.lit(phi, T_base_flange).all(axis=1), dtype=np.bool_)
+
+    def beam(self, phi: Floats, T_base_flange: Floats) -> tuple[Floats, Floats]:
+        light = self.mount.beam(phi[:4], T_base_flange)
+        return light.origin_m, light.direction
 
     def expect(self, phi: Floats, T_base_flange: Floats) -> Floats:
         return self.strike(phi, T_base_flange).spots_m.reshape(-1, 4) * phi[4:8]

@@ -5,6 +5,7 @@ difference of two rotation vectors would break near half a turn. So `expect` nee
 observation to compare with is (x, y, z, 0, 0, 0).
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -12,19 +13,33 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from acquisition.recording.columns import ORIENTATION, POSITION
+from acquisition.recording.rig_schema import Rig
+from acquisition.recording.samples import Samples
+from calibrate.blunders.finding import BlunderKind
+from calibrate.blunders.least_distance import weights
+from calibrate.blunders.rough_fit import turn_between
+from calibrate.blunders.witness import Otherwise, Strain, Witness, filled, stacked, thinned
+from calibrate.chain import Chain
 from calibrate.parameters import Parameter
 from calibrate.rigid import cross_matrix, left_jacobian
+from calibrate.sample_table import SampleTable
 from calibrate.sensors.device import Device
+from calibrate.sensors.kind import Columns, Found, NoiseSource, Quantity, SensorKind, Trait
+from calibrate.sensors.model import About, Usage
+from calibrate.sensors.position import NOISE, device_of, position_sigma_m, predicted_positions
 from calibrate.sensors.target import Target, point_by_twist
+from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 
+ORIENTATION_BELIEVED_RAD = 1e-4  # a 6-D target at a tracker is stated to 0.01 deg
 TURN_PLAUSIBLE_RAD = 0.1  # how a target is screwed on, against the drawing
 TURNS = ("roll", "pitch", "yaw")
 
 
 @dataclass(frozen=True)
-class FullPose:
+class FullPose(Usage):
     """Observed at a pose: x, y, z (m) and turn from the observed to the expected orientation (rad).
 
     Parameters: target 6 (point, then rotation vector of its own axes in the flange frame), device 6.
@@ -40,8 +55,22 @@ class FullPose:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        turns = tuple(Parameter(f"tool.{a}", "rad", self.turn_plausible_rad) for a in TURNS)
+        turns = tuple(Parameter(f"{self.target.name}.{a}", "rad", self.turn_plausible_rad) for a in TURNS)
         return self.target.parameters + turns + self.device.parameters
+
+    def about(self) -> About:
+        turn = Rotation.from_matrix(self.R_flange_target).as_rotvec()
+        return {self.target.name: (*self.target.point_m.tolist(), *turn.tolist()), **self.device.about()}
+
+    def placed(self, about: About) -> Self:
+        tool = about.get(self.target.name, ())
+        R = Rotation.from_rotvec(tool[3:]).as_matrix() if len(tool) == 6 else self.R_flange_target
+        return replace(self, target=self.target.placed(about), device=self.device.placed(about), R_flange_target=R)
+
+    def facing(self, expected: Floats) -> Self:
+        """A turn from another pose's orientation may pass half a turn."""
+        turn = Rotation.from_rotvec(expected[:, 3:]).as_matrix()
+        return replace(self, R_device_target=turn @ self.R_device_target)
 
     def select(self, rows: NDArray[np.intp]) -> Self:
         return replace(self, R_device_target=self.R_device_target[rows])
@@ -90,3 +119,144 @@ def inverse_left_jacobian(rotation_rad: Floats) -> Floats:
     factor = np.where(small, 1.0 / 12.0 + angle**2 / 720.0, 1.0 / safe**2 - 1.0 / (2.0 * safe * np.tan(safe / 2.0)))
     cross_r = cross_matrix(rotation_rad)
     return np.eye(3) - cross_r / 2.0 + factor[:, None, None] * (cross_r @ cross_r)
+
+
+SAID_COLUMNS = "columns rx_rad, ry_rad, rz_rad"
+FEWEST_POSES = 12  # two rotations have six unknowns
+LEVER_M = 0.2  # an angle counts by what it moves at this distance: a hand's length
+ROUNDS = 10  # compared are factors, not digits
+
+
+@dataclass(frozen=True)
+class OrientationWitness:
+    """R_device_target = A R_base_flange X with unknown rotations A of the device and X of the target's mount."""
+
+    q_rad: Floats  # (pose, joint)
+    rotation_rad: Floats  # (pose, 3) rotation vectors as written
+    columns: str = SAID_COLUMNS
+
+    def strain(self, T_base_flange: Floats) -> Strain:
+        """A and X as mean rotations in turn, from the start that the turns between poses give."""
+        flange, seen = T_base_flange[:, :3, :3], Rotation.from_rotvec(self.rotation_rad).as_matrix()
+        device = turn_between(_steps(flange), _steps(seen), np.ones(len(seen) - 1))  # their axes differ by A
+        weight, angle = np.ones(len(seen)), np.zeros(len(seen))
+        for _ in range(ROUNDS):
+            mount = _nearest(np.einsum("n,nji,njk->ik", weight, device @ flange, seen))
+            device = _nearest(np.einsum("n,nij,nkj->ik", weight, seen, flange @ mount))
+            apart = np.linalg.norm(device @ flange @ mount - seen, axis=(1, 2))
+            angle = 2.0 * np.arcsin(np.minimum(apart / np.sqrt(8.0), 1.0))
+            weight = weights(angle)
+        return Strain(LEVER_M * float(np.median(angle)), 0.0)
+
+    def otherwise(self) -> Iterator[Otherwise]:
+        """As `written_otherwise`."""
+        for told, _ in self.written_otherwise():
+            yield told
+
+    def written_otherwise(self) -> Iterator[tuple[Otherwise, "OrientationWitness"]]:
+        """Degrees, and the orientation of the device in the target instead of the other way round."""
+        other = replace(self, rotation_rad=np.radians(self.rotation_rad))
+        yield (
+            Otherwise(
+                BlunderKind.DEGREES,
+                self.columns,
+                "rotation vectors in degrees",
+                "write radians (degrees times pi/180)",
+                other,
+            ),
+            other,
+        )
+        other = replace(self, rotation_rad=-self.rotation_rad)
+        yield (
+            Otherwise(
+                BlunderKind.INVERTED_ROTATION,
+                self.columns,
+                "rotation vectors of the device in the target's axes",
+                "change the sign of all three columns: they lead from the device to the target",
+                other,
+            ),
+            other,
+        )
+
+
+def _steps(R: Floats) -> Floats:
+    """(pose - 1, 3) rotation vectors from each of these (pose, 3, 3) to the next."""
+    return Rotation.from_matrix(R[1:] @ np.swapaxes(R[:-1], 1, 2)).as_rotvec()
+
+
+def _nearest(matrix: Floats) -> Floats:
+    """The rotation (3, 3) nearest to a weighted sum of rotations: their mean (Moakher, SIAM J. Matrix Anal. 24)."""
+    U, _, Vt = np.linalg.svd(matrix)
+    return np.asarray(U @ np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))]) @ Vt, dtype=np.float64)
+
+
+def mounted(T_base_flange: Floats, R_base_device: Floats, rotation_rad: Floats) -> Floats:
+    """(3, 3) mean orientation of the target on the flange, from rotation vectors (pose, 3) in the device's axes."""
+    flange = Rotation.from_matrix(T_base_flange[:, :3, :3])
+    seen = Rotation.from_matrix(R_base_device) * Rotation.from_rotvec(rotation_rad)
+    return (flange.inv() * seen).mean().as_matrix()
+
+
+def _build(table: SampleTable) -> Measured | None:
+    rows = table.filled(*POSITION, *ORIENTATION)
+    if len(rows) == 0:
+        return None
+    seen = table.stacked(ORIENTATION)[rows]
+    device = table.device().T_base_device if table.alignment is None else table.alignment.T_a_b
+    mount = mounted(table.T_base_flange[rows], device[:3, :3], seen)
+    sensor = FullPose(table.target, table.device(), Rotation.from_rotvec(seen).as_matrix(), mount)
+    observed, sigma, turn = np.zeros((len(rows), 6)), np.zeros((len(rows), 6)), np.zeros((len(rows), 6))
+    observed[:, :3], sigma[:, :3] = table.position_m[rows], position_sigma_m(table.rig)
+    turn[:, 3:] = ORIENTATION_BELIEVED_RAD
+    own = dict(zip((source.name for source in KIND.noise), (sigma, turn), strict=True))
+    return table.measured(KIND.name, Chain(table.arm, sensor), rows, observed, own)
+
+
+def _witness(rig: Rig, samples: Samples, q_rad: Floats) -> Witness | None:
+    """The turning half: positions have a witness of their own. Which way the target sits on the flange is found."""
+    del rig
+    rows = thinned(filled(samples, *POSITION, *ORIENTATION))
+    if len(rows) < FEWEST_POSES:
+        return None
+    return OrientationWitness(q_rad[rows], stacked(samples, ORIENTATION)[rows])
+
+
+def predicted_turns(R_device_target: Floats, samples: Samples, names: tuple[str, ...] = ORIENTATION) -> Columns:
+    """Orientations (row, 3, 3) as rotation vectors under the names of columns, near the observed ones where any are."""
+    vectors = Rotation.from_matrix(R_device_target).as_rotvec()
+    if all(name in samples for name in names):
+        vectors = _nearer_form(vectors, stacked(samples, names))
+    return dict(zip(names, vectors.T, strict=True))
+
+
+def _predict(found: Found, T_base_flange: Floats, samples: Samples) -> Columns:
+    turns = device_of(found)[:3, :3].T @ T_base_flange[:, :3, :3] @ found.turn_of_target()
+    return predicted_positions(found, T_base_flange, samples) | predicted_turns(turns, samples)
+
+
+def _nearer_form(vectors: Floats, observed: Floats) -> Floats:
+    """(row, 3) the same rotations: of turns near half a turn the vector that is next to the observed one.
+
+    A turn by an angle about an axis is one by the angle less 2 pi about the same axis.
+    """
+    angle = np.linalg.norm(vectors, axis=1, keepdims=True)
+    turned_back = vectors * (1.0 - 2.0 * np.pi / np.maximum(angle, np.finfo(float).eps))
+    nearer = np.linalg.norm(turned_back - observed, axis=1) < np.linalg.norm(vectors - observed, axis=1)
+    return np.where(nearer[:, None], turned_back, vectors)
+
+
+KIND = SensorKind(
+    name="full-pose",
+    columns=POSITION,
+    further=ORIENTATION,
+    title="Measured poses",
+    noun="positions",
+    quantities=(Quantity("position", "m", 0, 3), Quantity("orientation", "rad", 3, 6)),
+    noise=(NOISE, NoiseSource("orientation", "rad")),
+    traits=frozenset({Trait.TARGET, Trait.DEVICE, Trait.IN_SPACE, Trait.ANGLE_ENCODERS}),
+    reads=(*POSITION, *ORIENTATION),
+    asks=ORIENTATION,
+    build=_build,
+    witness=_witness,
+    predict=_predict,
+)

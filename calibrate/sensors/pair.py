@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from calibrate.arms.model import KinematicModel
 from calibrate.parameters import Parameter
+from calibrate.sensors.model import About, Used
 
 Floats = NDArray[np.float64]
 
 
-class PairSensor(Protocol):
+class PairSensor(Used, Protocol):
     """As sensors.model.Sensor, but of two flange poses a row."""
 
     @property
@@ -79,6 +80,24 @@ class PairChain:
 
     def select(self, rows: NDArray[np.intp]) -> "PairChain":
         return replace(self, sensor=self.sensor.select(rows))
+
+    def placed(self, about: About) -> "PairChain":
+        return replace(self, sensor=self.sensor.placed(about))
+
+    def facing(self, expected: Floats) -> "PairChain":
+        return replace(self, sensor=self.sensor.facing(expected))
+
+    def at_flanges(self, own: Floats, flanges: tuple[Floats, ...]) -> Floats:
+        a, b = flanges
+        return self.sensor.expect(own, a, b)
+
+    def by_flanges(self, own: Floats, flanges: tuple[Floats, ...]) -> tuple[Floats, ...]:
+        a, b = flanges
+        return self.sensor.by_twists(own, a, b)
+
+    def by_own(self, own: Floats, flanges: tuple[Floats, ...]) -> Floats:
+        a, b = flanges
+        return self.sensor.by_parameter(own, a, b)
 
     def _split(self, theta: Floats) -> tuple[Floats, Floats]:
         n = len(self.model.parameters)

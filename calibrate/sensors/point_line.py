@@ -11,21 +11,32 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording.columns import SPOTS
+from calibrate.chain import Chain
 from calibrate.errors import DataError
 from calibrate.parameters import Parameter
+from calibrate.read_samples import observations
 from calibrate.rigid import cross
+from calibrate.sample_table import SampleTable
+from calibrate.sensors import spots
+from calibrate.sensors.kind import NoiseSource, SensorKind
 from calibrate.sensors.laser import LaserMount
-from calibrate.sensors.lines import Lines, nearest_point
+from calibrate.sensors.lines import CENTRED_M, Lines, nearest_point
+from calibrate.sensors.model import Usage
 from calibrate.sensors.shared_points import SharedPoints
+from calibrate.sensors.spots import laser_of
+from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+POINTS = "point"  # parameters are point<k>.x, ...
+LINE_BELIEVED_M = 5e-6  # how well the servo centres a spot
 POINT_PLAUSIBLE_M = 0.05  # about the point nearest to the nominal lines
 
 
 @dataclass(frozen=True)
-class PointLine:
+class PointLine(Usage):
     """The beam of pose j passes the point of pose j. Parameters: laser mount 4, then those of the points."""
 
     mount: LaserMount
@@ -86,4 +97,31 @@ def meeting_points(mount: LaserMount, T_base_flange: Floats, point: Ints) -> Sha
             raise DataError(f"point {k}: {len(rows)} lines, all parallel; take poses that cross there at an angle")
         none = np.zeros((len(rows), 3, 0))
         out[k] = nearest_point(Lines(beam.origin_m[rows], direction, none, none))[0]
-    return SharedPoints("point", out, point, POINT_PLAUSIBLE_M)
+    return SharedPoints(POINTS, out, point, POINT_PLAUSIBLE_M)
+
+
+def _build(table: SampleTable) -> Measured | None:
+    if len(table.filled(*SPOTS)) == 0:
+        return None
+    seen = observations(table.samples, table.angles)
+    centred = np.flatnonzero(np.abs(seen.spots_m).max(axis=1) <= CENTRED_M)
+    rows, place = table.filled(*SPOTS)[centred], seen.placement[centred]
+    if len(rows) == 0:
+        raise DataError(
+            f"samples: no row has all spots within {CENTRED_M} m of the centres; centre poses, or use spots"
+        )
+    mount = laser_of(table.rig)
+    sensor = PointLine(mount, meeting_points(mount, table.T_base_flange[rows], place))
+    own = {KIND.noise[0].name: np.full((len(rows), 2), LINE_BELIEVED_M)}
+    return table.measured(KIND.name, Chain(table.arm, sensor), rows, np.zeros((len(rows), 2)), own, condition=True)
+
+
+KIND = SensorKind(
+    name="point",
+    columns=SPOTS,
+    title="Lines of centred spots",
+    noun="lines of centred spots",
+    noise=(NoiseSource("line", "m"),),
+    instead_of=(spots.KIND.name,),
+    build=_build,
+)

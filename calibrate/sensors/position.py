@@ -1,20 +1,38 @@
 """Instrument: a tracker or the like that measures the target's position (m) in its own frame."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording.columns import ORIENTATION, POSITION
+from acquisition.recording.rig_schema import Rig
+from acquisition.recording.samples import Samples
+from calibrate.blunders.finding import BlunderKind
+from calibrate.blunders.other_session import rows_of_another_session
+from calibrate.blunders.rough_fit import rough_fit
+from calibrate.blunders.witness import Otherwise, Strain, Witness, drawn_point_m, filled, stacked, thinned
+from calibrate.chain import Chain
+from calibrate.errors import DataError
 from calibrate.parameters import Parameter
+from calibrate.rigid import transform
+from calibrate.sample_table import SampleTable
 from calibrate.sensors.device import Device
+from calibrate.sensors.kind import Columns, Found, NoiseSource, SensorKind, Trait
+from calibrate.sensors.model import About, Usage
 from calibrate.sensors.target import Target, point_by_twist
+from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 
+POSITION_BELIEVED_M = 20e-6  # start value where the rig's [noise] says nothing; the data correct it
+NOISE = NoiseSource("position", "m", "position_m")
+
 
 @dataclass(frozen=True)
-class Position:
+class Position(Usage):
     """Observed at a pose: x, y, z of the target in the device's frame. Parameters: target 3, device 6."""
 
     target: Target
@@ -25,6 +43,12 @@ class Position:
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         return self.target.parameters + self.device.parameters
+
+    def about(self) -> About:
+        return {**self.target.about(), **self.device.about()}
+
+    def placed(self, about: About) -> Self:
+        return replace(self, target=self.target.placed(about), device=self.device.placed(about))
 
     def select(self, rows: NDArray[np.intp]) -> Self:
         return self
@@ -41,3 +65,113 @@ class Position:
         R_device_base = self.device.T_base_device_at(phi[3:])[:3, :3].T
         by_device = self.device.seen_by_parameter(phi[3:], self.target.in_base(phi[:3], T_base_flange))
         return np.concatenate([R_device_base @ T_base_flange[:, :3, :3], by_device], axis=-1)
+
+
+SAID_COLUMNS = "columns x_m, y_m, z_m"
+FEWEST_POSES = 12  # a frame and a target have nine unknowns
+MILLIMETRES = 1e-3
+
+
+@dataclass(frozen=True)
+class PositionWitness:
+    """Frame and target are found; a drawn target should not have to move."""
+
+    q_rad: Floats  # (pose, joint)
+    position_m: Floats  # (pose, 3)
+    point_m: Floats | None  # (3,) target as drawn in the flange frame
+    mirrored: bool = False
+    columns: str = SAID_COLUMNS
+
+    def strain(self, T_base_flange: Floats) -> Strain:
+        drawn = self.point_m
+        start = np.zeros(3) if drawn is None else drawn
+        found = rough_fit(T_base_flange, self.position_m, start, mirrored=self.mirrored)
+        return Strain(found.typical_m, 0.0 if drawn is None else float(np.linalg.norm(found.point_m - drawn)))
+
+    def otherwise(self) -> Iterator[Otherwise]:
+        """As `written_otherwise`."""
+        for told, _ in self.written_otherwise():
+            yield told
+
+    def written_otherwise(self) -> Iterator[tuple[Otherwise, "PositionWitness"]]:
+        """Columns that mirror the readings (one sign, or two of them exchanged; which is open), and millimetres.
+
+        No instrument is left-handed: conventions.py looks for joint signs first.
+        """
+        other = replace(self, mirrored=not self.mirrored)
+        yield (
+            Otherwise(
+                BlunderKind.MIRRORED_AXIS,
+                self.columns,
+                "only the mirror image of the readings fits the arm (determinant -1), and no instrument is left-handed",
+                "change the sign of one of these columns, or exchange two, as the device's export shows",
+                other,
+            ),
+            other,
+        )
+        other = replace(self, position_m=MILLIMETRES * self.position_m)
+        yield (
+            Otherwise(
+                BlunderKind.MILLIMETRES,
+                self.columns,
+                "positions in millimetres",
+                "write metres (millimetres times 0.001)",
+                other,
+            ),
+            other,
+        )
+
+
+def position_sigma_m(rig: Rig) -> float:
+    """One sigma of a coordinate, as stated or else as usual."""
+    return rig.noise.position_m or POSITION_BELIEVED_M
+
+
+def device_of(found: Found) -> Floats:
+    """(4, 4) the measuring device in the base. DataError where neither model nor rig knows its place."""
+    given = found.rig.device
+    drawn = None if given is None else (*given.origin_m, *given.rotation_rad)
+    place = found.about.get("device", drawn)
+    if place is None:
+        raise DataError(f"rig {found.rig.name}: no [device] and none in the model; fit positions or a wire first")
+    device = Device(transform(place[:3], place[3:]))
+    return device.T_base_device_at(found.values_of(device.parameters))
+
+
+def predicted_positions(found: Found, T_base_flange: Floats, samples: Samples) -> Columns:
+    """The target in the device's frame."""
+    T = device_of(found)
+    return dict(zip(POSITION, ((found.tip_at(T_base_flange) - T[:3, 3]) @ T[:3, :3]).T, strict=True))
+
+
+def _build(table: SampleTable) -> Measured | None:
+    rows = np.setdiff1d(table.filled(*POSITION), table.filled(*POSITION, *ORIENTATION))
+    if len(rows) == 0:
+        return None
+    own = {NOISE.name: np.full((len(rows), 3), position_sigma_m(table.rig))}
+    chain = Chain(table.arm, Position(table.target, table.device()))
+    return table.measured(KIND.name, chain, rows, table.position_m[rows], own)
+
+
+def _witness(rig: Rig, samples: Samples, q_rad: Floats) -> Witness | None:
+    rows = thinned(filled(samples, *POSITION))
+    if len(rows) < FEWEST_POSES:
+        return None
+    return PositionWitness(q_rad[rows], stacked(samples, POSITION)[rows], drawn_point_m(rig))
+
+
+KIND = SensorKind(
+    name="position",
+    columns=POSITION,
+    title="Measured positions",
+    noun="positions",
+    noise=(NOISE,),
+    traits=frozenset({Trait.TARGET, Trait.DEVICE, Trait.IN_SPACE, Trait.ANGLE_ENCODERS, Trait.CERTIFIED}),
+    reads=POSITION,
+    asks=POSITION,
+    build=_build,
+    point_m=lambda table: table.tool_seen_m,
+    witness=_witness,
+    blocks=rows_of_another_session,
+    predict=predicted_positions,
+)

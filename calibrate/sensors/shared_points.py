@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from calibrate.errors import DataError
 from calibrate.parameters import Parameter
+from calibrate.sensors.model import About
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -47,6 +48,14 @@ class SharedPoints:
     def select(self, rows: NDArray[np.intp]) -> Self:
         """The same points, of some of the poses."""
         return replace(self, of_pose=self.of_pose[rows])
+
+    def about(self) -> About:
+        """Points in the base that the corrections start from."""
+        return {f"{self.kind}{k}": tuple(point.tolist()) for k, point in self.start_m.items()}
+
+    def placed(self, about: About) -> Self:
+        """The same where a model's corrections start from."""
+        return replace(self, start_m={k: np.array(about.get(f"{self.kind}{k}", at)) for k, at in self.start_m.items()})
 
     def at_poses_m(self, shifts_m: Floats) -> Floats:
         """(pose, 3) in the base, for shifts (3 * point,)."""

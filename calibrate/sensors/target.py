@@ -1,12 +1,14 @@
 """The target (reflector, wire eye, probe tip) on the flange: a point with three unknowns, and how points move."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.parameters import Parameter
 from calibrate.rigid import cross_matrix
+from calibrate.sensors.model import About
 
 Floats = NDArray[np.float64]
 
@@ -21,10 +23,20 @@ class Target:
 
     point_m: Floats  # (3,)
     plausible_m: float = POINT_PLAUSIBLE_M
+    name: str = "tool"  # first part of the names of its parameters
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        return tuple(Parameter(f"tool.{a}", "m", self.plausible_m) for a in "xyz")
+        return tuple(Parameter(f"{self.name}.{a}", "m", self.plausible_m) for a in "xyz")
+
+    def about(self) -> About:
+        """Point in the flange that the corrections start from."""
+        return {self.name: tuple(self.point_m.tolist())}
+
+    def placed(self, about: About) -> Self:
+        """The same where a model's corrections start from."""
+        found = about.get(self.name)
+        return self if found is None else replace(self, point_m=np.array(found[:3]))
 
     def in_base(self, tool: Floats, T_base_flange: Floats) -> Floats:
         """(pose, 3) the target in the base for corrections (3,) and flange poses (pose, 4, 4)."""

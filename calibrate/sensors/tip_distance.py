@@ -3,20 +3,21 @@
 Source of the relative distance |P_n - P_(n-1)| as an observation: patent CN114523474B, step 4.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.parameters import Parameter
+from calibrate.sensors.model import About, Usage
 from calibrate.sensors.target import Target, point_by_twist
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class TipDistance:
+class TipDistance(Usage):
     """Observed of a pair: |tip_b - tip_a| (m). Parameters: target 3."""
 
     target: Target
@@ -26,6 +27,12 @@ class TipDistance:
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         return self.target.parameters
+
+    def about(self) -> About:
+        return self.target.about()
+
+    def placed(self, about: About) -> Self:
+        return replace(self, target=self.target.placed(about))
 
     def select(self, rows: NDArray[np.intp]) -> Self:
         return self

@@ -1,20 +1,37 @@
 """Instrument: a draw wire (or a ball bar with its seat as origin) that measures the distance to the target."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording.columns import WIRE as COLUMN
+from acquisition.recording.rig_schema import Rig
+from acquisition.recording.samples import Samples
+from calibrate.alignment import trilaterate
+from calibrate.blunders.finding import BlunderKind
+from calibrate.blunders.least_distance import least_distance
+from calibrate.blunders.witness import Otherwise, Strain, Witness, drawn_point_m, filled, thinned
+from calibrate.chain import Chain
+from calibrate.errors import DataError
 from calibrate.parameters import Parameter
+from calibrate.sample_table import SampleTable
 from calibrate.sensors.device import Device
+from calibrate.sensors.kind import Columns, Found, NoiseSource, SensorKind, Trait
+from calibrate.sensors.model import About, Usage
+from calibrate.sensors.position import device_of
 from calibrate.sensors.target import Target, point_by_twist
+from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 
+WIRE_BELIEVED_M = 50e-6  # start value where the rig's [noise] says nothing; the data correct it
+
 
 @dataclass(frozen=True)
-class Wire:
+class Wire(Usage):
     """Observed at a pose: distance (m) from the device's origin to the target. Parameters: target 3, origin 3.
 
     A length knows nothing of the device's axes, so only the origin of `device` counts.
@@ -28,6 +45,12 @@ class Wire:
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         return self.target.parameters + self.device.origin_parameters
+
+    def about(self) -> About:
+        return {**self.target.about(), **self.device.about()}
+
+    def placed(self, about: About) -> Self:
+        return replace(self, target=self.target.placed(about), device=self.device.placed(about))
 
     def select(self, rows: NDArray[np.intp]) -> Self:
         return self
@@ -51,3 +74,89 @@ class Wire:
     def _along(self, phi: Floats, T_base_flange: Floats) -> Floats:
         span = self._span(phi, T_base_flange)
         return span / np.linalg.norm(span, axis=1, keepdims=True)
+
+
+FEWEST_POSES = 30  # one number each; drum and target have six unknowns
+
+
+@dataclass(frozen=True)
+class WireWitness:
+    """Drum and target are found, from trilateration and from where the rig says; a drawn target should not move."""
+
+    q_rad: Floats  # (pose, joint)
+    length_m: Floats  # (pose,)
+    point_m: Floats | None  # (3,) target as drawn in the flange frame
+    drum_m: Floats | None  # (3,) as the rig says, in the base
+
+    def strain(self, T_base_flange: Floats) -> Strain:
+        R, t = T_base_flange[:, :3, :3], T_base_flange[:, :3, 3]
+        drawn = np.zeros(3) if self.point_m is None else self.point_m
+
+        def rows(x: Floats) -> tuple[Floats, Floats]:
+            span = R @ (drawn + x[:3]) + t - x[3:]
+            length = np.maximum(np.linalg.norm(span, axis=1), 1e-9)
+            along = span / length[:, None]
+            return length - self.length_m, np.concatenate([np.einsum("ni,nij->nj", along, R), -along], axis=1)
+
+        tips = R @ drawn + t
+        starts = [_trilaterated(tips, self.length_m), *([] if self.drum_m is None else [self.drum_m])]
+        ends = [least_distance(rows, np.concatenate([np.zeros(3), drum])) for drum in starts]
+        x, distance = min(ends, key=lambda end: float(np.sum(end[1])))
+        return Strain(float(np.median(distance)), 0.0 if self.point_m is None else float(np.linalg.norm(x[:3])))
+
+    def otherwise(self) -> Iterator[Otherwise]:
+        """Millimetres."""
+        remedy = "write metres (millimetres times 0.001)"
+        converted = replace(self, length_m=1e-3 * self.length_m)
+        yield Otherwise(BlunderKind.MILLIMETRES, "column wire_m", "lengths in millimetres", remedy, converted)
+
+
+def _trilaterated(points_m: Floats, lengths_m: Floats) -> Floats:
+    """(3,) as calibrate.alignment.trilaterate, but an answer for every hypothesis, also of points in a plane."""
+    p = points_m - points_m.mean(axis=0)
+    square = np.sum(p**2, axis=1) - lengths_m**2
+    origin = np.linalg.lstsq(2.0 * p, square - square.mean(), rcond=1e-6)[0]
+    return np.asarray(origin + points_m.mean(axis=0), dtype=np.float64)
+
+
+def _build(table: SampleTable) -> Measured | None:
+    rows = table.filled(COLUMN)
+    if len(rows) == 0:
+        return None
+    length_m = table.samples.column(COLUMN)[rows]
+    if np.any(length_m <= 0.0):
+        bad = int(np.argmax(length_m <= 0.0))
+        raise DataError(
+            f"samples row {rows[bad] + 1}, column '{COLUMN}': {length_m[bad]} m; a length is positive: empty the cell"
+        )
+    sensor = Wire(table.target, table.device(lambda: trilaterate(table.tips_m[rows], length_m)))
+    own = {KIND.noise[0].name: np.full((len(rows), 1), table.rig.noise.wire_m or WIRE_BELIEVED_M)}
+    return table.measured(KIND.name, Chain(table.arm, sensor), rows, length_m[:, None], own)
+
+
+def _witness(rig: Rig, samples: Samples, q_rad: Floats) -> Witness | None:
+    rows = thinned(filled(samples, COLUMN))
+    if len(rows) < FEWEST_POSES:
+        return None
+    drum = None if rig.device is None else np.array(rig.device.origin_m)
+    return WireWitness(q_rad[rows], samples.column(COLUMN)[rows], drawn_point_m(rig), drum)
+
+
+def _predict(found: Found, T_base_flange: Floats, samples: Samples) -> Columns:
+    span = found.tip_at(T_base_flange) - device_of(found)[:3, 3]
+    return {COLUMN: np.linalg.norm(span, axis=1)}
+
+
+KIND = SensorKind(
+    name="wire",
+    columns=(COLUMN,),
+    title="Wire lengths",
+    noun="wire lengths",
+    noise=(NoiseSource("wire", "m", "wire_m"),),
+    traits=frozenset({Trait.TARGET, Trait.DEVICE, Trait.DRUM}),
+    reads=(COLUMN,),
+    asks=(COLUMN,),
+    build=_build,
+    witness=_witness,
+    predict=_predict,
+)

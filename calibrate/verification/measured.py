@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording.columns import BAR, SEAT
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.errors import DataError
@@ -61,7 +62,7 @@ def measured(samples: Samples, rig: Rig, predictor: Predictor) -> Measured:
 
 
 def _seats(samples: Samples, tips_m: Floats) -> dict[int, Floats]:
-    seat = samples.integers("seat", 0)
+    seat = samples.integers(SEAT, 0)
     return {k: tips_m[seat == k] for k in sorted(set(seat.tolist()) - {0})}
 
 
@@ -93,7 +94,7 @@ def _round(
 
 
 def _lengths(samples: Samples, rig: Rig, tips_m: Floats) -> tuple[Length, ...]:
-    bar = samples.integers("bar", 0)
+    bar = samples.integers(BAR, 0)
     rows = np.flatnonzero(bar)
     if len(rows) == 0:
         return ()

@@ -16,7 +16,7 @@ from calibrate.arms.catalogue import arm_of
 from calibrate.errors import DataError
 from calibrate.fit import Status, solve
 from calibrate.identifiability import analyse
-from calibrate.instruments import Positions, Spots, instruments_of
+from calibrate.instruments import instruments_of
 from calibrate.parameters import hold
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
@@ -127,7 +127,7 @@ def test_a_target_that_nobody_states_is_found_with_the_frame(rig, truth):
 
 def test_distances_need_no_frame(rig, truth):
     q = random_readings()
-    found = instruments_of(table(q, **position_columns(truth, q)), rig, positions=Positions.DISTANCE)
+    found = instruments_of(table(q, **position_columns(truth, q)), rig, asked=("distance",))
     assert not [p for p in found.weighting.parameters if p.name.startswith("device")]
     assert left_m(found) < 1e-9
     fit, _, seen = fitted(found)
@@ -304,11 +304,11 @@ def test_gains_and_second_face_are_free_only_under_a_stated_tolerance(rig, sessi
 
 def test_centred_spots_may_be_used_as_lines_through_one_point(rig, sessions, ur5e_exact):
     session = sessions(21, n=40, truth=ur5e_exact(), spread=0.0, places=(1,), joint_noise=0.0, psd_noise=0.0)
-    found = instruments_of(spots_table(session), rig, spots=Spots.POINT)
+    found = instruments_of(spots_table(session), rig, asked=("point",))
     assert [m.name for m in found.weighting.measured] == ["point"]
     assert left_m(found) < 1e-9
     seen = seen_without_drawing(found)
     assert seen.reason("joint1.zero") is not None
     off = sessions(11, n=24, places=(1, 2))
     with pytest.raises(DataError, match="no row has all spots within"):
-        instruments_of(spots_table(off), rig, spots=Spots.POINT)
+        instruments_of(spots_table(off), rig, asked=("point",))

@@ -11,7 +11,7 @@ from calibrate.arms.catalogue import arm_of
 from calibrate.identifiability import analyse
 from calibrate.parameters import hold
 from calibrate.problem import Problem, decorrelated
-from calibrate.sensors.bar import consecutive_pairs, shared_correlation
+from calibrate.sensors.distance import consecutive_pairs, shared_correlation
 from calibrate.sensors.pair import PairChain
 from calibrate.sensors.target import Target
 from calibrate.sensors.tip_distance import TipDistance

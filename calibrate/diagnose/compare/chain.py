@@ -18,9 +18,10 @@ from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.alignment import align
 from calibrate.arms.catalogue import arm_of
-from calibrate.diagnose.compare.seated import BAR, TIP, bar_differences, is_seated, tip_differences
+from calibrate.diagnose.compare.seated import LENGTH, bar_differences, is_seated, tip_differences
 from calibrate.errors import DataError
 from calibrate.predict import NOWHERE, Predictor, predict
+from calibrate.sensors import bar, position, seat, wire
 
 Floats = NDArray[np.float64]
 Pair = tuple[Samples, Samples]  # measured, simulated; row by row the same pose
@@ -99,7 +100,7 @@ def _spots(rig: Rig, pair: Pair) -> Floats:
 def _wire(rig: Rig, pair: Pair) -> Floats:
     if rig.device is None:
         return np.zeros((len(pair[0]), 1))
-    return _predicted(rig, pair, ("wire_m",))
+    return _predicted(rig, pair, wire.KIND.columns)
 
 
 def _predicted(rig: Rig, pair: Pair, names: tuple[str, ...]) -> Floats:
@@ -172,11 +173,11 @@ def _known(raw: OfPair, channels: int) -> Explained:
 
 READINGS: tuple[Reading, ...] = (
     Reading("spots", SPOTS, "m", _of_columns(SPOTS), _spots, _spots),
-    Reading("position", POSITION, "m", _of_columns(POSITION), _position, _position),
+    Reading(position.KIND.name, POSITION, "m", _of_columns(POSITION), _position, _position),
     Reading("orientation", ORIENTATION, "rad", _turned, _turned_by_joints, _turned_by_joints),
-    Reading("wire", ("wire_m",), "m", _of_columns(("wire_m",)), _wire, _wire),
-    Reading("seat", TIP, "m", _seats, _nothing(3), _known(_seats, 3)),
-    Reading("bar", BAR, "m", _bars, _nothing(1), _known(_bars, 1)),
+    Reading(wire.KIND.name, wire.KIND.columns, "m", _of_columns(wire.KIND.columns), _wire, _wire),
+    Reading(seat.KIND.name, seat.TIP, "m", _seats, _nothing(3), _known(_seats, 3)),
+    Reading(bar.KIND.name, LENGTH, "m", _bars, _nothing(1), _known(_bars, 1)),
 )
 
 

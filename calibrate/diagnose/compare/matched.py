@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import per_joint
+from acquisition.recording.columns import BAR, BAR_END, SEAT, per_joint
 from acquisition.recording.samples import Samples
 from calibrate.diagnose.compare.seated import NONE, lengths_of
 from calibrate.errors import DataError
@@ -19,7 +19,7 @@ Ints = NDArray[np.intp]
 
 # Of every joint: a servo that centres goes to a slightly other place; poses of a plan lie farther apart.
 SAME_RAD = 0.02
-WHAT = ("placement", "first_psd", "seat", "bar", "bar_end")  # where both say it, it must be the same
+WHAT = ("placement", "first_psd", SEAT, BAR, BAR_END)  # where both say it, it must be the same
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def _nearness(measured: Samples, simulated: Samples) -> Floats:
 
 def _labels(samples: Samples, name: str) -> Floats:
     """(row,) as numbers, NaN where nothing is said."""
-    if name != "bar_end":
+    if name != BAR_END:
         return samples.column(name)
     end = samples.columns[name]
     return np.where(end == "a", 0.0, np.where(end == "b", 1.0, np.nan))
@@ -74,9 +74,9 @@ def _labels(samples: Samples, name: str) -> Floats:
 
 def _whole_bars(measured: Samples, rows: Ints, columns: Ints) -> tuple[Ints, Ints]:
     """Without ends of a bar whose other end has no partner: half a length says nothing."""
-    if "bar" not in measured:
+    if BAR not in measured:
         return rows, columns
-    alone = measured.integers("bar", NONE)[rows] != NONE
+    alone = measured.integers(BAR, NONE)[rows] != NONE
     alone[lengths_of(measured.take(rows)).ravel()] = False
     return rows[~alone], columns[~alone]
 

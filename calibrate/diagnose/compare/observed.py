@@ -19,11 +19,19 @@ from calibrate.diagnose.compare.chain import Difference, Pair, columns_of
 from calibrate.diagnose.compare.seated import is_seated
 from calibrate.diagnose.fitted import Fitted, fit_geometry
 from calibrate.diagnose.session import session_of
+from calibrate.sensors import full_pose, position, spots, wire
+from calibrate.sensors.catalogue import names_with
+from calibrate.sensors.kind import Trait
 
 Floats = NDArray[np.float64]
 
-LINK = {"dual-psd": "spots", "position": "position", "full-pose": "position", "wire": "wire"}  # instrument -> link
-SEATED = ("seat", "bar")  # instruments
+LINK = {
+    spots.KIND.name: "spots",
+    position.KIND.name: position.KIND.name,
+    full_pose.KIND.name: position.KIND.name,
+    wire.KIND.name: wire.KIND.name,
+}  # instrument -> link
+SEATED = names_with(Trait.TOUCHED)
 DRIVERS = ("temp_", "payload", "qd", "cmd", "approach")  # of the measured table: the cause happened there
 
 
@@ -37,11 +45,11 @@ def difference_samples(rig: Rig, pair: Pair, links: tuple[Difference, ...]) -> S
             changed |= _joints(pair, fitted, changed)
         elif LINK.get(m.name) in added:
             rows, expected = m.sample_rows[:, -1], fitted.around.expected[i]
-            names = POSITION if m.name == "full-pose" else _names(links, LINK[m.name])
+            names = POSITION if m.name == full_pose.KIND.name else _names(links, LINK[m.name])
             readings = _so_far(changed, names, len(pair[0]))
             readings[rows] = expected[:, : len(names)] + added[LINK[m.name]][rows]
             changed |= dict(zip(names, readings.T, strict=True))
-            if m.name == "full-pose" and "orientation" in added:
+            if m.name == full_pose.KIND.name and "orientation" in added:
                 turned = _turned(pair[1], rows, expected[:, 3:], added["orientation"][rows])
                 vectors = _so_far(changed, ORIENTATION, len(pair[0]))
                 vectors[rows] = turned

@@ -11,6 +11,8 @@ from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.diagnose.compare.chain import READINGS, Difference, Pair, columns_of
 from calibrate.diagnose.compare.own_noise import chance_of_structure, scatter_of
+from calibrate.sensors import bar
+from calibrate.sensors.catalogue import SENSORS
 
 Floats = NDArray[np.float64]
 
@@ -109,9 +111,9 @@ def _noise(one: Difference, rig: Rig, pair: Pair) -> tuple[Floats | None, str]:
             return None, "a set-point has none"
         return np.broadcast_to(np.sqrt(2.0) * joint, one.own.shape), "believed, and one count of the encoders"
     noise = rig.noise
-    told = {"spots": noise.psd_m, "position": noise.position_m, "wire": noise.wire_m, "seat": noise.seat_m}
+    told = {"spots": noise.psd_m, **{k.name: getattr(noise, k.noise[0].key, None) for k in SENSORS}}
     ends_m = None if noise.seat_m is None else np.sqrt(2.0) * noise.seat_m
-    believed = ends_m if one.link == "bar" else told.get(one.link)
+    believed = ends_m if one.link == bar.KIND.name else told.get(one.link)
     if believed is None and one.link == "spots":
         stated = _stated(pair)
         if stated is not None:

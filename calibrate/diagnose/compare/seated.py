@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording.columns import BAR, BAR_END, SEAT
 from acquisition.recording.samples import Samples
 from calibrate.predict import Predictor
 
@@ -16,15 +17,14 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Bools = NDArray[np.bool_]
 
-TIP = ("tip_x_m", "tip_y_m", "tip_z_m")
-BAR = ("bar_m",)
+LENGTH = ("bar_m",)
 NONE = -1
 
 
 def is_seated(samples: Samples) -> Bools:
     """(row,)"""
     seated = np.zeros(len(samples), dtype=bool)
-    for name in ("seat", "bar"):
+    for name in (SEAT, BAR):
         if name in samples:
             seated |= samples.integers(name, NONE) != NONE
     return seated
@@ -32,9 +32,9 @@ def is_seated(samples: Samples) -> Bools:
 
 def lengths_of(samples: Samples) -> Ints:
     """(bar, 2) rows of end a and end b: consecutive rows with a bar, of one bar, both ends. Odd ones are left out."""
-    if "bar" not in samples or "bar_end" not in samples:
+    if BAR not in samples or BAR_END not in samples:
         return np.zeros((0, 2), dtype=np.intp)
-    bar, end = samples.integers("bar", NONE), samples.columns["bar_end"]
+    bar, end = samples.integers(BAR, NONE), samples.columns[BAR_END]
     rows = np.flatnonzero(bar != NONE)
     out: list[tuple[int, int]] = []
     taken = NONE
@@ -48,9 +48,9 @@ def lengths_of(samples: Samples) -> Ints:
 
 def tip_differences(model: Predictor, measured: Samples, simulated: Samples) -> Floats | None:
     """(row, 3) in the base, about the mean of each seat; NaN outside of cones. None without two rows in one."""
-    if "seat" not in measured or "seat" not in simulated:
+    if SEAT not in measured or SEAT not in simulated:
         return None
-    seat = measured.integers("seat", NONE)
+    seat = measured.integers(SEAT, NONE)
     apart = model.tip_m(measured.joints()) - model.tip_m(simulated.joints())
     out = np.full(apart.shape, np.nan)
     for k in np.unique(seat[seat != NONE]):
@@ -63,7 +63,7 @@ def tip_differences(model: Predictor, measured: Samples, simulated: Samples) -> 
 def bar_differences(model: Predictor, measured: Samples, simulated: Samples) -> Floats | None:
     """(row, 1) of the length, in the row of end b. None without a bar."""
     pairs = lengths_of(measured)
-    if not len(pairs) or "bar" not in simulated:
+    if not len(pairs) or BAR not in simulated:
         return None
     said = [model.tip_m(one.joints()) for one in (measured, simulated)]
     lengths = [np.linalg.norm(tips[pairs[:, 1]] - tips[pairs[:, 0]], axis=1) for tips in said]

@@ -10,9 +10,8 @@ from matplotlib.patches import FancyBboxPatch
 from calibrate.report.elements import Html
 from calibrate.report.svg import drawn
 from calibrate.report.tones import Tone
-
-SPOTS = "dual-psd"
-DEVICES = ("position", "full-pose", "wire")
+from calibrate.sensors.catalogue import kind_of
+from calibrate.sensors.kind import Trait
 
 
 @dataclass(frozen=True)
@@ -29,11 +28,12 @@ def chain_of(joints: int, instruments: Sequence[str]) -> tuple[Link, ...]:
     for i in range(1, joints + 1):
         out += [Link(f"J{i}", (f"joint{i}.",)), Link(f"link {i}", (f"link{i}.",))]
     out.append(Link("tool", ("tool.", "laser.")))
-    if SPOTS in instruments:
+    traits = {trait for name in instruments for trait in kind_of(name).traits}
+    if Trait.LIGHT in traits:
         out += [Link("fixture", ("fixture.",)), Link("PSD 1", ("psd1.",)), Link("PSD 2", ("psd2.",))]
-    if "seat" in instruments:
-        out.append(Link("seat", ("seat.",)))
-    if any(name in instruments for name in DEVICES):
+    if Trait.CONES in traits:
+        out.append(Link("cone", ("seat.",)))
+    if Trait.DEVICE in traits:
         out.append(Link("device", ("device.",)))
     return tuple(out)
 

@@ -10,12 +10,14 @@ from calibrate.report.model_tests import proofs, repeated, scatter
 from calibrate.report.quantities import DASH, angle, doubted_angle, doubted_length, fixed, length, significant
 from calibrate.report.session_evidence import SessionEvidence
 from calibrate.report.unseen_table import unseen_rows
+from calibrate.sensors.catalogue import SOURCES
+from calibrate.sensors.kind import NoiseSource
 from calibrate.uncertainty.chi_square import Alarm
+from calibrate.weighting import JOINT
 
 TITLE = "Proof and doubt"
 NONE = "too small to be told from none"
-ANGULAR = ("joint", "orientation")
-STATED = {"joint": "joint_rad", "psd": "psd_m", "position": "position_m", "wire": "wire_m", "seat": "seat_m"}
+OF_JOINTS = NoiseSource(JOINT, "rad", "joint_rad")
 
 
 def proofs_chapter(evidence: SessionEvidence) -> Html:
@@ -47,8 +49,9 @@ def _noise(model: ModelFile, rig: Rig) -> Html:
         believed, found, sigma = (model.noise.get(f"{name}{tail}") for tail in ("_believed", "", "_sigma"))
         if not (isinstance(believed, float) and isinstance(found, float) and isinstance(sigma, float)):
             continue
-        says, doubted = (angle, doubted_angle) if name in ANGULAR else (length, doubted_length)
-        stated = getattr(rig.noise, STATED.get(name, ""), None) is not None
+        source_of = {**SOURCES, JOINT: OF_JOINTS}.get(name, NoiseSource(name, "m"))
+        says, doubted = (angle, doubted_angle) if source_of.unit == "rad" else (length, doubted_length)
+        stated = getattr(rig.noise, source_of.key, None) is not None
         source = "rig file" if stated else "assumed: the rig file states none"
         if model.noise.get(f"{name}_at_zero"):
             rows.append((name, says(believed), source, NONE, ""))

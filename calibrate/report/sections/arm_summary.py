@@ -9,15 +9,16 @@ from calibrate.report.error_figures import by_sample, errors
 from calibrate.report.model_tests import proofs
 from calibrate.report.quantities import significant
 from calibrate.report.sections.zeros import determined, limits_of_zeros, zeros_part
-from calibrate.report.session_evidence import SAID, Readings, SessionEvidence
+from calibrate.report.session_evidence import Readings, SessionEvidence
 from calibrate.report.session_verdict import session_verdict
+from calibrate.sensors.catalogue import kind_of
 
 
 def masthead(evidence: SessionEvidence) -> Html:
     """Title, when and with what."""
     recording, model = evidence.recording, evidence.model
     when = recording.started_utc.partition(".")[0].replace("T", " ")
-    seen = ", ".join(SAID.get(name, name).lower() for name in model.instruments)
+    seen = ", ".join(kind_of(name).title.lower() for name in model.instruments)
     said = [f"{when} UTC"] if when else []
     said += [f"{model.poses} samples", seen, model.software]
     return tag(

@@ -10,11 +10,11 @@ from calibrate.arms.model import KinematicModel
 from calibrate.identifiability import Identifiability
 from calibrate.model_file import Covariance, Fields, FreeSpaceRecord
 from calibrate.parameters import Parameter, index_of
+from calibrate.sensors.catalogue import LENGTHS
 from calibrate.uncertainty.free_space import FreeSpaceStatus, Scatter
 
 Floats = NDArray[np.float64]
 
-IN_METRES = ("position", "wire", "seat", "line", "psd")  # sources of noise that are lengths
 JOINT = "joint"
 
 
@@ -54,7 +54,7 @@ def scatter_of(noise: Fields) -> Scatter:
     found = {name: value for name, value in noise.items() if isinstance(value, float)}
     if JOINT in found:
         return Scatter(joint_rad=found[JOINT])
-    return Scatter(target_m=max(found.get(source, 0.0) for source in IN_METRES))
+    return Scatter(target_m=max(found.get(source, 0.0) for source in LENGTHS))
 
 
 def whole_covariance(record: Covariance | None, parameters: tuple[Parameter, ...]) -> Floats:

@@ -6,8 +6,8 @@ import pytest
 from calibrate.blunders.conventions import wrong_convention
 from calibrate.blunders.degrees import beyond_limits
 from calibrate.blunders.finding import BlunderKind
-from calibrate.blunders.position_witness import PositionWitness
 from calibrate.blunders.rough_fit import rough_fit
+from calibrate.sensors.position import PositionWitness
 
 from .conftest import POINT, flange
 

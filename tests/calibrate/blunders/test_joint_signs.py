@@ -6,7 +6,7 @@ import pytest
 from acquisition.recording.errors import MESSAGE_LENGTH, brief
 from calibrate.blunders.conventions import wrong_convention
 from calibrate.blunders.finding import BlunderKind
-from calibrate.blunders.position_witness import PositionWitness
+from calibrate.sensors.position import PositionWitness
 
 from .conftest import NOISE, POINT, flange
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from calibrate.blunders.bar_witness import BarWitness
 from calibrate.blunders.conventions import wrong_convention
 from calibrate.blunders.finding import BlunderKind
-from calibrate.blunders.orientation_witness import OrientationWitness
-from calibrate.blunders.position_witness import PositionWitness
-from calibrate.blunders.seat_witness import SeatWitness
-from calibrate.blunders.wire_witness import WireWitness
+from calibrate.sensors.bar import BarWitness
+from calibrate.sensors.full_pose import OrientationWitness
+from calibrate.sensors.position import PositionWitness
+from calibrate.sensors.seat import SeatWitness
+from calibrate.sensors.wire import WireWitness
 
 from .conftest import POINT, flange
 

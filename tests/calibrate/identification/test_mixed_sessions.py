@@ -7,7 +7,7 @@ import pytest
 from acquisition.recording.rig_schema import KnownDistance, Pose
 from acquisition.recording.samples import Samples
 from calibrate.fit import Status
-from calibrate.fit_plan import FitPlan, InstrumentName
+from calibrate.fit_plan import FitPlan
 from calibrate.identification.identify import identify
 from calibrate.predict import Predictor, predict
 from calibrate.uncertainty.chi_square import Alarm
@@ -15,7 +15,7 @@ from calibrate.uncertainty.chi_square import Alarm
 from .conftest import SHIFT, TOOL, TURN
 
 SPOTS = ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")
-DUAL_PSD, POSITION = InstrumentName.DUAL_PSD, InstrumentName.POSITION
+DUAL_PSD, POSITION = "dual-psd", "position"
 LINKS = ("offset", "length", "twist", "tilt")
 POSITION_M, WIRE_M, JOINT_RAD = 1e-5, 2e-5, 3e-6
 

@@ -6,7 +6,7 @@ import pytest
 
 from acquisition.recording.rig_schema import ArmModel
 from calibrate.errors import DataError
-from calibrate.fit_plan import FitPlan, InstrumentName, LossName, RedundantName, SolverName
+from calibrate.fit_plan import FitPlan, LossName, RedundantName, SolverName
 from calibrate.identification.identify import identify
 from calibrate.identification.planned import rig_as_planned
 from calibrate.predict import Predictor, predict
@@ -102,7 +102,7 @@ def test_spots_as_lines_are_an_instrument_too(rig, sessions):
     names = ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")
     spots = dict(zip(names, lit.spots_m.T, strict=True))
     samples = table(lit.q_rad, placement=lit.placement.astype(float), first_psd=lit.first_psd.astype(float), **spots)
-    result = run((rig, samples), instruments=(InstrumentName.POINT,))
+    result = run((rig, samples), instruments=("point",))
     assert [i.name for i in result.instruments] == ["point"]
 
 
@@ -111,7 +111,7 @@ def test_spots_as_lines_are_an_instrument_too(rig, sessions):
     [
         ({"hold": ("link2.lenght",)}, "matches 'link2.lenght'; did you mean 'link2.length'"),
         ({"priors": {"placement9.x": 1e-3}}, "no parameter of this session matches 'placement9.x'"),
-        ({"instruments": (InstrumentName.POSITION, InstrumentName.WIRE)}, "instrument 'wire': the samples hold no row"),
+        ({"instruments": ("position", "wire")}, "instrument 'wire': the samples hold no row"),
     ],
 )
 def test_what_rig_or_samples_do_not_have_is_refused_by_name(tracked, keys, says):

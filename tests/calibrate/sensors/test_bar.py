@@ -5,7 +5,8 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from calibrate.errors import DataError
-from calibrate.sensors.bar import bar_pairs, consecutive_pairs, shared_correlation
+from calibrate.sensors.bar import bar_pairs
+from calibrate.sensors.distance import consecutive_pairs, shared_correlation
 
 ROWS = np.array([2, 3, 5, 6])
 

@@ -1,11 +1,14 @@
 """Laws that every instrument keeps: derivatives are those of differences, selection commutes, silence is zero."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from calibrate.rigid import transform
+from calibrate.sensors.catalogue import BY_NAME
 from calibrate.sensors.device import Device
 from calibrate.sensors.dual_psd import DualPsd, Fixture, PairBelief
 from calibrate.sensors.full_pose import FullPose
@@ -49,14 +52,20 @@ def dual_psd():
     return DualPsd(MOUNT, faces, GROUP, 1 + np.arange(POSES) % 2, 1e-3, PairBelief(1e-4, 1e-3))
 
 
+def camera():
+    device = Device(DEVICE.T_base_device, name="camera")
+    return replace(full_pose(), target=Target(TARGET.point_m, 0.2, "marker"), device=device)
+
+
 SENSORS = {
     "position": lambda: Position(TARGET, DEVICE),
-    "full pose": full_pose,
+    "full-pose": full_pose,
+    "camera-pose": camera,
     "wire": lambda: Wire(TARGET, DEVICE),
     "seat": lambda: Seat(TARGET, mean_tips(flanges(1)[:, :3, 3], GROUP)),
-    "point on laser lines": lambda: PointLine(MOUNT, meeting_points(MOUNT, flanges(1), GROUP)),
+    "point": lambda: PointLine(MOUNT, meeting_points(MOUNT, flanges(1), GROUP)),
 }
-PAIRS = {"tip distance": lambda: TipDistance(TARGET)}
+PAIRS = {"distance": lambda: TipDistance(TARGET), "bar": lambda: TipDistance(TARGET)}
 
 
 @pytest.fixture(params=list(SENSORS))
@@ -99,14 +108,34 @@ def test_derivative_by_every_parameter(sensor):
         check(analytic[:, :, k], sensor.expect(phi + step, T), sensor.expect(phi - step, T), sensor.parameters[k].name)
 
 
-@pytest.mark.parametrize("name", [*SENSORS, "dual PSD"])
+@pytest.mark.parametrize("name", [*SENSORS, "dual-psd"])
 def test_selected_poses_are_seen_as_before(name):
-    sensor = {**SENSORS, "dual PSD": dual_psd}[name]()
+    sensor = {**SENSORS, "dual-psd": dual_psd}[name]()
     phi, T, rows = values(sensor, 4), flanges(1), np.array([0, 2, 5])
     cut = sensor.select(rows)
     assert [p.name for p in cut.parameters] == [p.name for p in sensor.parameters]
     assert_allclose(cut.expect(phi, T[rows]), sensor.expect(phi, T)[rows])
     assert_allclose(cut.by_parameter(phi, T[rows]), sensor.by_parameter(phi, T)[rows])
+
+
+def test_every_sensor_of_the_catalogue_is_held_to_these_laws():
+    assert {*SENSORS, *PAIRS, "dual-psd"} == set(BY_NAME)  # the light of a dual PSD: test_dual_psd.py
+
+
+@pytest.mark.parametrize("name", [name for name in SENSORS if name != "point"])
+def test_what_corrections_are_about_says_where_everything_starts(name):
+    sensor = SENSORS[name]()
+    phi, T = values(sensor, 5), flanges(1)
+    shifted = sensor.placed({k: tuple(np.add(v, 0.01)) for k, v in sensor.about().items()})
+    assert not np.allclose(shifted.expect(phi, T), sensor.expect(phi, T), atol=1e-4)
+    assert_allclose(shifted.placed(sensor.about()).expect(phi, T), sensor.expect(phi, T), atol=1e-12)
+
+
+def test_new_poses_are_compared_with_what_is_expected_there(sensor):
+    phi, T = values(sensor, 6), flanges(1)
+    expected = sensor.expect(phi, T)
+    assert_allclose(sensor.facing(expected).expect(phi, T)[:, 3:], 0.0, atol=1e-12)
+    assert_allclose(sensor.facing(expected).expect(phi, T)[:, :3], expected[:, :3])
 
 
 def test_names_are_unique_and_units_said(sensor):

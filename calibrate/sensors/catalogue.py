@@ -1,0 +1,40 @@
+"""All sensors, one line each; the order is that of blocks and parameters in a fit."""
+
+from collections.abc import Iterable
+
+from calibrate.sensors import bar, camera, distance, full_pose, point_line, position, seat, spots, wire
+from calibrate.sensors.kind import NoiseSource, SensorKind, Trait
+
+SENSORS: tuple[SensorKind, ...] = (
+    spots.KIND,
+    point_line.KIND,
+    position.KIND,
+    full_pose.KIND,
+    distance.KIND,
+    wire.KIND,
+    seat.KIND,
+    bar.KIND,
+    camera.KIND,
+)
+BY_NAME = {kind.name: kind for kind in SENSORS}
+SOURCES: dict[str, NoiseSource] = {source.name: source for kind in SENSORS for source in kind.noise}
+FRAMES = tuple(frame for kind in SENSORS for frame in kind.frames)
+LENGTHS = tuple(name for name, source in SOURCES.items() if source.unit == "m")  # sources of noise that are lengths
+
+
+def kind_of(name: str) -> SensorKind:
+    """The sensor of this name. KeyError for a name that is none."""
+    return BY_NAME[name]
+
+
+def names_with(trait: Trait) -> tuple[str, ...]:
+    """Names of all sensors that have it."""
+    return tuple(kind.name for kind in SENSORS if trait in kind.traits)
+
+
+def used_with(asked: Iterable[str]) -> tuple[SensorKind, ...]:
+    """The sensors that readings are used by, where a plan asks for these names."""
+    wanted = set(asked)
+    given = [kind for kind in SENSORS if kind.instead_of and kind.name in wanted]
+    displaced = {name for kind in given for name in kind.instead_of}
+    return tuple(k for k in SENSORS if k in given or not (k.instead_of or k.name in displaced))

@@ -1,0 +1,230 @@
+"""Instrument: spots of a laser on the two faces of a dual PSD; the light itself is dual_psd.py and optics.py.
+
+Its gross-error check: two spots are one line of light in the fixture, and the laser's line has to lie on it. The first
+spot is a point of the line, and the second, mirrored at the first face, gives its direction: no reflection has to be
+computed for an arm that points elsewhere. Rotation of a fixture by Kabsch over directions, its shift by least squares
+over distances point to line.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from acquisition.recording.columns import SPOTS
+from acquisition.recording.rig_schema import Rig
+from acquisition.recording.samples import Samples
+from calibrate.blunders.finding import BlunderKind
+from calibrate.blunders.least_distance import weights
+from calibrate.blunders.rough_fit import turn_between
+from calibrate.blunders.witness import Otherwise, Strain, Witness, filled, stacked, thinned
+from calibrate.chain import Chain
+from calibrate.default_belief import pair_of
+from calibrate.errors import DataError
+from calibrate.joint_problem import Block
+from calibrate.read_samples import observations
+from calibrate.rigid import transform
+from calibrate.sample_table import SampleTable
+from calibrate.sensors.dual_psd import DualPsd, Fixture
+from calibrate.sensors.kind import Columns, Found, NoiseSource, SensorKind, Trait
+from calibrate.sensors.known_distance import KnownDistances
+from calibrate.sensors.laser import LaserMount
+from calibrate.weighting import Measured
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+PLACED = ("placement", "first_psd")  # columns that say how the fixture stood and was struck
+PSD_BELIEVED_M = 2e-6  # a PSD in shop conditions (Deng, Ding, Zhang, Food & Machinery 2019(3))
+FEWEST_POSES = 12  # of one placement: four numbers each, six unknowns
+TURNS = 10
+DAMPING = 1e-6  # of the mean square of a column: along lines all alike a fixture stays where it is believed
+LEVER_M = 0.3  # a turned fixture counts by what it moves at this distance: the usual travel of the beam
+
+
+@dataclass(frozen=True)
+class SpotsWitness:
+    """Every fixture's place is found; it should not have to be far from where it is believed."""
+
+    q_rad: Floats  # (pose, joint)
+    spots_m: Floats  # (pose, 4) x, y on PSD 1, x, y on PSD 2
+    placement: Ints  # (pose,)
+    first_psd: Ints  # (pose,) 1 or 2
+    T_psd1_psd2: Floats  # (4, 4)
+    T_base_psd1: Mapping[int, Floats]
+    origin_m: Floats  # (3,) of the laser in the flange frame
+    direction: Floats  # (3,) unit
+
+    def strain(self, T_base_flange: Floats) -> Strain:
+        beam = T_base_flange[:, :3, :3] @ self.direction
+        origin = T_base_flange[:, :3, :3] @ self.origin_m + T_base_flange[:, :3, 3]
+        near, far = self._line()
+        distance, moved = np.zeros(len(beam)), []
+        for place in np.unique(self.placement):
+            rows = self.placement == place
+            found = _placed(near[rows], far[rows], origin[rows], beam[rows], self.T_base_psd1[int(place)])
+            distance[rows] = found[0]
+            moved.append(found[1])
+        return Strain(float(np.median(distance)), float(np.median(moved)))
+
+    def otherwise(self) -> Iterator[Otherwise]:
+        """Detectors exchanged in the order of the light, and millimetres. Mirrored axes: spot_signs.py."""
+        yield Otherwise(
+            BlunderKind.EXCHANGED_PSD,
+            "column first_psd",
+            "the beam strikes the other detector first",
+            "write 1 for 2 and 2 for 1",
+            replace(self, first_psd=3 - self.first_psd),
+        )
+        yield Otherwise(
+            BlunderKind.MILLIMETRES,
+            "columns psd1_x_m, psd1_y_m, psd2_x_m, psd2_y_m",
+            "spots in millimetres",
+            "write metres (millimetres times 0.001)",
+            replace(self, spots_m=1e-3 * self.spots_m),
+        )
+
+    def _line(self) -> tuple[Floats, Floats]:
+        """(pose, 3), (pose, 3) first spot, and the second as the incoming beam would strike it unreflected; PSD 1."""
+        flat = np.zeros((len(self.spots_m), 2, 3))
+        flat[:, :, :2] = self.spots_m.reshape(-1, 2, 2)
+        R, t = self.T_psd1_psd2[:3, :3], self.T_psd1_psd2[:3, 3]
+        on_face = flat[:, 0], flat[:, 1] @ R.T + t
+        first = (self.first_psd == 1)[:, None]
+        near, far = np.where(first, on_face[0], on_face[1]), np.where(first, on_face[1], on_face[0])
+        normal = np.where(first, [0.0, 0.0, 1.0], R[:, 2])
+        return near, far - 2.0 * np.sum((far - near) * normal, axis=1, keepdims=True) * normal
+
+
+def _placed(near: Floats, far: Floats, origin: Floats, beam: Floats, believed: Floats) -> tuple[Floats, float]:
+    """(distance (pose,), moved m) of one fixture: mean distance of both points of each line from the laser's line."""
+    weight, distance = np.ones(len(near)), np.zeros(len(near))
+    turn, shift = believed[:3, :3], believed[:3, 3]
+    along = far - near
+    along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+    across = np.eye(3) - beam[:, :, None] * beam[:, None, :]
+    for _ in range(TURNS):
+        turn = turn_between(along, beam, weight)
+        points = np.stack([near @ turn.T, far @ turn.T], axis=1)
+        normal = 2.0 * np.einsum("n,nij->ij", weight, across)
+        ridge = DAMPING * np.trace(normal) / 3.0
+        pull = np.einsum("n,nij,nkj->i", weight, across, origin[:, None] - points)
+        shift = np.linalg.solve(normal + ridge * np.eye(3), pull + ridge * believed[:3, 3])
+        off = np.einsum("nij,nkj->nki", across, points + shift - origin[:, None])
+        distance = np.linalg.norm(off, axis=2).mean(axis=1)
+        weight = weights(distance)
+    turned = float(Rotation.from_matrix(turn @ believed[:3, :3].T).magnitude())
+    return distance, float(np.linalg.norm(shift - believed[:3, 3])) + LEVER_M * turned
+
+
+def fixture_of(rig: Rig) -> Fixture:
+    """Both faces and where they are believed to have stood. DataError where the rig has no fixture."""
+    if rig.fixture is None or not rig.placements:
+        raise DataError(f"rig {rig.name}: no [fixture] with a [[placement]]; dual-PSD data need both")
+    pair = rig.fixture.psd2_in_psd1
+    places = {k: transform(p.psd1_in_base.origin_m, p.psd1_in_base.rotation_rad) for k, p in rig.placements.items()}
+    return Fixture(rig.fixture.half_size_m, transform(pair.origin_m, pair.rotation_rad), places)
+
+
+def laser_of(rig: Rig) -> LaserMount:
+    """The laser as drawn. DataError where the rig has none."""
+    if rig.tool.laser_origin_m is None or rig.tool.laser_direction is None:
+        raise DataError(f"rig {rig.name}: tool.laser_origin_m and tool.laser_direction are needed for dual-PSD data")
+    return LaserMount.from_drawing(np.array(rig.tool.laser_origin_m), np.array(rig.tool.laser_direction))
+
+
+def dual_psd_of(rig: Rig, placement: NDArray[np.int64], first_psd: NDArray[np.int64]) -> DualPsd:
+    """The instrument alone; gains and PSD 2 in PSD 1 free under the [tolerance] that doubts them."""
+    gain = None if rig.tolerance is None else rig.tolerance.gain
+    return DualPsd(laser_of(rig), fixture_of(rig), placement, first_psd, gain, pair_of(rig))
+
+
+def psd_sigma_m(rig: Rig) -> float:
+    """One sigma of a coordinate of a spot, as stated or else as usual."""
+    return rig.noise.psd_m or PSD_BELIEVED_M
+
+
+def _build(table: SampleTable) -> Measured | None:
+    rows = table.filled(*SPOTS)
+    if len(rows) == 0:
+        return None
+    seen = observations(table.samples, table.angles)
+    sensor = dual_psd_of(table.rig, seen.placement, seen.first_psd)
+    sigma = np.full((len(rows), 4), psd_sigma_m(table.rig)) if seen.sigma_m is None else seen.sigma_m
+    return table.measured(KIND.name, Chain(table.arm, sensor), rows, seen.spots_m, {KIND.noise[0].name: sigma})
+
+
+def _known_distances(table: SampleTable) -> tuple[Block, ...]:
+    """Between placements that were both used; between others they say nothing."""
+    if len(table.filled(*SPOTS)) == 0:
+        return ()
+    seen = observations(table.samples, table.angles)
+    used = set(seen.placement.tolist())
+    listed = [d for d in table.rig.known_distances if {d.from_placement, d.to_placement} <= used]
+    if not listed:
+        return ()
+    sensor = dual_psd_of(table.rig, seen.placement, seen.first_psd)
+    between = np.array([[d.from_placement, d.to_placement] for d in listed])
+    length_m, sigma_m = np.array([d.length_m for d in listed]), np.array([d.sigma_m for d in listed])
+    return (KnownDistances(sensor, between, length_m, sigma_m),)
+
+
+def _witness(rig: Rig, samples: Samples, q_rad: Floats) -> Witness | None:
+    rows = filled(samples, *SPOTS, *PLACED)
+    place = samples.integers(PLACED[0], 0)
+    many = [k for k in np.unique(place[rows]) if np.sum(place[rows] == k) >= FEWEST_POSES]
+    rows = thinned(rows[np.isin(place[rows], many)])
+    if len(rows) == 0:
+        return None
+    mount, fixture = laser_of(rig), fixture_of(rig)
+    return SpotsWitness(
+        q_rad[rows],
+        stacked(samples, SPOTS)[rows],
+        place[rows],
+        samples.integers(PLACED[1], 0)[rows],
+        fixture.T_psd1_psd2,
+        fixture.T_base_psd1,
+        mount.origin_m,
+        mount.direction,
+    )
+
+
+def _predict(found: Found, T_base_flange: Floats, samples: Samples) -> Columns:
+    placement, first_psd = (samples.integers(name, 0) for name in PLACED)
+    known = np.flatnonzero((placement > 0) & (first_psd > 0))
+    sensor = dual_psd_of(found.rig, placement[known], first_psd[known])
+    spots = np.full((len(samples), 4), np.nan)
+    spots[known] = sensor.expect(found.values_of(sensor.parameters), T_base_flange[known])
+    return dict(zip(SPOTS, spots.T, strict=True))
+
+
+def _used(found: Found, samples: Samples, rows: NDArray[np.intp]) -> tuple[DualPsd, Floats]:
+    placement, first_psd = (samples.integers(name, 0)[rows] for name in PLACED)
+    sensor = dual_psd_of(found.rig, placement, first_psd)
+    return sensor, found.values_of(sensor.parameters)
+
+
+def _half_face_m(rig: Rig) -> float:
+    """A spot that should lie beyond the face it was read on is none that a bump moved."""
+    return np.inf if rig.fixture is None else rig.fixture.half_size_m
+
+
+KIND = SensorKind(
+    name="dual-psd",
+    columns=SPOTS,
+    title="Spots on the dual PSD",
+    noun="spots",
+    noise=(NoiseSource("psd", "m", "psd_m"),),
+    traits=frozenset({Trait.LIGHT}),
+    reads=SPOTS,
+    asks=SPOTS,
+    build=_build,
+    lengths=_known_distances,
+    witness=_witness,
+    far_m=_half_face_m,
+    predict=_predict,
+    used=_used,
+    place=lambda samples: samples.integers(PLACED[0], 0),
+)
