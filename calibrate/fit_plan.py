@@ -56,6 +56,14 @@ class InstrumentName(enum.Enum):
     WIRE = "wire"
     SEAT = "seat"
     BAR = "bar"
+    ENCODER_DIFFERENCE = "encoder-difference"  # second encoders against the controller's; only when listed
+
+
+class AnglesName(enum.Enum):
+    """Which readings of the joints drive the arm."""
+
+    CONTROLLER = "controller"
+    ENCODERS = "encoders"  # the second ones, in the controller's sense and about its zeros
 
 
 Limit = Annotated[float, Meta(ge=0.0, le=1e12)]  # whitened and scaled, so that 1 is a noise or a plausible size
@@ -78,6 +86,7 @@ class FitPlan(Struct, frozen=True, forbid_unknown_fields=True):
     schema: Literal[1]
     model: ArmModel | None = None  # the rig's arm is written anew in this model
     instruments: Few[InstrumentName] = ()  # none: all that the samples allow
+    angles: AnglesName = AnglesName.CONTROLLER
     free: Few[Name] = ()  # without an opinion of the drawing
     priors: Mapping[Name, Positive] = {}  # pattern -> one sigma about the drawing, m or rad; a later one wins
     hold: Few[Name] = ()  # as drawn; wins over `free` and `priors`
@@ -145,6 +154,8 @@ def _contradictions(plan: FitPlan) -> Iterator[tuple[KeyPath, str]]:
     for one, other in pairs:
         if {one, other} <= set(plan.instruments):
             yield ("instruments",), f"'{one.value}' and '{other.value}' are the same readings; choose one of them"
+    if plan.angles is AnglesName.ENCODERS and InstrumentName.ENCODER_DIFFERENCE in plan.instruments:
+        yield ("angles",), "angles = 'encoders' leaves no encoder-difference to observe; leave one of them out"
     if plan.dog_leg is not None and plan.solver is not SolverName.DOGLEG:
         yield ("dog-leg",), f"[dog-leg] has no meaning for solver = '{plan.solver.value}'; write solver = 'dog-leg'"
     if plan.share == 0.0 and plan.splits != tuple(SplitKind):

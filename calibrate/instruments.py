@@ -30,6 +30,7 @@ from calibrate.sample_table import SampleTable
 from calibrate.sample_table import Spots as Spots
 from calibrate.sensors.bar import bar_pairs, consecutive_pairs, shared_correlation
 from calibrate.sensors.dual_psd import DualPsd
+from calibrate.sensors.encoder_difference import encoder_difference
 from calibrate.sensors.full_pose import FullPose
 from calibrate.sensors.known_distance import KnownDistances
 from calibrate.sensors.pair import PairChain
@@ -70,8 +71,11 @@ def instruments_of(
     angles: Angles = "reported",
     positions: Positions = Positions.FRAME,
     spots: Spots = Spots.REFLECTION,
+    encoders: bool = False,
 ) -> Instruments:
     """All instruments of a session. `arm`: another model than the rig's own under its drawing tolerance.
+
+    `encoders`: second encoders, too. They know no geometry: only effects at the joints make use of them.
 
     DataError where no row holds an observation, or where columns and rig contradict each other.
     """
@@ -82,6 +86,7 @@ def instruments_of(
             "samples: no row holds an observation; columns of one are psd1_x_m ... with placement and first_psd, "
             "x_m y_m z_m, wire_m, seat, or bar with bar_end"
         )
+    measured += encoder_difference(table) if encoders else ()
     weighting = Weighting(measured, believed_noise(rig).joint_rad, _known(table, measured))
     used = np.unique(np.concatenate([instrument.sample_rows.ravel() for instrument in measured]))
     unused = np.setdiff1d(np.arange(len(samples)), used)

@@ -21,6 +21,7 @@ from calibrate.blunders.rough_fit import frame_between, rough_fit
 from calibrate.diagnose.session import Session, session_of
 from calibrate.diagnose.wild_rows import FEWEST_ROWS, alone, behind_gap, lasting
 from calibrate.effects.moved import LIMIT
+from calibrate.effects.ports import ENCODER_DIFFERENCE
 from calibrate.identification.clean import refuse_most, rows_of
 from calibrate.identification.identify import impossible_rows, wrong_file
 from calibrate.identification.rounds import distances, wary_fit
@@ -115,7 +116,7 @@ def _wild(session: Session) -> list[Blunder]:
     out: list[Blunder] = []
     every = zip(session.measured, distances(problem, theta), strict=False)  # known lengths come last and are no rows
     for index, (measured, distance) in enumerate(every):
-        if measured.problem.rows < FEWEST_ROWS:
+        if measured.problem.rows < FEWEST_ROWS or measured.name == ENCODER_DIFFERENCE:
             continue
         k = measured.problem.observed.shape[1]
         own = problem.of_block(index, theta)

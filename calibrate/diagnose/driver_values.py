@@ -13,6 +13,7 @@ from calibrate.chain import Chain
 from calibrate.diagnose.session import Session
 from calibrate.effects.drivers import Drivers, Readout
 from calibrate.sensors.dual_psd import DualPsd
+from calibrate.sensors.encoder_difference import EncoderDifference
 from calibrate.sensors.model import Sensor
 from calibrate.sensors.seat import Seat
 from calibrate.weighting import Measured
@@ -93,7 +94,8 @@ def readout_at(
         place = np.zeros(n, dtype=np.int64)
         place[rows] = sensor.seat
         return Readout(name, predicted, seen, place=place)
-    return Readout(name, predicted, seen)
+    joints = sensor.joints if isinstance(sensor, EncoderDifference) else ()
+    return Readout(name, predicted, seen, joints=joints)
 
 
 def _per_joint(samples: Samples, stem: str, unit: str, n: int) -> Floats | None:

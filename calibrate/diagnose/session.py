@@ -51,7 +51,7 @@ def session_of(rig: Rig, samples: Samples) -> Session:
     """The session of a table of samples without blunders. DataError where it holds no observation."""
     belief = _belief(rig, samples)
     arm = arm_of(rig, belief)
-    found = instruments_of(samples, _doubted(rig, belief), arm=arm)
+    found = instruments_of(samples, _doubted(rig, belief), arm=arm, encoders=True)
     return Session(rig, samples, arm, found.weighting, found.start)
 
 

@@ -19,6 +19,7 @@ from calibrate.fit_plan import DEFAULT, FitPlan, InstrumentName
 from calibrate.identification.planned import COLUMNS, as_planned, chosen_instruments, samples_as_planned
 from calibrate.instruments import Instruments, instruments_of
 from calibrate.sample_table import Positions, Spots
+from calibrate.sensors.encoder_difference import EncoderDifference
 from calibrate.sensors.full_pose import FullPose
 from calibrate.sensors.position import Position
 from calibrate.sensors.seat import Seat
@@ -51,6 +52,7 @@ def instruments_for_fit(rig: Rig, samples: Samples, plan: FitPlan = DEFAULT) -> 
         arm=with_discs(arm_of(rig, links), rig),
         positions=Positions.DISTANCE if as_distance else Positions.FRAME,
         spots=Spots.POINT if as_lines else Spots.REFLECTION,
+        encoders=InstrumentName.ENCODER_DIFFERENCE in plan.instruments,
     )
     found = as_planned(chosen_instruments(found, plan), plan)
     if all(m.name in OUTSIDE for m in found.weighting.measured):
@@ -70,7 +72,8 @@ def standing_at(weighting: Weighting, rows: Indices) -> Weighting:
 
 def columns_of(measured: Measured) -> tuple[str, ...]:
     """Where a person finds the observations of this instrument in the file."""
-    return COLUMNS[measured.name]
+    sensor = getattr(measured.problem.chain, "sensor", None)
+    return sensor.columns if isinstance(sensor, EncoderDifference) else COLUMNS[measured.name]
 
 
 def believed_sigma(measured: Measured) -> Floats:

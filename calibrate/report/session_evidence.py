@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.recording import Recording
 from calibrate.arms.model import KinematicModel
+from calibrate.effects.ports import ENCODER_DIFFERENCE
 from calibrate.errors import DataError
 from calibrate.fit import solve
 from calibrate.joint_problem import JointProblem
@@ -32,6 +33,7 @@ SAID = {
     "wire": "Wire lengths",
     "seat": "Probe in the cones",
     "bar": "Bar lengths",
+    "encoder-difference": "Second encoders",
 }
 
 
@@ -147,7 +149,7 @@ def _readings(
         return ()
     old, new = (block.misfit(problem.of_block(index, theta)) for theta in (before, after))
     whitened = block.residual(problem.of_block(index, after)).reshape(new.shape)
-    parts = [("", "m", slice(None))]
+    parts = [("", "rad" if measured.name == ENCODER_DIFFERENCE else "m", slice(None))]
     if measured.name == "full-pose":
         parts = [("position", "m", slice(0, 3)), ("orientation", "rad", slice(3, 6))]
     return tuple(

@@ -28,6 +28,7 @@ NOUNS = {
     "wire": "wire lengths",
     "seat": "cones",
     "bar": "bar lengths",
+    "encoder-difference": "second encoders",
 }
 
 
