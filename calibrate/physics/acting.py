@@ -26,7 +26,8 @@ from calibrate.effects.catalogue import EFFECTS
 from calibrate.effects.drivers import Drivers, Readout
 from calibrate.effects.form import Form
 from calibrate.effects.gravity import likely_torque_nm
-from calibrate.effects.ports import Perturbation, Port
+from calibrate.effects.ports import ENCODER_DIFFERENCE, Perturbation, Place, Port
+from calibrate.effects.second_encoders import SECOND, at_second_encoders
 from calibrate.effects.term import Shape, Term
 from calibrate.errors import DataError
 from calibrate.physics.records import Effect
@@ -74,6 +75,7 @@ def listed(effects: Sequence[Effect], drivers: Drivers) -> tuple[Carried, ...]:
     derived = any(effect.shape == Shape.HYSTERESIS.value for effect in effects)  # the file holds it as a column
     drivers = replace(drivers, approach_derived=derived)
     terms = [t for e in EFFECTS if e.physics in wanted for t in e.terms(drivers)]
+    terms += at_second_encoders(terms, drivers)
     return tuple(Carried(effect, _accepted(effect, _term(effect, terms, drivers))) for effect in effects)
 
 
@@ -138,7 +140,9 @@ def _term(effect: Effect, terms: Sequence[Term], drivers: Drivers) -> Term:
 
 
 def _port_of(effect: Effect, drivers: Drivers) -> Port:
-    """Where a curve acts: any port of the catalogue has one place, whatever acts there."""
+    """Where a curve acts: any port of the catalogue has one place, whatever acts there, but for a second encoder."""
+    if effect.variant == SECOND:
+        return Port(effect.where, Place.READING, instrument=ENCODER_DIFFERENCE)
     for e in EFFECTS:
         for term in e.terms(drivers):
             if term.port.where == effect.where:
@@ -250,7 +254,7 @@ def _beyond(carried: Carried, old: Drivers, new: Drivers) -> tuple[NDArray[np.bo
 
 def _readouts(predictor: Predictor, samples: Samples, frames: Floats, by: Perturbation) -> dict[str, Readout]:
     """Of the instruments that the model was fitted to, as predicted without their own errors of reading."""
-    asked = {name for name in predictor.instruments if name != "bar"}
+    asked = {name for name in predictor.instruments if name not in ("bar", ENCODER_DIFFERENCE)}
     read = readings(predictor, frames[:, -1], samples, asked)
     out: dict[str, Readout] = {}
     for name in asked:
@@ -271,6 +275,10 @@ def _readouts(predictor: Predictor, samples: Samples, frames: Floats, by: Pertur
             seat = samples.integers("seat", 0)
             seen = seat > 0
             out[name] = Readout(name, np.where(seen[:, None], table, np.nan), seen, place=seat)
+    if joints := tuple(i for i in range(1, samples.n_joints + 1) if f"encoder{i}.zero" in predictor.values):
+        n = len(frames)  # of use to say where an effect sits; nothing else depends on these readings
+        nothing = np.full((n, len(joints)), np.nan)
+        out[ENCODER_DIFFERENCE] = Readout(ENCODER_DIFFERENCE, nothing, np.zeros(n, dtype=bool), joints=joints)
     return out
 
 

@@ -24,12 +24,13 @@ from calibrate.diagnose.noise_law import curvature_of
 from calibrate.diagnose.noise_of_fit import freedom
 from calibrate.effects.catalogue import holds_of
 from calibrate.effects.drivers import Drivers
-from calibrate.effects.ports import Perturbation
+from calibrate.effects.ports import ENCODER_DIFFERENCE, Perturbation
+from calibrate.effects.second_encoders import SECOND
 from calibrate.effects.term import Size
 from calibrate.errors import DataError
 from calibrate.identifiability import Identifiability, analyse
 from calibrate.identification.record import left_out
-from calibrate.identification.session import about_of
+from calibrate.identification.session import about_of, columns_of
 from calibrate.model_file import (
     WITH_PHYSICS,
     Fields,
@@ -207,7 +208,7 @@ def _effect(a: Accepted, name: str, finding: Finding | None, drivers: Drivers, o
         depends_on=depends_on,
         shape=term.shape.value,
         order=term.order,
-        variant=term.variant,
+        variant=SECOND if isinstance(term, Curve) and term.port.instrument == ENCODER_DIFFERENCE else term.variant,
         parameters={k: _parameter(k, size) for k, size in sizes.items()},
         coefficients={f"{name}.c{j}": float(c) for j, c in enumerate(a.coefficients)},
         inner={s.name: float(v) for s, v in zip(term.inner, a.inner, strict=True)},
@@ -272,7 +273,8 @@ def _noise(fit: Fitted) -> Fields:
         white = np.linalg.solve(np.linalg.cholesky(scatter.covariance), misfit[..., None])[..., 0]
         size = larger * _normal_size(np.sum(white**2, axis=1), misfit.shape[1])
         sigma = np.sqrt(size * np.median(np.diagonal(scatter.covariance, axis1=1, axis2=2), axis=0))
-        names = TIP if m.name == "seat" else MOVED_COLUMNS.get(m.name, (m.name,))
+        usual = columns_of(m) if m.name == ENCODER_DIFFERENCE else (m.name,)
+        names = TIP if m.name == "seat" else MOVED_COLUMNS.get(m.name, usual)
         out |= {name: float(s) for name, s in zip(names, sigma, strict=True)}
     return out
 

@@ -30,7 +30,7 @@ SOURCE = "encoder"  # of noise
 BELIEVED_RAD = 5e-6  # a count of 20 bits a turn is 6 urad; the data correct it
 FOLLOWS_RAD = 0.05  # what no drive and no disc does: the readings are then not of one joint, or not in joint angles
 FEWEST = 10  # rows of a joint, for a zero and a scatter
-PLAUSIBLE_RAD = 1e-3  # of a zero about the middle of the differences
+PLAUSIBLE_RAD = 1e-3  # by which a zero may lie off the middle of the differences
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,8 @@ class EncoderDifference:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        return tuple(Parameter(f"encoder{joint}.zero", "rad", PLAUSIBLE_RAD) for joint in self.joints)
+        each = zip(self.joints, self.zero_rad.tolist(), strict=True)
+        return tuple(Parameter(f"encoder{joint}.zero", "rad", PLAUSIBLE_RAD, start=zero) for joint, zero in each)
 
     @property
     def channels(self) -> Ints:
@@ -56,7 +57,7 @@ class EncoderDifference:
         return self
 
     def expect(self, phi: Floats, T_base_flange: Floats) -> Floats:
-        return np.broadcast_to(self.zero_rad + phi, (len(T_base_flange), len(self.joints))).copy()
+        return np.broadcast_to(phi, (len(T_base_flange), len(self.joints))).copy()
 
     def by_twist(self, phi: Floats, T_base_flange: Floats) -> Floats:
         return np.zeros((len(T_base_flange), len(self.joints), 6))
