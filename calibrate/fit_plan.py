@@ -17,7 +17,8 @@ from acquisition.recording.toml_file import parse_toml, read_text
 from calibrate.errors import DataError
 from calibrate.fit import DogLegRules, Loss, Method
 from calibrate.redundant import Redundant
-from calibrate.sensors.catalogue import BY_NAME, SENSORS
+from calibrate.sensors.catalogue import BY_NAME, SENSORS, names_with
+from calibrate.sensors.kind import Trait
 from calibrate.uncertainty.splits import SplitKind
 
 Rounds = Annotated[int, Meta(ge=0, le=100_000)]  # some seconds each
@@ -44,6 +45,13 @@ class RedundantName(enum.Enum):
 
     REMOVED = "removed"
     PRIORS = "priors"
+
+
+class AnglesName(enum.Enum):
+    """Which readings of the joints drive the arm."""
+
+    CONTROLLER = "controller"
+    ENCODERS = "encoders"  # the second ones, in the controller's sense and about its zeros
 
 
 Limit = Annotated[float, Meta(ge=0.0, le=1e12)]  # whitened and scaled, so that 1 is a noise or a plausible size
@@ -74,6 +82,7 @@ class FitPlan(Struct, frozen=True, forbid_unknown_fields=True):
     schema: Literal[1]
     model: ArmModel | None = None  # the rig's arm is written anew in this model
     instruments: Few[Name] = ()  # sensors by name, of calibrate/sensors/catalogue.py; none: all that the samples allow
+    angles: AnglesName = AnglesName.CONTROLLER
     free: Few[Name] = ()  # without an opinion of the drawing
     priors: Mapping[Name, Positive] = {}  # pattern -> one sigma about the drawing, m or rad; a later one wins
     hold: Few[Name] = ()  # as drawn; wins over `free` and `priors`
@@ -142,6 +151,8 @@ def _contradictions(plan: FitPlan) -> Iterator[tuple[KeyPath, str]]:
         for other in kind.instead_of:
             if {kind.name, other} <= set(asked):
                 yield ("instruments",), f"'{other}' and '{kind.name}' are the same readings; choose one of them"
+    if plan.angles is AnglesName.ENCODERS and set(names_with(Trait.BETWEEN_ENCODERS)) & set(asked):
+        yield ("angles",), "angles = 'encoders' leaves no encoder-difference to observe; leave one of them out"
     if plan.dog_leg is not None and plan.solver is not SolverName.DOGLEG:
         yield ("dog-leg",), f"[dog-leg] has no meaning for solver = '{plan.solver.value}'; write solver = 'dog-leg'"
     if plan.share == 0.0 and plan.splits != tuple(SplitKind):

@@ -52,7 +52,7 @@ def instruments_of(
 ) -> Instruments:
     """All instruments of a session. `arm`: another model than the rig's own under its drawing tolerance.
 
-    `asked`: names of sensors, of those that use the same readings in another way.
+    `asked`: names of sensors, of those that use the same readings in another way or are used only where asked for.
 
     DataError where no row holds an observation, or where columns and rig contradict each other.
     """
@@ -62,7 +62,7 @@ def instruments_of(
     table = SampleTable(samples, rig, arm_of(rig) if arm is None else arm, angles, framed, points)
     built = [(kind, kind.build(table)) for kind in kinds]
     measured = tuple(found for _, found in built if found is not None)
-    if not measured:
+    if all(Trait.BETWEEN_ENCODERS in kind.traits for kind, found in built if found is not None):
         raise DataError(
             "samples: no row holds an observation; columns of one are psd1_x_m ... with placement and first_psd, "
             "x_m y_m z_m, wire_m, seat, or bar with bar_end"

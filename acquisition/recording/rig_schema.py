@@ -65,6 +65,13 @@ class Pose(Struct, frozen=True, forbid_unknown_fields=True):
     rotation_rad: Rotation = ZERO
 
 
+class EncoderSide(enum.Enum):
+    """On which side of the gear a second encoder sits."""
+
+    LINK = "link"
+    MOTOR = "motor"
+
+
 class Joint(Struct, frozen=True, forbid_unknown_fields=True):
     """One axis and the link after it. Either a, alpha, d (and theta offset), or origin and rotation, by `arm.model`."""
 
@@ -78,6 +85,7 @@ class Joint(Struct, frozen=True, forbid_unknown_fields=True):
     rotation_rad: Rotation | None = None
     gear_ratio: GearRatio | None = None
     encoder_counts: Identity | None = None
+    encoder_side: EncoderSide | None = None  # of the second encoder; None: not known
     mass_kg: Kilograms | None = None
     com_m: ArmVector | None = None
 
@@ -193,6 +201,8 @@ class Tolerance(Struct, frozen=True, forbid_unknown_fields=True):
     device_m: SigmaMetres | None = None  # of [device] in the base, with device_rad
     device_rad: SigmaRadians | None = None
     eccentricity_rad: SigmaRadians | None = None  # of an encoder's disc off its axis; None: centred
+    mass_share: Positive | None = None  # of every stated mass, about 1
+    com_m: SigmaMetres | None = None  # of every stated centre of mass
 
 
 class CameraBoard(Struct, frozen=True, forbid_unknown_fields=True):

@@ -9,7 +9,18 @@ from calibeam.prove.free_space_sums import by_instrument
 from calibeam.prove.hidden_angle import HiddenAngle
 from calibeam.prove.real import RealScore
 from calibeam.prove.record import CaseScore, ProofFile
-from calibeam.prove.tally import Figure, Line, at_once, by, by_effect, by_enr, by_fault, figures, rivals
+from calibeam.prove.tally import (
+    Figure,
+    Line,
+    at_once,
+    between_encoders,
+    by,
+    by_effect,
+    by_enr,
+    by_fault,
+    figures,
+    rivals,
+)
 
 
 def print_proof(console: Console, proof: ProofFile) -> None:
@@ -21,6 +32,8 @@ def print_proof(console: Console, proof: ProofFile) -> None:
     console.print(_lines("several at once", [at_once(cases, "three"), at_once(cases, "eighteen")]))
     console.print(_lines("effect over noise >= 0.6, by mechanism", by_effect(cases)))
     console.print(_lines("faults of motion, stamps and second encoders, in streams", by_fault(cases)))
+    if found := between_encoders(cases):
+        console.print(_lines("between the two encoders of a joint", found))
     console.print(_figures(cases))
     console.print(_free_space(cases))
     others = rivals(cases)

@@ -6,19 +6,19 @@ names something would shine there.
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, TypeVar, get_args
 
 import numpy as np
 from numpy.random import Generator
 
 from simulators.conceal.noise import Kind as Noise
-from simulators.conceal.wanted import FAMILIES, Family, Wanted
+from simulators.conceal.wanted import FAMILIES, SIDES, Family, Wanted
 
 T = TypeVar("T")
 Path = Literal["in process", "on wires"]  # how the recording comes about
-Kind = Literal["one", "disturbed", "three", "eighteen", "none", "outside", "withheld", "streams"]
-KINDS: tuple[Kind, ...] = get_args(Kind)
+Kind = Literal["one", "disturbed", "three", "eighteen", "none", "outside", "withheld", "streams", "encoders"]
+KINDS: tuple[Kind, ...] = tuple(k for k in get_args(Kind) if k != "encoders")  # of a proof that names none
 SHARES: dict[Kind, float] = {
     "one": 0.42,
     "disturbed": 0.06,  # one effect under heavy-tailed noise with outliers, or slowly wandering noise
@@ -27,6 +27,7 @@ SHARES: dict[Kind, float] = {
     "none": 0.14,
     "outside": 0.15,
     "withheld": 0.08,
+    "encoders": 0.1,  # something of machine-like size between the two encoders of a joint, or nothing; on request
     "streams": 0.05,  # nothing wrong with the chain; with motion, stamps or second encoders, in three of four
 }
 FAMILY_SHARES: dict[Family, float] = {"dual-psd": 0.5, "tracker": 0.25, "cones": 0.125, "wire": 0.125}
@@ -39,6 +40,7 @@ DEFECTS: dict[Kind, tuple[str, ...]] = {
     "outside": ("outside",),
     "withheld": ("any",),
     "streams": (),
+    "encoders": ("any",),
 }
 ENR = (0.15, 8.0)  # effect over noise: from hardly there to plain
 ENR_OF: dict[Kind, tuple[float, float]] = {  # one that must be noticed before anything can be said of it
@@ -51,6 +53,8 @@ SAMPLES = (160, 400)
 MANY_SAMPLES = 400  # of a session with eighteen effects: each has several parameters
 PLACES = (3, 6)
 STREAMED_SAMPLES = (60, 90)  # some minutes of motion
+SIDE_SHARES = (0.5, 0.25, 0.25)  # link, motor, beside
+NO_FAULT = 0.2  # share of the cases with second encoders in which there is only their zeros
 WIRED: tuple[Kind, ...] = ("one", "one", "outside", "none")  # in turns, of the sessions on the wires
 WIRED_SAMPLES = 120  # a minute of ours
 WIRED_PLACES = 3  # of the rig that is emulated
@@ -99,6 +103,8 @@ def scenario(mix: Mix, seed: int, number: int, attempt: int) -> Scenario:
         noise=_noise(kind, rng),
         withhold=kind == "withheld",
     )
+    if kind == "encoders":
+        wanted = _with_encoders(wanted, rng)
     return Scenario(f"case-{number:04d}", kind, wanted)
 
 
@@ -118,6 +124,17 @@ def wired_scenario(seed: int, number: int, attempt: int) -> Scenario:
     return Scenario(f"case-{number:04d}", kind, wanted, "on wires")
 
 
+def _with_encoders(wanted: Wanted, rng: Generator) -> Wanted:
+    """Second encoders on any side of the gear, which the rig file says or not; some sessions have only their zeros."""
+    nothing = wanted.defects == ("any",) and rng.random() < NO_FAULT
+    return replace(
+        wanted,
+        defects=() if nothing else wanted.defects,
+        encoders=_one_of(SIDES, SIDE_SHARES, rng),
+        side_stated=bool(rng.random() < 0.5),
+    )
+
+
 def _able(families: Sequence[Family], kind: Kind) -> Sequence[Family]:
     """Eighteen effects have room in a session with two detectors only, which alone leave streams of spots.
 
@@ -127,6 +144,7 @@ def _able(families: Sequence[Family], kind: Kind) -> Sequence[Family]:
         "eighteen": ("dual-psd",),
         "streams": ("dual-psd",),
         "withheld": ("dual-psd", "tracker", "wire"),
+        "encoders": ("dual-psd", "tracker", "wire"),
     }
     wide: tuple[Family, ...] = FAMILIES
     possible = narrow.get(kind, wide)

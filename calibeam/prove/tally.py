@@ -92,6 +92,13 @@ def in_streams(cases: Sequence[CaseScore]) -> Line:
     return _line("faults that streams tell", [c for c in cases if c.kind == "streams"])
 
 
+def between_encoders(cases: Sequence[CaseScore]) -> list[Line]:
+    """Mechanisms of machine-like size between the two encoders of a joint."""
+    ones = [c for c in cases if c.kind == "encoders" and c.defects]
+    words = sorted({c.defects[0].mechanism for c in ones})
+    return [_line(word, [c for c in ones if c.defects[0].mechanism == word]) for word in words]
+
+
 def by_fault(cases: Sequence[CaseScore]) -> list[Line]:
     """Faults of motion, stamps and second encoders, found in streams."""
     ones = [c for c in cases if c.kind == "streams" and c.defects]

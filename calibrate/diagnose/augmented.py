@@ -1,6 +1,6 @@
 """Geometry and terms as one least-squares problem under given weights, for any solver of calibrate/solvers."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -186,15 +186,14 @@ class Augmented:
         frames = perturbed_frames(self.session.arm, theta, q, by)
         joint = self.session.weighting.unweighted
         looks = tuple(look(m, joint.of_block(i, geometry), frames) for i, m in enumerate(self.session.measured))
-        return Around(
-            by, frames, looks, tuple(map(self._read, self.session.measured, looks, [by.readings] * len(looks)))
-        )
+        return Around(by, frames, looks, tuple(map(self._read, self.session.measured, looks, [by] * len(looks))))
 
     @staticmethod
-    def _read(measured: Measured, seen: Look, readings: Mapping[str, Floats]) -> Floats:
-        if measured.name not in readings:
-            return seen.expected
-        return seen.expected + readings[measured.name][measured.sample_rows[:, -1]]
+    def _read(measured: Measured, seen: Look, by: Perturbation) -> Floats:
+        expected, rows = seen.expected, measured.sample_rows[:, -1]
+        if (channels := encoder_channels(measured)) is not None:
+            expected = expected + by.between_rad[np.ix_(rows, channels)]
+        return expected if measured.name not in by.readings else expected + by.readings[measured.name][rows]
 
     @property
     def _drivers(self) -> Drivers:
@@ -255,8 +254,27 @@ def columns_of(session: Session, port: Port, basis: Floats, at: Around) -> list[
     """Of each instrument (row, k, m) derivative of its readings by what a port adds (sample, width, m)."""
     if port.place is not Place.READING:
         twists = flange_twists(at.frames, port, basis)
-        return [through(seen, m, twists) for seen, m in zip(at.looks, session.measured, strict=True)]
+        return [
+            through(seen, m, twists)
+            if (channels := encoder_channels(m)) is None
+            else _between(port, basis, m, channels)
+            for seen, m in zip(at.looks, session.measured, strict=True)
+        ]
     return [
         basis[m.sample_rows[:, -1]] if m.name == port.instrument else np.zeros((*seen.expected.shape, basis.shape[-1]))
         for seen, m in zip(at.looks, session.measured, strict=True)
     ]
+
+
+def encoder_channels(measured: Measured) -> Ints | None:
+    """(channel,) joints, from 0, that second encoders are read at; None: another instrument."""
+    joints = measured.problem.chain.sensor.joints_compared()
+    return np.array(joints, dtype=np.intp) - 1 if joints else None
+
+
+def _between(port: Port, basis: Floats, measured: Measured, channels: Ints) -> Floats:
+    """(row, channel, m) what second encoders see of a port that is no reading: turns of the joints before them."""
+    rows = measured.sample_rows[:, -1]
+    if not port.between_encoders:
+        return np.zeros((len(rows), len(channels), basis.shape[-1]))
+    return basis[np.ix_(rows, channels)]

@@ -27,6 +27,7 @@ from calibrate.identification.rounds import distances, wary_fit
 from calibrate.identification.session import columns_of, shots_of
 from calibrate.parameters import start_values
 from calibrate.sensors.catalogue import kind_of
+from calibrate.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
@@ -116,7 +117,7 @@ def _wild(session: Session) -> list[Blunder]:
     out: list[Blunder] = []
     every = zip(session.measured, distances(problem, theta), strict=False)  # known lengths come last and are no rows
     for index, (measured, distance) in enumerate(every):
-        if measured.problem.rows < FEWEST_ROWS:
+        if measured.problem.rows < FEWEST_ROWS or measured.name == ENCODER_DIFFERENCE:
             continue
         k = measured.problem.observed.shape[1]
         own = problem.of_block(index, theta)

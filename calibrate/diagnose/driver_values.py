@@ -85,6 +85,7 @@ def readout_at(
         None if stood.lean is None else _among(n, rows, stood.lean, 0.0),
         None if stood.first_psd is None else _numbers(n, rows, stood.first_psd),
         None if stood.place is None else _numbers(n, rows, stood.place),
+        joints=() if sensor is None else sensor.joints_compared(),
     )
 
 

@@ -139,16 +139,16 @@ def places_of(bench: Bench) -> tuple[tuple[Port, int], ...]:
 
     Lengths of links are left to geometry, and what a late clock does at each joint to the joint itself.
     """
-    found: dict[tuple[str, int], tuple[Port, int]] = {}
+    found: dict[tuple[Port, int], tuple[Port, int]] = {}
     drivers = bench.state.drivers
-    for term in {(t.port.where, t.physics): t for t in bench.state.candidates()}.values():
+    for term in {(t.port, t.physics): t for t in bench.state.candidates()}.values():
         inner = np.array([spec.grid[len(spec.grid) // 2] for spec in term.inner])
         where = term.port.where
-        if where == TIME or (where.startswith("link") and not where.endswith(".tilt")):
+        if where == TIME or term.port.past_encoders or (where.startswith("link") and not where.endswith(".tilt")):
             continue
         acts = np.any(term.basis(drivers, inner) != 0.0, axis=(0, 2))
         for component in np.flatnonzero(acts):
-            found.setdefault((term.port.where, int(component)), (term.port, int(component)))
+            found.setdefault((term.port, int(component)), (term.port, int(component)))
     return tuple(found.values())
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from calibrate.diagnose.folds import Split, splits_of, units
 from calibrate.diagnose.linearised import State, Unseen
+from calibrate.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -55,7 +56,7 @@ def proofs(bare: State, full: State, samples: Ints, rng: Generator) -> tuple[Hel
 def floors(state: State, samples: Ints, parameters: int) -> tuple[Floor, ...]:
     """Of every instrument: robust scatter within repeats after the model, or what the fit leaves."""
     repeat, out = state.drivers.repeat, list[Floor]()
-    seen = state.held_out(samples)
+    seen = _lengths(state.held_out(samples))
     total = sum(u.misfit[:, :POSITION].size for u in seen)
     for u in seen:
         good = _tame(u.whitened)
@@ -76,10 +77,15 @@ def _proof(bare: State, full: State, samples: Ints, split: Split, rng: Generator
     for fold in split.unseen:
         known = np.setdiff1d(samples, fold)
         without = bare.select(known).refitted(()).held_out(fold)
-        before += without
-        after += full.select(known).refitted(full.accepted).held_out(fold) if full.accepted else without
+        before += _lengths(without)
+        after += _lengths(full.select(known).refitted(full.accepted).held_out(fold) if full.accepted else without)
     names = sorted({u.instrument for u in before})
     return [_compared(split.name, name, before, after, units(bare.drivers), rng) for name in names]
+
+
+def _lengths(unseen: Sequence[Unseen]) -> list[Unseen]:
+    """Without second encoders: angles between two readings of a joint are no error of the arm."""
+    return [u for u in unseen if u.instrument != ENCODER_DIFFERENCE]
 
 
 def _compared(

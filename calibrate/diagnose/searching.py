@@ -9,6 +9,7 @@ from calibrate.diagnose.linearised import State
 from calibrate.diagnose.noise_law import noise_law
 from calibrate.diagnose.null import Null, null_of
 from calibrate.diagnose.visible import Menu
+from calibrate.effects.second_encoders import placed
 from calibrate.effects.term import Term
 
 Key = tuple[object, ...]
@@ -50,8 +51,12 @@ class Search:
 
 
 def cause_of(term: Term) -> Key:
-    """What a person would give one name: the key without the variant; each place may have been bumped by itself."""
-    return (*term.key[:-1], term.variant if term.variant.startswith(PLACE) else "")
+    """What a person would give one name: the key without the variant.
+
+    Each place may have been bumped by itself, and each of two encoders has a disc of its own.
+    """
+    kept = term.variant if term.variant.startswith(PLACE) else placed(term)
+    return (*term.key[:-1], kept)
 
 
 def null_at(bench: Bench, rng: Generator, menu: Menu | None = None) -> Null:

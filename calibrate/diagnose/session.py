@@ -19,7 +19,7 @@ from calibrate.arms.serial import SerialArm
 from calibrate.default_belief import PAIR, SCALELESS, WIDE
 from calibrate.instruments import instruments_of
 from calibrate.parameters import Parameter
-from calibrate.sensors.catalogue import SENSORS
+from calibrate.sensors.catalogue import SENSORS, names_with
 from calibrate.sensors.kind import Trait
 from calibrate.weighting import Measured, Weighting
 
@@ -55,7 +55,7 @@ def session_of(rig: Rig, samples: Samples) -> Session:
     """The session of a table of samples without blunders. DataError where it holds no observation."""
     belief = _belief(rig, samples)
     arm = arm_of(rig, belief)
-    found = instruments_of(samples, _doubted(rig, belief), arm=arm)
+    found = instruments_of(samples, _doubted(rig, belief), arm=arm, asked=names_with(Trait.BETWEEN_ENCODERS))
     return Session(rig, samples, arm, found.weighting, found.start)
 
 

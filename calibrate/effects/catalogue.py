@@ -38,6 +38,7 @@ from calibrate.effects import (
     tool_sag,
 )
 from calibrate.effects.drivers import Drivers
+from calibrate.effects.second_encoders import at_second_encoders
 from calibrate.effects.term import Effect, Holds, Missing, Term
 
 EFFECTS: tuple[Effect, ...] = (
@@ -81,7 +82,8 @@ EFFECTS: tuple[Effect, ...] = (
 
 def terms_of(drivers: Drivers) -> tuple[Term, ...]:
     """Every place and form that the catalogue knows and this session allows."""
-    return tuple(term for effect in EFFECTS for term in effect.terms(drivers))
+    listed = tuple(term for effect in EFFECTS for term in effect.terms(drivers))
+    return (*listed, *at_second_encoders(listed, drivers))
 
 
 def missing_of(drivers: Drivers) -> tuple[Missing, ...]:

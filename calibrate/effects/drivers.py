@@ -27,6 +27,7 @@ class Readout:
     lean: Floats | None = None  # (pose, 2, 2) x, y that the arriving beam travels along face 1, 2 per depth
     first_psd: Ints | None = None  # (pose,)
     place: Ints | None = None  # (pose,) placement or seat
+    joints: tuple[int, ...] = ()  # (k,) of second encoders, from 1
 
 
 @dataclass(frozen=True, eq=False)

@@ -86,13 +86,22 @@ def payload(drivers: Drivers, payload_kg: Floats) -> Load:
     return Load(drivers.n_joints, payload_kg, moment)
 
 
+def mass_doubt(drivers: Drivers) -> tuple[float, float]:
+    """One sigma of a stated mass, as a share of it, and of a stated centre (m): as [tolerance] has them, else usual."""
+    stated = drivers.rig.tolerance
+    share = None if stated is None else stated.mass_share
+    off_m = None if stated is None else stated.com_m
+    usual_m = CENTRE_SHARE * longest_link_m(drivers)
+    return MASS_SHARE if share is None else share, usual_m if off_m is None else off_m
+
+
 def doubts(drivers: Drivers) -> list[Load]:
     """What one sigma of every stated mass and centre adds; of a tool that is not stated, at the flange."""
     stated = stated_masses(drivers)
-    off_m = CENTRE_SHARE * longest_link_m(drivers)
+    share, off_m = mass_doubt(drivers)
     out: list[Load] = []
     for mass, i, com in stated:
-        out.append(load_at(i, MASS_SHARE * mass, com))
+        out.append(load_at(i, share * mass, com))
         out += [Load(i, np.array(0.0), mass * off_m * axis) for axis in np.eye(3)]
     if stated and drivers.rig.tool.mass_kg is None:
         out.append(load_at(drivers.n_joints, TOOL_SHARE * sum(mass for mass, _, _ in stated), (0.0, 0.0, 0.0)))
@@ -101,16 +110,16 @@ def doubts(drivers: Drivers) -> list[Load]:
 
 def doubtful_rigs(drivers: Drivers) -> tuple[Rig, ...]:
     """The rig with each stated mass and centre in turn off by one sigma, as `doubts` has it."""
-    rig, off_m = drivers.rig, CENTRE_SHARE * longest_link_m(drivers)
+    rig, (share, off_m) = drivers.rig, mass_doubt(drivers)
     stated = stated_masses(drivers)
     out: list[Rig] = []
     for i, link in enumerate(rig.arm.joints):
         if link.mass_kg:
-            for mass, com in _off(link.mass_kg, link.com_m, off_m):
+            for mass, com in _off(link.mass_kg, link.com_m, share, off_m):
                 joints = (*rig.arm.joints[:i], structs.replace(link, mass_kg=mass, com_m=com), *rig.arm.joints[i + 1 :])
                 out.append(structs.replace(rig, arm=structs.replace(rig.arm, joints=joints)))
     if rig.tool.mass_kg:
-        moved = _off(rig.tool.mass_kg, rig.tool.com_m, off_m)
+        moved = _off(rig.tool.mass_kg, rig.tool.com_m, share, off_m)
         out += [structs.replace(rig, tool=structs.replace(rig.tool, mass_kg=mass, com_m=com)) for mass, com in moved]
     elif stated and rig.tool.mass_kg is None:
         tool_kg = TOOL_SHARE * sum(mass for mass, _, _ in stated)
@@ -118,11 +127,11 @@ def doubtful_rigs(drivers: Drivers) -> tuple[Rig, ...]:
     return tuple(out)
 
 
-def _off(mass_kg: float, com_m: Point | None, off_m: float) -> list[tuple[float, Point]]:
+def _off(mass_kg: float, com_m: Point | None, share: float, off_m: float) -> list[tuple[float, Point]]:
     """Mass and centre with one of them off."""
     x, y, z = com_m or (0.0, 0.0, 0.0)
     centres = ((x + off_m, y, z), (x, y + off_m, z), (x, y, z + off_m))
-    return [((1.0 + MASS_SHARE) * mass_kg, (x, y, z)), *((mass_kg, centre) for centre in centres)]
+    return [((1.0 + share) * mass_kg, (x, y, z)), *((mass_kg, centre) for centre in centres)]
 
 
 def unit_loads(drivers: Drivers, first: int) -> list[Load]:

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
+JOINT = "joint"  # what a port of one joint's angle begins with; a late clock turns all joints at the flange alone
+
 
 class Place(Enum):
     """What a port perturbs; the number of components is that of one sample."""
@@ -24,12 +26,21 @@ class Place(Enum):
 
 @dataclass(frozen=True)
 class Port:
-    """`where` in the words of docs/formats.md; `index` is the frame of FRAME, `instrument` the one of READING."""
+    """`where` in the words of docs/formats.md; `index` is the frame of FRAME, `instrument` the one of READING.
+
+    `past_encoders`, of JOINTS: behind both encoders of the joint, so that their difference does not show it.
+    """
 
     where: str
     place: Place
     index: int = 0
     instrument: str = ""
+    past_encoders: bool = False
+
+    @property
+    def between_encoders(self) -> bool:
+        """Whether what acts here turns the joint between the controller's reading and the second encoder."""
+        return self.place is Place.JOINTS and self.where.startswith(JOINT) and not self.past_encoders
 
 
 @dataclass(frozen=True)
@@ -40,18 +51,26 @@ class Perturbation:
     frames: Floats  # (pose, joint + 1, 6) body twists [v; w] of B_0 ... B_n
     surroundings: Floats  # (pose, 6) base twists
     readings: dict[str, Floats]  # instrument -> (pose, k); absent: none
+    between_rad: Floats  # (pose, joint) of joints_rad, what the second encoders see
 
     @classmethod
     def none(cls, poses: int, joints: int) -> "Perturbation":
-        return cls(np.zeros((poses, joints)), np.zeros((poses, joints + 1, 6)), np.zeros((poses, 6)), {})
+        return cls(
+            np.zeros((poses, joints)),
+            np.zeros((poses, joints + 1, 6)),
+            np.zeros((poses, 6)),
+            {},
+            np.zeros((poses, joints)),
+        )
 
     def plus(self, port: Port, amount: Floats) -> "Perturbation":
         """With `amount` (pose, width of the port) added at a port."""
         joints, frames, around = self.joints_rad, self.frames, self.surroundings
-        readings = self.readings
+        readings, between = self.readings, self.between_rad
         match port.place:
             case Place.JOINTS:
                 joints = joints + amount
+                between = between + amount if port.between_encoders else between
             case Place.FRAME:
                 frames = frames.copy()
                 frames[:, port.index] += amount
@@ -59,4 +78,4 @@ class Perturbation:
                 around = around + amount
             case Place.READING:
                 readings = readings | {port.instrument: readings.get(port.instrument, 0.0) + amount}
-        return Perturbation(joints, frames, around, readings)
+        return Perturbation(joints, frames, around, readings, between)

@@ -12,10 +12,11 @@ from acquisition.recording.samples import Samples
 from calibrate.arms.belief import LINK_PLAUSIBLE
 from calibrate.converted_rig import rig_in_model
 from calibrate.errors import DataError
-from calibrate.fit_plan import FitPlan
+from calibrate.fit_plan import AnglesName, FitPlan
 from calibrate.instruments import Instruments
 from calibrate.parameters import Parameter
 from calibrate.sensors.catalogue import SENSORS
+from calibrate.sensors.encoder_difference import encoder_angles
 
 
 def rig_as_planned(rig: Rig, plan: FitPlan) -> Rig:
@@ -24,7 +25,12 @@ def rig_as_planned(rig: Rig, plan: FitPlan) -> Rig:
 
 
 def samples_as_planned(samples: Samples, plan: FitPlan) -> Samples:
-    """The samples without the columns of instruments that the plan leaves out."""
+    """The samples with the angles of the plan, without the columns of instruments that it leaves out.
+
+    DataError where it asks for second encoders and a joint has none that follows it.
+    """
+    if plan.angles is AnglesName.ENCODERS:
+        samples = encoder_angles(samples)
     if not plan.instruments:
         return samples
     listed = {kind.name: {*kind.columns, *kind.further} for kind in SENSORS}

@@ -58,7 +58,7 @@ def standing_at(weighting: Weighting, rows: Indices) -> Weighting:
 
 def columns_of(measured: Measured) -> tuple[str, ...]:
     """Where a person finds the observations of this instrument in the file."""
-    return kind_of(measured.name).columns
+    return measured.problem.chain.sensor.own_columns() or kind_of(measured.name).columns
 
 
 def believed_sigma(measured: Measured) -> Floats:

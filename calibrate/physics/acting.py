@@ -24,12 +24,14 @@ from calibrate.effects.catalogue import EFFECTS
 from calibrate.effects.drivers import Drivers, Readout
 from calibrate.effects.form import Form
 from calibrate.effects.gravity import likely_torque_nm
-from calibrate.effects.ports import Perturbation, Port
+from calibrate.effects.ports import Perturbation, Place, Port
+from calibrate.effects.second_encoders import SECOND, at_second_encoders
 from calibrate.effects.term import Shape, Term
 from calibrate.errors import DataError
 from calibrate.physics.records import Effect
 from calibrate.predict import Predictor, readings
 from calibrate.sensors.catalogue import kind_of
+from calibrate.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 
 Floats = NDArray[np.float64]
 
@@ -72,6 +74,7 @@ def listed(effects: Sequence[Effect], drivers: Drivers) -> tuple[Carried, ...]:
     derived = any(effect.shape == Shape.HYSTERESIS.value for effect in effects)  # the file holds it as a column
     drivers = replace(drivers, approach_derived=derived)
     terms = [t for e in EFFECTS if e.physics in wanted for t in e.terms(drivers)]
+    terms += at_second_encoders(terms, drivers)
     return tuple(Carried(effect, _accepted(effect, _term(effect, terms, drivers))) for effect in effects)
 
 
@@ -136,7 +139,9 @@ def _term(effect: Effect, terms: Sequence[Term], drivers: Drivers) -> Term:
 
 
 def _port_of(effect: Effect, drivers: Drivers) -> Port:
-    """Where a curve acts: any port of the catalogue has one place, whatever acts there."""
+    """Where a curve acts: any port of the catalogue has one place, whatever acts there, but for a second encoder."""
+    if effect.variant == SECOND:
+        return Port(effect.where, Place.READING, instrument=ENCODER_DIFFERENCE)
     for e in EFFECTS:
         for term in e.terms(drivers):
             if term.port.where == effect.where:
@@ -261,6 +266,10 @@ def _readouts(predictor: Predictor, samples: Samples, frames: Floats, by: Pertur
         sensor, phi = (None, np.zeros(0)) if kind.used is None else kind.used(predictor, samples, rows)
         found = readout_at(kind.name, sensor, phi, table[rows], rows, frames)
         out[kind.name] = found if found.place is not None else replace(found, place=place)
+    if joints := tuple(i for i in range(1, samples.n_joints + 1) if f"encoder{i}.zero" in predictor.values):
+        n = len(frames)  # of use to say where an effect sits; nothing else depends on these readings
+        nothing = np.full((n, len(joints)), np.nan)
+        out[ENCODER_DIFFERENCE] = Readout(ENCODER_DIFFERENCE, nothing, np.zeros(n, dtype=bool), joints=joints)
     return out
 
 

@@ -28,6 +28,7 @@ from calibrate.diagnose.stated_sizes import sizes_of
 from calibrate.effects.catalogue import holds_of
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.ports import Perturbation
+from calibrate.effects.second_encoders import SECOND
 from calibrate.effects.term import Shape, Size
 from calibrate.errors import DataError
 from calibrate.fit_plan import LossName, SolverName
@@ -51,6 +52,7 @@ from calibrate.physics.conditions import kept_conditions, needed_columns, record
 from calibrate.physics.records import Effect, EffectCurve, EffectParameter, SessionRecord
 from calibrate.predict import Predictor
 from calibrate.sensors.catalogue import kind_of
+from calibrate.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 
 Floats = NDArray[np.float64]
 
@@ -276,7 +278,7 @@ def _effect(
         depends_on=depends_on,
         shape=term.shape.value,
         order=term.order,
-        variant=term.variant,
+        variant=SECOND if isinstance(term, Curve) and term.port.instrument == ENCODER_DIFFERENCE else term.variant,
         parameters={k: _parameter(k, size) for k, size in sizes.items()},
         coefficients={f"{name}.c{j}": float(c) for j, c in enumerate(a.coefficients)},
         inner={s.name: float(v) for s, v in zip(term.inner, a.inner, strict=True)},
@@ -341,7 +343,7 @@ def _noise(fit: Fitted) -> Fields:
         white = np.linalg.solve(np.linalg.cholesky(scatter.covariance), misfit[..., None])[..., 0]
         size = larger * _normal_size(np.sum(white**2, axis=1), misfit.shape[1])
         sigma = np.sqrt(size * np.median(np.diagonal(scatter.covariance, axis1=1, axis2=2), axis=0))
-        names = kind_of(m.name).reads or (m.name,)
+        names = kind_of(m.name).reads or m.problem.chain.sensor.own_columns() or (m.name,)
         out |= {name: float(s) for name, s in zip(names, sigma, strict=True)}
     return out
 

@@ -2,7 +2,18 @@
 
 from collections.abc import Iterable
 
-from calibrate.sensors import bar, camera, distance, full_pose, point_line, position, seat, spots, wire
+from calibrate.sensors import (
+    bar,
+    camera,
+    distance,
+    encoder_difference,
+    full_pose,
+    point_line,
+    position,
+    seat,
+    spots,
+    wire,
+)
 from calibrate.sensors.kind import NoiseSource, SensorKind, Trait
 
 SENSORS: tuple[SensorKind, ...] = (
@@ -15,6 +26,7 @@ SENSORS: tuple[SensorKind, ...] = (
     seat.KIND,
     bar.KIND,
     camera.KIND,
+    encoder_difference.KIND,
 )
 BY_NAME = {kind.name: kind for kind in SENSORS}
 SOURCES: dict[str, NoiseSource] = {source.name: source for kind in SENSORS for source in kind.noise}
@@ -35,6 +47,6 @@ def names_with(trait: Trait) -> tuple[str, ...]:
 def used_with(asked: Iterable[str]) -> tuple[SensorKind, ...]:
     """The sensors that readings are used by, where a plan asks for these names."""
     wanted = set(asked)
-    given = [kind for kind in SENSORS if kind.instead_of and kind.name in wanted]
+    given = [kind for kind in SENSORS if (kind.instead_of or kind.only_asked) and kind.name in wanted]
     displaced = {name for kind in given for name in kind.instead_of}
-    return tuple(k for k in SENSORS if k in given or not (k.instead_of or k.name in displaced))
+    return tuple(k for k in SENSORS if k in given or not (k.instead_of or k.only_asked or k.name in displaced))

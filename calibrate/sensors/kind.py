@@ -41,6 +41,7 @@ class Trait(Enum):
     CONES = "a probe in a seat whose place nobody knows"
     TOUCHED = "a hand presses the probe into place"
     SCALELESS = "an arm half as large would give the same readings"
+    BETWEEN_ENCODERS = "two encoders of a joint, read against each other: it sees joints, not the flange"
     CERTIFIED = "its noise is certified: scatter far beyond it is something else"
 
 
@@ -128,6 +129,7 @@ class SensorKind:
     traits: frozenset[Trait] = frozenset()
     frames: tuple[Frame, ...] = ()
     instead_of: tuple[str, ...] = ()  # the same readings used otherwise: only where a fit plan asks for it by name
+    only_asked: bool = False  # it knows no geometry: used only where it is asked for by name
     reads: tuple[str, ...] = ()  # columns of its prediction, in the order of its readings
     asks: tuple[str, ...] = ()  # samples with one of these columns ask for the prediction
     build: Callable[[SampleTable], Measured | None]

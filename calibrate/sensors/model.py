@@ -56,6 +56,14 @@ class Usage:
         """The same where what was observed is what is expected (row, k): for poses that nobody has measured."""
         return self
 
+    def own_columns(self) -> tuple[str, ...]:
+        """Columns of the samples with its observations, where they depend on the arm; (): those of its kind."""
+        return ()
+
+    def joints_compared(self) -> tuple[int, ...]:
+        """Joints, from 1, of which it reads two encoders against each other, one reading each."""
+        return ()
+
     def beam(self, phi: Floats, T_base_flange: Floats) -> tuple[Floats, Floats] | None:
         """Origin (row, 3) m and direction (row, 3) of its laser in the base; None without a laser on the flange."""
         return None
@@ -71,6 +79,8 @@ class Used(Protocol):
     def aims(self, k: int, rng: Generator) -> Floats: ...
     def met(self, phi: Floats, T_base_flange: Floats) -> NDArray[np.bool_]: ...
     def facing(self, expected: Floats) -> Self: ...
+    def own_columns(self) -> tuple[str, ...]: ...
+    def joints_compared(self) -> tuple[int, ...]: ...
     def beam(self, phi: Floats, T_base_flange: Floats) -> tuple[Floats, Floats] | None: ...
 
 

@@ -37,12 +37,16 @@ class Belief:
     bars_m: Sequence[float]
     noise: Mapping[str, float]
     tolerance: Mapping[str, float]  # empty: the file has none
+    encoder_side: str = ""  # of all second encoders, as the file says; empty: it does not
 
 
 def rig_document(belief: Belief) -> dict[str, Any]:
     """The rig file as nested values, in the order of the interchange format."""
     document: dict[str, Any] = {"schema": 1, "name": belief.drawing.name}
     document["arm"] = _arm(belief)
+    if belief.encoder_side:
+        for joint in document["arm"]["joint"]:
+            joint["encoder_side"] = belief.encoder_side
     document["tool"] = _tool(belief)
     instrument = belief.rig.instrument
     if isinstance(instrument, DualPsd):

@@ -38,4 +38,5 @@ def believe(
         bars_m=tuple(bars_m.tolist()),
         noise=noise,
         tolerance=tolerance if rng.random() < 0.6 else {},
+        encoder_side="" if not wanted.side_stated else "link" if wanted.encoders == "link" else "motor",
     )

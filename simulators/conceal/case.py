@@ -17,6 +17,7 @@ from simulators.conceal.recorded import add_noise, choose_columns
 from simulators.conceal.rigs import DrawnRig, draw_rig
 from simulators.conceal.scale import scale_of
 from simulators.conceal.schedule import Timetable
+from simulators.conceal.second_encoders import at_the_flange, machine_like, over_noise, second_readings_rad
 from simulators.conceal.site import site_of
 from simulators.conceal.wanted import Wanted
 from simulators.defects.defect import Defect
@@ -41,6 +42,7 @@ class Case:
     sigma_m: float
     recorded: frozenset[str]  # columns beside the required ones
     withheld: tuple[str, ...]
+    second_rad: Floats | None  # (row, n) what second encoders say; None: there are none
     rng: np.random.Generator  # for what is still to be drawn when the table is written
 
 
@@ -49,7 +51,7 @@ def conceal(wanted: Wanted) -> Case:
     rig_rng, plan_rng, noise_rng = (np.random.default_rng(s) for s in np.random.SeedSequence([wanted.seed, 1]).spawn(3))
     hide_rng = np.random.default_rng([wanted.seed, 2, zlib.crc32(" ".join(wanted.defects).encode())])
     drawn = draw_rig(wanted, rig_rng)
-    kinds = choose(wanted, hide_rng)
+    kinds = choose(wanted, hide_rng) if wanted.encoders is None else ()
     habits = draw_habits(wanted, kinds, plan_rng)
     table = draw_timetable(wanted, drawn.true, habits, plan_rng)
     posture_rad = table.scene.goal_rad
@@ -57,15 +59,25 @@ def conceal(wanted: Wanted) -> Case:
     distances = measure_distances(drawn.true, plan_rng)
 
     def watch(defects: Sequence[Defect]) -> Observed:
+        defects = defects if wanted.encoders is None else at_the_flange(defects, wanted.encoders)
         return observe(drawn.true, table.scene, defects, posture_rad, wire=wanted.family == "wire")
 
     hidden: list[Hidden] = []
-    if kinds:
+    if wanted.encoders is not None and wanted.defects:
+        scale = scale_of(drawn, table, watch, sigma_m, distances)
+        for defect in machine_like(wanted.defects, site_of(wanted, drawn, table), hide_rng):
+            between = over_noise(drawn.true, table.scene, [defect], wanted.encoders, posture_rad)
+            hidden.append(Hidden(defect, max(scale.enr([defect]), between), max(scale.raw([defect]), between)))
+    elif kinds:
         scale = scale_of(drawn, table, watch, sigma_m, distances)
         hidden = hide(wanted, kinds, spares(wanted, kinds, hide_rng), site_of(wanted, drawn, table), scale, hide_rng)
     exact = watch([one.defect for one in hidden])
     reading_rad, values_m = add_noise(wanted, drawn.true, exact, sigma_m, noise_rng)
     recorded, withheld = choose_columns(wanted, hidden, table, plan_rng)
+    second_rad = None
+    if wanted.encoders is not None:
+        defects, rng = [one.defect for one in hidden], np.random.default_rng([wanted.seed, 31])
+        second_rad = second_readings_rad(drawn.true, table.scene, defects, wanted.encoders, exact.reading_rad, rng)
     return Case(
         wanted,
         drawn,
@@ -79,5 +91,6 @@ def conceal(wanted: Wanted) -> Case:
         sigma_m,
         recorded,
         withheld,
+        second_rad,
         noise_rng,
     )

@@ -115,6 +115,7 @@ def taken_case(wired: Wired, taken: Taken) -> Case:
         wired.sigma_m,
         RECORDED,
         (),
+        None,
         np.random.default_rng(wired.wanted.seed),
     )
 

@@ -14,6 +14,7 @@ from simulators.conceal.hide import Hidden
 from simulators.conceal.readings import tip_m
 from simulators.conceal.recorded import ENCODER_RAD
 from simulators.conceal.rig import Device, DualPsd, TrueRig
+from simulators.conceal.second_encoders import at_the_flange
 from simulators.defects.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -94,7 +95,9 @@ def _free_space(case: Case) -> dict[str, Any]:
     reading_rad = free_poses(case.drawn.believed.arm, FREE_POSES, rng)
     scene = at_start(case.table.scene, reading_rad, rng)
     true = case.drawn.true
-    stance = stand(true, scene, [one.defect for one in case.hidden], reading_rad)
+    defects = [one.defect for one in case.hidden]
+    felt = defects if case.wanted.encoders is None else at_the_flange(defects, case.wanted.encoders)
+    stance = stand(true, scene, felt, reading_rad)
     found: dict[str, Any] = {
         "reading_rad": reading_rad.tolist(),
         "approach": np.sign(scene.last_move_rad).astype(int).tolist(),

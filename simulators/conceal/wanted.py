@@ -7,6 +7,8 @@ from simulators.conceal.noise import Kind
 
 Family = Literal["dual-psd", "tracker", "cones", "wire"]
 FAMILIES: tuple[Family, ...] = get_args(Family)
+Side = Literal["link", "motor", "beside"]  # of second encoders: simulators/conceal/second_encoders.py
+SIDES: tuple[Side, ...] = get_args(Side)
 INSTRUMENT = {"dual-psd": "dual-psd", "tracker": "position", "cones": "seat", "wire": "wire"}
 
 
@@ -27,3 +29,5 @@ class Wanted:
     arm: str | None = None  # by name; None: drawn
     noise: Kind = "white"
     withhold: bool = False  # the column that would name the defect is not recorded
+    encoders: Side | None = None  # second encoders are recorded, and defects are of machine-like size, whatever `enr`
+    side_stated: bool = False  # the rig file says on which side of the gear they sit

@@ -38,6 +38,8 @@ def columns(case: Case) -> dict[str, Column]:
     written = session_columns(case.table.scene, case.reading_rad, case.table.repeat, case.recorded, case.rng, artefacts)
     for channel, name in enumerate(VALUES[case.wanted.family]):
         written[name] = case.values_m[:, channel].tolist()
+    if case.second_rad is not None:
+        written |= {f"enc{joint}_rad": said.tolist() for joint, said in enumerate(case.second_rad.T, start=1)}
     if case.exact.sum_v is not None:
         noisy_v = case.exact.sum_v + SUM_NOISE_V * case.rng.standard_normal(case.exact.sum_v.shape)
         for sensor, name in enumerate(("psd1_sum_v", "psd2_sum_v")):

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.diagnose.streams.between_encoders import Causes
 from calibrate.diagnose.streams.clock import ClockFit, ClockStatus, clock_between
 from calibrate.diagnose.streams.clock_steps import judged, shares_host_clock
 from calibrate.diagnose.streams.coarse_clock import Ticks
@@ -50,11 +51,15 @@ class StreamReport:
 
 
 def examine(
-    devices: Mapping[str, Device], predicted: Predicted | None = None, windows: Sequence[Window] | None = None
+    devices: Mapping[str, Device],
+    predicted: Predicted | None = None,
+    windows: Sequence[Window] | None = None,
+    causes: Causes | None = None,
 ) -> StreamReport:
     """Streams as `devices_of` gives them. `predicted`: a model's word on the spots; without it their clock is open.
 
-    `windows`: when the samples were taken, on the clock of the spots, one a sample.
+    `windows`: when the samples were taken, on the clock of the spots, one a sample. `causes`: what physics may do
+    between the two encoders of a joint.
     """
     found, devices = _mended(devices)
     joints, command = devices.get("joints"), devices.get("command")
@@ -67,7 +72,7 @@ def examine(
         behind = following(command.track, joints.track)
         found += [told_following(one) for one in behind if one.outcome is Outcome.FOUND]
     if "encoders" in devices:
-        clocks["encoders"], more = _encoders(joints, devices["encoders"], stands)
+        clocks["encoders"], more = _encoders(joints, devices["encoders"], stands, causes)
         found += more
     if "spots" in devices:
         seen = _spots(joints, devices["spots"], stands, predicted)
@@ -113,10 +118,12 @@ def _mended(devices: Mapping[str, Device]) -> tuple[list[StreamFinding], dict[st
     return found, out
 
 
-def _encoders(joints: Device, encoders: Device, stands: tuple[Stand, ...]) -> tuple[ClockFit, list[StreamFinding]]:
+def _encoders(
+    joints: Device, encoders: Device, stands: tuple[Stand, ...], causes: Causes | None
+) -> tuple[ClockFit, list[StreamFinding]]:
     fit = clock_between(joints.track, encoders.track, start_between(joints, encoders))
     if fit.offset_s is None:
-        return _by_stamps(joints, encoders, stands) if shares_host_clock(encoders) else (fit, [])
+        return _by_stamps(joints, encoders, stands, causes) if shares_host_clock(encoders) else (fit, [])
     lags = following(joints.track, _moved(encoders.track, fit))
     alike = _alike(lags)
     if len(alike) >= FEWEST_JOINTS and any(one.outcome is Outcome.FOUND for one in lags):
@@ -126,7 +133,7 @@ def _encoders(joints: Device, encoders: Device, stands: tuple[Stand, ...]) -> tu
         lags = following(joints.track, _moved(encoders.track, fit))
     at_joints = _moved(encoders.track, fit)
     found = [told_reading_lag(one) for one in lags if one.outcome is Outcome.FOUND]
-    found += [told_slip(one) for one in slips(at_joints, joints.track, stands).found]
+    found += [told_slip(one) for one in slips(at_joints, joints.track, stands, causes).found]
     frozen = [one for one in breaks(at_joints, None, _behind(joints.track, lags)) if one.fault is Fault.FROZEN]
     return fit, found + told_breaks(at_joints, frozen) + _rings(at_joints, stands)
 
@@ -141,7 +148,9 @@ def _behind(track: Track, lags: Sequence[Following]) -> Track:
     return replace(track, values=values)
 
 
-def _by_stamps(joints: Device, encoders: Device, stands: tuple[Stand, ...]) -> tuple[ClockFit, list[StreamFinding]]:
+def _by_stamps(
+    joints: Device, encoders: Device, stands: tuple[Stand, ...], causes: Causes | None
+) -> tuple[ClockFit, list[StreamFinding]]:
     """A host that runs at no even pace beside the joints leads to their clock piece by piece, to some milliseconds.
 
     That is enough for what stays from stand to stand, and for nothing that is a matter of time.
@@ -151,7 +160,7 @@ def _by_stamps(joints: Device, encoders: Device, stands: tuple[Stand, ...]) -> t
     fit = clock_between(joints.track, track, Ticks(0.0))
     if fit.offset_s is None:
         return fit, []
-    found = [told_slip(one) for one in slips(_moved(track, fit), joints.track, stands).found]
+    found = [told_slip(one) for one in slips(_moved(track, fit), joints.track, stands, causes).found]
     return ClockFit(ClockStatus.UNEVEN), found
 
 

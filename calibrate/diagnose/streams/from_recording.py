@@ -2,6 +2,7 @@
 
 from acquisition.recording.recording import Recording
 from calibrate.diagnose.fitted import Fitted
+from calibrate.diagnose.streams.between_encoders import causes_of
 from calibrate.diagnose.streams.examine import StreamReport, examine
 from calibrate.diagnose.streams.predicted_spots import predicted_spots
 from calibrate.diagnose.streams.recorded import devices_of
@@ -17,4 +18,4 @@ def streams_of(recording: Recording, fitted: Fitted | None) -> StreamReport | No
     if fitted is not None and "spots" in devices and "joints" in devices:
         placed = around(recording, windows, devices["spots"], devices["joints"])
         predicted = None if placed is None else predicted_spots(fitted, placed)
-    return examine(devices, predicted, windows)
+    return examine(devices, predicted, windows, None if fitted is None else causes_of(fitted))

@@ -1,7 +1,8 @@
 """Slips: steps in the difference of two readings of one joint that stay, with time and size.
 
 Judged from stand to stand, because between them everything that moves adds to the difference. What may be innocent is
-taken along: an error of either reading that depends on the angle (first two orders, Bai and Teo 2002), a slow drift.
+taken along: an error of either reading that depends on the angle (first two orders, Bai and Teo 2002), a slow drift,
+the side from which the joint came, and what physics at the joint asks for (between_encoders.py): a slip comes last.
 The noise is what scatters from stand to stand then. Steps are found one by one, the largest first (binary
 segmentation: Vostrikova 1981), each by its F statistic over all places; p from the largest of as many tests.
 """
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg import orth
 from scipy.stats import t as student
 
+from calibrate.diagnose.streams.between_encoders import Causes
 from calibrate.diagnose.streams.stands import Stand
 from calibrate.diagnose.streams.track import Curve, Track
 
@@ -22,6 +24,9 @@ Floats = NDArray[np.float64]
 ALARM = 1e-3  # over all joints and places
 SPARE = 5  # stands beyond the numbers that are fitted
 MOST = 5  # slips of one joint: then it is not slipping but loose
+ENOUGH = 12  # stands more, for what physics may ask for
+MOVED_RAD = 1e-4  # as in calibrate/diagnose/driver_values.py: a joint that went less far has not moved
+FLAT = 1e-9  # of a column: rounding
 EDGE_S = 0.1  # after the set-point stands, before readings count
 
 
@@ -47,8 +52,11 @@ class Slips:
     judged: tuple[bool, ...]
 
 
-def slips(track: Track, other: Track, stands: Sequence[Stand]) -> Slips:
-    """Of `track` against `other`, same channels, same clock. Within a stand a step divides it in two."""
+def slips(track: Track, other: Track, stands: Sequence[Stand], causes: Causes | None = None) -> Slips:
+    """Of `track` against `other`, same channels, same clock. Within a stand a step divides it in two.
+
+    `causes`: what else may turn a joint between the two, at any pose; None: nobody knows.
+    """
     track = track.read()
     difference = Track("difference", track.unit, track.time_s, track.values - other.curve.at(track.time_s)).read()
     at = other.curve
@@ -56,16 +64,22 @@ def slips(track: Track, other: Track, stands: Sequence[Stand]) -> Slips:
     judged: list[bool] = []
     for j in range(track.channels):
         pieces = _pieces(difference, at, stands, j)
-        one = _of_joint(j + 1, pieces, track.channels)
+        innocent = _innocent(j, pieces, causes)
+        one = _of_joint(j + 1, pieces[:, :4], track.channels, innocent)
         judged.append(one is not None)
         found += one or []
     return Slips(tuple(sorted(found, key=lambda slip: slip.from_s)), tuple(judged))
 
 
 def _pieces(difference: Track, at: Curve, stands: Sequence[Stand], j: int) -> Floats:
-    """(stand, 4): begin, end, mean difference, angle; a stand with a jump in it gives two."""
-    out: list[tuple[float, float, float, float]] = []
+    """(stand, 5 + joint): begin, end, mean difference, angle, side that the joint came from, angles of all joints.
+
+    A stand with a jump in it gives two.
+    """
+    out: list[Floats] = []
+    side = 0.0
     for stand in stands:
+        side = float(np.sign(stand.moved[j])) if abs(stand.moved[j]) > MOVED_RAD else side
         rows = difference.between(stand.from_s + EDGE_S, stand.to_s)
         if len(rows.time_s) < 4:
             continue
@@ -73,9 +87,19 @@ def _pieces(difference: Track, at: Curve, stands: Sequence[Stand], j: int) -> Fl
         cut = _jump(d)
         for piece in (slice(0, cut), slice(cut, None)) if cut else (slice(None),):
             t = rows.time_s[piece]
-            angle = float(np.nanmean(at.at(t)[:, j]))
-            out.append((float(t[0]), float(t[-1]), float(np.median(d[piece])), angle))
-    return np.array(out).reshape(-1, 4)
+            angles = np.nanmean(at.at(t), axis=0)
+            out.append(np.array([t[0], t[-1], np.median(d[piece]), angles[j], side, *angles]))
+    return np.array(out).reshape(-1, 5 + difference.channels)
+
+
+def _innocent(j: int, pieces: Floats, causes: Causes | None) -> list[Floats]:
+    """Columns (stand,) of unit size that physics may ask for; none where stands are too few to tell."""
+    if causes is None or len(pieces) < SPARE + ENOUGH or not np.isfinite(pieces).all():
+        return []
+    columns = [pieces[:, 4], *causes(j + 1, pieces[:, 5:]).T]
+    centred = [c - c.mean() for c in columns]
+    sizes = [float(np.linalg.norm(c)) for c in centred]
+    return [c / size for c, size in zip(centred, sizes, strict=True) if size > FLAT * max(1.0, max(sizes))]
 
 
 def _jump(d: Floats) -> int:
@@ -92,7 +116,7 @@ def _jump(d: Floats) -> int:
     return best if score.max() > 8.0 * max(float(inside.std()), 1e-12) else 0
 
 
-def _of_joint(joint: int, pieces: Floats, joints: int) -> list[Slip] | None:
+def _of_joint(joint: int, pieces: Floats, joints: int, innocent: Sequence[Floats] = ()) -> list[Slip] | None:
     """None where stands are too few."""
     n = len(pieces)
     if n < SPARE + 4:
@@ -103,6 +127,7 @@ def _of_joint(joint: int, pieces: Floats, joints: int) -> list[Slip] | None:
         level += [np.sin(q), np.cos(q), np.sin(2.0 * q), np.cos(2.0 * q)]
     if n >= SPARE + 6:
         level.append((t - t.mean()) / max(float(np.ptp(t)), 1e-12))
+    level += innocent[: max(0, n - SPARE - 4 - len(level))]
     places: list[int] = []
     out: dict[int, Slip] = {}
     while len(places) < MOST:

@@ -21,6 +21,7 @@ from calibrate.diagnose.streams.clock import ClockFit
 from calibrate.diagnose.streams.examine import StreamReport
 from calibrate.diagnose.streams.finding import StreamFinding
 
+SLIP = "encoder-slip"
 USUAL = ("following-error", "missing-samples", "duplicated-samples")
 EXPLAINS = {
     "latency": "A stamp that is set late, or a clock of its own, puts a reading beside angles of another moment.",
@@ -41,7 +42,7 @@ def with_streams(file: DiagnosisFile, report: StreamReport | None) -> DiagnosisF
     """The diagnosis with what its recording's streams say; findings of the samples stay in front."""
     if report is None:
         return file
-    told = [_finding(one) for one in report.findings]
+    told = [_finding(one) for one in report.findings if not _known(one, file)]
     faults = tuple(one for one in told if one.physics not in USUAL)
     streams = StreamsRecord(
         len(report.stands),
@@ -52,6 +53,12 @@ def with_streams(file: DiagnosisFile, report: StreamReport | None) -> DiagnosisF
     parted = faults and file.verdict == Verdict.CONSISTENT.value
     verdict = Verdict.MISMATCH.value if parted else file.verdict
     return replace(file, verdict=verdict, findings=file.findings + faults, streams=streams)
+
+
+def _known(one: StreamFinding, file: DiagnosisFile) -> bool:
+    """A slip that the samples show already: they give its size, the streams would tell it a second time."""
+    slip = one.name.physics == SLIP
+    return slip and any(f.physics == SLIP and f.where == one.name.where for f in file.findings)
 
 
 def _finding(one: StreamFinding) -> FindingRecord:

@@ -6,7 +6,7 @@ import pytest
 
 from acquisition.recording.rig_schema import ArmModel
 from calibrate.errors import DataError
-from calibrate.fit_plan import FitPlan, LossName, RedundantName, SolverName
+from calibrate.fit_plan import AnglesName, FitPlan, LossName, RedundantName, SolverName, parse_plan
 from calibrate.identification.identify import identify
 from calibrate.identification.planned import rig_as_planned
 from calibrate.predict import Predictor, predict
@@ -117,3 +117,42 @@ def test_spots_as_lines_are_an_instrument_too(rig, sessions):
 def test_what_rig_or_samples_do_not_have_is_refused_by_name(tracked, keys, says):
     with pytest.raises(DataError, match=says):
         run(tracked, **keys)
+
+
+SEATING_RAD = 1e-4  # by which the link stands off what the controller reads
+ENCODER_ZEROS = np.array([0.7, -2.9, 3.1, 1.1, -0.2, 2.0])
+SENSES = np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
+
+
+@pytest.fixture
+def with_encoders(rig, session):
+    rig = msgspec.structs.replace(rig, noise=msgspec.structs.replace(rig.noise, position_m=NOISE_M))
+    link = session.readings(150)
+    q = link - SEATING_RAD * np.random.default_rng(4).standard_normal(link.shape)
+    read = (SENSES * link + ENCODER_ZEROS) % (2.0 * np.pi)
+    encoders = {f"enc{i + 1}_rad": read[:, i] for i in range(6)}
+    return rig, table(q, **session.positions(link, NOISE_M), **encoders)
+
+
+def test_second_encoders_may_drive_the_arm_whatever_their_zeros_and_senses(with_encoders):
+    by_controller = told(run(with_encoders))
+    by_encoders = told(run(with_encoders, angles=AnglesName.ENCODERS))
+    zeros = [name for name in by_encoders if name.startswith("joint") and name.endswith(".zero")]
+    assert zeros
+    for name in zeros:  # about the controller's zeros, not about those of the encoders
+        assert abs(by_encoders[name].value) < 0.05
+        assert by_encoders[name].sigma < 0.5 * by_controller[name].sigma
+
+
+def test_second_encoders_are_an_instrument_where_the_plan_lists_them(with_encoders):
+    listed = ("position", "encoder-difference")
+    found = told(run(with_encoders, instruments=listed))
+    for i in range(6):  # zeros are those of the encoder turned to the joint's sense
+        away = found[f"encoder{i + 1}.zero"].value - SENSES[i] * ENCODER_ZEROS[i]
+        assert abs((away + np.pi) % (2.0 * np.pi) - np.pi) < 5.0 * SEATING_RAD
+
+
+def test_encoders_cannot_be_angles_and_an_observation_at_once():
+    text = 'schema = 1\nangles = "encoders"\ninstruments = ["position", "encoder-difference"]\n'
+    with pytest.raises(DataError, match="no encoder-difference to observe"):
+        parse_plan(text, "fit.toml")

@@ -1,0 +1,47 @@
+"""What lies between two encoders of a joint, on concealed sessions: one finding at its place, on either side."""
+
+import json
+
+import numpy as np
+import pytest
+
+from calibrate.diagnose.diagnosis import Verdict
+from calibrate.diagnose.from_recording import diagnose_samples
+
+from .concealed import recording_of
+
+CASES = {
+    "soft-joint": ("link", 11),
+    "slack-drive": ("motor", 3),
+    "encoder-eccentricity": ("link", 4),
+    "second-encoder-eccentricity": ("link", 5),
+    "second-encoder-slip": ("link", 6),
+}
+
+
+def diagnosed(folder, **wanted):
+    recording = recording_of(folder, family="tracker", samples=120, arm="ur5", **wanted)
+    found = diagnose_samples(recording.rig, recording.samples, np.random.default_rng(1))
+    return found.physics
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("mechanism", CASES)
+def test_a_fault_of_machine_like_size_is_found_between_the_encoders(mechanism, tmp_path):
+    side, seed = CASES[mechanism]
+    physics = diagnosed(tmp_path, seed=seed, defects=(mechanism,), encoders=side, side_stated=True)
+    (hidden,) = json.loads((tmp_path / "sealed" / "truth.json").read_text())["defects"]
+    first = physics.diagnosis.findings[0]
+    assert (first.name.where, first.name.physics) == (hidden["port"], hidden["physics"])
+    for name, true in hidden["figures"].items():
+        if name in first.parameters:
+            said = first.parameters[name]
+            assert abs(said.value - true) < 4.0 * said.sigma + 0.1 * abs(true)
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize(("side", "seed"), [("link", 2), ("motor", 10)])
+def test_arbitrary_zeros_of_second_encoders_are_no_mismatch(side, seed, tmp_path):
+    physics = diagnosed(tmp_path, seed=seed, encoders=side)
+    assert physics.diagnosis.verdict is Verdict.CONSISTENT
+    assert physics.diagnosis.findings == ()
