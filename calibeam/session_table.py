@@ -16,14 +16,14 @@ from calibrate.identification.point_constraint import PointConstraints
 from calibrate.identification.result import Identification
 from calibrate.model_file import ModelParameter
 from calibrate.report.verdict import Verdict
+from calibrate.sensors import spots
 
-SPOTS = "dual-psd"
 UNITS = {"m": ("um", 1e6), "rad": ("urad", 1e6)}
 
 
 def print_identification(console: Console, result: Identification, judged: Verdict, rig: Rig) -> None:
     """What was wrong with the file comes first, since all that follows is without these rows; last the verdict."""
-    of_spots = any(one.name == SPOTS for one in result.instruments)
+    of_spots = any(one.name == spots.KIND.name for one in result.instruments)
     if of_spots and (said := said_of(rig)) is not None:
         console.print(said, highlight=False, markup=False)
     for blunder in result.blunders:

@@ -20,6 +20,7 @@ from calibrate.default_belief import links_of
 from calibrate.identification.rounds import coarse_start, settled_fit
 from calibrate.instruments import instruments_of
 from calibrate.parameters import start_values
+from calibrate.sensors import spots
 from calibrate.weighting import Weighting
 
 Floats = NDArray[np.float64]
@@ -56,7 +57,7 @@ def mirrored_axes(rig: Rig, samples: Samples) -> Blunder | None:
 
 def _spots_alone(rig: Rig, samples: Samples) -> Weighting:
     found = instruments_of(samples, rig, arm=arm_of(rig, links_of(rig))).weighting
-    return replace(found, measured=tuple(m for m in found.measured if m.name == "dual-psd"), known=())
+    return replace(found, measured=tuple(m for m in found.measured if m.name == spots.KIND.name), known=())
 
 
 def _usual_misfit_m(weighting: Weighting, signs: Floats) -> float:

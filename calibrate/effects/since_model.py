@@ -15,6 +15,7 @@ from calibrate.effects.moved import SIX, in_use, motion
 from calibrate.effects.ports import Place, Port
 from calibrate.effects.term import Shape, Term
 from calibrate.effects.time_laws import Law
+from calibrate.sensors import seat, spots
 
 Floats = NDArray[np.float64]
 
@@ -74,9 +75,9 @@ def _link(drivers: Drivers, i: int) -> Iterator[Form]:
 
 def _tool(drivers: Drivers) -> Iterator[Form]:
     """The target or probe; of a laser also where it points."""
-    port, laser = Port("tool.point", Place.FRAME, drivers.n_joints), "dual-psd" in drivers.readouts
+    port, laser = Port("tool.point", Place.FRAME, drivers.n_joints), spots.KIND.name in drivers.readouts
     told = ", ".join(f"{{{name}}}" for name in SIX[:3])
-    if set(drivers.readouts) - {"dual-psd"}:
+    if set(drivers.readouts) - {spots.KIND.name}:
         yield _constant(
             port, "tool-moved", SIX[:3], np.eye(6)[:, :3], f"The tool moved by {told} in x, y, z of the flange"
         )
@@ -94,16 +95,16 @@ def _standing(drivers: Drivers) -> Iterator[Term]:
         return np.ones((len(drivers.q_rad), 1))
 
     yield motion("base.pose", "base-moved", RECORDING, Shape.CONSTANT, whole, "The base", told=False)
-    for name, where, physics, width, what in (
-        ("dual-psd", "fixture.pose", "fixture-moved", 6, "The fixture at station"),
-        ("seat", "seat.position", "seat-moved", 3, "Seat"),
+    for kind, where, physics, width, what, one in (
+        (spots.KIND, "fixture.pose", "fixture-moved", 6, "The fixture at station", "place"),
+        (seat.KIND, "seat.position", "seat-moved", 3, "Seat", seat.POINTS),
     ):
-        readout = drivers.readouts.get(name)
+        readout = drivers.readouts.get(kind.name)
         if readout is None or readout.place is None:
             continue
         for place in np.unique(readout.place[readout.seen]).tolist():
             there: Law = in_use(readout.seen & (readout.place == place))
-            variant = f"{'place' if name == 'dual-psd' else 'seat'} {place}"
+            variant = f"{one} {place}"
             what_moved = f"{what} {place}"
             yield motion(
                 where, physics, RECORDING, Shape.CONSTANT, whole, what_moved, (), there, width, variant, told=False

@@ -29,11 +29,12 @@ from calibrate.physics.applied import effects_at
 from calibrate.physics.conditions import BY_JOINT
 from calibrate.physics.records import Effect
 from calibrate.predict import Predictor
+from calibrate.sensors import seat
 
 Floats = NDArray[np.float64]
 
 ANEW = "device."  # set up anew for each recording: nothing of it is known
-FOUND = ("tool", "seat")  # corrections about points that were found in closed form, in `about` of the model
+FOUND = ("tool", seat.POINTS)  # corrections about points that were found in closed form, in `about` of the model
 AXES = ("x", "y", "z")
 
 

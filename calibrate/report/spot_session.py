@@ -12,8 +12,7 @@ from calibrate.identification.planned import rig_as_planned
 from calibrate.observations import Observations
 from calibrate.read_samples import observations
 from calibrate.report.session_evidence import Readings, SessionEvidence
-
-INSTRUMENT = "dual-psd"
+from calibrate.sensors import spots
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,7 @@ class SpotSession:
 
 def spot_session(evidence: SessionEvidence) -> SpotSession | None:
     """None for a session without spots of the dual PSD."""
-    readings = next((r for r in evidence.readings if r.instrument == INSTRUMENT), None)
+    readings = next((r for r in evidence.readings if r.instrument == spots.KIND.name), None)
     if readings is None:
         return None
     recording, model = evidence.recording, evidence.model

@@ -11,9 +11,9 @@ from calibrate.report.reasons import reason_among
 from calibrate.report.session_evidence import SessionEvidence
 from calibrate.report.workspace.known_arm import whole_covariance
 from calibrate.report.zero_figure import doubts
+from calibrate.sensors import spots
 
 SMALL_SHARE = 0.5  # measurement under this share of sigma: something else limits the zero
-SPOTS = "dual-psd"
 
 
 def zeros_of(evidence: SessionEvidence) -> tuple[JointZero, ...]:
@@ -38,7 +38,7 @@ def zeros_part(evidence: SessionEvidence) -> Iterator[Html]:
     lead = "True joint angle = reading + zero. Sigma is one standard deviation. All other parameters are further down."
     yield tag("h3", "Joint zeros")
     yield tag("p", lead, cls="lead")
-    if SPOTS not in evidence.model.instruments:
+    if spots.KIND.name not in evidence.model.instruments:
         yield table(("Joint", "zero (°)", "± sigma (°)", "± sigma (µrad)"), _rows(evidence, zeros), numeric=(1, 2, 3))
         return
     head = ("Joint", "zero (°)", "± sigma (°)", "± sigma (µrad)", "of measurement alone (µrad)", "limited by")
@@ -54,7 +54,7 @@ def zeros_part(evidence: SessionEvidence) -> Iterator[Html]:
 
 def limits_of_zeros(evidence: SessionEvidence) -> Iterator[str]:
     """What a reader must know before using the zeros of a session with spots; nothing for other instruments."""
-    if SPOTS not in evidence.model.instruments:
+    if spots.KIND.name not in evidence.model.instruments:
         return
     zeros = zeros_of(evidence)
     loose = [z for z in zeros if z.value_rad is not None and not limited_by_measurement(z)]

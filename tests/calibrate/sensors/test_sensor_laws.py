@@ -11,6 +11,7 @@ from calibrate.rigid import transform
 from calibrate.sensors.catalogue import BY_NAME
 from calibrate.sensors.device import Device
 from calibrate.sensors.dual_psd import DualPsd, Fixture, PairBelief
+from calibrate.sensors.encoder_difference import EncoderDifference
 from calibrate.sensors.full_pose import FullPose
 from calibrate.sensors.laser import LaserMount
 from calibrate.sensors.point_line import PointLine, meeting_points
@@ -63,6 +64,7 @@ SENSORS = {
     "camera-pose": camera,
     "wire": lambda: Wire(TARGET, DEVICE),
     "seat": lambda: Seat(TARGET, mean_tips(flanges(1)[:, :3, 3], GROUP)),
+    "encoder-difference": lambda: EncoderDifference((2, 3), np.array([0.4, -3.0])),
     "point": lambda: PointLine(MOUNT, meeting_points(MOUNT, flanges(1), GROUP)),
 }
 PAIRS = {"distance": lambda: TipDistance(TARGET), "bar": lambda: TipDistance(TARGET)}
@@ -122,7 +124,7 @@ def test_every_sensor_of_the_catalogue_is_held_to_these_laws():
     assert {*SENSORS, *PAIRS, "dual-psd"} == set(BY_NAME)  # the light of a dual PSD: test_dual_psd.py
 
 
-@pytest.mark.parametrize("name", [name for name in SENSORS if name != "point"])
+@pytest.mark.parametrize("name", [name for name in SENSORS if name not in ("point", "encoder-difference")])
 def test_what_corrections_are_about_says_where_everything_starts(name):
     sensor = SENSORS[name]()
     phi, T = values(sensor, 5), flanges(1)
