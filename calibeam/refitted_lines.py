@@ -15,8 +15,8 @@ def refitted_lines(model: ModelFile) -> Iterator[str]:
         f"{sum(not e.after for e in model.effects)} effects refitted"
     )
     yield (
-        f"misfit of {model.instruments[0]}, rms: {length(model.rms_before_m)} by geometry alone, "
-        f"{length(model.rms_after_m)} with the effects"
+        f"misfit of {model.instruments[0]}, rms distance: {length(model.rms_distance_before_m)} by geometry alone, "
+        f"{length(model.rms_distance_after_m)} with the effects"
     )
     for effect in model.effects:
         if not effect.after:

@@ -30,7 +30,7 @@ def import_folder(folder: Path | str, path: Path | str, *, software: str, starte
         rig_text=source.rig_text,
         software=source.software or software,
         clock=_SessionStart(),
-        notes={"imported_from": Path(folder).name} | source.notes,
+        notes={"imported_from": Path(folder).name, **source.notes},
         host_s0=source.host_s0,
         started_utc=_started(source, Path(folder)) or started_utc or datetime.now(UTC),
         host=source.host or None,

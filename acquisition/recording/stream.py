@@ -5,6 +5,7 @@ five fields of the driver's record on purpose.
 """
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -13,6 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_STREAM_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+_RESERVED = ("host_s", "device_s", "sequence")
 
 
 @dataclass(frozen=True)
@@ -63,3 +68,20 @@ class Event:
     host_s: float
     kind: str
     detail: Mapping[str, Any]
+
+
+def check_declaration(name: str, channels: tuple[Channel, ...]) -> None:
+    """ValueError for names that cannot stand in the file or that stand twice."""
+    if not _STREAM_NAME.fullmatch(name):
+        raise ValueError(f"stream '{name}': a name is letters, digits, - and _, beginning with a letter")
+    names = [*_RESERVED, *(channel.name for channel in channels)]
+    for channel in channels:
+        if not _NAME.fullmatch(channel.name):
+            raise ValueError(f"stream '{name}': channel '{channel.name}' is not letters, digits and _")
+        if names.count(channel.name) > 1:
+            raise ValueError(f"stream '{name}': channel '{channel.name}' is declared twice, or is one of {_RESERVED}")
+    scalars = ["host_s", *(scalar for channel in channels for scalar in scalar_names(channel))]
+    folded = [scalar.replace("_", "").lower() for scalar in (*scalars, "device_s", "sequence")]
+    for scalar in scalars:
+        if folded.count(scalar.replace("_", "").lower()) > 1:
+            raise ValueError(f"stream '{name}': '{scalar}' differs from another name only in case and _; rename it")

@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import msgspec
 import numpy as np
@@ -32,8 +32,7 @@ from acquisition.recording.bounds import (
 from acquisition.recording.errors import RecordingError, shown
 from acquisition.recording.json_file import JsonKind, read_json
 from acquisition.recording.recording import Recording
-from acquisition.recording.stream import Channel, Event, Gap, Stream, scalar_names
-from acquisition.recording.stream_writer import check_declaration
+from acquisition.recording.stream import Channel, Event, Gap, Stream, check_declaration, scalar_names
 from acquisition.recording.tables import EVENTS, GAPS, TableFormat, table_name, write_tables
 
 FOLDER, ABOUT = "streams", "streams.json"
@@ -63,8 +62,8 @@ class StreamAbout(msgspec.Struct, frozen=True, kw_only=True):
 class StreamsAbout(msgspec.Struct, frozen=True, kw_only=True):
     """Content of streams.json."""
 
-    schema: int = 1
-    kind: str = "calibeam-streams"
+    schema: Literal[1] = 1
+    kind: Literal["calibeam-streams"] = "calibeam-streams"
     software: Label
     host: Label
     started_utc: Label

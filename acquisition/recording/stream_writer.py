@@ -1,6 +1,5 @@
 """What a reader thread holds: takes its device's samples, notices what is missing, never waits for the disk."""
 
-import re
 import threading
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -8,13 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from acquisition.recording.stream import Channel, Floats, Gap, scalar_names
+from acquisition.recording.stream import Channel, Floats, Gap
 from acquisition.recording.stream_encoder import Piece
 
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-_STREAM_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 LARGEST = np.iinfo(np.int64).max
-_RESERVED = ("host_s", "device_s", "sequence")
 
 
 class StreamWriter:
@@ -119,23 +115,6 @@ class StreamWriter:
         steps = np.diff(sequence)
         jumps: list[int] = np.flatnonzero((steps > 1) | (steps < 0)).tolist()
         return [_gap(host_s, sequence, at) for at in jumps]
-
-
-def check_declaration(name: str, channels: tuple[Channel, ...]) -> None:
-    """ValueError for names that cannot stand in the file or that stand twice."""
-    if not _STREAM_NAME.fullmatch(name):
-        raise ValueError(f"stream '{name}': a name is letters, digits, - and _, beginning with a letter")
-    names = [*_RESERVED, *(channel.name for channel in channels)]
-    for channel in channels:
-        if not _NAME.fullmatch(channel.name):
-            raise ValueError(f"stream '{name}': channel '{channel.name}' is not letters, digits and _")
-        if names.count(channel.name) > 1:
-            raise ValueError(f"stream '{name}': channel '{channel.name}' is declared twice, or is one of {_RESERVED}")
-    scalars = ["host_s", *(scalar for channel in channels for scalar in scalar_names(channel))]
-    folded = [scalar.replace("_", "").lower() for scalar in (*scalars, "device_s", "sequence")]
-    for scalar in scalars:
-        if folded.count(scalar.replace("_", "").lower()) > 1:
-            raise ValueError(f"stream '{name}': '{scalar}' differs from another name only in case and _; rename it")
 
 
 def _gap(host_s: Floats, sequence: NDArray[np.int64], at: int) -> Gap:

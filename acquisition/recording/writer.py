@@ -37,9 +37,9 @@ from acquisition.recording.samples import Cell
 from acquisition.recording.samples_encoder import SamplesEncoder
 from acquisition.recording.scribe import Entry, Scribe
 from acquisition.recording.spool import Spool
-from acquisition.recording.stream import Channel, Event, Gap
+from acquisition.recording.stream import Channel, Event, Gap, check_declaration
 from acquisition.recording.stream_encoder import Piece, StreamEncoder, channels_json
-from acquisition.recording.stream_writer import StreamWriter, check_declaration
+from acquisition.recording.stream_writer import StreamWriter
 
 ANSWER_S = 30.0  # a disk that takes longer than this for what waits is reported, not waited for
 

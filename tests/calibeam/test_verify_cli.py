@@ -26,7 +26,7 @@ def perfect_model() -> ModelFile:
     identity = RigIdentity(RIG.name, rig_sha256(rig_text(RIG_FILE)), rig_text(RIG_FILE))
     return ModelFile(
         1, "calibeam-model", "test", identity, "local-poe", "CONVERGED", "", 10, 1, 1, None, (), (), (),
-        dict.fromkeys(names, 0.0), None, {}, None, None, 0.0, 0.0,
+        dict.fromkeys(names, 0.0), None, {}, None, None, 0.0, 0.0, 0.0, 0.0,
     )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ import pytest
 from acquisition.recording.rig_schema import ArmModel
 from calibrate.errors import DataError
 from calibrate.fit import DogLegRules, Loss, Method
-from calibrate.fit_plan import DEFAULT, parse_plan, read_plan
+from calibrate.fit_plan import DEFAULT, BesideName, parse_plan, read_plan
 from calibrate.redundant import Redundant
 from calibrate.uncertainty.splits import SplitKind
 
@@ -18,7 +18,8 @@ def test_the_example_of_the_documentation_is_a_plan(request):
     plan = parse_plan(example, "fit.toml")
     assert plan.model is ArmModel.LOCAL_POE
     assert plan.instruments == ("position", "wire")
-    assert (plan.method, plan.robust_loss, plan.of_redundant) == (Method.DOGLEG, Loss.HUBER, Redundant.REMOVED)
+    assert (plan.algorithm, plan.robust_loss, plan.of_redundant) == (Method.DOGLEG, Loss.HUBER, Redundant.REMOVED)
+    assert plan.method is BesideName.POINT_CONSTRAINT
     assert plan.splits == (SplitKind.RANDOM, SplitKind.LAST)
     assert plan.priors == {"link*.x": 5e-4, "link2.*": 1e-3}
 

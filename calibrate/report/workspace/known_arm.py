@@ -58,11 +58,15 @@ def scatter_of(noise: Fields) -> Scatter:
 
 
 def whole_covariance(record: Covariance | None, parameters: tuple[Parameter, ...]) -> Floats:
-    """(param, param) the covariance of a model.json among all parameters; NaN where there is none."""
+    """(param, param) the covariance of a model.json among all parameters; NaN where there is none.
+
+    What the file holds of effects is left out: these are parameters of the geometry.
+    """
     if record is None:
         return np.full((len(parameters), len(parameters)), np.nan)
     column = index_of(parameters)
     out = np.zeros((len(parameters), len(parameters)))
-    own = [column[name] for name in record.names]
-    out[np.ix_(own, own)] = np.array(record.rows)
+    known = [k for k, name in enumerate(record.names) if name in column]
+    own = [column[record.names[k]] for k in known]
+    out[np.ix_(own, own)] = np.array(record.rows)[np.ix_(known, known)]
     return out

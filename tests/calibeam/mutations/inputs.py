@@ -137,7 +137,7 @@ def _drawn_model(path: Path, rig_file: Path) -> None:
     identity = RigIdentity(rig.name, rig_sha256(text), text)
     model = ModelFile(
         1, "calibeam-model", "test", identity, rig.arm.model.value, "CONVERGED", "", 10, 1, 1, None, (), (), (),
-        dict.fromkeys(names, 0.0), None, {}, None, None, 0.0, 0.0,
+        dict.fromkeys(names, 0.0), None, {}, None, None, 0.0, 0.0, 0.0, 0.0,
     )  # fmt: skip
     write_model(path, model)
 

@@ -80,7 +80,7 @@ def test_the_report_of_a_model_with_physics_shows_what_is_left(slack, capsys):
     out = folder / "report.html"
     arguments = ["report", str(folder / "recording"), "--model", str(folder / "model.json"), "--out", str(out)]
     assert run(arguments) == 0
-    assert f"{1e6 * model.file.rms_after_m:.1f} µm" in " ".join(capsys.readouterr().out.split())
+    assert f"{1e6 * model.file.rms_distance_after_m:.1f} µm" in " ".join(capsys.readouterr().out.split())
     assert out.exists()
 
 
