@@ -71,7 +71,10 @@ class Model:
     def flange_sigma(
         self, q_rad: Floats, conditions: "Mapping[str, Floats | float] | None" = None, *, same_session: bool = False
     ) -> Floats:
-        """(pose, 6) one sigma of `flange`: m along x, y, z of the base, rad about them. NaN without a covariance."""
+        """(pose, 6) one sigma of `flange`: m along x, y, z of the base, rad about them. NaN without a covariance.
+
+        The place of the base counts: where nothing but a device of unknown place has seen the arm, that is most of it.
+        """
         return self._placed(q_rad, conditions, same_session).flange_sigma
 
     def tip(
@@ -86,7 +89,7 @@ class Model:
     def tip_sigma(
         self, q_rad: Floats, conditions: "Mapping[str, Floats | float] | None" = None, *, same_session: bool = False
     ) -> Floats:
-        """(pose, 3) one sigma of `tip`, m. NaN without a covariance."""
+        """(pose, 3) one sigma of `tip`, m, the place of the base included. NaN without a covariance."""
         return self._placed(q_rad, conditions, same_session).tip_sigma_m
 
     def predict(self, samples: Mapping[str, NDArray[np.generic]], *, same_session: bool = False) -> dict[str, Floats]:

@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording.can_frames import block_of, channels
 from acquisition.recording.can_message import frame_of
 from acquisition.recording.rig import load_rig, rig_sha256, rig_text
-from acquisition.recording.stream import Channel, Event
+from acquisition.recording.stream import Channel, Event, Gap
 from acquisition.recording.writer import RecordingWriter
 from calibeam.fleet.found import recordings
 from calibeam.fleet.judge import judged
@@ -228,6 +228,7 @@ def _streams(path: Path, rig_file: Path) -> None:
             stream = writer.stream(name, made)
             values = {one.name: np.sin(t).reshape(-1, *[1] * len(one.shape)) * np.ones(one.shape) for one in made}
             stream.append(t, t, np.arange(len(t)), values)
+            stream.gap(Gap(0.5, 1.0, 50, "cable pulled"))
         block = block_of([frame_of(m, m.timestamp - 1_790_000_000.0, sent=False) for m in _frames()], 8)
         frames = writer.stream("can", channels(8), viewer=())
         frames.append(block.host_s, block.device_s, np.arange(len(block.host_s)), block.values)

@@ -26,6 +26,7 @@ def known():
         rng.normal(0.0, 1e-4, (ROWS, n + 1, 6)),
         rng.normal(0.0, 1e-4, (ROWS, 6)),
         {},
+        np.zeros((ROWS, n)),
     )
     return Flanges.of(arm, start_values(arm.parameters), rng.uniform(-2.0, 2.0, (ROWS, n)), by)
 

@@ -1,5 +1,6 @@
 """The first sentence: trust where all is well, care with reason and advice, no trust where nothing is gained."""
 
+import re
 from dataclasses import replace
 
 import msgspec
@@ -96,7 +97,7 @@ def test_as_many_unknowns_as_readings_is_no_trust_whatever_the_fit_says(arm_sess
     session = arm_session(poses)
     recording = session.recording(session.positions())
     if not tolerance:  # 27 unknowns that 27 or 30 equations have to find
-        text = recording.rig_text.replace("[tolerance]\nlength_m = 3e-4\nangle_rad = 5e-4\n", "")
+        text = re.sub(r"\[tolerance\]\n(\w.*\n)+", "", recording.rig_text)
         recording = replace(recording, rig_text=text, rig=parse_rig(text, "rig"))
         assert recording.rig.tolerance is None
     judged = session_verdict(session_evidence(recording, session.model(recording)))
