@@ -74,8 +74,11 @@ class NoiseLaw:
         return sum(s.minus_two_log_likelihood(before) - s.minus_two_log_likelihood(after) for s in self.series)
 
     def draw(self, rng: Generator, count: int) -> Floats:
-        """(row, count): sign flips of whole observations where noise is white, Gaussian wander where not."""
-        _, groups = np.unique(self.rows.group, return_inverse=True)
+        """(row, count): sign flips of whole samples where noise is white, Gaussian wander where not.
+
+        All instruments of a sample flip together, since the repeatability of the joints is in each of them.
+        """
+        _, groups = np.unique(self.rows.sample, return_inverse=True)
         alone = np.where(self.rows.data, groups, groups.max(initial=0) + 1 + np.arange(len(groups)))
         signs = rng.integers(0, 2, (int(alone.max(initial=0)) + 1, count)) * 2.0 - 1.0
         out = self.inflated[:, None] * signs[alone]
