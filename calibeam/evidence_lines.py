@@ -2,6 +2,7 @@
 
 from calibrate.identification.result import Evidence, FreeSpace, Unseen
 from calibrate.observability import Observability
+from calibrate.sensors.catalogue import thousandth_of
 
 
 def lines_of(evidence: Evidence) -> list[str]:
@@ -21,8 +22,8 @@ def lines_of(evidence: Evidence) -> list[str]:
 def _held_out(unseen: Unseen) -> str:
     return (
         f"held out ({unseen.split}): {unseen.name}, {unseen.observations} rows, "
-        f"{1e3 * unseen.rms_distance_before_m:.4g} mm rms distance before, "
-        f"{1e3 * unseen.rms_distance_after_m:.4g} mm after"
+        f"{1e3 * unseen.rms_distance_before_m:.4g} {thousandth_of(unseen.name)} rms distance before, "
+        f"{1e3 * unseen.rms_distance_after_m:.4g} {thousandth_of(unseen.name)} after"
     )
 
 

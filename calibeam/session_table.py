@@ -17,6 +17,7 @@ from calibrate.identification.result import Identification
 from calibrate.model_file import ModelParameter
 from calibrate.report.verdict import Verdict
 from calibrate.sensors import spots
+from calibrate.sensors.catalogue import thousandth_of
 
 UNITS = {"m": ("um", 1e6), "rad": ("urad", 1e6)}
 
@@ -131,8 +132,8 @@ def _cell(value: float | None, factor: float, sign: str = "") -> str:
 
 def _figures(result: Identification) -> list[str]:
     out = [
-        f"{one.name}: {1e3 * one.rms_distance_before_m:.4g} mm rms distance with the arm as drawn, "
-        f"{1e3 * one.rms_distance_after_m:.4g} mm after"
+        f"{one.name}: {1e3 * one.rms_distance_before_m:.4g} {thousandth_of(one.name)} rms distance "
+        f"with the arm as drawn, {1e3 * one.rms_distance_after_m:.4g} {thousandth_of(one.name)} after"
         for one in result.instruments
     ]
     for noise in result.noise:

@@ -14,7 +14,7 @@ from acquisition.recording.recording import Recording
 from acquisition.recording.stream import Stream
 from acquisition.recording.writer import RecordingWriter
 
-WAITING = 50_000  # rows given to the writer before it is waited for: it measures against no clock here
+WAITING = 16 * 2**20  # bytes given to the writer before it is waited for: a quarter of what may wait (spool.py)
 BLOCK = 1000  # rows of a stream at a time; a viewer loads little more than the time it shows
 
 
@@ -52,7 +52,7 @@ def _write_streams(writer: RecordingWriter, source: Recording) -> None:
         block = slice(*rows)
         values = {channel: array[block] for channel, array in stream.values.items()}
         inlets[name].append(stream.host_s[block], stream.device_s[block], stream.sequence[block], values)
-        given += rows[1] - rows[0]
+        given += sum(array.nbytes for array in values.values()) + 3 * stream.host_s[block].nbytes
         if given >= WAITING:
             writer.flush()
             given = 0

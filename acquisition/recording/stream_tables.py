@@ -10,6 +10,7 @@ import importlib
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -108,6 +109,9 @@ def with_streams(recording: Recording, folder: Path) -> Recording:
     gaps = _gaps(folder)
     if not (folder / ABOUT).is_file():
         found = [path for path in sorted(folder.iterdir()) if path.suffix in (".csv", ".parquet")]
+        for one, other in pairwise(found):
+            if one.stem == other.stem:
+                raise RecordingError(f"{folder}: both {one.name} and {other.name} are there; remove one of them")
         streams = [_foreign(path, gaps) for path in found if path.stem not in (EVENTS, GAPS)]
         return replace(recording, streams={s.name: s for s in streams}, events=_events(folder))
     about = read_json(folder / ABOUT, KIND, StreamsAbout, _other)
@@ -185,8 +189,10 @@ def _stream(
     values: Mapping[str, NDArray[Any]],
     gaps: Mapping[str, tuple[Gap, ...]],
 ) -> Stream:
-    if "host_s" not in columns or "sequence" not in columns:
+    if "host_s" not in columns:
         raise RecordingError(f"{path}: no column 'host_s'; a stream needs the time of each row, host_s or t_s, in s")
+    if "sequence" not in columns:
+        raise RecordingError(f"{path}: no column 'sequence', which numbers the rows; {KIND.again}")
     host_s = columns["host_s"]
     device_s = columns.get("device_s", np.full(len(host_s), math.nan))
     if np.any(bad := ~(np.abs(host_s) <= TIME_S)):
@@ -269,7 +275,7 @@ def _events(folder: Path) -> tuple[Event, ...]:
     for number, row in enumerate(rows, start=1):
         try:
             detail = msgspec.json.decode(str(row["detail_json"]).encode(), type=dict[str, Any])
-            out.append(Event(_time(row["host_s"]), str(row["kind"]), detail))
+            out.append(Event(_time(row["host_s"]), str(row["kind"] or ""), detail))
         except (msgspec.DecodeError, RecursionError, ValueError, TypeError) as error:
             raise RecordingError(
                 f"{folder / EVENTS} row {number}: no event ({shown(str(error))}); {KIND.again}"

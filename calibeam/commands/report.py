@@ -28,8 +28,8 @@ def report_command(
 
     How accurate the arm is now, whether to trust the result, what to do; then the details.
 
-    Of the dual PSD alone: rig, spots, centring, residuals, joint zeros. Of any other session: errors by instrument,
-    proof on unseen rows, what was identified and what was refused and why. How to read it: docs/report.md.
+    Errors by instrument, proof on unseen rows, what was identified and what was not and why; of spots also the rig, the
+    faces, the centring and the joint zeros. How to read it: docs/report.md.
 
     Example: calibeam report out/demo/recording.mcap --out report.html
 

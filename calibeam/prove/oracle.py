@@ -20,6 +20,7 @@ from calibrate.diagnose.linearised import Accepted, Unseen
 from calibrate.diagnose.schema import FindingRecord
 from calibrate.diagnose.score import scores
 from calibrate.effects.term import Term
+from calibrate.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -103,7 +104,8 @@ def _is_said(term: Term, finding: FindingRecord) -> bool:
 
 def misfit_m(unseen: Sequence[Unseen], wild: NDArray[np.bool_] | None = None) -> Floats:
     """(reading,) lengths that a model misses on unseen samples, wild ones left out."""
-    parts = [u.misfit[:, :LENGTHS] if u.misfit.shape[1] > 4 else u.misfit for u in unseen]
+    lengths = [u.misfit for u in unseen if u.instrument != ENCODER_DIFFERENCE]
+    parts = [misfit[:, :LENGTHS] if misfit.shape[1] > 4 else misfit for misfit in lengths]
     flat = np.concatenate([p.ravel() for p in parts])
     return flat if wild is None else flat[~wild]
 

@@ -70,7 +70,7 @@ def joint_zeros(
     found: list[JointZero] = []
     for e in estimates:
         owner, _, what = e.name.partition(".")
-        if what != "zero":
+        if what != "zero" or not owner.startswith("joint"):  # a second encoder has a zero, too
             continue
         known = e.sigma is not None and bool(np.all(np.isfinite(covariance)))
         alone = conditional_sigma(covariance, index[e.name], believed) if known else None

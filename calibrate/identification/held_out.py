@@ -87,7 +87,8 @@ def lengths(problem: JointProblem, index: int, theta: Floats) -> Floats:
     if block.rows == 0:
         return np.zeros(0)
     misfit = block.misfit(own) if isinstance(block, Problem) else block.residual(own).reshape(block.rows, -1)
-    return np.linalg.norm(misfit[:, :3] if misfit.shape[1] == POSE else misfit, axis=1)
+    of_joints = isinstance(block, Problem) and block.chain.sensor.joints_compared()
+    return np.linalg.norm(misfit[:, :3] if misfit.shape[1] == POSE and not of_joints else misfit, axis=1)
 
 
 def _lengths_of_all(problem: JointProblem, theta: Floats) -> Floats:

@@ -14,6 +14,7 @@ from calibrate.identification.point_constraint import PointConstraints
 from calibrate.identification.scale import scale_alarms
 from calibrate.observability import Observability
 from calibrate.parameters import Parameter
+from calibrate.sensors.catalogue import kind_of
 from calibrate.uncertainty.bootstrap import Bootstrap
 from calibrate.uncertainty.chi_square import Alarm, RepeatNoise, StatedNoise
 from calibrate.uncertainty.free_space import FreeSpaceError, Scatter
@@ -48,8 +49,7 @@ class InstrumentFound:
     @property
     def coordinates(self) -> int:
         """That make up a distance: of a pose those of its position."""
-        k = self.misfit.shape[1]
-        return POSITION if k == POSE else k
+        return len(range(self.misfit.shape[1])[kind_of(self.name).quantities[0].part])
 
     @property
     def rms_coordinate_before_m(self) -> float:

@@ -33,7 +33,7 @@ from calibrate.sensors import seat
 
 Floats = NDArray[np.float64]
 
-ANEW = "device."  # set up anew for each recording: nothing of it is known
+ANEW = ("device.", "camera.", "marker.", "encoder")  # set up or found anew for each recording: nothing is known of it
 FOUND = ("tool", seat.POINTS)  # corrections about points that were found in closed form, in `about` of the model
 AXES = ("x", "y", "z")
 

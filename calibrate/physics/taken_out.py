@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.samples import Samples
+from calibrate.diagnose.augmented import encoder_channels
 from calibrate.diagnose.ported import look
 from calibrate.effects.ports import Perturbation
 from calibrate.model_file import ModelFile
@@ -32,6 +33,8 @@ def without_effects(weighting: Weighting, theta: Floats, samples: Samples, model
     def less(i: int, m: Measured) -> Measured:
         own = weighting.unweighted.of_block(i, theta)
         added = look(m, own, moved).expected - look(m, own, plain).expected
+        if (channels := encoder_channels(m)) is not None:
+            added = added + by.between_rad[np.ix_(m.sample_rows[:, -1], channels)]
         if m.name in by.readings:
             added = added + by.readings[m.name][m.sample_rows[:, -1]]
         return replace(m, problem=replace(m.problem, observed=m.problem.observed - added))

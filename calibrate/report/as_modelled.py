@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 
 from acquisition.recording.recording import Recording
@@ -31,6 +32,8 @@ def weighting_of(recording: Recording, model: ModelFile) -> Weighting:
     if len(bad) > len(samples) - len(kept):
         raise _strangers(recording, f"it leaves out row {max(bad) + 1}, but there are {len(samples)}")
     plan = DEFAULT if model.plan is None else parse_plan(model.plan, "fit plan in the model")
+    if model.session is not None:  # a diagnosis uses second encoders without being asked to
+        plan = structs.replace(plan, instruments=model.instruments)
     rig, some = rig_as_planned(recording.rig, plan), samples_as_planned(samples.take(kept), plan)
     found = standing_at(instruments_for_fit(rig, some, plan).weighting, kept)
     names = tuple(m.name for m in found.measured)

@@ -1,60 +1,18 @@
-"""What the model leaves of the spots: before and after the fit, pose by pose, and whether the rest looks like noise."""
-
-from collections.abc import Sequence
+"""Whether what the model leaves of the readings looks like noise."""
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.special import betaincinv, ndtri
 
-from calibrate.observations import Observations
 from calibrate.report.elements import Html
 from calibrate.report.svg import drawn
-from calibrate.report.tones import Tone, place_mark
+from calibrate.report.tones import Tone
 
 Floats = NDArray[np.float64]
 
-COORDINATES = ("PSD 1 x", "PSD 1 y", "PSD 2 x", "PSD 2 y")
-MARKERS = {1: "o", 2: "^"}  # by the face that is struck first
 MOST_POINTS = 800  # of the ordered residuals: beyond, the page grows and the eye sees no more
 CORRIDOR = 0.95  # pointwise, of the order statistics
-
-
-def by_pose(
-    data: Observations, residual_m: Floats, sigma_m: Floats | None, places: Sequence[int], name: str, title: str
-) -> Html:
-    """Residual (pose, 4) of each coordinate against the number of the pose; a band of two sigma where given."""
-    says = f"{title} of the four spot coordinates against the number of the pose"
-    return drawn(name, says, 4.8, 6.4, lambda figure: _paint(figure, data, residual_m, sigma_m, places, title))
-
-
-def _paint(
-    figure: Figure, data: Observations, residual_m: Floats, sigma_m: Floats | None, places: Sequence[int], title: str
-) -> None:
-    unit, scale = ("mm", 1e3) if np.abs(residual_m).max() >= 1e-3 else ("µm", 1e6)
-    limit = 1.1 * scale * float(np.abs(residual_m).max())
-    number = np.arange(1, len(data) + 1)
-    all_axes = figure.subplots(4, 1, sharex=True, squeeze=False)[:, 0]
-    for k, axes in enumerate(all_axes):
-        if sigma_m is not None:
-            band = 2.0 * sigma_m[:, k] * scale
-            axes.fill_between(number, -band, band, step="mid", color=Tone.FAINT.value, lw=0)
-        axes.axhline(0.0, color=Tone.SOFT.value, lw=0.7)
-        for i, place in enumerate(places):
-            for first, marker in MARKERS.items():
-                rows = (data.placement == place) & (data.first_psd == first)
-                axes.plot(
-                    number[rows],
-                    residual_m[rows, k] * scale,
-                    marker,
-                    ms=3.8,
-                    mew=1.0,
-                    **place_mark(i),  # pyright: ignore[reportArgumentType]
-                )
-        axes.set(ylim=(-limit, limit), ylabel=f"{COORDINATES[k]} ({unit})")
-        axes.grid(visible=False)
-    all_axes[0].set_title(title)
-    all_axes[-1].set_xlabel("pose")
 
 
 def quantiles(whitened: Floats, name: str = "residual-quantiles") -> Html:

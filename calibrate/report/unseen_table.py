@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from calibrate.model_file import UnseenRows
 from calibrate.report.elements import Html, table, tag
-from calibrate.report.quantities import fixed, length
+from calibrate.report.quantities import angle, fixed, length
 from calibrate.sensors.catalogue import kind_of
 
 
@@ -19,12 +19,13 @@ def unseen_rows(found: Sequence[UnseenRows], unproven: Sequence[str]) -> list[Ht
 
 
 def _proof(proof: UnseenRows) -> tuple[str, ...]:
-    name = kind_of(proof.instrument).title
+    kind = kind_of(proof.instrument)
+    says = angle if kind.quantities[0].unit == "rad" else length
     return (
         proof.split,
-        name,
+        kind.title,
         str(proof.observations),
-        length(proof.rms_distance_before_m),
-        length(proof.rms_distance_after_m),
+        says(proof.rms_distance_before_m),
+        says(proof.rms_distance_after_m),
         fixed(proof.chi_after, 2),
     )

@@ -39,6 +39,11 @@ def kind_of(name: str) -> SensorKind:
     return BY_NAME[name]
 
 
+def thousandth_of(name: str) -> str:
+    """Unit in which a terminal shows the first quantity of a sensor: "mm" or "mrad"."""
+    return f"m{kind_of(name).quantities[0].unit}"
+
+
 def names_with(trait: Trait) -> tuple[str, ...]:
     """Names of all sensors that have it."""
     return tuple(kind.name for kind in SENSORS if trait in kind.traits)

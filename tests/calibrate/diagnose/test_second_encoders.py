@@ -1,12 +1,18 @@
 """What lies between two encoders of a joint, on concealed sessions: one finding at its place, on either side."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from acquisition.recording.read import read
+from calibeam.cli import run
 from calibrate.diagnose.diagnosis import Verdict
 from calibrate.diagnose.from_recording import diagnose_samples
+from calibrate.model_file import read_model
+from calibrate.report.sections.zeros import zeros_of
+from calibrate.report.session_evidence import session_evidence
 
 from .concealed import recording_of
 
@@ -45,3 +51,17 @@ def test_arbitrary_zeros_of_second_encoders_are_no_mismatch(side, seed, tmp_path
     physics = diagnosed(tmp_path, seed=seed, encoders=side)
     assert physics.diagnosis.verdict is Verdict.CONSISTENT
     assert physics.diagnosis.findings == ()
+
+
+@pytest.mark.timeout(300)
+def test_a_report_by_the_model_takes_effects_out_of_both_encoders(tmp_path):
+    case = {"seed": 11, "defects": ("soft-joint",), "encoders": "link", "side_stated": True}
+    recording_of(tmp_path, family="tracker", samples=120, arm="ur5", **case)
+    folder, model, page = (str(tmp_path / name) for name in ("recording", "model.json", "report.html"))
+    assert run(["diagnose", folder, "--out", str(tmp_path / "diagnosis.json"), "--model-out", model]) == 0
+    assert "encoder-difference" in json.loads(Path(model).read_text())["instruments"]
+    assert run(["report", folder, "--model", model, "--out", page]) == 0
+    evidence = session_evidence(read(Path(folder)), read_model(Path(model)))
+    (between,) = (r for r in evidence.readings if r.instrument == "encoder-difference")
+    assert np.sqrt(np.mean(between.whitened**2)) < 1.2  # with the soft joint in it: 3 and more
+    assert [z.joint for z in zeros_of(evidence)] == [1, 2, 3, 4, 5, 6]
