@@ -281,7 +281,7 @@ def test_the_command_logs_exports_imports_recovers(
     tables = tmp_path / "tables"
     assert run(["export", str(segment), "--out", str(tables), "--streams", "--table", "parquet"]) == 0
     assert {path.name for path in (tables / "streams").iterdir()} == {
-        "can.parquet", "encoders.parquet", "events.parquet", "gaps.parquet",
+        "can.parquet", "encoders.parquet", "events.parquet", "gaps.parquet", "streams.json",
     }  # fmt: skip
 
 
