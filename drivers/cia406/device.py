@@ -41,6 +41,7 @@ SILENT_S = 0.5  # a node that answers no SYNC for so long is gone
 HEARTBEAT_GOES_ON_S = 0.49  # of SILENT_S: a heartbeat this fresh is one of after the silence began
 BATCH_S = 0.02  # rows gathered in one block; more only delays a reader
 TOGETHER_S = 1.1e-3  # answers wait so long for the next SYNC: at 1 kHz one waking a row in place of two or more
+HELD_UP_S = 0.05  # a thread that waits so much longer than it asked to was kept from running
 SYNC = can.Message(arbitration_id=objects.SYNC_ID, is_extended_id=False)
 
 
@@ -142,8 +143,11 @@ class Cia406Encoders:
             while len(self._rows) < self._batch:
                 if now_s >= deadline_s:
                     break
-                messages = self._receive(min(self._cycle.wakes_s, deadline_s) - now_s)
+                due_s = max(now_s, min(self._cycle.wakes_s, deadline_s))
+                messages = self._receive(due_s - now_s)
                 now_s = self._clock.now_s()
+                if now_s - due_s > HELD_UP_S:  # this thread sent no SYNC meanwhile: no silence of the encoders
+                    deadline_s += now_s - due_s
                 # Before the work on what came, which is of earlier SYNCs: it would delay this one, and its answers.
                 sent = now_s >= self._cycle.wakes_s and self._keep_pace(now_s)
                 self._take_all(messages, now_s)

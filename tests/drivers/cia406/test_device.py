@@ -331,3 +331,17 @@ def test_at_slower_rates_an_answer_is_seen_when_it_comes(memory):
     memory.encoders.connect()
     block = memory.encoders.read(READ_S)
     np.testing.assert_allclose(block.host_s - block.device_s, 0.0006, atol=1e-9)
+
+
+def test_a_reader_that_was_kept_from_running_does_not_call_the_encoders_silent(memory, monkeypatch):
+    """No SYNC was sent meanwhile, so no encoder could answer one."""
+    memory.encoders.connect()
+    memory.encoders.read(0.5)
+    recv, held_up = memory.bus.recv, iter((0.7,))
+
+    def late(timeout=None):
+        memory.clock.sleep_s(next(held_up, 0.0))
+        return recv(timeout)
+
+    monkeypatch.setattr(memory.bus, "recv", late)
+    assert np.isfinite(memory.encoders.read(0.5).values["position_rad"]).all()
