@@ -18,7 +18,6 @@ from calibrate.export.export import ExportForm, export_model
 from calibrate.fit import Status
 from calibrate.identification.planned import rig_as_planned
 from calibrate.model_file import ModelFile, corrections, read_model, write_model
-from calibrate.physics.refitted import refit
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_verdict import session_verdict
 
@@ -108,6 +107,8 @@ def _identify(
 
 
 def _refit(console: Console, recording: Path, known: ModelFile, out: Path, export: tuple[ExportForm, ...]) -> None:
+    from calibrate.physics.refitted import refit  # a third of a second of imports that few runs need
+
     source = read(recording)
     found = refit(known, source)
     out.parent.mkdir(parents=True, exist_ok=True)

@@ -13,7 +13,6 @@ from calibrate.fit import solve
 from calibrate.joint_problem import JointProblem
 from calibrate.model_file import ModelFile
 from calibrate.parameters import Parameter
-from calibrate.physics.taken_out import without_effects
 from calibrate.problem import Problem
 from calibrate.report.as_modelled import noise_of, values_of, weighting_of
 from calibrate.report.quantities import angle, length
@@ -109,7 +108,10 @@ def session_evidence(recording: Recording, model: ModelFile) -> SessionEvidence:
     """DataError where the model was not made from this recording."""
     weighting = weighting_of(recording, model)
     theta = values_of(weighting, model)
-    weighting = without_effects(weighting, theta, recording.samples, model)
+    if model.effects:
+        from calibrate.physics.taken_out import without_effects  # all effects: identify finds none, and starts sooner
+
+        weighting = without_effects(weighting, theta, recording.samples, model)
     problem = weighting.problem(theta, noise_of(weighting, model))
     before = _places_only(weighting, problem, model, theta)
     readings = tuple(r for i in range(len(weighting.measured)) for r in _readings(weighting, problem, i, before, theta))
