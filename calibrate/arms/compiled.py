@@ -25,7 +25,7 @@ Indices = NDArray[np.intp]
 
 SOURCE = Path(__file__).with_name("fast.py")
 PER_PART = 7  # slots of a perturbed part: shift 3, turn 3, and the angle of the joint behind it
-WORTH_POSES = 256  # below, a single fit is over before numba is imported (0.3 to 0.4 s, once a process)
+WORTH_POSES = 600  # below, a single fit is over before numba is imported and loaded (0.4 to 0.5 s, once a process)
 
 
 @dataclass(frozen=True)
