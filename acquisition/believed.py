@@ -8,18 +8,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.motion.inverse.kinematics import Kinematics
+
 Floats = NDArray[np.float64]
 
 
-class BelievedArm(Protocol):
+class BelievedArm(Kinematics, Protocol):
     """The arm with its laser as believed now. `q_rad` (joint,) are the controller's readings."""
-
-    lower_rad: Floats
-    upper_rad: Floats
-
-    def frames(self, q_rad: Floats) -> Floats:
-        """T_base_frame of the base and of every link, (joint + 1, 4, 4); the last is the flange."""
-        ...
 
     def beam(self, q_rad: Floats) -> tuple[Floats, Floats]:
         """Origin (3,) m and unit direction (3,) of the laser beam in the base frame."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from calibrate.arms.rig_arm import limits_of
 from calibrate.diagnose.elsewhere import NewPoses
 from calibrate.diagnose.fitted import Fitted
 from calibrate.observation_model import ObservationModel
@@ -95,10 +96,10 @@ def _met(chain: ObservationModel, theta: Floats, q_rad: Floats, rng: Generator) 
 
 def _allowed(state: Fitted, q_rad: Floats) -> Bools:
     """(pose,) inside the joint limits, and where flange and links have been."""
-    arm, joints = state.session.arm, state.session.rig.arm.joints
+    arm, (lower_rad, upper_rad) = state.session.arm, limits_of(state.session.rig)
     theta = state.geometry[: len(arm.parameters)]
     q = np.nan_to_num(q_rad)
-    inside = np.all((q >= [j.lower_rad for j in joints]) & (q <= [j.upper_rad for j in joints]), axis=1)
+    inside = np.all((q >= lower_rad) & (q <= upper_rad), axis=1)
     been, there = state.drivers.frames, arm.frames(theta, q)
     low, high = been[:, -1, :3, 3].min(axis=0) - ROOM_M, been[:, -1, :3, 3].max(axis=0) + ROOM_M
     inside &= np.all((there[:, -1, :3, 3] >= low) & (there[:, -1, :3, 3] <= high), axis=1)
