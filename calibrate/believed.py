@@ -12,7 +12,7 @@ from calibrate.believed_fixture import BelievedFixture, FixtureView, Light
 from calibrate.dual_psd_rig import dual_psd_chain, dual_psd_of
 from calibrate.errors import DataError
 from calibrate.parameters import values_by_name
-from calibrate.rigid import cross
+from calibrate.sensors import optics
 
 Floats = NDArray[np.float64]
 
@@ -69,13 +69,9 @@ class BelievedRig:
     def expect(self, q_rad: Floats, placement: int, first_psd: int) -> Expected:
         """Spots and their derivative. DataError for an unknown placement or order."""
         view = self._view(placement, first_psd)
-        T = self.arm.frames(q_rad[None])[0]
-        origin, direction = self.arm.beam_from(T[-1])
-        hit = view.strike(origin, direction)
-        meet = origin + hit.travel[:, None] * direction  # (face, 3) on the unreflected beam
-        velocity = cross(T[:-1, :3, 2], meet[:, None, :] - T[:-1, :3, 3])  # (face, joint, 3)
-        by_joint = (hit.by_origin @ velocity.transpose(0, 2, 1)).reshape(4, -1)
-        return Expected(hit.spots_m * self._gain, by_joint * self._gain[:, None], hit.light)
+        hit = view.strike(*self.arm.beam(q_rad))
+        by_joint = optics.by_beam(hit) @ self.arm.beam_jacobian(q_rad)
+        return Expected(hit.spots_m.ravel() * self._gain, by_joint * self._gain[:, None], view.light(hit))
 
     def spots(self, q_rad: Floats, placement: int, first_psd: int) -> Floats:
         """(4,) m, as in `expect`."""
@@ -83,8 +79,9 @@ class BelievedRig:
 
     def struck(self, T_base_flange: Floats, placement: int, first_psd: int) -> tuple[Floats, Light]:
         """Spots (4,) m and where the beam goes, as in `expect`, of a flange pose (4, 4): five times as fast."""
-        hit = self._view(placement, first_psd).strike(*self.arm.beam_from(T_base_flange))
-        return hit.spots_m * self._gain, hit.light
+        view = self._view(placement, first_psd)
+        hit = view.strike(*self.arm.beam_from(T_base_flange))
+        return hit.spots_m.ravel() * self._gain, view.light(hit)
 
     def _view(self, placement: int, first_psd: int) -> FixtureView:
         view = self._views.get((placement, first_psd))
