@@ -66,6 +66,22 @@ class ObservationModel(ABC):
         each = zip(self.by_flanges(own, self._flanges(of_model, q_rad)), self._each(q_rad), strict=True)
         return np.concatenate([by @ self.model.joint_twists(of_model, q) for by, q in each], axis=-1)
 
+    def readings_for(
+        self, theta: Floats, q_rad: Floats, wanted: Floats, singular: float, steps: int, step_rad: float = np.inf
+    ) -> Floats:
+        """(row, reading) near `q_rad`, at which what is expected is `wanted` (row, k): Newton's steps of least length.
+
+        Directions slower than `singular` of the quickest are not used; no reading turns further than `step_rad` a step.
+        """
+        for _ in range(steps):
+            with np.errstate(all="ignore"):  # a beam along a face: its row stays where it is
+                left = np.nan_to_num(wanted - self.expect(theta, q_rad), posinf=0.0, neginf=0.0)
+                J = np.nan_to_num(self.by_joint(theta, q_rad), posinf=0.0, neginf=0.0)
+            step = np.einsum("nji,ni->nj", np.linalg.pinv(J, rcond=singular), left)
+            longest = np.max(np.abs(step), axis=1, keepdims=True)
+            q_rad = q_rad + step * np.minimum(1.0, step_rad / np.maximum(longest, 1e-12))
+        return q_rad
+
     def select(self, rows: NDArray[np.intp]) -> Self:
         """The same at some of the rows."""
         return replace(self, sensor=self.sensor.select(rows))
