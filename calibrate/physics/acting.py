@@ -14,9 +14,10 @@ from scipy.spatial import KDTree
 from acquisition.recording.samples import Samples
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.serial import SerialArm
+from calibrate.conditions import temperatures_of
 from calibrate.diagnose.causes import cause
 from calibrate.diagnose.curve import curve
-from calibrate.diagnose.driver_values import drivers_at, readout_at, temperatures_of
+from calibrate.diagnose.driver_values import drivers_at, readout_at
 from calibrate.diagnose.extended import alike, rearranged
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.ported import perturbed_frames

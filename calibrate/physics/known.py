@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from acquisition.recording.fingerprint import readings_sha256
 from acquisition.recording.samples import Samples
+from calibrate.conditions import moves_of
 from calibrate.diagnose.assumed import Assumed, Stated
-from calibrate.diagnose.driver_values import moves_of
 from calibrate.diagnose.fitted import Fitted, fit_from_model, fit_geometry, given
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.session import Session
