@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
-from calibrate.conditions import conditions_of, temperatures_of
 from calibrate.diagnose.session import Session
+from calibrate.effects.conditions import conditions_of, temperatures_of
 from calibrate.effects.drivers import Drivers, Readout
 from calibrate.sensors.model import Standing, Used
 from calibrate.weighting import Measured

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.rig_schema import Rig
-from calibrate.conditions import Conditions
+from calibrate.effects.conditions import Conditions
 from calibrate.sensors.catalogue import names_with
 from calibrate.sensors.kind import Trait
 

@@ -14,7 +14,6 @@ from scipy.spatial import KDTree
 from acquisition.recording.samples import Samples
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.serial import SerialArm
-from calibrate.conditions import temperatures_of
 from calibrate.diagnose.causes import cause
 from calibrate.diagnose.curve import curve
 from calibrate.diagnose.driver_values import drivers_at, readout_at
@@ -22,6 +21,7 @@ from calibrate.diagnose.extended import alike, rearranged
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.ported import perturbed_frames
 from calibrate.effects.catalogue import EFFECTS
+from calibrate.effects.conditions import temperatures_of
 from calibrate.effects.drivers import Drivers, Readout
 from calibrate.effects.form import Form
 from calibrate.effects.gravity import likely_torque_nm

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from scipy.linalg import orth
 from scipy.stats import t as student
 
-from calibrate.conditions import MOVED_RAD
 from calibrate.diagnose.streams.between_encoders import Causes
 from calibrate.diagnose.streams.stands import Stand
 from calibrate.diagnose.streams.track import Curve, Track
+from calibrate.effects.conditions import MOVED_RAD
 
 Floats = NDArray[np.float64]
 
