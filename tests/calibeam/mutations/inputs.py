@@ -112,7 +112,7 @@ def _guided(folder: Path) -> None:
     """A verification of the measuring arm, and its model, which is the arm as drawn."""
     source = RIGS / "arm-cmm-reference.toml"
     rig, rng = load_rig(source), np.random.default_rng(1)
-    arm = BelievedGuidedArm(rig)
+    arm = BelievedGuidedArm.of_rig(rig)
 
     def posture(point_m: tuple[float, ...]) -> Floats:
         return arm.postures(rng.uniform(arm.lower_rad, arm.upper_rad, (200, 6)), np.array(point_m))[0]
