@@ -2,6 +2,7 @@
 
 import csv
 import json
+from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -11,9 +12,12 @@ from acquisition.recording.rig import parse_rig
 from calibeam.notebook import Model
 from calibrate.export.export import ExportForm, export_model
 from calibrate.export.not_carried import not_carried
+from calibrate.model_file import read_model
+from calibrate.predict import Predictor
 
 from ..physics.two_joints import PLAY_RAD, REACH_M, two_joints
 
+MODELS = Path(__file__).parents[2] / "golden" / "data" / "formats" / "models"
 FORMS = [form for form in ExportForm if not form.value.startswith("ur-")]  # those have six joints
 OFF_UM = 1e6 * REACH_M * PLAY_RAD / 2.0  # half the play either way, at a stretched arm
 SAYS = "not carried: joint1-backlash: 250.0 µm rms, at most 250.0 µm"
@@ -84,3 +88,21 @@ def test_a_tool_that_the_model_found_is_exported_where_it_was_found(model, tmp_p
     found = msgspec.structs.replace(model, about={"tool": (0.01, 0.02, 0.03)}, chain={"tool.x": 1e-3})
     text, _ = exported(tmp_path / "arm", found, ExportForm.JSON)
     assert json.loads(text)["tool_point_m"] == pytest.approx([0.011, 0.02, 0.03])
+
+
+@pytest.mark.parametrize("path", sorted(MODELS.glob("*.json")), ids=lambda path: path.stem)
+def test_a_model_file_of_schema_1_is_exported_as_it_predicts(path, tmp_path):
+    """Whatever the model of the arm, flange and tool are where a prediction has them, and nothing is lost."""
+    model = read_model(path)
+    assert model.schema == 1
+    predictor = Predictor.of(model)
+    assert export_model(tmp_path / "arm", predictor.rig, model, ExportForm.JSON) == ()
+    arm = json.loads((tmp_path / "arm").read_text())
+    for q in np.random.default_rng(2).uniform(-2.0, 2.0, (5, predictor.rig.n_joints)):
+        T = np.array(arm["parts"][0])
+        for angle, part in zip(q, arm["parts"][1:], strict=True):
+            T = T @ turn(angle) @ np.array(part)
+        np.testing.assert_allclose(T, predictor.flange(q[None])[0], atol=1e-9)
+        if arm["tool_point_m"] is not None:
+            tip = T @ np.array([*arm["tool_point_m"], 1.0])
+            np.testing.assert_allclose(tip[:3], predictor.tip_m(q[None])[0], atol=1e-9)
