@@ -9,7 +9,6 @@ from calibrate.export.dh_csv import dh_csv_text
 from calibrate.export.identified import IdentifiedArm, identified_arm
 from calibrate.export.json_text import json_text
 from calibrate.export.matlab import matlab_text
-from calibrate.export.not_carried import not_carried
 from calibrate.export.ur import ur_calibration_text, ur_kinematics_text
 from calibrate.export.urdf import urdf_text
 from calibrate.model_file import ModelFile, corrections
@@ -50,10 +49,15 @@ def export_model(path: Path, rig: Rig, model: ModelFile, form: ExportForm) -> tu
     `rig` is in the arm model of `model`. DataError as `export_text`, and where effects cannot be evaluated; OSError
     where the folder cannot be written.
     """
-    lost = not_carried(model)
-    says = () if lost is None else lost.sentences
+    says = _not_carried(model) if model.effects else ()
     text = FORMS[form](identified_arm(rig, corrections(model), model.about.get("tool"), says))
     partial = path.with_name(path.name + ".partial")
     partial.write_text(text, encoding="utf-8")
     partial.replace(path)
     return says
+
+
+def _not_carried(model: ModelFile) -> tuple[str, ...]:
+    from calibrate.export.not_carried import not_carried  # a third of a second of imports that few runs need
+
+    return not_carried(model).sentences

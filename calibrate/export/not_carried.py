@@ -69,10 +69,8 @@ class NotCarried:
             yield f"not carried: {name}: true of its own session only"
 
 
-def not_carried(model: ModelFile) -> NotCarried | None:
-    """None for a model without effects. DataError for one without its rig, or whose effects cannot be evaluated."""
-    if not model.effects:
-        return None
+def not_carried(model: ModelFile) -> NotCarried:
+    """Of a model with effects. DataError for one without its rig, or whose effects cannot be evaluated."""
     predictor = Predictor.of(model)
     recorded = recorded_samples(model, len(predictor.rig.arm.joints))
     session = tuple(e.name for e in model.effects if e.holds == "session")
