@@ -17,7 +17,7 @@ from calibrate.errors import DataError
 from calibrate.export.export import ExportForm, export_model
 from calibrate.fit import Status
 from calibrate.identification.planned import rig_as_planned
-from calibrate.model_file import ModelFile, corrections, read_model, write_model
+from calibrate.model_file import ModelFile, read_model, write_model
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_verdict import session_verdict
 from calibrate.sensors.catalogue import unused_columns
@@ -122,7 +122,12 @@ def _refit(console: Console, recording: Path, known: ModelFile, out: Path, expor
 
 
 def _export(console: Console, rig: Rig, out: Path, export: tuple[ExportForm, ...]) -> None:
+    if not export:
+        return
+    model, lost = read_model(out), tuple[str, ...]()
     for form in export:
         beside = out.with_name(out.stem + SUFFIX[form])
-        export_model(beside, rig, corrections(read_model(out)), form)
+        lost = export_model(beside, rig, model, form)
         console.print(f"{form.value}: {beside}", markup=False)
+    for says in lost:
+        console.print(says, markup=False, highlight=False)

@@ -15,6 +15,7 @@ def dh_csv_text(arm: IdentifiedArm) -> str:
         "# Standard Denavit-Hartenberg table, identified by calibeam; m and rad",
         "# T_base_flange = base T_1 ... T_n flange; T_i = Rz(q_i + theta_offset) Tz(d) Tx(a) Rx(alpha) Ry(tilt)",
         f"# {SIGN}",
+        *(f"# {says}" for says in arm.not_carried),
         "# base and flange: origin x, y, z and rotation vector rx, ry, rz (axis times angle)",
         ",".join(("row", *TABLE, *FRAME)),
         _frame("base", pose_of(new.T_base_new)),

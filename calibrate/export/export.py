@@ -11,6 +11,7 @@ from calibrate.export.json_text import json_text
 from calibrate.export.matlab import matlab_text
 from calibrate.export.ur import ur_calibration_text, ur_kinematics_text
 from calibrate.export.urdf import urdf_text
+from calibrate.model_file import ModelFile, corrections
 
 
 class ExportForm(enum.Enum):
@@ -34,17 +35,29 @@ FORMS: Mapping[ExportForm, Callable[[IdentifiedArm], str]] = {
 }
 
 
-def export_text(rig: Rig, corrections: Mapping[str, float], form: ExportForm) -> str:
-    """The file's text. DataError for a correction of no parameter, or an arm that the form cannot hold."""
-    return FORMS[form](identified_arm(rig, corrections))
+def export_text(rig: Rig, values: Mapping[str, float], form: ExportForm) -> str:
+    """The file's text; `values` are corrections by name.
 
-
-def export_model(path: Path, rig: Rig, corrections: Mapping[str, float], form: ExportForm) -> None:
-    """Write the rig's arm as corrected (model_file.corrections), whole or not at all.
-
-    DataError as `export_text`; OSError where the folder cannot be written.
+    DataError for a correction of no parameter, or an arm that the form cannot hold.
     """
-    text = export_text(rig, corrections, form)
+    return FORMS[form](identified_arm(rig, values))
+
+
+def export_model(path: Path, rig: Rig, model: ModelFile, form: ExportForm) -> tuple[str, ...]:
+    """Write the arm of a model, whole or not at all. Sentences about what the file cannot carry, as they stand in it.
+
+    `rig` is in the arm model of `model`. DataError as `export_text`, and where effects cannot be evaluated; OSError
+    where the folder cannot be written.
+    """
+    says = _not_carried(model) if model.effects else ()
+    text = FORMS[form](identified_arm(rig, corrections(model), model.about.get("tool"), says))
     partial = path.with_name(path.name + ".partial")
     partial.write_text(text, encoding="utf-8")
     partial.replace(path)
+    return says
+
+
+def _not_carried(model: ModelFile) -> tuple[str, ...]:
+    from calibrate.export.not_carried import not_carried  # a third of a second of imports that few runs need
+
+    return not_carried(model).sentences

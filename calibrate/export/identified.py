@@ -27,11 +27,19 @@ class IdentifiedArm:
     rig: Rig
     corrections: Mapping[str, float]  # of the arm only
     parts: Floats  # (joint + 1, 4, 4) F_0 ... F_n
-    tool_m: tuple[float, float, float] | None  # target point in the flange frame, where the rig names one
+    tool_m: tuple[float, float, float] | None  # target point in the flange frame, where rig or model names one
+    not_carried: tuple[str, ...] = ()  # sentences: what no form can hold (not_carried.py)
 
 
-def identified_arm(rig: Rig, corrections: Mapping[str, float]) -> IdentifiedArm:
-    """Takes what belongs to arm and tool point; DataError for a joint or link that this arm does not have."""
+def identified_arm(
+    rig: Rig,
+    corrections: Mapping[str, float],
+    tool_about_m: tuple[float, ...] | None = None,
+    not_carried: tuple[str, ...] = (),
+) -> IdentifiedArm:
+    """Takes what belongs to arm and tool point; `tool_about_m` is what a model's corrections of the tool are about,
+    else the rig's point. DataError for a joint or link that this arm does not have.
+    """
     known = {p.name for p in arm_of(rig).parameters}
     discs = [name for name, value in corrections.items() if name.endswith((SINE, COSINE)) and value != 0.0]
     if discs:
@@ -46,13 +54,14 @@ def identified_arm(rig: Rig, corrections: Mapping[str, float]) -> IdentifiedArm:
                 " joints; give the model.json that was identified with this rig"
             )
     own = {k: v for k, v in corrections.items() if k in known}
-    return IdentifiedArm(rig, own, corrected_parts(rig.arm, own), _tool_m(rig, corrections))
+    tool_m = _tool_m(rig.tool.point_m if tool_about_m is None else tool_about_m[:3], corrections)
+    return IdentifiedArm(rig, own, corrected_parts(rig.arm, own), tool_m, not_carried)
 
 
-def _tool_m(rig: Rig, corrections: Mapping[str, float]) -> tuple[float, float, float] | None:
-    if rig.tool.point_m is None:
+def _tool_m(about_m: tuple[float, ...] | None, corrections: Mapping[str, float]) -> tuple[float, float, float] | None:
+    if about_m is None:
         return None
-    x, y, z = (v + corrections.get(f"tool.{a}", 0.0) for a, v in zip("xyz", rig.tool.point_m, strict=True))
+    x, y, z = (v + corrections.get(f"tool.{a}", 0.0) for a, v in zip("xyz", about_m, strict=True))
     return x, y, z
 
 

@@ -32,5 +32,6 @@ def json_text(arm: IdentifiedArm) -> str:
             "flange": dict(zip(FRAME, (*flange.origin_m, *flange.rotation_rad), strict=True)),
         },
         "tool_point_m": arm.tool_m,
+        "not_carried": arm.not_carried,
     }
     return msgspec.json.format(msgspec.json.encode(content), indent=1).decode() + "\n"

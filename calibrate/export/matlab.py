@@ -40,6 +40,7 @@ def matlab_text(arm: IdentifiedArm) -> str:
     lines = [
         "% Identified by calibeam; m and rad.",
         f"% {SIGN}.",
+        *(f"% {says}" for says in arm.not_carried),
         "% T_base_flange = parts(:,:,1) * Rz(q1) * parts(:,:,2) * ... * Rz(qn) * parts(:,:,n+1)",
         f"arm.name = '{name}';",
         *(f"arm.parts(:, :, {i}) = {_matrix(part.tolist())};" for i, part in enumerate(arm.parts, start=1)),

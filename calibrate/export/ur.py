@@ -33,6 +33,7 @@ def ur_kinematics_text(arm: IdentifiedArm) -> str:
     lines = [
         "# Identified by calibeam; m and rad; roll, pitch, yaw about fixed axes, the joint then turns about its z",
         f"# {SIGN}",
+        *(f"# {says}" for says in arm.not_carried),
         "kinematics:",
         *(line for name, part in zip(BODIES, parts[:-1], strict=True) for line in _yaml_pose(name, part, "  ")),
         "  hash: not_produced_by_calibeam  # the controller's own; the driver warns of the difference and goes on",
@@ -60,6 +61,7 @@ def ur_calibration_text(arm: IdentifiedArm) -> str:
     lines = [
         "# Identified by calibeam: true = drawn + delta; m and rad; standard D-H without tilt, Rz Tz Tx Rx",
         f"# {SIGN}",
+        *(f"# {says}" for says in arm.not_carried),
         "# joint_checksum, calibration_status, joint_raw_offset and joint_selftest_data_crc are the controller's own",
         "# and not produced: take the lists over into an existing file, never replace the file",
     ]

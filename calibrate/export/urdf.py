@@ -19,6 +19,9 @@ def urdf_text(arm: IdentifiedArm) -> str:
     n = arm.rig.n_joints
     links = ["base", *(f"link{i}" for i in range(1, n + 1)), "flange"]
     lines = [f"  <!-- Identified by calibeam. m and rad; {SIGN}. -->"]
+    lines += [
+        f"  <!-- {says.replace('--', '- -')} -->" for says in arm.not_carried
+    ]  # XML ends a comment at two hyphens
     for i, joint in enumerate(arm.rig.arm.joints, start=1):
         limit = (
             f'<limit lower="{joint.lower_rad!r}" upper="{joint.upper_rad!r}" effort="0"'

@@ -57,10 +57,13 @@ def effects_at(model: ModelFile, predictor: Predictor, samples: Samples, same_se
     by = nothing
     for one in found:
         by = by.plus(one.port, one.amount)
-    doubts = (*_of_missing(carried, found, predictor, recorded, filled), *_of_range(found))
+    doubts = list(_of_range(found))
+    for name, rows in filled.missing.items():
+        felt = _of_missing(name, rows, carried, found, predictor, recorded, filled)
+        doubts += [(one.port, off) for one, off in felt]
+        notes = (*notes, *_lacks(name, rows, [one.carried.record.name for one, _ in felt]))
     outside = _outside(carried, predictor, both, len(recorded), filled)
-    notes = (*notes, *(_lacks(name, rows, carried) for name, rows in filled.missing.items()))
-    return Applied(by, found, doubts, outside, notes)
+    return Applied(by, found, tuple(doubts), outside, notes)
 
 
 def recorded_samples(model: ModelFile, n_joints: int) -> Samples:
@@ -100,16 +103,22 @@ def _at_the_end(filled: Completed, last_t_s: float) -> Completed:
 
 
 def _of_missing(
-    carried: Sequence[Carried], found: Sequence[Acting], predictor: Predictor, recorded: Samples, filled: Completed
-) -> list[tuple[Port, Floats]]:
-    """What each effect would add if a condition that a row lacks were one standard deviation off its middle."""
-    out: list[tuple[Port, Floats]] = []
-    for name, rows in filled.missing.items():
-        off = np.where(rows, float(np.nanstd(recorded.column(name))), 0.0)
-        columns = {**filled.samples.columns, name: filled.samples.column(name) + off}
-        other = acting(carried, predictor, recorded, joined(recorded, Samples(columns, recorded.n_joints)))
-        out += [(a.port, b.amount - a.amount) for a, b in zip(found, other, strict=True)]
-    return out
+    name: str,
+    rows: Bools,
+    carried: Sequence[Carried],
+    found: Sequence[Acting],
+    predictor: Predictor,
+    recorded: Samples,
+    filled: Completed,
+) -> list[tuple[Acting, Floats]]:
+    """Effects that a condition which rows lack acts on, each with what it would add if that were one standard deviation
+    off its middle. A column can be read together with one that an effect needs and do nothing itself.
+    """
+    off = np.where(rows, float(np.nanstd(recorded.column(name))), 0.0)
+    columns = {**filled.samples.columns, name: filled.samples.column(name) + off}
+    other = acting(carried, predictor, recorded, joined(recorded, Samples(columns, recorded.n_joints)))
+    shifts = [(a, b.amount - a.amount) for a, b in zip(found, other, strict=True)]
+    return [(a, shift) for a, shift in shifts if np.any(shift)]
 
 
 def _of_range(found: Sequence[Acting]) -> list[tuple[Port, Floats]]:
@@ -145,9 +154,11 @@ def _beyond(values: Floats, low: float, high: float) -> Bools:
     return np.asarray((values < low - slack) | (values > high + slack), dtype=np.bool_)
 
 
-def _lacks(column: str, rows: Bools, carried: Sequence[Carried]) -> str:
-    names = [c.record.name for c in carried if column in needed_columns(c.drivers, (column,))]
+def _lacks(column: str, rows: Bools, effects: Sequence[str]) -> tuple[str, ...]:
+    """Nothing where no effect is changed by it."""
+    if not effects:
+        return ()
     return (
         f"{column} is missing in {int(rows.sum())} of {len(rows)} rows: taken as the mean of the session, sigma "
-        f"widened ({', '.join(names)})"
+        f"widened ({', '.join(effects)})",
     )

@@ -1,5 +1,7 @@
 """Flange and tip of a model with physics: the effects act, and what a row lacks is named and widens the sigma."""
 
+import json
+import re
 import warnings
 
 import numpy as np
@@ -92,3 +94,35 @@ def test_a_recording_is_opened_beside_it(slack):
     stated = np.sqrt(np.mean([model.file.noise[name] ** 2 for name in ("x_m", "y_m", "z_m")]))
     residual = np.stack([found[f"r_{name}"] for name in ("x_m", "y_m", "z_m")])
     assert np.sqrt(np.mean(residual**2)) < 1.1 * stated
+
+
+def test_an_exported_arm_states_what_it_cannot_carry(slack, capsys):
+    """The distance in the file is that between the exported arm and the model's flange with its effects."""
+    folder, unseen, model = slack
+    out = folder / "exported.json"
+    arguments = ["identify", str(folder / "recording"), "--model", str(folder / "model.json"), "--out", str(out)]
+    assert run([*arguments, "--export", "json", "--export", "urdf"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    arm = json.loads((folder / "exported.arm.json").read_text())
+    (whole, *each) = arm["not_carried"]
+    assert all(" ".join(says.split()) in said for says in arm["not_carried"])
+    assert all(says in (folder / "exported.urdf").read_text() for says in arm["not_carried"])
+    assert [says.split(": ")[1] for says in each] == [e.name for e in model.file.effects]
+
+    q, conditions, _ = asked(unseen, model)
+    tip = np.array([*arm["tool_point_m"], 1.0])
+    exported = np.array([carried(arm["parts"], row) @ tip for row in q])[:, :3]
+    apart_um = 1e6 * np.linalg.norm(Model(read_model(out), "", "", ()).tip(q, conditions) - exported, axis=1)
+    rms_um, largest_um = (float(number) for number in re.findall(r"([\d.]+) µm", whole))
+    assert np.sqrt(np.mean(apart_um**2)) == pytest.approx(rms_um, rel=0.25)  # other poses of the same workspace
+    assert rms_um > 5.0
+    assert largest_um >= rms_um
+
+
+def carried(parts, q_rad):
+    """T_base_flange of the file, as it states its own convention."""
+    T = np.array(parts[0])
+    for angle, part in zip(q_rad, parts[1:], strict=True):
+        c, s = np.cos(angle), np.sin(angle)
+        T = T @ np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]) @ np.array(part)
+    return T
