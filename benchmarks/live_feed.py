@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
+from acquisition.aiming.pose import BeamTarget, flange_for
+from acquisition.aiming.reach import reach
 from acquisition.psd_view import PsdView
 from acquisition.recording.rig_schema import Rig
 from calibeam.live.feed import Feed
 from calibrate.believed import BelievedRig
-from calibrate.believed_fixture import Light
 from drivers.clock import Clock
 from drivers.device import Block
 from drivers.psd_daq.messages import Flag
@@ -32,22 +32,9 @@ WANDER_HZ = np.array([0.11, 0.17, 0.13, 0.19, 0.23, 0.07])
 def lit_posture(rig: Rig, placement: int = 1, first: int = 1) -> Floats:
     """Joint readings whose beam strikes the middle of both faces."""
     believed = BelievedRig(rig)
-    point_m, direction = believed.fixture.line(np.zeros(4), first)
-    T = believed.T_base_psd1(placement)
-    wanted = np.concatenate([T[:3, :3] @ (point_m - BEFORE_M * direction) + T[:3, 3], T[:3, :3] @ direction])
-    home_rad = np.array(rig.motion.home_rad)
-    for start in home_rad + np.random.default_rng(1).normal(0.0, 0.6, (300, rig.n_joints)):
-        found = least_squares(lambda q: np.concatenate(believed.beam(q)) - wanted, start, xtol=1e-14, ftol=1e-14)
-        above = believed.arm.frames(found.x[None])[0, 2:, 2, 3].min() > 0.1
-        inside = np.all((found.x > believed.arm.lower_rad) & (found.x < believed.arm.upper_rad))
-        if (
-            found.cost < 1e-16
-            and above
-            and inside
-            and believed.expect(found.x, placement, first).light is Light.BOTH_LIT
-        ):
-            return found.x
-    raise ValueError(f"rig {rig.name}: no posture lights place {placement}")
+    middle = BeamTarget(first, (0.0, 0.0, 0.0, 0.0), BEFORE_M, 0.0)
+    flange = flange_for(believed.arm, believed.fixture, believed.T_base_psd1(placement), middle)
+    return reach(believed.arm, flange, np.array(rig.motion.home_rad), np.random.default_rng(1))
 
 
 @dataclass
