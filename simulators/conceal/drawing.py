@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from simulators.arm.rigid import moved, shifted, turned
 from simulators.defects.directions import Vector
-from simulators.defects.rigid import moved, shifted, turned
 
 Floats = NDArray[np.float64]
 Model = Literal["dh", "mdh", "local-poe"]

@@ -8,10 +8,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.rigid import moved
 from simulators.conceal.drawing import Drawing, Row
 from simulators.conceal.perturb import Spread
 from simulators.conceal.rig import DualPsd, TrueRig
-from simulators.defects.rigid import moved
 from simulators.world.rig import Emulation, WorldRig
 from simulators.world.truth import Truth, draw_truth
 from simulators.world.weights import arm_of

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.defects.rigid import about_z
+from simulators.arm.rigid import about_z
 
 Floats = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ reflection). The cosines and the power share of each face follow.
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.defects.rigid import inverse
+from simulators.arm.rigid import inverse
 from simulators.defects.scene import Light
 
 Floats = NDArray[np.float64]

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.rigid import moved
 from simulators.conceal.kinematics import Arm
 from simulators.conceal.rig import Artefacts, Device, DualPsd, TrueRig
-from simulators.defects.rigid import moved
 
 Floats = NDArray[np.float64]
 

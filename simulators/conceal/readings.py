@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.rigid import inverse, shifted
 from simulators.conceal.chain import Stance
 from simulators.conceal.optics import shine
 from simulators.conceal.rig import Device, DualPsd, TrueRig
@@ -22,7 +23,6 @@ from simulators.defects.ports import (
     MovesDevice,
     MovesFixture,
 )
-from simulators.defects.rigid import inverse, shifted
 from simulators.defects.scene import Light, Scene
 
 Floats = NDArray[np.float64]

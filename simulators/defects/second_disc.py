@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.defects.directions import phase, spread
-from simulators.defects.encoder_disc import RADIUS_M, EccentricDisc
+from simulators.defects.encoder import RADIUS_M, EccentricDisc
 from simulators.defects.scene import Scene
 from simulators.defects.site import Site
 

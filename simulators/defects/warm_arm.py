@@ -7,8 +7,8 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.rigid import shifted
 from simulators.defects.directions import ANY_INSTRUMENT, spread
-from simulators.defects.rigid import shifted
 from simulators.defects.scene import Load, Scene
 from simulators.defects.site import Site
 

@@ -12,8 +12,8 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.rigid import turned
 from simulators.defects.directions import ANY_INSTRUMENT, phase, spread
-from simulators.defects.rigid import turned
 from simulators.defects.scene import Load, Scene
 from simulators.defects.site import Site
 

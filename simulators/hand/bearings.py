@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.defects.rigid import moved
+from simulators.arm.rigid import moved
 from simulators.hand.truth import TrueAxis, TrueRunout
 
 Floats = NDArray[np.float64]

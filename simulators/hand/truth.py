@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from simulators.defects.rigid import moved
+from simulators.arm.rigid import moved
 from simulators.hand.rig import Emulation, HandRig, Part, Vector
 from simulators.world.errors import WorldError
 

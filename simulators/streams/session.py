@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.rigid import turned
 from simulators.conceal.case import Case
 from simulators.conceal.observe import observe
 from simulators.conceal.reveal import at_start
 from simulators.conceal.rig import DualPsd, TrueRig
-from simulators.defects.rigid import turned
 from simulators.defects.scene import Load, Scene
 from simulators.streams.course import STAND_S, Course, course
 from simulators.streams.devices import (

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.rigid import inverse
 from simulators.conceal.kinematics import Arm, Frames
 from simulators.conceal.statics import weigh
 from simulators.defects.defect import Defect
@@ -25,7 +26,6 @@ from simulators.defects.ports import (
     ReadsAngle,
     TurnsJoint,
 )
-from simulators.defects.rigid import inverse
 from simulators.defects.scene import Load, Scene
 from simulators.world.optics import Ray
 

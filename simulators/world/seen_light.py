@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from simulators.arm.rigid import moved
 from simulators.conceal.optics import FULL_SUM_V
 from simulators.defects.ports import ChangesSums, DistortsSpots
-from simulators.defects.rigid import moved
 from simulators.defects.scene import Light, Scene
 from simulators.world.hidden import Hidden
 from simulators.world.optics import Face, Ray, Spot, Spots, meet, reflect

@@ -7,8 +7,8 @@ import pytest
 
 from simulators.conceal.chain import balanced
 from simulators.conceal.kinematics import Arm, forward
+from simulators.defects.drive import SoftJoint
 from simulators.defects.scene import Scene
-from simulators.defects.soft_joint import SoftJoint
 from simulators.defects.soft_pedestal import SoftPedestal
 from tests.simulators.conceal import mujoco_arm
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from simulators.defects.bending_link import BendingLink
-from simulators.defects.encoder_disc import EccentricDisc
+from simulators.defects.encoder import EccentricDisc
+from simulators.defects.link import BendingLink
 from simulators.defects.oval_ring import OvalRing
 from simulators.defects.play import played
 from simulators.defects.psd_glass import CoverGlass
-from simulators.defects.wire_drum import DrumOutOfRound
+from simulators.defects.tracker import DrumOutOfRound
 from simulators.defects.worn_bearing import WornBearing
 
 ANY_SCENE = SimpleNamespace()

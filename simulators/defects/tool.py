@@ -11,8 +11,8 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.rigid import turned
 from simulators.defects.directions import ROBOT, Vector, as_vector, spread
-from simulators.defects.rigid import turned
 from simulators.defects.scene import Load, Scene
 from simulators.defects.site import Site
 

@@ -11,8 +11,8 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.rigid import shifted, turned_about
 from simulators.defects.directions import ROBOT, spread
-from simulators.defects.rigid import shifted, turned_about
 from simulators.defects.scene import Load, Scene
 from simulators.defects.site import Site
 
