@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from simulators.conceal.kinematics import Arm, Frames, forward
 from simulators.conceal.rig import TrueRig
 from simulators.conceal.statics import weigh
-from simulators.defects.defect import Defect
-from simulators.defects.ports import MovesBase, MovesLink, MovesTool, ReadsAngle, TurnsJoint
+from simulators.defects.defect import Defect, MovesBase, MovesLink, MovesTool, ReadsAngle, TurnsJoint
 from simulators.defects.scene import Load, Scene
 
 Floats = NDArray[np.float64]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from simulators.arm.rigid import moved, shifted, turned
-from simulators.defects.directions import Vector
+from simulators.defects.defect import Vector
 
 Floats = NDArray[np.float64]
 Model = Literal["dh", "mdh", "local-poe"]

@@ -9,7 +9,7 @@ from simulators.conceal.strength import INVISIBLE, Scale
 from simulators.conceal.wanted import INSTRUMENT, ConcealError, Wanted
 from simulators.defects.defect import Defect
 from simulators.defects.mechanisms import MECHANISMS
-from simulators.defects.site import Site, UnsuitedError
+from simulators.defects.scene import Site, UnsuitedError
 
 TRIES = 12
 CLOSE = 0.95  # of the wanted effect: less is drawn again, for another joint may show it better

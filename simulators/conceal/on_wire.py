@@ -28,8 +28,7 @@ from simulators.conceal.strength import INVISIBLE
 from simulators.conceal.wanted import ConcealError, Wanted
 from simulators.defects.defect import Defect
 from simulators.defects.mechanisms import MECHANISMS
-from simulators.defects.scene import Scene
-from simulators.defects.site import Site
+from simulators.defects.scene import Scene, Site
 from simulators.world.exposure import temperatures
 from simulators.world.rig import WorldRig, read_rig
 from simulators.world.truth import draw_truth

@@ -14,9 +14,9 @@ from simulators.arm.rigid import inverse, shifted
 from simulators.conceal.chain import Stance
 from simulators.conceal.optics import shine
 from simulators.conceal.rig import Device, DualPsd, TrueRig
-from simulators.defects.defect import Defect
-from simulators.defects.ports import (
+from simulators.defects.defect import (
     ChangesSums,
+    Defect,
     DistortsLength,
     DistortsPosition,
     DistortsSpots,

@@ -8,7 +8,7 @@ from simulators.conceal.rigs import DrawnRig
 from simulators.conceal.schedule import Timetable
 from simulators.conceal.statics import weigh
 from simulators.conceal.wanted import INSTRUMENT, Wanted
-from simulators.defects.site import Site
+from simulators.defects.scene import Site
 
 CARRIES = 0.02  # of the largest torque's spread: a joint below it feels no weight
 

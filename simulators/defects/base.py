@@ -1,60 +1,71 @@
-"""A table or a foot that settles: the arm slowly moves and turns, more slowly as time goes on."""
+"""Mechanisms under the arm."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.rigid import moved
-from simulators.defects.directions import Vector, direction, spread
-from simulators.defects.scene import Load, Scene
-from simulators.defects.site import Site
+from simulators.arm.rigid import turned
+from simulators.defects.defect import ROBOT, Defect
+from simulators.defects.displacement import Bump, Settling
+from simulators.defects.scene import Load, Scene, Site
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class DriftingBase:
-    """Base that moves by `shift_m` in the end, with one time constant."""
+class BumpedBase(Bump):
+    """A foot that was knocked."""
 
-    shift_m: float
-    along: Vector
-    turn_rad_m: float
-    about: Vector
-    time_constant_s: float
+    KIND = "bumped-base"
+    PHYSICS = "base-moved"
+    PORT = "base.pose"
+    TYPICAL = 4e-5
+    TURNS_RAD_M = (0.3, 1.5)
+    INSTRUMENTS = ("dual-psd", "seat")
 
-    KIND: ClassVar[str] = "drifting-base"
-    PHYSICS: ClassVar[str] = "base-moved"
-    SIZE: ClassVar[str] = "shift_m"
-    TYPICAL: ClassVar[float] = 5e-5
-    INSTRUMENTS: ClassVar[tuple[str, ...]] = ("dual-psd", "seat")
-    HABIT: ClassVar[str] = ""
+    def base_motion(self, scene: Scene, load: Load) -> Floats:
+        return self.motion(scene)
 
-    @property
-    def port(self) -> str:
-        return "base.pose"
 
-    @property
-    def drivers(self) -> tuple[str, ...]:
-        return ("t",)
+@dataclass(frozen=True)
+class DriftingBase(Settling):
+    """A table or a foot that settles."""
 
-    @property
-    def needs(self) -> tuple[str, ...]:
-        return ()
+    KIND = "drifting-base"
+    PHYSICS = "base-moved"
+    PORT = "base.pose"
+    TYPICAL = 5e-5
+    TURNS_RAD_M = (0.3, 1.5)
+    INSTRUMENTS = ("dual-psd", "seat")
 
-    @property
-    def figures(self) -> Mapping[str, float]:
-        return {"shift_m": self.shift_m, "time_constant_s": self.time_constant_s}
+    def base_motion(self, scene: Scene, load: Load) -> Floats:
+        return self.motion(scene)
+
+
+@dataclass(frozen=True)
+class SoftPedestal(Defect):
+    """A pedestal that leans `compliance_rad_nm` per newton metre of the arm's overturning moment.
+
+    A spring against tilting in two directions: tilt = moment / stiffness, about the foot. Twisting about the vertical
+    carries no weight and stays.
+    """
+
+    compliance_rad_nm: float
+
+    KIND = "soft-pedestal"
+    PHYSICS = "base-compliance"
+    PORT = "base.pose"
+    DRIVERS = ("overturning_moment",)
+    SIZE = "compliance_rad_nm"
+    TYPICAL = 2e-6
+    INSTRUMENTS = ROBOT
+    FIGURES = ("compliance_rad_nm",)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:
-        time_constant_s = float(rng.uniform(0.2, 0.6) * site.duration_s)
-        return cls(
-            spread(rng, cls.TYPICAL), direction(rng), float(rng.uniform(0.3, 1.5)), direction(rng), time_constant_s
-        )
+        return cls(cls.draw_size(rng))
 
     def base_motion(self, scene: Scene, load: Load) -> Floats:
-        gone_m = self.shift_m * (1.0 - np.exp(-scene.t_s / self.time_constant_s))[:, np.newaxis]
-        return moved(gone_m * np.asarray(self.along), self.turn_rad_m * gone_m * np.asarray(self.about))
+        return turned(self.compliance_rad_nm * load.moment_nm[:, 0] * np.array([1.0, 1.0, 0.0]))

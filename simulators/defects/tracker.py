@@ -1,58 +1,120 @@
-"""A wire drum that runs out of round: each turn of it pays out a little more and a little less.
+"""Mechanisms of trackers and wire drums: under the device, and between target and reading."""
 
-A drum of radius R whose centre is e off its shaft pays out, over a turn from angle a, R a + e (sin(a + b) - sin b)
-(length of an off-centre circle to first order in e / R); the encoder counts turns, so the reading is off by that
-second part.
-"""
-
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.defects.directions import phase, spread
-from simulators.defects.scene import Scene
-from simulators.defects.site import Site
+from simulators.defects.defect import Defect, phase
+from simulators.defects.displacement import Bump, Settling
+from simulators.defects.scene import Scene, Site
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class DrumOutOfRound:
-    """Drum of `radius_m`, its centre `offset_m` off the shaft."""
+class BumpedDevice(Bump):
+    """A tripod that was knocked."""
+
+    KIND = "bumped-device"
+    PHYSICS = "device-drift"
+    PORT = "device.pose"
+    TYPICAL = 5e-5
+    TURNS_RAD_M = (0.1, 0.6)
+    INSTRUMENTS = ("position", "wire")
+
+    def device_motion(self, scene: Scene) -> Floats:
+        return self.motion(scene)
+
+
+@dataclass(frozen=True)
+class DriftingDevice(Settling):
+    """A tripod that settles."""
+
+    KIND = "drifting-device"
+    PHYSICS = "device-drift"
+    PORT = "device.pose"
+    TYPICAL = 5e-5
+    TURNS_RAD_M = (0.1, 0.6)
+    INSTRUMENTS = ("position", "wire")
+
+    def device_motion(self, scene: Scene) -> Floats:
+        return self.motion(scene)
+
+
+@dataclass(frozen=True)
+class LengthScale(Defect):
+    """A device that gives every length `excess` too long (no unit)."""
+
+    excess: float
+
+    PHYSICS = "device-scale"
+    PORT = "device.reading"
+    DRIVERS = ("reading",)
+    SIZE = "excess"
+
+    @property
+    def figures(self) -> dict[str, float]:
+        return {"scale": self.excess}
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        return cls(cls.draw_signed(rng))
+
+
+@dataclass(frozen=True)
+class TrackerScale(LengthScale):
+    """A tracker with another wavelength of its laser, or with the wrong air pressure."""
+
+    KIND = "tracker-scale"
+    TYPICAL = 5e-5
+    INSTRUMENTS = ("position",)
+
+    def seen_position_m(self, position_m: Floats, scene: Scene) -> Floats:
+        return position_m * (1.0 + self.excess)
+
+
+@dataclass(frozen=True)
+class WireScale(LengthScale):
+    """A wire drum whose circumference is off."""
+
+    KIND = "wire-scale"
+    TYPICAL = 3e-4
+    INSTRUMENTS = ("wire",)
+
+    def seen_length_m(self, length_m: Floats, scene: Scene) -> Floats:
+        return length_m * (1.0 + self.excess)
+
+
+@dataclass(frozen=True)
+class DrumOutOfRound(Defect):
+    """A wire drum whose centre is `offset_m` off its shaft: each turn pays out a little more and a little less.
+
+    A drum of radius R whose centre is e off its shaft pays out, over a turn from angle a, R a + e (sin(a + b) - sin b)
+    (length of an off-centre circle to first order in e / R); the encoder counts turns, so the reading is off by that
+    second part.
+    """
 
     offset_m: float
     radius_m: float
     bearing_rad: float
 
-    KIND: ClassVar[str] = "wire-drum-out-of-round"
-    PHYSICS: ClassVar[str] = "device-periodic"
-    SIZE: ClassVar[str] = "offset_m"
-    TYPICAL: ClassVar[float] = 4e-5
-    INSTRUMENTS: ClassVar[tuple[str, ...]] = ("wire",)
-    HABIT: ClassVar[str] = ""
+    KIND = "wire-drum-out-of-round"
+    PHYSICS = "device-periodic"
+    PORT = "device.reading"
+    DRIVERS = ("reading",)
+    SIZE = "offset_m"
+    TYPICAL = 4e-5
+    INSTRUMENTS = ("wire",)
 
     @property
-    def port(self) -> str:
-        return "device.reading"
-
-    @property
-    def drivers(self) -> tuple[str, ...]:
-        return ("reading",)
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        return ()
-
-    @property
-    def figures(self) -> Mapping[str, float]:
+    def figures(self) -> dict[str, float]:
         return {"amplitude_m": abs(self.offset_m), "period_m": 2.0 * np.pi * self.radius_m}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:
-        return cls(spread(rng, cls.TYPICAL), float(rng.uniform(0.03, 0.06)), phase(rng))
+        return cls(cls.draw_size(rng), float(rng.uniform(0.03, 0.06)), phase(rng))
 
     def seen_length_m(self, length_m: Floats, scene: Scene) -> Floats:
         turn_rad = length_m / self.radius_m

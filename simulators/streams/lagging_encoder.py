@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from simulators.defects.directions import spread
+from simulators.defects.defect import spread
 from simulators.streams.course import STEP_S, Course
 
 Floats = NDArray[np.float64]

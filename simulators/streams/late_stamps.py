@@ -6,7 +6,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from simulators.defects.directions import spread
+from simulators.defects.defect import spread
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.defects.directions import spread
+from simulators.defects.defect import spread
 from simulators.streams.course import Course
 
 Floats = NDArray[np.float64]

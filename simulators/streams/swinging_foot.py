@@ -10,7 +10,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.defects.directions import Vector, direction
+from simulators.defects.defect import Vector, direction
 from simulators.streams.course import STEP_S, Course, swung
 
 Floats = NDArray[np.float64]

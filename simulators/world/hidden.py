@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from simulators.arm.rigid import inverse
 from simulators.conceal.kinematics import Arm, Frames
 from simulators.conceal.statics import weigh
-from simulators.defects.defect import Defect
-from simulators.defects.ports import (
+from simulators.defects.defect import (
     ChangesSums,
+    Defect,
     DistortsSpots,
     MovesBase,
     MovesFixture,

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from simulators.arm.rigid import moved
 from simulators.conceal.optics import FULL_SUM_V
-from simulators.defects.ports import ChangesSums, DistortsSpots
+from simulators.defects.defect import ChangesSums, DistortsSpots
 from simulators.defects.scene import Light, Scene
 from simulators.world.hidden import Hidden
 from simulators.world.optics import Face, Ray, Spot, Spots, meet, reflect

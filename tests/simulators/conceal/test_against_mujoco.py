@@ -7,9 +7,9 @@ import pytest
 
 from simulators.conceal.chain import balanced
 from simulators.conceal.kinematics import Arm, forward
+from simulators.defects.base import SoftPedestal
 from simulators.defects.drive import SoftJoint
 from simulators.defects.scene import Scene
-from simulators.defects.soft_pedestal import SoftPedestal
 from tests.simulators.conceal import mujoco_arm
 
 SceneOf = Callable[..., Scene]
