@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.conceal.drawing import Drawing, origin_and_rotation
+from simulators.arm.drawing import Drawing, origin_and_rotation
 from simulators.conceal.rig import Device, DualPsd, TrueRig
 from simulators.conceal.toml_text import Inline
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.conceal.kinematics import Arm, Frames, forward
+from simulators.arm.kinematics import Arm, Frames, forward
+from simulators.arm.statics import weigh
 from simulators.conceal.rig import TrueRig
-from simulators.conceal.statics import weigh
 from simulators.defects.defect import Defect, MovesBase, MovesLink, MovesTool, ReadsAngle, TurnsJoint
 from simulators.defects.scene import Load, Scene
 

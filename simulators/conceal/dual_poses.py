@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from simulators.arm.kinematics import forward
 from simulators.arm.rigid import inverse, moved, turned
 from simulators.conceal.inverse import reach_pose, within_limits
-from simulators.conceal.kinematics import forward
 from simulators.conceal.rig import DualPsd, TrueRig
 
 Floats = NDArray[np.float64]

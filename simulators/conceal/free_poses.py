@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.conceal.kinematics import Arm, forward
+from simulators.arm.kinematics import Arm, forward
 
 Floats = NDArray[np.float64]
 CLEAR_M = 0.05  # every joint beyond the second, and the flange, stays this far above the floor

@@ -8,8 +8,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.drawing import Drawing, Row
 from simulators.arm.rigid import moved
-from simulators.conceal.drawing import Drawing, Row
 from simulators.conceal.perturb import Spread
 from simulators.conceal.rig import DualPsd, TrueRig
 from simulators.world.rig import Emulation, WorldRig

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from simulators.conceal.kinematics import Arm, forward, jacobian
+from simulators.arm.kinematics import Arm, forward, jacobian
 
 Floats = NDArray[np.float64]
 Marks = NDArray[np.bool_]

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.kinematics import Arm
 from simulators.arm.rigid import moved
-from simulators.conceal.kinematics import Arm
 from simulators.conceal.rig import Artefacts, Device, DualPsd, TrueRig
 
 Floats = NDArray[np.float64]

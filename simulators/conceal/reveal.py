@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.drawing import origin_and_rotation
 from simulators.conceal.case import Case
 from simulators.conceal.chain import stand
-from simulators.conceal.drawing import origin_and_rotation
 from simulators.conceal.free_poses import free_poses
 from simulators.conceal.hide import Hidden
 from simulators.conceal.readings import tip_m

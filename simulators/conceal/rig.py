@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.conceal.kinematics import Arm
+from simulators.arm.kinematics import Arm
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]

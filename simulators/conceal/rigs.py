@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.drawing import Drawing, as_local_poe, fixed_parts, turning_com_m
+from simulators.arm.kinematics import Arm
 from simulators.arm.rigid import moved, turned
 from simulators.conceal.arms import ARM_CMM, ROBOTS
 from simulators.conceal.artefacts import artefacts
-from simulators.conceal.drawing import Drawing, as_local_poe, fixed_parts, turning_com_m
 from simulators.conceal.dual_poses import reachable_share
-from simulators.conceal.kinematics import Arm
 from simulators.conceal.perturb import Spread, perturbed
 from simulators.conceal.rig import Artefacts, Device, DualPsd, TrueRig
 from simulators.conceal.wanted import ConcealError, Wanted

@@ -5,11 +5,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.kinematics import forward, jacobian
 from simulators.conceal.artefacts import BAR_SIGMA_M
 from simulators.conceal.belief import KnownDistance
 from simulators.conceal.distances import in_sigmas
 from simulators.conceal.geometry import Absorber
-from simulators.conceal.kinematics import forward, jacobian
 from simulators.conceal.observe import Observed, observe
 from simulators.conceal.recorded import ENCODER_RAD
 from simulators.conceal.rig import Artefacts, TrueRig

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from simulators.conceal.kinematics import forward
+from simulators.arm.kinematics import forward
+from simulators.arm.statics import weigh
 from simulators.conceal.rig import Artefacts, DualPsd
 from simulators.conceal.rigs import DrawnRig
 from simulators.conceal.schedule import Timetable
-from simulators.conceal.statics import weigh
 from simulators.conceal.wanted import INSTRUMENT, Wanted
 from simulators.defects.scene import Site
 

@@ -8,8 +8,8 @@ Does not imitate: weight (measuring arms are balanced), bending tubes, heat.
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.kinematics import Arm, Frames, forward, jacobian
 from simulators.arm.rigid import moved
-from simulators.conceal.kinematics import Arm, Frames, forward, jacobian
 from simulators.defects.encoder import RADIUS_M
 from simulators.hand.bearings import Bearings
 from simulators.hand.rig import HandRig

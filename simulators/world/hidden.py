@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.kinematics import Arm, Frames
 from simulators.arm.rigid import inverse
-from simulators.conceal.kinematics import Arm, Frames
-from simulators.conceal.statics import weigh
+from simulators.arm.statics import weigh
 from simulators.defects.defect import (
     ChangesSums,
     Defect,

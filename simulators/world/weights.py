@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.kinematics import Arm
 from simulators.arm.rigid import moved, shifted, turned
-from simulators.conceal.kinematics import Arm
 from simulators.world.rig import WorldRig
 from simulators.world.truth import TrueLink, Truth
 

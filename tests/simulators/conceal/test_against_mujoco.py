@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from simulators.arm.kinematics import Arm, forward
 from simulators.conceal.chain import balanced
-from simulators.conceal.kinematics import Arm, forward
 from simulators.defects.base import SoftPedestal
 from simulators.defects.drive import SoftJoint
 from simulators.defects.scene import Scene

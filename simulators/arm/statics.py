@@ -7,7 +7,7 @@ text).
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.conceal.kinematics import Arm, Frames
+from simulators.arm.kinematics import Arm, Frames
 from simulators.defects.scene import Load
 
 Floats = NDArray[np.float64]
