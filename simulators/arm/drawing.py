@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from simulators.arm.rigid import moved, shifted, turned
-from simulators.defects.defect import Vector
+from simulators.arm.rigid import Vector, moved, shifted, turned
 
 Floats = NDArray[np.float64]
 Model = Literal["dh", "mdh", "local-poe"]

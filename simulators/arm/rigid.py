@@ -5,6 +5,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 Floats = NDArray[np.float64]
+Vector = tuple[float, float, float]
 
 
 def turned(rotation_rad: ArrayLike) -> Floats:

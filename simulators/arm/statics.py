@@ -4,13 +4,25 @@ Sum over all masses beyond: moment = sum (c - o) x m g, force = sum m g (statics
 text).
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from simulators.arm.kinematics import Arm, Frames
-from simulators.defects.scene import Load
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """What weight does to the arm, in its true pose and with its true masses."""
+
+    torque_nm: Floats  # (row, n) of gravity about each joint's positive axis
+    payload_torque_nm: Floats  # (row, n) the payload's share of it
+    moment_nm: Floats  # (row, n + 1, 3) of all weight beyond the start of link i, about that start, in link i's frame
+    force_n: Floats  # (row, n + 1, 3) the weight itself, same frame
+    down_flange: Floats  # (row, 3) direction of gravity in the flange frame
 
 
 def weigh(arm: Arm, frames: Frames, foot: Floats, payload_kg: Floats, payload_com_m: Floats) -> Load:

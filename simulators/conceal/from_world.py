@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from simulators.arm.drawing import Drawing, Row
 from simulators.arm.rigid import moved
-from simulators.conceal.perturb import Spread
-from simulators.conceal.rig import DualPsd, TrueRig
+from simulators.conceal.rig import DualPsd, Spread, TrueRig
 from simulators.world.rig import Emulation, WorldRig
 from simulators.world.truth import Truth, draw_truth
 from simulators.world.weights import arm_of

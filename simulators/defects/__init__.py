@@ -5,9 +5,10 @@ A file holds the mechanisms of one place in the chain: encoder, drive, link, bas
 lists the places), and one line in `mechanisms.MECHANISMS`. Other folders import from here.
 """
 
+from simulators.arm.statics import Load
 from simulators.defects.defect import Defect, size_of, with_size
 from simulators.defects.mechanisms import MECHANISMS, WrittenError, defects_of, written
-from simulators.defects.scene import Light, Load, Scene, Site, UnsuitedError
+from simulators.defects.scene import Light, Scene, Site, UnsuitedError
 
 __all__ = [
     "MECHANISMS",

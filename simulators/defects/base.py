@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.arm.rigid import turned
+from simulators.arm.statics import Load
 from simulators.defects.defect import ROBOT, Defect
 from simulators.defects.displacement import Bump, Settling
-from simulators.defects.scene import Load, Scene, Site
+from simulators.defects.scene import Scene, Site
 
 Floats = NDArray[np.float64]
 

@@ -12,10 +12,11 @@ from typing import Any, ClassVar, Protocol, Self, TypeVar, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.defects.scene import Light, Load, Scene, Site
+from simulators.arm.rigid import Vector
+from simulators.arm.statics import Load
+from simulators.defects.scene import Light, Scene, Site
 
 Floats = NDArray[np.float64]
-Vector = tuple[float, float, float]
 ANY_INSTRUMENT = ("dual-psd", "position", "wire", "seat")
 ROBOT = ("dual-psd", "position", "wire")  # arms with drives
 SPOTS = ("dual-psd",)

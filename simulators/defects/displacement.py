@@ -6,8 +6,8 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.rigid import moved
-from simulators.defects.defect import Defect, Vector, direction
+from simulators.arm.rigid import Vector, moved
+from simulators.defects.defect import Defect, direction
 from simulators.defects.scene import Scene, Site
 
 Floats = NDArray[np.float64]

@@ -6,8 +6,9 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.statics import Load
 from simulators.defects.defect import ROBOT, Defect, phase
-from simulators.defects.scene import Load, Scene, Site, UnsuitedError
+from simulators.defects.scene import Scene, Site, UnsuitedError
 
 Floats = NDArray[np.float64]
 

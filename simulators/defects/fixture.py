@@ -6,8 +6,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.rigid import moved
-from simulators.defects.defect import SPOTS, Defect, Vector, direction
+from simulators.arm.rigid import Vector, moved
+from simulators.defects.defect import SPOTS, Defect, direction
 from simulators.defects.scene import Scene, Site
 
 Floats = NDArray[np.float64]

@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.arm.rigid import shifted, turned, turned_about
+from simulators.arm.statics import Load
 from simulators.defects.defect import ANY_INSTRUMENT, ROBOT, Defect, phase
-from simulators.defects.scene import Load, Scene, Site
+from simulators.defects.scene import Scene, Site
 
 Floats = NDArray[np.float64]
 

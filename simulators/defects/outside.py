@@ -6,12 +6,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.rigid import turned
-from simulators.defects.defect import ANY_INSTRUMENT, ROBOT, UNKNOWN, Defect, Vector, direction, phase
+from simulators.arm.rigid import Vector, turned
+from simulators.arm.statics import Load
+from simulators.defects.defect import ANY_INSTRUMENT, ROBOT, UNKNOWN, Defect, direction, phase
 from simulators.defects.detector import PsdDefect, either_psd
 from simulators.defects.drive import DriveDefect
 from simulators.defects.encoder import EncoderDefect
-from simulators.defects.scene import Light, Load, Scene, Site
+from simulators.defects.scene import Light, Scene, Site
 
 Floats = NDArray[np.float64]
 

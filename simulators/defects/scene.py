@@ -45,17 +45,6 @@ class Scene:
 
 
 @dataclass(frozen=True, eq=False)
-class Load:
-    """What weight does to the arm, in its true pose and with its true masses."""
-
-    torque_nm: Floats  # (row, n) of gravity about each joint's positive axis
-    payload_torque_nm: Floats  # (row, n) the payload's share of it
-    moment_nm: Floats  # (row, n + 1, 3) of all weight beyond the start of link i, about that start, in link i's frame
-    force_n: Floats  # (row, n + 1, 3) the weight itself, same frame
-    down_flange: Floats  # (row, 3) direction of gravity in the flange frame
-
-
-@dataclass(frozen=True, eq=False)
 class Light:
     """Light on both sensors before any distortion; last axis but one: PSD 1, PSD 2."""
 

@@ -6,9 +6,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.rigid import turned
-from simulators.defects.defect import ROBOT, SPOTS, Defect, Vector, as_vector, direction
-from simulators.defects.scene import Load, Scene, Site
+from simulators.arm.rigid import Vector, turned
+from simulators.arm.statics import Load
+from simulators.defects.defect import ROBOT, SPOTS, Defect, as_vector, direction
+from simulators.defects.scene import Scene, Site
 
 Floats = NDArray[np.float64]
 

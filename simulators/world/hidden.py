@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from simulators.arm.kinematics import Arm, Frames
 from simulators.arm.rigid import inverse
-from simulators.arm.statics import weigh
+from simulators.arm.statics import Load, weigh
 from simulators.defects.defect import (
     ChangesSums,
     Defect,
@@ -26,7 +26,7 @@ from simulators.defects.defect import (
     ReadsAngle,
     TurnsJoint,
 )
-from simulators.defects.scene import Load, Scene
+from simulators.defects.scene import Scene
 from simulators.world.optics import Ray
 
 Floats = NDArray[np.float64]

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from simulators.arm.rigid import moved
-from simulators.conceal.optics import FULL_SUM_V
+from simulators.conceal.readings import FULL_SUM_V
 from simulators.defects.defect import ChangesSums, DistortsSpots
 from simulators.defects.scene import Light, Scene
 from simulators.world.hidden import Hidden

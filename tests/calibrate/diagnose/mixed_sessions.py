@@ -15,10 +15,9 @@ from simulators.conceal.chain import stand
 from simulators.conceal.observe import observe
 from simulators.conceal.rig import Artefacts
 from simulators.conceal.seated import postures, shaken_rad
-from simulators.conceal.table import csv_text
 from simulators.conceal.toml_text import toml_text
 from simulators.conceal.wanted import Wanted
-from simulators.conceal.write import columns
+from simulators.conceal.write import columns, csv_text
 
 TURN_RAD = 2e-5  # one sigma of a 6-D target's orientation
 CONTACT_M = 8e-6

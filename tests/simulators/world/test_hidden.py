@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simulators.conceal.dual_poses import shots
 from simulators.conceal.from_world import rig_of_world
 from simulators.conceal.observe import observe
+from simulators.conceal.poses import shots
 from simulators.conceal.rig import TrueRig
 from simulators.defects.defect import Defect
 from simulators.defects.mechanisms import MECHANISMS, WrittenError, defects_of, written

@@ -1,4 +1,4 @@
-"""Poses from which the beam strikes both faces where it is wanted: the line is given, roll and stand-off are free.
+"""Poses of a session: from which the beam strikes both faces where it is wanted, or anywhere in free space.
 
 A line through point 1 on the first face and through the mirror image of point 2 strikes both (law of reflection). The
 laser stands on that line, turned about it at random; the arm is solved for on the true rig.
@@ -10,17 +10,32 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from simulators.arm.kinematics import forward
+from simulators.arm.kinematics import Arm, forward, reach_pose, within_limits
 from simulators.arm.rigid import inverse, moved, turned
-from simulators.conceal.inverse import reach_pose, within_limits
 from simulators.conceal.rig import DualPsd, TrueRig
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
+FREE_CLEAR_M = 0.05  # every joint beyond the second, and the flange, stays this far above the floor
+MARGIN = 0.92  # of the limits: nobody drives into the end stop
+
+
+def free_poses(arm: Arm, number: int, rng: np.random.Generator) -> Floats:
+    """Readings (row, n)."""
+    middle, half = 0.5 * (arm.lower_rad + arm.upper_rad), 0.5 * MARGIN * (arm.upper_rad - arm.lower_rad)
+    found = np.empty((0, arm.n_joints))
+    while len(found) < number:
+        reading_rad = middle + half * rng.uniform(-1.0, 1.0, (2 * number, arm.n_joints))
+        frames = forward(arm, reading_rad + arm.zero_rad)
+        height_m = np.minimum(frames.turning[:, 2:, 2, 3].min(axis=1), frames.flange[:, 2, 3])
+        found = np.concatenate((found, reading_rad[height_m > FREE_CLEAR_M]))
+    return found[:number]
+
+
 EDGE = 0.85  # of half the face: further out a spot of 1 mm is cut
 CENTRED_M = 20e-6  # where a servo stops
 STAND_OFF_M = (0.08, 0.45)
-CLEAR_M = 0.03  # every joint stays this far above the floor
+BEAM_CLEAR_M = 0.03  # every joint stays this far above the floor
 ROUNDS = 10
 
 
@@ -48,7 +63,7 @@ def shots(rig: TrueRig, fixture: DualPsd, place: int, wanted: int, centred: floa
         joint_rad, arrived = reach_pose(rig.arm, flange, start)
         reading_rad, inside = within_limits(rig.arm, joint_rad)
         good = arrived & inside
-        good[good] &= forward(rig.arm, joint_rad[good]).turning[:, 2:, 2, 3].min(axis=1) > CLEAR_M
+        good[good] &= forward(rig.arm, joint_rad[good]).turning[:, 2:, 2, 3].min(axis=1) > BEAM_CLEAR_M
         found.append(reading_rad[good])
         firsts.append(first[good])
         have, tried = have + int(good.sum()), tried + number
