@@ -12,8 +12,7 @@ from simulators.arm.drawing import Drawing, Row
 from simulators.arm.rigid import moved
 from simulators.conceal.rig import DualPsd, Spread, TrueRig
 from simulators.world.rig import Emulation, WorldRig
-from simulators.world.truth import Truth, draw_truth
-from simulators.world.weights import arm_of
+from simulators.world.truth import Truth, arm_of, draw_truth
 
 Floats = NDArray[np.float64]
 
