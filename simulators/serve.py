@@ -25,7 +25,7 @@ from simulators.devices import (
     with_robot_on,
     without_links,
 )
-from simulators.faults.verbs import fault_verbs
+from simulators.faults.faulty_wire import fault_verbs
 from simulators.host.errors import HostError, PortBusy
 from simulators.host.loop import Host
 from simulators.host.side_channel import Control, side_channel

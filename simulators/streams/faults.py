@@ -140,7 +140,7 @@ class LaggingEncoder(Fault):
 
 @dataclass(frozen=True)
 class SlippingEncoder(Fault):
-    """Encoder whose coupling slips once, on the way to a pose: it reads `slip_rad` more after `share` of the session."""
+    """Encoder whose coupling slips once, on its way: it reads `slip_rad` more after `share` of the session."""
 
     joint: int
     slip_rad: float
