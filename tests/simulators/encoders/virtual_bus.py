@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import can
 
-from simulators.encoders.frame import CanFrame
+from simulators.encoders.bus import CanFrame
 from simulators.encoders.node import EncoderNode
 
 
