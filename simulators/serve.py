@@ -50,7 +50,7 @@ class ServeOptions:
     control_host: str = "127.0.0.1"  # of the side channel; anywhere but on loopback it wants a token
     links: bool = True  # make the symbolic links that the rig names as serial ports
     end_with_stdin: bool = False  # stop when stdin closes, so that a parent that dies leaves no emulators behind
-    hidden: Sequence[Mapping[str, Any]] = ()  # mechanisms at work in the world, see simulators/defects/written.py
+    hidden: Sequence[Mapping[str, Any]] = ()  # mechanisms at work in the world, see simulators/defects/mechanisms.py
 
 
 class _Stop:
