@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 
 import simulators.serve
 from acquisition.recording.rig import plain_rig, rig_text
-from simulators.world.history import Knot, interpolate
 from simulators.world.model import STEP_S
 from simulators.world.optics import Ray
-from simulators.world.photocurrent import sample_a
+from simulators.world.photocurrent import Knot, interpolate, sample_a
 from simulators.world.world import World
 
 Floats = NDArray[np.float64]

@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from simulators.faults.fault import DisturbedLight
+from simulators.faults.faulty_wire import with_faults
 from simulators.faults.injector import Injector
-from simulators.faults.light import DisturbedLight
-from simulators.faults.verbs import with_faults
 from simulators.hand.world import HandWorld
 from simulators.host.errors import HostError
 from simulators.host.loop import Host

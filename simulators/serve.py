@@ -15,7 +15,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from simulators.defects.written import defects_of
+from simulators.defects.mechanisms import defects_of
 from simulators.devices import (
     EmulatedDevices,
     addresses,
@@ -25,7 +25,7 @@ from simulators.devices import (
     with_robot_on,
     without_links,
 )
-from simulators.faults.verbs import fault_verbs
+from simulators.faults.faulty_wire import fault_verbs
 from simulators.host.errors import HostError, PortBusy
 from simulators.host.loop import Host
 from simulators.host.side_channel import Control, side_channel
@@ -50,7 +50,7 @@ class ServeOptions:
     control_host: str = "127.0.0.1"  # of the side channel; anywhere but on loopback it wants a token
     links: bool = True  # make the symbolic links that the rig names as serial ports
     end_with_stdin: bool = False  # stop when stdin closes, so that a parent that dies leaves no emulators behind
-    hidden: Sequence[Mapping[str, Any]] = ()  # mechanisms at work in the world, see simulators/defects/written.py
+    hidden: Sequence[Mapping[str, Any]] = ()  # mechanisms at work in the world, see simulators/defects/mechanisms.py
 
 
 class _Stop:

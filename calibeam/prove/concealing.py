@@ -14,10 +14,9 @@ from calibeam.worker_processes import in_workers
 from simulators.conceal.belief import rig_document
 from simulators.conceal.case import Case, conceal
 from simulators.conceal.reveal import truth_document
-from simulators.conceal.table import csv_text
 from simulators.conceal.toml_text import toml_text
 from simulators.conceal.wanted import ConcealError
-from simulators.conceal.write import columns
+from simulators.conceal.write import columns, csv_text
 
 
 @dataclass(frozen=True)

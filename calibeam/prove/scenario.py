@@ -12,8 +12,8 @@ from typing import Literal, TypeVar, get_args
 import numpy as np
 from numpy.random import Generator
 
-from simulators.conceal.noise import Kind as Noise
 from simulators.conceal.wanted import FAMILIES, SIDES, Family, Wanted
+from simulators.conceal.wanted import Kind as Noise
 
 T = TypeVar("T")
 Path = Literal["in process", "on wires"]  # how the recording comes about

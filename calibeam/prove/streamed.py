@@ -14,8 +14,7 @@ from simulators.conceal.case import Case
 from simulators.conceal.toml_text import toml_text
 from simulators.conceal.write import columns
 from simulators.streams.devices import HOST_S
-from simulators.streams.fault import Fault
-from simulators.streams.faults import FAULTS
+from simulators.streams.faults import FAULTS, Fault
 from simulators.streams.session import StreamedSession, streamed
 
 HEALTHY = 0.25  # share of the cases with streams in which nothing is wrong

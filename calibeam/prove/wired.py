@@ -25,7 +25,7 @@ from simulators.conceal.case import Case
 from simulators.conceal.on_wire import Taken, Wired, draw_wired, taken_case
 from simulators.conceal.toml_text import toml_text
 from simulators.conceal.wanted import ConcealError, Wanted
-from simulators.defects.written import written
+from simulators.defects.mechanisms import written
 from simulators.process import Emulators
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"

@@ -9,8 +9,7 @@ import sys
 from pathlib import Path
 
 from simulators.conceal.case import conceal
-from simulators.conceal.noise import KINDS
-from simulators.conceal.wanted import FAMILIES, ConcealError, Wanted
+from simulators.conceal.wanted import FAMILIES, KINDS, ConcealError, Wanted
 from simulators.conceal.write import write_case
 from simulators.defects.mechanisms import MECHANISMS
 

@@ -2,7 +2,7 @@
 
 import math
 
-from simulators.conceal.drawing import Drawing, Row
+from simulators.arm.drawing import Drawing, Row
 
 QUARTER = 0.5 * math.pi
 NO_POSE = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.conceal.kinematics import Arm, Frames, forward
+from simulators.arm.kinematics import Arm, Frames, forward
+from simulators.arm.statics import Load, weigh
 from simulators.conceal.rig import TrueRig
-from simulators.conceal.statics import weigh
-from simulators.defects.defect import Defect
-from simulators.defects.ports import MovesBase, MovesLink, MovesTool, ReadsAngle, TurnsJoint
-from simulators.defects.scene import Load, Scene
+from simulators.defects.defect import Defect, MovesBase, MovesLink, MovesTool, ReadsAngle, TurnsJoint
+from simulators.defects.scene import Scene
 
 Floats = NDArray[np.float64]
 READING_STEPS = 12  # an error of slope 1e-2 shrinks to 1e-24

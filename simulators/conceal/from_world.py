@@ -8,13 +8,11 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.conceal.drawing import Drawing, Row
-from simulators.conceal.perturb import Spread
-from simulators.conceal.rig import DualPsd, TrueRig
-from simulators.defects.rigid import moved
+from simulators.arm.drawing import Drawing, Row
+from simulators.arm.rigid import moved
+from simulators.conceal.rig import DualPsd, Spread, TrueRig
 from simulators.world.rig import Emulation, WorldRig
-from simulators.world.truth import Truth, draw_truth
-from simulators.world.weights import arm_of
+from simulators.world.truth import Truth, arm_of, draw_truth
 
 Floats = NDArray[np.float64]
 

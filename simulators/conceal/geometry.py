@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.conceal.perturb import Spread
-from simulators.conceal.rig import Artefacts, Device, DualPsd, TrueRig
-from simulators.defects.rigid import moved
+from simulators.arm.rigid import moved
+from simulators.conceal.rig import Artefacts, Device, DualPsd, Spread, TrueRig
 
 Floats = NDArray[np.float64]
 Predict = Callable[[TrueRig], Floats]  # whitened predictions, flat

@@ -11,25 +11,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.conceal.belief import Belief, rig_document
-from simulators.conceal.believe import believe
+from simulators.conceal.belief import Belief, believe, rig_document
 from simulators.conceal.case import Case
-from simulators.conceal.distances import measure_distances
 from simulators.conceal.from_world import drawing_of, nominal_truth, rig_of_world, spread_of
-from simulators.conceal.hide import Hidden, columns_of, hide
+from simulators.conceal.hide import Hidden, columns_of, hide, site_of
 from simulators.conceal.observe import Observed, observe
-from simulators.conceal.plan import draw_timetable
+from simulators.conceal.plan import Habits, Timetable, draw_timetable
 from simulators.conceal.rig import TrueRig
 from simulators.conceal.rigs import DrawnRig
-from simulators.conceal.scale import scale_of
-from simulators.conceal.schedule import Habits, Timetable
-from simulators.conceal.site import site_of
-from simulators.conceal.strength import INVISIBLE
+from simulators.conceal.scale import INVISIBLE, measure_distances, scale_of
 from simulators.conceal.wanted import ConcealError, Wanted
 from simulators.defects.defect import Defect
 from simulators.defects.mechanisms import MECHANISMS
-from simulators.defects.scene import Scene
-from simulators.defects.site import Site
+from simulators.defects.scene import Scene, Site
 from simulators.world.exposure import temperatures
 from simulators.world.rig import WorldRig, read_rig
 from simulators.world.truth import draw_truth

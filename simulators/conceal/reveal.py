@@ -6,14 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.drawing import origin_and_rotation
 from simulators.conceal.case import Case
 from simulators.conceal.chain import stand
-from simulators.conceal.drawing import origin_and_rotation
-from simulators.conceal.free_poses import free_poses
 from simulators.conceal.hide import Hidden
+from simulators.conceal.poses import free_poses
 from simulators.conceal.readings import tip_m
-from simulators.conceal.recorded import ENCODER_RAD
-from simulators.conceal.rig import Device, DualPsd, TrueRig
+from simulators.conceal.rig import ENCODER_RAD, Device, DualPsd, TrueRig
 from simulators.conceal.second_encoders import at_the_flange
 from simulators.defects.scene import Scene
 

@@ -5,17 +5,37 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.drawing import Drawing, as_local_poe, fixed_parts, turning_com_m
+from simulators.arm.kinematics import Arm
+from simulators.arm.rigid import moved, turned
 from simulators.conceal.arms import ARM_CMM, ROBOTS
-from simulators.conceal.artefacts import artefacts
-from simulators.conceal.drawing import Drawing, as_local_poe, fixed_parts, turning_com_m
-from simulators.conceal.dual_poses import reachable_share
-from simulators.conceal.kinematics import Arm
-from simulators.conceal.perturb import Spread, perturbed
-from simulators.conceal.rig import Artefacts, Device, DualPsd, TrueRig
+from simulators.conceal.poses import reachable_share
+from simulators.conceal.rig import Artefacts, Device, DualPsd, Spread, TrueRig, perturbed
 from simulators.conceal.wanted import ConcealError, Wanted
-from simulators.defects.rigid import moved, turned
 
 Floats = NDArray[np.float64]
+BAR_CHANCE = 0.6
+HOLDINGS = 12  # of each bar
+BAR_SIGMA_M = 1e-6  # a calibrated bar; ISO 10360-12 asks for a fifth of what it tests
+
+
+def artefacts(cone_m: Floats, reach_m: float, rng: np.random.Generator) -> Artefacts:
+    """The cones (cone, 3), and in most sessions one or two bars, held in many directions within reach."""
+    count = int(rng.integers(1, 3)) if rng.random() < BAR_CHANCE else 0
+    bar_m = np.round(reach_m * rng.uniform(0.35, 0.7, count), 6)
+    held = np.tile(np.arange(count), HOLDINGS)  # in turns
+    middle_m = reach_m * rng.uniform(0.35, 0.6, (held.size, 1)) * _unit(held.size, rng)
+    middle_m[:, 2] = np.abs(middle_m[:, 2])
+    half_m = 0.5 * bar_m[held][:, np.newaxis] * _unit(held.size, rng)
+    ends_m = np.stack((middle_m - half_m, middle_m + half_m), axis=1).reshape(-1, 3)
+    return Artefacts(np.concatenate((cone_m, ends_m)), len(cone_m), bar_m, held)
+
+
+def _unit(rows: int, rng: np.random.Generator) -> Floats:
+    vector = rng.standard_normal((rows, 3))
+    return vector / np.linalg.norm(vector, axis=1, keepdims=True)
+
+
 PLACE_TRIES = 30
 REACHABLE = 0.06  # share of random lines to a place that one attempt reaches
 NO_LASER_PLACE = np.eye(4)[np.newaxis]

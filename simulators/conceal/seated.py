@@ -5,13 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.kinematics import forward, jacobian, reach_point, within_limits
 from simulators.conceal.chain import balanced, said_rad
-from simulators.conceal.inverse import reach_point, within_limits
-from simulators.conceal.kinematics import forward, jacobian
 from simulators.conceal.readings import tip_m
 from simulators.conceal.rig import Artefacts, TrueRig
-from simulators.defects.defect import Defect
-from simulators.defects.ports import MovesSeat
+from simulators.defects.defect import Defect, MovesSeat
 from simulators.defects.scene import Scene
 
 Floats = NDArray[np.float64]

@@ -14,15 +14,10 @@ from numpy.typing import NDArray
 from simulators.conceal.chain import balanced, true_shaft_rad
 from simulators.conceal.rig import TrueRig
 from simulators.conceal.wanted import ConcealError, Side
-from simulators.defects.defect import Defect, with_size
-from simulators.defects.encoder_disc import RADIUS_M, EccentricDisc
-from simulators.defects.ports import TurnsJoint
-from simulators.defects.scene import Scene
-from simulators.defects.second_disc import SecondDisc
-from simulators.defects.second_slip import SecondSlip
-from simulators.defects.site import Site, UnsuitedError
-from simulators.defects.slack_drive import SlackDrive
-from simulators.defects.soft_joint import SoftJoint
+from simulators.defects.defect import Defect, TurnsJoint, with_size
+from simulators.defects.drive import SlackDrive, SoftJoint
+from simulators.defects.encoder import RADIUS_M, EccentricDisc, SecondDisc, SecondSlip
+from simulators.defects.scene import Scene, Site, UnsuitedError
 
 Floats = NDArray[np.float64]
 COUNT_RAD = 2.0 * np.pi / (1 << 20)

@@ -1,9 +1,46 @@
-"""What is asked for: a family of sessions, its size, and what shall be hidden in it."""
+"""What is asked for: a family of sessions, its size, what shall be hidden in it, and how its instrument is noisy.
+
+Noise in units of its one sigma: white, with heavy tails, or slowly wandering.
+"""
 
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from simulators.conceal.noise import Kind
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Kind = Literal["white", "heavy", "wandering"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+FREEDOM = 4.0  # of Student's t: tails of a shop floor, finite variance
+OUTLIER_SHARE = 0.02
+OUTLIER_SIGMAS = (6.0, 20.0)
+KEEP = 0.95  # lag-one correlation of the wander
+WANDER_SHARE = 0.75  # its standard deviation, in sigmas, on top of the white part
+
+
+def draw_noise(kind: Kind, rows: int, channels: int, rng: np.random.Generator) -> Floats:
+    """(row, channel), rows in order of time; the white kind has standard deviation 1."""
+    if kind == "white":
+        return rng.standard_normal((rows, channels))
+    if kind == "heavy":
+        noise = rng.standard_t(FREEDOM, (rows, channels)) / np.sqrt(FREEDOM / (FREEDOM - 2.0))
+        wild = np.flatnonzero(rng.random(rows) < OUTLIER_SHARE)
+        far = rng.uniform(*OUTLIER_SIGMAS, wild.size)
+        noise[wild] += far[:, np.newaxis] * _directions(wild.size, channels, rng)
+        return noise
+    shocks = rng.standard_normal((rows, channels))
+    wander = np.empty_like(shocks)
+    wander[0] = shocks[0]
+    for row in range(1, rows):
+        wander[row] = KEEP * wander[row - 1] + np.sqrt(1.0 - KEEP**2) * shocks[row]
+    return rng.standard_normal((rows, channels)) + WANDER_SHARE * wander
+
+
+def _directions(rows: int, channels: int, rng: np.random.Generator) -> Floats:
+    vector = rng.standard_normal((rows, channels))
+    return vector / np.linalg.norm(vector, axis=1, keepdims=True)
+
 
 Family = Literal["dual-psd", "tracker", "cones", "wire"]
 FAMILIES: tuple[Family, ...] = get_args(Family)

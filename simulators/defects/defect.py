@@ -1,53 +1,81 @@
-"""What a mechanism is, and the places where it may take hold of the chain.
+"""What a mechanism is, and the places where it may take hold of the chain, in the order of the signal.
 
 A defect is a frozen record of what is physically wrong, with one quantity (`SIZE`) that scales it: zero changes
-nothing. It takes hold by having one or more of the methods below; the chain looks for them and calls each at its
-place. A new mechanism is one file and one line in `mechanisms.MECHANISMS`.
+nothing. It takes hold by having one or more of the methods of the protocols below; the chain looks for them and calls
+each at its place.
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any, ClassVar, Protocol, Self, TypeVar
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Protocol, Self, TypeVar, runtime_checkable
 
 import numpy as np
+from numpy.typing import NDArray
 
-from simulators.defects.site import Site
+from simulators.arm.rigid import Vector
+from simulators.arm.statics import Load
+from simulators.defects.scene import Light, Scene, Site
+
+Floats = NDArray[np.float64]
+ANY_INSTRUMENT = ("dual-psd", "position", "wire", "seat")
+ROBOT = ("dual-psd", "position", "wire")  # arms with drives
+SPOTS = ("dual-psd",)
+UNKNOWN = "unknown"  # physics that no catalogue lists
 
 
-class Defect(Protocol):
-    """One hidden mechanism."""
+@dataclass(frozen=True)
+class Mechanism:
+    """What has a name, a port and figures in the words of a diagnosis. {Braces} stand for fields of the record."""
 
     KIND: ClassVar[str]  # the mechanism's own name
-    PHYSICS: ClassVar[str]  # as in the interchange format; "unknown" when no catalogue has it
-    SIZE: ClassVar[str]  # the field that scales it
-    TYPICAL: ClassVar[float]  # a plausible value of that field, in its unit
-    INSTRUMENTS: ClassVar[tuple[str, ...]]  # where it can occur
-    HABIT: ClassVar[str]  # how a session must be run to show it: "moving", "direct", "payload" or "" for any
+    PHYSICS: ClassVar[str]  # as in the interchange format; UNKNOWN when no catalogue has it
+    PORT: ClassVar[str]  # where it sits: "joint{joint}.angle", as in the interchange format
+    DRIVERS: ClassVar[tuple[str, ...]]  # what it depends on: "q{joint}", as in the interchange format
+    FIGURES: ClassVar[tuple[str, ...]] = ()  # fields that a diagnosis states under the same names
 
     @property
     def port(self) -> str:
-        """Where it sits: `joint3.angle`, ... as in the interchange format."""
-        ...
+        return self.PORT.format_map(vars(self))
 
     @property
     def drivers(self) -> tuple[str, ...]:
-        """What it depends on: `q3`, ... as in the interchange format."""
-        ...
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Columns without which nobody could name it; `temp_room_degC`, `approach`, ... (no number: of every joint)."""
-        ...
+        return tuple(driver.format_map(vars(self)) for driver in self.DRIVERS)
 
     @property
     def figures(self) -> Mapping[str, float]:
         """Its size in the words of a diagnosis, e.g. `amplitude_rad`; empty when there is no single number."""
-        ...
+        return {name: float(getattr(self, name)) for name in self.FIGURES}
+
+
+@dataclass(frozen=True)
+class Defect(Mechanism):
+    """One hidden mechanism of the chain."""
+
+    SIZE: ClassVar[str]  # the field that scales it
+    TYPICAL: ClassVar[float]  # a plausible value of that field, in its unit
+    INSTRUMENTS: ClassVar[tuple[str, ...]]  # where it can occur
+    HABIT: ClassVar[str] = ""  # how a session must be run to show it: "moving", "direct", "payload" or "" for any
+    NEEDS: ClassVar[tuple[str, ...]] = ()  # see `needs`
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Columns without which nobody could name it; `temp_room_degC`, `approach`, ... (no number: of every joint)."""
+        return tuple(column.format_map(vars(self)) for column in self.NEEDS)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:
         """A plausible one. UnsuitedError when the rig or session has no room for it."""
-        ...
+        raise NotImplementedError(f"{cls.__name__} is a family of mechanisms; draw one of its members")
+
+    @classmethod
+    def draw_size(cls, rng: np.random.Generator) -> float:
+        """A size between half and twice the typical one."""
+        return spread(rng, cls.TYPICAL)
+
+    @classmethod
+    def draw_signed(cls, rng: np.random.Generator) -> float:
+        """The same with either sign."""
+        return cls.draw_size(rng) * float(rng.choice([-1.0, 1.0]))
 
 
 AnyDefect = TypeVar("AnyDefect", bound=Defect)
@@ -62,3 +90,144 @@ def with_size(defect: AnyDefect, size: float) -> AnyDefect:
 def size_of(defect: Defect) -> float:
     """The value of the field that scales the mechanism."""
     return float(getattr(defect, defect.SIZE))
+
+
+# --- drawing
+
+
+def direction(rng: np.random.Generator) -> Vector:
+    """A unit vector, all directions alike."""
+    vector = rng.standard_normal(3)
+    return as_vector(vector / np.linalg.norm(vector))
+
+
+def as_vector(values: NDArray[np.float64]) -> Vector:
+    """Three numbers as a tuple."""
+    x, y, z = (float(value) for value in values)
+    return (x, y, z)
+
+
+def spread(rng: np.random.Generator, typical: float) -> float:
+    """A size between half and twice the typical one, in even steps of its logarithm."""
+    return float(typical * 2.0 ** rng.uniform(-1.0, 1.0))
+
+
+def phase(rng: np.random.Generator) -> float:
+    """An angle (rad) in (-pi, pi)."""
+    return float(rng.uniform(-np.pi, np.pi))
+
+
+# --- places in the chain
+
+
+@runtime_checkable
+class ReadsAngle(Protocol):
+    """Between the turning shaft and the number that its encoder gives."""
+
+    def reading_error_rad(self, shaft_rad: Floats, scene: Scene) -> Floats:
+        """Reading less true angle, (row, n), for shafts that truly stand at `shaft_rad` (row, n)."""
+        ...
+
+
+@runtime_checkable
+class TurnsJoint(Protocol):
+    """Between the shaft that is read and the joint's output."""
+
+    def extra_turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
+        """Output less shaft, (row, n)."""
+        ...
+
+
+@runtime_checkable
+class MovesLink(Protocol):
+    """Between a joint's output and the start of the next joint."""
+
+    @property
+    def links(self) -> tuple[int, ...]:
+        """Links that move; link i follows joint i, link 0 stands before joint 1."""
+        ...
+
+    def link_motion(self, link: int, end_m: Floats, angle_rad: Floats, scene: Scene, load: Load) -> Floats:
+        """Motion (row, 4, 4) in the frame that turns with joint `link`, applied to the link's end at `end_m` (3,)."""
+        ...
+
+
+@runtime_checkable
+class MovesBase(Protocol):
+    """Under the arm."""
+
+    def base_motion(self, scene: Scene, load: Load) -> Floats:
+        """Motion (row, 4, 4) of the arm's foot in the base frame."""
+        ...
+
+
+@runtime_checkable
+class MovesTool(Protocol):
+    """Between flange and laser or target."""
+
+    def tool_motion(self, scene: Scene, load: Load) -> Floats:
+        """Motion (row, 4, 4) of the tool in the flange frame."""
+        ...
+
+
+@runtime_checkable
+class MovesFixture(Protocol):
+    """Under the dual-PSD fixture."""
+
+    def fixture_motion(self, scene: Scene) -> Floats:
+        """Motion (row, 4, 4) of the fixture in its own frame."""
+        ...
+
+
+@runtime_checkable
+class MovesDevice(Protocol):
+    """Under the tracker or the wire drum."""
+
+    def device_motion(self, scene: Scene) -> Floats:
+        """Motion (row, 4, 4) of the device in its own frame."""
+        ...
+
+
+@runtime_checkable
+class MovesSeat(Protocol):
+    """Under a cone."""
+
+    def seat_shift_m(self, scene: Scene) -> Floats:
+        """(row, 3) in the base frame."""
+        ...
+
+
+@runtime_checkable
+class DistortsSpots(Protocol):
+    """Between light and what a PSD says."""
+
+    def seen_spots_m(self, spot_m: Floats, light: Light, scene: Scene) -> Floats:
+        """Spots (row, 2, 2) as given when they are truly at `spot_m`."""
+        ...
+
+
+@runtime_checkable
+class ChangesSums(Protocol):
+    """Light beside the laser's."""
+
+    def seen_sum_v(self, sum_v: Floats, scene: Scene) -> Floats:
+        """Sum signals (row, 2) as given."""
+        ...
+
+
+@runtime_checkable
+class DistortsPosition(Protocol):
+    """Between a target and what a tracker says."""
+
+    def seen_position_m(self, position_m: Floats, scene: Scene) -> Floats:
+        """(row, 3) in the device's frame."""
+        ...
+
+
+@runtime_checkable
+class DistortsLength(Protocol):
+    """Between a wire and what its drum says."""
+
+    def seen_length_m(self, length_m: Floats, scene: Scene) -> Floats:
+        """(row,)."""
+        ...

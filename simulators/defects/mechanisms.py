@@ -1,53 +1,45 @@
-"""Every mechanism that can be hidden. A new one is one file and one line here."""
+"""Every mechanism that can be hidden, and mechanisms as plain values. A new one is a class and a line here.
 
-from simulators.defects.bending_link import BendingLink
-from simulators.defects.bumped_base import BumpedBase
-from simulators.defects.bumped_device import BumpedDevice
-from simulators.defects.bumped_fixture import BumpedFixture
-from simulators.defects.coupled_wrist import CoupledWrist
+As plain values: [{"mechanism": "soft-joint", "fields": {...}}, ...], as a revealed truth lists them.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import msgspec
+
+from simulators.defects.base import BumpedBase, DriftingBase, SoftPedestal
 from simulators.defects.defect import Defect
-from simulators.defects.drifting_base import DriftingBase
-from simulators.defects.drifting_device import DriftingDevice
-from simulators.defects.encoder_disc import EccentricDisc
-from simulators.defects.encoder_slip import EncoderSlip
-from simulators.defects.gear_runout import GearRunout
-from simulators.defects.heated_link import HeatedLink
-from simulators.defects.laser_warm_up import LaserWarmUp
-from simulators.defects.late_clock import LateClock
-from simulators.defects.moved_cone import MovedCone
-from simulators.defects.outside_beat import GearBeat
-from simulators.defects.outside_bump import NarrowBump
-from simulators.defects.outside_cable import CableBundle
-from simulators.defects.outside_drag_chain import DragChain
-from simulators.defects.outside_fan import FanOnBracket
-from simulators.defects.outside_fringes import Fringes
-from simulators.defects.outside_product import SaturatedProduct
-from simulators.defects.outside_refraction import BentRay
-from simulators.defects.outside_sticking import StickingPad
-from simulators.defects.outside_uneven_spring import UnevenSpring
-from simulators.defects.oval_ring import OvalRing
-from simulators.defects.payload_on_soft_joint import PayloadOnSoftJoint
-from simulators.defects.psd_bowed import BowedScale
-from simulators.defects.psd_gain import WrongGain
-from simulators.defects.psd_glass import CoverGlass
-from simulators.defects.psd_pincushion import Pincushion
-from simulators.defects.psd_skewed import SkewedElectrodes
-from simulators.defects.psd_stray_light import StrayLight
-from simulators.defects.sagging_mount import SaggingMount
-from simulators.defects.slack_drive import SlackDrive
-from simulators.defects.slack_under_weight import SlackUnderWeight
-from simulators.defects.slow_filter import SlowFilter
-from simulators.defects.soft_joint import SoftJoint
-from simulators.defects.soft_pedestal import SoftPedestal
-from simulators.defects.tracker_scale import TrackerScale
-from simulators.defects.two_slope_flexspline import TwoSlopeFlexspline
-from simulators.defects.unsettled import Unsettled
-from simulators.defects.warm_arm import WarmArm
-from simulators.defects.warm_laser import WarmLaser
-from simulators.defects.wire_drum import DrumOutOfRound
-from simulators.defects.wire_scale import WireScale
-from simulators.defects.worn_bearing import WornBearing
-from simulators.defects.wrong_ratio import WrongRatio
+from simulators.defects.detector import BowedScale, CoverGlass, Pincushion, SkewedElectrodes, StrayLight, WrongGain
+from simulators.defects.drive import (
+    CoupledWrist,
+    GearRunout,
+    LateClock,
+    PayloadOnSoftJoint,
+    SlackDrive,
+    SlackUnderWeight,
+    SoftJoint,
+    TwoSlopeFlexspline,
+    Unsettled,
+    WrongRatio,
+)
+from simulators.defects.encoder import EccentricDisc, EncoderSlip, OvalRing, SlowFilter
+from simulators.defects.fixture import BumpedFixture, MovedCone
+from simulators.defects.link import BendingLink, HeatedLink, WarmArm, WornBearing
+from simulators.defects.outside import (
+    BentRay,
+    CableBundle,
+    DragChain,
+    FanOnBracket,
+    Fringes,
+    GearBeat,
+    NarrowBump,
+    SaturatedProduct,
+    StickingPad,
+    UnevenSpring,
+)
+from simulators.defects.tool import LaserWarmUp, SaggingMount, WarmLaser
+from simulators.defects.tracker import BumpedDevice, DriftingDevice, DrumOutOfRound, TrackerScale, WireScale
 
 MECHANISMS: tuple[type[Defect], ...] = (
     EccentricDisc,
@@ -98,3 +90,28 @@ MECHANISMS: tuple[type[Defect], ...] = (
     BentRay,
     DragChain,
 )
+
+
+class WrittenError(ValueError):
+    """The name of no mechanism, or other quantities than it has."""
+
+
+def written(defects: Sequence[Defect]) -> list[dict[str, Any]]:
+    """Ready for JSON."""
+    return [{"mechanism": defect.KIND, "fields": dict(vars(defect))} for defect in defects]
+
+
+def defects_of(listed: Sequence[Mapping[str, Any]]) -> tuple[Defect, ...]:
+    """The mechanisms that were written. WrittenError with the name and the remedy."""
+    return tuple(_made(one) for one in listed)
+
+
+def _made(one: Mapping[str, Any]) -> Defect:
+    kind: Any = next((kind for kind in MECHANISMS if one.get("mechanism") == kind.KIND), None)
+    if kind is None:
+        names = ", ".join(kind.KIND for kind in MECHANISMS)
+        raise WrittenError(f"no mechanism {one.get('mechanism')!r}; there are {names}")
+    try:
+        return msgspec.convert(one.get("fields", {}), type=kind)
+    except msgspec.ValidationError as error:
+        raise WrittenError(f"mechanism {kind.KIND}: {error}; correct its fields") from error

@@ -6,9 +6,8 @@ transmission type 0, sending on a change of value (types 254 and 255 follow thei
 
 from functools import partial
 
-from simulators.encoders.abort import AbortCode, SdoAbort
-from simulators.encoders.dictionary import NodeDictionary
-from simulators.encoders.frame import CanFrame
+from simulators.encoders.bus import CanFrame
+from simulators.encoders.dictionary import AbortCode, NodeDictionary, SdoAbort
 
 INVALID = 1 << 31
 EXTENDED_ID = 1 << 29

@@ -9,8 +9,7 @@ timing registers (s), polling (A, P, X), the CAN FD commands of later firmware: 
 
 from typing import Protocol
 
-from simulators.encoders.bus import CanBus
-from simulators.encoders.frame import CanFrame
+from simulators.encoders.bus import CanBus, CanFrame
 from simulators.wire import TICK_S
 
 CR, BEL = b"\r", b"\a"

@@ -1,12 +1,55 @@
-"""One injected fault: of which kind, how often it strikes, and for how long it lasts."""
+"""One injected fault: of which kind, how often it strikes, and for how long it lasts.
 
-from collections.abc import Callable, Mapping
+The light on the faces, which trouble can make too strong or take away; everything else is the world's.
+
+What it does not imitate: a spot that leaves the face slowly, or one face alone.
+
+Faults of a device itself, which last for a number of cycles instead of striking outputs.
+"""
+
+import math
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simulators.faults.device_clock import DeviceClock
-from simulators.faults.light import DisturbedLight
+
+Floats = NDArray[np.float64]
+BLINDING_GAIN = 1e4  # a lit face gives tens of microamperes, the converters of such boxes end below a milliampere
+
+
+class LitWorld(Protocol):
+    """What is wrapped."""
+
+    def photocurrents_a(self, times_s: Sequence[float] | Floats) -> Floats: ...
+
+
+class DisturbedLight:
+    """A world as the PSD electronics see it. Several disturbances multiply; each is mended by itself."""
+
+    def __init__(self, world: LitWorld) -> None:
+        self._world = world
+        self._gains: dict[Hashable, float] = {}  # whose -> of the laser's power
+
+    def disturb(self, whose: Hashable, gain: float) -> None:
+        """`gain` of the laser's power; 0 is a spot that has left both faces."""
+        self._gains[whose] = gain
+
+    def mend(self, whose: Hashable) -> None:
+        """As if that one had not been."""
+        self._gains.pop(whose, None)
+
+    def photocurrents_a(self, times_s: Sequence[float] | Floats) -> Floats:
+        """(sample, 8) A, as the world's `photocurrents_a`."""
+        current_a = self._world.photocurrents_a(times_s)
+        return math.prod(self._gains.values()) * current_a if self._gains else current_a
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._world, name)
+
 
 MOST_JUNK_BYTES = 65536
 
@@ -79,3 +122,57 @@ class Output:
     def replace(self, data: bytes) -> None:
         """The whole output becomes `data`, held back as its first part was."""
         self.parts = [(self.parts[0][0] if self.parts else 0, data)]
+
+
+@dataclass(frozen=True)
+class StateFault:
+    """A kind: how it begins and ends. FaultError from `begin` when the device has nothing that it could disturb."""
+
+    name: str
+    begin: Callable[[Target, Fault, float], None]
+    end: Callable[[Target, Fault], None]
+    settings: Mapping[str, Setting] = field(default_factory=dict[str, Setting])
+
+
+def _clock_of(target: Target) -> DeviceClock:
+    if target.clock is None:
+        raise FaultError("clock: this device puts no time stamps into what it sends; choose another kind")
+    return target.clock
+
+
+def _light_of(target: Target) -> DisturbedLight:
+    if target.light is None:
+        raise FaultError("this device sees no light; inject it into psd")
+    return target.light
+
+
+def _disturb_clock(target: Target, fault: Fault, t_s: float) -> None:
+    _clock_of(target).disturb(fault, fault.settings["step_s"], fault.settings["drift"], t_s)
+
+
+def _mend_clock(target: Target, fault: Fault) -> None:
+    _clock_of(target).mend(fault)
+
+
+def _blind(target: Target, fault: Fault, t_s: float) -> None:
+    _light_of(target).disturb(fault, BLINDING_GAIN)
+
+
+def _spot_off(target: Target, fault: Fault, t_s: float) -> None:
+    _light_of(target).disturb(fault, 0.0)
+
+
+def _mend_light(target: Target, fault: Fault) -> None:
+    _light_of(target).mend(fault)
+
+
+STATE_FAULTS = (
+    StateFault(
+        "clock",
+        _disturb_clock,
+        _mend_clock,
+        {"step_s": Setting(0.5, -1e6, 1e6), "drift": Setting(0.0, -0.5, 0.5)},
+    ),
+    StateFault("saturation", _blind, _mend_light),
+    StateFault("spot-off", _spot_off, _mend_light),
+)

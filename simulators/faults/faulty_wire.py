@@ -4,13 +4,18 @@ A wire may say what only its protocol knows, by two methods that are optional:
 
     damaged(output) -> bytes        the same output with a wrong checksum or length (otherwise: one bit turned)
     refusal(request) -> bytes|None  the error reply to these bytes; None: they are no request that could be refused
+
+Puts the faults on the lines of a bench, and gives the side channel its verbs for them.
 """
 
 from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
 
-from simulators.faults.fault import Output
+from simulators.faults.fault import DisturbedLight, FaultError, Output, Target
 from simulators.faults.injector import Injector
-from simulators.wire import TICK_S, Wire
+from simulators.wire import TICK_S, Bench, SerialPort, TcpPort, Wire
 
 UNPLUGGED_S = 0.1  # for how long a disconnected serial device is away; a TCP client may come back at once
 
@@ -76,3 +81,46 @@ def turn_a_bit(data: bytes) -> bytes:
 
 def _no_reply(request: bytes) -> bytes | None:
     return None
+
+
+def with_faults(device: str, bench: Bench, light: DisturbedLight | None = None) -> tuple[Bench, Injector]:
+    """The same bench with every line under an injector of its own, which must run with the bench's instruments."""
+    injector = Injector(device, Target(clock=bench.clock, light=light))
+    ports = [_faulty(port, injector) for port in bench.ports]
+    return replace(bench, instruments=[injector, *bench.instruments], ports=ports), injector
+
+
+def fault_verbs(injectors: Mapping[str, Injector]) -> dict[str, Callable[..., Any]]:
+    """Verbs "fault.inject", "fault.clear" and "fault.list", for devices by the names of the announcement."""
+
+    def named(device: str) -> Injector:
+        if device not in injectors:
+            raise FaultError(f"no device {device!r}; there are {', '.join(injectors)}")
+        return injectors[device]
+
+    def inject(
+        device: str, kind: str, count: int | None = None, every: int = 1, port: str | None = None, **settings: Any
+    ) -> None:
+        named(device).inject(kind, count, every, port, settings)
+
+    def clear(device: str | None = None) -> None:
+        for injector in [named(device)] if device is not None else injectors.values():
+            injector.clear()
+
+    def listed() -> list[dict[str, Any]]:
+        return [fault for injector in injectors.values() for fault in injector.listed()]
+
+    return {"fault.inject": inject, "fault.clear": clear, "fault.list": listed}
+
+
+def _faulty(port: SerialPort | TcpPort, injector: Injector) -> SerialPort | TcpPort:
+    if isinstance(port, SerialPort):
+        return replace(port, wire=FaultyWire(port.wire, injector, port.name))
+
+    def accept() -> Wire:
+        return FaultyWire(port.accept(), injector, port.name)
+
+    def closed(wire: Wire) -> None:
+        port.closed(wire.inner if isinstance(wire, FaultyWire) else wire)
+
+    return replace(port, accept=accept, closed=closed)

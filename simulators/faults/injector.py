@@ -6,9 +6,8 @@ What it does not imitate: faults on the way to the device; requests always arriv
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from simulators.faults.fault import Fault, FaultError, Output, Setting, Target
+from simulators.faults.fault import STATE_FAULTS, Fault, FaultError, Output, Setting, Target
 from simulators.faults.line_faults import LINE_FAULTS
-from simulators.faults.state_faults import STATE_FAULTS
 
 LINE_KINDS = {kind.name: kind for kind in LINE_FAULTS}
 STATE_KINDS = {kind.name: kind for kind in STATE_FAULTS}

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from simulators.defects.rigid import moved
+from simulators.arm.rigid import moved
 from simulators.hand.rig import Emulation, HandRig, Part, Vector
 from simulators.world.errors import WorldError
 
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 SCHEMA = 1
 KIND = "hand-held-arm"
 LINES = 256  # groups of graduation lines a turn: a head looks at some hundred lines at a time and averages them
-CYCLES = (-3, -2, -1, 2, 3)  # error motions of an axis a turn, see simulators/hand/bearings.py
+CYCLES = (-3, -2, -1, 2, 3)  # error motions of an axis a turn, see simulators/hand/arm.py
 AXIAL_CYCLES = (1, 2, 3)
 
 

@@ -4,6 +4,11 @@ Each turn waits for bytes until the next tick is due, serves them, and runs it, 
 gives. When the machine is late it runs up to CATCH_UP_TICKS and sends what became due in all of them at once: half of
 a tick's cost is the system's, for waking every client. So it does with time scales at which ticks follow faster than
 TURN_S. A client that is slow, gone or talks rubbish holds up nobody.
+
+When the next tick is due: emulated time runs at a fixed rate of wall time, and never jumps.
+
+A little lateness is caught up. A stall of more than STALL_S (the machine slept, or is too slow for the rate) is not:
+emulated time lags from then on, so that no client sees a burst of time. Pure arithmetic: the caller reads the clock.
 """
 
 import selectors
@@ -13,12 +18,35 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Protocol
 
-from simulators.host.faults import Log, Report, log_to_stderr
-from simulators.host.link import check_link
-from simulators.host.pace import Pace
+from simulators.host.line import Log, Report, check_link, log_to_stderr
 from simulators.host.serial_line import SerialLine
 from simulators.host.tcp import Connection, Listener
 from simulators.wire import TICK_S, Bench, SerialPort, TcpPort
+
+STALL_S = 0.050  # wall time; longer than any scheduling delay of a working machine, shorter than a client's time-outs
+
+
+class Pace:
+    """Deadlines of ticks, in the wall time of whoever asks."""
+
+    def __init__(self, tick_wall_s: float, now_s: float) -> None:
+        self._tick_wall_s = tick_wall_s
+        self.next_s = now_s
+        self.stalls = 0
+        self.lost_s = 0.0  # wall time that emulated time has not followed
+
+    def take(self, now_s: float) -> bool:
+        """True when a tick is due now; counts it as run."""
+        late_s = now_s - self.next_s
+        if late_s < 0.0:
+            return False
+        if late_s > STALL_S:
+            self.stalls += 1
+            self.lost_s += late_s
+            self.next_s = now_s
+        self.next_s += self._tick_wall_s
+        return True
+
 
 CATCH_UP_TICKS = 4  # 8 ms, less than the 10 ms that devices gather in a frame
 TURN_S = 0.5e-3  # ticks that a high time scale makes due within it run in one turn, if no more than CATCH_UP_TICKS

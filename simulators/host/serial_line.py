@@ -11,9 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from simulators.host.errors import HostError
-from simulators.host.faults import Report
-from simulators.host.link import make_link, remove_link
-from simulators.host.outbox import Outbox
+from simulators.host.line import Outbox, Report, make_link, remove_link
 from simulators.wire import SerialPort
 
 READ_BYTES = 65536

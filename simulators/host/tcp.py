@@ -5,8 +5,7 @@ import socket
 from collections.abc import Callable
 
 from simulators.host.errors import HostError, PortBusy
-from simulators.host.faults import Report
-from simulators.host.outbox import Outbox
+from simulators.host.line import Outbox, Report
 from simulators.wire import TcpPort, Wire
 
 READ_BYTES = 65536

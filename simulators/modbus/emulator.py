@@ -10,11 +10,9 @@ The motion controller is that of the UR emulator, with the rig's joints: its own
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from simulators.modbus.memory import Memory
 from simulators.modbus.plc import WRITTEN_BY_CLIENTS, MotionProgram
-from simulators.modbus.register_map import RegisterMap
-from simulators.modbus.rtu_wire import RtuWire
-from simulators.modbus.tcp_wire import TcpWire
+from simulators.modbus.register_map import Memory, RegisterMap
+from simulators.modbus.server import RtuWire, TcpWire
 from simulators.ur.dynamics import ArmWorld
 from simulators.ur.emulator import arm_controller
 from simulators.ur.motion import ArmController

@@ -6,12 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.rigid import turned
+from simulators.arm.statics import Load
 from simulators.conceal.case import Case
 from simulators.conceal.observe import observe
 from simulators.conceal.reveal import at_start
 from simulators.conceal.rig import DualPsd, TrueRig
-from simulators.defects.rigid import turned
-from simulators.defects.scene import Load, Scene
+from simulators.defects.scene import Scene
 from simulators.streams.course import STAND_S, Course, course
 from simulators.streams.devices import (
     JOINT_NOISE_RAD,
@@ -21,7 +22,7 @@ from simulators.streams.devices import (
     sample_times,
     second_encoders,
 )
-from simulators.streams.fault import Fault, HurriesReading, MovesOutput, ReadsEncoders, StampsLate, SwaysBase
+from simulators.streams.faults import Fault, HurriesReading, MovesOutput, ReadsEncoders, StampsLate, SwaysBase
 
 Floats = NDArray[np.float64]
 WAIT_S, READ_S = 0.35, 0.2  # of a patient program: from the stop to the reading, and its length

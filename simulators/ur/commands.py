@@ -11,11 +11,10 @@ from collections.abc import Callable
 from typing import Protocol
 
 from simulators.ur.motion import ArmController, MoveRefused
-from simulators.ur.moves import Leg
+from simulators.ur.moves import Floats, Leg
 from simulators.ur.poses import IDENTITY, compose, frame_of, pose_of, rotate
 from simulators.ur.program import Wait
 from simulators.ur.registers import Memory
-from simulators.ur.setpoint import Floats
 from simulators.wire import TICK_S
 
 

@@ -11,12 +11,11 @@ from collections.abc import Sequence
 
 from simulators.ur.commands import COMMANDS
 from simulators.ur.motion import ArmController, MoveRefused
-from simulators.ur.moves import Leg
+from simulators.ur.moves import Floats, Leg
 from simulators.ur.program import Wait
 from simulators.ur.registers import Memory
 from simulators.ur.script_program import leg_of
 from simulators.ur.script_text import ScriptRefused, UploadedControl
-from simulators.ur.setpoint import Floats
 from simulators.wire import TICK_S
 
 READY, DONE = 1, 2

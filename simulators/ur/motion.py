@@ -16,11 +16,9 @@ from numpy.typing import ArrayLike
 
 from simulators.ur.dynamics import ArmWorld, Carried, Dynamics, Joints
 from simulators.ur.kinematics import NominalArm
-from simulators.ur.moves import JointMove, Leg, LineMove, PathMove
+from simulators.ur.moves import Floats, Generator, JointMove, Leg, LineMove, PathBlocked, PathMove, SetPoint, standing
 from simulators.ur.poses import IDENTITY, Frame
-from simulators.ur.power import Power
-from simulators.ur.setpoint import Floats, Generator, PathBlocked, SetPoint, standing
-from simulators.ur.states import SafetyMode
+from simulators.ur.states import Power, SafetyMode
 from simulators.ur.streams import JointServo, JointSpeed, JointStop, ToolSpeed
 from simulators.wire import TICK_S
 

@@ -2,16 +2,92 @@
 
 They start from rest. What is not imitated: blends (the arm halts at every way-point), and the time law of a
 real controller, which also limits jerk.
+
+Also the set-point, what every generator of set-points offers, and the trapezoidal time law that moves follow.
+Source: Siciliano et al., "Robotics: Modelling, Planning and Control", section 4.2.1; the names `speed` and
+`acceleration` are those of URScript's movej and movel (leading axis, tool).
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simulators.ur.kinematics import NominalArm
 from simulators.ur.poses import Frame, partway, twist_to
-from simulators.ur.setpoint import Floats, Generator, PathBlocked, SetPoint, standing
-from simulators.ur.time_law import Trapezoid, trapezoid
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SetPoint:
+    """Where the joints shall be, in the controller's own readings; each (n,)."""
+
+    q_rad: Floats
+    qd_rad_s: Floats
+    qdd_rad_s2: Floats
+
+
+class Generator(Protocol):
+    """One motion. `finished` says that the last set-point was its end; it then stands still."""
+
+    @property
+    def finished(self) -> bool: ...
+
+    def step(self, now: SetPoint, dt_s: float) -> SetPoint:
+        """The next set-point. PathBlocked when the arm cannot follow."""
+        ...
+
+
+class PathBlocked(Exception):  # noqa: N818 - the arm is blocked, the program is not in error
+    """The path leaves what the joints can do: joint range, joint speed near a singularity, out of reach."""
+
+
+def standing(q_rad: Floats) -> SetPoint:
+    """A set-point at rest."""
+    return SetPoint(q_rad, np.zeros(len(q_rad)), np.zeros(len(q_rad)))
+
+
+@dataclass(frozen=True)
+class Trapezoid:
+    """From rest to rest over `distance` >= 0, in any unit u; u/s and u/s^2 are limits and stay under them."""
+
+    distance: float
+    acceleration: float
+    ramp_s: float
+    cruise_s: float
+
+    @property
+    def duration_s(self) -> float:
+        return 2.0 * self.ramp_s + self.cruise_s
+
+    def at(self, t_s: float) -> tuple[float, float, float]:
+        """Way, speed and acceleration at a time; still before the start and after the end."""
+        if t_s >= self.duration_s:  # asked first: the shortest ways take no time at all
+            return self.distance, 0.0, 0.0
+        if t_s <= 0.0:
+            return 0.0, 0.0, 0.0
+        a, ramp = self.acceleration, self.ramp_s
+        if t_s < ramp:
+            return 0.5 * a * t_s * t_s, a * t_s, a
+        if t_s <= ramp + self.cruise_s:
+            return a * ramp * (t_s - 0.5 * ramp), a * ramp, 0.0
+        left = self.duration_s - t_s
+        return self.distance - 0.5 * a * left * left, a * left, -a
+
+
+def trapezoid(distance: float, speed: float, acceleration: float) -> Trapezoid:
+    """The fastest one within both limits. ValueError unless both are positive and the distance is not negative."""
+    if not (distance >= 0.0 and speed > 0.0 and acceleration > 0.0):
+        raise ValueError(
+            f"move over {distance} at speed {speed} and acceleration {acceleration}; both must be positive"
+        )
+    ramp_s = min(speed / acceleration, (distance / acceleration) ** 0.5)
+    cruise_s = max(0.0, distance / (acceleration * ramp_s) - ramp_s) if ramp_s > 0.0 else 0.0
+    return Trapezoid(distance, acceleration, ramp_s, cruise_s)
+
 
 TURN_SPEED_RAD_S = 1.05  # movel of a pure turn: the controller's default joint speed and acceleration (URScript, movej)
 TURN_ACCELERATION_RAD_S2 = 1.4

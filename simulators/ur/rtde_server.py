@@ -10,9 +10,8 @@ import struct
 from collections.abc import Callable
 
 from simulators.ur.readout import Readout
-from simulators.ur.recipes import InputRecipe, OutputRecipe, names_of
+from simulators.ur.recipes import HEADER, FrameType, InputRecipe, OutputRecipe, frame, names_of
 from simulators.ur.registers import Memory
-from simulators.ur.rtde_types import HEADER, FrameType, frame
 from simulators.wire import TICK_S
 
 BASE_RATE_HZ = 1.0 / TICK_S

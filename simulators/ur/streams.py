@@ -11,9 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from simulators.ur.kinematics import NominalArm
-from simulators.ur.moves import follow
+from simulators.ur.moves import Floats, PathBlocked, SetPoint, follow, standing
 from simulators.ur.poses import Frame
-from simulators.ur.setpoint import Floats, PathBlocked, SetPoint, standing
 
 DEFAULT_GAIN = 300.0  # URScript manual, servoj
 NEAR_RAD = 1e-9  # closer than any encoder resolves: take the target itself, so that the arm comes to rest on it

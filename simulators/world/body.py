@@ -2,23 +2,118 @@
 
 When everything stands (reference arrived, gears seated, error and speed below what double precision can still
 change) the state is frozen: stepping on would move no joint by more than 1e-12 rad.
+
+The set-point between two commands: a straight line over one controller cycle, no faster than a joint can turn.
+
+A controller commands once per cycle and its joints interpolate in between, so the reference trails the set-point by
+one cycle and its speed is known to the servo. A jump becomes a ramp at top speed.
+
+Joint repeatability: after every motion the output of a gear stands a little off what the motor side says.
+
+Mechanism: when a gear turns, teeth and rolling elements seat anew, so the output comes to rest N(0, sigma) away from
+the motor-side angle, and stays there as long as nothing moves. A motion begins when the set-point changes after
+standing; then the next offset is drawn and taken up along a smooth curve of SEATING_S, so that no step is seen. A
+motion has ended when the set-point has not changed for SEATING_S: every curve is finished by then.
+
+What it does not imitate: dependence on direction, load or distance (that is backlash, another mechanism).
 """
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.world.engine import Engine
+from simulators.wire import TICK_S
 from simulators.world.exposure import Exposure
 from simulators.world.hidden import Hidden
-from simulators.world.model import build_mjcf, torque_limits_nm
+from simulators.world.model import STEP_S, build_mjcf, torque_limits_nm
 from simulators.world.optics import Ray
-from simulators.world.reference import Reference
-from simulators.world.repeatability import Repeatability
 from simulators.world.rig import WorldRig
-from simulators.world.servo import Servo
+from simulators.world.servo import Engine, Servo
 from simulators.world.truth import Truth
 
 Floats = NDArray[np.float64]
+TOP_SPEED_RAD_S = math.pi  # 180 deg/s: UR5e technical details, every joint
+STEPS_PER_COMMAND = round(TICK_S / STEP_S)
+
+
+class Reference:
+    """Where each joint shall be now, in the controller's own readings."""
+
+    def __init__(self, q_rad: Floats) -> None:
+        self.q_rad: Floats = q_rad.copy()
+        self.qd_rad_s: Floats = np.zeros_like(q_rad)
+        self.goal_rad: Floats = q_rad.copy()
+        self.arrived = True
+        self._stride_rad: Floats = np.zeros_like(q_rad)
+
+    def aim(self, goal_rad: Floats) -> bool:
+        """A new set-point (n,); False when it is the present one, which changes nothing."""
+        if np.array_equal(goal_rad, self.goal_rad):
+            return False
+        self.goal_rad = goal_rad.copy()
+        per_step_rad = np.abs(goal_rad - self.q_rad) / STEPS_PER_COMMAND
+        self._stride_rad = np.minimum(per_step_rad, TOP_SPEED_RAD_S * STEP_S)
+        self.arrived = False
+        return True
+
+    def step(self) -> None:
+        """Advance by one physics step."""
+        if self.arrived:
+            return
+        left_rad = self.goal_rad - self.q_rad
+        move_rad = np.minimum(np.maximum(left_rad, -self._stride_rad), self._stride_rad)
+        self.q_rad = self.q_rad + move_rad
+        self.qd_rad_s = move_rad / STEP_S
+        if not move_rad.any():
+            self.q_rad = self.goal_rad.copy()
+            self.arrived = True
+
+
+SEATING_S = 0.050  # about the settling time of a UR joint; shorter would shake the arm, longer outlast a small motion
+
+
+class Repeatability:
+    """How far each true joint stands off its reading, (n,) rad; stepped with the physics."""
+
+    def __init__(self, sigma_rad: float, n_joints: int, rng: np.random.Generator) -> None:
+        self._sigma_rad = sigma_rad
+        self._rng = rng
+        self._steps_of_curve = math.ceil(SEATING_S / STEP_S - 1e-9)
+        self._step_of_curve = self._steps_of_curve
+        self._steps_unchanged = self._steps_of_curve
+        self._from_rad: Floats = np.zeros(n_joints)
+        self._to_rad: Floats = self._draw()
+        self.offset_rad: Floats = self._to_rad
+
+    @property
+    def seated(self) -> bool:
+        """True when the offsets stay what they are until the next motion."""
+        return self._step_of_curve >= self._steps_of_curve and self._steps_unchanged >= self._steps_of_curve
+
+    def setpoint_changed(self) -> None:
+        """The controller asked for another position; after standing this begins a motion."""
+        if self._steps_unchanged >= self._steps_of_curve:
+            self._from_rad, self._to_rad = self._to_rad, self._draw()
+            self._step_of_curve = 0
+        self._steps_unchanged = 0
+
+    def step(self, moving: bool) -> None:
+        """Advance by one physics step; `moving`: the reference has not arrived at the set-point yet."""
+        self._steps_unchanged = 0 if moving else self._steps_unchanged + 1
+        if self._step_of_curve >= self._steps_of_curve:
+            return
+        self._step_of_curve += 1
+        done = self._step_of_curve / self._steps_of_curve
+        share = done * done * (3.0 - 2.0 * done)  # smoothstep: starts and ends without speed
+        self.offset_rad = self._from_rad + share * (self._to_rad - self._from_rad)
+        if self._step_of_curve == self._steps_of_curve:
+            self.offset_rad = self._to_rad
+
+    def _draw(self) -> Floats:
+        return self._sigma_rad * self._rng.standard_normal(len(self._from_rad))
+
+
 STANDS_RAD = 1e-13
 WAKES_RAD = 1e-11  # by which a mechanism has moved the reading of a standing joint: the servo takes it up
 STANDS_RAD_S = 1e-11  # dies out within about 1/150 s of the servo, so less than 1e-13 rad is still to come

@@ -20,16 +20,13 @@ from numpy.typing import ArrayLike, NDArray
 from simulators.defects.defect import Defect
 from simulators.world.body import ArmBody
 from simulators.world.errors import WorldError
-from simulators.world.hidden import Hidden
-from simulators.world.history import EDGE_S, Knot, interpolate
+from simulators.world.exposure import joint_temperature_degC, psd_temperature_degC
+from simulators.world.hidden import Hidden, fixture_at, seen
 from simulators.world.model import STEP_S
 from simulators.world.optics import DARK, Face, Ray, Spots, place_faces, trace
-from simulators.world.photocurrent import ELECTRODES, NOISE_RATE_HZ, Photodetectors, sample_a
+from simulators.world.photocurrent import EDGE_S, ELECTRODES, NOISE_RATE_HZ, Knot, Photodetectors, interpolate, sample_a
 from simulators.world.rig import Pose, WorldRig, read_rig
-from simulators.world.seen_light import fixture_at, seen
-from simulators.world.truth import Truth, draw_truth
-from simulators.world.warming import joint_temperature_degC, psd_temperature_degC
-from simulators.world.weights import arm_of
+from simulators.world.truth import Truth, arm_of, draw_truth
 
 Floats = NDArray[np.float64]
 NO_FIXTURE = 0

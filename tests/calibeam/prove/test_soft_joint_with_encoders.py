@@ -16,7 +16,7 @@ from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibrate.diagnose.from_recording import diagnose_samples
 from drivers.clock import SystemClock
-from simulators.defects.soft_joint import SoftJoint
+from simulators.defects.drive import SoftJoint
 from simulators.world.world import World
 
 RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from drivers.cia406.device import Cia406Encoders
+from simulators.encoders.bus import CanFrame
 from simulators.encoders.emulator import build
-from simulators.encoders.frame import CanFrame
 from simulators.encoders.node import EncoderNode
 from simulators.host.loop import Host
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from simulators.arm.drawing import Drawing, fixed_parts, turning_com_m
+from simulators.arm.kinematics import Arm
 from simulators.conceal.arms import IRB120
-from simulators.conceal.drawing import Drawing, fixed_parts, turning_com_m
-from simulators.conceal.kinematics import Arm
 from simulators.defects.scene import Scene
 
 

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from simulators.conceal.kinematics import Arm
+from simulators.arm.kinematics import Arm
 
 PLACE = 'pos="{0[0]!r} {0[1]!r} {0[2]!r}" quat="{1[0]!r} {1[1]!r} {1[2]!r} {1[3]!r}"'
 MASS = '<inertial pos="{0[0]!r} {0[1]!r} {0[2]!r}" mass="{1!r}" diaginertia="0.05 0.05 0.05"/>'

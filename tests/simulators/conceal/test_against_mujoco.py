@@ -5,11 +5,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from simulators.arm.kinematics import Arm, forward
 from simulators.conceal.chain import balanced
-from simulators.conceal.kinematics import Arm, forward
+from simulators.defects.base import SoftPedestal
+from simulators.defects.drive import SoftJoint
 from simulators.defects.scene import Scene
-from simulators.defects.soft_joint import SoftJoint
-from simulators.defects.soft_pedestal import SoftPedestal
 from tests.simulators.conceal import mujoco_arm
 
 SceneOf = Callable[..., Scene]

@@ -10,9 +10,8 @@ import pytest
 from acquisition.recording.folder import read_folder
 from simulators.conceal.__main__ import main
 from simulators.conceal.case import Case, conceal
-from simulators.conceal.noise import KINDS, draw_noise
 from simulators.conceal.seated import seated_tip_m
-from simulators.conceal.wanted import FAMILIES, ConcealError, Family, Wanted
+from simulators.conceal.wanted import FAMILIES, KINDS, ConcealError, Family, Wanted, draw_noise
 from simulators.conceal.write import write_case
 
 SMALL = {"samples": 100, "places": 3}

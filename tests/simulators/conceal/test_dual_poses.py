@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from simulators.arm.drawing import origin_and_rotation
 from simulators.conceal.chain import stand
-from simulators.conceal.drawing import origin_and_rotation
-from simulators.conceal.dual_poses import EDGE, shots
+from simulators.conceal.poses import EDGE, shots
 from simulators.conceal.readings import spots
 from simulators.conceal.rig import DualPsd
 from simulators.conceal.rigs import draw_rig

@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from simulators.defects.bending_link import BendingLink
-from simulators.defects.encoder_disc import EccentricDisc
-from simulators.defects.oval_ring import OvalRing
-from simulators.defects.play import played
-from simulators.defects.psd_glass import CoverGlass
-from simulators.defects.wire_drum import DrumOutOfRound
-from simulators.defects.worn_bearing import WornBearing
+from simulators.defects.detector import CoverGlass
+from simulators.defects.drive import played
+from simulators.defects.encoder import EccentricDisc, OvalRing
+from simulators.defects.link import BendingLink, WornBearing
+from simulators.defects.tracker import DrumOutOfRound
 
 ANY_SCENE = SimpleNamespace()
 TURN_RAD = np.linspace(-3.0, 3.0, 25)[:, np.newaxis]

@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simulators.encoders.abort import SdoAbort
-from simulators.encoders.dictionary import NodeDictionary
+from simulators.encoders.dictionary import NodeDictionary, SdoAbort
 from simulators.encoders.encoder import AbsoluteEncoder
 
 TURN = 1 << 20

@@ -4,7 +4,7 @@ import struct
 
 import pytest
 
-from simulators.encoders.frame import CanFrame
+from simulators.encoders.bus import CanFrame
 from simulators.encoders.node import EncoderNode, NmtState
 
 NO_DATA = b""

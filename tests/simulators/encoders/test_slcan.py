@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simulators.encoders.bus import CanBus
-from simulators.encoders.frame import CanFrame, bus_bits
+from simulators.encoders.bus import CanBus, CanFrame, bus_bits
 from simulators.encoders.node import EncoderNode
 from simulators.encoders.slcan import as_line, from_line
 from simulators.wire import TICK_S

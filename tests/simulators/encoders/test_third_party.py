@@ -11,7 +11,7 @@ import pytest
 
 from simulators.encoders.dictionary import EDS_PATH
 from simulators.encoders.node import EncoderNode
-from simulators.encoders.virtual_bus import NodesOnBus
+from tests.simulators.encoders.virtual_bus import NodesOnBus
 
 WAIT_S = 5.0
 TURN = 1 << 20

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from simulators.faults.device_clock import DeviceClock
-from simulators.faults.fault import Target
+from simulators.faults.fault import DisturbedLight, Target
 from simulators.faults.injector import Injector
-from simulators.faults.light import DisturbedLight
 from simulators.wire import TICK_S
 
 

@@ -1,6 +1,6 @@
 """Bytes for a client that reads slowly, or never."""
 
-from simulators.host.outbox import ANSWER_LIMIT_BYTES, STREAM_LIMIT_BYTES, Outbox
+from simulators.host.line import ANSWER_LIMIT_BYTES, STREAM_LIMIT_BYTES, Outbox
 
 
 class Pipe:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from simulators.host.pace import STALL_S, Pace
+from simulators.host.loop import STALL_S, Pace
 
 
 def ticks_taken(pace: Pace, now_s: float) -> int:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from simulators.host.pace import STALL_S
+from simulators.host.loop import STALL_S
 from simulators.wire import TICK_S
 from simulators.world.truth import read_truth, truth_of
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from simulators.host.loop import Host
-from simulators.kpa101.unit import Kpa101Unit, Kpa101Wire
+from simulators.kpa101.emulator import Kpa101Unit, Kpa101Wire
 from simulators.wire import Bench, TcpPort
 
 

@@ -4,9 +4,8 @@ import random
 
 import pytest
 
-from simulators.modbus.memory import HOLDING, INPUT, Memory
-from simulators.modbus.rtu_wire import PATIENCE_TICKS, RtuWire, checksum
-from simulators.modbus.tcp_wire import TcpWire
+from simulators.modbus.register_map import HOLDING, INPUT, Memory
+from simulators.modbus.server import PATIENCE_TICKS, RtuWire, TcpWire, checksum
 
 # Modbus Application Protocol V1.1b3, sections 6.3, 6.6 and 6.12: their examples, with the registers they read
 READ = bytes.fromhex("03 006B 0003")

@@ -5,8 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from simulators.psd_daq.emulator import build
-from simulators.psd_daq.wire import PsdDaqWire
+from simulators.psd_daq.emulator import PsdDaqWire, build
 from simulators.wire import TICK_S, Bench
 
 

@@ -4,8 +4,7 @@ from cobs import cobs
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simulators.psd_daq.cobs import StuffingError, stuff, unstuff
-from simulators.psd_daq.frames import checksum
+from simulators.psd_daq.frames import StuffingError, checksum, stuff, unstuff
 
 content = st.one_of(
     st.binary(max_size=300),

@@ -8,14 +8,16 @@ import pytest
 from simulators.conceal.case import Case, conceal
 from simulators.conceal.wanted import Wanted
 from simulators.streams.devices import DARK_A, EPOCH_S, HOST_S, photocurrents_a
-from simulators.streams.early_reading import EarlyReading
-from simulators.streams.fault import Fault
-from simulators.streams.faults import FAULTS
-from simulators.streams.lagging_encoder import LaggingEncoder
-from simulators.streams.late_stamps import LateStamps
+from simulators.streams.faults import (
+    FAULTS,
+    EarlyReading,
+    Fault,
+    LaggingEncoder,
+    LateStamps,
+    SlippingEncoder,
+    SwingingFoot,
+)
 from simulators.streams.session import StreamedSession, streamed
-from simulators.streams.slipping_encoder import SlippingEncoder
-from simulators.streams.swinging_foot import SwingingFoot
 
 PORTS = {"time", "base.pose", *(f"joint{i}.angle" for i in range(1, 7))}
 PHYSICS = {"latency", "reading-lag", "encoder-slip", "not-settled", "ringing"}

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simulators.ur.time_law import trapezoid
+from simulators.ur.moves import trapezoid
 
 positive = st.floats(1e-3, 1e2)
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from simulators.world.repeatability import SEATING_S, Repeatability
+from simulators.world.body import SEATING_S, Repeatability
 from simulators.world.world import World
 
 SIGMA_RAD = 3e-6

@@ -1,0 +1,72 @@
+"""Mechanisms under the arm."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulators.arm.rigid import turned
+from simulators.arm.statics import Load
+from simulators.defects.defect import ROBOT, Defect
+from simulators.defects.displacement import Bump, Settling
+from simulators.defects.scene import Scene, Site
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class BumpedBase(Bump):
+    """A foot that was knocked."""
+
+    KIND = "bumped-base"
+    PHYSICS = "base-moved"
+    PORT = "base.pose"
+    TYPICAL = 4e-5
+    TURNS_RAD_M = (0.3, 1.5)
+    INSTRUMENTS = ("dual-psd", "seat")
+
+    def base_motion(self, scene: Scene, load: Load) -> Floats:
+        return self.motion(scene)
+
+
+@dataclass(frozen=True)
+class DriftingBase(Settling):
+    """A table or a foot that settles."""
+
+    KIND = "drifting-base"
+    PHYSICS = "base-moved"
+    PORT = "base.pose"
+    TYPICAL = 5e-5
+    TURNS_RAD_M = (0.3, 1.5)
+    INSTRUMENTS = ("dual-psd", "seat")
+
+    def base_motion(self, scene: Scene, load: Load) -> Floats:
+        return self.motion(scene)
+
+
+@dataclass(frozen=True)
+class SoftPedestal(Defect):
+    """A pedestal that leans `compliance_rad_nm` per newton metre of the arm's overturning moment.
+
+    A spring against tilting in two directions: tilt = moment / stiffness, about the foot. Twisting about the vertical
+    carries no weight and stays.
+    """
+
+    compliance_rad_nm: float
+
+    KIND = "soft-pedestal"
+    PHYSICS = "base-compliance"
+    PORT = "base.pose"
+    DRIVERS = ("overturning_moment",)
+    SIZE = "compliance_rad_nm"
+    TYPICAL = 2e-6
+    INSTRUMENTS = ROBOT
+    FIGURES = ("compliance_rad_nm",)
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        return cls(cls.draw_size(rng))
+
+    def base_motion(self, scene: Scene, load: Load) -> Floats:
+        return turned(self.compliance_rad_nm * load.moment_nm[:, 0] * np.array([1.0, 1.0, 0.0]))

@@ -1,0 +1,72 @@
+"""Parts of the set-up that move as a whole while a session lasts: at once, or slowly to an end."""
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulators.arm.rigid import Vector, moved
+from simulators.defects.defect import Defect, direction
+from simulators.defects.scene import Scene, Site
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Displacement(Defect):
+    """Moves by `shift_m`, and turns about `turn_rad_m` for each metre of it."""
+
+    shift_m: float
+    along: Vector
+    turn_rad_m: float
+    about: Vector
+
+    DRIVERS = ("t",)
+    SIZE = "shift_m"
+    TURNS_RAD_M: ClassVar[tuple[float, float]]  # range of `turn_rad_m`
+
+    def displaced(self, gone_m: Floats) -> Floats:
+        """Motion (row, 4, 4) of a part that has gone `gone_m` (row,) on its way."""
+        far_m = gone_m[:, np.newaxis]
+        return moved(far_m * np.asarray(self.along), self.turn_rad_m * far_m * np.asarray(self.about))
+
+    @classmethod
+    def _draw_way(cls, rng: np.random.Generator) -> tuple[float, Vector, float, Vector]:
+        return cls.draw_size(rng), direction(rng), float(rng.uniform(*cls.TURNS_RAD_M)), direction(rng)
+
+
+@dataclass(frozen=True)
+class Bump(Displacement):
+    """Knocked: from `at_s` on it stands elsewhere."""
+
+    at_s: float
+
+    FIGURES = ("at_s", "shift_m")
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        at_s = site.middle_s(rng)
+        return cls(*cls._draw_way(rng), at_s)
+
+    def motion(self, scene: Scene) -> Floats:
+        """(row, 4, 4) of the part in its own frame."""
+        return self.displaced(np.where(scene.t_s >= self.at_s, self.shift_m, 0.0))
+
+
+@dataclass(frozen=True)
+class Settling(Displacement):
+    """Slowly moves and turns, more slowly as time goes on: by `shift_m` in the end, with one time constant."""
+
+    time_constant_s: float
+
+    FIGURES = ("shift_m", "time_constant_s")
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        time_constant_s = float(rng.uniform(0.2, 0.6) * site.duration_s)
+        return cls(*cls._draw_way(rng), time_constant_s)
+
+    def motion(self, scene: Scene) -> Floats:
+        """(row, 4, 4) of the part in its own frame."""
+        return self.displaced(self.shift_m * (1.0 - np.exp(-scene.t_s / self.time_constant_s)))

@@ -1,0 +1,365 @@
+"""Mechanisms between the shaft whose angle is read and the joint's output; also samples taken while it moves."""
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulators.arm.statics import Load
+from simulators.defects.defect import ROBOT, Defect, phase
+from simulators.defects.scene import Scene, Site, UnsuitedError
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DriveDefect(Defect):
+    """Of the drive of one joint; a member says by how much its output turns."""
+
+    joint: int
+
+    PORT = "joint{joint}.angle"
+    DRIVERS: ClassVar[tuple[str, ...]] = ("q{joint}",)
+    INSTRUMENTS = ROBOT
+
+    def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
+        """Output less shaft of this joint, (row,), for shafts at `shaft_rad` (row, n)."""
+        raise NotImplementedError(type(self).__name__)
+
+    def extra_turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
+        extra_rad = np.zeros_like(shaft_rad)
+        extra_rad[:, self.joint - 1] = self.turn_rad(shaft_rad, scene, load)
+        return extra_rad
+
+
+# --- gears
+
+
+@dataclass(frozen=True)
+class GearRunout(DriveDefect):
+    """A pinion `runout_m` off its axis: once per turn of it the output leads and lags, and a little at twice that.
+
+    The pinion of pitch radius r runs e off its axis; the wheel is driven by the place where the teeth meet, so the
+    output is off by e sin(N q - b) / R, with N the gear ratio and R the wheel's pitch radius (Munro, "A review of the
+    theory and measurement of gear transmission error", IMechE 1990: long-wave part). The second tooth flank adds
+    `second` of it at 2 N.
+    """
+
+    runout_m: float
+    ratio: float
+    second: float
+    bearing_rad: float
+    wheel_radius_m: float = 0.05
+
+    KIND = "gear-runout"
+    PHYSICS = "gear-transmission-error"
+    SIZE = "runout_m"
+    TYPICAL = 2.5e-6  # 50 urad at 50 mm
+    NEEDS = ("gear_ratio",)
+
+    @property
+    def figures(self) -> dict[str, float]:
+        return {"amplitude_rad": abs(self.runout_m) / self.wheel_radius_m, "order": self.ratio}
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        joint = site.geared_joint(rng)
+        return cls(joint, cls.draw_size(rng), site.gear_ratio[joint - 1], float(rng.choice([0.0, 0.3])), phase(rng))
+
+    def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
+        pinion_rad = self.ratio * shaft_rad[:, self.joint - 1] - self.bearing_rad
+        lead_m = self.runout_m * (np.sin(pinion_rad) + self.second * np.sin(2.0 * pinion_rad + 1.0))
+        return lead_m / self.wheel_radius_m
+
+
+@dataclass(frozen=True)
+class WrongRatio(DriveDefect):
+    """A gear ratio that the controller has wrong: the joint turns `excess` too far in proportion (no unit).
+
+    A friction or belt stage whose wheel diameter is off, or an encoder scale with a missing line: every turn is off
+    alike.
+    """
+
+    excess: float
+
+    KIND = "wrong-gear-ratio"
+    PHYSICS = "gear-ratio-error"
+    SIZE = "excess"
+    TYPICAL = 1e-4
+
+    @property
+    def figures(self) -> dict[str, float]:
+        return {"scale_error_rad_per_rad": self.excess}
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        return cls(site.any_joint(rng), cls.draw_signed(rng))
+
+    def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
+        return self.excess * shaft_rad[:, self.joint - 1]
+
+
+@dataclass(frozen=True)
+class CoupledWrist(DriveDefect):
+    """A wrist whose drive shafts run through each other: joint `joint` turns by `share` of joint `other` (no unit).
+
+    The concentric shafts of a wrist drive bevel gears; the controller takes the coupling out with a ratio, and what is
+    wrong with that ratio remains as a share of the other joint's turn.
+    """
+
+    other: int
+    share: float
+
+    KIND = "coupled-wrist"
+    PHYSICS = "joint-coupling"
+    DRIVERS = ("q{other}",)
+    SIZE = "share"
+    TYPICAL = 1e-4
+
+    @property
+    def figures(self) -> dict[str, float]:
+        return {"coupling_rad_per_rad": self.share}
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        if not site.gear_ratio or site.n_joints < 6:
+            raise UnsuitedError("the arm has no driven wrist")
+        joint, other = [(5, 4), (6, 5), (6, 4)][int(rng.integers(3))]
+        return cls(joint, other, cls.draw_signed(rng))
+
+    def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
+        return self.share * shaft_rad[:, self.other - 1]
+
+
+# --- play
+
+
+@dataclass(frozen=True)
+class SlackDrive(DriveDefect):
+    """Slack of `play_rad` between the flanks: the output trails the motor by half the play, on the side it came from.
+
+    The play operator with the whole history of the motion (see `played`): a move shorter than the play leaves the
+    output where it was. Friction holds the output against gravity.
+    """
+
+    play_rad: float
+
+    KIND = "slack-drive"
+    PHYSICS = "backlash"
+    DRIVERS = ("approach{joint}",)
+    SIZE = "play_rad"
+    TYPICAL = 1e-4
+    NEEDS = ("approach",)
+    FIGURES = ("play_rad",)
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        return cls(site.geared_joint(rng), cls.draw_size(rng))
+
+    def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
+        column = self.joint - 1
+        return played(scene.via_rad[:, column], scene.goal_rad[:, column], self.play_rad)
+
+
+@dataclass(frozen=True)
+class SlackUnderWeight(DriveDefect):
+    """Slack of `play_rad` in a drive too smooth to hold its load: the output lies on the lower flank.
+
+    Near balance friction of the output (`friction_nm`) holds it between the flanks: the offset goes over from one flank
+    to the other in proportion to the torque, min(max(torque / friction, -1), 1).
+    """
+
+    play_rad: float
+    friction_nm: float
+
+    KIND = "slack-under-weight"
+    PHYSICS = "backlash"
+    DRIVERS = ("gravity_torque{joint}",)
+    SIZE = "play_rad"
+    TYPICAL = 2e-4
+    FIGURES = ("play_rad",)
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        if not site.gear_ratio:
+            raise UnsuitedError("the arm has no gears")
+        return cls(site.loaded_joint(rng), cls.draw_size(rng), float(rng.uniform(0.1, 0.5)))
+
+    def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
+        lean = np.clip(load.torque_nm[:, self.joint - 1] / self.friction_nm, -1.0, 1.0)
+        return 0.5 * self.play_rad * lean
+
+
+def played(via_rad: Floats, goal_rad: Floats, play_rad: float) -> Floats:
+    """Driven less driving side at the goal of each row, (row,), for one joint, with the history of the motion.
+
+    The play operator (Visintin, "Differential Models of Hysteresis", 1994, section III.2): the driven side stays where
+    it is until one flank of the driving side meets it, w <- min(max(w, u - b/2), u + b/2). The driving side goes from
+    goal to `via_rad` and on to the next `goal_rad`, both (row,), row by row; the driven side first stands in the
+    middle.
+    """
+    half_rad = 0.5 * play_rad
+    driven_rad = via_rad[0]
+    behind_rad = np.empty_like(goal_rad)
+    for row, (via, goal) in enumerate(zip(via_rad.tolist(), goal_rad.tolist(), strict=True)):
+        for driving in (via, goal):
+            driven_rad = min(max(driven_rad, driving - half_rad), driving + half_rad)
+        behind_rad[row] = driven_rad - goal
+    return behind_rad
+
+
+# --- compliance
+
+
+@dataclass(frozen=True)
+class SoftJoint(DriveDefect):
+    """A joint that turns `compliance_rad_nm` per newton metre, like a torsion spring, under the weight beyond it.
+
+    Hooke: turn = torque / stiffness, in the pose that the deflected arm truly takes, with its true masses.
+    """
+
+    compliance_rad_nm: float
+
+    KIND = "soft-joint"
+    PHYSICS = "joint-compliance"
+    DRIVERS = ("gravity_torque{joint}",)
+    SIZE = "compliance_rad_nm"
+    TYPICAL = 5e-6  # 1 to 10 urad/Nm: arms of 10 to 200 kg
+    FIGURES = ("compliance_rad_nm",)
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        return cls(site.loaded_joint(rng), cls.draw_size(rng))
+
+    def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
+        return self.compliance_rad_nm * load.torque_nm[:, self.joint - 1]
+
+
+@dataclass(frozen=True)
+class TwoSlopeFlexspline(DriveDefect):
+    """A strain-wave gear: soft up to `knee_nm` while the flexspline's teeth find their seat, stiffer beyond.
+
+    Harmonic Drive, "Engineering data", torsional stiffness: K1 up to the torque T1, K2 = K1 / `hardening` beyond;
+    deflection is T / K1 below and T1 / K1 + (T - T1) / K2 above, the same for both senses.
+    """
+
+    compliance_rad_nm: float
+    hardening: float
+    knee_nm: float
+
+    KIND = "two-slope-flexspline"
+    PHYSICS = "joint-compliance"
+    DRIVERS = ("gravity_torque{joint}",)
+    SIZE = "compliance_rad_nm"
+    TYPICAL = 6e-6
+    FIGURES = ("compliance_rad_nm", "knee_nm")
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        joint = site.loaded_joint(rng)
+        knee_nm = float(rng.uniform(0.3, 0.7) * site.torque_nm[joint - 1])
+        return cls(joint, cls.draw_size(rng), float(rng.uniform(0.3, 0.7)), knee_nm)
+
+    def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
+        torque_nm = load.torque_nm[:, self.joint - 1]
+        soft_nm = np.clip(torque_nm, -self.knee_nm, self.knee_nm)
+        return self.compliance_rad_nm * (soft_nm + self.hardening * (torque_nm - soft_nm))
+
+
+@dataclass(frozen=True)
+class PayloadOnSoftJoint(DriveDefect):
+    """A soft joint whose controller takes its own weight into account but knows nothing of the payload.
+
+    The drive is a torsion spring; the feed-forward of the arm's own weight winds it back, so only the payload's torque
+    is left to turn the output.
+    """
+
+    compliance_rad_nm: float
+
+    KIND = "payload-on-soft-joint"
+    PHYSICS = "payload-compliance"
+    DRIVERS = ("payload",)
+    SIZE = "compliance_rad_nm"
+    TYPICAL = 1e-5
+    HABIT = "payload"
+    NEEDS = ("payload_kg",)
+    FIGURES = ("compliance_rad_nm",)
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        return cls(site.loaded_joint(rng), cls.draw_size(rng))
+
+    def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
+        return self.compliance_rad_nm * load.payload_torque_nm[:, self.joint - 1]
+
+
+# --- all drives still on their way
+
+
+@dataclass(frozen=True)
+class Unsettled(Defect):
+    """Samples taken before the arm stands: `left` of the last move is still to go (no unit).
+
+    Every joint still creeps towards its goal, which is what the controller reports. First-order settling (a position
+    loop without integrator): what is left of the move after `wait` is exp(-wait / T). The field is that rest; it is the
+    same for all joints and all moves, as the program waits the same time after each.
+    """
+
+    left: float
+    joints: int
+
+    KIND = "unsettled"
+    PHYSICS = "not-settled"
+    PORT = "time"
+    SIZE = "left"
+    TYPICAL = 1e-5
+    INSTRUMENTS = ROBOT
+    HABIT = "direct"
+
+    @property
+    def drivers(self) -> tuple[str, ...]:
+        return tuple(f"last_move{joint}" for joint in range(1, self.joints + 1))
+
+    @property
+    def figures(self) -> dict[str, float]:
+        return {"left_share": self.left}
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        return cls(cls.draw_size(rng), site.n_joints)
+
+    def extra_turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
+        return -self.left * scene.last_move_rad
+
+
+@dataclass(frozen=True)
+class LateClock(Defect):
+    """Clocks that disagree: the instrument reads `late_s` after the encoders, while the arm moves on."""
+
+    late_s: float
+    joints: int
+
+    KIND = "late-clock"
+    PHYSICS = "latency"
+    PORT = "time"
+    SIZE = "late_s"
+    TYPICAL = 2e-3
+    INSTRUMENTS = ROBOT
+    HABIT = "moving"
+    NEEDS = ("qd",)
+
+    @property
+    def drivers(self) -> tuple[str, ...]:
+        return tuple(f"qd{joint}" for joint in range(1, self.joints + 1))
+
+    @property
+    def figures(self) -> dict[str, float]:
+        return {"delay_s": self.late_s}
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        return cls(cls.draw_signed(rng), site.n_joints)
+
+    def extra_turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
+        return self.late_s * scene.qd_rad_s

@@ -1,0 +1,84 @@
+"""Mechanisms under what the arm is measured against: the dual-PSD fixture and the cones."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simulators.arm.rigid import Vector, moved
+from simulators.defects.defect import SPOTS, Defect, direction
+from simulators.defects.scene import Scene, Site
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class BumpedFixture(Defect):
+    """A fixture that was knocked at a place: it moves by `shift_m` at `at_s`, until it leaves that place.
+
+    It also turns about `turn_rad_m` for each metre.
+    """
+
+    place: int
+    shift_m: float
+    along: Vector
+    turn_rad_m: float
+    about: Vector
+    at_s: float
+    until_s: float
+
+    KIND = "bumped-fixture"
+    PHYSICS = "fixture-moved"
+    PORT = "fixture.pose"
+    DRIVERS = ("t",)
+    SIZE = "shift_m"
+    TYPICAL = 3e-5
+    INSTRUMENTS = SPOTS
+
+    @property
+    def figures(self) -> dict[str, float]:
+        return {"at_s": self.at_s, "placement": float(self.place), "shift_m": self.shift_m}
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        place = int(rng.choice(site.places))
+        at_s, until_s = site.stay_s(place, rng)
+        way = cls.draw_size(rng), direction(rng), float(rng.uniform(0.0, 3.0)), direction(rng)
+        return cls(place, *way, at_s, until_s)
+
+    def fixture_motion(self, scene: Scene) -> Floats:
+        knocked = (scene.placement == self.place) & (scene.t_s >= self.at_s) & (scene.t_s < self.until_s)
+        far_m = np.where(knocked, self.shift_m, 0.0)[:, np.newaxis]
+        return moved(far_m * np.asarray(self.along), self.turn_rad_m * far_m * np.asarray(self.about))
+
+
+@dataclass(frozen=True)
+class MovedCone(Defect):
+    """A cone that was pushed by `shift_m` at `at_s`."""
+
+    cone: int
+    shift_m: float
+    along: Vector
+    at_s: float
+
+    KIND = "moved-cone"
+    PHYSICS = "seat-moved"
+    PORT = "seat.position"
+    DRIVERS = ("t",)
+    SIZE = "shift_m"
+    TYPICAL = 4e-5
+    INSTRUMENTS = ("seat",)
+
+    @property
+    def figures(self) -> dict[str, float]:
+        return {"at_s": self.at_s, "seat": float(self.cone), "shift_m": self.shift_m}
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        at_s = site.middle_s(rng)
+        return cls(int(rng.choice(site.seats)), cls.draw_size(rng), direction(rng), at_s)
+
+    def seat_shift_m(self, scene: Scene) -> Floats:
+        pushed = (scene.seat == self.cone) & (scene.t_s >= self.at_s)
+        return np.where(pushed, self.shift_m, 0.0)[:, np.newaxis] * np.asarray(self.along)
