@@ -8,7 +8,7 @@ import msgspec
 from cyclopts import Parameter, validators
 from rich.console import Console
 
-from calibeam.fleet.layout import PAGE, TABLE
+from calibeam.fleet.settings import PAGE, TABLE
 from calibeam.fleet.workers import Engine, Workers
 from calibeam.outcome import PartialResult
 from calibeam.progress_bar import progress_bar

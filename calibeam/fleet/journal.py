@@ -10,8 +10,8 @@ from typing import IO, Self
 import msgspec
 
 from acquisition.recording.errors import RecordingError, shown
-from calibeam.fleet.layout import JOURNAL, TABLE
 from calibeam.fleet.row import Row
+from calibeam.fleet.settings import JOURNAL, TABLE
 from calibeam.fleet.table import read_rows, write_rows
 from calibeam.recorded import uninterrupted
 

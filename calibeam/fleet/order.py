@@ -12,7 +12,7 @@ from calibeam.fleet.found import Found, content_sha256
 from calibeam.fleet.row import Outcome, Row
 from calibeam.software import SOFTWARE
 
-CHILD = (sys.executable, "-P", "-m", "calibeam.fleet.child")
+CHILD = (sys.executable, "-P", "-m", "calibeam.fleet.worker")
 
 
 class Task(msgspec.Struct, frozen=True):

@@ -36,7 +36,7 @@ ASKS = {
 }
 PROMPTERS = {"input", "rich.prompt", "readline", "getpass", "click"}
 # Processes whose standard input is a pipe of the program that started them.
-FED = {"calibeam/fleet/child.py", "calibeam/prove/blind.py", "simulators/__main__.py", "simulators/serve.py"}
+FED = {"calibeam/fleet/worker.py", "calibeam/prove/blind.py", "simulators/__main__.py", "simulators/serve.py"}
 
 
 class MovedError(AcquisitionError):

@@ -1,4 +1,4 @@
-"""Stands in for calibeam.fleet.child: the same lines in and out."""
+"""Stands in for calibeam.fleet.worker: the same lines in and out."""
 
 import hashlib
 import json

@@ -6,8 +6,8 @@ import pytest
 
 from acquisition.recording.errors import RecordingError
 from calibeam.fleet.journal import Journal
-from calibeam.fleet.layout import JOURNAL
 from calibeam.fleet.row import Cause, Outcome, Row, Zero
+from calibeam.fleet.settings import JOURNAL
 from calibeam.fleet.table import read_rows, write_rows
 
 FULL = Row(
