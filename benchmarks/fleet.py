@@ -11,10 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.fleet_sessions import Robot, write_fleet
-from calibeam.fleet.drift import FAMILY, drifts_of
+from calibeam.fleet.drift import FAMILY, Series, drifts_of
 from calibeam.fleet.run import Wanted, run
-from calibeam.fleet.series import Series
-from calibeam.fleet.workers import Engine, Workers
+from calibeam.fleet.settings import Engine, Workers
 
 FILES = (12, 24, 48)
 SAMPLES = 40  # the least that is still identified: what is measured is the spreading

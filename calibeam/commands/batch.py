@@ -8,8 +8,7 @@ import msgspec
 from cyclopts import Parameter, validators
 from rich.console import Console
 
-from calibeam.fleet.settings import PAGE, TABLE
-from calibeam.fleet.workers import Engine, Workers
+from calibeam.fleet.settings import PAGE, TABLE, Engine, Workers
 from calibeam.outcome import PartialResult
 from calibeam.progress_bar import progress_bar
 from calibrate.errors import DataError
@@ -67,10 +66,13 @@ def batch_command(
         Print counts, drifts, shared causes and failures on one line, and nothing else.
 
     """
-    from calibeam.fleet.lines import print_fleet, record  # with joblib, Arrow, matplotlib: only where they are wanted
     from calibeam.fleet.page import write_fleet_page
     from calibeam.fleet.run import Wanted, run
     from calibeam.fleet.summary import Fleet
+    from calibeam.printing.fleet import (  # with joblib, Arrow, matplotlib: only where they are wanted
+        print_fleet,
+        record,
+    )
 
     workers = Workers(engine, jobs or os.cpu_count() or 1, scheduler)
     wanted = Wanted(diagnose, again, robot_by_folder, timeout or None, workers)

@@ -17,10 +17,9 @@ from typing import Any
 from joblib import Parallel, delayed, parallel_config
 from joblib.externals.loky.backend import resource_tracker as loky_tracker
 
-from calibeam.fleet.order import Order
-from calibeam.fleet.row import Row
+from calibeam.fleet.row import Order, Row
+from calibeam.fleet.settings import Engine, Workers
 from calibeam.fleet.supervised import START_S, rest, worked
-from calibeam.fleet.workers import Engine, Workers
 from calibeam.worker_processes import without_ctrl_c
 from calibrate.errors import DataError
 

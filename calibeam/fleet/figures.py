@@ -9,9 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from calibeam.fleet.drift import Drift
-from calibeam.fleet.series import YEAR_S, Series
-from calibeam.fleet.shared import Shared
+from calibeam.fleet.drift import YEAR_S, Drift, Series
+from calibeam.fleet.summary import Shared
 from calibrate.report.elements import Html
 from calibrate.report.svg import drawn
 from calibrate.report.tones import PLACES, Tone

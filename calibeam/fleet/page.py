@@ -3,10 +3,9 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from calibeam.fleet.drift import FEWEST
+from calibeam.fleet.drift import FEWEST, all_series
 from calibeam.fleet.figures import over_time, who_shares
 from calibeam.fleet.row import Row
-from calibeam.fleet.series import all_series
 from calibeam.fleet.summary import Fleet, drift_words, method_words, shared_words
 from calibeam.software import SOFTWARE
 from calibrate.report.elements import Html, bullets, figure, folded, join, section, table, tag

@@ -15,8 +15,7 @@ from collections.abc import Callable
 
 import msgspec
 
-from calibeam.fleet.order import Order, death
-from calibeam.fleet.row import Row
+from calibeam.fleet.row import Order, Row, death
 
 START_S = 120.0  # to load all libraries on a busy machine with a cold disk; 1 s as a rule
 ONE_THREAD = dict.fromkeys(

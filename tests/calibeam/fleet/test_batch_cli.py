@@ -11,13 +11,12 @@ from acquisition.recording.rig import load_rig
 from benchmarks.fleet_sessions import Robot, write_fleet
 from calibeam.cli import run
 from calibeam.commands.batch import _end
-from calibeam.fleet.found import recordings
-from calibeam.fleet.judge import _zeros, judged
-from calibeam.fleet.order import Task
-from calibeam.fleet.row import Outcome, Zero
+from calibeam.fleet.recordings import recordings
+from calibeam.fleet.row import Outcome, Task, Zero
 from calibeam.fleet.run import Ran
 from calibeam.fleet.summary import Fleet
 from calibeam.fleet.table import read_rows
+from calibeam.fleet.worker import _zeros, judged
 from calibeam.outcome import PartialResult
 from calibrate.model_file import ModelParameter
 

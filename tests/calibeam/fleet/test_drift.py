@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from calibeam.fleet.drift import FAMILY, common_scatter, drifts, drifts_of, holm, line
+from calibeam.fleet.drift import FAMILY, Series, all_series, common_scatter, drifts, drifts_of, holm, line, year_of
 from calibeam.fleet.row import Outcome, Row, Zero
-from calibeam.fleet.series import Series, all_series, year_of
 
 SIGMA = 2e-5
 

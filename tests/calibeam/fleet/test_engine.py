@@ -6,10 +6,9 @@ from dataclasses import replace
 import pytest
 
 from calibeam.fleet.engine import LOST, rows
-from calibeam.fleet.found import recordings
-from calibeam.fleet.order import Order, Task
-from calibeam.fleet.row import Outcome, Row
-from calibeam.fleet.workers import Engine, Workers
+from calibeam.fleet.recordings import recordings
+from calibeam.fleet.row import Order, Outcome, Row, Task
+from calibeam.fleet.settings import Engine, Workers
 from calibrate.errors import DataError
 
 NAMES = [f"{letter}.mcap" for letter in "abcdefgh"]

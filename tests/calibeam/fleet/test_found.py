@@ -2,7 +2,7 @@
 
 import pytest
 
-from calibeam.fleet.found import content_sha256, recordings
+from calibeam.fleet.recordings import content_sha256, recordings
 from calibrate.errors import DataError
 
 

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from calibeam.fleet.lines import record
 from calibeam.fleet.page import LISTED, fleet_html
 from calibeam.fleet.row import Cause, Outcome, Row, Zero
 from calibeam.fleet.run import Ran
-from calibeam.fleet.shared import causes
-from calibeam.fleet.summary import Fleet, shared_words
+from calibeam.fleet.summary import Fleet, causes, shared_words
+from calibeam.printing.fleet import record
 
 DAYS = ("2025-01-01", "2025-07-01", "2026-01-01", "2026-07-01")
 FOUND = Cause("joint3.angle", "q3", "harmonic", "encoder-eccentricity", 0.99, 0.8, "…")

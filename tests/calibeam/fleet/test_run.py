@@ -6,8 +6,8 @@ import pytest
 from calibeam.fleet import run as module
 from calibeam.fleet.row import Outcome
 from calibeam.fleet.run import Wanted, run
+from calibeam.fleet.settings import Workers
 from calibeam.fleet.table import read_rows
-from calibeam.fleet.workers import Workers
 
 ONE = Workers(jobs=1)  # in this process: who reads is a process of its own all the same
 
@@ -73,7 +73,7 @@ def test_a_more_thorough_run_or_one_that_is_forced_does_all_again(ran, folder):
 def test_an_update_of_the_program_does_all_again(ran, folder, monkeypatch):
     root = folder("a.mcap")
     ran(root)
-    monkeypatch.setattr("calibeam.fleet.standing.SOFTWARE", "calibeam of tomorrow")
+    monkeypatch.setattr("calibeam.fleet.run.SOFTWARE", "calibeam of tomorrow")
     assert ran(root).stood == 0
 
 

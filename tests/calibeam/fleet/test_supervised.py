@@ -2,9 +2,8 @@
 
 import pytest
 
-from calibeam.fleet.found import recordings
-from calibeam.fleet.order import Order, Task
-from calibeam.fleet.row import Outcome
+from calibeam.fleet.recordings import recordings
+from calibeam.fleet.row import Order, Outcome, Task
 from calibeam.fleet.supervised import Child
 
 

@@ -5,10 +5,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from acquisition.recording.errors import RecordingError
-from calibeam.fleet.journal import Journal
 from calibeam.fleet.row import Cause, Outcome, Row, Zero
 from calibeam.fleet.settings import JOURNAL
-from calibeam.fleet.table import read_rows, write_rows
+from calibeam.fleet.table import Journal, read_rows, write_rows
 
 FULL = Row(
     path="/f/a.mcap",

@@ -23,10 +23,10 @@ from acquisition.recording.can_message import frame_of
 from acquisition.recording.rig import load_rig, rig_sha256, rig_text
 from acquisition.recording.stream import Channel, Event, Gap
 from acquisition.recording.writer import RecordingWriter
-from calibeam.fleet.found import recordings
-from calibeam.fleet.judge import judged
-from calibeam.fleet.order import Task
+from calibeam.fleet.recordings import recordings
+from calibeam.fleet.row import Task
 from calibeam.fleet.table import write_rows
+from calibeam.fleet.worker import judged
 from calibeam.guided.arm import BelievedGuidedArm
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.eccentric import with_discs
