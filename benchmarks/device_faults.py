@@ -25,7 +25,7 @@ from acquisition.recording.rig_devices import PsdDriver, RobotDriver
 from acquisition.recording.rig_schema import Rig
 from acquisition.streams import Pump
 from acquisition.supervisor import Supervisor
-from calibeam.encoders import emulated_encoders, encoder_driver
+from calibeam.devices.encoders import emulated_encoders, encoder_driver
 from calibeam.psd import emulated_psd, psd_driver
 from calibeam.robot import emulated_robot, robot_of
 from drivers.clock import Clock, SystemClock

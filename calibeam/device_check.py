@@ -14,7 +14,7 @@ from acquisition.recording.errors import RigFileError, brief
 from acquisition.recording.rig_devices import EncoderDriver, RobotDriver
 from acquisition.recording.rig_schema import Camera, Rig
 from calibeam.camera import camera_sight
-from calibeam.encoders import encoder_driver, identities_of
+from calibeam.devices.encoders import encoder_driver, identities_of
 from calibeam.listened import bus_trouble, noise, pace, uneven_layers
 from calibeam.psd import psd_driver, psd_view
 from calibeam.robot import robot_of

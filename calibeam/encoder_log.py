@@ -20,9 +20,9 @@ from acquisition.recording.stream import Channel, Gap
 from acquisition.recording.writer import RecordingWriter
 from acquisition.reopening import Reopening
 from acquisition.streams import Pump
-from calibeam.encoders import VIEWED, encoder_driver, identities_of, names_of
+from calibeam.devices.encoders import VIEWED, encoder_driver, identities_of, names_of
+from calibeam.devices.recorder import uninterrupted
 from calibeam.interrupts import ENDING
-from calibeam.recorded import uninterrupted
 from calibeam.software import SOFTWARE
 from drivers.clock import Clock
 from drivers.device import Block

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from multiprocessing import active_children, get_context, resource_tracker
 from typing import TypeVar
 
-from calibeam.recorded import uninterrupted
+from calibeam.devices.recorder import uninterrupted
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")

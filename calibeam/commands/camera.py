@@ -7,8 +7,8 @@ from rich.console import Console
 from acquisition.recording.errors import RigFileError
 from acquisition.recording.rig import load_rig, rig_text
 from calibeam.asking import YES, at_terminal, someone
+from calibeam.devices.recorder import new_recording
 from calibeam.outcome import CheckFailed
-from calibeam.recorded import new_recording
 from calibeam.site import addresses_of, check_session, connected
 from drivers.clock import SystemClock
 

@@ -9,9 +9,9 @@ from rich.console import Console
 from acquisition.plan import PlanOptions
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.rig import load_rig, rig_text
+from calibeam.devices.recorder import new_recording, record_session
 from calibeam.emulation import Emulation
 from calibeam.progress_bar import progress_bar
-from calibeam.recorded import new_recording, record_session
 from calibeam.reveal import print_revealed, reveal
 from calibeam.site import addresses_of, check_session, connected
 from drivers.clock import SystemClock

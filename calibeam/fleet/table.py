@@ -15,9 +15,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from acquisition.recording.errors import RecordingError, shown
+from calibeam.devices.recorder import uninterrupted
 from calibeam.fleet.row import Row
 from calibeam.fleet.settings import JOURNAL, TABLE
-from calibeam.recorded import uninterrupted
 
 VERSION = b"2"
 KEY = b"calibeam.fleet"

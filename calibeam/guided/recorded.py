@@ -19,11 +19,11 @@ from acquisition.recording.stream import Channel, Event
 from acquisition.recording.writer import RecordingWriter
 from acquisition.streams import Pump
 from acquisition.supervisor import Supervisor
-from calibeam.encoders import VIEWED, emulated_encoders, encoder_driver, identities_of
+from calibeam.devices.encoders import VIEWED, emulated_encoders, encoder_driver, identities_of
+from calibeam.devices.recorder import Interrupted, uninterrupted
 from calibeam.guided.arm import BelievedGuidedArm
 from calibeam.guided.judge import FittedJudge
 from calibeam.outcome import PartialResult, interruption
-from calibeam.recorded import Interrupted, uninterrupted
 from drivers.clock import Clock
 
 STREAM_MEMORY = 400  # blocks: some seconds, of which a dwell needs one

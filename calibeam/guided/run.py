@@ -10,10 +10,10 @@ from rich.console import Console
 from acquisition.guided.guide import Guide
 from acquisition.guided.plan import GuidedOptions, Visit, by_kind, calibration_plan, verification_plan
 from acquisition.recording.rig_schema import Rig
+from calibeam.devices.recorder import new_recording
 from calibeam.guided.hand import EmulatedHand
 from calibeam.guided.recorded import EncoderAddress, record_guided, watching
 from calibeam.guided.view import PersonGuide
-from calibeam.recorded import new_recording
 from drivers.clock import SystemClock
 
 HAND_PATIENCE_S = 30.0  # of emulated time: the longest reach takes 8 s

@@ -13,7 +13,7 @@ from acquisition.recording.errors import RigFileError
 from acquisition.recording.rig_schema import Rig
 from acquisition.streams import Pump
 from acquisition.supervisor import Supervisor
-from calibeam.recorded import uninterrupted
+from calibeam.devices.recorder import uninterrupted
 from calibeam.robot import emulated_robot, robot_of
 from drivers.clock import Clock
 from drivers.device import Block, Movable

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
 
+from calibeam.devices.recorder import uninterrupted
 from calibeam.prove.layout import Layout
-from calibeam.recorded import uninterrupted
 
 KEPT = ("PATH", "HOME", "PYTHONPATH", "LANG", "SYSTEMROOT")  # of the environment; nothing in them is about a case
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")

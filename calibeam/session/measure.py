@@ -18,12 +18,12 @@ from acquisition.servo.centring import Limits
 from acquisition.session import Session, Summary
 from acquisition.wired import WiredBench
 from calibeam.camera import camera_sight
+from calibeam.devices.recorder import end_event, kept, new_recording
 from calibeam.interrupts import INTERRUPTS
 from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibeam.live.feed import Feed
 from calibeam.outcome import PartialResult
-from calibeam.recorded import end_event, kept, new_recording
 from calibeam.session.ahead import Ahead
 from calibeam.session.earlier import STANDS_IN
 from calibeam.session.forecast import Forecast, forecast

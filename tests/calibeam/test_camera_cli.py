@@ -16,9 +16,9 @@ from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.writer import RecordingWriter
 from calibeam.camera import camera_sight
 from calibeam.cli import run
+from calibeam.devices.recorder import record_session
 from calibeam.emulation import Emulation
 from calibeam.progress_bar import progress_bar
-from calibeam.recorded import record_session
 from calibeam.site import addresses_of, connected
 from drivers.clock import SystemClock
 

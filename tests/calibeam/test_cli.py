@@ -9,9 +9,9 @@ from rich.console import Console
 from acquisition.recording.read import read
 from calibeam.cli import run
 from calibeam.conclude import conclude
+from calibeam.devices.recorder import new_recording
 from calibeam.emulation import Emulation
 from calibeam.outcome import PartialResult
-from calibeam.recorded import new_recording
 from drivers.clock import SystemClock
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"

@@ -11,10 +11,10 @@ from acquisition.recording.read import read
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
 from acquisition.recording.samples import Samples
 from acquisition.recording.writer import RecordingWriter
+from calibeam.devices.recorder import record_session
 from calibeam.direct import direct_bench
 from calibeam.pose_design.reachable import candidates_of
 from calibeam.progress_bar import progress_bar
-from calibeam.recorded import record_session
 from calibrate.pose_design.plan_of import blocks_of, plan_of, taken
 from drivers.clock import SystemClock
 

@@ -6,8 +6,8 @@ import pytest
 
 from acquisition.errors import StoppedError
 from acquisition.recording.errors import RecordingError
+from calibeam.devices.recorder import kept
 from calibeam.outcome import PartialResult
-from calibeam.recorded import kept
 from drivers.errors import DeviceLost
 
 STEPS = ("stop", "event", "flush")
