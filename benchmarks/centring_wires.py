@@ -21,9 +21,9 @@ from acquisition.sample import Sample
 from acquisition.servo.centring import Limits
 from acquisition.servo.status import Status
 from acquisition.session import Session
+from calibeam.devices.site import addresses_of, connected
 from calibeam.emulation import Emulation
 from calibeam.learner import FittedLearner
-from calibeam.site import addresses_of, connected
 from drivers.clock import Clock, SystemClock
 
 Floats = NDArray[np.float64]

@@ -24,8 +24,8 @@ from acquisition.recording.rig_schema import Rig
 from acquisition.recording.writer import RecordingWriter
 from benchmarks.slices import Slices
 from calibeam.any_session import Planned, identify_session
+from calibeam.devices.recorder import RecordingJournal
 from calibeam.direct import direct_bench
-from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibeam.pose_design.reachable import candidates_of
 from calibeam.prove.free_space import errors_m

@@ -26,8 +26,8 @@ from acquisition.recording.rig_schema import Rig
 from acquisition.streams import Pump
 from acquisition.supervisor import Supervisor
 from calibeam.devices.encoders import emulated_encoders, encoder_driver
-from calibeam.psd import emulated_psd, psd_driver
-from calibeam.robot import emulated_robot, robot_of
+from calibeam.devices.psd import emulated_psd, psd_driver
+from calibeam.devices.robot import emulated_robot, robot_of
 from drivers.clock import Clock, SystemClock
 from drivers.device import Block, Device, Movable
 from drivers.errors import DeviceError

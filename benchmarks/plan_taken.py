@@ -19,9 +19,9 @@ from acquisition.recording.rig import load_rig, plain_rig, rig_text
 from acquisition.recording.samples import Samples
 from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
+from calibeam.devices.recorder import RecordingJournal
 from calibeam.diagnosis import diagnose_recording, plan_next
 from calibeam.direct import DirectBench
-from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.contests import rival_named

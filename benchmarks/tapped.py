@@ -21,8 +21,8 @@ from acquisition.recording.stream import Channel
 from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
 from benchmarks.disturbed import DisturbedWorld, Trouble
+from calibeam.devices.recorder import RecordingJournal
 from calibeam.direct import DirectBench
-from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
 
 Floats = NDArray[np.float64]

@@ -14,8 +14,8 @@ from acquisition.recording.rig_schema import Rig
 from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
 from calibeam.any_session import identify_session
+from calibeam.devices.recorder import RecordingJournal
 from calibeam.direct import direct_bench
-from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibeam.reveal import Revealed, reveal
 from calibeam.software import SOFTWARE

@@ -8,8 +8,8 @@ from acquisition.recording.errors import RigFileError
 from acquisition.recording.rig import load_rig, rig_text
 from calibeam.asking import YES, at_terminal, someone
 from calibeam.devices.recorder import new_recording
+from calibeam.devices.site import addresses_of, check_session, connected
 from calibeam.outcome import CheckFailed
-from calibeam.site import addresses_of, check_session, connected
 from drivers.clock import SystemClock
 
 
@@ -47,8 +47,8 @@ def camera_command(
         someone(at_terminal(), "whether the arm may move", YES).may_move()
     from acquisition.camera.measuring import CameraMeasuring
     from acquisition.camera.model import write_model
-    from calibeam.camera import opened
-    from calibeam.journal import RecordingJournal
+    from calibeam.devices.camera import opened
+    from calibeam.devices.recorder import RecordingJournal
     from calibeam.learner import FittedLearner
     from calibeam.software import SOFTWARE
 

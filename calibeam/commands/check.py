@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from acquisition.recording.rig import load_rig
-from calibeam.device_check import check_devices
+from calibeam.devices.check import check_devices
 from calibeam.outcome import CheckFailed
 from calibeam.recording_check import check_recording
 from drivers.clock import SystemClock

@@ -10,10 +10,10 @@ from acquisition.plan import PlanOptions
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.rig import load_rig, rig_text
 from calibeam.devices.recorder import new_recording, record_session
+from calibeam.devices.site import addresses_of, check_session, connected
 from calibeam.emulation import Emulation
 from calibeam.progress_bar import progress_bar
 from calibeam.reveal import print_revealed, reveal
-from calibeam.site import addresses_of, check_session, connected
 from drivers.clock import SystemClock
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"

@@ -14,7 +14,7 @@ from acquisition.recording.errors import SamplesError, shown
 from acquisition.recording.rig import load_rig
 from acquisition.recording.rig_devices import PsdDevice
 from calibeam.asking import Asking, NotAgreedError, at_terminal, someone
-from calibeam.psd import PsdInstrument, psd_driver
+from calibeam.devices.psd import PsdInstrument, psd_driver
 from drivers.clock import SystemClock
 from drivers.device import Block
 from drivers.errors import DeviceRefused

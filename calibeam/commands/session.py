@@ -19,6 +19,7 @@ from acquisition.recording.pose_plan import read_pose_plan
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.rig_schema import Rig
 from calibeam.asking import at_terminal
+from calibeam.devices.site import addresses_of, check_session
 from calibeam.emulation import ask_emulators, moves_nothing_real
 from calibeam.guided.recorded import encoder_address, is_guided
 from calibeam.guided.run import plan_of, run_guided
@@ -27,7 +28,6 @@ from calibeam.session.earlier import Earlier, earlier_of
 from calibeam.session.job import Job, with_place
 from calibeam.session.places import new_place, with_places
 from calibeam.session.run import run_session
-from calibeam.site import addresses_of, check_session
 from drivers.clock import SystemClock
 
 ACCURACY_UM = 20.0  # as Job.goal_m

@@ -1,4 +1,7 @@
-"""A session that is recorded: runs the plan, and whatever happens the arm is stopped and the file is whole."""
+"""A session that is recorded: runs the plan, and whatever happens the arm is stopped and the file is whole.
+
+Samples and events of a session go into the recording.
+"""
 
 import signal
 from collections.abc import Callable, Generator, Mapping
@@ -6,7 +9,7 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from types import FrameType
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from rich.progress import Progress as Bar
@@ -23,16 +26,30 @@ from acquisition.recording.read import read
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.stream import Event
 from acquisition.recording.writer import RecordingWriter
+from acquisition.sample import Sample
 from acquisition.servo.centring import Limits
 from acquisition.session import Session, Summary
 from calibeam.emulation import EmulationError
 from calibeam.interrupts import ENDING
-from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibeam.outcome import PartialResult, interruption
 from calibeam.software import SOFTWARE
 from drivers.clock import Clock
 from drivers.errors import DeviceError
+
+
+class RecordingJournal:
+    """Implements acquisition.journal.Journal."""
+
+    def __init__(self, writer: RecordingWriter, clock: Clock) -> None:
+        self._writer, self._clock = writer, clock
+
+    def sample(self, sample: Sample) -> None:
+        self._writer.sample(sample.row(), sample.look.host_s)
+
+    def event(self, kind: str, detail: Mapping[str, Any]) -> None:
+        self._writer.event(Event(self._clock.now_s(), kind, detail))
+
 
 Result = TypeVar("Result")
 

@@ -9,9 +9,9 @@ from acquisition.guarded import Guarded, one_error_tree
 from acquisition.recording.errors import RigFileError
 from acquisition.recording.rig_schema import Devices, Rig
 from calibeam.devices.encoders import encoder_driver
+from calibeam.devices.psd import psd_driver, psd_view
+from calibeam.devices.robot import robot_of
 from calibeam.live.feed import Feed
-from calibeam.psd import psd_driver, psd_view
-from calibeam.robot import robot_of
 from drivers.clock import Clock
 from drivers.device import Device
 from drivers.errors import DeviceError, DeviceRefused

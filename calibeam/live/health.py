@@ -7,7 +7,7 @@ from msgspec import Struct
 
 from acquisition.recording.rig_devices import EncoderDriver
 from acquisition.recording.rig_schema import Rig
-from calibeam.listened import LEAST_RATE
+from calibeam.devices.encoders import LEAST_RATE
 from calibeam.live.latest import Heard
 
 STALE_S = 0.3  # readers themselves give up after 0.5 s; sooner, a busy machine would make a page flicker

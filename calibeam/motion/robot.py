@@ -14,7 +14,7 @@ from acquisition.recording.rig_schema import Rig
 from acquisition.streams import Pump
 from acquisition.supervisor import Supervisor
 from calibeam.devices.recorder import uninterrupted
-from calibeam.robot import emulated_robot, robot_of
+from calibeam.devices.robot import emulated_robot, robot_of
 from drivers.clock import Clock
 from drivers.device import Block, Movable
 from drivers.errors import DeviceError, DeviceRefused, DeviceStale

@@ -14,10 +14,10 @@ from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import parse_rig, plain_rig, rig_text
 from calibeam.devices.recorder import new_recording, record_session
+from calibeam.devices.site import addresses_of, connected
 from calibeam.emulation import EmulationError
 from calibeam.outcome import PartialResult
 from calibeam.progress_bar import progress_bar
-from calibeam.site import addresses_of, connected
 from calibrate.diagnose.streams.sample_times import sample_windows
 from drivers.clock import SystemClock
 from drivers.errors import DeviceError

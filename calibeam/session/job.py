@@ -9,9 +9,9 @@ from acquisition.errors import AcquisitionError
 from acquisition.plan import Block, PlanOptions, PoseKey, blocks
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig_schema import Placement, Rig
+from calibeam.devices.site import Addresses
 from calibeam.session.earlier import PLAN_NOTE, SEED_NOTE, Earlier
 from calibeam.session.places import moved_plan, with_places
-from calibeam.site import Addresses
 
 MORE = 100  # index from which poses that a person asked for in addition are counted, round by round
 

@@ -17,10 +17,10 @@ from acquisition.sample import Sample
 from acquisition.servo.centring import Limits
 from acquisition.session import Session, Summary
 from acquisition.wired import WiredBench
-from calibeam.camera import camera_sight
-from calibeam.devices.recorder import end_event, kept, new_recording
+from calibeam.devices.camera import camera_sight
+from calibeam.devices.recorder import RecordingJournal, end_event, kept, new_recording
+from calibeam.devices.site import connected
 from calibeam.interrupts import INTERRUPTS
-from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibeam.live.feed import Feed
 from calibeam.outcome import PartialResult
@@ -32,7 +32,6 @@ from calibeam.session.job import Job, Part, notes_of
 from calibeam.session.keys import Keys
 from calibeam.session.person import Person
 from calibeam.session.teller import Teller, ToldJournal
-from calibeam.site import connected
 from drivers.clock import Clock
 
 FORECAST_EVERY = 5  # poses; one takes a tenth of a second, in a thread of its own

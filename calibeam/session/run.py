@@ -16,7 +16,7 @@ from acquisition.recording.parts import next_part, parts
 from acquisition.recording.rig_schema import Placement
 from acquisition.session import Summary
 from calibeam.asking import Asking
-from calibeam.device_check import DeviceCheck, check_devices
+from calibeam.devices.check import DeviceCheck, check_devices
 from calibeam.interrupts import INTERRUPTS
 from calibeam.learner import FittedLearner
 from calibeam.live.feed import SILENT, Feed

@@ -14,12 +14,12 @@ from acquisition.recording.errors import RigFileError
 from acquisition.recording.read import read
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.writer import RecordingWriter
-from calibeam.camera import camera_sight
 from calibeam.cli import run
+from calibeam.devices.camera import camera_sight
 from calibeam.devices.recorder import record_session
+from calibeam.devices.site import addresses_of, connected
 from calibeam.emulation import Emulation
 from calibeam.progress_bar import progress_bar
-from calibeam.site import addresses_of, connected
 from drivers.clock import SystemClock
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd-camera.toml"

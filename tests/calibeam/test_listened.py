@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calibeam.listened import bus_trouble, noise, pace, uneven_layers
+from calibeam.devices.encoders import bus_trouble, noise, pace, uneven_layers
 from drivers.device import Block
 from drivers.psd_daq.messages import FaceIdentity
 from drivers.psd_faces import FaceKind

@@ -22,10 +22,10 @@ from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import parse_rig
 from acquisition.recording.segments import Rotation, segments
-from calibeam import encoder_log
 from calibeam.cli import run
+from calibeam.devices import encoder_log
+from calibeam.devices.encoder_log import EncoderLog, State
 from calibeam.devices.encoders import names_of
-from calibeam.encoder_log import EncoderLog, State
 from drivers.cia406.angle import Scale
 from drivers.cia406.configuration import EncoderIdentity
 from drivers.cia406.device import Cia406Encoders

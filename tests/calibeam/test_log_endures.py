@@ -17,8 +17,8 @@ from acquisition.recording.messages import EVENT, packed
 from acquisition.recording.read import read
 from acquisition.recording.rig import parse_rig
 from acquisition.recording.segments import Rotation, segments
-from calibeam import encoder_log
-from calibeam.encoder_log import LOOK_S, EncoderLog, State
+from calibeam.devices import encoder_log
+from calibeam.devices.encoder_log import LOOK_S, EncoderLog, State
 from drivers.device import Block, Channel
 from drivers.errors import DeviceStale
 from drivers.transports.can_tap import Tap

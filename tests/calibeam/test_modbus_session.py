@@ -12,9 +12,9 @@ from acquisition.recording.read import read
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.writer import RecordingWriter
 from calibeam.devices.recorder import record_session
+from calibeam.devices.site import addresses_of, check_session, connected
 from calibeam.emulation import Emulation
 from calibeam.progress_bar import progress_bar
-from calibeam.site import addresses_of, check_session, connected
 from drivers.clock import SystemClock
 from drivers.errors import DeviceRefused
 

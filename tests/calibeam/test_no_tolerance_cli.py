@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from calibeam.cli import run
-from calibeam.site import check_session
+from calibeam.devices.site import check_session
 from calibrate.model_file import read_model
 from simulators.conceal.case import conceal
 from simulators.conceal.wanted import Wanted

@@ -14,13 +14,12 @@ from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.writer import RecordingWriter
 from acquisition.sample import Sample
 from acquisition.session import Session
-from calibeam.devices.recorder import record_session
+from calibeam.devices.recorder import RecordingJournal, record_session
+from calibeam.devices.site import addresses_of, connected
 from calibeam.direct import direct_bench
 from calibeam.emulation import Emulation
-from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibeam.progress_bar import progress_bar
-from calibeam.site import addresses_of, connected
 from drivers.clock import SystemClock
 from simulators.world.world import World
 

@@ -15,8 +15,8 @@ from acquisition.recording.samples import Samples
 from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
 from calibeam.any_session import Planned, identify_session, session_model
+from calibeam.devices.recorder import RecordingJournal
 from calibeam.direct import direct_bench
-from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibeam.session_table import print_identification
 from calibrate.errors import DataError

@@ -20,10 +20,10 @@ from acquisition.recording.rig_schema import Rig
 from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Summary
 from calibeam.devices.recorder import record_session
+from calibeam.devices.site import addresses_of, connected
 from calibeam.emulation import Emulation
 from calibeam.outcome import PartialResult
 from calibeam.progress_bar import progress_bar
-from calibeam.site import addresses_of, connected
 from drivers.clock import SystemClock
 from drivers.ur.reader import UrReader
 

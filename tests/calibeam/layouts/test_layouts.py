@@ -15,7 +15,7 @@ from acquisition.recording.stream import Channel, Event
 from acquisition.recording.writer import RecordingWriter
 from calibeam.cli import run
 from calibeam.commands.demo import RIG
-from calibeam.site import VIEWED
+from calibeam.devices.site import VIEWED
 from drivers.clock import SystemClock
 from drivers.ur.recipe import VARIABLES
 

@@ -11,11 +11,11 @@ from msgspec import structs
 from websockets.sync.client import connect
 
 from acquisition.recording.rig_schema import Rig
+from calibeam.devices.robot import robot_of
+from calibeam.devices.site import addresses_of
 from calibeam.emulation import Emulation
 from calibeam.live.devices import devices_of, reading
 from calibeam.live.page import LivePage, PageAddress, live_page
-from calibeam.robot import robot_of
-from calibeam.site import addresses_of
 from drivers.clock import SystemClock
 from drivers.errors import DeviceError
 

@@ -10,8 +10,8 @@ from acquisition.plan import PlanOptions
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
+from calibeam.devices.recorder import RecordingJournal
 from calibeam.direct import DirectBench
-from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
 from drivers.clock import SystemClock
 from simulators.conceal.observe import observe

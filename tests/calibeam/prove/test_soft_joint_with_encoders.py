@@ -11,8 +11,8 @@ from acquisition.recording.read import read
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
+from calibeam.devices.recorder import RecordingJournal
 from calibeam.direct import DirectBench
-from calibeam.journal import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibrate.diagnose.from_recording import diagnose_samples
 from drivers.clock import SystemClock

@@ -8,12 +8,12 @@ from rich.console import Console
 from acquisition.plan import PlanOptions
 from acquisition.session import Summary
 from calibeam.asking import Asking
-from calibeam.device_check import DeviceCheck
+from calibeam.devices.check import DeviceCheck
+from calibeam.devices.site import addresses_of
 from calibeam.live.feed import SILENT
 from calibeam.session.earlier import Earlier
 from calibeam.session.job import Job, part_of
 from calibeam.session.run import OnSite
-from calibeam.site import addresses_of
 from drivers.clock import SystemClock
 from drivers.errors import DeviceRefused
 

@@ -9,7 +9,7 @@ import pytest
 
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
 from acquisition.recording.rig_devices import RobotDevice
-from calibeam.robot import emulated_robot, robot_of
+from calibeam.devices.robot import emulated_robot, robot_of
 from drivers.clock import SystemClock
 from drivers.device import Device, Movable
 from simulators.process import Emulators

@@ -19,11 +19,11 @@ from acquisition.streams import Pump
 from acquisition.supervisor import Supervisor
 from acquisition.wired import Pumps, Speeds, WiredBench
 from calibeam.devices.encoders import emulated_encoders, encoder_driver
+from calibeam.devices.psd import PsdInstrument, emulated_psd, psd_driver, psd_view
 from calibeam.devices.recorder import uninterrupted
+from calibeam.devices.robot import emulated_robot, robot_of
 from calibeam.live.feed import PAGE_STOP, SILENT, Feed
 from calibeam.motion.gate_of_rig import gated_arm
-from calibeam.psd import PsdInstrument, emulated_psd, psd_driver, psd_view
-from calibeam.robot import emulated_robot, robot_of
 from calibrate.dual_psd_rig import fixture_of, laser_of
 from drivers.clock import Clock
 from drivers.device import Block, Device, Movable

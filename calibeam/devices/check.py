@@ -13,11 +13,10 @@ from acquisition.psd_view import psd_window
 from acquisition.recording.errors import RigFileError, brief
 from acquisition.recording.rig_devices import EncoderDriver, RobotDriver
 from acquisition.recording.rig_schema import Camera, Rig
-from calibeam.camera import camera_sight
-from calibeam.devices.encoders import encoder_driver, identities_of
-from calibeam.listened import bus_trouble, noise, pace, uneven_layers
-from calibeam.psd import psd_driver, psd_view
-from calibeam.robot import robot_of
+from calibeam.devices.camera import camera_sight
+from calibeam.devices.encoders import bus_trouble, encoder_driver, identities_of, noise, pace, uneven_layers
+from calibeam.devices.psd import psd_driver, psd_view
+from calibeam.devices.robot import robot_of
 from drivers.clock import Clock
 from drivers.device import Block, Device
 from drivers.errors import DeviceError
