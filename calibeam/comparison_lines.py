@@ -3,9 +3,9 @@
 from rich.console import Console
 from rich.table import Table
 
-from calibeam.comparison import CLEAR, SAYS
 from calibeam.comparison_record import ComparisonFile, LinkRecord, StreamRecord
 from calibeam.diagnosis_lines import print_diagnosis
+from calibeam.results.comparison import CLEAR, SAYS
 
 
 def print_comparison(console: Console, file: ComparisonFile) -> None:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
-from calibeam.modelled import modelled
+from calibeam.results.identification import modelled
 from calibrate.diagnose.file import read_diagnosis
 from calibrate.model_file import read_model
 from calibrate.report.drift.drift import Calibration

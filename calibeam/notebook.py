@@ -26,7 +26,7 @@ from calibrate.errors import DataError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from calibeam.modelled import Modelled
+    from calibeam.results.identification import Modelled
     from calibrate.diagnose.schema import DiagnosisFile
     from calibrate.model_file import ModelFile, ModelParameter
     from calibrate.physics.predicting import Placed
@@ -150,7 +150,7 @@ class Session:
         if plan is None:
             return _model(self._modelled)
         from calibeam.any_session import Planned
-        from calibeam.modelled import modelled
+        from calibeam.results.identification import modelled
 
         return _model(modelled(self.recording, Planned.read(Path(plan))))
 
@@ -189,7 +189,7 @@ class Session:
 
     @cached_property
     def _modelled(self) -> "Modelled":
-        from calibeam.modelled import modelled
+        from calibeam.results.identification import modelled
 
         return modelled(self.recording)
 

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from calibeam.modelled import ReadingErrors
+from calibeam.results.identification import ReadingErrors
 
 BEFORE, AFTER = "#d55e00", "#0072b2"  # Okabe and Ito, Color Universal Design, 2008
 MICRO = 1e6

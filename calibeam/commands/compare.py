@@ -6,10 +6,10 @@ import msgspec
 from rich.console import Console
 
 from acquisition.recording.read import read
-from calibeam.comparison import compare
 from calibeam.comparison_lines import print_comparison
 from calibeam.comparison_record import write_comparison
 from calibeam.ending import naming
+from calibeam.results.comparison import compare
 
 
 def compare_command(

@@ -48,7 +48,7 @@ def demo(*, out: Path = Path("out/demo"), rig: Path = RIG, seed: int = 1, time_s
     _clear(out)
     console.print(f"starting the emulators of {rig.name} ({time_scale:g} x real time)")
     # two seconds of libraries that are wanted in the end, loaded while the emulators load theirs
-    threading.Thread(target=import_module, args=("calibeam.conclude",), daemon=True).start()
+    threading.Thread(target=import_module, args=("calibeam.results.session_results",), daemon=True).start()
     notes = {"emulation_seed": str(seed), "time_scale": f"{time_scale:g}"}
     with (
         Emulation(rig, seed=seed, time_scale=time_scale, truth=out / TRUTH) as emulation,
@@ -59,7 +59,7 @@ def demo(*, out: Path = Path("out/demo"), rig: Path = RIG, seed: int = 1, time_s
     ):
         summary = record_session(bench, loaded, writer, PlanOptions(), clock, progress_bar(console))
     console.print(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {out / RECORDING}")
-    from calibeam.conclude import conclude
+    from calibeam.results.session_results import conclude
 
     identified = conclude(out / RECORDING, console)
     print_revealed(console, reveal(identified.zeros, out / TRUTH))

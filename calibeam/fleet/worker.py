@@ -28,7 +28,7 @@ from acquisition.recording.rig_schema import Rig
 from calibeam.diagnosis import diagnose_recording
 from calibeam.fleet.recordings import content_sha256
 from calibeam.fleet.row import Cause, Outcome, Row, Task, Zero
-from calibeam.modelled import Modelled, modelled
+from calibeam.results.identification import Modelled, modelled
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.eccentric import with_discs
 from calibrate.diagnose.schema import DiagnosisFile

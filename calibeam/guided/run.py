@@ -65,7 +65,9 @@ def run_guided(
         highlight=False,
     )
     if conclude:
-        from calibeam.conclude import conclude as concluded  # a second of libraries that no device waits for
+        from calibeam.results.session_results import (
+            conclude as concluded,  # a second of libraries that no device waits for
+        )
 
         concluded(recording, console)
     else:

@@ -87,7 +87,7 @@ class OnSite:
             earlier = with_place(earlier_of(self._job.out, self._job.rig), place)
         self.teller.step("result")
         files = parts(self._job.out)
-        from calibeam.conclude import conclude  # a second of libraries that no device waits for
+        from calibeam.results.session_results import conclude  # a second of libraries that no device waits for
 
         conclude(files[0] if len(files) == 1 else self._job.out, self._console)
 

@@ -8,10 +8,10 @@ from rich.console import Console
 
 from acquisition.recording.read import read
 from calibeam.cli import run
-from calibeam.conclude import conclude
 from calibeam.devices.recorder import new_recording
 from calibeam.emulation import Emulation
 from calibeam.outcome import PartialResult
+from calibeam.results.session_results import conclude
 from drivers.clock import SystemClock
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
@@ -125,7 +125,7 @@ def test_ctrl_c_while_identifying_says_that_the_recording_is_whole(
     def interrupted(recording: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("calibeam.conclude.identify_session", interrupted)
+    monkeypatch.setattr("calibeam.results.session_results.identify_session", interrupted)
     with pytest.raises(PartialResult, match=r"^Ctrl-C; the recording is whole"):
         conclude(unfinished, Console(quiet=True))
     assert read(unfinished).complete

@@ -30,7 +30,7 @@ TICKS = os.sysconf("SC_CLK_TCK")
 PAGE_BYTES = resource.getpagesize()
 FILE_BYTES = 1 << 30  # the largest file that a run may write
 LAZY = (  # loaded by commands when they need them; here once for all
-    "calibeam.conclude",
+    "calibeam.results.session_results",
     "calibeam.error_files",
     "calibeam.fleet.page",
     "calibeam.fleet.run",

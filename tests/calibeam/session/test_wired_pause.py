@@ -94,7 +94,7 @@ def reported_rad(rig_file: Path) -> np.ndarray:
 @pytest.mark.usefixtures("interrupted")
 def test_paused_resumed_and_gone_on_with(arguments, tmp_path, capsys, monkeypatch) -> None:
     concluded: list[Path] = []
-    monkeypatch.setattr("calibeam.conclude.conclude", lambda path, console: concluded.append(path))
+    monkeypatch.setattr("calibeam.results.session_results.conclude", lambda path, console: concluded.append(path))
     log = tmp_path / "out" / "session.log"
     code = run(arguments)
     said = log.read_text()

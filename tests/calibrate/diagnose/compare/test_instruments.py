@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from calibeam.comparison import compare
+from calibeam.results.comparison import compare
 from calibrate.diagnose.compare.chain import differences
 from calibrate.diagnose.compare.observed import difference_samples
 from calibrate.diagnose.compare.seated import lengths_of
