@@ -23,7 +23,6 @@ from acquisition.recording.rig import load_rig, plain_rig, rig_sha256, rig_text
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.writer import RecordingWriter
 from benchmarks.slices import Slices
-from calibeam.any_session import Planned, identify_session
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.direct import direct_bench
 from calibeam.learner import FittedLearner
@@ -31,6 +30,7 @@ from calibeam.pose_design.reachable import candidates_of
 from calibeam.prove.free_space import errors_m
 from calibeam.prove.truth import FreeSpace
 from calibeam.prove.unseen_poses import Beam
+from calibeam.results.identification import Planned, identify_session
 from calibrate.believed_arm import believed_arm
 from calibrate.fit_plan import FitPlan
 from calibrate.pose_design.candidates import Candidates

@@ -20,9 +20,9 @@ from acquisition.recording.samples import Samples
 from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
 from calibeam.devices.recorder import RecordingJournal
-from calibeam.diagnosis import diagnose_recording, plan_next
 from calibeam.direct import DirectBench
 from calibeam.learner import FittedLearner
+from calibeam.results.diagnosis import diagnose_recording, plan_next
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.contests import rival_named
 from calibrate.diagnose.diagnosis import Named

@@ -13,11 +13,11 @@ from acquisition.recording.read import read
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
-from calibeam.any_session import identify_session
+from calibeam.commands.demo import Revealed, reveal
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.direct import direct_bench
 from calibeam.learner import FittedLearner
-from calibeam.reveal import Revealed, reveal
+from calibeam.results.identification import identify_session
 from calibeam.software import SOFTWARE
 from drivers.clock import SystemClock
 from simulators.world.truth import write_truth

@@ -3,9 +3,8 @@
 from rich.console import Console
 from rich.table import Table
 
-from calibeam.comparison_record import ComparisonFile, LinkRecord, StreamRecord
 from calibeam.diagnosis_lines import print_diagnosis
-from calibeam.results.comparison import CLEAR, SAYS
+from calibeam.results.comparison import CLEAR, SAYS, ComparisonFile, LinkRecord, StreamRecord
 
 
 def print_comparison(console: Console, file: ComparisonFile) -> None:

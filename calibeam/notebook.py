@@ -149,8 +149,7 @@ class Session:
         """
         if plan is None:
             return _model(self._modelled)
-        from calibeam.any_session import Planned
-        from calibeam.results.identification import modelled
+        from calibeam.results.identification import Planned, modelled
 
         return _model(modelled(self.recording, Planned.read(Path(plan))))
 
@@ -177,7 +176,7 @@ class Session:
 
         DataError where it cannot be written, or the recording holds nothing to fit.
         """
-        from calibeam.reporting import write_any_report
+        from calibeam.results.session_results import write_any_report
 
         write_any_report(self.recording, self._modelled.model, Path(path), self.diagnose() if diagnosis else None)
         return Path(path)
@@ -195,7 +194,7 @@ class Session:
 
     @cached_property
     def _diagnosis(self) -> "DiagnosisFile":
-        from calibeam.diagnosis import diagnose_recording
+        from calibeam.results.diagnosis import diagnose_recording
 
         found, file = diagnose_recording(self.recording)
         if found.physics is None:

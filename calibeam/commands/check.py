@@ -1,17 +1,108 @@
-"""`calibeam check`: every device of a rig, or what is in a recording."""
+"""`calibeam check`: every device of a rig, or what is in a recording.
+
+`calibeam check` of a recording, or of a folder of log segments: what is in it, and what is wrong with it.
+"""
 
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
+import msgspec
+import numpy as np
 from cyclopts import Parameter
+from rich.console import Console
 
+from acquisition.recording.check import Finding, check
+from acquisition.recording.clock_model import ClockModel, ClockStatus, clock_model
+from acquisition.recording.read import read
+from acquisition.recording.recording import Recording
 from acquisition.recording.rig import load_rig
+from acquisition.recording.segments import segments
+from acquisition.recording.stream import Floats, Stream
 from calibeam.devices.check import check_devices
 from calibeam.outcome import CheckFailed
-from calibeam.recording_check import check_recording
 from drivers.clock import SystemClock
+
+SAME_S = 1.0  # longer than any driver keeps a sample
+MOST_LINES = 20  # findings of one file told one by one; a script gets all of them with --json
+
+
+def check_recording(path: Path, *, as_json: bool = False) -> bool:
+    """Print what is in it and what was found; True when nothing is wrong. RecordingError when it cannot be read."""
+    files = segments(path) if path.is_dir() else []
+    good = True
+    for file in files or [path]:
+        recording = read(file)
+        findings = check(recording)
+        good = good and not findings
+        if as_json:
+            print(msgspec.json.encode(_as_json(recording, findings)).decode())
+        else:
+            Console(highlight=False, soft_wrap=True).print("\n".join(lines(recording, findings)), markup=False)
+    return good
+
+
+def lines(recording: Recording, findings: tuple[Finding, ...]) -> list[str]:
+    """For a person: the file, each stream with its rate and clock, each finding."""
+    told = [f"{recording.path}: {len(recording.samples)} settled samples, {len(recording.events)} events"]
+    told += [f"  {stream.name}: {_rate(stream)}; {_clock(stream)}" for stream in recording.streams.values()]
+    told += [f"  {finding.problem.value}: {finding.where}: {finding.says}" for finding in findings[:MOST_LINES]]
+    if len(findings) > MOST_LINES:
+        told.append(f"  and {len(findings) - MOST_LINES} findings more; --json tells all")
+    return told if findings else [*told, "  nothing is wrong with it"]
+
+
+def _rate(stream: Stream) -> str:
+    count = stream.host_s.size
+    span_s = float(stream.host_s[-1] - stream.host_s[0]) if count > 1 else 0.0
+    rate = f", {(count - 1) / span_s:.1f} a second over {span_s:.1f} s" if span_s > 0.0 else ""
+    return f"{count} samples{rate}"
+
+
+def _clock(stream: Stream) -> str:
+    if (late_s := _after_host_stamps(stream)) is not None:
+        median_s, p99_s = np.quantile(late_s, [0.5, 0.99])
+        return f"stamped by the host's clock, arrive {_ms(median_s)} later in the median, {_ms(p99_s)} at 99 %"
+    model = clock_model(stream)
+    if model.status is not ClockStatus.FOUND:
+        return f"clock: {model.status.value}"
+    delays = f"arrive {_ms(model.delay_median_s)} late in the median, {_ms(model.delay_p99_s)} at 99 %"
+    wander = "" if model.wander_s is None else f", clock wanders {_ms(model.wander_s)}"
+    return f"clock {1e6 * ((model.rate or 1.0) - 1.0):+.1f} us/s against the host, {delays}{wander}"
+
+
+def _after_host_stamps(stream: Stream) -> Floats | None:
+    """How long after its stamp each sample came, where the driver stamps for a device that has no clock.
+
+    No clock of a device shows the host's time since it was started to SAME_S.
+    """
+    late_s = stream.host_s - stream.device_s
+    stamped = late_s.size > 0 and bool(np.isfinite(late_s).all())
+    return late_s if stamped and late_s.min() >= 0.0 and late_s.max() < SAME_S else None
+
+
+def _ms(seconds: float | None) -> str:
+    return "-" if seconds is None else f"{1e3 * seconds:.2f} ms"
+
+
+def _as_json(recording: Recording, findings: tuple[Finding, ...]) -> dict[str, Any]:
+    return {
+        "recording": str(recording.path),
+        "complete": recording.complete,
+        "samples": len(recording.samples),
+        "streams": {
+            stream.name: {"samples": stream.host_s.size, "gaps": len(stream.gaps), "clock": _model(clock_model(stream))}
+            for stream in recording.streams.values()
+        },
+        "findings": [
+            {"problem": finding.problem.value, "where": finding.where, "says": finding.says} for finding in findings
+        ],
+    }
+
+
+def _model(model: ClockModel) -> dict[str, Any]:
+    return msgspec.to_builtins(model) | {"status": model.status.name.lower()}
 
 
 def check_command(what: Path, *, json_: Annotated[bool, Parameter(name="--json")] = False) -> None:

@@ -7,9 +7,8 @@ from rich.console import Console
 
 from acquisition.recording.read import read
 from calibeam.comparison_lines import print_comparison
-from calibeam.comparison_record import write_comparison
-from calibeam.ending import naming
-from calibeam.results.comparison import compare
+from calibeam.results.comparison import compare, write_comparison
+from calibeam.results.identification import naming
 
 
 def compare_command(

@@ -6,9 +6,9 @@ import msgspec
 from rich.console import Console
 
 from acquisition.recording.read import read
-from calibeam.diagnosis import diagnose_recording, plan_next, refuse_wrong_file
 from calibeam.diagnosis_lines import print_diagnosis
-from calibeam.ending import naming
+from calibeam.results.diagnosis import diagnose_recording, plan_next, refuse_wrong_file
+from calibeam.results.identification import naming
 from calibrate.diagnose.file import write_diagnosis
 from calibrate.model_file import read_model, write_model
 from calibrate.physics.from_diagnosis import model_of_diagnosis

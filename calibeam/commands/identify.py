@@ -9,9 +9,15 @@ from rich.console import Console
 
 from acquisition.recording.read import read
 from acquisition.recording.rig_schema import Rig
-from calibeam.any_session import Planned, identify_session, write_session_model
-from calibeam.ending import naming, refuse_nothing, tell_unfinished
 from calibeam.refitted_lines import refitted_lines
+from calibeam.results.identification import (
+    Planned,
+    identify_session,
+    naming,
+    refuse_nothing,
+    tell_unfinished,
+    write_session_model,
+)
 from calibeam.session_table import print_identification
 from calibrate.errors import DataError
 from calibrate.export.export import ExportForm, export_model

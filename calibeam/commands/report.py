@@ -1,17 +1,88 @@
-"""`calibeam report`: (re)write the report of a recording, alone or against an earlier calibration of the same arm."""
+"""`calibeam report`: (re)write the report of a recording, alone or against an earlier calibration of the same arm.
+
+An earlier calibration, from whatever is left of it: a model.json, the folder of a session, or a recording.
+
+The first screen of a report for scripts: what `calibeam report --json` prints, version 1 (docs/report.md).
+"""
 
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 
 from acquisition.recording.read import read
-from calibeam.earlier import earlier_calibration
-from calibeam.ending import naming
-from calibeam.reporting import write_any_report
-from calibeam.summary_record import summary_of
+from acquisition.recording.recording import Recording
+from calibeam.results.identification import modelled, naming
+from calibeam.results.session_results import write_any_report
 from calibeam.verdict_line import verdict_words
 from calibrate.diagnose.file import read_diagnosis
 from calibrate.model_file import read_model
+from calibrate.report.answers import Answers
+from calibrate.report.drift.drift import Calibration
+from calibrate.report.verdict import Trust
+
+MODEL, DIAGNOSIS = "model.json", "diagnosis.json"  # as sessions name them
+
+
+def earlier_calibration(path: Path) -> Calibration:
+    """DataError, RecordingError for what is none. A recording is identified anew, without a plan."""
+    if path.suffix == ".json":
+        return Calibration(str(path), read_model(path))
+    if path.is_dir() and (path / MODEL).exists():
+        told = path / DIAGNOSIS
+        return Calibration(str(path), read_model(path / MODEL), None, read_diagnosis(told) if told.exists() else None)
+    recording = read(path)
+    return Calibration(_label(recording), modelled(recording).model, recording)
+
+
+def _label(recording: Recording) -> str:
+    """The day, where the recording says it."""
+    return recording.started_utc.partition("T")[0] or recording.path.name
+
+
+WORDS = {Trust.GOOD: "yes", Trust.CARE: "with care", Trust.NONE: "no"}
+
+
+class NumberRecord(msgspec.Struct, frozen=True):
+    """A number of the first screen; null where it cannot be told, `about` then says why."""
+
+    value: float | None
+    unit: str
+    about: str
+
+
+class SummaryRecord(msgspec.Struct, frozen=True):
+    """All of the first screen."""
+
+    schema: Literal[1]
+    kind: Literal["calibeam-report"]
+    report: str
+    trust: str  # "yes", "with care", "no"
+    verdict: str
+    reasons: tuple[str, ...]
+    known: tuple[str, ...]
+    advice: tuple[str, ...]
+    numbers: dict[str, NumberRecord]
+    drift: str | None
+    warnings: tuple[str, ...]
+
+
+def summary_of(answers: Answers, path: Path) -> SummaryRecord:
+    """Of the report at `path`."""
+    judged = answers.verdict
+    return SummaryRecord(
+        1,
+        "calibeam-report",
+        str(path),
+        WORDS[judged.trust],
+        judged.sentence,
+        judged.reasons,
+        answers.known,
+        judged.advice,
+        {n.key: NumberRecord(n.value, n.unit, n.about) for n in answers.numbers},
+        answers.drift or None,
+        answers.warnings,
+    )
 
 
 def report_command(

@@ -25,9 +25,9 @@ from acquisition.recording.errors import RecordingError
 from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig_schema import Rig
-from calibeam.diagnosis import diagnose_recording
 from calibeam.fleet.recordings import content_sha256
 from calibeam.fleet.row import Cause, Outcome, Row, Task, Zero
+from calibeam.results.diagnosis import diagnose_recording
 from calibeam.results.identification import Modelled, modelled
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.eccentric import with_discs

@@ -1,18 +1,107 @@
-"""From any recording to its model and the verdict on it."""
+"""From any recording to its model and the verdict on it.
 
+How an identification ends for a script: good, partial, or failed with one sentence that says where and why.
+
+From any recording or session folder to a model of the arm, whatever instruments it holds.
+"""
+
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording.fingerprint import readings_sha256
 from acquisition.recording.recording import Recording
-from calibeam.any_session import Planned, identify_session, session_model
-from calibeam.ending import UNFINISHED, refuse_nothing
+from acquisition.recording.rig import rig_sha256
+from calibeam.outcome import PartialResult
+from calibrate.errors import DataError
 from calibrate.fit import Status
-from calibrate.model_file import ModelFile
+from calibrate.fit_plan import DEFAULT, FitPlan, read_plan
+from calibrate.identification.estimates import Estimate
+from calibrate.identification.identify import identify
+from calibrate.identification.record import record_of
+from calibrate.identification.result import Identification
+from calibrate.model_file import ModelFile, RigIdentity, write_model
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_verdict import session_verdict
 from calibrate.report.verdict import Verdict
+
+UNFINISHED = (Status.OUT_OF_STEPS, Status.STALLED, Status.AT_BOUND)
+
+
+@contextmanager
+def naming(source: Path) -> Generator[None]:
+    """DataErrors of what is computed from a recording or session folder, with the file's name before them."""
+    try:
+        yield
+    except DataError as error:
+        if str(source) in str(error):
+            raise
+        raise DataError(f"{source}: {error}") from error
+
+
+def refuse_nothing(status: Status, estimates: Sequence[Estimate]) -> None:
+    """DataError where a fit that came to its end determines not one parameter: its model would say nothing."""
+    if status is Status.NOT_FINITE:
+        raise DataError(f"nothing can be identified: {status.value}")
+    if status not in UNFINISHED and estimates and all(estimate.value is None for estimate in estimates):
+        first = next((e for e in estimates if e.why is not None), estimates[0])
+        raise DataError(
+            f"nothing can be identified: none of {len(estimates)} parameters is determined by these samples "
+            f"({first.name}: {first.why}); measure more poses, more different ones, or state in the rig what is known"
+        )
+
+
+def tell_unfinished(status: Status, model: Path) -> None:
+    """PartialResult where the fit came to no end: what it had is in the model, but nobody should rely on it."""
+    if status in UNFINISHED:
+        raise PartialResult(f"{status.value}; what was found so far is in {model}")
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A fit plan and its text, which travels with the model."""
+
+    plan: FitPlan = DEFAULT
+    text: str | None = None
+
+    @classmethod
+    def read(cls, path: Path | None) -> "Planned":
+        """The plan of a file, the defaults without one. DataError for what is wrong in it."""
+        return cls() if path is None else cls(*read_plan(path))
+
+
+def identify_session(
+    recording: Recording, planned: Planned | None = None, bootstrap_rounds: int | None = None
+) -> Identification:
+    """The arm by all instruments of the recording. DataError when it holds nothing to fit, or is a blunder as such."""
+    plan = DEFAULT if planned is None else planned.plan
+    rng = np.random.default_rng(plan.seed)
+    return identify(recording.rig, recording.samples, rng=rng, plan=plan, bootstrap_rounds=bootstrap_rounds)
+
+
+def session_model(result: Identification, recording: Recording, planned: Planned | None = None) -> ModelFile:
+    """What model.json holds, with the rig in it."""
+    text, rig = recording.rig_text, recording.rig
+    told = Planned() if planned is None else planned
+    arm_model = (told.plan.model or rig.arm.model).value
+    identity, readings = RigIdentity(rig.name, rig_sha256(text), text), readings_sha256(recording.samples)
+    return msgspec.structs.replace(record_of(result, identity, arm_model, told.text), readings_sha256=readings)
+
+
+def write_session_model(
+    result: Identification, recording: Recording, path: Path, planned: Planned | None = None
+) -> ModelFile:
+    """Write model.json; returns its content."""
+    model = session_model(result, recording, planned)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_model(path, model)
+    return model
+
 
 Floats = NDArray[np.float64]
 

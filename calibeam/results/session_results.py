@@ -1,6 +1,8 @@
 """What follows a recording: identify, diagnose, write model.json, diagnosis.json, report.html beside it, print.
 
 Needs no device any more.
+
+The report of a recording, with its diagnosis and an earlier calibration where there are any.
 """
 
 from collections.abc import Generator
@@ -11,19 +13,50 @@ from rich.console import Console
 
 from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
-from calibeam.any_session import identify_session, write_session_model
-from calibeam.diagnosis import diagnosed_to
 from calibeam.diagnosis_lines import print_diagnosis
 from calibeam.outcome import PartialResult, interruption
-from calibeam.reporting import write_any_report
+from calibeam.results.diagnosis import diagnosed_to
+from calibeam.results.identification import identify_session, session_model, write_session_model
 from calibeam.session_table import print_identification
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.errors import DataError
 from calibrate.identification.result import Identification
-from calibrate.model_file import write_model
+from calibrate.model_file import ModelFile, write_model
 from calibrate.physics.from_diagnosis import model_of_diagnosis
+from calibrate.report.answers import Answers
+from calibrate.report.drift.drift import Calibration, drift_of
+from calibrate.report.page import write_page
 from calibrate.report.session_evidence import session_evidence
+from calibrate.report.session_report import session_answers, session_page
 from calibrate.report.session_verdict import session_verdict
+from calibrate.report.session_workspace import session_arm
+
+NOW = "now"
+
+
+def write_any_report(
+    recording: Recording,
+    model: ModelFile | None,
+    path: Path,
+    diagnosis: DiagnosisFile | None = None,
+    *,
+    against: Calibration | None = None,
+    interactive: bool = False,
+) -> Answers:
+    """The report at `path`; without a model the recording is identified anew, without a plan. Returns its first screen.
+
+    A diagnosis adds pages, an earlier calibration of the same arm (`against`) a chapter on what has changed since,
+    `interactive` figures that can be turned. DataError where the recording holds nothing to fit, the model is not of
+    it, the other calibration cannot be compared, or the file cannot be written.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    found = session_model(identify_session(recording), recording) if model is None else model
+    known = session_evidence(recording, found)
+    drift = None
+    if against is not None:
+        drift = drift_of(Calibration(NOW, known.model, recording, diagnosis), against, session_arm(known))
+    write_page(path, session_page(known, diagnosis, drift, interactive=interactive))
+    return session_answers(known, drift)
 
 
 def conclude(recording_path: Path, console: Console) -> Identification:

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from calibeam.cli import run
-from calibeam.earlier import earlier_calibration
+from calibeam.commands.report import earlier_calibration
 
 RIG = """schema = 1
 name = "five-joints"

@@ -14,10 +14,10 @@ from acquisition.recording.rig import load_rig, plain_rig, rig_text
 from acquisition.recording.samples import Samples
 from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
-from calibeam.any_session import Planned, identify_session, session_model
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.direct import direct_bench
 from calibeam.learner import FittedLearner
+from calibeam.results.identification import Planned, identify_session, session_model
 from calibeam.session_table import print_identification
 from calibrate.errors import DataError
 from calibrate.fit_plan import parse_plan

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording.read import read
 from calibeam.cli import run
-from calibeam.diagnosis import diagnosed_to
+from calibeam.results.diagnosis import diagnosed_to
 from calibrate.diagnose import to_file
 from calibrate.effects import catalogue
 from calibrate.effects.words import UNITS

@@ -2,7 +2,7 @@
 
 import pytest
 
-from calibeam.diagnosis import diagnose_recording
+from calibeam.results.diagnosis import diagnose_recording
 
 from .mixed_sessions import full_pose, spots_and_bar, tracker_and_cones, truth_of
 

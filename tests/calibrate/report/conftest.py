@@ -14,10 +14,10 @@ from acquisition.recording.rig import load_rig, parse_rig, plain_rig, rig_sha256
 from acquisition.recording.samples import Samples
 from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
-from calibeam.any_session import identify_session, session_model
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.direct import direct_bench
 from calibeam.learner import FittedLearner
+from calibeam.results.identification import identify_session, session_model
 from calibrate.identification.identify import identify
 from calibrate.identification.record import record_of
 from calibrate.model_file import ModelFile, RigIdentity

@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from calibeam.any_session import Planned, identify_session, session_model
+from calibeam.results.identification import Planned, identify_session, session_model
 from calibrate.fit import Status
 from calibrate.fit_plan import parse_plan
 from calibrate.report.sections.arm_proofs import proofs_chapter
