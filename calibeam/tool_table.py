@@ -18,7 +18,7 @@ def print_tool(console: Console, tool: ToolFile) -> None:
     console.print(f"target determined: {tool.trust}", style=f"bold {COLOUR[tool.trust]}", highlight=False)
     for line in _lines(tool):
         console.print(line, highlight=False, markup=False)
-    console.print(_table(tool.axes, several=len(tool.targets) > 1))
+    console.print(_tool_axes_table(tool.axes, several=len(tool.targets) > 1))
     if tool.tool_m is not None:
         point = ", ".join(f"{v + 0.0:.7f}" for v in tool.tool_m)
         console.print(f"for the rig file, under [tool]:  point_m = [{point}]", highlight=False, markup=False)
@@ -79,7 +79,7 @@ def _sizes(sigmas_m: tuple[float, ...]) -> str:
     return ", ".join(fixed(1e3 * s, decimals_of(1e3 * s)) for s in sigmas_m)
 
 
-def _table(axes: tuple[AxisRecord, ...], *, several: bool) -> Table:
+def _tool_axes_table(axes: tuple[AxisRecord, ...], *, several: bool) -> Table:
     table = Table(title="single-axis rotations, in the device's frame", title_justify="left")
     headings = ("joint", "rows", "arc (°)", "radius (mm)", "axis, 1 sigma (µrad)", "scatter (µm)")
     for heading in (*(("target",) if several else ()), *headings):

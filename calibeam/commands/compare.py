@@ -6,7 +6,7 @@ import msgspec
 from rich.console import Console
 
 from acquisition.recording.read import read
-from calibeam.comparison_lines import print_comparison
+from calibeam.printing.results import print_comparison
 from calibeam.results.comparison import compare, write_comparison
 from calibeam.results.identification import naming
 

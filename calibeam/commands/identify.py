@@ -9,7 +9,7 @@ from rich.console import Console
 
 from acquisition.recording.read import read
 from acquisition.recording.rig_schema import Rig
-from calibeam.refitted_lines import refitted_lines
+from calibeam.printing.identification import refitted_lines
 from calibeam.results.identification import (
     Planned,
     identify_session,

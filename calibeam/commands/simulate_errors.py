@@ -9,8 +9,8 @@ from rich.console import Console
 
 from acquisition.recording.rig import load_rig
 from acquisition.recording.rig_schema import Rig
-from calibeam.error_lines import print_simulation
 from calibeam.motion.arm import read_geometry
+from calibeam.printing.tables import print_simulation
 from calibeam.progress_bar import progress_bar
 from calibeam.software import SOFTWARE
 from calibrate.error_simulation.machine import Machine, identified_machine, machine_of

@@ -30,7 +30,7 @@ def print_simulation(console: Console, s: Simulation) -> None:
         console.print(f"worst posture: {length(p.rms_m)} rms at ({joints}) deg", highlight=False, markup=False)
 
 
-def _table(title: str, *headings: str) -> Table:
+def _errors_table(title: str, *headings: str) -> Table:
     table = Table(title=title, title_justify="left", box=None)
     for i, heading in enumerate(headings):
         table.add_column(heading, justify="left" if i == 0 else "right")
@@ -38,7 +38,9 @@ def _table(title: str, *headings: str) -> Table:
 
 
 def _print_budget(console: Console, s: Simulation) -> None:
-    table = _table("error budget, each group alone over the workspace", "group", "errors", "rms", "share of variance")
+    table = _errors_table(
+        "error budget, each group alone over the workspace", "group", "errors", "rms", "share of variance"
+    )
     for line in s.budget:
         table.add_row(line.group, str(line.sources), length(line.rms_m), f"{100.0 * line.share:.2f} %")
     console.print(table)
@@ -46,7 +48,7 @@ def _print_budget(console: Console, s: Simulation) -> None:
 
 def _print_poses(console: Console, s: Simulation) -> None:
     title = f"linear propagation beside {s.drawn.arms:,} drawn arms at every pose"
-    table = _table(title, "pose", "linear rms", "drawn rms", "linear sigma x y z, µm", "drawn, µm", "95 % below")
+    table = _errors_table(title, "pose", "linear rms", "drawn rms", "linear sigma x y z, µm", "drawn, µm", "95 % below")
     p95 = s.drawn.quantile_m(SHARE)
     for i in range(len(s.drawn_at_rad)):
         sigmas = (" ".join(f"{1e6 * v:.1f}" for v in values[i]) for values in (s.linear.sigma_m, s.drawn.sigma_m))
@@ -60,7 +62,7 @@ def _print_ranking(console: Console, s: Simulation) -> None:
         f"the {min(SHOWN, len(s.sources))} most important errors: shares of the variance, linear over "
         f"{len(s.wide_rad)} poses, Sobol indices over {s.shares.poses} of them"
     )
-    table = _table(title, "error", "alone, rms", "linear", "first order", "total")
+    table = _errors_table(title, "error", "alone, rms", "linear", "first order", "total")
     for i in s.ranking[:SHOWN]:
         table.add_row(
             s.sources[i].name,
