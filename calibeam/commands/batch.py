@@ -10,7 +10,7 @@ from rich.console import Console
 
 from calibeam.fleet.settings import PAGE, TABLE, Engine, Workers
 from calibeam.outcome import PartialResult
-from calibeam.progress_bar import progress_bar
+from calibeam.printing.progress import progress_bar
 from calibrate.errors import DataError
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from acquisition.recording.rig import load_rig, rig_text
 from calibeam.devices.recorder import new_recording, record_session
 from calibeam.devices.site import addresses_of, check_session, connected
 from calibeam.emulation import Emulation
-from calibeam.progress_bar import progress_bar
+from calibeam.printing.progress import progress_bar
 from calibrate.identification.estimates import JointZero
 from drivers.clock import SystemClock
 from simulators.world.truth import read_truth

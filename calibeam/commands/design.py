@@ -12,7 +12,7 @@ from rich.console import Console
 from acquisition.recording.pose_plan import write_pose_plan
 from acquisition.recording.rig import load_rig
 from acquisition.recording.rig_schema import Rig
-from calibeam.progress_bar import progress_bar
+from calibeam.printing.progress import progress_bar
 from calibeam.software import SOFTWARE
 
 if TYPE_CHECKING:  # loaded when it is needed: it takes a second
@@ -71,8 +71,8 @@ def design_command(
         Print the figures as one line of JSON, and nothing else.
 
     """
-    from calibeam.pose_design.lines import print_design
     from calibeam.pose_design.reachable import candidates_of
+    from calibeam.printing.design import print_design
     from calibrate.pose_design.design import Asked, design
     from calibrate.pose_design.information import information_of
     from calibrate.pose_design.record import record_of

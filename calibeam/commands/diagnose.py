@@ -6,7 +6,7 @@ import msgspec
 from rich.console import Console
 
 from acquisition.recording.read import read
-from calibeam.diagnosis_lines import print_diagnosis
+from calibeam.printing.results import print_diagnosis
 from calibeam.results.diagnosis import diagnose_recording, plan_next, refuse_wrong_file
 from calibeam.results.identification import naming
 from calibrate.diagnose.file import write_diagnosis

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from acquisition.recording.read import read
 from acquisition.recording.rig_schema import Rig
-from calibeam.printing.identification import refitted_lines
+from calibeam.printing.identification import print_identification, refitted_lines
 from calibeam.results.identification import (
     Planned,
     identify_session,
@@ -18,7 +18,6 @@ from calibeam.results.identification import (
     tell_unfinished,
     write_session_model,
 )
-from calibeam.session_table import print_identification
 from calibrate.errors import DataError
 from calibrate.export.export import ExportForm, export_model
 from calibrate.fit import Status

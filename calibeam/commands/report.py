@@ -12,9 +12,9 @@ import msgspec
 
 from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
+from calibeam.printing.identification import verdict_words
 from calibeam.results.identification import modelled, naming
 from calibeam.results.session_results import write_any_report
-from calibeam.verdict_line import verdict_words
 from calibrate.diagnose.file import read_diagnosis
 from calibrate.model_file import read_model
 from calibrate.report.answers import Answers

@@ -10,8 +10,8 @@ from rich.console import Console
 from acquisition.recording.rig import load_rig
 from acquisition.recording.rig_schema import Rig
 from calibeam.motion.arm import read_geometry
+from calibeam.printing.progress import progress_bar
 from calibeam.printing.tables import print_simulation
-from calibeam.progress_bar import progress_bar
 from calibeam.software import SOFTWARE
 from calibrate.error_simulation.machine import Machine, identified_machine, machine_of
 from calibrate.error_simulation.plan import NOTHING_STATED, read_error_plan

@@ -15,8 +15,8 @@ from acquisition.recording.rig import rig_sha256
 from acquisition.recording.rig_quantity import si_value
 from acquisition.recording.rig_schema import Rig
 from calibeam.outcome import PartialResult
+from calibeam.printing.tables import print_tool
 from calibeam.software import SOFTWARE
-from calibeam.tool_table import print_tool
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.eccentric import with_discs
 from calibrate.errors import DataError

@@ -1,10 +1,223 @@
-"""A refitted model as a person reads it in a terminal: what is left of the readings, and each effect with its size."""
+"""A refitted model as a person reads it in a terminal: what is left of the readings, and each effect with its size.
 
-from collections.abc import Iterator
+The first sentence of a report as the last words in a terminal, so that both say the same.
 
-from calibrate.model_file import ModelFile
+Proofs of an identification as lines for a terminal.
+
+An identified arm as a person reads it in a terminal: blunders, alarms, rank, numbers with their doubt, verdict.
+"""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from acquisition.recording.rig_schema import Rig
+from calibrate.default_belief import said_of
+from calibrate.identification.estimates import ONLY_BELIEVED, JointZero
+from calibrate.identification.evidence_record import parameter_records
+from calibrate.identification.point_constraint import PointConstraints
+from calibrate.identification.result import Evidence, FreeSpace, Identification, Unseen
+from calibrate.model_file import ModelFile, ModelParameter
+from calibrate.observability import Observability
 from calibrate.physics.records import Effect
+from calibrate.report.answers import Answers
 from calibrate.report.quantities import length
+from calibrate.report.verdict import Trust, Verdict
+from calibrate.sensors import spots
+from calibrate.sensors.catalogue import thousandth_of
+
+COLOUR = {Trust.GOOD: "green", Trust.CARE: "yellow", Trust.NONE: "red"}
+
+
+def print_verdict(console: Console, judged: Verdict) -> None:
+    """How far to trust what was found, and every reason for care."""
+    console.print(f"\n{judged.sentence}", style=f"bold {COLOUR[judged.trust]}", highlight=False, markup=False)
+    for reason in judged.reasons:
+        console.print(f"  {reason}", highlight=False, markup=False)
+
+
+def verdict_words(answers: Answers) -> Iterator[str]:
+    """The first screen of a report in a few lines: verdict, drift, what to do."""
+    yield answers.verdict.sentence
+    yield from (f"  {reason}" for reason in answers.verdict.reasons)
+    yield from answers.warnings
+    if answers.drift:
+        yield answers.drift
+    yield from (f"to do: {advice}" for advice in answers.verdict.advice)
+
+
+def lines_of(evidence: Evidence) -> list[str]:
+    """Held-out error, observability, free space, bootstrap; what was not asked for is not spoken of."""
+    out = [_held_out(unseen) for unseen in evidence.proven.held_out]
+    out += [f"no proof ({why})" for why in evidence.proven.unproven]
+    if evidence.observability is not None:
+        out.append(_observability(evidence.observability))
+    if evidence.free_space is not None:
+        out += _free_space(evidence.free_space)
+    if evidence.bootstrap is not None:
+        drawn = evidence.bootstrap
+        out.append(f"bootstrap: {len(drawn.theta)} refits to drawn rows, {drawn.failed} more without an answer")
+    return out
+
+
+def _held_out(unseen: Unseen) -> str:
+    return (
+        f"held out ({unseen.split}): {unseen.name}, {unseen.observations} rows, "
+        f"{1e3 * unseen.rms_distance_before_m:.4g} {thousandth_of(unseen.name)} rms distance before, "
+        f"{1e3 * unseen.rms_distance_after_m:.4g} {thousandth_of(unseen.name)} after"
+    )
+
+
+def _observability(shown: Observability) -> str:
+    indices = ", ".join(f"O{i} {v:.3g}" for i, v in enumerate((shown.o1, shown.o2, shown.o3, shown.o4, shown.o5), 1))
+    well = "" if shown.well_conditioned else " (usual limit 100: other poses would show more)"
+    return f"observability of {shown.n_free} parameters: {indices}, condition {shown.condition:.3g}{well}"
+
+
+def _free_space(room: FreeSpace) -> list[str]:
+    one, pose = room.geometry, room.pose
+    if one.rms_m is None or one.p95_m is None or one.max_m is None:
+        return [f"free space: {one.status.value}", *(f"  {words}" for words in one.undetermined)]
+    out = [
+        f"free space, {room.poses} poses drawn evenly between the joint limits: {1e3 * one.rms_m:.3g} mm rms, "
+        f"{1e3 * one.p95_m:.3g} mm at 95 %, {1e3 * one.max_m:.3g} mm at most (one sigma of the identified geometry)"
+    ]
+    if pose.rms_m is not None and pose.p95_m is not None and pose.max_m is not None:
+        out.append(
+            f"  of a single pose: {1e3 * pose.rms_m:.3g} mm rms, {1e3 * pose.p95_m:.3g} mm at 95 %, "
+            f"{1e3 * pose.max_m:.3g} mm at most, with {room.scatter_says}"
+        )
+    if one.guessed:
+        out.append(f"  known no better than their plausible size: {'; '.join(one.guessed)}")
+    return out
+
+
+UNITS = {"m": ("um", 1e6), "rad": ("urad", 1e6)}
+
+
+def print_identification(console: Console, result: Identification, judged: Verdict, rig: Rig) -> None:
+    """What was wrong with the file comes first, since all that follows is without these rows; last the verdict."""
+    of_spots = any(one.name == spots.KIND.name for one in result.instruments)
+    if of_spots and (said := said_of(rig)) is not None:
+        console.print(said, highlight=False, markup=False)
+    for blunder in result.blunders:
+        console.print(f"left out: {blunder.says}", highlight=False, markup=False)
+    for alarm in result.alarms:
+        console.print(f"ALARM: {alarm}", style="bold red", highlight=False, markup=False)
+    seen = result.identifiability
+    names = ", ".join(f"{i.name} ({i.observations})" for i in result.instruments)
+    console.print(
+        f"{names}: {result.n_samples} samples, rank {seen.rank} of {seen.n_free} unknowns, "
+        f"condition {seen.condition:.3g}",
+        highlight=False,
+    )
+    for combination in seen.combinations:
+        about = "" if len(combination.members) > 1 else f"{combination.words}: "
+        console.print(f"  {about}{combination.says}", highlight=False, markup=False)
+    believed = [e.name for e in result.estimates if e.why is not None and e.why.startswith(ONLY_BELIEVED)]
+    if believed:
+        console.print(f"  only the drawing speaks of: {', '.join(believed)}", highlight=False, markup=False)
+    if of_spots:
+        _print_zeros(console, result.zeros)
+    listed = parameter_records(result.estimates, seen, result.evidence.bootstrap)
+    _print_parameters(console, tuple(p for p in listed if not (of_spots and p.name.endswith(".zero"))))
+    if result.point_constraints is not None:
+        _print_point_constraints(console, result.point_constraints)
+    for line in (*_figures(result), *lines_of(result.evidence)):
+        console.print(line, highlight=False, markup=False)
+    print_verdict(console, judged)
+
+
+def _print_parameters(console: Console, parameters: tuple[ModelParameter, ...]) -> None:
+    known = [p for p in parameters if p.value is not None]
+    if not known:
+        console.print("no single parameter can be told alone; together they predict (model.json: chain)")
+        return
+    _print_table(console, ("correction", "sigma", "predicted", "95 %"), known, _by_covariance)
+    drawn = [p for p in known if p.bootstrap_sigma is not None]
+    if drawn:
+        _print_table(console, ("bootstrap sigma", "bootstrap 95 %"), drawn, _by_bootstrap)
+
+
+def _print_zeros(console: Console, zeros: tuple[JointZero, ...]) -> None:
+    """Of a session with spots, which is made for them; true angle = reading + zero."""
+    table = Table()
+    for heading in ("joint", "zero (deg)", "sigma (deg)", "sigma (urad)", "measurement alone (urad)"):
+        table.add_column(heading, justify="right")
+    for zero in zeros:
+        if zero.value_rad is None or zero.sigma_rad is None:
+            table.add_row(f"J{zero.joint}", "not determined", "-", "-", "-")
+            continue
+        alone = "-" if zero.measurement_sigma_rad is None else f"{1e6 * zero.measurement_sigma_rad:.1f}"
+        degrees, sigma = f"{np.degrees(zero.value_rad):+.5f}", f"{np.degrees(zero.sigma_rad):.5f}"
+        table.add_row(f"J{zero.joint}", degrees, sigma, f"{1e6 * zero.sigma_rad:.1f}", alone)
+    console.print(table)
+    for zero in zeros:
+        if zero.value_rad is None:
+            console.print(f"  J{zero.joint} not determined: {zero.why}", highlight=False, markup=False)
+
+
+def _print_point_constraints(console: Console, found: PointConstraints) -> None:
+    """The method beside the fit, in both forms."""
+    console.print("\nfor comparison: point constraint, Deng, Ding, Zhang 2019; links and laser as drawn")
+    at = f"at placement {found.placement}"
+    forms = (
+        (f"four poses {at}, as published", found.four_poses),
+        (f"all {found.poses} centred poses {at}", found.all_poses),
+    )
+    for says, result in forms:
+        seen = result.identifiability
+        console.print(f"{says}: rank {seen.rank} of {seen.n_free} unknowns", highlight=False)
+        _print_zeros(console, result.zeros)
+
+
+def _print_table(
+    console: Console,
+    headings: tuple[str, ...],
+    parameters: list[ModelParameter],
+    cells: Callable[[ModelParameter, float], list[str]],
+) -> None:
+    table = Table()
+    for heading in ("parameter", *headings, "unit"):
+        table.add_column(heading, justify="right")
+    for p in parameters:
+        unit, factor = UNITS.get(p.unit, (p.unit, 1.0))
+        table.add_row(p.name, *cells(p, factor), unit)
+    console.print(table)
+
+
+def _by_covariance(p: ModelParameter, factor: float) -> list[str]:
+    promised = _cell(p.predicted_sigma, factor)
+    return [_cell(p.value, factor, "+"), _cell(p.sigma, factor), promised, _interval(p.low, p.high, factor)]
+
+
+def _by_bootstrap(p: ModelParameter, factor: float) -> list[str]:
+    return [_cell(p.bootstrap_sigma, factor), _interval(p.bootstrap_low, p.bootstrap_high, factor)]
+
+
+def _interval(low: float | None, high: float | None, factor: float) -> str:
+    return f"{_cell(low, factor, '+')} {_cell(high, factor, '+')}"
+
+
+def _cell(value: float | None, factor: float, sign: str = "") -> str:
+    return "-" if value is None else f"{factor * value:{sign}.4g}"
+
+
+def _figures(result: Identification) -> list[str]:
+    out = [
+        f"{one.name}: {1e3 * one.rms_distance_before_m:.4g} {thousandth_of(one.name)} rms distance "
+        f"with the arm as drawn, {1e3 * one.rms_distance_after_m:.4g} {thousandth_of(one.name)} after"
+        for one in result.instruments
+    ]
+    for noise in result.noise:
+        found, believed = 1e6 * noise.found, 1e6 * noise.believed
+        out.append(f"noise of {noise.source}: {found:.3g}e-6 found, {believed:.3g}e-6 believed")
+    stated = result.stated_noise
+    if np.isfinite(stated.p_above):
+        out.append(f"chi-square under the noise as stated: {stated.chi2:.4g} at {stated.dof} degrees of freedom")
+    return out
 
 
 def refitted_lines(model: ModelFile) -> Iterator[str]:

@@ -1,10 +1,93 @@
-"""A comparison as a person reads it in a terminal."""
+"""A comparison as a person reads it in a terminal.
+
+A diagnosis as a person reads it in a terminal: verdict, causes with their size, proof, doubt, what to do next.
+"""
+
+from collections.abc import Iterator
 
 from rich.console import Console
 from rich.table import Table
 
-from calibeam.diagnosis_lines import print_diagnosis
 from calibeam.results.comparison import CLEAR, SAYS, ComparisonFile, LinkRecord, StreamRecord
+from calibrate.diagnose.schema import DiagnosisFile, FindingRecord
+from calibrate.report.diagnosis.words import (
+    before_after,
+    free_space_words,
+    micrometres,
+    place_words,
+    rival_words,
+    stream_words,
+    verdict_words,
+)
+
+MOST = 8  # of what is only told by the way; all of it stands in the file
+
+
+def print_diagnosis(console: Console, file: DiagnosisFile) -> None:
+    """Everything that decides; the rest is in the file and in the report."""
+    for blunder in file.blunders:
+        console.print(f"fault of the file: {blunder.says}", highlight=False, markup=False)
+    console.print(f"\n[bold]{verdict_words(file)}[/bold]", highlight=False)
+    for number, finding in enumerate(file.findings, start=1):
+        for line in _finding(number, finding):
+            console.print(line, highlight=False, markup=False)
+    for line in _changes(file):
+        console.print(line, highlight=False, markup=False)
+    for line in _doubt(file):
+        console.print(line, highlight=False, markup=False)
+    if file.splits:
+        console.print(_proof(file))
+    for line in file.next:
+        console.print(f"next: {line}", highlight=False, markup=False)
+
+
+def _finding(number: int, finding: FindingRecord) -> Iterator[str]:
+    yield f"{number}. {finding.says}"
+    found = f"in the stream of {finding.stream}"
+    if finding.share is not None:
+        found = f"{100 * finding.share:.0f} % of what was found"
+    yield f"   {place_words(finding)}; {found}; confidence {finding.confidence:.3f}"
+    for rival in finding.rivals:
+        yield f"   or: {rival_words(rival)}"
+
+
+def _changes(file: DiagnosisFile) -> Iterator[str]:
+    """Beside a model: which of its values are others now, and which of its effects took no part."""
+    for one in file.changed:
+        known = "" if one.known is None else f" (known: {one.known:.6g})"
+        yield f"changed: {one.parameter} by {one.by:+.3g} ± {one.sigma:.2g}{known}"
+    if file.known is not None and file.known.left_out:
+        yield f"not applied, true of another recording only: {', '.join(file.known.left_out)}"
+
+
+def _doubt(file: DiagnosisFile) -> Iterator[str]:
+    for one in (u for u in (file.unexplained, *file.also_unexplained) if u is not None):
+        where = f" at {one.where}" if one.where else ""
+        yield f"unexplained{where}: {one.says}"
+    if file.free_space is not None:
+        yield free_space_words(file.free_space)
+    yield from stream_words(file)
+    for missing in file.not_recorded[:MOST]:
+        yield f"not recorded: {missing.column} (without it no word about {missing.physics})"
+
+
+def _proof(file: DiagnosisFile) -> Table:
+    table = Table(title="on samples that the fit has not seen (rms)", title_justify="left")
+    for heading in ("left out", "instrument", "samples", "geometry alone", "with the physics", "floor"):
+        table.add_column(heading, justify="left" if heading in ("left out", "instrument") else "right")
+    floors = {f.instrument: f.rms_m for f in file.floors}
+    for split in file.splits:
+        before, after = before_after(split)
+        floor = floors.get(split.instrument)
+        table.add_row(
+            split.split,
+            split.instrument,
+            str(split.observations),
+            before,
+            after,
+            micrometres(floor),
+        )
+    return table
 
 
 def print_comparison(console: Console, file: ComparisonFile) -> None:

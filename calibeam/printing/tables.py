@@ -1,4 +1,9 @@
-"""An error simulation as a person reads it in a terminal."""
+"""An error simulation as a person reads it in a terminal.
+
+A tool found by single axes as a person reads it in a terminal: the verdict first, then values with uncertainty.
+"""
+
+from collections.abc import Iterator
 
 import numpy as np
 from rich.console import Console
@@ -6,7 +11,98 @@ from rich.table import Table
 
 from calibrate.error_simulation.record import SHARE
 from calibrate.error_simulation.simulate import Simulation
-from calibrate.report.quantities import length
+from calibrate.report.quantities import DASH, angle, decimals_of, fixed, length, significant
+from calibrate.tool_axes.tool_file import ArmErrorsRecord, AxisRecord, TargetRecord, ToolFile
+
+COLOUR = {"yes": "green", "with care": "yellow", "no": "red"}
+WHERE = "in the flange"
+
+
+def print_tool(console: Console, tool: ToolFile) -> None:
+    """Verdict, target, what its uncertainty consists of, circles, and the line that a rig file wants."""
+    console.print(f"target determined: {tool.trust}", style=f"bold {COLOUR[tool.trust]}", highlight=False)
+    for line in _lines(tool):
+        console.print(line, highlight=False, markup=False)
+    console.print(_tool_axes_table(tool.axes, several=len(tool.targets) > 1))
+    if tool.tool_m is not None:
+        point = ", ".join(f"{v + 0.0:.7f}" for v in tool.tool_m)
+        console.print(f"for the rig file, under [tool]:  point_m = [{point}]", highlight=False, markup=False)
+
+
+def _lines(tool: ToolFile) -> Iterator[str]:
+    for target in tool.targets:
+        yield from _target(target, tool)
+    if tool.orientation is not None:
+        turn = _values(tool.orientation.rotation_rad, tool.orientation.sigma_rad, 1.0, "rad")
+        yield f"orientation ({tool.orientation.frame}): rotation vector {turn}"
+    elif tool.tool_m is not None:
+        yield f"orientation: not determined, because {tool.orientation_undetermined}"
+    yield from (f"with care: {caution}" for caution in tool.cautions)
+    yield _assumed(tool.arm_errors)
+    if tool.flange is not None:
+        joints = len(tool.flange.q_rad)
+        used = sum(len(t.rows_used) for t in tool.targets)
+        noise = length(tool.position_noise_m, 2)
+        yield f"used: {used} rows in which only joints {joints - 1} and {joints} turn, noise {noise} per coordinate"
+        origin = _values(tool.flange.origin_m, tool.flange.origin_sigma_m, 1e-3, "mm")
+        yield f"flange in the device's frame: {origin}; direction of its z ± {angle(tool.flange.z_sigma_rad, 2)}"
+    if tool.other_rows_rms_m is not None:
+        yield f"check: {tool.other_rows} other rows differ from the fit by {length(tool.other_rows_rms_m, 2)} rms"
+
+
+def _target(target: TargetRecord, tool: ToolFile) -> Iterator[str]:
+    name = f"target {target.target}" if len(tool.targets) > 1 else "target"
+    if target.point_m is None or target.sigma_m is None:
+        yield f"{name}: not determined, because {tool.undetermined}"
+        return
+    yield f"{name}: {_values(target.point_m, target.sigma_m, 1e-3, 'mm')} {WHERE}"
+    if target.instrument_sigma_m is not None and target.arm_sigma_m is not None:
+        device, arm = (_sizes(s) for s in (target.instrument_sigma_m, target.arm_sigma_m))
+        yield f"  measuring device ± ({device}) mm, errors of the arm ± ({arm}) mm"
+
+
+def _assumed(errors: ArmErrorsRecord) -> str:
+    sizes = (
+        f"joint zeros {1e3 * errors.zero_sigma_rad:.6g} mrad, lengths {1e3 * errors.length_sigma_m:.6g} mm, "
+        f"angles {1e3 * errors.angle_sigma_rad:.6g} mrad (1 sigma; {errors.source})"
+    )
+    if errors.model is None:
+        return f"assumed errors of the arm: {sizes}"
+    return f"errors of the arm: covariance of {errors.model}; for what it does not determine {sizes}"
+
+
+def _values(values: tuple[float, ...], sigmas: tuple[float, ...], unit: float, name: str) -> str:
+    """'x 35.12 ± 0.33, y −20.1 ± 1.2, z 110.00 ± 0.30 mm'."""
+    parts: list[str] = []
+    for axis, value, sigma in zip("xyz", values, sigmas, strict=True):
+        decimals = decimals_of(sigma / unit)
+        parts.append(f"{axis} {fixed(round(value / unit, decimals) + 0.0, decimals)} ± {fixed(sigma / unit, decimals)}")
+    return f"{', '.join(parts)} {name}"
+
+
+def _sizes(sigmas_m: tuple[float, ...]) -> str:
+    return ", ".join(fixed(1e3 * s, decimals_of(1e3 * s)) for s in sigmas_m)
+
+
+def _tool_axes_table(axes: tuple[AxisRecord, ...], *, several: bool) -> Table:
+    table = Table(title="single-axis rotations, in the device's frame", title_justify="left")
+    headings = ("joint", "rows", "arc (°)", "radius (mm)", "axis, 1 sigma (µrad)", "scatter (µm)")
+    for heading in (*(("target",) if several else ()), *headings):
+        table.add_column(heading, justify="right")
+    for axis in axes:
+        table.add_row(*((str(axis.target),) if several else ()), *_axis(axis))
+    return table
+
+
+def _axis(axis: AxisRecord) -> tuple[str, ...]:
+    rows, arc = f"{axis.rows[0]}-{axis.rows[1]}", f"{np.degrees(axis.span_rad):.1f}"
+    radius, turn = axis.status, DASH
+    if axis.radius_sigma_m is not None and axis.direction_sigma_rad is not None:
+        decimals = decimals_of(1e3 * axis.radius_sigma_m)
+        radius = f"{fixed(1e3 * axis.radius_m, decimals)} ± {fixed(1e3 * axis.radius_sigma_m, decimals)}"
+        turn = significant(1e6 * axis.direction_sigma_rad, 2)
+    return f"J{axis.joint}", rows, arc, radius, turn, significant(1e6 * axis.scatter_m, 2)
+
 
 SHOWN = 15
 

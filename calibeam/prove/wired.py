@@ -17,7 +17,7 @@ from calibeam.devices.recorder import new_recording, record_session
 from calibeam.devices.site import addresses_of, connected
 from calibeam.emulation import EmulationError
 from calibeam.outcome import PartialResult
-from calibeam.progress_bar import progress_bar
+from calibeam.printing.progress import progress_bar
 from calibrate.diagnose.streams.sample_times import sample_windows
 from drivers.clock import SystemClock
 from drivers.errors import DeviceError

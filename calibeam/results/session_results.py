@@ -13,11 +13,11 @@ from rich.console import Console
 
 from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
-from calibeam.diagnosis_lines import print_diagnosis
 from calibeam.outcome import PartialResult, interruption
+from calibeam.printing.identification import print_identification
+from calibeam.printing.results import print_diagnosis
 from calibeam.results.diagnosis import diagnosed_to
 from calibeam.results.identification import identify_session, session_model, write_session_model
-from calibeam.session_table import print_identification
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.errors import DataError
 from calibrate.identification.result import Identification

@@ -19,7 +19,7 @@ from calibeam.devices.camera import camera_sight
 from calibeam.devices.recorder import record_session
 from calibeam.devices.site import addresses_of, connected
 from calibeam.emulation import Emulation
-from calibeam.progress_bar import progress_bar
+from calibeam.printing.progress import progress_bar
 from drivers.clock import SystemClock
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd-camera.toml"

@@ -14,7 +14,7 @@ from acquisition.recording.writer import RecordingWriter
 from calibeam.devices.recorder import record_session
 from calibeam.devices.site import addresses_of, check_session, connected
 from calibeam.emulation import Emulation
-from calibeam.progress_bar import progress_bar
+from calibeam.printing.progress import progress_bar
 from drivers.clock import SystemClock
 from drivers.errors import DeviceRefused
 

@@ -19,7 +19,7 @@ from calibeam.devices.site import addresses_of, connected
 from calibeam.direct import direct_bench
 from calibeam.emulation import Emulation
 from calibeam.learner import FittedLearner
-from calibeam.progress_bar import progress_bar
+from calibeam.printing.progress import progress_bar
 from drivers.clock import SystemClock
 from simulators.world.world import World
 

@@ -17,8 +17,8 @@ from acquisition.session import Session
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.direct import direct_bench
 from calibeam.learner import FittedLearner
+from calibeam.printing.identification import print_identification
 from calibeam.results.identification import Planned, identify_session, session_model
-from calibeam.session_table import print_identification
 from calibrate.errors import DataError
 from calibrate.fit_plan import parse_plan
 from calibrate.identification.point_constraint import point_constraints

@@ -23,7 +23,7 @@ from calibeam.devices.recorder import record_session
 from calibeam.devices.site import addresses_of, connected
 from calibeam.emulation import Emulation
 from calibeam.outcome import PartialResult
-from calibeam.progress_bar import progress_bar
+from calibeam.printing.progress import progress_bar
 from drivers.clock import SystemClock
 from drivers.ur.reader import UrReader
 

@@ -39,7 +39,7 @@ LAZY = (  # loaded by commands when they need them; here once for all
     "calibeam.motion.by_hand",
     "calibeam.motion.examples",
     "calibeam.motion.example_plots",
-    "calibeam.pose_design.lines",
+    "calibeam.printing.design",
     "calibeam.pose_design.reachable",
     "calibrate.error_simulation.simulate",
     "calibrate.pose_design.design",
