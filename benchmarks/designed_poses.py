@@ -26,7 +26,7 @@ from benchmarks.slices import Slices
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.direct import direct_bench
 from calibeam.learner import FittedLearner
-from calibeam.pose_design.reachable import candidates_of
+from calibeam.motion.reachable_poses import candidates_of
 from calibeam.prove.free_space import errors_m
 from calibeam.prove.truth import FreeSpace
 from calibeam.prove.unseen_poses import Beam

@@ -71,7 +71,7 @@ def design_command(
         Print the figures as one line of JSON, and nothing else.
 
     """
-    from calibeam.pose_design.reachable import candidates_of
+    from calibeam.motion.reachable_poses import candidates_of
     from calibeam.printing.design import print_design
     from calibrate.pose_design.design import Asked, design
     from calibrate.pose_design.information import information_of
@@ -108,8 +108,8 @@ def design_command(
 
 def _places(rig: Rig, poses: int, most: int, rng: np.random.Generator, progress: Progress) -> "tuple[Places, ...]":
     """Of the rig's own places and of a grid about them."""
+    from calibeam.motion.reachable_poses import candidates_of
     from calibeam.pose_design.grid import with_grid
-    from calibeam.pose_design.reachable import candidates_of
     from calibrate.errors import DataError
     from calibrate.pose_design.information import information_of
     from calibrate.pose_design.places import choose_places

@@ -8,7 +8,7 @@ import pytest
 from acquisition.recording.pose_plan import read_pose_plan
 from acquisition.recording.rig import load_rig
 from calibeam.cli import run
-from calibeam.pose_design import reachable
+from calibeam.motion import reachable_poses
 
 RIGS = Path(__file__).parents[2] / "rigs"
 ROBOT, ARM = RIGS / "ur5e-dual-psd.toml", RIGS / "arm-cmm-reference.toml"
@@ -81,12 +81,12 @@ def test_a_design_of_places_out_of_reach_gives_up_after_a_stated_number_of_tries
         tried.append(1)
         return []
 
-    monkeypatch.setattr(reachable, "all_solutions", none)
+    monkeypatch.setattr(reachable_poses, "all_solutions", none)
     far = tmp_path / "rig.toml"
     far.write_text(ROBOT.read_text().replace("d_m = 0.1625", "d_m = 19.0", 1))
     places = len(load_rig(far).placements)
     assert run(["design", str(far), "--out", str(tmp_path / "plan.toml")]) == 1
-    assert len(tried) == 2 * places * reachable.FUTILE  # each place, with either face first
+    assert len(tried) == 2 * places * reachable_poses.FUTILE  # each place, with either face first
     assert "no pose lights both faces at any place; check placements" in capsys.readouterr().err
 
 

@@ -13,7 +13,7 @@ from acquisition.recording.samples import Samples
 from acquisition.recording.writer import RecordingWriter
 from calibeam.devices.recorder import record_session
 from calibeam.direct import direct_bench
-from calibeam.pose_design.reachable import candidates_of
+from calibeam.motion.reachable_poses import candidates_of
 from calibeam.printing.progress import progress_bar
 from calibrate.pose_design.plan_of import blocks_of, plan_of, taken
 from drivers.clock import SystemClock

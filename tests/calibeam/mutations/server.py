@@ -40,7 +40,7 @@ LAZY = (  # loaded by commands when they need them; here once for all
     "calibeam.motion.examples",
     "calibeam.motion.example_plots",
     "calibeam.printing.design",
-    "calibeam.pose_design.reachable",
+    "calibeam.motion.reachable_poses",
     "calibrate.error_simulation.simulate",
     "calibrate.pose_design.design",
     "calibrate.report.pose_design.page",

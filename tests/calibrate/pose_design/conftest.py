@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig import load_rig
-from calibeam.pose_design.reachable import candidates_of
+from calibeam.motion.reachable_poses import candidates_of
 from calibrate.pose_design.information import information_of
 
 RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
