@@ -108,8 +108,7 @@ def design_command(
 
 def _places(rig: Rig, poses: int, most: int, rng: np.random.Generator, progress: Progress) -> "tuple[Places, ...]":
     """Of the rig's own places and of a grid about them."""
-    from calibeam.motion.reachable_poses import candidates_of
-    from calibeam.pose_design.grid import with_grid
+    from calibeam.motion.reachable_poses import candidates_of, with_grid
     from calibrate.errors import DataError
     from calibrate.pose_design.information import information_of
     from calibrate.pose_design.places import choose_places

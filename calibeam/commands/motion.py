@@ -44,10 +44,9 @@ def motion_command(
 
     """
     from calibeam.motion.by_hand import draw_plan_file
-    from calibeam.motion.example_plots import numbers_of, plot
-    from calibeam.motion.examples import EXAMPLES, Stage
+    from calibeam.motion.examples import EXAMPLES, KeptSetPoints, Stage
+    from calibeam.motion.figures import numbers_of, plot
     from calibeam.motion.gate_of_rig import cell_of, gate_of, solver_of
-    from calibeam.motion.lag import KeptSetPoints
     from calibeam.motion.robot import streamed_robot
 
     strangers = sorted(set(only) - EXAMPLES.keys())

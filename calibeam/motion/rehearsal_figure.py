@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from acquisition.recording.rig_schema import Rig
-from calibeam.motion.cell_figure import draw_cell
+from calibeam.motion.figures import draw_cell
 from calibeam.motion.gate_of_rig import cell_of
 from calibeam.motion.rehearsal import Rehearsal
 from calibrate.report.tones import Tone, tone_of

@@ -92,7 +92,7 @@ def _print_places(console: Console, rig: Rig, made: Design, places: Sequence[Pla
 
 def placement_lines(rig: Rig, ids: Sequence[int]) -> list[str]:
     """Rows of a rig file for those of the grid."""
-    from calibeam.pose_design.grid import with_grid
+    from calibeam.motion.reachable_poses import with_grid
 
     listed = with_grid(rig).placements
     out: list[str] = []

@@ -29,7 +29,6 @@ ASKS = {
     "calibeam/commands/psd_check.py",
     "calibeam/commands/session.py",
     "calibeam/motion/by_hand.py",
-    "calibeam/motion/keys.py",
     "calibeam/session/keys.py",
     "calibeam/session/person.py",
     "calibeam/session/run.py",

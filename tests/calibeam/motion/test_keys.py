@@ -8,7 +8,7 @@ import pytest
 from acquisition.motion.states import Event, State, after
 from calibeam.asking import Asking
 from calibeam.interrupts import INTERRUPTS
-from calibeam.motion.keys import WORDS, Keys, keys_of
+from calibeam.motion.by_hand import WORDS, Keys, keys_of
 
 PATIENCE_S = 30.0
 

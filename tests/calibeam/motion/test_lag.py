@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calibeam.motion.lag import lag_s
+from calibeam.motion.examples import lag_s
 
 
 def curve(t_s: np.ndarray) -> np.ndarray:

@@ -38,7 +38,7 @@ LAZY = (  # loaded by commands when they need them; here once for all
     "calibeam.live.page",
     "calibeam.motion.by_hand",
     "calibeam.motion.examples",
-    "calibeam.motion.example_plots",
+    "calibeam.motion.figures",
     "calibeam.printing.design",
     "calibeam.motion.reachable_poses",
     "calibrate.error_simulation.simulate",

@@ -9,8 +9,7 @@ import pytest
 from acquisition.planned_session import check_planned
 from acquisition.recording.pose_plan import read_pose_plan, write_pose_plan
 from acquisition.recording.rig import load_rig
-from calibeam.motion.reachable_poses import candidates_of
-from calibeam.pose_design.grid import with_grid
+from calibeam.motion.reachable_poses import candidates_of, with_grid
 from calibrate.errors import DataError
 from calibrate.pose_design.design import Asked, design, enough_of
 from calibrate.pose_design.information import information_of
