@@ -25,9 +25,9 @@ from acquisition.guided.stillness import Motion, StillRule
 from acquisition.recording.rig import load_rig, plain_rig, rig_sha256, rig_text
 from acquisition.recording.rig_schema import Rig
 from benchmarks.slices import Slices
-from calibeam.guided.arm import BelievedGuidedArm
-from calibeam.guided.direct import COUNTS, DirectHand
+from calibeam.guided.hand import COUNTS, DirectHand
 from calibeam.guided.judge import FittedJudge
+from calibeam.guided.recorded import BelievedGuidedArm
 from calibeam.guided.refit import samples_of
 from calibrate.alignment import align
 from calibrate.identification.identify import identify

@@ -1,4 +1,7 @@
-"""A guided session that is recorded: connects the encoders, runs the plan, and whatever happens the file is whole."""
+"""A guided session that is recorded: connects the encoders, runs the plan, and whatever happens the file is whole.
+
+The measuring arm as believed, for guidance: where the probe is, and postures that bring it somewhere.
+"""
 
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
@@ -6,12 +9,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition.guided.guide import Guide
 from acquisition.guided.plan import Visit
 from acquisition.guided.reading import Reading
 from acquisition.guided.session import GuidedSession, Summary
 from acquisition.guided.wired import WiredEncoderWatch
+from acquisition.motion.inverse.solve import AtPoint, refine, within
 from acquisition.recording.errors import RecordingError, RigFileError
 from acquisition.recording.rig_devices import EncodersDevice
 from acquisition.recording.rig_schema import Rig
@@ -21,10 +26,22 @@ from acquisition.streams import Pump
 from acquisition.supervisor import Supervisor
 from calibeam.devices.encoders import VIEWED, emulated_encoders, encoder_driver, identities_of
 from calibeam.devices.recorder import Interrupted, uninterrupted
-from calibeam.guided.arm import BelievedGuidedArm
 from calibeam.guided.judge import FittedJudge
 from calibeam.outcome import PartialResult, interruption
+from calibrate.arms.rig_arm import RigArm
 from drivers.clock import Clock
+
+Floats = NDArray[np.float64]
+ARRIVED_M = 1e-6  # far below what a person can do
+
+
+class BelievedGuidedArm(RigArm):
+    """Implements acquisition.guided.arm.GuidedArm."""
+
+    def postures(self, start_rad: Floats, point_m: Floats) -> Floats:
+        found = refine(self, AtPoint(self.point_m, point_m), start_rad, close=ARRIVED_M).q_rad
+        return found[within(self, found)]
+
 
 STREAM_MEMORY = 400  # blocks: some seconds, of which a dwell needs one
 

@@ -11,7 +11,7 @@ from acquisition.recording.fingerprint import readings_sha256
 from acquisition.recording.read import read
 from acquisition.recording.rig import load_rig, rig_sha256, rig_text
 from calibeam.cli import run
-from calibeam.guided.arm import BelievedGuidedArm
+from calibeam.guided.recorded import BelievedGuidedArm
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.eccentric import with_discs
 from calibrate.model_file import ModelFile, RigIdentity, write_model

@@ -10,9 +10,9 @@ from acquisition.guided.reading import Reading
 from acquisition.guided.session import GuidedSession, Summary
 from acquisition.guided.target import BarEnd, Cone
 from acquisition.recording.rig import load_rig, plain_rig, rig_sha256, rig_text
-from calibeam.guided.arm import BelievedGuidedArm
-from calibeam.guided.direct import DirectHand
+from calibeam.guided.hand import DirectHand
 from calibeam.guided.judge import FittedJudge
+from calibeam.guided.recorded import BelievedGuidedArm
 from calibeam.guided.refit import samples_of
 from calibrate.fit import Status
 from calibrate.identification.identify import identify

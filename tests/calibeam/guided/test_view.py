@@ -8,7 +8,7 @@ from rich.console import Console
 from acquisition.guided.coverage import Coverage
 from acquisition.guided.guide import Progress, Request
 from acquisition.guided.target import BarEnd, Cone
-from calibeam.guided.view import PersonGuide, drawn
+from calibeam.guided.run import PersonGuide, drawn
 
 CONE = Cone(2, (0.5, 0.1, 0.0))
 

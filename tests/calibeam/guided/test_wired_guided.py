@@ -16,10 +16,9 @@ from acquisition.recording.read import read
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.writer import RecordingWriter
 from calibeam.emulation import Emulation
-from calibeam.guided.arm import BelievedGuidedArm
 from calibeam.guided.hand import EmulatedHand
-from calibeam.guided.recorded import encoder_address, record_guided, watching
-from calibeam.guided.view import PersonGuide
+from calibeam.guided.recorded import BelievedGuidedArm, encoder_address, record_guided, watching
+from calibeam.guided.run import PersonGuide
 from calibeam.outcome import PartialResult
 from drivers.clock import SystemClock
 from simulators.hand.truth import read_hand_truth

@@ -27,7 +27,7 @@ from calibeam.fleet.recordings import recordings
 from calibeam.fleet.row import Task
 from calibeam.fleet.table import write_rows
 from calibeam.fleet.worker import judged
-from calibeam.guided.arm import BelievedGuidedArm
+from calibeam.guided.recorded import BelievedGuidedArm
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.eccentric import with_discs
 from calibrate.model_file import ModelFile, RigIdentity, write_model

@@ -16,7 +16,7 @@ OWN = ROOT / "calibrate" / "sensors"
 # Why a file may spell a sensor's name.
 SPELLED = {
     "calibeam/prove": "families of the simulator's scenarios, which have the proof's own names",
-    "calibeam/guided/direct.py": "verbs of the emulated hand",
+    "calibeam/guided/hand.py": "verbs of the emulated hand",
     "calibrate/model_file.py": "what a model file of version 1 without the key holds",
     "calibrate/older_models.py": "keys of model files of version 1",
     "calibrate/report/session_report.py": "id of a chapter on the page",
