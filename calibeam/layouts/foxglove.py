@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from acquisition.recording.layout import EVENTS_TOPIC
-from calibeam.layouts.panels import Panel, panels
-from calibeam.layouts.views import Views
+from calibeam.layouts.views import Panel, Views, panels
 
 FLAGS = "flags"  # whole numbers that stand for states
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # Okabe and Ito

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from calibeam.layouts.foxglove import COLOURS
-from calibeam.layouts.panels import Panel, panels
-from calibeam.layouts.views import Views
+from calibeam.layouts.views import Panel, Views, panels
 
 ROWS = 3  # panels of a tab, one above the other
 LARGEST_ARRAY = "500"  # the plugin's own limit: views hold no arrays

@@ -1,4 +1,7 @@
-"""What a recording shows to viewers without set-up: its thinned topics and their fields."""
+"""What a recording shows to viewers without set-up: its thinned topics and their fields.
+
+Which curves stand together, whatever the viewer: the faces, spots, joints, motion, health.
+"""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -67,3 +70,37 @@ def _fields(schema: Schema) -> tuple[str, ...]:
         return ()
     kinds = {f"{file.package}.{kind.name}": kind for file in files for kind in file.message_type}
     return tuple(field.name for field in kinds[schema.name].field) if schema.name in kinds else ()
+
+
+Curve = tuple[str, str]  # topic, field
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Curves of one unit in one picture."""
+
+    name: str
+    curves: tuple[Curve, ...]
+
+
+# Name, stream, how its fields begin: streams of docs/formats.md as sessions write them.
+WANTED = (
+    ("PSD 1, spot (m)", "spots", "psd1_"),
+    ("PSD 2, spot (m)", "spots", "psd2_"),
+    ("Joint angles (rad)", "robot", "actual_q_rad"),
+    ("Joint speeds (rad/s)", "robot", "actual_qd_rad_s"),
+    ("Encoders (rad)", "encoders", "position_rad"),
+    ("Detector temperature (degC)", "psd", "temperature_degC"),
+    ("Detector flags", "psd", "flags"),
+)
+
+
+def panels(views: Views) -> tuple[Panel, ...]:
+    """Those that the recording can fill, and what else it shows, a panel a topic."""
+    found = [Panel(name, views.like(stream, start)) for name, stream, start in WANTED]
+    drawn = {curve for panel in found for curve in panel.curves}
+    rest = [
+        Panel(topic, tuple((topic, field) for field in fields if (topic, field) not in drawn))
+        for topic, fields in views.views.items()
+    ]
+    return tuple(panel for panel in (*found, *rest) if panel.curves)

@@ -7,10 +7,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.rig_schema import Rig
-from calibeam.live.faces import FaceNow, faces_now, measured_m
 from calibeam.live.health import Watch, asked_rates
 from calibeam.live.latest import Heard, Latest
-from calibeam.live.messages import Job, LineSays, Now, Picture, RigSays, State, StopSays, Trouble
+from calibeam.live.messages import (
+    FaceNow,
+    Job,
+    LineSays,
+    Now,
+    Picture,
+    RigSays,
+    State,
+    StopSays,
+    Trouble,
+    faces_now,
+    measured_m,
+)
 from calibeam.live.scene import Scene, Standing
 from calibeam.software import SOFTWARE
 

@@ -17,13 +17,13 @@ import uvicorn
 from acquisition.errors import AcquisitionError
 from acquisition.recording.rig_schema import Rig
 from calibeam.live.access import LOOPBACK_NAMES, Rules, is_loopback
-from calibeam.live.alone import watched_pages
 from calibeam.live.app import live_app
 from calibeam.live.composer import Composer
 from calibeam.live.feed import Feed
 from calibeam.live.latest import Latest
 from calibeam.live.limits import ACCEPTED_AT_ONCE, LimitedHttp, LimitedServer, LimitedWebSocket, Limits
 from calibeam.live.messages import Job
+from calibeam.live.stopping import watched_pages
 from calibeam.live.viewers import Viewers
 from drivers.clock import Clock
 

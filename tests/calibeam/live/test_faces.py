@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.psd_view import PsdView, psd_window
-from calibeam.live.faces import faces_now, measured_m
+from calibeam.live.messages import faces_now, measured_m
 from drivers.device import Block
 from drivers.psd_daq.messages import Flag
 from drivers.psd_error_map import ErrorMap

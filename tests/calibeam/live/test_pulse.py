@@ -6,8 +6,8 @@ from contextlib import suppress
 import msgspec
 import pytest
 
+from calibeam.live.app import Pulse
 from calibeam.live.composer import Composer
-from calibeam.live.pulse import Pulse
 from calibeam.live.viewers import Viewer, Viewers
 
 

@@ -4,8 +4,7 @@ import threading
 
 import pytest
 
-from calibeam.live.alone import overdue, watched_pages
-from calibeam.live.stopping import Stop
+from calibeam.live.stopping import Stop, overdue, watched_pages
 from calibeam.live.viewers import Viewers
 from drivers.errors import DeviceLost
 
@@ -82,7 +81,7 @@ def test_where_the_rig_says_so_a_page_that_is_gone_stops_once(stop, clock) -> No
 
 
 def test_a_stop_that_was_not_delivered_is_pressed_again_until_it_is(stop, clock, monkeypatch) -> None:
-    monkeypatch.setattr("calibeam.live.alone.AGAIN_S", 0.0)
+    monkeypatch.setattr("calibeam.live.stopping.AGAIN_S", 0.0)
     viewers, presses, third = Viewers(clock), [], threading.Event()
     viewers.newest_s = clock.now_s()
 
