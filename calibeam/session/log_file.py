@@ -5,7 +5,7 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
-from calibeam.session.shown import Shown
+from calibeam.session.status import Shown
 
 NAME = "session.log"
 
@@ -15,7 +15,7 @@ def utc_now() -> datetime:
 
 
 class LogFile:
-    """Implements calibeam.session.shown.Listener. A disk that takes no line ends no session: the recording tells it."""
+    """Implements status.Listener. A disk that takes no line ends no session: the recording reports it."""
 
     def __init__(self, path: Path, now: Callable[[], datetime] = utc_now) -> None:
         self.path, self._now = path, now

@@ -2,11 +2,11 @@
 
 from calibeam.live.feed import Feed
 from calibeam.live.feed import Progress as PageProgress
-from calibeam.session.shown import Shown
+from calibeam.session.status import Shown
 
 
 class PageView:
-    """Implements calibeam.session.shown.Listener."""
+    """Implements calibeam.session.status.Listener."""
 
     def __init__(self, feed: Feed) -> None:
         self._feed = feed

@@ -3,13 +3,13 @@
 from rich.console import Console
 
 from calibeam.session.pace import clock_words
-from calibeam.session.shown import Shown
+from calibeam.session.status import Shown
 
 EVERY = 10  # poses
 
 
 class PlainView:
-    """Implements calibeam.session.shown.Listener."""
+    """Implements calibeam.session.status.Listener."""
 
     def __init__(self, console: Console) -> None:
         self._console = console

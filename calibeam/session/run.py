@@ -31,9 +31,9 @@ from calibeam.session.page_view import PageView
 from calibeam.session.person import Person
 from calibeam.session.places import new_place, placement_text, same_place
 from calibeam.session.plain_view import PlainView
-from calibeam.session.shown import Listener
+from calibeam.session.status import Listener
 from calibeam.session.teller import Teller
-from calibeam.session.terminal_view import TerminalView
+from calibeam.session.views import TerminalView
 from calibrate.pose_design.candidates import POSE_S
 from drivers.clock import Clock, SystemClock
 from drivers.errors import DeviceError, DeviceRefused

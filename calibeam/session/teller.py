@@ -17,7 +17,7 @@ from calibeam.outcome import PartialResult
 from calibeam.session.forecast import Forecast
 from calibeam.session.pace import Pace
 from calibeam.session.quality import Keeper
-from calibeam.session.shown import UNDELIVERED, Listener, Shown
+from calibeam.session.status import UNDELIVERED, Listener, Shown
 from calibrate.arms.rig_arm import limits_of
 from drivers.clock import Clock
 from drivers.errors import DeviceError

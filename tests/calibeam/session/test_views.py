@@ -23,9 +23,9 @@ from calibeam.session.pace import Pace, clock_words
 from calibeam.session.page_view import PageView
 from calibeam.session.person import Person
 from calibeam.session.plain_view import PlainView
-from calibeam.session.shown import Shown
+from calibeam.session.status import Shown
 from calibeam.session.teller import Teller, ToldJournal
-from calibeam.session.terminal_view import KEYS, TerminalView, drawn
+from calibeam.session.views import KEYS, TerminalView, drawn
 from drivers.errors import DeviceLost
 
 PATIENCE_S = 30.0

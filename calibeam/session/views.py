@@ -17,7 +17,7 @@ from acquisition.progress import Progress
 from acquisition.session_states import State
 from calibeam.session.pace import clock_words
 from calibeam.session.quality import Quality
-from calibeam.session.shown import Shown
+from calibeam.session.status import Shown
 
 REFRESH_HZ = 4.0
 BAR = 30  # characters
@@ -44,7 +44,7 @@ KEYS = {
 
 
 class TerminalView:
-    """Implements calibeam.session.shown.Listener; `opened` while the keys are listened to."""
+    """Implements calibeam.session.status.Listener; `opened` while the keys are listened to."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
