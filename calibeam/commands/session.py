@@ -24,9 +24,7 @@ from calibeam.emulation import ask_emulators, moves_nothing_real
 from calibeam.guided.recorded import encoder_address, is_guided
 from calibeam.guided.run import plan_of, run_guided
 from calibeam.live.feed import SILENT, Feed
-from calibeam.session.earlier import Earlier, earlier_of
-from calibeam.session.job import Job, with_place
-from calibeam.session.places import new_place, with_places
+from calibeam.session.job import Earlier, Job, earlier_of, new_place, with_place, with_places
 from calibeam.session.run import run_session
 from drivers.clock import SystemClock
 

@@ -3,18 +3,33 @@
 The error is that of the beam in free space, as the covariance of the fit so far predicts it: the same fit, noise and
 target as identification and pose design have (calibrate/identification, calibrate/pose_design), at the values and
 under the noise found so far. What these samples cannot tell is said instead of a number.
+
+Where the arm will about stand at the poses that a session still has to take: what a forecast counts on.
+
+Postures are those of the rig as drawn; a pose out of reach is left out here, and said by the drawing of the plan.
+
+Forecasts made beside the session, while the arm is on its way: the newest samples count, the session never waits.
 """
 
+import threading
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.aiming.pose import flange_for
+from acquisition.aiming.reach import reach
+from acquisition.errors import UnreachableError
+from acquisition.plan import Block, PoseKey
 from acquisition.recording.columns import SPOTS, per_joint
+from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.samples import Samples
 from acquisition.sample import Sample
 from calibrate.arms.catalogue import arm_of
+from calibrate.believed import BelievedRig
 from calibrate.fit import Status
 from calibrate.identifiability import Identifiability, analyse
 from calibrate.identification.rounds import Fitted, coarse_start, settled_fit
@@ -29,7 +44,62 @@ from calibrate.variance import VarianceFactors
 
 Floats = NDArray[np.float64]
 
-SEED = 1  # of the poses over which free space is looked at: always the same, so that only the samples change the number
+SEED = 1  # of the starts of the inverse kinematics
+
+
+@dataclass(frozen=True, eq=False)
+class Ahead:
+    """Poses in the order in which they are taken."""
+
+    poses: Candidates
+    keys: tuple[PoseKey, ...]
+
+    def after(self, taken: int) -> Candidates:
+        """All but the first so many."""
+        return self.poses.take(np.arange(min(taken, len(self.keys)), len(self.keys)))
+
+
+def ahead_of_blocks(rig: Rig, blocks: Sequence[Block]) -> Ahead:
+    """Of a session that aims; repeats stand where their first pose stands."""
+    believed, rng = BelievedRig(rig), np.random.default_rng(SEED)
+    near_rad = np.array(rig.motion.home_rad)
+    found: dict[PoseKey, tuple[Floats, Floats]] = {}
+    for block in blocks:
+        T = believed.T_base_psd1(block.placement)
+        for visit in block.visits:
+            flange = flange_for(believed.arm, believed.fixture, T, visit.target)
+            try:
+                near_rad = reach(believed.arm, flange, near_rad, rng)
+            except UnreachableError:
+                continue
+            for again in range(1 if visit.repeat is None else 3):
+                found[visit.key(again)] = near_rad, np.array(visit.target.spots_m)
+    keys = tuple(key for block in blocks for key in block.pose_keys() if key in found)
+    return Ahead(_poses([found[key] for key in keys], keys, rig.n_joints), keys)
+
+
+def ahead_of_plan(rig: Rig, plan: PosePlan) -> Ahead:
+    """Of a plan of joint poses."""
+    believed = BelievedRig(rig)
+    each = [(block, pose) for block in plan.block for pose in block.pose]
+    keys = tuple(PoseKey(block.placement or 0, block.first_psd or 1, k) for k, (block, _) in enumerate(each))
+    found: list[tuple[Floats, Floats]] = []
+    for key, (_, pose) in zip(keys, each, strict=True):
+        q_rad = np.array(pose.q_rad)
+        spots = believed.expect(q_rad, key.placement, key.first).spots_m if pose.spots_m is None else pose.spots_m
+        found.append((q_rad, np.array(spots)))
+    return Ahead(_poses(found, keys, rig.n_joints), keys)
+
+
+def _poses(found: list[tuple[Floats, Floats]], keys: Sequence[PoseKey], n_joints: int) -> Candidates:
+    return Candidates(
+        np.array([q for q, _ in found]).reshape(-1, n_joints),
+        np.array([spots for _, spots in found]).reshape(-1, 4),
+        np.array([key.placement for key in keys], dtype=np.int64),
+        np.array([key.first for key in keys], dtype=np.int64),
+    )
+
+
 LARGEST_M = 1e-2  # a prediction beyond this is no number that a straight-line covariance can give
 
 
@@ -161,3 +231,57 @@ def _short(combinations: list[str], count: int) -> str:
 
 def _microns(length_m: float) -> str:
     return f"{1e6 * length_m:.3g} um" if length_m < 1e-3 else f"{1e3 * length_m:.2g} mm"
+
+
+END_S = 5.0  # longer than any forecast takes: a tenth of a second at ninety poses
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a forecast is made of."""
+
+    samples: list[Sample]
+    taken_of_plan: int  # how many of the plan's poses are behind
+
+
+class Forecaster:
+    """One thread; `make` computes and tells. What it raises is told to `failed`, once, and no more is made."""
+
+    def __init__(self, make: Callable[[Asked], None], failed: Callable[[Exception], None]) -> None:
+        self._make, self._failed = make, failed
+        self._news = threading.Condition()
+        self._asked: Asked | None = None
+        self._over = True
+
+    def ask(self, asked: Asked) -> None:
+        """Takes the place of what was asked before and is not begun yet."""
+        with self._news:
+            self._asked = asked
+            self._news.notify()
+
+    @contextmanager
+    def running(self) -> Generator[None]:
+        """Inside, what is asked is made."""
+        self._over = False
+        thread = threading.Thread(target=self._run, name="forecast", daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            with self._news:
+                self._over = True
+                self._news.notify()
+            thread.join(END_S)
+
+    def _run(self) -> None:
+        while True:
+            with self._news:
+                self._news.wait_for(lambda: self._over or self._asked is not None)
+                asked, self._asked = self._asked, None
+                if self._over or asked is None:
+                    return
+            try:
+                self._make(asked)
+            except Exception as error:  # a session goes on without forecasts
+                self._failed(error)
+                return

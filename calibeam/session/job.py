@@ -1,17 +1,149 @@
-"""What a session on site is asked for, and the part of it that is measured next."""
+"""What a session on site is asked for, and the part of it that is measured next.
+
+What earlier parts of a session in the same folder have taken, and under which places: read from their recordings.
+
+Places that a session adds to those of its rig file: where the fixture was moved, or stands in addition.
+"""
 
 import hashlib
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+
+import msgspec
 
 from acquisition.errors import AcquisitionError
 from acquisition.plan import Block, PlanOptions, PoseKey, blocks
+from acquisition.recording.errors import RecordingError, RigFileError, shown
+from acquisition.recording.parts import differs, parts
 from acquisition.recording.pose_plan import PosePlan
-from acquisition.recording.rig_schema import Placement, Rig
+from acquisition.recording.read import read
+from acquisition.recording.recording import Recording
+from acquisition.recording.rig import parse_rig
+from acquisition.recording.rig_schema import Placement, Pose, Rig
+from acquisition.sample import Sample, sample_of
 from calibeam.devices.site import Addresses
-from calibeam.session.earlier import PLAN_NOTE, SEED_NOTE, Earlier
-from calibeam.session.places import moved_plan, with_places
+
+PLACE_EVENT, STANDS_IN = "placement", "place added"
+SEED_NOTE, PLAN_NOTE = "plan_seed", "plan_sha256"
+
+
+@dataclass(frozen=True)
+class Earlier:
+    """Nothing at all: a session that begins."""
+
+    taken: Mapping[PoseKey, Sample] = field(default_factory=dict[PoseKey, Sample])
+    added: tuple[Placement, ...] = ()  # places that the rig file does not know
+    stands_in: Mapping[int, int] = field(default_factory=dict[int, int])  # place -> the one that is measured instead
+    standing: int | None = None  # place where the fixture was last
+    notes: Mapping[str, str] = field(default_factory=dict[str, str])
+
+    @property
+    def begun(self) -> bool:
+        return bool(self.notes)
+
+
+def earlier_of(folder: Path, rig: Rig) -> Earlier:
+    """Of all parts. RecordingError where there are none, or they are of another rig."""
+    files = parts(folder)
+    if not files:
+        raise RecordingError(f"{folder}: no session to go on with; leave --continue out, or give the folder of one")
+    each = [read(path) for path in files]
+    try:
+        return _of_parts(each, folder, rig)
+    except (KeyError, TypeError, ValueError) as error:  # events and samples of another program, or damaged
+        raise RecordingError(
+            f"{folder}: its recordings do not contain which poses are done ({shown(str(error))}); "
+            "begin a new session with another --out"
+        ) from error
+
+
+def _of_parts(each: Sequence[Recording], folder: Path, rig: Rig) -> Earlier:
+    """KeyError, TypeError, ValueError where events or samples are not as a session writes them."""
+    last = each[-1]
+    listed = {place.id: place for place in rig.placement_list}
+    added = tuple(place for place in last.rig.placement_list if place.id not in listed)
+    if said := differs(last.rig, msgspec.structs.replace(rig, placement_list=(*rig.placement_list, *added))):
+        raise RecordingError(f"{folder}: its session was of another rig: {said}; begin a new one with another --out")
+    events = [event for one in each for event in one.events]
+    placed = [int(event.detail["id"]) for event in events if event.kind == PLACE_EVENT]
+    stands_in = {
+        int(event.detail["instead_of"]): int(event.detail["id"])
+        for event in events
+        if event.kind == STANDS_IN and event.detail.get("instead_of") is not None
+    }
+    taken = {key: sample for one in each for key, sample in _taken(one).items()}
+    return Earlier(taken, added, stands_in, placed[-1] if placed else None, each[0].notes)
+
+
+def _taken(one: Recording) -> dict[PoseKey, Sample]:
+    """A sample whose event was not written any more, because the process was killed, is taken once more."""
+    told = [event.detail.get("pose") for event in one.events if event.kind == "sample"]
+    rows = [sample_of(row, one.samples.n_joints) for row in one.samples.rows()]
+    if len(one.samples) and not any(told):
+        raise RecordingError(
+            f"{one.path}: recorded by an earlier version, which did not say which pose a sample is; begin a new session"
+        )
+    return {PoseKey(**pose): row for pose, row in zip(told, rows, strict=False) if pose is not None}
+
+
+TEXT = """
+# added by the session
+[[placement]]
+id = {id}
+psd1_in_base = {{ origin_m = {origin}, rotation_rad = {rotation} }}
+"""
+
+
+def with_places(rig: Rig, text: str, added: Sequence[Placement]) -> tuple[Rig, str]:
+    """The rig, and its text, with these places behind its own. RigFileError where the text takes no more."""
+    if not added:
+        return rig, text
+    longer = text.rstrip("\n") + "\n" + "".join(map(placement_text, added))
+    try:
+        return parse_rig(longer, f"{rig.name} with the places of the session"), longer
+    except RigFileError as error:
+        raise RigFileError(
+            f"rig {rig.name}: a place cannot be added to the file ({error}); write its places as [[placement]]"
+        ) from error
+
+
+def placement_text(place: Placement) -> str:
+    """As it stands in a rig file."""
+    pose = place.psd1_in_base
+    return TEXT.format(id=place.id, origin=list(pose.origin_m), rotation=list(pose.rotation_rad))
+
+
+def new_place(rig: Rig, numbers: Sequence[float]) -> Placement:
+    """From x, y, z (m) of PSD 1 in the base and its turn about z (deg): a fixture stands upright."""
+    x, y, z, yaw_deg = numbers
+    return Placement(_free(rig), Pose(origin_m=(x, y, z), rotation_rad=(0.0, 0.0, math.radians(yaw_deg))))
+
+
+def same_place(rig: Rig, placement: int) -> Placement:
+    """A new place about where this one was: the fixture was moved since."""
+    return Placement(_free(rig), rig.placements[placement].psd1_in_base)
+
+
+def moved_plan(plan: PosePlan, stands_in: Mapping[int, int]) -> PosePlan:
+    """The plan with its poses at the places that are measured instead."""
+    blocks = tuple(
+        msgspec.structs.replace(block, placement=resolved(block.placement, stands_in)) for block in plan.block
+    )
+    return msgspec.structs.replace(plan, block=blocks)
+
+
+def resolved(placement: int | None, stands_in: Mapping[int, int]) -> int | None:
+    """A place, or the one that is measured instead of it, or of that."""
+    while placement is not None and placement in stands_in:
+        placement = stands_in[placement]
+    return placement
+
+
+def _free(rig: Rig) -> int:
+    return 1 + max(rig.placements)
+
 
 MORE = 100  # index from which poses that a person asked for in addition are counted, round by round
 

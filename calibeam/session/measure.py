@@ -24,14 +24,11 @@ from calibeam.interrupts import INTERRUPTS
 from calibeam.learner import FittedLearner
 from calibeam.live.feed import Feed
 from calibeam.outcome import PartialResult
-from calibeam.session.ahead import Ahead
-from calibeam.session.earlier import STANDS_IN
-from calibeam.session.forecast import Forecast, forecast
-from calibeam.session.forecaster import Asked, Forecaster
-from calibeam.session.job import Job, Part, notes_of
+from calibeam.session.forecast import Ahead, Asked, Forecast, Forecaster, forecast
+from calibeam.session.job import STANDS_IN, Job, Part, notes_of
 from calibeam.session.keys import Keys
 from calibeam.session.person import Person
-from calibeam.session.teller import Teller, ToldJournal
+from calibeam.session.reporter import Teller, ToldJournal
 from drivers.clock import Clock
 
 FORECAST_EVERY = 5  # poses; one takes a tenth of a second, in a thread of its own

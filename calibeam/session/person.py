@@ -8,7 +8,7 @@ from rich.console import Console
 from acquisition.errors import AcquisitionError
 from calibeam.asking import YES, Asking, someone
 from calibeam.session.keys import ENTER, Keys
-from calibeam.session.teller import Teller
+from calibeam.session.reporter import Teller
 
 
 class Person:

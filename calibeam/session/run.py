@@ -21,19 +21,25 @@ from calibeam.interrupts import INTERRUPTS
 from calibeam.learner import FittedLearner
 from calibeam.live.feed import SILENT, Feed
 from calibeam.outcome import PartialResult, interruption
-from calibeam.session.ahead import ahead_of_blocks, ahead_of_plan
-from calibeam.session.earlier import Earlier, earlier_of
-from calibeam.session.job import Job, Part, more_at, moved, part_of, with_place
-from calibeam.session.log_file import NAME, LogFile
+from calibeam.session.forecast import ahead_of_blocks, ahead_of_plan
+from calibeam.session.job import (
+    Earlier,
+    Job,
+    Part,
+    earlier_of,
+    more_at,
+    moved,
+    new_place,
+    part_of,
+    placement_text,
+    same_place,
+    with_place,
+)
 from calibeam.session.measure import Measuring, measuring
-from calibeam.session.pace import clock_words
-from calibeam.session.page_view import PageView
 from calibeam.session.person import Person
-from calibeam.session.places import new_place, placement_text, same_place
-from calibeam.session.plain_view import PlainView
-from calibeam.session.status import Listener
-from calibeam.session.teller import Teller
-from calibeam.session.views import TerminalView
+from calibeam.session.reporter import Teller
+from calibeam.session.status import Listener, clock_words
+from calibeam.session.views import NAME, LogFile, PageView, PlainView, TerminalView
 from calibrate.pose_design.candidates import POSE_S
 from drivers.clock import Clock, SystemClock
 from drivers.errors import DeviceError, DeviceRefused

@@ -1,10 +1,18 @@
 """A session in a terminal, for somebody with gloves a step away: what is going on in colour and capitals, few words.
 
 The view stays at the bottom; what is said scrolls by above it, and stands in the log.
+
+A session on something that is no terminal: plain lines, few of them.
+
+A session on the live page.
+
+The log beside a recording, session.log: one line a happening, with its time; nothing that was said is lost.
 """
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
+from datetime import UTC, datetime
+from pathlib import Path
 
 import numpy as np
 from rich.console import Console, Group, RenderableType
@@ -15,9 +23,84 @@ from rich.text import Text
 
 from acquisition.progress import Progress
 from acquisition.session_states import State
-from calibeam.session.pace import clock_words
-from calibeam.session.quality import Quality
-from calibeam.session.status import Shown
+from calibeam.live.feed import Feed
+from calibeam.live.feed import Progress as PageProgress
+from calibeam.session.status import Quality, Shown, clock_words
+
+EVERY = 10  # poses
+
+
+class PlainView:
+    """Implements calibeam.session.status.Listener."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._told, self._step = 0, ""
+
+    def said(self, text: str, loud: bool) -> None:
+        if loud:
+            self._console.print(text, highlight=False, markup=False, soft_wrap=True)
+
+    def shows(self, shown: Shown) -> None:
+        if shown.step != self._step:
+            self._step = shown.step
+            self.said(shown.step, loud=True)
+        progress = shown.progress
+        if progress is None or progress.done < self._told + EVERY:
+            return
+        self._told = progress.done
+        left = "" if shown.left_s is None else f", about {clock_words(shown.left_s)} left"
+        accuracy = "" if shown.forecast is None else f"; accuracy {shown.forecast.says}"
+        self.said(f"{progress.done} of {progress.total} poses{left}{accuracy}", loud=True)
+
+
+class PageView:
+    """Implements calibeam.session.status.Listener."""
+
+    def __init__(self, feed: Feed) -> None:
+        self._feed = feed
+        self._stands: tuple[int, int] | None = None
+        self._samples = -1
+
+    def said(self, text: str, loud: bool) -> None:
+        if loud:
+            self._feed.said(text)
+
+    def shows(self, shown: Shown) -> None:
+        progress, forecast = shown.progress, shown.forecast
+        if progress is not None and (progress.placement, progress.first) != self._stands:
+            self._stands = progress.placement, progress.first
+            self._feed.stands(*self._stands)
+        if forecast is not None and forecast.corrections is not None and forecast.samples != self._samples:
+            self._samples = forecast.samples
+            self._feed.believes(forecast.corrections)
+        note = shown.asked or ("" if forecast is None else f"accuracy: {forecast.says}")
+        done, total = (0, None) if progress is None else (progress.done, progress.total)
+        self._feed.progress(PageProgress(shown.head, done, total, shown.left_s, note))
+
+
+NAME = "session.log"
+
+
+def utc_now() -> datetime:
+    return datetime.now(UTC)
+
+
+class LogFile:
+    """Implements status.Listener. A disk that takes no line ends no session: the recording reports it."""
+
+    def __init__(self, path: Path, now: Callable[[], datetime] = utc_now) -> None:
+        self.path, self._now = path, now
+
+    def said(self, text: str, loud: bool) -> None:
+        stamp = self._now().isoformat(timespec="milliseconds").replace("+00:00", "Z")
+        lines = "".join(f"{stamp} {line}\n" for line in text.splitlines())
+        with suppress(OSError), self.path.open("a", encoding="utf-8") as file:
+            file.write(lines)
+
+    def shows(self, shown: Shown) -> None:
+        """A log holds what was said."""
+
 
 REFRESH_HZ = 4.0
 BAR = 30  # characters

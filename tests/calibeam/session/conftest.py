@@ -10,7 +10,7 @@ from acquisition.plan import PlanOptions, blocks
 from acquisition.recording.rig import load_rig
 from acquisition.recording.rig_schema import Rig
 from acquisition.sample import Sample
-from calibeam.session.ahead import Ahead, ahead_of_blocks
+from calibeam.session.forecast import Ahead, ahead_of_blocks
 from calibrate.believed import BelievedRig
 
 RIG_FILE = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"

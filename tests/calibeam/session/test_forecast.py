@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.plan import PlanOptions, blocks
-from calibeam.session.ahead import ahead_of_blocks
-from calibeam.session.forecast import forecast
+from calibeam.session.forecast import ahead_of_blocks, forecast
 from calibrate.pose_design.information import information_of
 
 GOAL_M = 10e-6

@@ -13,9 +13,20 @@ from acquisition.recording.rig import parse_rig
 from acquisition.recording.stream import Event
 from acquisition.recording.writer import RecordingWriter
 from calibeam.devices.site import addresses_of
-from calibeam.session.earlier import Earlier, earlier_of
-from calibeam.session.job import MORE, Job, more_at, moved, notes_of, part_of, with_place
-from calibeam.session.places import new_place, same_place, with_places
+from calibeam.session.job import (
+    MORE,
+    Earlier,
+    Job,
+    earlier_of,
+    more_at,
+    moved,
+    new_place,
+    notes_of,
+    part_of,
+    same_place,
+    with_place,
+    with_places,
+)
 
 from .conftest import RIG_FILE
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from calibeam.session.key_stream import KeyStream
+from calibeam.session.keys import KeyStream
 
 SEQUENCES = {
     "up": "\x1b[A",

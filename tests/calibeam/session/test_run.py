@@ -11,8 +11,7 @@ from calibeam.asking import Asking
 from calibeam.devices.check import DeviceCheck
 from calibeam.devices.site import addresses_of
 from calibeam.live.feed import SILENT
-from calibeam.session.earlier import Earlier
-from calibeam.session.job import Job, part_of
+from calibeam.session.job import Earlier, Job, part_of
 from calibeam.session.run import OnSite
 from drivers.clock import SystemClock
 from drivers.errors import DeviceRefused

@@ -18,14 +18,10 @@ from calibeam.live.feed import SILENT
 from calibeam.live.feed import Progress as PageProgress
 from calibeam.session.forecast import Forecast
 from calibeam.session.keys import Keys
-from calibeam.session.log_file import LogFile
-from calibeam.session.pace import Pace, clock_words
-from calibeam.session.page_view import PageView
 from calibeam.session.person import Person
-from calibeam.session.plain_view import PlainView
-from calibeam.session.status import Shown
-from calibeam.session.teller import Teller, ToldJournal
-from calibeam.session.views import KEYS, TerminalView, drawn
+from calibeam.session.reporter import Teller, ToldJournal
+from calibeam.session.status import Pace, Shown, clock_words
+from calibeam.session.views import KEYS, LogFile, PageView, PlainView, TerminalView, drawn
 from drivers.errors import DeviceLost
 
 PATIENCE_S = 30.0

@@ -19,8 +19,8 @@ from acquisition.session_states import State
 from benchmarks.stops import emulated_rig, without_encoders
 from calibeam.cli import run
 from calibeam.emulation import Emulation
-from calibeam.session.ahead import ahead_of_blocks
-from calibeam.session.teller import Teller
+from calibeam.session.forecast import ahead_of_blocks
+from calibeam.session.reporter import Teller
 from drivers.ur.reader import UrReader
 
 from .conftest import RIG_FILE

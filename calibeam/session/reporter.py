@@ -15,9 +15,7 @@ from acquisition.sample import Sample
 from acquisition.session_states import State
 from calibeam.outcome import PartialResult
 from calibeam.session.forecast import Forecast
-from calibeam.session.pace import Pace
-from calibeam.session.quality import Keeper
-from calibeam.session.status import UNDELIVERED, Listener, Shown
+from calibeam.session.status import UNDELIVERED, Keeper, Listener, Pace, Shown
 from calibrate.arms.rig_arm import limits_of
 from drivers.clock import Clock
 from drivers.errors import DeviceError
