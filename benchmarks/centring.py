@@ -25,8 +25,8 @@ from acquisition.servo.measured import Measured
 from acquisition.servo.registered import Registered
 from acquisition.servo.status import Centring, Status
 from acquisition.servo.strategy import Strategy
-from calibeam.direct import DirectBench, direct_bench
 from calibeam.learner import FittedLearner
+from tests.support.direct_bench import DirectBench, direct_bench
 
 Floats = NDArray[np.float64]
 Make = Callable[[BelievedArm, FixtureOptics, Floats, int], Strategy]

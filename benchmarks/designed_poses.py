@@ -24,7 +24,6 @@ from acquisition.recording.rig_schema import Rig
 from acquisition.recording.writer import RecordingWriter
 from benchmarks.slices import Slices
 from calibeam.devices.recorder import RecordingJournal
-from calibeam.direct import direct_bench
 from calibeam.learner import FittedLearner
 from calibeam.motion.reachable_poses import candidates_of
 from calibeam.prove.free_space import errors_m
@@ -40,6 +39,7 @@ from calibrate.pose_design.information import Information, information_of
 from calibrate.pose_design.plan_of import blocks_of, plan_of, taken
 from drivers.clock import SystemClock
 from simulators.world.truth import Truth
+from tests.support.direct_bench import direct_bench
 
 Floats = NDArray[np.float64]
 

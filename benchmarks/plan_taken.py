@@ -20,7 +20,6 @@ from acquisition.recording.samples import Samples
 from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
 from calibeam.devices.recorder import RecordingJournal
-from calibeam.direct import DirectBench
 from calibeam.learner import FittedLearner
 from calibeam.results.diagnosis import diagnose_recording, plan_next
 from calibrate.diagnose.bench import Bench
@@ -33,6 +32,7 @@ from simulators.conceal.case import conceal
 from simulators.conceal.wanted import Wanted
 from simulators.defects.defect import Defect
 from simulators.world.world import World
+from tests.support.direct_bench import DirectBench
 
 FIRST = PlanOptions(centred=1, off_centre=12, repeats=1)
 

@@ -22,8 +22,8 @@ from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
 from benchmarks.disturbed import DisturbedWorld, Trouble
 from calibeam.devices.recorder import RecordingJournal
-from calibeam.direct import DirectBench
 from calibeam.learner import FittedLearner
+from tests.support.direct_bench import DirectBench
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

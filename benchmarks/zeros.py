@@ -15,12 +15,12 @@ from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
 from calibeam.commands.demo import Revealed, reveal
 from calibeam.devices.recorder import RecordingJournal
-from calibeam.direct import direct_bench
 from calibeam.learner import FittedLearner
 from calibeam.results.identification import identify_session
 from calibeam.software import SOFTWARE
 from drivers.clock import SystemClock
 from simulators.world.truth import write_truth
+from tests.support.direct_bench import direct_bench
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The emulated camera without a wire, beside calibeam.direct: its pictures are those that the emulator sends."""
+"""The emulated camera without a wire: its pictures are those that the emulator sends."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording.rig import load_rig
 from acquisition.recording.rig_schema import Rig
-from calibeam.direct import DirectBench, direct_bench
+from tests.support.direct_bench import DirectBench, direct_bench
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
 

@@ -8,9 +8,9 @@ from acquisition.plan import PlanOptions, PoseKey, blocks
 from acquisition.reins import Reins
 from acquisition.session import Session
 from acquisition.session_states import State
-from calibeam.direct import DirectBench
 from calibeam.learner import FittedLearner
 from drivers.errors import DeviceRefused
+from tests.support.direct_bench import DirectBench
 
 from .test_session import Kept
 

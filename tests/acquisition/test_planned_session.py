@@ -22,7 +22,7 @@ OPTIONS = PlanOptions(centred=2, off_centre=2, repeats=0)
 @pytest.fixture(scope="module")
 def plan(rig, plain_rig) -> PosePlan:
     """Every off-centre pose of a short session, from the other side."""
-    from calibeam.direct import direct_bench
+    from tests.support.direct_bench import direct_bench
 
     bench, kept = direct_bench(rig, plain_rig, seed=6), Kept()
     Session(bench, FittedLearner(rig), kept, OPTIONS, np.array(rig.motion.home_rad)).run((1,))

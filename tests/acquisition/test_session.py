@@ -13,9 +13,9 @@ from acquisition.navigator import GLANCE_S
 from acquisition.plan import PlanOptions, blocks
 from acquisition.sample import Sample
 from acquisition.session import Session, Summary
-from calibeam.direct import DirectBench
 from calibeam.learner import FittedLearner
 from drivers.errors import DeviceRefused
+from tests.support.direct_bench import DirectBench
 
 SMALL = PlanOptions(centred=2, off_centre=4, repeats=1)
 
@@ -42,7 +42,7 @@ def run(rig, bench, options: PlanOptions = SMALL) -> tuple[Summary, Kept]:
 
 @pytest.fixture(scope="module")
 def taken(rig, plain_rig) -> tuple[Summary, Kept]:
-    from calibeam.direct import direct_bench
+    from tests.support.direct_bench import direct_bench
 
     return run(rig, direct_bench(rig, plain_rig, seed=6))
 

@@ -12,11 +12,11 @@ from acquisition.recording.rig import load_rig, plain_rig, rig_text
 from acquisition.recording.samples import Samples
 from acquisition.recording.writer import RecordingWriter
 from calibeam.devices.recorder import record_session
-from calibeam.direct import direct_bench
 from calibeam.motion.reachable_poses import candidates_of
 from calibeam.printing.progress import progress_bar
 from calibrate.pose_design.plan_of import blocks_of, plan_of, taken
 from drivers.clock import SystemClock
+from tests.support.direct_bench import direct_bench
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
 

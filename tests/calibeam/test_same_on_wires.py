@@ -16,12 +16,12 @@ from acquisition.sample import Sample
 from acquisition.session import Session
 from calibeam.devices.recorder import RecordingJournal, record_session
 from calibeam.devices.site import addresses_of, connected
-from calibeam.direct import direct_bench
 from calibeam.emulation import Emulation
 from calibeam.learner import FittedLearner
 from calibeam.printing.progress import progress_bar
 from drivers.clock import SystemClock
 from simulators.world.world import World
+from tests.support.direct_bench import direct_bench
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
 SEED = 9

@@ -15,7 +15,6 @@ from acquisition.recording.samples import Samples
 from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
 from calibeam.devices.recorder import RecordingJournal
-from calibeam.direct import direct_bench
 from calibeam.learner import FittedLearner
 from calibeam.printing.identification import print_identification
 from calibeam.results.identification import Planned, identify_session, session_model
@@ -25,6 +24,7 @@ from calibrate.identification.point_constraint import point_constraints
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_verdict import session_verdict
 from drivers.clock import SystemClock
+from tests.support.direct_bench import direct_bench
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
 

@@ -96,7 +96,7 @@ def test_a_file_that_is_not_there_or_of_another_camera_is_refused_with_the_remed
 
 @pytest.mark.parametrize("dictionary", ["aruco-4x4-50", "apriltag-36h11"])
 def test_the_board_is_found_in_pictures_of_either_dictionary(rig, exact, dictionary: str) -> None:
-    from calibeam.direct import direct_bench
+    from tests.support.direct_bench import direct_bench
 
     other = {**exact, "camera": {**exact["camera"], "board": {**exact["camera"]["board"], "dictionary": dictionary}}}
     bench = direct_bench(rig, other, seed=1)

@@ -11,13 +11,13 @@ from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
 from calibeam.devices.recorder import RecordingJournal
-from calibeam.direct import DirectBench
 from calibeam.learner import FittedLearner
 from drivers.clock import SystemClock
 from simulators.conceal.observe import observe
 from simulators.conceal.on_wire import Taken, draw_wired, taken_case
 from simulators.conceal.wanted import Wanted
 from simulators.world.world import World
+from tests.support.direct_bench import DirectBench
 
 RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
 

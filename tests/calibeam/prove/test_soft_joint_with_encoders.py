@@ -12,12 +12,12 @@ from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
 from calibeam.devices.recorder import RecordingJournal
-from calibeam.direct import DirectBench
 from calibeam.learner import FittedLearner
 from calibrate.diagnose.from_recording import diagnose_samples
 from drivers.clock import SystemClock
 from simulators.defects.drive import SoftJoint
 from simulators.world.world import World
+from tests.support.direct_bench import DirectBench
 
 RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
 COMPLIANCE_RAD_NM = 8e-6

@@ -15,7 +15,6 @@ from acquisition.recording.samples import Samples
 from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
 from calibeam.devices.recorder import RecordingJournal
-from calibeam.direct import direct_bench
 from calibeam.learner import FittedLearner
 from calibeam.results.identification import identify_session, session_model
 from calibrate.identification.identify import identify
@@ -24,6 +23,7 @@ from calibrate.model_file import ModelFile, RigIdentity
 from calibrate.report.session_evidence import SessionEvidence, session_evidence
 from calibrate.report.session_report import session_page
 from drivers.clock import SystemClock
+from tests.support.direct_bench import direct_bench
 
 RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
 POSITION, ORIENTATION = ("x_m", "y_m", "z_m"), ("rx_rad", "ry_rad", "rz_rad")
