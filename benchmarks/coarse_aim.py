@@ -28,9 +28,8 @@ from acquisition.motion.rigid import inverse, transform
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
 from acquisition.recording.rig_schema import Rig
 from acquisition.sample import Sample
-from calibeam.direct_eye import DirectEye
 from calibeam.learner import FittedLearner
-from tests.support.direct_bench import DirectBench, direct_bench
+from tests.support.direct_bench import DirectBench, DirectEye, direct_bench
 
 Floats = NDArray[np.float64]
 

@@ -2,6 +2,8 @@
 
 For the many sessions of benchmarks and proofs. What it leaves out is the wire: protocols, line time, threads, other
 processes; world, optics, noise and settling are those of the emulators. tests/calibeam checks that both tell the same.
+
+The emulated camera without a wire: its pictures are those that the emulator sends.
 """
 
 import math
@@ -13,14 +15,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.bench import Look
+from acquisition.camera.eye import Grey
 from acquisition.psd_view import NO_LIGHT, PsdView, PsdWindow
 from acquisition.recording.rig_schema import Rig
 from acquisition.settling import SettleRule, stretch_to_average
 from drivers.psd_faces import Face, FaceKind
+from simulators.camera.emulator import Eye
+from simulators.camera.true_camera import TrueCamera
 from simulators.wire import TICK_S
 from simulators.world.world import World
 
 Floats = NDArray[np.float64]
+
+
+class DirectEye:
+    """Implements acquisition.camera.eye.Eye over a world in this process."""
+
+    def __init__(self, world: World, plain_rig: Mapping[str, Any]) -> None:
+        self._eye = Eye(world, plain_rig, world.truth.seed)
+
+    @property
+    def camera(self) -> TrueCamera:
+        """What it truly is; for tests."""
+        return self._eye.camera
+
+    def picture(self) -> Grey:
+        return self._eye.take(self._eye.scene())
+
+    def taken(self, T_camera_board: Floats) -> Grey:
+        """A picture of the board at a pose (4, 4) of its own, wherever the world has it."""
+        return self._eye.take(T_camera_board)
+
 
 DARK_A = 1e-6  # photocurrent below this is no light; a lit face gives tens of microamperes, a dark one nanoamperes
 TRANSIMPEDANCE_V_A = 1e4

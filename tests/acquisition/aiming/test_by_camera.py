@@ -16,10 +16,9 @@ from acquisition.motion.rigid import apart, transform
 from acquisition.navigator import Navigator
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
 from benchmarks import coarse_aim
-from calibeam.direct_eye import DirectEye
 from calibeam.learner import FittedLearner
 from tests.acquisition.conftest import true_fixture
-from tests.support.direct_bench import direct_bench
+from tests.support.direct_bench import DirectEye, direct_bench
 
 RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd-camera.toml"
 CENTRES = (0.0, 0.0, 0.0, 0.0)

@@ -13,7 +13,7 @@ from acquisition.camera.model import CameraFit, drawn, read_model, write_model
 from acquisition.errors import AcquisitionError
 from acquisition.motion.rigid import apart, transform
 from benchmarks.coarse_aim import measured_world
-from calibeam.direct_eye import DirectEye
+from tests.support.direct_bench import DirectEye
 
 
 @pytest.fixture(scope="module")
