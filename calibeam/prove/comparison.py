@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.read import read
+from calibeam.prove.baselines import installed
 from calibeam.prove.baselines.features import features
 from calibeam.prove.baselines.method import Method
-from calibeam.prove.baselines.methods import installed
 from calibeam.prove.free_space import errors_m
 from calibeam.prove.oracle import Fold, fold_of, misfit_m, oracle_terms, rms_m, said_terms, wild_of
 from calibeam.prove.record import DIAGNOSIS, BaselineScore
 from calibeam.prove.truth import Truth
-from calibeam.prove.unseen_file import read_asked
+from calibeam.prove.unseen import read_asked
 from calibeam.prove.unseen_poses import tool_at
 from calibrate.diagnose.file import read_diagnosis
 from calibrate.diagnose.fitted import Fitted, fit_geometry

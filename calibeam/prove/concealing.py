@@ -9,7 +9,7 @@ from calibeam.prove.layout import Layout
 from calibeam.prove.scenario import DRAWS, WIRED_DRAWS, Mix, Scenario, scenario, wired_scenario
 from calibeam.prove.seal import fingerprint, new_key, sealed
 from calibeam.prove.streamed import conceal_streams, told
-from calibeam.prove.unseen_file import write_asked
+from calibeam.prove.unseen import write_asked
 from calibeam.worker_processes import in_workers
 from simulators.conceal.belief import rig_document
 from simulators.conceal.case import Case, conceal

@@ -13,7 +13,7 @@ from calibrate.report.elements import Html
 from calibrate.report.svg import drawn
 from calibrate.report.tones import Tone
 
-PLAIN = 0.6  # effect over noise
+PLAIN_ENR = 0.6  # effect over noise
 SINGLE = ("one", "disturbed", "outside", "streams")
 NOTHING = "nothing"
 FAILED = "failed"
@@ -27,7 +27,7 @@ def confusion(cases: Sequence[CaseScore]) -> tuple[list[str], list[str], NDArray
     """Words hidden, words said, counts. Of cases with none or one cause; several at once have no single answer."""
     pairs: Counter[tuple[str, str]] = Counter()
     for case in cases:
-        if case.kind in SINGLE and case.defects and case.defects[0].enr >= PLAIN:
+        if case.kind in SINGLE and case.defects and case.defects[0].enr >= PLAIN_ENR:
             pairs[case.defects[0].physics, _said(case)] += 1
         elif not case.defects:
             pairs[NOTHING, _said(case)] += 1

@@ -26,7 +26,7 @@ def by_instrument(cases: Sequence[CaseScore]) -> list[FreeSpaceLine]:
     """Of cases with hidden causes that a catalogue may list, and all three numbers."""
     compared = [c for c in cases if c.kind in ONES and _numbers(c) is not None]
     words = sorted({c.family for c in compared})
-    return [_line(word, [c for c in compared if c.family == word]) for word in words]
+    return [_free_space_line(word, [c for c in compared if c.family == word]) for word in words]
 
 
 def shares_of_oracle(cases: Sequence[CaseScore]) -> list[float]:
@@ -46,6 +46,6 @@ def _numbers(case: CaseScore) -> tuple[float, float, float] | None:
     return three[0], three[1], three[2]
 
 
-def _line(label: str, cases: Sequence[CaseScore]) -> FreeSpaceLine:
+def _free_space_line(label: str, cases: Sequence[CaseScore]) -> FreeSpaceLine:
     middle = np.median([n for n in map(_numbers, cases) if n is not None], axis=0)
     return FreeSpaceLine(label, len(cases), float(middle[0]), float(middle[1]), float(middle[2]))

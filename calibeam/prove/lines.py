@@ -10,8 +10,8 @@ from calibeam.prove.hidden_angle import HiddenAngle
 from calibeam.prove.real import RealScore
 from calibeam.prove.record import CaseScore, ProofFile
 from calibeam.prove.tally import (
-    Figure,
     Line,
+    ProofFigure,
     at_once,
     between_encoders,
     by,
@@ -73,7 +73,7 @@ def _free_space(cases: Sequence[CaseScore]) -> Table:
     return table
 
 
-def _shares(others: Sequence[Figure]) -> Table:
+def _shares(others: Sequence[ProofFigure]) -> Table:
     table = Table(title="share of the oracle's held-out gain (1: all, 0: none)", title_justify="left")
     for heading in ("", "median, p10"):
         table.add_column(heading)

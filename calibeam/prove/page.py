@@ -8,7 +8,7 @@ from calibeam.prove.free_space_sums import by_instrument
 from calibeam.prove.record import CaseScore, ProofFile
 from calibeam.prove.story import faults, hidden_briefly, hidden_words, said_words
 from calibeam.prove.summary import summary
-from calibeam.prove.tally import NONE, Figure, Line, at_once, by, by_effect, by_enr, by_fault, figures, rivals
+from calibeam.prove.tally import NONE, Line, ProofFigure, at_once, by, by_effect, by_enr, by_fault, figures, rivals
 from calibrate.report.elements import Html, bullets, figure, folded, section, table, tag
 from calibrate.report.page import page, write_page
 from calibrate.report.quantities import DASH, length
@@ -189,7 +189,7 @@ def _lines(caption: str, lines: Sequence[Line]) -> list[Html]:
     return [table(HEAD, rows, numeric=(1, 5), caption=caption)] if rows else []
 
 
-def _figures(head: Sequence[str], found: Sequence[Figure]) -> Html:
+def _figures(head: Sequence[str], found: Sequence[ProofFigure]) -> Html:
     return table(head, [(f.label, f.said, f.wanted)[: len(head)] for f in found])
 
 

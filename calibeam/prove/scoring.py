@@ -15,7 +15,7 @@ from calibeam.prove.layout import Layout
 from calibeam.prove.noise_floor import floor_m
 from calibeam.prove.record import UNKNOWN, CaseScore, DefectScore, Said, SizeScore
 from calibeam.prove.truth import TrueDefect, Truth
-from calibeam.prove.unseen_file import read_unseen
+from calibeam.prove.unseen import read_unseen
 from calibrate.diagnose.file import read_diagnosis
 from calibrate.diagnose.schema import DiagnosisFile, FindingRecord, NameRecord
 

@@ -36,7 +36,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Figure:
+class ProofFigure:
     """One number of the proof and what it should be."""
 
     label: str
@@ -106,7 +106,7 @@ def by_fault(cases: Sequence[CaseScore]) -> list[Line]:
     return [_line(word, [c for c in ones if c.defects[0].mechanism == word]) for word in words]
 
 
-def figures(cases: Sequence[CaseScore]) -> list[Figure]:
+def figures(cases: Sequence[CaseScore]) -> list[ProofFigure]:
     """The rest of what was promised."""
     null = [c for c in cases if c.kind == "none"]
     outside = [c for c in cases if c.kind == "outside" and all(d.enr >= PLAIN for d in c.defects)]
@@ -114,40 +114,42 @@ def figures(cases: Sequence[CaseScore]) -> list[Figure]:
     faint = [s for c in cases if c.kind in SINGLE and 0.15 <= _enr(c) < 0.3 for s in c.said if s.physics != UNKNOWN]
     sizes = [s for c in cases for d in c.defects for s in d.sizes]
     out = [
-        Figure(f"false alarms, {noise} noise", str(share(c.alarmed for c in null if c.noise == noise)), wanted)
+        ProofFigure(f"false alarms, {noise} noise", str(share(c.alarmed for c in null if c.noise == noise)), wanted)
         for noise, wanted in (("white", "<= 6 %"), ("heavy", "<= 6 %"), ("wandering", "<= 8 %"))
     ]
     healthy = [c for c in cases if c.kind == "streams" and not c.defects]
-    out.append(Figure("false alarms, healthy streams", str(share(c.alarmed for c in healthy)), "none"))
+    out.append(ProofFigure("false alarms, healthy streams", str(share(c.alarmed for c in healthy)), "none"))
     return [
         *out,
-        Figure("faint (0.15 - 0.3): what is named is right", str(share(s.right for s in faint)), "all"),
-        Figure("outside: place right", str(share(c.defects[0].located for c in outside)), ">= 90 %"),
-        Figure("outside: said to be unknown", str(share(_said_unknown(c) for c in outside)), ">= 90 %"),
-        Figure("outside: misnamed with confidence", str(share(c.misnamed for c in outside)), "<= 5 %"),
-        Figure(
+        ProofFigure("faint (0.15 - 0.3): what is named is right", str(share(s.right for s in faint)), "all"),
+        ProofFigure("outside: place right", str(share(c.defects[0].located for c in outside)), ">= 90 %"),
+        ProofFigure("outside: said to be unknown", str(share(_said_unknown(c) for c in outside)), ">= 90 %"),
+        ProofFigure("outside: misnamed with confidence", str(share(c.misnamed for c in outside)), "<= 5 %"),
+        ProofFigure(
             "withheld: says what is missing", str(share(c.asks_for and not c.misnamed for c in withheld)), ">= 95 %"
         ),
-        Figure("withheld: said to be consistent", str(share(c.verdict == "consistent" for c in withheld)), "none"),
-        Figure("stated sizes within 1.96 sigma", str(share(s.inside for s in sizes)), "93 - 97 %"),
-        Figure("diagnoses that failed", str(share(c.verdict == "failed" for c in cases)), "none"),
+        ProofFigure("withheld: said to be consistent", str(share(c.verdict == "consistent" for c in withheld)), "none"),
+        ProofFigure("stated sizes within 1.96 sigma", str(share(s.inside for s in sizes)), "93 - 97 %"),
+        ProofFigure("diagnoses that failed", str(share(c.verdict == "failed" for c in cases)), "none"),
         *_ratios(cases),
     ]
 
 
-def _ratios(cases: Sequence[CaseScore]) -> Iterable[Figure]:
+def _ratios(cases: Sequence[CaseScore]) -> Iterable[ProofFigure]:
     floor = [c.held_out_after_m / c.floor_m for c in cases if c.held_out_after_m and c.floor_m and c.kind in SINGLE]
-    yield Figure("held-out / floor, median and p90", _percentiles(floor, 50, 90), "<= 1.05, 1.15")
+    yield ProofFigure("held-out / floor, median and p90", _percentiles(floor, 50, 90), "<= 1.05, 1.15")
     gains = [g for c in cases if (g := oracle_share(c)) is not None]
-    yield Figure("held-out gain, share of the oracle's, median and p10", _percentiles(gains, 50, 10), ">= 0.97, 0.85")
+    yield ProofFigure(
+        "held-out gain, share of the oracle's, median and p10", _percentiles(gains, 50, 10), ">= 0.97, 0.85"
+    )
     free = [c for c in cases if c.free_space_before_m and c.free_space_after_m and c.kind in (*SINGLE, "three")]
     found = [c for c in free if c.said]
     ratio = [(c.free_space_after_m or 0.0) / (c.free_space_before_m or 1.0) for c in found]
-    yield Figure("free-space error, after / before, where something was found", _percentiles(ratio), "")
+    yield ProofFigure("free-space error, after / before, where something was found", _percentiles(ratio), "")
     shares = shares_of_oracle(cases)
-    yield Figure("free-space gain, share of the oracle's, median and p10", _percentiles(shares, 50, 10), ">= 0.9")
-    yield Figure("free-space error worse by more than a tenth", str(share(r > 1.1 for r in ratio)), "")
-    yield Figure("seconds a case (CPU), median and p90", _percentiles([c.cpu_s for c in cases]), "<= 5")
+    yield ProofFigure("free-space gain, share of the oracle's, median and p10", _percentiles(shares, 50, 10), ">= 0.9")
+    yield ProofFigure("free-space error worse by more than a tenth", str(share(r > 1.1 for r in ratio)), "")
+    yield ProofFigure("seconds a case (CPU), median and p90", _percentiles([c.cpu_s for c in cases]), "<= 5")
 
 
 def oracle_share(case: CaseScore) -> float | None:
@@ -155,15 +157,15 @@ def oracle_share(case: CaseScore) -> float | None:
     return next((b.gain for b in case.baselines if b.method == DIAGNOSIS), None)
 
 
-def rivals(cases: Sequence[CaseScore]) -> list[Figure]:
+def rivals(cases: Sequence[CaseScore]) -> list[ProofFigure]:
     """All methods on the same unseen samples of the same cases: share of the oracle's gain."""
     compared = [c for c in cases if c.baselines]
     names = dict.fromkeys(b.method for c in compared for b in c.baselines)
     return [_gains(n, [b.gain for c in compared for b in c.baselines if b.method == n]) for n in names]
 
 
-def _gains(label: str, gains: Sequence[float | None]) -> Figure:
-    return Figure(label, _percentiles([g for g in gains if g is not None], 50, 10), "")
+def _gains(label: str, gains: Sequence[float | None]) -> ProofFigure:
+    return ProofFigure(label, _percentiles([g for g in gains if g is not None], 50, 10), "")
 
 
 def _said_unknown(case: CaseScore) -> bool:

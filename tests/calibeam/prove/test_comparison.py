@@ -14,7 +14,7 @@ from calibeam.prove.comparison import GEOMETRY, compare
 from calibeam.prove.hidden_angle import SEED, hidden_angles
 from calibeam.prove.oracle import fold_of, oracle_terms
 from calibeam.prove.truth import Truth, truth_of
-from calibeam.prove.unseen_file import write_asked
+from calibeam.prove.unseen import write_asked
 from calibeam.prove.unseen_poses import tool_at
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.diagnosis import Verdict

@@ -48,10 +48,10 @@ def read_unseen(path: Path) -> tuple[Tool | None, Tool | None]:
         return None, None
     with np.load(path) as parts:
         kept = {name: np.asarray(parts[name], dtype=np.float64) for name in parts.files}
-    return _tool(kept, "before"), _tool(kept, "after")
+    return _tool_in(kept, "before"), _tool_in(kept, "after")
 
 
-def _tool(parts: dict[str, Floats], name: str) -> Tool | None:
+def _tool_in(parts: dict[str, Floats], name: str) -> Tool | None:
     if f"{name}_origin_m" in parts:
         return Beam(parts[f"{name}_origin_m"], parts[f"{name}_direction"])
     return parts.get(f"{name}_tip_m")
