@@ -60,7 +60,7 @@ prove-table: $(READY)
 # Effects taken out of the catalogue, one after the other: their cases have to turn into "unknown, at the right place".
 mutate: $(READY)
 	rm -rf out/mutate
-	$(BIN)/python -m calibeam.prove.mutations out/mutate $(NAMES)
+	$(BIN)/python -m benchmarks.forgotten_effects out/mutate $(NAMES)
 
 # In an environment of its own, which also holds the libraries that are compared with. One thread, quiet waiting.
 bench: $(BENCH)/.ready

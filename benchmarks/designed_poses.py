@@ -26,9 +26,9 @@ from benchmarks.slices import Slices
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibeam.motion.reachable_poses import candidates_of
-from calibeam.prove.free_space import errors_m
-from calibeam.prove.truth import FreeSpace
-from calibeam.prove.unseen_poses import Beam
+from calibeam.prove.record import FreeSpace
+from calibeam.prove.scoring import errors_m
+from calibeam.prove.unseen import Beam
 from calibeam.results.identification import Planned, identify_session
 from calibrate.believed_arm import believed_arm
 from calibrate.fit_plan import FitPlan

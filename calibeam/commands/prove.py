@@ -6,10 +6,9 @@ from pathlib import Path
 import msgspec
 from rich.console import Console
 
-from calibeam.prove.lines import print_proof, print_real
+from calibeam.printing.proof import print_proof, print_real
 from calibeam.prove.prove import Plan, ending_early, fresh, prove
-from calibeam.prove.real import prove_real
-from calibeam.prove.real_page import write_real_page
+from calibeam.prove.real import prove_real, write_real_page
 from calibeam.prove.scenario import DEVELOPMENT, KINDS, Kind, Mix
 from calibeam.software import SOFTWARE
 from calibrate.errors import DataError

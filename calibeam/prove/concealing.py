@@ -1,22 +1,168 @@
-"""Conceals cases in worker processes: recordings for the diagnosis, seals for the end, hashes for the public."""
+"""Conceals cases in worker processes: recordings for the diagnosis, seals for the end, hashes for the public.
+
+Concealed cases with streams: a fault of motion, stamps or second encoders, in a recording as a session leaves it.
+
+A concealed session that goes the whole way: emulated PSD box, CAN encoders and controller, recorded as on site.
+
+The emulators get what is hidden over their standard input, never through a file; the recording holds the rig as it is
+believed, and nothing of the world.
+"""
 
 import json
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from calibeam.prove.layout import Layout
+import numpy as np
+from rich.console import Console
+
+from acquisition.plan import PlanOptions
+from acquisition.recording.read import read
+from acquisition.recording.recording import Recording
+from acquisition.recording.rig import parse_rig, plain_rig, rig_text
+from acquisition.recording.stream import Channel, Event
+from acquisition.recording.writer import RecordingWriter
+from calibeam.devices.recorder import new_recording, record_session
+from calibeam.devices.site import addresses_of, connected
+from calibeam.emulation import EmulationError
+from calibeam.outcome import PartialResult
+from calibeam.printing.progress import progress_bar
 from calibeam.prove.scenario import DRAWS, WIRED_DRAWS, Mix, Scenario, scenario, wired_scenario
-from calibeam.prove.seal import fingerprint, new_key, sealed
-from calibeam.prove.streamed import conceal_streams, told
+from calibeam.prove.seal import Layout, fingerprint, new_key, sealed
 from calibeam.prove.unseen import write_asked
+from calibeam.software import SOFTWARE
 from calibeam.worker_processes import in_workers
+from calibrate.diagnose.streams.sample_times import sample_windows
+from drivers.clock import SystemClock
+from drivers.errors import DeviceError
 from simulators.conceal.belief import rig_document
 from simulators.conceal.case import Case, conceal
+from simulators.conceal.on_wire import Taken, Wired, draw_wired, taken_case
 from simulators.conceal.reveal import truth_document
 from simulators.conceal.toml_text import toml_text
-from simulators.conceal.wanted import ConcealError
+from simulators.conceal.wanted import ConcealError, Wanted
 from simulators.conceal.write import columns, csv_text
+from simulators.defects.mechanisms import written
+from simulators.process import Emulators
+from simulators.streams.devices import HOST_S
+from simulators.streams.faults import FAULTS, Fault
+from simulators.streams.session import StreamedSession, streamed
+
+HEALTHY = 0.25  # share of the cases with streams in which nothing is wrong
+UNITS = {"target_q_rad": "rad", "actual_q_rad": "rad", "position_rad": "rad", "photocurrent_a": "A"}
+
+
+class _HostTime:
+    """Of a session that is written long after it was drawn."""
+
+    def now_s(self) -> float:
+        return HOST_S
+
+
+def conceal_streams(case: Case, mechanism: str | None, path: Path) -> tuple[Fault, ...]:
+    """Draws a fault, or none, and writes the recording; returns what is wrong with it."""
+    rng = np.random.default_rng([case.wanted.seed, 21])
+    among = [kind for kind in FAULTS if mechanism in (None, kind.KIND)]
+    kind = among[int(rng.integers(len(among)))]
+    wrong = rng.random() >= HEALTHY or mechanism is not None
+    fault = kind.draw(rng, case.posture_rad.shape[1]) if wrong else None
+    session = streamed(case, fault, rng)
+    _write(case, session, path)
+    return () if fault is None else (fault,)
+
+
+def told(faults: tuple[Fault, ...]) -> list[dict[str, Any]]:
+    """For the truth, in the words that a mechanism of the chain has there."""
+    return [
+        {
+            "mechanism": fault.KIND,
+            "physics": fault.PHYSICS,
+            "port": fault.port,
+            "drivers": list(fault.drivers),
+            "fields": dict(vars(fault)),
+            "figures": dict(fault.figures),
+            "enr": fault.size,
+        }
+        for fault in faults
+    ]
+
+
+def _write(case: Case, session: StreamedSession, path: Path) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.unlink(missing_ok=True)
+    text = toml_text(rig_document(case.belief))
+    with RecordingWriter(path, rig_text=text, software=SOFTWARE, clock=_HostTime(), host_s0=HOST_S) as writer:
+        for row in _rows(case, session):
+            writer.sample(row, HOST_S + float(row["t_s"]))
+        for (from_s, to_s), at_s in zip(session.window_s.tolist(), session.read_s.tolist(), strict=True):
+            writer.event(Event(HOST_S + at_s, "sample", {"psd_from_s": from_s, "psd_to_s": to_s}))
+        for name, stream in session.streams.items():
+            channels = tuple(Channel(c, UNITS[c], values.shape[1:]) for c, values in stream.values.items())
+            writer.stream(name, channels).append(stream.host_s, stream.device_s, stream.sequence, stream.values)
+
+
+def _rows(case: Case, session: StreamedSession) -> list[Mapping[str, Any]]:
+    """The samples of the case, at the times at which the streams have them."""
+    table = columns(case) | {"t_s": session.read_s.tolist()}
+    return [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)]
+
+
+RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
+PACE = 8.0  # emulated seconds in one of ours, as in `calibeam demo`
+CENTRED, REPEATS = 2, 2  # a place and order
+ORDERS = 2
+
+
+def conceal_on_wires(wanted: Wanted, path: Path, pace: float = PACE) -> Case:
+    """Runs the session; the recording is at `path`. ConcealError where it could not be had."""
+    wired = draw_wired(wanted, plain_rig(rig_text(RIG), str(RIG)))
+    try:
+        _record(wired, path, pace)
+    except (PartialResult, DeviceError, EmulationError) as reason:
+        raise ConcealError(f"the session on the wires ended early: {reason}") from reason
+    return taken_case(wired, _taken(read(path)))
+
+
+def _record(wired: Wired, path: Path, pace: float) -> None:
+    text, clock = toml_text(wired.site_rig), SystemClock()
+    rig = parse_rig(text, "rig of the site")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.unlink(missing_ok=True)  # of an attempt that ended early
+    block = wired.wanted.samples // (ORDERS * wired.wanted.places)
+    each = max(block - 2 * REPEATS - CENTRED, REPEATS)
+    options = PlanOptions(centred=CENTRED, off_centre=each, repeats=REPEATS, seed=wired.wanted.seed)
+    hidden = written([one.defect for one in wired.hidden])
+    with (
+        Emulators(wired.emulated, seed=wired.wanted.seed, time_scale=pace, links=False, hidden=hidden) as emulators,
+        new_recording(path, text, clock, {}) as writer,
+    ):
+
+        def place(placement: int) -> None:
+            emulators.ask("fixture.place", id=placement)
+
+        addresses = addresses_of(rig, emulators.address, pace)
+        with connected(rig, addresses, writer, clock, place) as bench:
+            record_session(bench, rig, writer, options, clock, progress_bar(Console(quiet=True)))
+
+
+def _taken(recording: Recording) -> Taken:
+    """ConcealError where the recording does not say when its samples were taken."""
+    samples, windows = recording.samples, sample_windows(recording)
+    if windows is None:
+        raise ConcealError("the session on the wires took no sample, or does not say when")
+    t_s = samples.column("t_s")
+    n = range(1, samples.n_joints + 1)
+    return Taken(
+        t_s=t_s,
+        power_on_s=float(np.median([0.5 * (w.from_s + w.to_s) for w in windows] - t_s)),
+        reading_rad=samples.joints(),
+        approach=np.stack([samples.column(f"approach{i}") for i in n], axis=1),
+        placement=samples.integers("placement", 0),
+        first_psd=samples.integers("first_psd", 0),
+        repeat=samples.integers("repeat", 0),
+        spots_m=np.stack([samples.column(f"psd{k}_{axis}_m") for k in (1, 2) for axis in "xy"], axis=1),
+    )
 
 
 @dataclass(frozen=True)
@@ -79,7 +225,6 @@ def _drawn(order: _Order) -> tuple[Scenario, Case, int]:
         try:
             if order.wired:
                 # what a session over wires needs, devices' libraries and all, is a second of each process that has none
-                from calibeam.prove.wired import conceal_on_wires
 
                 drawn = wired_scenario(order.seed, order.number, attempt)
                 return drawn, conceal_on_wires(drawn.wanted, order.layout.recorded(drawn.name)), attempt

@@ -13,7 +13,7 @@ from pathlib import Path
 from queue import SimpleQueue
 
 from calibeam.devices.recorder import uninterrupted
-from calibeam.prove.layout import Layout
+from calibeam.prove.seal import Layout
 
 KEPT = ("PATH", "HOME", "PYTHONPATH", "LANG", "SYSTEMROOT")  # of the environment; nothing in them is about a case
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")

@@ -1,17 +1,166 @@
-"""proof.html: the sums, the confusion matrix, and each case's story: what was hidden, what was said."""
+"""proof.html: the sums, the confusion matrix, and each case's story: what was hidden, what was said.
 
+A proof in five sentences: what was found, what was said for nothing, and what it is worth.
+
+The confusion matrix: what was hidden against what was said first, one row a kind of physics.
+"""
+
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from calibeam.prove.confusion import confusion_figure
-from calibeam.prove.free_space_sums import by_instrument
-from calibeam.prove.record import CaseScore, ProofFile
-from calibeam.prove.story import faults, hidden_briefly, hidden_words, said_words
-from calibeam.prove.summary import summary
-from calibeam.prove.tally import NONE, Line, ProofFigure, at_once, by, by_effect, by_enr, by_fault, figures, rivals
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from numpy.typing import NDArray
+
+from calibeam.prove.misses import faults, hidden_briefly, hidden_words, said_words
+from calibeam.prove.record import UNKNOWN, CaseScore, ProofFile
+from calibeam.prove.tally import (
+    NONE,
+    PLAIN,
+    Line,
+    ProofFigure,
+    at_once,
+    by,
+    by_effect,
+    by_enr,
+    by_fault,
+    by_instrument,
+    figures,
+    oracle_share,
+    plain,
+    rivals,
+    share,
+)
 from calibrate.report.elements import Html, bullets, figure, folded, section, table, tag
 from calibrate.report.page import page, write_page
 from calibrate.report.quantities import DASH, length
+from calibrate.report.svg import drawn
+from calibrate.report.tones import Tone
+
+
+def summary(cases: Sequence[CaseScore]) -> list[str]:
+    """One sentence for each kind of case that there is."""
+    return [s for s in (_single(cases), _nothing(cases), _outside(cases), _gain(cases), _faulty(cases)) if s]
+
+
+def _single(cases: Sequence[CaseScore]) -> str:
+    line = plain(cases, "")
+    if not line.located.n:
+        return ""
+    return (
+        f"{line.located.n} single causes of {PLAIN:g} times the noise and more: located {line.located.brief}, named "
+        f"{line.named.brief}, named or among the rivals {line.among_rivals.brief}."
+    )
+
+
+def _nothing(cases: Sequence[CaseScore]) -> str:
+    null = [c for c in cases if not c.defects]
+    if not null:
+        return ""
+    return f"{len(null)} sessions with nothing wrong: something was said in {share(c.alarmed for c in null).brief}."
+
+
+def _outside(cases: Sequence[CaseScore]) -> str:
+    strange = [c for c in cases if c.kind == "outside" and all(d.enr >= PLAIN for d in c.defects)]
+    if not strange:
+        return ""
+    found, wrong = share(c.defects[0].located for c in strange), share(c.misnamed for c in strange)
+    return (
+        f"{len(strange)} mechanisms of no catalogue: located {found.brief}, given a wrong name with confidence "
+        f"{wrong.brief}."
+    )
+
+
+def _gain(cases: Sequence[CaseScore]) -> str:
+    gains = [g for c in cases if (g := oracle_share(c)) is not None]
+    if not gains:
+        return ""
+    return (
+        f"On unseen samples of {len(gains)} cases the diagnosis removes {float(np.median(gains)):.2f} (median) of what "
+        "an oracle removes that is told the truth."
+    )
+
+
+def _faulty(cases: Sequence[CaseScore]) -> str:
+    wrong = sum(bool(faults(c)) for c in cases)
+    return f"{wrong} of {len(cases)} cases hold something that a strict reader would not let pass; they stand first."
+
+
+PLAIN_ENR = 0.6  # effect over noise
+SINGLE = ("one", "disturbed", "outside", "streams")
+NOTHING = "nothing"
+FAILED = "failed"
+ELSEWHERE = "right name, elsewhere"
+LAST = (UNKNOWN, NOTHING, ELSEWHERE, FAILED)
+CELL_IN = 0.27
+MARGIN_IN = 2.2
+
+
+def confusion(cases: Sequence[CaseScore]) -> tuple[list[str], list[str], NDArray[np.int64]]:
+    """Words hidden, words said, counts. Of cases with none or one cause; several at once have no single answer."""
+    pairs: Counter[tuple[str, str]] = Counter()
+    for case in cases:
+        if case.kind in SINGLE and case.defects and case.defects[0].enr >= PLAIN_ENR:
+            pairs[case.defects[0].physics, _said(case)] += 1
+        elif not case.defects:
+            pairs[NOTHING, _said(case)] += 1
+    hidden = _ordered({h for h, _ in pairs})
+    said = _ordered({s for _, s in pairs} | set(hidden))
+    counts = np.array([[pairs[h, s] for s in said] for h in hidden], dtype=np.int64).reshape(len(hidden), len(said))
+    return hidden, said, counts
+
+
+def _said(case: CaseScore) -> str:
+    """The right word where it was said at the right place, else the largest finding's."""
+    if any(d.named for d in case.defects):
+        return case.defects[0].physics
+    if case.error:
+        return FAILED
+    if not case.said:
+        return UNKNOWN if case.unexplained else NOTHING
+    first = case.said[0].physics
+    return ELSEWHERE if case.defects and first == case.defects[0].physics else first
+
+
+def _ordered(words: set[str]) -> list[str]:
+    """By name, those that are none at the end."""
+    return sorted(words - {*LAST}) + [w for w in LAST if w in words]
+
+
+def confusion_figure(cases: Sequence[CaseScore]) -> Html:
+    """As a picture: the diagonal is right."""
+    hidden, said, counts = confusion(cases)
+    right = sum(int(counts[i, said.index(word)]) for i, word in enumerate(hidden))
+
+    def paint(figure: Figure) -> None:
+        axes = figure.subplots()
+        axes.grid(visible=False)
+        for i, word in enumerate(hidden):
+            for j, other in enumerate(said):
+                if counts[i, j]:
+                    tone = Tone.PLACE_1 if word == other else Tone.PLACE_2
+                    share = 0.2 + 0.5 * counts[i, j] / max(int(counts[i].sum()), 1)
+                    axes.add_patch(_cell(j, i, tone, share))
+                    axes.text(j, i, str(counts[i, j]), ha="center", va="center", fontsize=8.0)
+        axes.set(xlim=(-0.5, len(said) - 0.5), ylim=(len(hidden) - 0.5, -0.5), xlabel="said", ylabel="hidden")
+        axes.set_xticks(range(len(said)), said, rotation=90, fontsize=8.0)
+        axes.set_yticks(range(len(hidden)), hidden, fontsize=8.0)
+        for i in range(1, len(hidden)):  # lines between the cells, to read a far one by
+            axes.axhline(i - 0.5, color=Tone.FAINT.value, linewidth=0.6, zorder=0.5)
+        for j in range(1, len(said)):
+            axes.axvline(j - 0.5, color=Tone.FAINT.value, linewidth=0.6, zorder=0.5)
+        axes.tick_params(length=0.0)
+
+    says = f"Hidden against said physics: {right} of {int(counts.sum())} on the diagonal."
+    width, height = MARGIN_IN + CELL_IN * len(said), MARGIN_IN + CELL_IN * len(hidden)
+    return drawn("confusion", says, width, height, paint)
+
+
+def _cell(x: int, y: int, tone: Tone, share: float) -> Rectangle:
+    return Rectangle((x - 0.5, y - 0.5), 1.0, 1.0, color=tone.value, alpha=share, linewidth=0.0)
+
 
 CONTENTS = {
     "short": "In short",

@@ -9,16 +9,14 @@ from pathlib import Path
 import msgspec
 
 from calibeam.outcome import PartialResult, interruption
-from calibeam.prove.comparing import compared_cases
+from calibeam.prove.comparison import compared_cases
 from calibeam.prove.concealing import Concealed, conceal_cases, publish
 from calibeam.prove.diagnosing import Answered, diagnose_cases
-from calibeam.prove.layout import Layout
 from calibeam.prove.page import write_proof_page
-from calibeam.prove.record import SCHEMA, ProofFile
+from calibeam.prove.record import SCHEMA, ProofFile, Truth, truth_of
 from calibeam.prove.scenario import DEVELOPMENT, Mix
 from calibeam.prove.scoring import score
-from calibeam.prove.seal import opened
-from calibeam.prove.truth import Truth, truth_of
+from calibeam.prove.seal import Layout, opened
 from calibeam.software import SOFTWARE
 from calibrate.effects.catalogue import EFFECTS
 from calibrate.errors import DataError

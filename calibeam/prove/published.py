@@ -9,9 +9,19 @@ from pathlib import Path
 
 import msgspec
 
-from calibeam.prove.free_space_sums import by_instrument
 from calibeam.prove.record import CaseScore, ProofFile
-from calibeam.prove.tally import PLAIN, Line, at_once, by_enr, figures, in_streams, over_the_wire, plain, rivals
+from calibeam.prove.tally import (
+    PLAIN,
+    Line,
+    at_once,
+    by_enr,
+    by_instrument,
+    figures,
+    in_streams,
+    over_the_wire,
+    plain,
+    rivals,
+)
 from calibrate.errors import DataError
 from calibrate.report.quantities import length
 

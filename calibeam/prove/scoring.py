@@ -1,23 +1,148 @@
-"""Scores one case: what was said against what was hidden."""
+"""Scores one case: what was said against what was hidden.
 
-from collections.abc import Sequence
+Places that no measurement of these instruments can tell apart: each rule with its reason. Everything else is wrong.
+
+Short on purpose: where a diagnosis may say "or", it has to say so itself, as a rival.
+
+What no model can explain: the noise that the concealing side really added, known because exact readings are.
+
+Error in free space against the world's truth: where a model puts the tool, and where it truly is.
+
+Where the base frame stands is nobody's error, so the best rigid motion between both is taken out first. A beam has no
+point that is its own: its error is the distance of the true beam's points, at working distances, from the said line.
+"""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
+from scipy.spatial.transform import Rotation
 
+from acquisition.recording.columns import POSITION, SPOTS
 from acquisition.recording.read import read
+from acquisition.recording.samples import Samples
 from calibeam.prove.concealing import Concealed
 from calibeam.prove.diagnosing import Answered
-from calibeam.prove.equivalent import same_name, same_place
-from calibeam.prove.free_space import errors_m
-from calibeam.prove.layout import Layout
-from calibeam.prove.noise_floor import floor_m
-from calibeam.prove.record import UNKNOWN, CaseScore, DefectScore, Said, SizeScore
-from calibeam.prove.truth import TrueDefect, Truth
-from calibeam.prove.unseen import read_unseen
+from calibeam.prove.record import UNKNOWN, CaseScore, DefectScore, FreeSpace, Said, SizeScore, TrueDefect, Truth
+from calibeam.prove.seal import Layout
+from calibeam.prove.unseen import Beam, Tool, read_unseen
 from calibrate.diagnose.file import read_diagnosis
 from calibrate.diagnose.schema import DiagnosisFile, FindingRecord, NameRecord
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Two names of one place."""
+
+    holds: Callable[[str, str, str], bool]  # true port, said port, family
+    reason: str
+    names: frozenset[str] = frozenset()  # of causes at these places that are as equal as the places
+
+
+def _all_links(true: str, said: str, family: str) -> bool:
+    return true == "link*.length" and re.fullmatch(r"link(\d+|\*)\.length", said) is not None
+
+
+def _one_stand(true: str, said: str, family: str) -> bool:
+    return {true, said} == {"base.pose", "device.pose"} and family in ("tracker", "wire")
+
+
+RULES = (
+    Rule(_all_links, "all links grow together: whichever is named, the growth of the arm is meant"),
+    Rule(
+        _one_stand,
+        "one device watches the arm: the base moved one way or the device the other way is the same to every reading",
+        frozenset({"base-moved", "device-drift"}),
+    ),
+)
+
+
+def same_place(true: str, said: str, family: str) -> str | None:
+    """Why the said port is the true one: "" the same word, else the reason of the rule; None: it is another."""
+    if true == said:
+        return ""
+    return next((rule.reason for rule in RULES if rule.holds(true, said, family)), None)
+
+
+def same_name(true: str, said: str, why: str) -> bool:
+    """Whether two names are those of one cause, to every reading; `why` as told by `same_place`."""
+    return true == said or any(rule.reason == why and {true, said} <= rule.names for rule in RULES)
+
+
+Floats = NDArray[np.float64]
+
+CHANNELS: dict[str, tuple[str, ...]] = {"dual-psd": SPOTS, "tracker": POSITION, "wire": ("wire_m",)}
+WILD = 6.0  # sigmas: rows that every side of the comparison leaves out
+
+
+def floor_m(samples: Samples, truth: Truth, family: str) -> float | None:
+    """Rms over all readings but wild ones, m. None for cones: their noise is in the encoders."""
+    if family not in CHANNELS:
+        return None
+    recorded = np.stack([samples.column(name) for name in CHANNELS[family]], axis=1)
+    noise: Floats = recorded - np.array(truth.exact.values_m)
+    size = np.max(np.abs(noise), axis=1)
+    middle = float(np.median(np.abs(noise))) / 0.6745
+    return float(np.sqrt(np.mean(noise[size <= WILD * middle] ** 2)))
+
+
+REACH_M = (0.08, 0.45)  # along a beam: from the nearest to the farthest detector of a session
+TURNS = 6  # of Gauss-Newton for the best motion: errors are small, three are enough
+
+
+def errors_m(said: Tool | None, truth: FreeSpace) -> float | None:
+    """Rms over the poses, three axes together. None where the model says nothing, or not of the same tool."""
+    if isinstance(said, Beam):
+        if truth.beam_origin_m is None or truth.beam_direction is None:
+            return None
+        return _beams_m(said, np.array(truth.beam_origin_m), np.array(truth.beam_direction))
+    if said is None or truth.tip_m is None:
+        return None
+    return _rms(_tips_m(said, np.array(truth.tip_m)))
+
+
+def _tips_m(said: Floats, true: Floats) -> Floats:
+    """(pose, 3) after the best rigid motion. Source: Kabsch, Acta Cryst. A32, 1976."""
+    a, b = said - said.mean(axis=0), true - true.mean(axis=0)
+    turn = Rotation.align_vectors(b, a)[0]
+    return turn.apply(a) - b
+
+
+def _beams_m(said: Beam, origin_m: Floats, direction: Floats) -> float:
+    along = direction / np.linalg.norm(direction, axis=1, keepdims=True)
+    points = np.concatenate([origin_m + s * along for s in REACH_M])
+    start = np.concatenate([said.origin_m] * len(REACH_M))
+    line = np.concatenate([said.direction / np.linalg.norm(said.direction, axis=1, keepdims=True)] * len(REACH_M))
+    turn, shift = Rotation.identity(), np.zeros(3)
+    for _ in range(TURNS):
+        away, d = _away(turn.apply(start) + shift, turn.apply(line), points)
+        across = np.eye(3) - d[:, :, None] * d[:, None, :]
+        step, *_ = np.linalg.lstsq(_slope(points, across), away.ravel(), rcond=None)
+        small = Rotation.from_rotvec(step[3:])
+        turn, shift = small * turn, small.apply(shift) + step[:3]
+    return _rms(_away(turn.apply(start) + shift, turn.apply(line), points)[0])
+
+
+def _away(start: Floats, line: Floats, points: Floats) -> tuple[Floats, Floats]:
+    """(point, 3) from each line to its point, across the line; and the lines' directions."""
+    span = points - start
+    return span - np.sum(span * line, axis=1, keepdims=True) * line, line
+
+
+def _slope(points: Floats, across: Floats) -> Floats:
+    """(3 point, 6) by which the foot of each point moves across its line, by shift and turn [v; w] of the lines."""
+    turned = np.cross(np.eye(3)[None, :, :], points[:, None, :])  # (point, axis, 3): w x p
+    by = np.concatenate([np.broadcast_to(np.eye(3), (len(points), 3, 3)), np.swapaxes(turned, 1, 2)], axis=2)
+    return (across @ by).reshape(-1, 6)
+
+
+def _rms(errors: Floats) -> float:
+    return float(np.sqrt(np.mean(np.sum(errors**2, axis=1))))
+
 
 FAILED = "failed"
 TIED = 0.5  # of BIC: told as equal

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from calibeam.prove.diagnosing import Blind
-from calibeam.prove.layout import Layout
+from calibeam.prove.seal import Layout
 from calibeam.worker_processes import in_workers
 
 PATIENCE_S = 60.0

@@ -4,8 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from calibeam.prove.record import CaseScore, DefectScore, Said
-from calibeam.prove.truth import TrueDefect
+from calibeam.prove.record import CaseScore, DefectScore, Said, TrueDefect
 
 
 @pytest.fixture

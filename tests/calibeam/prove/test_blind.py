@@ -8,9 +8,8 @@ import pytest
 
 from calibeam.prove.concealing import Concealed, conceal_cases, publish
 from calibeam.prove.diagnosing import Blind, bare_environment
-from calibeam.prove.layout import Layout
 from calibeam.prove.scenario import Mix
-from calibeam.prove.seal import fingerprint, opened
+from calibeam.prove.seal import Layout, fingerprint, opened
 
 MIX = Mix(kinds=("one",), families=("tracker",), mechanism="encoder-eccentricity")
 
@@ -18,7 +17,7 @@ MIX = Mix(kinds=("one",), families=("tracker",), mechanism="encoder-eccentricity
 def test_the_diagnosing_process_may_not_import_the_simulators() -> None:
     script = (
         "import sys; from calibeam.prove.blind import NoSimulators; sys.meta_path.insert(0, NoSimulators())\n"
-        "import calibeam.results.diagnosis, calibeam.prove.unseen_poses, calibeam.prove.unseen\n"
+        "import calibeam.results.diagnosis, calibeam.prove.unseen, calibeam.prove.unseen\n"
         "import simulators.conceal.case"
     )
     result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False)
@@ -28,7 +27,7 @@ def test_the_diagnosing_process_may_not_import_the_simulators() -> None:
 def test_what_a_diagnosis_needs_loads_no_simulator() -> None:
     script = (
         "import sys, calibeam.prove.blind, calibeam.results.diagnosis\n"
-        "import calibeam.prove.unseen_poses, calibeam.prove.unseen\n"
+        "import calibeam.prove.unseen, calibeam.prove.unseen\n"
         "print([name for name in sys.modules if name.split('.')[0] == 'simulators'])"
     )
     result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)

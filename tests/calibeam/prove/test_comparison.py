@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 
 from acquisition.recording.read import read
-from calibeam.prove.baselines.features import features
-from calibeam.prove.comparison import GEOMETRY, compare
-from calibeam.prove.hidden_angle import SEED, hidden_angles
-from calibeam.prove.oracle import fold_of, oracle_terms
-from calibeam.prove.truth import Truth, truth_of
-from calibeam.prove.unseen import write_asked
-from calibeam.prove.unseen_poses import tool_at
+from calibeam.prove.baselines import features
+from calibeam.prove.comparison import GEOMETRY, compare, fold_of, oracle_terms
+from calibeam.prove.real import SEED, hidden_angles
+from calibeam.prove.record import Truth, truth_of
+from calibeam.prove.unseen import tool_at, write_asked
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.diagnosis import Verdict
 from calibrate.diagnose.file import write_diagnosis

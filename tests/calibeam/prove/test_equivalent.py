@@ -2,7 +2,7 @@
 
 import pytest
 
-from calibeam.prove.equivalent import RULES, same_place
+from calibeam.prove.scoring import RULES, same_place
 
 
 def test_the_same_word_needs_no_reason() -> None:

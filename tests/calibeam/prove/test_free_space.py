@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from calibeam.prove.free_space import errors_m
-from calibeam.prove.truth import FreeSpace
-from calibeam.prove.unseen_poses import Beam
+from calibeam.prove.record import FreeSpace
+from calibeam.prove.scoring import errors_m
+from calibeam.prove.unseen import Beam
 
 RNG = np.random.default_rng(5)
 TIPS_M = RNG.uniform(-0.8, 0.8, (60, 3))

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import pytest
 
-from calibeam.prove.free_space_sums import by_instrument, shares_of_oracle
 from calibeam.prove.record import CaseScore, DefectScore
+from calibeam.prove.tally import by_instrument, shares_of_oracle
 
 Case = Callable[..., CaseScore]
 Found = Callable[..., DefectScore]

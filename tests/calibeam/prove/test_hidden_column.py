@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording.samples import Samples
-from calibeam.prove.hidden_column import against_hidden
-from calibeam.prove.real import real_sets
+from calibeam.prove.real import against_hidden, real_sets
 from calibrate.diagnose.schema import CurveRecord, DiagnosisFile, FindingRecord
 from calibrate.errors import DataError
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from calibeam.prove.mutations import MUTATIONS, caught, main
+from benchmarks.forgotten_effects import MUTATIONS, caught, main
 from calibeam.prove.record import CaseScore, DefectScore, Said
 from calibrate.effects.catalogue import EFFECTS
 from calibrate.errors import DataError

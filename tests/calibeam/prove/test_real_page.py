@@ -5,10 +5,7 @@ from collections.abc import Callable
 import msgspec
 import pytest
 
-from calibeam.prove.hidden_angle import HiddenAngle
-from calibeam.prove.hidden_column import HiddenColumn
-from calibeam.prove.real import RealScore
-from calibeam.prove.real_page import real_html
+from calibeam.prove.real import HiddenAngle, HiddenColumn, RealScore, real_html
 from calibrate.diagnose.schema import DiagnosisFile, FindingRecord, UnexplainedRecord
 
 SAYS = "joint 2 bends under gravity"

@@ -8,11 +8,10 @@ import pytest
 
 from calibeam.prove.concealing import Concealed
 from calibeam.prove.diagnosing import Answered
-from calibeam.prove.layout import Layout
-from calibeam.prove.record import CaseScore
+from calibeam.prove.record import CaseScore, Exact, FreeSpace, TrueDefect, TrueNoise, Truth
 from calibeam.prove.scenario import Scenario
 from calibeam.prove.scoring import score
-from calibeam.prove.truth import Exact, FreeSpace, TrueDefect, TrueNoise, Truth
+from calibeam.prove.seal import Layout
 from calibrate.diagnose.file import write_diagnosis
 from calibrate.diagnose.schema import (
     DiagnosisFile,

@@ -4,10 +4,9 @@ from collections.abc import Callable
 
 import msgspec
 
-from calibeam.prove.page import proof_html
+from calibeam.prove.misses import faults, hidden_briefly
+from calibeam.prove.page import proof_html, summary
 from calibeam.prove.record import DIAGNOSIS, SCHEMA, BaselineScore, CaseScore, DefectScore, ProofFile, Said
-from calibeam.prove.story import faults, hidden_briefly
-from calibeam.prove.summary import summary
 
 Case = Callable[..., CaseScore]
 Found = Callable[..., DefectScore]

@@ -4,11 +4,10 @@ from collections.abc import Callable
 
 import pytest
 
-from calibeam.prove.confusion import ELSEWHERE, confusion
-from calibeam.prove.interval import Share, share
+from calibeam.prove.misses import faults
+from calibeam.prove.page import ELSEWHERE, confusion
 from calibeam.prove.record import CaseScore, DefectScore, Said, SizeScore
-from calibeam.prove.story import faults
-from calibeam.prove.tally import by_effect, by_enr, figures, plain
+from calibeam.prove.tally import Share, by_effect, by_enr, figures, plain, share
 
 Case = Callable[..., CaseScore]
 Found = Callable[..., DefectScore]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording.read import read
-from calibeam.prove.wired import conceal_on_wires
+from calibeam.prove.concealing import conceal_on_wires
 from simulators.conceal.observe import observe
 from simulators.conceal.wanted import Wanted
 

@@ -5,9 +5,7 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.table import Table
 
-from calibeam.prove.free_space_sums import by_instrument
-from calibeam.prove.hidden_angle import HiddenAngle
-from calibeam.prove.real import RealScore
+from calibeam.prove.real import HiddenAngle, RealScore
 from calibeam.prove.record import CaseScore, ProofFile
 from calibeam.prove.tally import (
     Line,
@@ -18,6 +16,7 @@ from calibeam.prove.tally import (
     by_effect,
     by_enr,
     by_fault,
+    by_instrument,
     figures,
     rivals,
 )

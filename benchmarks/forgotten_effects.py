@@ -1,4 +1,4 @@
-"""`python -m calibeam.prove.mutations OUT [PHYSICS ...]`: what is said of an effect that the catalogue has forgotten.
+"""`python -m benchmarks.forgotten_effects OUT [PHYSICS ...]`: effects that the catalogue has forgotten.
 
 One effect after the other is taken out; sessions with the mechanism behind it, plain enough, are diagnosed. It has to
 be "unknown, at the right place"; the effect under another name, believed, is what this is to catch. `make mutate`.
