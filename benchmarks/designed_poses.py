@@ -28,7 +28,7 @@ from calibeam.learner import FittedLearner
 from calibeam.motion.reachable_poses import candidates_of
 from calibeam.prove.record import FreeSpace
 from calibeam.prove.scoring import errors_m
-from calibeam.prove.unseen import Beam
+from calibeam.prove.unseen import LaserBeam
 from calibeam.results.identification import Planned, identify_session
 from calibrate.believed_arm import believed_arm
 from calibrate.fit_plan import FitPlan
@@ -112,13 +112,13 @@ def _error_m(rig_file: Path, rig: Rig, plan: PosePlan, seed: int) -> tuple[float
     return error, kept
 
 
-def _found(recording: Recording, q_rad: Floats) -> Beam:
+def _found(recording: Recording, q_rad: Floats) -> LaserBeam:
     """The laser's beam on the identified arm."""
     result = identify_session(recording, plan_without_proofs())
     values = dict(zip((p.name for p in result.parameters), result.theta.tolist(), strict=True))
     arm = believed_arm(recording.rig, values)
     beams = [arm.beam(q) for q in q_rad]
-    return Beam(np.array([origin for origin, _ in beams]), np.array([direction for _, direction in beams]))
+    return LaserBeam(np.array([origin for origin, _ in beams]), np.array([direction for _, direction in beams]))
 
 
 def _true(truth: Truth, q_rad: Floats) -> FreeSpace:

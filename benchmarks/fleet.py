@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.fleet_sessions import Robot, write_fleet
-from calibeam.fleet.drift import FAMILY, Series, drifts_of
-from calibeam.fleet.run import Wanted, run
+from calibeam.fleet.drift import FAMILY, Series, find_drifts_in
+from calibeam.fleet.run import RunOptions, run
 from calibeam.fleet.settings import Engine, Workers
 
 FILES = (12, 24, 48)
@@ -51,7 +51,7 @@ def _timed(folder: Path, count: int, workers: Workers) -> float:
         if not link.exists():
             link.hardlink_to(path)
     begun = time.perf_counter()
-    ran = run(some, folder / "out", Wanted(again=True, workers=workers), lambda done, total, name: None)
+    ran = run(some, folder / "out", RunOptions(again=True, workers=workers), lambda done, total, name: None)
     assert all(row.good for row in ran.rows), [row.error for row in ran.rows if not row.good]
     assert len(ran.rows) == count
     return time.perf_counter() - begun
@@ -67,7 +67,7 @@ def false_drift_lines() -> Iterator[str]:
     }
     for name, scatter in cases.items():
         rng = np.random.default_rng(1)
-        said = sum(any(one.significant for one in drifts_of(_still(rng, scatter)).lines) for _ in range(FLEETS))
+        said = sum(any(one.significant for one in find_drifts_in(_still(rng, scatter)).lines) for _ in range(FLEETS))
         yield f"{name}: a drift is said in {said} of {FLEETS} fleets without one (wanted <= {FAMILY:.0%})"
 
 
@@ -79,7 +79,7 @@ def told_drift_lines() -> Iterator[str]:
             year = np.array([0.0, 0.3, 0.6, 1.0])
             slope = ratio / float(np.sqrt(np.sum((year - year.mean()) ** 2)))  # in sigma of the slope
             zero = [rng.standard_normal(4) + (slope * year if k == 0 else 0.0) for k in range(20)]
-            found = drifts_of([_series(k, year, z) for k, z in enumerate(zero)])
+            found = find_drifts_in([_series(k, year, z) for k, z in enumerate(zero)])
             said += any(one.significant and one.series.joint == 0 for one in found.lines)
         yield f"a drift of {ratio:g} sigma on four dates is said in {said} of {FLEETS // 5} fleets"
 

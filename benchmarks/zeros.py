@@ -13,7 +13,7 @@ from acquisition.recording.read import read
 from acquisition.recording.rig_schema import Rig
 from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
-from calibeam.commands.demo import Revealed, reveal
+from calibeam.commands.demo import ZeroAgainstTruth, compare_with_truth
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibeam.results.identification import identify_session
@@ -30,7 +30,7 @@ class SeedResult:
     seed: int
     samples: int
     skipped: int
-    revealed: tuple[Revealed, ...]
+    revealed: tuple[ZeroAgainstTruth, ...]
 
 
 def run(rig: Rig, plain_rig: Mapping[str, Any], rig_text: str, seeds: range) -> Iterator[SeedResult]:
@@ -49,7 +49,7 @@ def _one(rig: Rig, plain_rig: Mapping[str, Any], rig_text: str, seed: int, folde
         session = Session(bench, FittedLearner(rig), journal, PlanOptions(seed=seed), home_rad)
         summary = session.run(tuple(rig.placements))
     zeros = identify_session(read(folder / "r.mcap")).zeros
-    return SeedResult(seed, len(summary.samples), summary.skipped, reveal(zeros, folder / "truth.json"))
+    return SeedResult(seed, len(summary.samples), summary.skipped, compare_with_truth(zeros, folder / "truth.json"))
 
 
 def line(result: SeedResult) -> str:

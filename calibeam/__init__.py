@@ -20,6 +20,6 @@ def open(path: Path | str) -> "Session":  # noqa: A001 - `calibeam.open` is what
 
     RecordingError where it is neither, with the reason.
     """
-    from calibeam.notebook import opened  # only now: the command line starts without it
+    from calibeam.notebook import open_recording  # only now: the command line starts without it
 
-    return opened(path)
+    return open_recording(path)

@@ -26,7 +26,7 @@ from calibrate.errors import DataError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from calibeam.results.identification import Modelled
+    from calibeam.results.identification import JudgedModel
     from calibrate.diagnose.schema import DiagnosisFile
     from calibrate.model_file import ModelFile, ModelParameter
     from calibrate.physics.predicting import Placed
@@ -149,9 +149,9 @@ class Session:
         """
         if plan is None:
             return _model(self._modelled)
-        from calibeam.results.identification import Planned, modelled
+        from calibeam.results.identification import Planned, identify_and_judge
 
-        return _model(modelled(self.recording, Planned.read(Path(plan))))
+        return _model(identify_and_judge(self.recording, Planned.read(Path(plan))))
 
     fit = identify  # what other libraries call it
 
@@ -176,9 +176,9 @@ class Session:
 
         DataError where it cannot be written, or the recording holds nothing to fit.
         """
-        from calibeam.results.session_results import write_any_report
+        from calibeam.results.session_results import write_recording_report
 
-        write_any_report(self.recording, self._modelled.model, Path(path), self.diagnose() if diagnosis else None)
+        write_recording_report(self.recording, self._modelled.model, Path(path), self.diagnose() if diagnosis else None)
         return Path(path)
 
     def __str__(self) -> str:
@@ -187,10 +187,10 @@ class Session:
         return f"{r.path.name}: rig {r.rig.name}, {r.rig.n_joints} joints, {len(r.samples)} samples{whole}"
 
     @cached_property
-    def _modelled(self) -> "Modelled":
-        from calibeam.results.identification import modelled
+    def _modelled(self) -> "JudgedModel":
+        from calibeam.results.identification import identify_and_judge
 
-        return modelled(self.recording)
+        return identify_and_judge(self.recording)
 
     @cached_property
     def _diagnosis(self) -> "DiagnosisFile":
@@ -202,10 +202,10 @@ class Session:
         return file
 
 
-def opened(path: Path | str) -> Session:
+def open_recording(path: Path | str) -> Session:
     """A recording (.mcap) or session folder. RecordingError where it is neither, with the reason."""
     return Session(read(Path(path)))
 
 
-def _model(found: "Modelled") -> Model:
+def _model(found: "JudgedModel") -> Model:
     return Model(found.model, found.verdict.trust.value, found.verdict.sentence, found.verdict.reasons)

@@ -14,7 +14,7 @@ from calibeam.printing.progress import progress_bar
 from calibrate.errors import DataError
 
 if TYPE_CHECKING:
-    from calibeam.fleet.run import Ran
+    from calibeam.fleet.run import RunResult
     from calibeam.fleet.summary import Fleet
 
 
@@ -67,15 +67,15 @@ def batch_command(
 
     """
     from calibeam.fleet.page import write_fleet_page
-    from calibeam.fleet.run import Wanted, run
+    from calibeam.fleet.run import RunOptions, run
     from calibeam.fleet.summary import Fleet
     from calibeam.printing.fleet import (  # with joblib, Arrow, matplotlib: only where they are wanted
+        fleet_record,
         print_fleet,
-        record,
     )
 
     workers = Workers(engine, jobs or os.cpu_count() or 1, scheduler)
-    wanted = Wanted(diagnose, again, robot_by_folder, timeout or None, workers)
+    wanted = RunOptions(diagnose, again, robot_by_folder, timeout or None, workers)
     with progress_bar(Console(stderr=True)) as bar:
         task = bar.add_task("recordings", total=None)
         ran = run(folder, out, wanted, lambda done, total, _: bar.update(task, completed=done, total=total))
@@ -84,7 +84,7 @@ def batch_command(
     if ran.stopped and not json:
         _end(ran, fleet, out, again=again)
     if json:
-        print(msgspec.json.encode(record(ran, fleet, str(out / TABLE), str(page))).decode())
+        print(msgspec.json.encode(fleet_record(ran, fleet, str(out / TABLE), str(page))).decode())
     else:
         console = Console()
         print_fleet(console, ran, fleet)
@@ -93,7 +93,7 @@ def batch_command(
     _end(ran, fleet, out, again=again)
 
 
-def _end(ran: "Ran", fleet: "Fleet", out: Path, *, again: bool) -> None:
+def _end(ran: "RunResult", fleet: "Fleet", out: Path, *, again: bool) -> None:
     """PartialResult where not all is well, DataError where nothing is."""
     if ran.stopped:
         how = "leave --again out to go on" if again else "the same command goes on"

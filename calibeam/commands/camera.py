@@ -47,14 +47,14 @@ def camera_command(
         someone(at_terminal(), "whether the arm may move", YES).may_move()
     from acquisition.camera.measuring import CameraMeasuring
     from acquisition.camera.model import write_model
-    from calibeam.devices.camera import opened
+    from calibeam.devices.camera import open_camera
     from calibeam.devices.recorder import RecordingJournal
     from calibeam.learner import FittedLearner
     from calibeam.software import SOFTWARE
 
     out.mkdir(parents=True, exist_ok=True)
     with (
-        opened(loaded.camera, clock) as eye,
+        open_camera(loaded.camera, clock) as eye,
         new_recording(out / "recording.mcap", text, clock, {"purpose": "camera"}) as writer,
         connected(loaded, addresses_of(loaded, hurry=time_scale), writer, clock, lambda _: None) as bench,
     ):

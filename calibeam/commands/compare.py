@@ -8,7 +8,7 @@ from rich.console import Console
 from acquisition.recording.read import read
 from calibeam.printing.results import print_comparison
 from calibeam.results.comparison import compare, write_comparison
-from calibeam.results.identification import naming
+from calibeam.results.identification import naming_source
 
 
 def compare_command(
@@ -41,7 +41,7 @@ def compare_command(
         Print the comparison as it stands in the file, on one line, and nothing else.
 
     """
-    with naming(measured):
+    with naming_source(measured):
         file = compare(read(measured), read(simulated), diagnosed=diagnose)
     write_comparison(out, file)
     if json:

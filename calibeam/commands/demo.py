@@ -26,7 +26,7 @@ from simulators.world.truth import read_truth
 
 
 @dataclass(frozen=True)
-class Revealed:
+class ZeroAgainstTruth:
     """One joint: what was said, what is true. `deviation` is in stated sigmas, None where nothing was said."""
 
     joint: int
@@ -42,16 +42,16 @@ class Revealed:
         return (self.value_rad - self.truth_rad) / self.sigma_rad
 
 
-def reveal(zeros: Iterable[JointZero], truth_path: Path) -> tuple[Revealed, ...]:
+def compare_with_truth(zeros: Iterable[JointZero], truth_path: Path) -> tuple[ZeroAgainstTruth, ...]:
     """Every joint zero against the truth file."""
     truth = read_truth(truth_path)
     return tuple(
-        Revealed(zero.joint, zero.value_rad, zero.sigma_rad, truth.joint_zero_rad[zero.joint - 1], zero.why)
+        ZeroAgainstTruth(zero.joint, zero.value_rad, zero.sigma_rad, truth.joint_zero_rad[zero.joint - 1], zero.why)
         for zero in zeros
     )
 
 
-def print_revealed(console: Console, revealed: tuple[Revealed, ...]) -> None:
+def print_against_truth(console: Console, revealed: tuple[ZeroAgainstTruth, ...]) -> None:
     """Identified beside true zeros."""
     table = Table(title="concealed truth, opened after the fit", title_justify="left")
     for heading in ("joint", "identified (deg)", "sigma", "truth (deg)", "off by", "in sigma"):
@@ -115,10 +115,10 @@ def demo(*, out: Path = Path("out/demo"), rig: Path = RIG, seed: int = 1, time_s
     ):
         summary = record_session(bench, loaded, writer, PlanOptions(), clock, progress_bar(console))
     console.print(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {out / RECORDING}")
-    from calibeam.results.session_results import conclude
+    from calibeam.results.session_results import write_session_results
 
-    identified = conclude(out / RECORDING, console)
-    print_revealed(console, reveal(identified.zeros, out / TRUTH))
+    identified = write_session_results(out / RECORDING, console)
+    print_against_truth(console, compare_with_truth(identified.zeros, out / TRUTH))
 
 
 def _clear(out: Path) -> None:

@@ -8,7 +8,7 @@ from rich.console import Console
 from acquisition.recording.read import read
 from calibeam.printing.results import print_diagnosis
 from calibeam.results.diagnosis import diagnose_recording, plan_next, refuse_wrong_file
-from calibeam.results.identification import naming
+from calibeam.results.identification import naming_source
 from calibrate.diagnose.file import write_diagnosis
 from calibrate.model_file import read_model, write_model
 from calibrate.physics.from_diagnosis import model_of_diagnosis
@@ -54,7 +54,7 @@ def diagnose_command(
     """
     known = None if model is None else read_model(model)
     source, console = read(recording), Console()
-    with naming(recording):
+    with naming_source(recording):
         found, file = diagnose_recording(source, known)
         write_diagnosis(out, file)
         if json:

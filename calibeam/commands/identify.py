@@ -13,9 +13,9 @@ from calibeam.printing.identification import print_identification, refitted_line
 from calibeam.results.identification import (
     Planned,
     identify_session,
-    naming,
-    refuse_nothing,
-    tell_unfinished,
+    naming_source,
+    refuse_undetermined,
+    report_unfinished,
     write_session_model,
 )
 from calibrate.errors import DataError
@@ -81,17 +81,17 @@ def identify_command(
     if model is not None:
         if plan is not None or bootstrap:
             raise DataError("--model refits a known structure; give it without --plan and --bootstrap")
-        with naming(recording):
+        with naming_source(recording):
             _refit(Console(quiet=json), recording, read_model(model), out, export)
         if json:
             print(msgspec.json.encode(read_model(out)).decode())
         return
     planned = Planned.read(plan)
-    with naming(recording):
+    with naming_source(recording):
         status = _identify(Console(quiet=json), recording, planned, bootstrap, out, export)
     if json:
         print(msgspec.json.encode(read_model(out)).decode())
-    tell_unfinished(status, out)
+    report_unfinished(status, out)
 
 
 def _identify(
@@ -104,7 +104,7 @@ def _identify(
 ) -> Status:
     source = read(recording)
     result = identify_session(source, planned, bootstrap)
-    refuse_nothing(result.status, result.estimates)
+    refuse_undetermined(result.status, result.estimates)
     model = write_session_model(result, source, out, planned)
     print_identification(console, result, session_verdict(session_evidence(source, model)), source.rig)
     for sentence in unused_columns(source.samples):

@@ -12,7 +12,7 @@ from rich.console import Console
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.segments import Rotation
-from calibeam.devices.encoder_log import EncoderLog, State
+from calibeam.devices.encoder_log import EncoderLog, LogState
 from calibeam.outcome import PartialResult
 from drivers.clock import Clock, SystemClock
 from drivers.errors import DeviceError, DeviceRefused
@@ -88,19 +88,19 @@ def _is_over(job: EncoderLog, for_s: float | None, clock: Clock) -> bool:
     return for_s is not None and job.since_s is not None and clock.now_s() >= job.since_s + for_s
 
 
-def _now(state: State) -> str:
+def _now(state: LogState) -> str:
     away = "" if state.away is None else f"; AWAY: {state.away}"
     return f"{state.segment.name}: {state.rows} rows, {state.frames} frames{away} (Ctrl-C ends the log)"
 
 
-def _summary(state: State, segments: list[Path]) -> str:
+def _summary(state: LogState, segments: list[Path]) -> str:
     which = segments[0].name if len(segments) == 1 else f"{segments[0].name} to {segments[-1].name}"
     outages = f", {state.outages} outages" if state.outages else ""
     errors = f", {state.error_frames} of them error frames" if state.error_frames else ""
     return f"{segments[0].parent}: {which}: {state.rows} rows, {state.frames} frames{errors}{outages}"
 
 
-def _as_json(state: State, segments: list[Path]) -> dict[str, Any]:
+def _as_json(state: LogState, segments: list[Path]) -> dict[str, Any]:
     return {
         "segments": [str(path) for path in segments],
         "rows": state.rows,

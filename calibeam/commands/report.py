@@ -13,8 +13,8 @@ import msgspec
 from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
 from calibeam.printing.identification import verdict_words
-from calibeam.results.identification import modelled, naming
-from calibeam.results.session_results import write_any_report
+from calibeam.results.identification import identify_and_judge, naming_source
+from calibeam.results.session_results import write_recording_report
 from calibrate.diagnose.file import read_diagnosis
 from calibrate.model_file import read_model
 from calibrate.report.answers import Answers
@@ -24,7 +24,7 @@ from calibrate.report.verdict import Trust
 MODEL, DIAGNOSIS = "model.json", "diagnosis.json"  # as sessions name them
 
 
-def earlier_calibration(path: Path) -> Calibration:
+def read_earlier_calibration(path: Path) -> Calibration:
     """DataError, RecordingError for what is none. A recording is identified anew, without a plan."""
     if path.suffix == ".json":
         return Calibration(str(path), read_model(path))
@@ -32,7 +32,7 @@ def earlier_calibration(path: Path) -> Calibration:
         told = path / DIAGNOSIS
         return Calibration(str(path), read_model(path / MODEL), None, read_diagnosis(told) if told.exists() else None)
     recording = read(path)
-    return Calibration(_label(recording), modelled(recording).model, recording)
+    return Calibration(_label(recording), identify_and_judge(recording).model, recording)
 
 
 def _label(recording: Recording) -> str:
@@ -128,9 +128,9 @@ def report_command(
     """
     known = None if model is None else read_model(model)
     found = None if diagnosis is None else read_diagnosis(diagnosis)
-    earlier = None if against is None else earlier_calibration(against)
-    with naming(recording):
-        answers = write_any_report(read(recording), known, out, found, against=earlier, interactive=interactive)
+    earlier = None if against is None else read_earlier_calibration(against)
+    with naming_source(recording):
+        answers = write_recording_report(read(recording), known, out, found, against=earlier, interactive=interactive)
     if json:
         print(msgspec.json.encode(summary_of(answers, out)).decode())
         return

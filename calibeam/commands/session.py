@@ -24,7 +24,7 @@ from calibeam.emulation import ask_emulators, moves_nothing_real
 from calibeam.guided.recorded import encoder_address, is_guided
 from calibeam.guided.run import plan_of, run_guided
 from calibeam.live.feed import SILENT, Feed
-from calibeam.session.job import Earlier, Job, earlier_of, new_place, with_place, with_places
+from calibeam.session.job import EarlierParts, Job, new_place, read_earlier_parts, with_place, with_places
 from calibeam.session.run import run_session
 from drivers.clock import SystemClock
 
@@ -165,14 +165,14 @@ def _page(rig: Rig, asked: PageAsked, console: Console) -> Generator[Feed]:
         yield page.feed
 
 
-def _earlier(job: Job, *, go_on: bool, place: tuple[float, float, float, float] | None) -> Earlier:
+def _earlier(job: Job, *, go_on: bool, place: tuple[float, float, float, float] | None) -> EarlierParts:
     """What was taken already. RecordingError where a session is in the folder and nobody wants to go on with it."""
     if not go_on and parts(job.out):
         raise RecordingError(
             f"{job.out}: holds a session already, and no recording is written over; go on with it by --continue, or "
             "choose another --out"
         )
-    earlier = earlier_of(job.out, job.rig) if go_on else Earlier()
+    earlier = read_earlier_parts(job.out, job.rig) if go_on else EarlierParts()
     if place is None:
         return earlier
     if job.plan is not None:

@@ -11,7 +11,7 @@ from acquisition.recording.rig import load_rig
 from acquisition.recording.rig_schema import Rig
 from calibeam.motion.arm import read_geometry
 from calibeam.printing.progress import progress_bar
-from calibeam.printing.tables import print_simulation
+from calibeam.printing.tables import print_error_simulation
 from calibeam.software import SOFTWARE
 from calibrate.error_simulation.machine import Machine, identified_machine, machine_of
 from calibrate.error_simulation.plan import NOTHING_STATED, read_error_plan
@@ -79,7 +79,7 @@ def simulate_errors_command(
     if json_:
         print(msgspec.json.encode(record_of(found, SOFTWARE)).decode())
     else:
-        print_simulation(console, found)
+        print_error_simulation(console, found)
     if out is not None:
         from calibeam.error_files import write_simulation
 

@@ -15,7 +15,7 @@ from acquisition.recording.rig import rig_sha256
 from acquisition.recording.rig_quantity import si_value
 from acquisition.recording.rig_schema import Rig
 from calibeam.outcome import PartialResult
-from calibeam.printing.tables import print_tool
+from calibeam.printing.tables import print_tool_axes
 from calibeam.software import SOFTWARE
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.eccentric import with_discs
@@ -79,7 +79,7 @@ def tool_axes_command(
         print(msgspec.json.encode(found).decode())
     else:
         console = Console()
-        print_tool(console, found)
+        print_tool_axes(console, found)
         console.print(f"tool: {out}", markup=False)
     if found.tool_m is None:
         raise PartialResult(f"these rotations do not determine the tool: {found.undetermined}; {out} holds the axes")

@@ -35,12 +35,12 @@ def camera_sight(rig: Rig, clock: Clock, emulated: Mapping[str, Any] | None = No
         )
     model = read_model(Path(rig.camera.calibration), rig.camera)
     board = rig.camera.board
-    with opened(rig.camera, clock, emulated) as eye:
+    with open_camera(rig.camera, clock, emulated) as eye:
         yield Sight(eye, model, Board(board), transform(board.in_psd1.origin_m, board.in_psd1.rotation_rad))
 
 
 @contextmanager
-def opened(camera: Camera, clock: Clock, emulated: Mapping[str, Any] | None = None) -> Generator["CameraDevice"]:
+def open_camera(camera: Camera, clock: Clock, emulated: Mapping[str, Any] | None = None) -> Generator["CameraDevice"]:
     """The camera itself, connected. DeviceError."""
     from drivers.camera.device import Camera as CameraDevice
 

@@ -14,7 +14,14 @@ from acquisition.recording.errors import RigFileError, brief
 from acquisition.recording.rig_devices import EncoderDriver, RobotDriver
 from acquisition.recording.rig_schema import Camera, Rig
 from calibeam.devices.camera import camera_sight
-from calibeam.devices.encoders import bus_trouble, encoder_driver, identities_of, noise, pace, uneven_layers
+from calibeam.devices.encoders import (
+    bus_trouble,
+    encoder_driver,
+    identities_of,
+    sample_noise,
+    sample_rate,
+    uneven_layers,
+)
 from calibeam.devices.psd import psd_driver, psd_view
 from calibeam.devices.robot import robot_of
 from drivers.clock import Clock
@@ -101,8 +108,8 @@ def _psd(rig: Rig, clock: Clock) -> DeviceCheck:
         window = psd_window(blocks)
         spots_m = psd_view(psd, device).each(window)
     dark = [k + 1 for k in (0, 1) if np.isnan(spots_m[:, 2 * k]).mean() > 0.5]
-    told = "no light on either face" if len(dark) == 2 else f"noise {1e6 * noise(spots_m):.2f} um a sample"
-    rate_hz, wrong = pace(blocks, device.rate_hz)
+    told = "no light on either face" if len(dark) == 2 else f"noise {1e6 * sample_noise(spots_m):.2f} um a sample"
+    rate_hz, wrong = sample_rate(blocks, device.rate_hz)
     if (window.flags & (Flag.PSD1_SATURATED | Flag.PSD2_SATURATED)).any():
         wrong = wrong or "a face is saturated: lessen the laser's power or the gain"
     if identity is not None:
@@ -119,7 +126,7 @@ def _encoders(rig: Rig, clock: Clock) -> DeviceCheck:
         q_rad = np.concatenate([block.values["position_rad"] for block in blocks])
         identities = identities_of(driver)
     asked_hz = device.sync_hz if device.driver is EncoderDriver.CIA406 else 0.0  # others send at a pace of their own
-    rate_hz, wrong = pace(blocks, asked_hz)
+    rate_hz, wrong = sample_rate(blocks, asked_hz)
     registers = {int(identity["node"]): int(identity["error_register"]) for identity in identities}
     wrong = wrong or bus_trouble(blocks[-1], registers)
     mute = [k + 1 for k in range(q_rad.shape[1]) if np.isnan(q_rad[:, k]).all()]
@@ -129,7 +136,7 @@ def _encoders(rig: Rig, clock: Clock) -> DeviceCheck:
     what = f"{q_rad.shape[1]} encoders on {device.interface} {device.channel}"
     what += f" (serial numbers {numbers})" if numbers else ""
     firmware = "/".join(sorted({f"{identity.get('revision', 0):#x}" for identity in identities}))
-    return DeviceCheck("encoders", what, firmware, rate_hz, f"noise {1e6 * noise(q_rad):.2f} urad", wrong)
+    return DeviceCheck("encoders", what, firmware, rate_hz, f"noise {1e6 * sample_noise(q_rad):.2f} urad", wrong)
 
 
 def _robot(rig: Rig, clock: Clock) -> DeviceCheck:
@@ -138,7 +145,7 @@ def _robot(rig: Rig, clock: Clock) -> DeviceCheck:
     robot = robot_of(device, clock)
     with _listened(robot.reader, clock) as blocks:
         q_rad = np.concatenate([block.values["actual_q_rad"] for block in blocks])
-    rate_hz, wrong = pace(blocks, device.rate_hz)
+    rate_hz, wrong = sample_rate(blocks, device.rate_hz)
     what, firmware = f"Modbus controller with {len(device.registers)} registers in the map", ""
     if device.driver is RobotDriver.UR_RTDE and isinstance(robot.reader, UrReader) and device.host is not None:
         version = robot.reader.version
@@ -149,7 +156,7 @@ def _robot(rig: Rig, clock: Clock) -> DeviceCheck:
         robot.arm().close()  # DeviceRefused when the map cannot move it
         wrong = _stopped(blocks[-1]) or wrong
     wrong = wrong or _misplaced(rig, q_rad[-1])
-    return DeviceCheck("robot", what, firmware, rate_hz, f"noise {1e6 * noise(q_rad):.2f} urad", wrong)
+    return DeviceCheck("robot", what, firmware, rate_hz, f"noise {1e6 * sample_noise(q_rad):.2f} urad", wrong)
 
 
 def _ur(host: str) -> tuple[str, str]:

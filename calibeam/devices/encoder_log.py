@@ -33,7 +33,7 @@ LOOK_S = 0.1  # how often the log looks after itself: the last frames of a quiet
 
 
 @dataclass(frozen=True)
-class State:
+class LogState:
     """What a log can say of itself."""
 
     segment: Path
@@ -66,9 +66,9 @@ class EncoderLog:
         self.segments: list[Path] = [self._recording.writer.path]
 
     @property
-    def state(self) -> State:
+    def state(self) -> LogState:
         frames = self._frames
-        return State(
+        return LogState(
             self._recording.writer.path,
             self._rows,
             frames.count if frames else 0,
@@ -77,7 +77,7 @@ class EncoderLog:
             self._away,
         )
 
-    def run(self, stopped: Callable[[], bool], tell: Callable[[State], None]) -> None:
+    def run(self, stopped: Callable[[], bool], tell: Callable[[LogState], None]) -> None:
         """DeviceError when the encoders are not there at the start, and then nothing is left behind; RecordingError."""
         pump = self._start()
         with _asked_to_end() as asked, _rarely_looking_for_cycles():

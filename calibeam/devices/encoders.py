@@ -32,7 +32,7 @@ LAYERS = 0.02  # between the sums of a duo-lateral face, one photocurrent; feels
 Floats = NDArray[np.float64]
 
 
-def pace(blocks: Sequence[Block], wanted_hz: float) -> tuple[float, str]:
+def sample_rate(blocks: Sequence[Block], wanted_hz: float) -> tuple[float, str]:
     """Samples a second of the device's clock, and what is wrong with them."""
     device_s = np.concatenate([block.device_s for block in blocks])
     sequence = np.concatenate([block.sequence for block in blocks])
@@ -47,7 +47,7 @@ def pace(blocks: Sequence[Block], wanted_hz: float) -> tuple[float, str]:
     return rate_hz, ""
 
 
-def noise(values: Floats) -> float:
+def sample_noise(values: Floats) -> float:
     """One sigma of the noisiest column from neighbouring samples (von Neumann 1941); slow motion does not count."""
     steps = np.diff(values, axis=0)
     steps = steps[np.isfinite(steps).all(axis=1)] if np.isfinite(steps).all(axis=1).any() else np.nan_to_num(steps)

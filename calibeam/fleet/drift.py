@@ -117,15 +117,15 @@ class Drifts:
     scatter: float
 
 
-def drifts(rows: Iterable[Row]) -> Drifts:
+def find_drifts(rows: Iterable[Row]) -> Drifts:
     """Of a fleet."""
-    return drifts_of([series for series in all_series(rows) if series.dates >= FEWEST])
+    return find_drifts_in([series for series in all_series(rows) if series.dates >= FEWEST])
 
 
-def drifts_of(found: Sequence[Series]) -> Drifts:
+def find_drifts_in(found: Sequence[Series]) -> Drifts:
     """Of series with FEWEST different dates or more."""
     scatter = common_scatter(found)
-    lines = [line(series, scatter) for series in found]
+    lines = [fit_line(series, scatter) for series in found]
     told = holm([one.p for one in lines])
     judged = [replace(one, significant=said) for one, said in zip(lines, told, strict=True)]
     return Drifts(tuple(sorted(judged, key=lambda one: one.p)), scatter)
@@ -141,7 +141,7 @@ def common_scatter(found: Sequence[Series]) -> float:
     return max(1.0, float(np.sqrt(np.median(ratio)))) if ratio else 1.0
 
 
-def line(series: Series, scatter: float = 1.0) -> Drift:
+def fit_line(series: Series, scatter: float = 1.0) -> Drift:
     """The robust line through a series of three dates or more; its sigmas are taken `scatter` times."""
     n, middle = len(series.year), float(series.year.mean())
     design, wanted = _whitened(series, scatter)

@@ -19,7 +19,7 @@ from joblib.externals.loky.backend import resource_tracker as loky_tracker
 
 from calibeam.fleet.row import Order, Row
 from calibeam.fleet.settings import Engine, Workers
-from calibeam.fleet.supervised import START_S, rest, worked
+from calibeam.fleet.supervised import START_S, end_child, run_in_child
 from calibeam.worker_processes import without_ctrl_c
 from calibrate.errors import DataError
 
@@ -43,7 +43,9 @@ NEEDS_LIMIT = (  # Dask gives up what killed its workers, and joblib is never to
 )
 
 
-def rows(orders: Sequence[Order], workers: Workers, work: Callable[[Order], Row] = worked) -> Generator[Row]:
+def run_orders(
+    orders: Sequence[Order], workers: Workers, work: Callable[[Order], Row] = run_in_child
+) -> Generator[Row]:
     """One row an order, as they come. DataError where the engine cannot be had."""
     if workers.engine is Engine.DASK and any(order.timeout_s is None for order in orders):
         raise DataError(NEEDS_LIMIT)
@@ -54,7 +56,7 @@ def rows(orders: Sequence[Order], workers: Workers, work: Callable[[Order], Row]
             while left:
                 yield from _rest_of(left, broken, settings, work)
     finally:
-        rest()  # one job is done in this process
+        end_child()  # one job is done in this process
 
 
 def _rest_of(

@@ -37,7 +37,7 @@ class Found:
         return head if rest else ""
 
 
-def recordings(folder: Path, but: Path) -> tuple[Found, ...]:
+def find_recordings(folder: Path, but: Path) -> tuple[Found, ...]:
     """All below `folder` in the order of their names, hidden folders and `but` left out.
 
     DataError where there is no folder, or no recording in it.

@@ -40,11 +40,11 @@ class Outcome(Enum):
     LOST = "lost"  # its process died or took too long: worth another try
 
 
-class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class FleetRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Every part of a row."""
 
 
-class Zero(Record, frozen=True):
+class Zero(FleetRecord, frozen=True):
     """Zero of one joint: angle in the arm's table = reading + drawn + value. Value None where `status` says why."""
 
     joint: Identity  # from 1
@@ -54,7 +54,7 @@ class Zero(Record, frozen=True):
     drawn_rad: Radians  # theta_offset_rad of the rig file, about which the value is a correction
 
 
-class Cause(Record, frozen=True):
+class Cause(FleetRecord, frozen=True):
     """A finding of the diagnosis, in the words of docs/formats.md."""
 
     where: Label
@@ -66,7 +66,7 @@ class Cause(Record, frozen=True):
     says: Sentence
 
 
-class Row(Record, frozen=True):
+class Row(FleetRecord, frozen=True):
     """What a run over a fleet says of one recording; SI units. Fields after `error` are empty where it failed."""
 
     path: Sentence

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import msgspec
 
-from calibeam.fleet.engine import rows
-from calibeam.fleet.recordings import Found, content_sha256, parts_of, recordings
+from calibeam.fleet.engine import run_orders
+from calibeam.fleet.recordings import Found, content_sha256, find_recordings, parts_of
 from calibeam.fleet.row import CHILD, Order, Outcome, Row, Task
 from calibeam.fleet.settings import Workers
 from calibeam.fleet.table import Journal
@@ -22,7 +22,7 @@ Tell = Callable[[int, int, str], None]  # done, of so many, what
 
 
 @dataclass(frozen=True)
-class Wanted:
+class RunOptions:
     """What is asked of a run."""
 
     diagnose: bool = False
@@ -34,7 +34,7 @@ class Wanted:
 
 
 @dataclass(frozen=True)
-class Ran:
+class RunResult:
     """How a run ended."""
 
     rows: tuple[Row, ...]  # of the recordings that are there now, and that are done
@@ -44,15 +44,15 @@ class Ran:
     stopped: str  # by what (Ctrl-C, SIGTERM); "" where it came to its end
 
 
-def run(folder: Path, out: Path, wanted: Wanted, tell: Tell) -> Ran:
+def run(folder: Path, out: Path, wanted: RunOptions, tell: Tell) -> RunResult:
     """All recordings below `folder` into the table in `out`. Ctrl-C ends it early, with what is done kept.
 
     DataError where there is nothing to do, RecordingError where it cannot be kept.
     """
-    found = recordings(folder, out)
+    found = find_recordings(folder, out)
     with Journal(out) as journal:
         before = () if wanted.again else journal.rows
-        stands = standing(found, before, diagnose=wanted.diagnose)
+        stands = find_unchanged(found, before, diagnose=wanted.diagnose)
         groups = {str(one.path): one.group for one in found}
         parts = {str(part) for one in found for part in parts_of(one.path)} - groups.keys()
         for path in (*stands.moved, *parts):
@@ -66,12 +66,12 @@ def run(folder: Path, out: Path, wanted: Wanted, tell: Tell) -> Ran:
         if wanted.again:
             _still_to_do(journal, groups.keys() - done)
         here = tuple(row for row in journal.rows if row.path in groups)
-        return Ran(here, len(journal.rows) - len(here), len(stands.done), len(orders) - len(done), stopped)
+        return RunResult(here, len(journal.rows) - len(here), len(stands.done), len(orders) - len(done), stopped)
 
 
 def _work(
     orders: Sequence[Order],
-    wanted: Wanted,
+    wanted: RunOptions,
     journal: Journal,
     groups: dict[str, str],
     tell: Tell,
@@ -84,7 +84,7 @@ def _work(
     if not orders:
         return done, ""
     try:
-        with closing(rows(orders, wanted.workers)) as coming:
+        with closing(run_orders(orders, wanted.workers)) as coming:
             for row in coming:
                 journal.add(_named(row, groups, wanted))
                 done.add(row.path)
@@ -100,14 +100,14 @@ def _still_to_do(journal: Journal, paths: Set[str]) -> None:
         journal.add(msgspec.structs.replace(row, software=""))
 
 
-def _named(row: Row, groups: dict[str, str], wanted: Wanted) -> Row:
+def _named(row: Row, groups: dict[str, str], wanted: RunOptions) -> Row:
     """With the robot's name: its folder where that was asked for, else its serial number, else the rig's name."""
     robot = groups.get(row.path, "") if wanted.by_folder else ""
     return msgspec.structs.replace(row, robot=robot or row.robot_serial or row.rig)
 
 
 @dataclass(frozen=True)
-class Standing:
+class Unchanged:
     """How the recordings of a folder stand against the rows of earlier runs."""
 
     done: tuple[Row, ...]  # one a recording that stands, with the path it has now
@@ -115,7 +115,7 @@ class Standing:
     moved: tuple[str, ...]  # paths under which rows stood of what now lies elsewhere
 
 
-def standing(found: Sequence[Found], rows: Iterable[Row], *, diagnose: bool) -> Standing:
+def find_unchanged(found: Sequence[Found], rows: Iterable[Row], *, diagnose: bool) -> Unchanged:
     """What is unchanged by size and time, or by content where only name or time changed, stands."""
     good = [row for row in rows if _stands(row, diagnose=diagnose)]
     by_path = {row.path: row for row in good}
@@ -136,7 +136,7 @@ def standing(found: Sequence[Found], rows: Iterable[Row], *, diagnose: bool) -> 
         if row.path not in here:
             moved.append(row.path)
         done.append(msgspec.structs.replace(row, path=str(one.path), name=one.name, modified_ns=one.modified_ns))
-    return Standing(tuple(done), tuple(todo), tuple(moved))
+    return Unchanged(tuple(done), tuple(todo), tuple(moved))
 
 
 def _stands(row: Row, *, diagnose: bool) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
-from calibeam.fleet.drift import Drift, Drifts, drifts
+from calibeam.fleet.drift import Drift, Drifts, find_drifts
 from calibeam.fleet.row import Outcome, Row
 from calibrate.report.quantities import angle, doubted_angle, significant
 
@@ -87,7 +87,7 @@ class Fleet:
     @cached_property
     def drifts(self) -> Drifts:
         """Of every zero that was seen on enough dates."""
-        return drifts(self.rows)
+        return find_drifts(self.rows)
 
     @property
     def lines(self) -> tuple[Drift, ...]:

@@ -26,16 +26,16 @@ TAIL_BYTES = 4096
 _of_thread = threading.local()  # a worker of a Dask cluster may have several threads: each has its own process
 
 
-def worked(order: Order) -> Row:
+def run_in_child(order: Order) -> Row:
     """The row of one recording, whatever it does. Called in a worker."""
     child: Child | None = getattr(_of_thread, "child", None)
     if child is None or child.command != order.command:
-        rest()
+        end_child()
         child = _of_thread.child = Child(order.command)
     return child.ask(order)
 
 
-def rest() -> None:
+def end_child() -> None:
     """End the process of this thread, if it has one: where work is done without workers, who asked for it says when."""
     child: Child | None = getattr(_of_thread, "child", None)
     if child is not None:

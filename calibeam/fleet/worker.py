@@ -28,7 +28,7 @@ from acquisition.recording.rig_schema import Rig
 from calibeam.fleet.recordings import content_sha256
 from calibeam.fleet.row import Cause, Outcome, Row, Task, Zero
 from calibeam.results.diagnosis import diagnose_recording
-from calibeam.results.identification import Modelled, modelled
+from calibeam.results.identification import JudgedModel, identify_and_judge
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.eccentric import with_discs
 from calibrate.diagnose.schema import DiagnosisFile
@@ -43,7 +43,7 @@ OF_NOISE = ("_believed", "_sigma", "_believed_rad", "_believed_m", "_sigma_rad",
 NO_SIZES = ("chi2", "dof", "p_stated", "alarm", "converged", "at_zero")  # fields of the noise that are none
 
 
-def judged(task: Task) -> Row:
+def judge_recording(task: Task) -> Row:
     """Never raises for what is in the file."""
     begun_s = time.monotonic()
     sha256 = ""
@@ -79,7 +79,7 @@ def _fields(task: Task, recording: Recording) -> dict[str, Any]:
     if len(recording.samples) == 0:
         return {**known, "outcome": Outcome.EMPTY, "error": "no settled sample"}
     try:
-        found = modelled(recording)
+        found = identify_and_judge(recording)
         causes = _diagnosed(recording) if task.diagnose else {}
     except DataError as why:
         return {**known, "outcome": Outcome.FAILED, "error": str(why)}
@@ -88,7 +88,7 @@ def _fields(task: Task, recording: Recording) -> dict[str, Any]:
     return {**known, "outcome": Outcome.IDENTIFIED, **_of_model(found, recording.rig), **causes}
 
 
-def _of_model(found: Modelled, rig: Rig) -> dict[str, Any]:
+def _of_model(found: JudgedModel, rig: Rig) -> dict[str, Any]:
     model = found.model
     before_m, after_m = _held_out(model)
     return {
@@ -178,7 +178,7 @@ def main() -> None:
             line = tasks.get(timeout=IDLE_S)
         except queue.Empty:
             return
-        row = judged(msgspec.json.decode(line, type=Task))
+        row = judge_recording(msgspec.json.decode(line, type=Task))
         answers.write(msgspec.json.encode(row) + b"\n")
 
 

@@ -13,7 +13,7 @@ from acquisition.guided.judge import Doubt
 from acquisition.guided.reading import Reading
 from acquisition.guided.target import BarEnd, Cone
 from acquisition.recording.rig_schema import Rig, Tolerance
-from calibeam.guided.refit import LIMIT_SIGMAS, Refit, believed, refitted, visits_of
+from calibeam.guided.refit import LIMIT_SIGMAS, Refit, assumed_prior, refit_arm, visits_of
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.eccentric import with_discs
 from calibrate.arms.model import KinematicModel
@@ -35,7 +35,7 @@ class FittedJudge:
         self._arm: KinematicModel = with_discs(arm_of(self._rig), self._rig)
         self._point_m = np.array(rig.tool.point_m or (0.0, 0.0, 0.0))
         self._noise = believed_noise(rig).joint_rad, rig.noise.seat_m or SEAT_BELIEVED_M
-        sigmas = np.array([believed(p).prior if p.free else 0.0 for p in self._arm.parameters])
+        sigmas = np.array([assumed_prior(p).prior if p.free else 0.0 for p in self._arm.parameters])
         self._values: Mapping[str, float] = {}
         self._theta, self._covariance = np.zeros(len(sigmas)), np.diag(sigmas**2)
         self._learned: list[Reading] = []
@@ -45,7 +45,7 @@ class FittedJudge:
     def learn(self, readings: Sequence[Reading]) -> None:
         self._learned = list(readings)
         visits = visits_of(readings)
-        fit = refitted(self._rig, visits, self._values)
+        fit = refit_arm(self._rig, visits, self._values)
         self._cones = {}
         for visit in visits if fit is None else fit.kept:
             if isinstance(visit[0].target, Cone):
@@ -65,7 +65,7 @@ class FittedJudge:
         sigmas = float(np.sqrt(miss @ np.linalg.solve(covariance, miss)))
         if sigmas <= LIMIT_SIGMAS:
             return None
-        fit = refitted(self._rig, visits_of([*self._learned, *visit]), self._values)
+        fit = refit_arm(self._rig, visits_of([*self._learned, *visit]), self._values)
         if fit is not None and not any(dropped[0] is visit[0] for dropped in fit.dropped):
             return None
         return Doubt(float(np.linalg.norm(miss)), sigmas)

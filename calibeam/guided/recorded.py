@@ -108,7 +108,7 @@ def watching(address: EncoderAddress, writer: RecordingWriter, clock: Clock) -> 
             pump.stop()
 
 
-class RecordingJournal:
+class GuidedJournal:
     """Implements acquisition.guided.session.Journal."""
 
     def __init__(self, writer: RecordingWriter, clock: Clock) -> None:
@@ -134,7 +134,7 @@ def record_guided(
     patience_s: float = np.inf,
 ) -> Summary:
     """Run the plan. PartialResult when it ended early: what was taken is kept."""
-    judge, journal = FittedJudge(rig), RecordingJournal(writer, clock)
+    judge, journal = FittedJudge(rig), GuidedJournal(writer, clock)
     rng = np.random.default_rng(seed)
     session = GuidedSession(watch, BelievedGuidedArm.of_rig(rig), guide, judge, journal, rng, patience_s=patience_s)
     try:

@@ -48,7 +48,7 @@ def visits_of(readings: Sequence[Reading]) -> tuple[Visit, ...]:
     return (*cones, *zip(ends[::2], ends[1::2], strict=True))
 
 
-def refitted(rig: Rig, visits: Sequence[Visit], values: Mapping[str, float]) -> Refit | None:
+def refit_arm(rig: Rig, visits: Sequence[Visit], values: Mapping[str, float]) -> Refit | None:
     """From `values` by name, where there are any; None where no cone was taken twice and no bar at all.
 
     Of two visits that only contradict each other the later one goes.
@@ -87,7 +87,7 @@ def _prepared(
 ) -> tuple[Weighting, tuple[Parameter, ...], Floats]:
     samples = samples_of([reading for visit in told for reading in visit], rig.n_joints)
     weighting = instruments_for_fit(rig, samples).weighting
-    parameters = tuple(believed(p) for p in weighting.parameters)
+    parameters = tuple(assumed_prior(p) for p in weighting.parameters)
     return weighting, parameters, np.array([values.get(p.name, p.start) for p in parameters])
 
 
@@ -110,7 +110,7 @@ def _without_itself(problem: JointProblem, weighting: Weighting, theta: Floats, 
     return out
 
 
-def believed(p: Parameter) -> Parameter:
+def assumed_prior(p: Parameter) -> Parameter:
     """Wide beliefs where the identification has none; the probe is held, for link n has the same three shifts."""
     if p.name.startswith("tool."):
         return replace(p, free=False)

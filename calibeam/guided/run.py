@@ -142,7 +142,7 @@ def run_guided(
     )
     if conclude:
         from calibeam.results.session_results import (
-            conclude as concluded,  # a second of libraries that no device waits for
+            write_session_results as concluded,  # a second of libraries that no device waits for
         )
 
         concluded(recording, console)

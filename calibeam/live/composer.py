@@ -8,21 +8,21 @@ from numpy.typing import NDArray
 
 from acquisition.recording.rig_schema import Rig
 from calibeam.live.health import Watch, asked_rates
-from calibeam.live.latest import Heard, Latest
+from calibeam.live.latest import DeviceReadings, Latest
 from calibeam.live.messages import (
     FaceNow,
     Job,
-    LineSays,
-    Now,
+    LineMessage,
     Picture,
-    RigSays,
-    State,
-    StopSays,
-    Trouble,
+    PictureMessage,
+    RigMessage,
+    StateMessage,
+    StopMessage,
+    TroubleMessage,
     faces_now,
     measured_m,
 )
-from calibeam.live.scene import Scene, Standing
+from calibeam.live.scene import Scene, SceneFixture
 from calibeam.software import SOFTWARE
 
 Floats = NDArray[np.float64]
@@ -38,7 +38,7 @@ class Composer:
         self._rig, self._latest = rig, latest
         self._job: Job = job
         self._watch, self._scene = Watch(asked_rates(rig)), Scene(rig)
-        self._standing: Standing | None = None
+        self._standing: SceneFixture | None = None
         self._number = 0
         self._encode = msgspec.json.Encoder().encode
 
@@ -47,7 +47,7 @@ class Composer:
         rig = self._rig
         joints = rig.arm.joints
         return self._text(
-            RigSays(
+            RigMessage(
                 rig.name,
                 self._job,
                 SOFTWARE,
@@ -69,8 +69,8 @@ class Composer:
         flange = None if frames is None else frames[-1]
         self._standing = self._scene.standing(latest.standing, flange, measured_m(self._faces(now_s)))
         newest = latest.lines[-SHOWN_LINES:]
-        lines = [LineSays(line.number, round(now_s - line.host_s, 1), line.text) for line in newest]
-        return self._text(State(devices, latest.where, lines, self._stop(now_s), self._standing))
+        lines = [LineMessage(line.number, round(now_s - line.host_s, 1), line.text) for line in newest]
+        return self._text(StateMessage(devices, latest.where, lines, self._stop(now_s), self._standing))
 
     def now(self) -> str:
         """Now."""
@@ -80,7 +80,7 @@ class Composer:
         frames = None if q_rad is None else self._scene.frames(q_rad)
         beam = None if frames is None else self._scene.beam(frames[-1], self._standing)
         return self._text(
-            Now(
+            PictureMessage(
                 self._number,
                 self._faces(now_s),
                 None if q_rad is None else [round(q, 6) if isfinite(q) else None for q in q_rad.tolist()],
@@ -93,17 +93,17 @@ class Composer:
     def trouble(self, of: Picture, error: Exception) -> str:
         """Trouble."""
         says = f"calibeam cannot make this picture ({type(error).__name__}: {error}); what you see is old"
-        return self._text(Trouble(of, says))
+        return self._text(TroubleMessage(of, says))
 
-    def _stop(self, now_s: float) -> StopSays:
+    def _stop(self, now_s: float) -> StopMessage:
         stop = self._latest.stop
         if stop.last is None:
-            return StopSays(stop.ready)
+            return StopMessage(stop.ready)
         last = stop.last
         age_s = round(now_s - last.host_s, 3)  # a page tells by it whether its own press was sooner
-        return StopSays(stop.ready, age_s, last.delivered, last.who, last.says)
+        return StopMessage(stop.ready, age_s, last.delivered, last.who, last.says)
 
-    def _fresh(self, device: str, now_s: float) -> Heard | None:
+    def _fresh(self, device: str, now_s: float) -> DeviceReadings | None:
         heard = self._latest.of(device)
         return heard if self._watch.fresh(device, heard, now_s) else None
 

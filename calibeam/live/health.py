@@ -8,7 +8,7 @@ from msgspec import Struct
 from acquisition.recording.rig_devices import EncoderDriver
 from acquisition.recording.rig_schema import Rig
 from calibeam.devices.encoders import LEAST_RATE
-from calibeam.live.latest import Heard
+from calibeam.live.latest import DeviceReadings
 
 STALE_S = 0.3  # readers themselves give up after 0.5 s; sooner, a busy machine would make a page flicker
 STALE_PERIODS = 5.0  # of a device slower than that
@@ -47,11 +47,11 @@ class Watch:
         self.asked_hz = dict(asked_hz)
         self._marks: dict[str, deque[tuple[float, float, int]]] = {name: deque() for name in asked_hz}
 
-    def fresh(self, device: str, heard: Heard, now_s: float) -> bool:
+    def fresh(self, device: str, heard: DeviceReadings, now_s: float) -> bool:
         """Whether its newest sample may be shown as what is."""
         return heard.why is None and heard.block is not None and _age_s(heard, now_s) <= self._limit_s(device)
 
-    def look(self, device: str, heard: Heard, now_s: float) -> Health:
+    def look(self, device: str, heard: DeviceReadings, now_s: float) -> Health:
         """The device now."""
         asked_hz = self.asked_hz.get(device)
         if heard.block is None:
@@ -70,7 +70,7 @@ class Watch:
         asked_hz = self.asked_hz.get(device)
         return STALE_S if asked_hz is None else max(STALE_S, STALE_PERIODS / asked_hz)
 
-    def _rate(self, device: str, heard: Heard, now_s: float) -> float | None:
+    def _rate(self, device: str, heard: DeviceReadings, now_s: float) -> float | None:
         """Samples a second of the device's own clock; None until there are two looks to compare."""
         marks = self._marks.setdefault(device, deque())
         assert heard.block is not None  # noqa: S101 - asked by look
@@ -84,7 +84,7 @@ class Watch:
         return (heard.samples - marks[0][2]) / span_s if span_s > 0.0 else None
 
 
-def _age_s(heard: Heard, now_s: float) -> float:
+def _age_s(heard: DeviceReadings, now_s: float) -> float:
     assert heard.block is not None  # noqa: S101 - asked by its callers
     return max(0.0, now_s - float(heard.block.host_s[-1]))
 

@@ -15,7 +15,7 @@ LINES = 200  # of what was said that are kept
 
 
 @dataclass(frozen=True)
-class Heard:
+class DeviceReadings:
     """All that is known of one device. `why`: it is lost, and why."""
 
     block: Block | None = None  # the newest
@@ -25,7 +25,7 @@ class Heard:
 
 
 @dataclass(frozen=True)
-class Line:
+class ReportedLine:
     """Something that was said."""
 
     number: int
@@ -44,18 +44,20 @@ class Latest:
         self.standing: tuple[int, int] | None = None  # placement, first_psd
         self.corrections: Mapping[str, float] = {}
         self.where: Progress | None = None
-        self.lines: tuple[Line, ...] = ()
-        self._heard: dict[str, Heard] = {}
+        self.lines: tuple[ReportedLine, ...] = ()
+        self._heard: dict[str, DeviceReadings] = {}
         self._speaking = threading.Lock()
 
-    def of(self, device: str) -> Heard:
+    def of(self, device: str) -> DeviceReadings:
         """Empty before anything was heard."""
-        return self._heard.get(device, Heard())
+        return self._heard.get(device, DeviceReadings())
 
     def heard(self, device: str, block: Block) -> None:
         before = self.of(device)
         count = len(block.host_s)
-        self._heard[device] = Heard(block, before.samples + count, before.lost + _missed(before.block, block, count))
+        self._heard[device] = DeviceReadings(
+            block, before.samples + count, before.lost + _missed(before.block, block, count)
+        )
 
     def lost(self, device: str, why: str) -> None:
         self._heard[device] = replace(self.of(device), why=why)
@@ -78,7 +80,7 @@ class Latest:
     def said(self, text: str) -> None:
         with self._speaking:
             number = self.lines[-1].number + 1 if self.lines else 1
-            self.lines = (*self.lines[1 - LINES :], Line(number, self.clock.now_s(), text))
+            self.lines = (*self.lines[1 - LINES :], ReportedLine(number, self.clock.now_s(), text))
 
     def stops_by(self, stop: Callable[[], None] | None) -> None:
         self.stop.by(stop)

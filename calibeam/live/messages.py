@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from acquisition.psd_view import NO_LIGHT, SATURATED, PsdView
 from calibeam.live.feed import Progress
 from calibeam.live.health import Health
-from calibeam.live.scene import Beam, Points, Standing
+from calibeam.live.scene import Points, SceneBeam, SceneFixture
 from drivers.device import Block
 
 NEWEST = 50  # samples at 1 kHz: longer than a look at 30 Hz, so that a mean sees them all
@@ -65,7 +65,7 @@ Job = Literal["session", "watch"]
 Picture = Literal["now", "state"]  # what is made anew at every beat, or at some
 
 
-class RigSays(Struct, frozen=True, tag_field="kind", tag="rig"):
+class RigMessage(Struct, frozen=True, tag_field="kind", tag="rig"):
     """What does not change."""
 
     name: str
@@ -78,7 +78,7 @@ class RigSays(Struct, frozen=True, tag_field="kind", tag="rig"):
     reach_m: float
 
 
-class LineSays(Struct, frozen=True):
+class LineMessage(Struct, frozen=True):
     """One line of the log."""
 
     number: int
@@ -86,7 +86,7 @@ class LineSays(Struct, frozen=True):
     text: str
 
 
-class StopSays(Struct, frozen=True):
+class StopMessage(Struct, frozen=True):
     """`ready`: there is an arm that STOP stops; the rest tells of the last one pressed."""
 
     ready: bool
@@ -96,24 +96,24 @@ class StopSays(Struct, frozen=True):
     says: str = ""
 
 
-class State(Struct, frozen=True, tag_field="kind", tag="state"):
+class StateMessage(Struct, frozen=True, tag_field="kind", tag="state"):
     """How things stand."""
 
     devices: list[Health]
     progress: Progress | None
-    lines: list[LineSays]
-    stop: StopSays
-    standing: Standing | None
+    lines: list[LineMessage]
+    stop: StopMessage
+    standing: SceneFixture | None
 
 
-class Trouble(Struct, frozen=True, tag_field="kind", tag="trouble"):
+class TroubleMessage(Struct, frozen=True, tag_field="kind", tag="trouble"):
     """Why the page cannot be shown what it should; over with the next message of the kind `of`."""
 
     of: Picture
     says: str
 
 
-class Now(Struct, frozen=True, tag_field="kind", tag="now"):
+class PictureMessage(Struct, frozen=True, tag_field="kind", tag="now"):
     """The newest of everything; None for what has no fresh sample: it is not shown as live."""
 
     number: int
@@ -121,4 +121,4 @@ class Now(Struct, frozen=True, tag_field="kind", tag="now"):
     q_rad: list[float | None] | None  # None: this joint does not answer
     by: str  # the device that told the joints
     points_m: Points | None  # origins of the base and of every link's frame
-    beam: Beam | None
+    beam: SceneBeam | None

@@ -20,7 +20,7 @@ FREE_BEAM_M = 0.5  # of a beam that meets no face, drawn
 NEAR_M = 0.1  # expected to observed spot of a place that can be meant: a fixture set down by hand; feels right
 
 
-class Beam(Struct, frozen=True):
+class SceneBeam(Struct, frozen=True):
     """`points_m`: laser, first face, second face; or laser and a point in the air. `says`: where it goes."""
 
     points_m: Points
@@ -29,7 +29,7 @@ class Beam(Struct, frozen=True):
     says: str
 
 
-class Standing(Struct, frozen=True):
+class SceneFixture(Struct, frozen=True):
     """The fixture in the base: corners (m) of PSD 1, PSD 2. `told`: the session says so, else it was guessed."""
 
     placement: int
@@ -58,36 +58,36 @@ class Scene:
             return None
         return self._arm.frames(q_rad[None])[0]
 
-    def beam(self, T_base_flange: Floats, standing: Standing | None) -> Beam | None:
+    def beam(self, T_base_flange: Floats, standing: SceneFixture | None) -> SceneBeam | None:
         """None for a rig without laser and fixture."""
         if self._believed is None:
             return None
         origin, direction = (row.tolist() for row in self._believed.arm.beam_from(T_base_flange))
         laser_m, far_m = _point(origin), _point([o + FREE_BEAM_M * d for o, d in zip(origin, direction, strict=True)])
         if standing is None:
-            return Beam([laser_m, far_m], None, both=False, says="")
+            return SceneBeam([laser_m, far_m], None, both=False, says="")
         expected_m, light = self._believed.struck(T_base_flange, standing.placement, standing.first_psd)
         spots_m = [round(value, 9) for value in expected_m.tolist()]
         if light is Light.WRONG_WAY or not all(map(isfinite, spots_m)):
-            return Beam([laser_m, far_m], None, both=False, says=light.value)
+            return SceneBeam([laser_m, far_m], None, both=False, says=light.value)
         one, other = self._faces[standing.placement]
         struck_m = [_on_face(one, *spots_m[:2]), _on_face(other, *spots_m[2:])]
         ordered_m = struck_m if standing.first_psd == 1 else struck_m[::-1]
-        return Beam([laser_m, *ordered_m], spots_m, light is Light.BOTH_LIT, light.value)
+        return SceneBeam([laser_m, *ordered_m], spots_m, light is Light.BOTH_LIT, light.value)
 
     def standing(
         self, told: tuple[int, int] | None, T_base_flange: Floats | None, measured_m: list[float] | None
-    ) -> Standing | None:
+    ) -> SceneFixture | None:
         """As told; else the place and order by which the beam would strike nearest to where light is, or should be."""
         if self._believed is None:
             return None
         if told is not None and told[0] in self._faces:
-            return Standing(*told, self._corners(told[0]), told=True)
+            return SceneFixture(*told, self._corners(told[0]), told=True)
         if T_base_flange is None:
             return None
         spots_m = np.zeros(4) if measured_m is None else np.array(measured_m)
         found = self._nearest(self._believed, T_base_flange, spots_m)
-        return None if found is None else Standing(*found, self._corners(found[0]), told=False)
+        return None if found is None else SceneFixture(*found, self._corners(found[0]), told=False)
 
     def _nearest(self, believed: BelievedRig, T_base_flange: Floats, spots_m: Floats) -> tuple[int, int] | None:
         off_m: dict[tuple[int, int], float] = {}

@@ -38,7 +38,7 @@ from drivers.errors import DeviceError
 WORDS = "r resume, s stop, a abort, h halt, then ENTER"
 
 
-class Keys:
+class MotionKeys:
     """What was pressed, told to the gate."""
 
     def __init__(self, gate: Gate, asking: Asking | None, out: TextIO) -> None:
@@ -99,9 +99,9 @@ class Keys:
 
 
 @contextmanager
-def keys_of(gate: Gate) -> Generator[Keys]:
+def keys_of(gate: Gate) -> Generator[MotionKeys]:
     """Inside, Ctrl-C and SIGTERM speak to the gate instead of ending the program."""
-    keys = Keys(gate, at_terminal(), sys.stderr)
+    keys = MotionKeys(gate, at_terminal(), sys.stderr)
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         keys.interrupted()

@@ -96,7 +96,7 @@ PINS: Mapping[str, Floats] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class ExampleResult:
     """One sweep of an example: planned, and as the controller said (time s, readings)."""
 
     name: str
@@ -138,28 +138,28 @@ class Stage:
         segment = Segment("to the start", By.JOINTS, place)
         self.go([segment])
 
-    def shown(self, name: str, made: Plan, followed: Followed) -> Shown:
+    def shown(self, name: str, made: Plan, followed: Followed) -> ExampleResult:
         t_s, q_rad = self.robot.track.joints()
         corners = tuple(s.place.flange_at(0.0) @ s.place.tool for s in made.segments if s.place.coord is None)
         behind_s = lag_s(*self.sent.sent(), self.robot.track.host_s()[: len(q_rad)], q_rad)
-        return Shown(name, made, followed, t_s - t_s[0], q_rad, corners, behind_s)
+        return ExampleResult(name, made, followed, t_s - t_s[0], q_rad, corners, behind_s)
 
 
-def joint_motion(stage: Stage) -> Shown:
+def joint_motion(stage: Stage) -> ExampleResult:
     """Through two corners by joints, and back."""
     stage.to_start()
     targets = [(0.10, 0.15, -0.05), (-0.05, 0.20, 0.10), (0.0, 0.0, 0.0)]
     return stage.shown("joint", *stage.go(_rectangle(stage, targets, By.JOINTS), "joint"))
 
 
-def straight_motion(stage: Stage) -> Shown:
+def straight_motion(stage: Stage) -> ExampleResult:
     """Round a rectangle on straight lines, the hand turning on one side; its corners are the blend's close-up."""
     stage.to_start()
     targets = [(0.12, 0.0, 0.0), (0.12, 0.16, 0.0), (0.0, 0.16, 0.0), (0.0, 0.0, 0.0)]
     return stage.shown("straight", *stage.go(_rectangle(stage, targets, By.LINE), "straight"))
 
 
-def belt(stage: Stage) -> Shown:
+def belt(stage: Stage) -> ExampleResult:
     """A part on a belt that runs: read, followed, gripped, brought away."""
     stage.to_start()
     task = read_task(TASKS / "conveyor.toml")
@@ -189,7 +189,7 @@ def belt(stage: Stage) -> Shown:
     return replace(shown, belt=_belt, figures=figures)
 
 
-def two_pins(stage: Stage) -> Shown:
+def two_pins(stage: Stage) -> ExampleResult:
     """Teach by placing the arm, then the whole program; each transform that was taught is compared with the truth."""
     stage.to_start()
     task = read_task(TASKS / "two-pins.toml")
@@ -252,7 +252,7 @@ def _belt(t_s: float) -> Belt:
     return Belt(BELT_M_S * t_s, BELT_M_S)
 
 
-EXAMPLES: Mapping[str, Callable[[Stage], Shown]] = {
+EXAMPLES: Mapping[str, Callable[[Stage], ExampleResult]] = {
     "joint": joint_motion,
     "straight": straight_motion,
     "belt": belt,

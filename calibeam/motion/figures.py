@@ -18,7 +18,7 @@ from acquisition.motion.cell import Box, Cell
 from acquisition.motion.inverse.solver import Solver
 from acquisition.motion.paths.solved import SolvedPath
 from acquisition.motion.plan import Plan
-from calibeam.motion.examples import TOOL, Shown
+from calibeam.motion.examples import TOOL, ExampleResult
 from calibrate.report.svg import house_style
 from calibrate.report.tones import Tone
 
@@ -120,7 +120,7 @@ def write_figure(path: Path, width_in: float, height_in: float, paint: Callable[
     path.write_text(text, encoding="utf-8")
 
 
-def draw_joints(figure: Figure, shown: Shown) -> None:
+def draw_joints(figure: Figure, shown: ExampleResult) -> None:
     """Readings and speeds over time: planned thin, said by the controller broad."""
     position, speed = figure.subplots(2, 1, sharex=True)
     t_s, q_rad = fine(shown.plan)
@@ -137,7 +137,7 @@ def draw_joints(figure: Figure, shown: Shown) -> None:
     speed.set(ylabel="deg/s, planned", xlabel="s")
 
 
-def draw_track(figure: Figure, shown: Shown, solver: Solver) -> None:
+def draw_track(figure: Figure, shown: ExampleResult, solver: Solver) -> None:
     """From above and from the side, with the targets."""
     above, side = figure.subplots(1, 2)
     planned, said = tips(solver, fine(shown.plan)[1]), tips(solver, thinned(shown.q_rad))
@@ -150,7 +150,7 @@ def draw_track(figure: Figure, shown: Shown, solver: Solver) -> None:
     above.legend()
 
 
-def draw_blend(figure: Figure, shown: Shown, solver: Solver) -> None:
+def draw_blend(figure: Figure, shown: ExampleResult, solver: Solver) -> None:
     """The first corner: track close up, and position, speed and acceleration of the hand through the transition."""
     t_s, q_rad = fine(shown.plan)
     tip, corner_s, tacc_s = tips(solver, q_rad), shown.plan.corners_s[1], shown.plan.pace.tacc_s
@@ -177,7 +177,7 @@ def draw_blend(figure: Figure, shown: Shown, solver: Solver) -> None:
     curves[0].legend()
 
 
-def draw_belt(figure: Figure, shown: Shown, solver: Solver) -> None:
+def draw_belt(figure: Figure, shown: ExampleResult, solver: Solver) -> None:
     """The hand along the belt, and the belt itself."""
     along, above = figure.subplots(1, 2)
     at_s, said = thinned(shown.t_s), tips(solver, thinned(shown.q_rad))
@@ -221,7 +221,7 @@ def _transitions(many: Sequence[Axes], plan: Plan) -> None:
             axes.axvspan(corner_s - plan.pace.tacc_s, corner_s + plan.pace.tacc_s, color=Tone.FAINT.value, alpha=0.5)
 
 
-def _begin_s(shown: Shown, planned_rad: Floats) -> float:
+def _begin_s(shown: ExampleResult, planned_rad: Floats) -> float:
     """When the arm set off, by what the controller said, less when it was planned to."""
     moved = np.flatnonzero(np.max(np.abs(shown.q_rad - shown.q_rad[0]), axis=1) > 1e-3)
     planned = np.flatnonzero(np.max(np.abs(planned_rad - planned_rad[0]), axis=1) > 1e-3)
@@ -230,10 +230,10 @@ def _begin_s(shown: Shown, planned_rad: Floats) -> float:
     return float(shown.t_s[moved[0]] - FINE_S * planned[0])
 
 
-def plot(shown: Shown, solver: Solver, out: Path) -> None:
+def plot(shown: ExampleResult, solver: Solver, out: Path) -> None:
     """The SVG files of one example."""
 
-    def with_solver(draw: Callable[[Figure, Shown, Solver], None]) -> Callable[[Figure], None]:
+    def with_solver(draw: Callable[[Figure, ExampleResult, Solver], None]) -> Callable[[Figure], None]:
         return lambda figure: draw(figure, shown, solver)
 
     match shown.name:
@@ -247,7 +247,7 @@ def plot(shown: Shown, solver: Solver, out: Path) -> None:
                 write_figure(out / "blend.svg", 12.0, 3.5, with_solver(draw_blend))
 
 
-def numbers_of(shown: Shown, solver: Solver) -> dict[str, float]:
+def numbers_of(shown: ExampleResult, solver: Solver) -> dict[str, float]:
     """By what is measured; names that end in ", m" are lengths."""
     out = {
         "seconds planned": float(shown.plan.t_s[-1]),

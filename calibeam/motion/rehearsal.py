@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Stop:
+class RehearsedPose:
     """One pose of a plan: where, and the readings (joint,); `why`: it cannot be had."""
 
     placement: int | None
@@ -43,12 +43,12 @@ class Rehearsal:
 
     arm: RigArm
     home_rad: Floats
-    stops: tuple[Stop, ...]
+    stops: tuple[RehearsedPose, ...]
     ways: tuple[Floats, ...]
     places: tuple[int | None, ...]
 
     @property
-    def refused(self) -> tuple[Stop, ...]:
+    def refused(self) -> tuple[RehearsedPose, ...]:
         return tuple(stop for stop in self.stops if stop.why)
 
     @property
@@ -89,7 +89,7 @@ def rehearse(rig: Rig, options: PlanOptions, plan: PosePlan | None = None) -> Re
     home_rad = np.zeros(rig.n_joints) if rig.motion.home_rad is None else np.array(rig.motion.home_rad)
     paper = PaperArm(home_rad)
     gated = GatedArm(paper, arm, cell_of(rig), lambda: paper.q_rad)
-    stops, places = list[Stop](), list[int | None]()
+    stops, places = list[RehearsedPose](), list[int | None]()
     wanted = _aimed(rig, options, paper) if plan is None else _planned(plan)
     for stop in wanted:
         said = stop
@@ -98,7 +98,7 @@ def rehearse(rig: Rig, options: PlanOptions, plan: PosePlan | None = None) -> Re
                 gated.move_joints(stop.q_rad, rig.motion.speed_rad_s, rig.motion.acceleration_rad_s2)
                 places.append(stop.placement)
             except RefusedMotionError as why:
-                said = Stop(stop.placement, stop.name, stop.q_rad, str(why))
+                said = RehearsedPose(stop.placement, stop.name, stop.q_rad, str(why))
         stops.append(said)
     return Rehearsal(arm, home_rad, tuple(stops), tuple(paper.ways), tuple(places))
 
@@ -109,11 +109,11 @@ def draw_session(rig: Rig, path: Path, options: PlanOptions, plan: PosePlan | No
 
     rehearsed = rehearse(rig, options, plan)
     path.parent.mkdir(parents=True, exist_ok=True)
-    figures.write_figure(path, 13.0, 5.0, lambda figure: rehearsal_figure.draw(figure, rehearsed, rig))
+    figures.write_figure(path, 13.0, 5.0, lambda figure: rehearsal_figure.draw_rehearsal(figure, rehearsed, rig))
     return f"{rehearsed.says}; drawn in {path}"
 
 
-def _aimed(rig: Rig, options: PlanOptions, paper: PaperArm) -> Iterator[Stop]:
+def _aimed(rig: Rig, options: PlanOptions, paper: PaperArm) -> Iterator[RehearsedPose]:
     """Poses of a session that aims: every block begins where the light is looked for."""
     learner, rng = FittedLearner(rig), np.random.default_rng(options.seed)
     for block in blocks(tuple(rig.placements), learner.optics.half_size_m, options):
@@ -125,12 +125,12 @@ def _aimed(rig: Rig, options: PlanOptions, paper: PaperArm) -> Iterator[Stop]:
             try:
                 q_rad = reach(learner.arm, flange_for(learner.arm, learner.optics, T, target), paper.q_rad, rng)
             except UnreachableError as why:
-                yield Stop(block.placement, name, None, str(why))
+                yield RehearsedPose(block.placement, name, None, str(why))
                 continue
-            yield Stop(block.placement, name, q_rad)
+            yield RehearsedPose(block.placement, name, q_rad)
 
 
-def _planned(plan: PosePlan) -> Iterable[Stop]:
+def _planned(plan: PosePlan) -> Iterable[RehearsedPose]:
     for number, block in enumerate(plan.block, start=1):
         for index, pose in enumerate(block.pose, start=1):
-            yield Stop(block.placement, f"block {number}, pose {index}", np.array(pose.q_rad))
+            yield RehearsedPose(block.placement, f"block {number}, pose {index}", np.array(pose.q_rad))

@@ -17,7 +17,7 @@ WAY_POINTS = 40  # of a way by joints, between two poses
 MARGIN_M = 0.4  # round what is drawn; boxes may go on beyond it
 
 
-def draw(figure: Figure, rehearsed: Rehearsal, rig: Rig) -> None:
+def draw_rehearsal(figure: Figure, rehearsed: Rehearsal, rig: Rig) -> None:
     """Ways of the laser, or of the probe, one colour a place; the arm at home; crosses where a pose was refused."""
     above, side, joints = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 0.7))
     cell, tracks = cell_of(rig), _tracks(rehearsed, rig)

@@ -6,14 +6,14 @@ import msgspec
 from rich.console import Console
 from rich.table import Table
 
-from calibeam.fleet.run import Ran
+from calibeam.fleet.run import RunResult
 from calibeam.fleet.summary import Fleet, drift_words, shared_words
 from calibrate.report.quantities import length
 
 SHOWN = 20  # lines of a kind; the page holds more
 
 
-def print_fleet(console: Console, ran: Ran, fleet: Fleet) -> None:
+def print_fleet(console: Console, ran: RunResult, fleet: Fleet) -> None:
     """Counts, the robots as they are now, what drifts, what is shared, what failed."""
     table = Table()
     for heading in ("robot", "recordings", "last", "unseen rows", "trust", "diagnosis"):
@@ -36,7 +36,7 @@ def print_fleet(console: Console, ran: Ran, fleet: Fleet) -> None:
     console.print(_counts(ran, fleet), markup=False, highlight=False)
 
 
-def _counts(ran: Ran, fleet: Fleet) -> str:
+def _counts(ran: RunResult, fleet: Fleet) -> str:
     said = f"{len(fleet.rows)} recordings: {len(fleet.good)} identified"
     said += f" ({len(fleet.torn)} of them cut short or damaged)" if fleet.torn else ""
     said += f", {len(fleet.bad)} failed or lost"
@@ -45,7 +45,7 @@ def _counts(ran: Ran, fleet: Fleet) -> str:
     return said + (f"; {ran.kept} of the table are not in this folder (any more)" if ran.kept else "")
 
 
-def record(ran: Ran, fleet: Fleet, table: str, page: str) -> dict[str, Any]:
+def fleet_record(ran: RunResult, fleet: Fleet, table: str, page: str) -> dict[str, Any]:
     """What `--json` prints."""
     return {
         "schema": 1,

@@ -48,7 +48,7 @@ def verdict_words(answers: Answers) -> Iterator[str]:
     yield from (f"to do: {advice}" for advice in answers.verdict.advice)
 
 
-def lines_of(evidence: Evidence) -> list[str]:
+def evidence_lines(evidence: Evidence) -> list[str]:
     """Held-out error, observability, free space, bootstrap; what was not asked for is not spoken of."""
     out = [_held_out(unseen) for unseen in evidence.proven.held_out]
     out += [f"no proof ({why})" for why in evidence.proven.unproven]
@@ -125,7 +125,7 @@ def print_identification(console: Console, result: Identification, judged: Verdi
     _print_parameters(console, tuple(p for p in listed if not (of_spots and p.name.endswith(".zero"))))
     if result.point_constraints is not None:
         _print_point_constraints(console, result.point_constraints)
-    for line in (*_figures(result), *lines_of(result.evidence)):
+    for line in (*_figures(result), *evidence_lines(result.evidence)):
         console.print(line, highlight=False, markup=False)
     print_verdict(console, judged)
 

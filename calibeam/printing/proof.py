@@ -8,8 +8,8 @@ from rich.table import Table
 from calibeam.prove.real import HiddenAngle, RealScore
 from calibeam.prove.record import CaseScore, ProofFile
 from calibeam.prove.tally import (
-    Line,
     ProofFigure,
+    TallyLine,
     at_once,
     between_encoders,
     by,
@@ -43,7 +43,7 @@ def print_proof(console: Console, proof: ProofFile) -> None:
             console.print(f"{case.name}: {case.error}", markup=False, highlight=False)
 
 
-def _lines(title: str, lines: Sequence[Line]) -> Table:
+def _lines(title: str, lines: Sequence[TallyLine]) -> Table:
     table = Table(title=title, title_justify="left")
     for heading in ("", "n", "located", "named", "among rivals", "others said, a case"):
         table.add_column(heading)

@@ -18,7 +18,7 @@ COLOUR = {"yes": "green", "with care": "yellow", "no": "red"}
 WHERE = "in the flange"
 
 
-def print_tool(console: Console, tool: ToolFile) -> None:
+def print_tool_axes(console: Console, tool: ToolFile) -> None:
     """Verdict, target, what its uncertainty consists of, circles, and the line that a rig file wants."""
     console.print(f"target determined: {tool.trust}", style=f"bold {COLOUR[tool.trust]}", highlight=False)
     for line in _lines(tool):
@@ -107,7 +107,7 @@ def _axis(axis: AxisRecord) -> tuple[str, ...]:
 SHOWN = 15
 
 
-def print_simulation(console: Console, s: Simulation) -> None:
+def print_error_simulation(console: Console, s: Simulation) -> None:
     """Budget, linear beside drawn, the most important errors, worst postures."""
     rms = float(np.sqrt(np.mean(s.wide.rms_m**2)))
     console.print(

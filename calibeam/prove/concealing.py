@@ -29,7 +29,7 @@ from calibeam.emulation import EmulationError
 from calibeam.outcome import PartialResult
 from calibeam.printing.progress import progress_bar
 from calibeam.prove.scenario import DRAWS, WIRED_DRAWS, Mix, Scenario, scenario, wired_scenario
-from calibeam.prove.seal import Layout, fingerprint, new_key, sealed
+from calibeam.prove.seal import Layout, fingerprint, new_key, seal_truth
 from calibeam.prove.unseen import write_asked
 from calibeam.software import SOFTWARE
 from calibeam.worker_processes import in_workers
@@ -72,7 +72,7 @@ def conceal_streams(case: Case, mechanism: str | None, path: Path) -> tuple[Faul
     return () if fault is None else (fault,)
 
 
-def told(faults: tuple[Fault, ...]) -> list[dict[str, Any]]:
+def fault_records(faults: tuple[Fault, ...]) -> list[dict[str, Any]]:
     """For the truth, in the words that a mechanism of the chain has there."""
     return [
         {
@@ -208,14 +208,14 @@ def _conceal(order: _Order) -> Concealed:
     truth = truth_document(case)
     recorded = order.layout.recorded(drawn.name)
     if drawn.kind == "streams":
-        truth["defects"] = told(conceal_streams(case, order.mix.mechanism, recorded))
+        truth["defects"] = fault_records(conceal_streams(case, order.mix.mechanism, recorded))
     elif not order.wired:
         _write_recording(case, order.layout.recording(drawn.name))
     text = json.dumps(truth).encode()
     write_asked(truth["free_space"], order.layout.asked(drawn.name))
     seal = order.layout.seal(drawn.name)
     seal.parent.mkdir(parents=True, exist_ok=True)
-    seal.write_bytes(sealed(text, order.key))
+    seal.write_bytes(seal_truth(text, order.key))
     return Concealed(drawn, fingerprint(text), order.key, attempts)
 
 

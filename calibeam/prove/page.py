@@ -19,8 +19,8 @@ from calibeam.prove.record import UNKNOWN, CaseScore, ProofFile
 from calibeam.prove.tally import (
     NONE,
     PLAIN,
-    Line,
     ProofFigure,
+    TallyLine,
     at_once,
     by,
     by_effect,
@@ -328,7 +328,7 @@ def _repeat(proof: ProofFile) -> Html:
     )
 
 
-def _lines(caption: str, lines: Sequence[Line]) -> list[Html]:
+def _lines(caption: str, lines: Sequence[TallyLine]) -> list[Html]:
     """Nothing where no case was of that kind."""
     rows = [
         (line.label, str(line.located.n), *(share.brief for share in line.shares), line.others)

@@ -16,7 +16,7 @@ from calibeam.prove.page import write_proof_page
 from calibeam.prove.record import SCHEMA, ProofFile, Truth, truth_of
 from calibeam.prove.scenario import DEVELOPMENT, Mix
 from calibeam.prove.scoring import score
-from calibeam.prove.seal import Layout, opened
+from calibeam.prove.seal import Layout, open_seal
 from calibeam.software import SOFTWARE
 from calibrate.effects.catalogue import EFFECTS
 from calibrate.errors import DataError
@@ -120,7 +120,7 @@ def fresh(out: Path) -> Layout:
 def _opened(layout: Layout, concealed: Concealed, without: Sequence[str]) -> Truth:
     """From now on the truth lies in clear beside the answer."""
     name = concealed.scenario.name
-    content = opened(layout.seal(name).read_bytes(), concealed.key, concealed.sha256)
+    content = open_seal(layout.seal(name).read_bytes(), concealed.key, concealed.sha256)
     path = layout.revealed(name)
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(content)

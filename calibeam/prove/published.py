@@ -12,7 +12,7 @@ import msgspec
 from calibeam.prove.record import CaseScore, ProofFile
 from calibeam.prove.tally import (
     PLAIN,
-    Line,
+    TallyLine,
     at_once,
     by_enr,
     by_instrument,
@@ -69,7 +69,7 @@ def _findings(cases: Sequence[CaseScore]) -> list[str]:
     return _rows(head, [_cells(line) for line in lines if line.located.n])
 
 
-def _cells(line: Line) -> tuple[str, ...]:
+def _cells(line: TallyLine) -> tuple[str, ...]:
     return (line.label, str(line.located.n), *(share.brief for share in line.shares), line.others)
 
 

@@ -14,11 +14,11 @@ DIAGNOSIS = "diagnosis"  # among the methods that are compared
 CONFIDENT = 0.9  # a name with less is a suspicion, and said as one
 
 
-class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class ProofRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Every part of the file."""
 
 
-class SizeScore(Record, frozen=True):
+class SizeScore(ProofRecord, frozen=True):
     """A stated size against the true one."""
 
     name: str
@@ -31,7 +31,7 @@ class SizeScore(Record, frozen=True):
         return abs(self.said - self.true) <= 1.959964 * self.sigma
 
 
-class DefectScore(Record, frozen=True):
+class DefectScore(ProofRecord, frozen=True):
     """One concealed mechanism and what became of it."""
 
     mechanism: str
@@ -48,7 +48,7 @@ class DefectScore(Record, frozen=True):
     sizes: tuple[SizeScore, ...] = ()
 
 
-class Said(Record, frozen=True):
+class NamedCause(ProofRecord, frozen=True):
     """One finding, in short."""
 
     where: str
@@ -65,7 +65,7 @@ class Said(Record, frozen=True):
         return self.physics != UNKNOWN and self.confidence >= CONFIDENT and not self.right
 
 
-class BaselineScore(Record, frozen=True):
+class BaselineScore(ProofRecord, frozen=True):
     """Another method on the same unseen samples; 1: all that the oracle removes, 0: none."""
 
     method: str
@@ -74,7 +74,7 @@ class BaselineScore(Record, frozen=True):
     says: str  # what it answers to "where and why"
 
 
-class CaseScore(Record, frozen=True):
+class CaseScore(ProofRecord, frozen=True):
     """One case of the proof."""
 
     name: str
@@ -90,7 +90,7 @@ class CaseScore(Record, frozen=True):
     withheld: tuple[str, ...]
     verdict: str  # "failed" where the diagnosis did not end
     defects: tuple[DefectScore, ...]
-    said: tuple[Said, ...]
+    said: tuple[NamedCause, ...]
     unexplained: bool
     asks_for: bool  # withheld: what is missing is named, or the cause is found without it
     held_out_before_m: float | None
@@ -117,7 +117,7 @@ class CaseScore(Record, frozen=True):
         return any(s.misnamed for s in self.said)
 
 
-class ProofFile(Record, frozen=True):
+class ProofFile(ProofRecord, frozen=True):
     """Content of proof.json."""
 
     schema: Literal[1]

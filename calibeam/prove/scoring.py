@@ -27,9 +27,9 @@ from acquisition.recording.read import read
 from acquisition.recording.samples import Samples
 from calibeam.prove.concealing import Concealed
 from calibeam.prove.diagnosing import Answered
-from calibeam.prove.record import UNKNOWN, CaseScore, DefectScore, FreeSpace, Said, SizeScore, TrueDefect, Truth
+from calibeam.prove.record import UNKNOWN, CaseScore, DefectScore, FreeSpace, NamedCause, SizeScore, TrueDefect, Truth
 from calibeam.prove.seal import Layout
-from calibeam.prove.unseen import Beam, Tool, read_unseen
+from calibeam.prove.unseen import LaserBeam, Tool, read_unseen
 from calibrate.diagnose.file import read_diagnosis
 from calibrate.diagnose.schema import DiagnosisFile, FindingRecord, NameRecord
 
@@ -96,7 +96,7 @@ TURNS = 6  # of Gauss-Newton for the best motion: errors are small, three are en
 
 def errors_m(said: Tool | None, truth: FreeSpace) -> float | None:
     """Rms over the poses, three axes together. None where the model says nothing, or not of the same tool."""
-    if isinstance(said, Beam):
+    if isinstance(said, LaserBeam):
         if truth.beam_origin_m is None or truth.beam_direction is None:
             return None
         return _beams_m(said, np.array(truth.beam_origin_m), np.array(truth.beam_direction))
@@ -112,7 +112,7 @@ def _tips_m(said: Floats, true: Floats) -> Floats:
     return turn.apply(a) - b
 
 
-def _beams_m(said: Beam, origin_m: Floats, direction: Floats) -> float:
+def _beams_m(said: LaserBeam, origin_m: Floats, direction: Floats) -> float:
     along = direction / np.linalg.norm(direction, axis=1, keepdims=True)
     points = np.concatenate([origin_m + s * along for s in REACH_M])
     start = np.concatenate([said.origin_m] * len(REACH_M))
@@ -265,10 +265,10 @@ def _sizes(defect: TrueDefect, finding: FindingRecord) -> tuple[SizeScore, ...]:
     return tuple(out)
 
 
-def _said(finding: FindingRecord, truth: Truth, family: str) -> Said:
+def _said(finding: FindingRecord, truth: Truth, family: str) -> NamedCause:
     near = [(d, same_place(d.port, finding.where, family)) for d in truth.defects]
     there = [(d, why) for d, why in near if why is not None]
-    return Said(
+    return NamedCause(
         where=finding.where,
         depends_on=finding.depends_on,
         physics=finding.physics,

@@ -78,7 +78,7 @@ def new_key() -> bytes:
     return secrets.token_bytes(KEY_BYTES)
 
 
-def sealed(truth: bytes, key: bytes) -> bytes:
+def seal_truth(truth: bytes, key: bytes) -> bytes:
     """The truth as nobody can read it without the key; the same call opens it."""
     stream = hashlib.shake_256(key).digest(len(truth))
     return (np.frombuffer(truth, dtype=np.uint8) ^ np.frombuffer(stream, dtype=np.uint8)).tobytes()
@@ -89,9 +89,9 @@ def fingerprint(truth: bytes) -> str:
     return hashlib.sha256(truth).hexdigest()
 
 
-def opened(content: bytes, key: bytes, published: str) -> bytes:
+def open_seal(content: bytes, key: bytes, published: str) -> bytes:
     """The truth. BrokenSealError where its hash is another than the published one."""
-    truth = sealed(content, key)
+    truth = seal_truth(content, key)
     if fingerprint(truth) != published:
         raise BrokenSealError(f"the seal holds SHA-256 {fingerprint(truth)}, published was {published}; conceal anew")
     return truth

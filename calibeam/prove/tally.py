@@ -108,7 +108,7 @@ NONE = "-"  # no case of that kind
 
 
 @dataclass(frozen=True)
-class Line:
+class TallyLine:
     """One line of a table about hidden causes."""
 
     label: str
@@ -135,7 +135,7 @@ class ProofFigure:
     wanted: str
 
 
-def by_enr(cases: Sequence[CaseScore]) -> list[Line]:
+def by_enr(cases: Sequence[CaseScore]) -> list[TallyLine]:
     """Cases with one effect that a catalogue may list."""
     ones = [c for c in cases if c.kind in SINGLE]
     return [
@@ -144,28 +144,28 @@ def by_enr(cases: Sequence[CaseScore]) -> list[Line]:
     ]
 
 
-def by(cases: Sequence[CaseScore], what: Callable[[CaseScore], str]) -> list[Line]:
+def by(cases: Sequence[CaseScore], what: Callable[[CaseScore], str]) -> list[TallyLine]:
     """Plain single effects, grouped by a word about the case."""
     ones = [c for c in cases if c.kind in SINGLE and _enr(c) >= PLAIN]
     return [_line(word, [c for c in ones if what(c) == word]) for word in sorted({what(c) for c in ones})]
 
 
-def plain(cases: Sequence[CaseScore], label: str) -> Line:
+def plain(cases: Sequence[CaseScore], label: str) -> TallyLine:
     """Plain single effects, all together."""
     return _line(label, [c for c in cases if c.kind in SINGLE and _enr(c) >= PLAIN])
 
 
-def over_the_wire(cases: Sequence[CaseScore]) -> Line:
+def over_the_wire(cases: Sequence[CaseScore]) -> TallyLine:
     """Plain single effects of sessions that went over the emulated wires; they count above, too."""
     ones = [c for c in cases if c.kind in SINGLE and _enr(c) >= PLAIN and c.path == "on wires"]
     return _line("of these, over the emulated wires", ones)
 
 
-def by_effect(cases: Sequence[CaseScore]) -> list[Line]:
+def by_effect(cases: Sequence[CaseScore]) -> list[TallyLine]:
     """Plain effects, single or several at once, by mechanism."""
     kept = [c for c in cases if c.kind in (*SINGLE, "three", "eighteen")]
     words = sorted({d.mechanism for c in kept for d in c.defects})
-    out: list[Line] = []
+    out: list[TallyLine] = []
     for word in words:
         hits = [d for c in kept for d in c.defects if d.mechanism == word and d.enr >= PLAIN]
         if hits:
@@ -173,24 +173,24 @@ def by_effect(cases: Sequence[CaseScore]) -> list[Line]:
     return out
 
 
-def at_once(cases: Sequence[CaseScore], kind: str) -> Line:
+def at_once(cases: Sequence[CaseScore], kind: str) -> TallyLine:
     """Several effects at once: each counts."""
     return _line(kind, [c for c in cases if c.kind == kind])
 
 
-def in_streams(cases: Sequence[CaseScore]) -> Line:
+def in_streams(cases: Sequence[CaseScore]) -> TallyLine:
     """All faults that streams tell, together."""
     return _line("faults that streams tell", [c for c in cases if c.kind == "streams"])
 
 
-def between_encoders(cases: Sequence[CaseScore]) -> list[Line]:
+def between_encoders(cases: Sequence[CaseScore]) -> list[TallyLine]:
     """Mechanisms of machine-like size between the two encoders of a joint."""
     ones = [c for c in cases if c.kind == "encoders" and c.defects]
     words = sorted({c.defects[0].mechanism for c in ones})
     return [_line(word, [c for c in ones if c.defects[0].mechanism == word]) for word in words]
 
 
-def by_fault(cases: Sequence[CaseScore]) -> list[Line]:
+def by_fault(cases: Sequence[CaseScore]) -> list[TallyLine]:
     """Faults of motion, stamps and second encoders, found in streams."""
     ones = [c for c in cases if c.kind == "streams" and c.defects]
     words = sorted({c.defects[0].mechanism for c in ones})
@@ -264,13 +264,13 @@ def _said_unknown(case: CaseScore) -> bool:
     return not case.misnamed and (case.unexplained or all(d.unknown_there for d in case.defects))
 
 
-def _line(label: str, cases: Sequence[CaseScore]) -> Line:
+def _line(label: str, cases: Sequence[CaseScore]) -> TallyLine:
     spurious = [max(0, len(c.said) - sum(d.located for d in c.defects)) for c in cases]
     return _of(label, [d for c in cases for d in c.defects], float(np.mean(spurious)) if spurious else 0.0)
 
 
-def _of(label: str, defects: Sequence[DefectScore], spurious: float | None) -> Line:
-    return Line(
+def _of(label: str, defects: Sequence[DefectScore], spurious: float | None) -> TallyLine:
+    return TallyLine(
         label,
         share(d.located for d in defects),
         share(d.named for d in defects),

@@ -31,14 +31,14 @@ OF_THE_ARM = (Place.JOINTS, Place.FRAME)  # other ports move fixture, device or 
 
 
 @dataclass(frozen=True)
-class Beam:
+class LaserBeam:
     """Laser lines in the base frame."""
 
     origin_m: Floats  # (pose, 3)
     direction: Floats  # (pose, 3)
 
 
-Tool = Floats | Beam  # tip (pose, 3) m in the base frame, or the laser's beam
+Tool = Floats | LaserBeam  # tip (pose, 3) m in the base frame, or the laser's beam
 
 
 def tool_at(state: Fitted, q_rad: Floats, approach: Floats) -> Tool | None:
@@ -115,7 +115,7 @@ def _tool(state: Fitted, T_base_flange: Floats) -> Tool:
         own = session.weighting.unweighted.of_block(block, state.geometry)[len(chain.model.parameters) :]
         beam = chain.sensor.beam(own, T_base_flange)
         if beam is not None:
-            return Beam(*beam)
+            return LaserBeam(*beam)
     point_m = _drawn_point_m(state) + _corrections_m(state)
     return T_base_flange[:, :3, :3] @ point_m + T_base_flange[:, :3, 3]
 
@@ -151,7 +151,7 @@ def write_unseen(path: Path, before: Tool | None, after: Tool | None) -> None:
     """Geometry alone, and with the physics found."""
     parts: dict[str, Floats] = {}
     for name, tool in (("before", before), ("after", after)):
-        if isinstance(tool, Beam):
+        if isinstance(tool, LaserBeam):
             parts |= {f"{name}_origin_m": tool.origin_m, f"{name}_direction": tool.direction}
         elif tool is not None:
             parts[f"{name}_tip_m"] = tool
@@ -169,5 +169,5 @@ def read_unseen(path: Path) -> tuple[Tool | None, Tool | None]:
 
 def _tool_in(parts: dict[str, Floats], name: str) -> Tool | None:
     if f"{name}_origin_m" in parts:
-        return Beam(parts[f"{name}_origin_m"], parts[f"{name}_direction"])
+        return LaserBeam(parts[f"{name}_origin_m"], parts[f"{name}_direction"])
     return parts.get(f"{name}_tip_m")

@@ -82,7 +82,7 @@ def refuse_wrong_file(found: Diagnosed, path: Path) -> None:
         raise DataError(f"{said} (also in {path}); no physics is sought before that is put right")
 
 
-def diagnosed_to(recording: Recording, path: Path) -> tuple[Diagnosed, DiagnosisFile]:
+def diagnose_to_file(recording: Recording, path: Path) -> tuple[Diagnosed, DiagnosisFile]:
     """diagnosis.json at `path`. DataError as above; OSError where it cannot be written."""
     found, file = diagnose_recording(recording)
     write_diagnosis(path, file)

@@ -34,7 +34,7 @@ UNFINISHED = (Status.OUT_OF_STEPS, Status.STALLED, Status.AT_BOUND)
 
 
 @contextmanager
-def naming(source: Path) -> Generator[None]:
+def naming_source(source: Path) -> Generator[None]:
     """DataErrors of what is computed from a recording or session folder, with the file's name before them."""
     try:
         yield
@@ -44,7 +44,7 @@ def naming(source: Path) -> Generator[None]:
         raise DataError(f"{source}: {error}") from error
 
 
-def refuse_nothing(status: Status, estimates: Sequence[Estimate]) -> None:
+def refuse_undetermined(status: Status, estimates: Sequence[Estimate]) -> None:
     """DataError where a fit that came to its end determines not one parameter: its model would say nothing."""
     if status is Status.NOT_FINITE:
         raise DataError(f"nothing can be identified: {status.value}")
@@ -56,7 +56,7 @@ def refuse_nothing(status: Status, estimates: Sequence[Estimate]) -> None:
         )
 
 
-def tell_unfinished(status: Status, model: Path) -> None:
+def report_unfinished(status: Status, model: Path) -> None:
     """PartialResult where the fit came to no end: what it had is in the model, but nobody should rely on it."""
     if status in UNFINISHED:
         raise PartialResult(f"{status.value}; what was found so far is in {model}")
@@ -117,7 +117,7 @@ class ReadingErrors:
 
 
 @dataclass(frozen=True)
-class Modelled:
+class JudgedModel:
     """What model.json would hold, how far to trust it, and what it leaves of each reading."""
 
     model: ModelFile
@@ -130,10 +130,10 @@ class Modelled:
         return Status[self.model.status] not in UNFINISHED
 
 
-def modelled(recording: Recording, planned: Planned | None = None) -> Modelled:
+def identify_and_judge(recording: Recording, planned: Planned | None = None) -> JudgedModel:
     """Identify as `calibeam identify` does. DataError where nothing can be identified, or the file is a blunder."""
     result = identify_session(recording, planned)
-    refuse_nothing(result.status, result.estimates)
+    refuse_undetermined(result.status, result.estimates)
     known = session_evidence(recording, session_model(result, recording, planned))
     errors = tuple(ReadingErrors(r.title, r.unit, r.error_before, r.error_after) for r in known.readings)
-    return Modelled(known.model, session_verdict(known), errors)
+    return JudgedModel(known.model, session_verdict(known), errors)

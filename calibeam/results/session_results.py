@@ -16,7 +16,7 @@ from acquisition.recording.recording import Recording
 from calibeam.outcome import PartialResult, interruption
 from calibeam.printing.identification import print_identification
 from calibeam.printing.results import print_diagnosis
-from calibeam.results.diagnosis import diagnosed_to
+from calibeam.results.diagnosis import diagnose_to_file
 from calibeam.results.identification import identify_session, session_model, write_session_model
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.errors import DataError
@@ -34,7 +34,7 @@ from calibrate.report.session_workspace import session_arm
 NOW = "now"
 
 
-def write_any_report(
+def write_recording_report(
     recording: Recording,
     model: ModelFile | None,
     path: Path,
@@ -59,7 +59,7 @@ def write_any_report(
     return session_answers(known, drift)
 
 
-def conclude(recording_path: Path, console: Console) -> Identification:
+def write_session_results(recording_path: Path, console: Console) -> Identification:
     """Model, diagnosis, report into the recording's folder, which may be given for all its parts.
 
     PartialResult when that cannot be done.
@@ -87,8 +87,8 @@ def _concluded(recording_path: Path, console: Console) -> Identification:
     model = write_session_model(result, recording, folder / "model.json")
     print_identification(console, result, session_verdict(session_evidence(recording, model)), recording.rig)
     console.print(f"model: {folder / 'model.json'}", markup=False)
-    diagnosis = diagnosed(recording, folder, console)
-    write_any_report(recording, model, folder / "report.html", diagnosis)
+    diagnosis = write_session_diagnosis(recording, folder, console)
+    write_recording_report(recording, model, folder / "report.html", diagnosis)
     console.print(f"report: {folder / 'report.html'}", markup=False)
     return result
 
@@ -98,14 +98,14 @@ def _folder_of(recording_path: Path) -> Path:
     return recording_path if recording_path.is_dir() else recording_path.parent
 
 
-def diagnosed(recording: Recording, folder: Path, console: Console) -> DiagnosisFile | None:
+def write_session_diagnosis(recording: Recording, folder: Path, console: Console) -> DiagnosisFile | None:
     """Writes diagnosis.json, and model.json with the physics found in place of the identified geometry.
 
     None, with the reason printed, where there is too little to diagnose: model.json then stays as identified.
     """
     path = folder / "diagnosis.json"
     try:
-        found, file = diagnosed_to(recording, path)
+        found, file = diagnose_to_file(recording, path)
     except DataError as why:
         console.print(f"no diagnosis: {why}", highlight=False, markup=False)
         return None

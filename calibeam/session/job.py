@@ -30,7 +30,7 @@ SEED_NOTE, PLAN_NOTE = "plan_seed", "plan_sha256"
 
 
 @dataclass(frozen=True)
-class Earlier:
+class EarlierParts:
     """Nothing at all: a session that begins."""
 
     taken: Mapping[PoseKey, Sample] = field(default_factory=dict[PoseKey, Sample])
@@ -44,7 +44,7 @@ class Earlier:
         return bool(self.notes)
 
 
-def earlier_of(folder: Path, rig: Rig) -> Earlier:
+def read_earlier_parts(folder: Path, rig: Rig) -> EarlierParts:
     """Of all parts. RecordingError where there are none, or they are of another rig."""
     files = parts(folder)
     if not files:
@@ -59,7 +59,7 @@ def earlier_of(folder: Path, rig: Rig) -> Earlier:
         ) from error
 
 
-def _of_parts(each: Sequence[Recording], folder: Path, rig: Rig) -> Earlier:
+def _of_parts(each: Sequence[Recording], folder: Path, rig: Rig) -> EarlierParts:
     """KeyError, TypeError, ValueError where events or samples are not as a session writes them."""
     last = each[-1]
     listed = {place.id: place for place in rig.placement_list}
@@ -74,7 +74,7 @@ def _of_parts(each: Sequence[Recording], folder: Path, rig: Rig) -> Earlier:
         if event.kind == STANDS_IN and event.detail.get("instead_of") is not None
     }
     taken = {key: sample for one in each for key, sample in _taken(one).items()}
-    return Earlier(taken, added, stands_in, placed[-1] if placed else None, each[0].notes)
+    return EarlierParts(taken, added, stands_in, placed[-1] if placed else None, each[0].notes)
 
 
 def _taken(one: Recording) -> dict[PoseKey, Sample]:
@@ -169,7 +169,7 @@ class Part:
 
     rig: Rig
     text: str
-    earlier: Earlier
+    earlier: EarlierParts
     blocks: tuple[Block, ...]  # of a session that aims
     plan: PosePlan | None  # else
     options: PlanOptions
@@ -199,7 +199,7 @@ class Part:
         return any(key.placement == placement and key not in self.earlier.taken for key in self.keys)
 
 
-def part_of(job: Job, earlier: Earlier, half_size_m: float) -> Part:
+def part_of(job: Job, earlier: EarlierParts, half_size_m: float) -> Part:
     """AcquisitionError where what is asked for contradicts how the session was begun."""
     _check_same_plan(job, earlier)
     rig, text = with_places(job.rig, job.text, earlier.added)
@@ -227,12 +227,12 @@ def more_at(part: Part, placement: int, half_size_m: float, options: PlanOptions
     )
 
 
-def with_place(earlier: Earlier, place: Placement) -> Earlier:
+def with_place(earlier: EarlierParts, place: Placement) -> EarlierParts:
     """One more place, to be measured."""
     return replace(earlier, added=(*earlier.added, place))
 
 
-def moved(earlier: Earlier, place: Placement, instead_of: int) -> Earlier:
+def with_fixture_moved(earlier: EarlierParts, place: Placement, instead_of: int) -> EarlierParts:
     """The fixture does not stand any more where it stood: what is left is measured at a new place."""
     return replace(with_place(earlier, place), stands_in={**earlier.stands_in, instead_of: place.id}, standing=None)
 
@@ -243,7 +243,7 @@ def notes_of(job: Job, seed: int) -> dict[str, str]:
     return notes if job.plan is None else {**notes, PLAN_NOTE: _sha256(job.plan_text)}
 
 
-def _check_same_plan(job: Job, earlier: Earlier) -> None:
+def _check_same_plan(job: Job, earlier: EarlierParts) -> None:
     if not earlier.begun:
         return
     told, begun = (_sha256(job.plan_text) if job.plan is not None else None), earlier.notes.get(PLAN_NOTE)

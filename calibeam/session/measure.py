@@ -28,7 +28,7 @@ from calibeam.session.forecast import Ahead, Asked, Forecast, Forecaster, foreca
 from calibeam.session.job import STANDS_IN, Job, Part, notes_of
 from calibeam.session.keys import Keys
 from calibeam.session.person import Person
-from calibeam.session.reporter import Teller, ToldJournal
+from calibeam.session.reporter import ReportingJournal, StatusReporter
 from drivers.clock import Clock
 
 FORECAST_EVERY = 5  # poses; one takes a tenth of a second, in a thread of its own
@@ -45,7 +45,7 @@ class Measuring:
         bench: WiredBench,
         writer: RecordingWriter,
         clock: Clock,
-        told: tuple[Teller, Person],
+        told: tuple[StatusReporter, Person],
         sight: Sight | None = None,
     ) -> None:
         self._job, self._part, self._ahead = job, part, ahead
@@ -89,7 +89,7 @@ class Measuring:
 
     def _session_of(self, sight: Sight | None) -> Session | PlannedSession:
         rig, options, earlier = self._part.rig, self._job.options, self._part.earlier.taken
-        journal = ToldJournal(RecordingJournal(self._writer, self._clock), self._teller, self._took)
+        journal = ReportingJournal(RecordingJournal(self._writer, self._clock), self._teller, self._took)
         learner, home_rad = FittedLearner(rig), np.array(rig.motion.home_rad)
         tell, limits, reins = self._teller.progress, Limits(step_rad=rig.motion.step_limit_rad), self._reins
         if self._part.plan is not None:
@@ -130,7 +130,7 @@ class Measuring:
 
 @contextmanager
 def measuring(
-    job: Job, part: Part, ahead: Ahead, path: Path, clock: Clock, told: tuple[Teller, Person], feed: Feed
+    job: Job, part: Part, ahead: Ahead, path: Path, clock: Clock, told: tuple[StatusReporter, Person], feed: Feed
 ) -> Generator[Measuring]:
     """Devices connected, the recording begun. DeviceError, RecordingError, and what `camera_sight` raises."""
     mover = partial(_asked_for, part, told[1]) if job.place is None else partial(_emulated, part, job.place)

@@ -8,7 +8,7 @@ from rich.console import Console
 from acquisition.errors import AcquisitionError
 from calibeam.asking import YES, Asking, someone
 from calibeam.session.keys import ENTER, Keys
-from calibeam.session.reporter import Teller
+from calibeam.session.reporter import StatusReporter
 
 
 class Person:
@@ -17,7 +17,7 @@ class Person:
     def __init__(
         self,
         console: Console,
-        teller: Teller,
+        teller: StatusReporter,
         asking: Asking | None,
         *,
         agrees: bool,

@@ -15,7 +15,7 @@ from acquisition.sample import Sample
 from acquisition.session_states import State
 from calibeam.outcome import PartialResult
 from calibeam.session.forecast import Forecast
-from calibeam.session.status import UNDELIVERED, Keeper, Listener, Pace, Shown
+from calibeam.session.status import UNDELIVERED, Listener, Pace, QualityKeeper, SessionStatus
 from calibrate.arms.rig_arm import limits_of
 from drivers.clock import Clock
 from drivers.errors import DeviceError
@@ -24,14 +24,14 @@ STEPS = ("devices", "plan", "arm", "measure", "look", "result")
 WORKING = (State.RUNNING, State.PAUSING, State.ENDING)
 
 
-class Teller:
+class StatusReporter:
     """Verbs for every part of a session, from any thread."""
 
     def __init__(self, rig: Rig, clock: Clock, listeners: Sequence[Listener]) -> None:
-        self._keeper = Keeper(*limits_of(rig))
+        self._keeper = QualityKeeper(*limits_of(rig))
         self._pace, self._listeners = Pace(clock), listeners
         self._turn = threading.RLock()
-        self.shown = Shown()
+        self.shown = SessionStatus()
 
     def step(self, name: str) -> None:
         """A step of the whole job begins."""
@@ -121,10 +121,10 @@ class Teller:
                 listener.shows(self.shown)
 
 
-class ToldJournal:
+class ReportingJournal:
     """Implements acquisition.journal.Journal: what goes into the recording is told as well."""
 
-    def __init__(self, journal: Journal, teller: Teller, took: Callable[[list[Sample]], None]) -> None:
+    def __init__(self, journal: Journal, teller: StatusReporter, took: Callable[[list[Sample]], None]) -> None:
         """`took`: all samples so far, after each."""
         self._journal, self._teller, self._took = journal, teller, took
         self.samples: list[Sample] = []

@@ -23,21 +23,21 @@ from calibeam.live.feed import SILENT, Feed
 from calibeam.outcome import PartialResult, interruption
 from calibeam.session.forecast import ahead_of_blocks, ahead_of_plan
 from calibeam.session.job import (
-    Earlier,
+    EarlierParts,
     Job,
     Part,
-    earlier_of,
     more_at,
-    moved,
     new_place,
     part_of,
     placement_text,
+    read_earlier_parts,
     same_place,
+    with_fixture_moved,
     with_place,
 )
 from calibeam.session.measure import Measuring, measuring
 from calibeam.session.person import Person
-from calibeam.session.reporter import Teller
+from calibeam.session.reporter import StatusReporter
 from calibeam.session.status import Listener, clock_words
 from calibeam.session.views import NAME, LogFile, PageView, PlainView, TerminalView
 from calibrate.pose_design.candidates import POSE_S
@@ -57,12 +57,12 @@ class OnSite:
         self._job, self._console, self._clock, self._feed = job, console, clock, feed
         terminal = TerminalView(console) if asking is not None and console.is_terminal else None
         view: Listener = PlainView(console) if terminal is None else terminal
-        self.teller = Teller(job.rig, clock, (LogFile(job.out / NAME), view, PageView(feed)))
+        self.teller = StatusReporter(job.rig, clock, (LogFile(job.out / NAME), view, PageView(feed)))
         opened = {} if terminal is None else {"view": terminal.opened}
         self._person = Person(console, self.teller, asking, agrees=agrees, **opened)
         self._half_size_m = FittedLearner(job.rig).optics.half_size_m
 
-    def run(self, earlier: Earlier, *, stands: bool) -> None:
+    def run(self, earlier: EarlierParts, *, stands: bool) -> None:
         """Everything, until there is nothing more to be measured. PartialResult, and what its steps raise.
 
         `stands`: the fixture has not been touched since the earlier parts.
@@ -90,12 +90,14 @@ class OnSite:
                 continue
             if place is None:
                 break
-            earlier = with_place(earlier_of(self._job.out, self._job.rig), place)
+            earlier = with_place(read_earlier_parts(self._job.out, self._job.rig), place)
         self.teller.step("result")
         files = parts(self._job.out)
-        from calibeam.results.session_results import conclude  # a second of libraries that no device waits for
+        from calibeam.results.session_results import (
+            write_session_results,  # a second of libraries that no device waits for
+        )
 
-        conclude(files[0] if len(files) == 1 else self._job.out, self._console)
+        write_session_results(files[0] if len(files) == 1 else self._job.out, self._console)
 
     @contextmanager
     def _kept(self) -> Generator[None]:
@@ -153,17 +155,17 @@ class OnSite:
             INTERRUPTS.close()  # the exit code is decided
         return answer == "g"
 
-    def _again(self) -> Earlier:
+    def _again(self) -> EarlierParts:
         """After a failure every device is connected anew, and asked for, into a further recording."""
         self._devices()
-        return self._since(earlier_of(self._job.out, self._job.rig), stands=False)
+        return self._since(read_earlier_parts(self._job.out, self._job.rig), stands=False)
 
     def _told(self) -> Iterator[DeviceCheck]:
         for check in check_devices(self._job.rig, self._clock):
             self.teller.said(check.line)
             yield check
 
-    def _since(self, earlier: Earlier, *, stands: bool) -> Earlier:
+    def _since(self, earlier: EarlierParts, *, stands: bool) -> EarlierParts:
         """Where the fixture stands now, as far as it matters: a place that was left half done."""
         standing = earlier.standing
         if standing is None:
@@ -177,7 +179,7 @@ class OnSite:
             return earlier
         place = same_place(part.rig, standing)
         self.teller.said(f"place {standing} is measured anew as place {place.id}; what was taken there still counts")
-        return moved(earlier, place, standing)
+        return with_fixture_moved(earlier, place, standing)
 
     def _plan(self, part: Part) -> None:
         """Gone through and drawn before anything moves."""
@@ -249,7 +251,7 @@ class OnSite:
 def run_session(
     job: Job,
     console: Console,
-    earlier: Earlier,
+    earlier: EarlierParts,
     feed: Feed = SILENT,
     *,
     asking: Asking | None,

@@ -75,7 +75,7 @@ class Quality:
     marks: tuple[str, ...]  # a joint's range step by step: acquisition/guided/coverage.py
 
 
-class Keeper:
+class QualityKeeper:
     """Counts; owned by one session."""
 
     def __init__(self, lower_rad: Floats, upper_rad: Floats) -> None:
@@ -108,7 +108,7 @@ UNDELIVERED = "stop not delivered, press the red emergency stop"
 
 
 @dataclass(frozen=True)
-class Shown:
+class SessionStatus:
     """None: nothing to say yet."""
 
     state: State = State.IDLE
@@ -139,6 +139,6 @@ class Listener(Protocol):
         """One line; those that are not loud are for the log."""
         ...
 
-    def shows(self, shown: Shown) -> None:
+    def shows(self, shown: SessionStatus) -> None:
         """At every change."""
         ...

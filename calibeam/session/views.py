@@ -25,7 +25,7 @@ from acquisition.progress import Progress
 from acquisition.session_states import State
 from calibeam.live.feed import Feed
 from calibeam.live.feed import Progress as PageProgress
-from calibeam.session.status import Quality, Shown, clock_words
+from calibeam.session.status import Quality, SessionStatus, clock_words
 
 EVERY = 10  # poses
 
@@ -41,7 +41,7 @@ class PlainView:
         if loud:
             self._console.print(text, highlight=False, markup=False, soft_wrap=True)
 
-    def shows(self, shown: Shown) -> None:
+    def shows(self, shown: SessionStatus) -> None:
         if shown.step != self._step:
             self._step = shown.step
             self.said(shown.step, loud=True)
@@ -66,7 +66,7 @@ class PageView:
         if loud:
             self._feed.said(text)
 
-    def shows(self, shown: Shown) -> None:
+    def shows(self, shown: SessionStatus) -> None:
         progress, forecast = shown.progress, shown.forecast
         if progress is not None and (progress.placement, progress.first) != self._stands:
             self._stands = progress.placement, progress.first
@@ -98,7 +98,7 @@ class LogFile:
         with suppress(OSError), self.path.open("a", encoding="utf-8") as file:
             file.write(lines)
 
-    def shows(self, shown: Shown) -> None:
+    def shows(self, shown: SessionStatus) -> None:
         """A log holds what was said."""
 
 
@@ -132,7 +132,7 @@ class TerminalView:
     def __init__(self, console: Console) -> None:
         self._console = console
         self._live: Live | None = None
-        self._shown = Shown()
+        self._shown = SessionStatus()
 
     @contextmanager
     def opened(self) -> Generator[None]:
@@ -151,7 +151,7 @@ class TerminalView:
         if loud and not (self._live is not None and text in {state.value for state in State}):  # the view shows these
             self._console.print(text, highlight=False, markup=False, soft_wrap=self._live is None)
 
-    def shows(self, shown: Shown) -> None:
+    def shows(self, shown: SessionStatus) -> None:
         asks = bool(shown.asked) and not self._shown.asked
         if shown.step != self._shown.step:
             self._console.rule(f"[bold]{shown.step}[/bold]", align="left", style="bold")
@@ -165,7 +165,7 @@ class TerminalView:
         return drawn(self._shown)
 
 
-def drawn(shown: Shown) -> Group:
+def drawn(shown: SessionStatus) -> Group:
     """The whole view."""
     parts: list[RenderableType] = [Text(), _head(shown)]
     if shown.undelivered:
@@ -178,7 +178,7 @@ def drawn(shown: Shown) -> Group:
     return Group(*parts)
 
 
-def _head(shown: Shown) -> Text:
+def _head(shown: SessionStatus) -> Text:
     style = STOPS if shown.undelivered else ASKS if shown.asked else STYLES.get(shown.state, MOVES)
     text = Text(f"   {shown.head.upper()}   ", style=style)
     if shown.progress is not None:
@@ -200,7 +200,7 @@ def _bar(progress: Progress, left_s: float | None) -> Text:
     return text
 
 
-def _facts(shown: Shown) -> Table:
+def _facts(shown: SessionStatus) -> Table:
     table = Table.grid(padding=(0, 1))
     table.add_column(min_width=11)
     table.add_column()

@@ -77,7 +77,7 @@ def command(monkeypatch, tmp_path) -> Callable[[str], list[str]]:
     for step in ("_devices", "_plan"):
         monkeypatch.setattr(OnSite, step, lambda *_: None)
     monkeypatch.setattr(OnSite, "_measure", moves)
-    monkeypatch.setattr("calibeam.devices.camera.opened", moves)
+    monkeypatch.setattr("calibeam.devices.camera.open_camera", moves)
     psd = SimpleNamespace(connect=lambda: None, close=lambda: None)
     monkeypatch.setattr(psd_check, "psd_driver", lambda *_: psd)
     monkeypatch.setattr(psd_check, "_face", lambda *_: None)

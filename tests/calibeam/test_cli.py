@@ -11,7 +11,7 @@ from calibeam.cli import run
 from calibeam.devices.recorder import new_recording
 from calibeam.emulation import Emulation
 from calibeam.outcome import PartialResult
-from calibeam.results.session_results import conclude
+from calibeam.results.session_results import write_session_results
 from drivers.clock import SystemClock
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
@@ -116,7 +116,7 @@ def unfinished(tmp_path: Path) -> Path:
 
 def test_a_recording_that_cannot_be_identified_is_a_partial_result(unfinished: Path) -> None:
     with pytest.raises(PartialResult, match=r"the recording is whole: .*recording\.mcap"):
-        conclude(unfinished, Console(quiet=True))
+        write_session_results(unfinished, Console(quiet=True))
 
 
 def test_ctrl_c_while_identifying_says_that_the_recording_is_whole(
@@ -127,7 +127,7 @@ def test_ctrl_c_while_identifying_says_that_the_recording_is_whole(
 
     monkeypatch.setattr("calibeam.results.session_results.identify_session", interrupted)
     with pytest.raises(PartialResult, match=r"^Ctrl-C; the recording is whole"):
-        conclude(unfinished, Console(quiet=True))
+        write_session_results(unfinished, Console(quiet=True))
     assert read(unfinished).complete
 
 

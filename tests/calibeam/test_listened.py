@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calibeam.devices.encoders import bus_trouble, noise, pace, uneven_layers
+from calibeam.devices.encoders import bus_trouble, sample_noise, sample_rate, uneven_layers
 from drivers.device import Block
 from drivers.psd_daq.messages import FaceIdentity
 from drivers.psd_faces import FaceKind
@@ -17,8 +17,8 @@ def block(step: int = 1, **values: np.ndarray) -> Block:
 
 
 def test_the_pace_of_a_stream_and_what_was_lost_on_its_way() -> None:
-    assert pace([block()], 100.0) == (pytest.approx(100.0), "")
-    rate_hz, wrong = pace([block(step=2)], 100.0)
+    assert sample_rate([block()], 100.0) == (pytest.approx(100.0), "")
+    rate_hz, wrong = sample_rate([block(step=2)], 100.0)
     assert rate_hz == pytest.approx(50.0)
     assert wrong.startswith("100 Hz are asked for, 49 samples were lost on the way: lower the rate")
 
@@ -26,7 +26,7 @@ def test_the_pace_of_a_stream_and_what_was_lost_on_its_way() -> None:
 def test_noise_is_that_of_the_noisiest_column_whatever_it_moves() -> None:
     rng = np.random.default_rng(1)
     drifting = np.linspace(0.0, 1.0, 4000)[:, None] + rng.normal(0.0, [0.01, 0.03], (4000, 2))
-    assert noise(drifting) == pytest.approx(0.03, rel=0.05)
+    assert sample_noise(drifting) == pytest.approx(0.03, rel=0.05)
 
 
 @pytest.mark.parametrize(("share", "wrong"), [(1.0, ""), (0.99, ""), (0.9, "face 2 differ by 11 %")])

@@ -24,7 +24,7 @@ from acquisition.recording.rig import parse_rig
 from acquisition.recording.segments import Rotation, segments
 from calibeam.cli import run
 from calibeam.devices import encoder_log
-from calibeam.devices.encoder_log import EncoderLog, State
+from calibeam.devices.encoder_log import EncoderLog, LogState
 from calibeam.devices.encoders import names_of
 from drivers.cia406.angle import Scale
 from drivers.cia406.configuration import EncoderIdentity
@@ -99,7 +99,9 @@ def new_log(rig_path: Path, tmp_path: Path) -> Callable[..., EncoderLog]:
     return made
 
 
-def until(log: EncoderLog, done: Callable[[State], bool], tell: Callable[[State], None] = lambda state: None) -> None:
+def until(
+    log: EncoderLog, done: Callable[[LogState], bool], tell: Callable[[LogState], None] = lambda state: None
+) -> None:
     log.run(lambda: done(log.state), tell)
 
 
@@ -130,7 +132,7 @@ def test_positions_and_every_frame_are_kept(new_log, tmp_path: Path) -> None:
 def test_ctrl_c_ends_a_log_and_the_next_one_goes_on_beside_it(new_log, tmp_path: Path) -> None:
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
 
-    def press(state: State) -> None:
+    def press(state: LogState) -> None:
         if state.rows >= 10:
             os.kill(os.getpid(), signal.SIGINT)
 
@@ -158,7 +160,7 @@ def test_a_log_that_rotates_loses_nothing_between(new_log, tmp_path: Path) -> No
 def test_a_bus_that_is_pulled_and_put_back_is_a_gap(new_log, bus: Bus, tmp_path: Path) -> None:
     log, rows = new_log(), [0]
 
-    def pull_and_put_back(state: State) -> None:
+    def pull_and_put_back(state: LogState) -> None:
         if state.rows >= 10 and state.outages == 0:
             bus.unplug()
         elif state.outages == 1 and state.away is not None and bus._stop.is_set():

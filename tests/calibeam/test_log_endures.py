@@ -18,7 +18,7 @@ from acquisition.recording.read import read
 from acquisition.recording.rig import parse_rig
 from acquisition.recording.segments import Rotation, segments
 from calibeam.devices import encoder_log
-from calibeam.devices.encoder_log import LOOK_S, EncoderLog, State
+from calibeam.devices.encoder_log import LOOK_S, EncoderLog, LogState
 from drivers.device import Block, Channel
 from drivers.errors import DeviceStale
 from drivers.transports.can_tap import Tap
@@ -89,7 +89,7 @@ def grown(
     assert device is not None
     log = EncoderLog(device, RIG.read_text(), folder, clock, rotation, raw=True)
 
-    def note(state: State) -> None:
+    def note(state: LogState) -> None:
         if len(log.segments) in (from_segment, to_segment) and len(log.segments) not in sizes:
             sizes[len(log.segments)] = size()
         for path in log.segments[:-1][-1:]:

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from calibeam.cli import run
-from calibeam.commands.report import earlier_calibration
+from calibeam.commands.report import read_earlier_calibration
 
 RIG = """schema = 1
 name = "five-joints"
@@ -128,7 +128,7 @@ def test_a_script_reads_verdict_numbers_and_drift_on_one_line(folder, tmp_path, 
 def test_an_earlier_calibration_is_a_model_a_folder_or_a_recording(folder, tmp_path):
     model = tmp_path / "last-year" / "model.json"
     assert run(["identify", str(folder), "--out", str(model)]) == 0
-    by_file, by_folder, by_recording = (earlier_calibration(path) for path in (model, model.parent, folder))
+    by_file, by_folder, by_recording = (read_earlier_calibration(path) for path in (model, model.parent, folder))
     assert by_file.model == by_folder.model
     assert by_recording.model.chain == by_file.model.chain
     assert (by_file.recording, by_folder.recording) == (None, None)

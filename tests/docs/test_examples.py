@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording.read import read
 from calibeam.cli import run
-from calibeam.results.diagnosis import diagnosed_to
+from calibeam.results.diagnosis import diagnose_to_file
 from calibrate.diagnose import to_file
 from calibrate.effects import catalogue
 from calibrate.effects.words import UNITS
@@ -60,7 +60,7 @@ def with_the_effect(monkeypatch):
 
 
 def test_an_effect_of_one_file_is_found_and_measured(session, with_the_effect, tmp_path):
-    _, file = diagnosed_to(with_pressure(session, GIVE_RAD), tmp_path / "diagnosis.json")
+    _, file = diagnose_to_file(with_pressure(session, GIVE_RAD), tmp_path / "diagnosis.json")
     (found,) = [f for f in file.findings if f.physics == "balancer-pull"]
     assert found.where == "joint2.angle"
     give = found.parameters["give_level_rad"]
@@ -69,7 +69,7 @@ def test_an_effect_of_one_file_is_found_and_measured(session, with_the_effect, t
 
 
 def test_it_is_not_claimed_where_nothing_gives_way(session, with_the_effect, tmp_path):
-    _, file = diagnosed_to(with_pressure(session, 0.0), tmp_path / "diagnosis.json")
+    _, file = diagnose_to_file(with_pressure(session, 0.0), tmp_path / "diagnosis.json")
     assert "balancer-pull" not in {f.physics for f in file.findings}
 
 

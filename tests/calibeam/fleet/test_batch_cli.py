@@ -11,12 +11,12 @@ from acquisition.recording.rig import load_rig
 from benchmarks.fleet_sessions import Robot, write_fleet
 from calibeam.cli import run
 from calibeam.commands.batch import _end
-from calibeam.fleet.recordings import recordings
+from calibeam.fleet.recordings import find_recordings
 from calibeam.fleet.row import Outcome, Task, Zero
-from calibeam.fleet.run import Ran
+from calibeam.fleet.run import RunResult
 from calibeam.fleet.summary import Fleet
 from calibeam.fleet.table import read_rows
-from calibeam.fleet.worker import _zeros, judged
+from calibeam.fleet.worker import _zeros, judge_recording
 from calibeam.outcome import PartialResult
 from calibrate.model_file import ModelParameter
 
@@ -71,8 +71,8 @@ def test_what_stands_is_told_again_with_what_failed(fleet, out, capsys):
 def test_what_is_no_recording_fails_in_words(tmp_path):
     (tmp_path / "text.mcap").write_text("nothing of the kind")
     (tmp_path / "away.mcap").symlink_to(tmp_path / "nowhere")
-    found = recordings(tmp_path, tmp_path / "-")
-    errors = {one.name: judged(Task.of(one, diagnose=False)).error for one in found}
+    found = find_recordings(tmp_path, tmp_path / "-")
+    errors = {one.name: judge_recording(Task.of(one, diagnose=False)).error for one in found}
     assert "not a recording" in errors["text.mcap"]
     assert "No such file" in errors["away.mcap"]
 
@@ -85,7 +85,7 @@ def test_a_zero_comes_with_what_the_rig_file_draws():
 
 
 def test_a_stopped_run_says_how_to_go_on():
-    ran = Ran((), 0, 0, 2, stopped="SIGTERM")
+    ran = RunResult((), 0, 0, 2, stopped="SIGTERM")
     for again, says in ((True, "leave --again out to go on"), (False, "the same command goes on")):
         with pytest.raises(PartialResult, match=says):
             _end(ran, Fleet(()), Path("out"), again=again)

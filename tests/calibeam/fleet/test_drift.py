@@ -3,7 +3,17 @@
 import numpy as np
 import pytest
 
-from calibeam.fleet.drift import FAMILY, Series, all_series, common_scatter, drifts, drifts_of, holm, line, year_of
+from calibeam.fleet.drift import (
+    FAMILY,
+    Series,
+    all_series,
+    common_scatter,
+    find_drifts,
+    find_drifts_in,
+    fit_line,
+    holm,
+    year_of,
+)
 from calibeam.fleet.row import Outcome, Row, Zero
 
 SIGMA = 2e-5
@@ -24,7 +34,7 @@ def row(robot, date, zero_rad, sigma_rad=SIGMA, drawn_rad=0.0, **fields):
 
 def test_points_on_a_line_give_the_line():
     year = np.array([2020.0, 2020.5, 2022.0])
-    found = line(series(year, 1e-3 + 3e-4 * (year - 2020.0)))
+    found = fit_line(series(year, 1e-3 + 3e-4 * (year - 2020.0)))
     assert found.slope_rad_year == pytest.approx(3e-4)
     assert found.zero_rad == pytest.approx(1e-3)
     assert found.change_rad == pytest.approx(6e-4)
@@ -35,12 +45,12 @@ def test_one_session_gone_wrong_is_no_drift():
     rng = np.random.default_rng(4)
     zero = SIGMA * rng.standard_normal(8)
     zero[-1] += 60.0 * SIGMA
-    assert line(series(np.arange(8.0), zero)).p > 0.01
+    assert fit_line(series(np.arange(8.0), zero)).p > 0.01
 
 
 def test_scatter_beyond_the_stated_sigma_widens_the_interval():
     year, zero = np.arange(6.0), 20.0 * SIGMA * np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
-    found = line(series(year, zero))
+    found = fit_line(series(year, zero))
     assert found.sigma_rad_year > 5.0 * SIGMA / np.sqrt(np.sum((year - 2.5) ** 2))
     assert found.low_rad_year < 0.0 < found.high_rad_year
 
@@ -59,7 +69,7 @@ def test_of_fleets_without_drift_at_most_five_in_a_hundred_show_one(scatter):
     for _ in range(fleets):
         dates = [np.sort(rng.uniform(0.0, 3.0, rng.integers(3, 7))) for _ in range(12)]
         still = [series(year, scatter * SIGMA * rng.standard_normal(len(year))) for year in dates]
-        said += any(one.significant for one in drifts_of(still).lines)
+        said += any(one.significant for one in find_drifts_in(still).lines)
     assert said <= FAMILY * fleets + 3.0 * np.sqrt(FAMILY * (1.0 - FAMILY) * fleets)
 
 
@@ -71,18 +81,18 @@ def test_the_robot_that_drifts_is_found_among_many():
         for robot in range(20)
         for k, day in enumerate(days)
     ]
-    found = [d for d in drifts(rows).lines if d.significant]
+    found = [d for d in find_drifts(rows).lines if d.significant]
     assert [(d.series.robot, d.series.joint) for d in found] == [("r3", 2)]
     assert found[0].low_rad_year < 5e-4 < found[0].high_rad_year
 
 
 def test_two_dates_copies_and_numbers_of_no_trust_are_no_series():
     rows = [row("r", day, 0.0) for day in ("2025-01-01", "2026-01-01")]
-    assert drifts(rows).lines == ()
+    assert find_drifts(rows).lines == ()
     copy = row("r", "2026-06-01", 0.0, sha256=rows[0].sha256)
     doubtful = row("r", "2026-07-01", 1.0, trust="bad")
     undated = row("r", "", 1.0)
-    assert drifts([*rows, copy, doubtful, undated]).lines == ()
+    assert find_drifts([*rows, copy, doubtful, undated]).lines == ()
     assert [len(s.year) for s in all_series([*rows, copy, doubtful, undated])] == [2]
 
 

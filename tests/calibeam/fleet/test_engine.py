@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from calibeam.fleet.engine import LOST, rows
-from calibeam.fleet.recordings import recordings
+from calibeam.fleet.engine import LOST, run_orders
+from calibeam.fleet.recordings import find_recordings
 from calibeam.fleet.row import Order, Outcome, Row, Task
 from calibeam.fleet.settings import Engine, Workers
 from calibrate.errors import DataError
@@ -17,7 +17,7 @@ NAMES = [f"{letter}.mcap" for letter in "abcdefgh"]
 @pytest.fixture
 def orders(folder, reader, tmp_path):
     def make(*names: str) -> list[Order]:
-        return [Order(Task.of(one, diagnose=False), 30.0, reader) for one in recordings(folder(*names), tmp_path)]
+        return [Order(Task.of(one, diagnose=False), 30.0, reader) for one in find_recordings(folder(*names), tmp_path)]
 
     return make
 
@@ -30,7 +30,7 @@ def outcomes(found: Iterator[Row]) -> dict[str, Outcome]:
 
 def test_loky_goes_on_when_a_worker_is_killed(orders):
     names = [*NAMES, "d worker.mcap"]
-    found = outcomes(rows(orders(*names), Workers(Engine.LOKY, 2)))
+    found = outcomes(run_orders(orders(*names), Workers(Engine.LOKY, 2)))
     assert found == dict.fromkeys(names, Outcome.IDENTIFIED)
 
 
@@ -41,7 +41,7 @@ def test_a_dask_scheduler_goes_on_when_one_of_its_two_workers_is_killed(orders):
         n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, silence_logs=50
     ) as cluster:
         names = [*NAMES, "d worker.mcap"]
-        found = outcomes(rows(orders(*names), Workers(Engine.DASK, scheduler=cluster.scheduler_address)))
+        found = outcomes(run_orders(orders(*names), Workers(Engine.DASK, scheduler=cluster.scheduler_address)))
     assert found == dict.fromkeys(names, Outcome.IDENTIFIED)
 
 
@@ -57,7 +57,7 @@ def test_what_kills_its_worker_each_time_is_given_up(orders, monkeypatch):
             yield work(order)
 
     monkeypatch.setattr("calibeam.fleet.engine._round", breaking)
-    done = {row.name: row for row in rows(orders("a.mcap", "bad.mcap", "c.mcap"), Workers(jobs=1))}
+    done = {row.name: row for row in run_orders(orders("a.mcap", "bad.mcap", "c.mcap"), Workers(jobs=1))}
     assert [done[name].outcome for name in ("a.mcap", "bad.mcap", "c.mcap")] == [
         Outcome.IDENTIFIED,
         Outcome.LOST,
@@ -73,18 +73,18 @@ def test_workers_that_fall_silent_are_not_waited_for(orders, monkeypatch):
     silent = [
         Order(order.task, 0.0, ("cat",)) for order in orders("a.mcap", "b.mcap")
     ]  # it never says that it is ready
-    found = list(rows(silent, Workers(Engine.LOKY, 2)))
+    found = list(run_orders(silent, Workers(Engine.LOKY, 2)))
     assert [(row.outcome, row.error) for row in found] == [(Outcome.LOST, LOST)] * 2
 
 
 def test_dask_is_not_waited_for_without_end(orders):
     unlimited = [replace(order, timeout_s=None) for order in orders("a.mcap")]
     with pytest.raises(DataError, match="--timeout 0 is not for --engine dask"):
-        next(rows(unlimited, Workers(Engine.DASK)))
+        next(run_orders(unlimited, Workers(Engine.DASK)))
 
 
 def test_a_scheduler_belongs_to_dask_and_has_to_answer(orders):
     with pytest.raises(DataError, match="for --engine dask"):
-        next(rows(orders("a.mcap"), Workers(scheduler="tcp://127.0.0.1:1")))
+        next(run_orders(orders("a.mcap"), Workers(scheduler="tcp://127.0.0.1:1")))
     with pytest.raises(DataError, match="no Dask scheduler answers"):
-        next(rows(orders("a.mcap"), Workers(Engine.DASK, scheduler="nonsense://127.0.0.1:1")))
+        next(run_orders(orders("a.mcap"), Workers(Engine.DASK, scheduler="nonsense://127.0.0.1:1")))

@@ -2,12 +2,12 @@
 
 import pytest
 
-from calibeam.fleet.recordings import content_sha256, recordings
+from calibeam.fleet.recordings import content_sha256, find_recordings
 from calibrate.errors import DataError
 
 
 def names(root, but=None):
-    return [one.name for one in recordings(root, but or root / "nowhere")]
+    return [one.name for one in find_recordings(root, but or root / "nowhere")]
 
 
 def test_files_and_session_folders_are_found_in_the_order_of_their_names(folder):
@@ -22,15 +22,15 @@ def test_results_and_hidden_folders_are_left_out(folder):
 
 def test_a_folder_without_recordings_is_told(folder, tmp_path):
     with pytest.raises(DataError, match="no recording"):
-        recordings(folder("notes.txt"), tmp_path)
+        find_recordings(folder("notes.txt"), tmp_path)
     with pytest.raises(DataError, match="no such folder"):
-        recordings(tmp_path / "none", tmp_path)
+        find_recordings(tmp_path / "none", tmp_path)
 
 
 def test_the_last_date_of_the_name_and_its_first_folder(folder):
-    (one,) = recordings(folder("robot-7/2024-01-02/2025-03-04 after crash.mcap"), folder())
+    (one,) = find_recordings(folder("robot-7/2024-01-02/2025-03-04 after crash.mcap"), folder())
     assert (one.date, one.group) == ("2025-03-04", "robot-7")
-    (other,) = recordings(folder() / "robot-7" / "2024-01-02", folder())
+    (other,) = find_recordings(folder() / "robot-7" / "2024-01-02", folder())
     assert (other.date, other.group) == ("2025-03-04", "")
 
 
@@ -40,7 +40,7 @@ def test_the_last_date_of_the_name_and_its_first_folder(folder):
 )
 def test_what_only_looks_like_a_date_is_none(folder, name, date):
     root = folder(name)
-    assert [one.date for one in recordings(root, root / "nowhere")] == [date]
+    assert [one.date for one in find_recordings(root, root / "nowhere")] == [date]
 
 
 def test_the_parts_of_a_session_are_one_recording(folder):
@@ -48,7 +48,7 @@ def test_the_parts_of_a_session_are_one_recording(folder):
     before = content_sha256(root / "r7")
     folder("r7/recording-0002.mcap")
     assert names(root) == ["r7/below/x.mcap", "r7/other.mcap", "r7/recording.mcap", "r8/recording.mcap"]
-    whole = recordings(root, root / "nowhere")[2]
+    whole = find_recordings(root, root / "nowhere")[2]
     assert (whole.path, whole.group) == (root / "r7", "r7")
     assert whole.size_bytes == len("r7/recording.mcap") + len("r7/recording-0002.mcap")
     assert content_sha256(whole.path) != before

@@ -9,9 +9,9 @@ from msgspec import structs
 
 from calibeam.fleet.page import LISTED, fleet_html
 from calibeam.fleet.row import Cause, Outcome, Row, Zero
-from calibeam.fleet.run import Ran
+from calibeam.fleet.run import RunResult
 from calibeam.fleet.summary import Fleet, causes, shared_words
-from calibeam.printing.fleet import record
+from calibeam.printing.fleet import fleet_record
 
 DAYS = ("2025-01-01", "2025-07-01", "2026-01-01", "2026-07-01")
 FOUND = Cause("joint3.angle", "q3", "harmonic", "encoder-eccentricity", 0.99, 0.8, "…")
@@ -63,7 +63,7 @@ def test_two_recordings_of_one_day_are_one_date(fleet):
     again = session(told.robot, DAYS[0], 0.0)
     rows = (*fleet.rows, msgspec.structs.replace(again, path="/again", name="again", sha256="again"))
     twice = Fleet(rows)
-    assert record(Ran(rows, 0, 0, 0, stopped=False), twice, "", "")["drifts"][0]["dates"] == len(DAYS)
+    assert fleet_record(RunResult(rows, 0, 0, 0, stopped=False), twice, "", "")["drifts"][0]["dates"] == len(DAYS)
     cells = re.search(r"<tr>(?:(?!</tr>).)*>drifts<.*?</tr>", fleet_html(twice, "hall 3"), re.DOTALL)
     assert cells is not None
     assert f">{len(DAYS)}<" in cells[0]

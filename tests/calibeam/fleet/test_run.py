@@ -5,7 +5,7 @@ import pytest
 
 from calibeam.fleet import run as module
 from calibeam.fleet.row import Outcome
-from calibeam.fleet.run import Wanted, run
+from calibeam.fleet.run import RunOptions, run
 from calibeam.fleet.settings import Workers
 from calibeam.fleet.table import read_rows
 
@@ -19,7 +19,7 @@ def ran(reader, tmp_path):
 
     def go(root, tell=lambda done, total, name: None, **wanted):
         settings = {"workers": ONE, "command": reader, "timeout_s": 30.0} | wanted
-        return run(root, out, Wanted(**settings), tell)
+        return run(root, out, RunOptions(**settings), tell)
 
     go.table = out / "fleet.parquet"
     return go
@@ -115,7 +115,7 @@ def test_a_part_has_no_row_of_its_own_once_its_session_was_gone_on_with(ran, fol
 
 def test_a_robot_is_named_by_its_serial_number_else_by_its_rig(folder, reader):
     row = module.Row("/f/a/b.mcap", "a/b.mcap", "", 0, 0, Outcome.IDENTIFIED, "", rig="ur5", robot_serial="77")
-    named = module._named(row, {row.path: "a"}, Wanted())
+    named = module._named(row, {row.path: "a"}, RunOptions())
     assert named.robot == "77"
-    assert module._named(msgspec.structs.replace(row, robot_serial=""), {}, Wanted()).robot == "ur5"
-    assert module._named(row, {row.path: "a"}, Wanted(by_folder=True)).robot == "a"
+    assert module._named(msgspec.structs.replace(row, robot_serial=""), {}, RunOptions()).robot == "ur5"
+    assert module._named(row, {row.path: "a"}, RunOptions(by_folder=True)).robot == "a"

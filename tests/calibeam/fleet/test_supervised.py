@@ -2,7 +2,7 @@
 
 import pytest
 
-from calibeam.fleet.recordings import recordings
+from calibeam.fleet.recordings import find_recordings
 from calibeam.fleet.row import Order, Outcome, Task
 from calibeam.fleet.supervised import Child
 
@@ -13,7 +13,7 @@ def ask(folder, reader):
     child = Child(reader)
 
     def rows(*names, timeout_s=30.0):
-        found = {one.name: one for one in recordings(folder(*names), folder())}
+        found = {one.name: one for one in find_recordings(folder(*names), folder())}
         return [
             child.ask(Order(Task.of(found[name], diagnose=False), 0.2 if "hangs" in name else timeout_s, reader))
             for name in names
@@ -47,7 +47,7 @@ def test_a_process_that_is_lost_becomes_a_row_and_the_next_recording_is_read(ask
 
 
 def test_a_program_that_does_not_start_is_told(folder, tmp_path):
-    (one,) = recordings(folder("a.mcap"), tmp_path)
+    (one,) = find_recordings(folder("a.mcap"), tmp_path)
     order = Order(Task.of(one, diagnose=False), None, (str(tmp_path / "none"),))
     child = Child(order.command)
     row = child.ask(order)

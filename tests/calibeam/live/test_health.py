@@ -3,7 +3,7 @@
 import pytest
 
 from calibeam.live.health import Watch, asked_rates
-from calibeam.live.latest import Heard
+from calibeam.live.latest import DeviceReadings
 
 
 @pytest.fixture
@@ -16,9 +16,9 @@ def test_devices_and_rates_are_those_of_the_rig(rig) -> None:
 
 
 def test_before_its_first_sample_a_device_is_waited_for(watch) -> None:
-    health = watch.look("psd", Heard(), 100.0)
+    health = watch.look("psd", DeviceReadings(), 100.0)
     assert (health.state, health.age_s, health.rate_hz) == ("waiting", None, None)
-    assert not watch.fresh("psd", Heard(), 100.0)
+    assert not watch.fresh("psd", DeviceReadings(), 100.0)
 
 
 def test_a_live_device_tells_age_and_rate_by_its_own_clock(watch, latest, block, clock) -> None:

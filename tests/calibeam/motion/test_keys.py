@@ -8,7 +8,7 @@ import pytest
 from acquisition.motion.states import Event, State, after
 from calibeam.asking import Asking
 from calibeam.interrupts import INTERRUPTS
-from calibeam.motion.by_hand import WORDS, Keys, keys_of
+from calibeam.motion.by_hand import WORDS, MotionKeys, keys_of
 
 PATIENCE_S = 30.0
 
@@ -45,7 +45,7 @@ class Told:
 
 def test_ctrl_c_pauses_then_holds_then_gives_up() -> None:
     gate, out = Told(State.MOVING), io.StringIO()
-    keys = Keys(gate, None, out)  # type: ignore[arg-type]
+    keys = MotionKeys(gate, None, out)  # type: ignore[arg-type]
     for state in (State.PAUSING, State.HELD, State.ENDING):
         keys.interrupted()
         assert gate.state is state
@@ -57,14 +57,14 @@ def test_ctrl_c_pauses_then_holds_then_gives_up() -> None:
 @pytest.mark.parametrize(("word", "told"), [("r\n", "resume"), ("Stop", "stop"), ("a", "abort"), ("h", "halt")])
 def test_words(word: str, told: str) -> None:
     gate = Told(State.HELD)
-    Keys(gate, None, io.StringIO()).word(word)  # type: ignore[arg-type]
+    MotionKeys(gate, None, io.StringIO()).word(word)  # type: ignore[arg-type]
     assert gate.told == [told]
 
 
 @pytest.mark.parametrize("word", ["what", "rest", "", "\x1b[A"])
 def test_another_word_does_nothing(word: str) -> None:
     gate = Told(State.HELD)
-    Keys(gate, None, io.StringIO()).word(word)  # type: ignore[arg-type]
+    MotionKeys(gate, None, io.StringIO()).word(word)  # type: ignore[arg-type]
     assert gate.told == []
 
 
@@ -72,7 +72,7 @@ def test_a_word_typed_ahead_does_not_resume(typist) -> None:
     gate = Told(State.MOVING)
     typist.ahead("r\n")
     typist.answers("> ", "what\n", "s\n")
-    keys = Keys(gate, Asking(typist.terminal), io.StringIO())  # type: ignore[arg-type]
+    keys = MotionKeys(gate, Asking(typist.terminal), io.StringIO())  # type: ignore[arg-type]
     keys.interrupted()
     assert keys._thread is not None
     keys._thread.join(PATIENCE_S)
@@ -82,7 +82,7 @@ def test_a_word_typed_ahead_does_not_resume(typist) -> None:
 
 def test_a_closed_terminal_gives_up() -> None:
     gate = Told(State.MOVING)
-    Keys(gate, None, io.StringIO()).ended()  # type: ignore[arg-type]
+    MotionKeys(gate, None, io.StringIO()).ended()  # type: ignore[arg-type]
     assert gate.state is State.ENDING
 
 
@@ -100,7 +100,7 @@ def test_signals_reach_the_gate_while_it_is_followed_and_no_longer(monkeypatch, 
 
 def test_the_keyboard_is_left_when_the_held_motion_ends(typist) -> None:
     gate = Told(State.MOVING)
-    keys = Keys(gate, Asking(typist.terminal), io.StringIO())  # type: ignore[arg-type]
+    keys = MotionKeys(gate, Asking(typist.terminal), io.StringIO())  # type: ignore[arg-type]
     keys.interrupted()
     assert typist.shows("> ")
     keys.ended()

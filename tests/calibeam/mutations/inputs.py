@@ -23,10 +23,10 @@ from acquisition.recording.can_message import frame_of
 from acquisition.recording.rig import load_rig, rig_sha256, rig_text
 from acquisition.recording.stream import Channel, Event, Gap
 from acquisition.recording.writer import RecordingWriter
-from calibeam.fleet.recordings import recordings
+from calibeam.fleet.recordings import find_recordings
 from calibeam.fleet.row import Task
 from calibeam.fleet.table import write_rows
-from calibeam.fleet.worker import judged
+from calibeam.fleet.worker import judge_recording
 from calibeam.guided.recorded import BelievedGuidedArm
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.eccentric import with_discs
@@ -271,7 +271,7 @@ def _made_by_calibeam(folder: Path, run: Run) -> None:
     shutil.copy(folder / "streams.mcap", folder / "begun" / "recording.mcap")
     shutil.copytree(folder / "tracker", folder / "fleet-of-one" / "tracker")
     fleet.mkdir()
-    row = judged(Task.of(recordings(folder / "fleet-of-one", fleet)[0], diagnose=False))
+    row = judge_recording(Task.of(find_recordings(folder / "fleet-of-one", fleet)[0], diagnose=False))
     write_rows(fleet / "fleet.parquet", [row])
     (fleet / "fleet.rows.jsonl").write_bytes(msgspec.json.encode(row) + b"\n")
 

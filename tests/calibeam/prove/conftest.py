@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from calibeam.prove.record import CaseScore, DefectScore, Said, TrueDefect
+from calibeam.prove.record import CaseScore, DefectScore, NamedCause, TrueDefect
 
 
 @pytest.fixture
@@ -18,7 +18,7 @@ def defect() -> Callable[..., TrueDefect]:
 
 @pytest.fixture
 def case() -> Callable[..., CaseScore]:
-    def make(defects: tuple[DefectScore, ...] = (), said: tuple[Said, ...] = (), **more: object) -> CaseScore:
+    def make(defects: tuple[DefectScore, ...] = (), said: tuple[NamedCause, ...] = (), **more: object) -> CaseScore:
         fields: dict[str, object] = {
             "name": "case-0000",
             "sha256": "",

@@ -9,7 +9,7 @@ import pytest
 from calibeam.prove.concealing import Concealed, conceal_cases, publish
 from calibeam.prove.diagnosing import Blind, bare_environment
 from calibeam.prove.scenario import Mix
-from calibeam.prove.seal import Layout, fingerprint, opened
+from calibeam.prove.seal import Layout, fingerprint, open_seal
 
 MIX = Mix(kinds=("one",), families=("tracker",), mechanism="encoder-eccentricity")
 
@@ -71,7 +71,7 @@ def test_nothing_of_the_truth_lies_in_clear_before_the_reveal(concealed: tuple[L
         name = one.scenario.name
         assert {p.name for p in layout.recording(name).iterdir()} == {"rig.toml", "samples.csv"}
         assert not any(str(one.scenario.wanted.seed).encode() in p.read_bytes() for p in files)
-        truth = opened(layout.seal(name).read_bytes(), one.key, one.sha256)
+        truth = open_seal(layout.seal(name).read_bytes(), one.key, one.sha256)
         assert b"encoder-eccentricity" in truth
 
 

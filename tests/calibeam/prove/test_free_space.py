@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from calibeam.prove.record import FreeSpace
 from calibeam.prove.scoring import errors_m
-from calibeam.prove.unseen import Beam
+from calibeam.prove.unseen import LaserBeam
 
 RNG = np.random.default_rng(5)
 TIPS_M = RNG.uniform(-0.8, 0.8, (60, 3))
@@ -28,13 +28,13 @@ def test_a_moved_frame_is_no_error_of_tips() -> None:
 
 
 def test_a_moved_frame_is_no_error_of_beams() -> None:
-    moved = Beam(TURN.apply(TIPS_M) + SHIFT_M, TURN.apply(WAYS))
+    moved = LaserBeam(TURN.apply(TIPS_M) + SHIFT_M, TURN.apply(WAYS))
     assert errors_m(moved, _beams()) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_where_on_its_beam_a_laser_sits_is_no_error() -> None:
     along = RNG.uniform(-0.2, 0.2, (60, 1)) * WAYS
-    assert errors_m(Beam(TIPS_M + along, 3.0 * WAYS), _beams()) == pytest.approx(0.0, abs=1e-12)
+    assert errors_m(LaserBeam(TIPS_M + along, 3.0 * WAYS), _beams()) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_noise_of_tips_is_its_own_size() -> None:
@@ -45,7 +45,7 @@ def test_noise_of_tips_is_its_own_size() -> None:
 
 def test_a_beam_off_to_the_side_counts() -> None:
     side_m = 1e-4 * np.cross(WAYS, RNG.standard_normal((60, 3)))
-    said = errors_m(Beam(TIPS_M + side_m, WAYS), _beams())
+    said = errors_m(LaserBeam(TIPS_M + side_m, WAYS), _beams())
     assert said == pytest.approx(float(np.sqrt(np.mean(np.sum(side_m**2, axis=1)))), rel=0.15)
 
 

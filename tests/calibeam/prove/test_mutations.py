@@ -7,7 +7,7 @@ import msgspec
 import pytest
 
 from benchmarks.forgotten_effects import MUTATIONS, caught, main
-from calibeam.prove.record import CaseScore, DefectScore, Said
+from calibeam.prove.record import CaseScore, DefectScore, NamedCause
 from calibrate.effects.catalogue import EFFECTS
 from calibrate.errors import DataError
 from simulators.conceal.wanted import INSTRUMENT
@@ -30,7 +30,7 @@ def test_each_takes_out_what_its_mechanism_does() -> None:
 def test_only_unknown_at_the_right_place_is_caught(case: Case, found: Found) -> None:
     there = msgspec.structs.replace(found(physics="unknown", named=False), unknown_there=True)
     elsewhere = msgspec.structs.replace(there, located=False)
-    named = Said("joint2.angle", "q2", "backlash", 0.99, "", placed=True, right=False)
+    named = NamedCause("joint2.angle", "q2", "backlash", 0.99, "", placed=True, right=False)
     assert caught(case((there,), kind="outside"))
     assert not caught(case((elsewhere,), kind="outside"))
     assert not caught(case((there,), (named,), kind="outside"))

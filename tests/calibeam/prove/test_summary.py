@@ -6,11 +6,11 @@ import msgspec
 
 from calibeam.prove.misses import faults, hidden_briefly
 from calibeam.prove.page import proof_html, summary
-from calibeam.prove.record import DIAGNOSIS, SCHEMA, BaselineScore, CaseScore, DefectScore, ProofFile, Said
+from calibeam.prove.record import DIAGNOSIS, SCHEMA, BaselineScore, CaseScore, DefectScore, NamedCause, ProofFile
 
 Case = Callable[..., CaseScore]
 Found = Callable[..., DefectScore]
-ALARM = Said("joint2.angle", "q2", "backlash", 0.99, "", placed=False, right=False)
+ALARM = NamedCause("joint2.angle", "q2", "backlash", 0.99, "", placed=False, right=False)
 
 
 def _plain(text: str) -> str:

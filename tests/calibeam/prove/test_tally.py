@@ -6,15 +6,15 @@ import pytest
 
 from calibeam.prove.misses import faults
 from calibeam.prove.page import ELSEWHERE, confusion
-from calibeam.prove.record import CaseScore, DefectScore, Said, SizeScore
+from calibeam.prove.record import CaseScore, DefectScore, NamedCause, SizeScore
 from calibeam.prove.tally import Share, by_effect, by_enr, figures, plain, share
 
 Case = Callable[..., CaseScore]
 Found = Callable[..., DefectScore]
 
 
-def _said(physics: str = "backlash", *, right: bool = False, confidence: float = 0.99) -> Said:
-    return Said("joint2.angle", "q2", physics, confidence, "", placed=right, right=right)
+def _said(physics: str = "backlash", *, right: bool = False, confidence: float = 0.99) -> NamedCause:
+    return NamedCause("joint2.angle", "q2", physics, confidence, "", placed=right, right=right)
 
 
 def test_wilson_interval_of_none_in_ten() -> None:

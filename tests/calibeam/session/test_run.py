@@ -11,7 +11,7 @@ from calibeam.asking import Asking
 from calibeam.devices.check import DeviceCheck
 from calibeam.devices.site import addresses_of
 from calibeam.live.feed import SILENT
-from calibeam.session.job import Earlier, Job, part_of
+from calibeam.session.job import EarlierParts, Job, part_of
 from calibeam.session.run import OnSite
 from drivers.clock import SystemClock
 from drivers.errors import DeviceRefused
@@ -29,7 +29,7 @@ def test_a_forecast_that_cannot_be_made_is_said_and_ends_nothing(site, tmp_path)
     def fails() -> None:
         raise ZeroDivisionError("no pose ahead")
 
-    part = part_of(site._job, Earlier(), 0.01)
+    part = part_of(site._job, EarlierParts(), 0.01)
     site._look(SimpleNamespace(forecast_now=fails), Summary((), (), 2), part)
     log = (tmp_path / "session.log").read_text()
     assert "0 poses; 2 left out" in log
@@ -40,7 +40,7 @@ def test_a_terminal_that_goes_instead_of_the_numbers_of_a_place_finishes(rig, tm
     job = Job(rig, RIG_FILE.read_text(), tmp_path, addresses_of(rig), PlanOptions())
     site = OnSite(job, Console(quiet=True), SystemClock(), SILENT, Asking(typist.terminal), agrees=False)
     typist.answers("> ", "\x04")
-    assert site._new_place(part_of(job, Earlier(), 0.01)) is None
+    assert site._new_place(part_of(job, EarlierParts(), 0.01)) is None
 
 
 def test_devices_that_are_wrong_end_the_session_where_the_input_ends(rig, tmp_path, typist, monkeypatch) -> None:

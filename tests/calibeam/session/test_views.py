@@ -19,8 +19,8 @@ from calibeam.live.feed import Progress as PageProgress
 from calibeam.session.forecast import Forecast
 from calibeam.session.keys import Keys
 from calibeam.session.person import Person
-from calibeam.session.reporter import Teller, ToldJournal
-from calibeam.session.status import Pace, Shown, clock_words
+from calibeam.session.reporter import ReportingJournal, StatusReporter
+from calibeam.session.status import Pace, SessionStatus, clock_words
 from calibeam.session.views import KEYS, LogFile, PageView, PlainView, TerminalView, drawn
 from drivers.errors import DeviceLost
 
@@ -49,16 +49,16 @@ class Heard:
 
     def __init__(self) -> None:
         self.lines: list[tuple[str, bool]] = []
-        self.shown: list[Shown] = []
+        self.shown: list[SessionStatus] = []
 
     def said(self, text: str, loud: bool) -> None:
         self.lines.append((text, loud))
 
-    def shows(self, shown: Shown) -> None:
+    def shows(self, shown: SessionStatus) -> None:
         self.shown.append(shown)
 
 
-def told(shown: Shown, width: int = 80) -> str:
+def told(shown: SessionStatus, width: int = 80) -> str:
     console = Console(file=StringIO(), width=width)
     console.print(drawn(shown))
     return console.file.getvalue()
@@ -79,8 +79,8 @@ def heard() -> Heard:
 
 
 @pytest.fixture
-def teller(rig, clock, heard) -> Teller:
-    return Teller(rig, clock, (heard,))
+def teller(rig, clock, heard) -> StatusReporter:
+    return StatusReporter(rig, clock, (heard,))
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def teller(rig, clock, heard) -> Teller:
     ],
 )
 def test_the_view_says_in_capitals_what_goes_on_and_which_keys_serve(state, large, keys) -> None:
-    text = told(Shown(state, progress=progress(), left_s=1080.0, forecast=Forecast(5, 2e-5, 34e-6, 12, 1e-5)))
+    text = told(SessionStatus(state, progress=progress(), left_s=1080.0, forecast=Forecast(5, 2e-5, 34e-6, 12, 1e-5)))
     assert large in text
     assert keys in text
     assert "3 of 78   18 min left" in text
@@ -104,7 +104,7 @@ def test_the_view_says_in_capitals_what_goes_on_and_which_keys_serve(state, larg
 
 
 def test_the_view_fits_a_terminal_of_eighty_columns(teller, samples) -> None:
-    journal = ToldJournal(Kept(), teller, lambda all_: None)
+    journal = ReportingJournal(Kept(), teller, lambda all_: None)
     teller.state(State.RUNNING)
     teller.progress(progress())
     for sample in samples[:9]:
@@ -135,7 +135,7 @@ def test_a_stop_that_does_not_reach_the_arm_is_the_largest_thing_on_the_screen(t
 
 
 def test_a_dark_face_is_said(teller, samples) -> None:
-    journal = ToldJournal(Kept(), teller, lambda all_: None)
+    journal = ReportingJournal(Kept(), teller, lambda all_: None)
     look = samples[0].look
     from dataclasses import replace
 
@@ -145,14 +145,14 @@ def test_a_dark_face_is_said(teller, samples) -> None:
 
 
 def test_who_is_asked_sees_nothing_else() -> None:
-    text = told(Shown(State.RUNNING, progress=progress(), asked="put the fixture at place 2, then press ENTER"))
+    text = told(SessionStatus(State.RUNNING, progress=progress(), asked="put the fixture at place 2, then press ENTER"))
     assert "YOUR TURN" in text
     assert "then press ENTER" in text
     assert "SPACE" not in text
 
 
 def test_time_left_counts_only_when_the_arm_works(teller, clock, samples) -> None:
-    journal = ToldJournal(Kept(), teller, lambda all_: None)
+    journal = ReportingJournal(Kept(), teller, lambda all_: None)
     teller.state(State.RUNNING)
     teller.progress(progress(0))
     for sample in samples[:4]:
@@ -182,7 +182,7 @@ def test_times_are_told_as_anybody_plans_by_them(seconds, words) -> None:
 
 
 def test_every_sample_and_everything_left_out_stands_in_the_log(teller, heard, samples) -> None:
-    journal = ToldJournal(Kept(), teller, lambda all_: None)
+    journal = ReportingJournal(Kept(), teller, lambda all_: None)
     teller.progress(progress(0))
     journal.sample(samples[0])
     journal.event("skipped", {"placement": 1, "why": "no light, or saturated, when read"})
@@ -205,9 +205,9 @@ def test_the_log_has_a_time_in_every_line_and_outlives_a_disk_that_is_full(tmp_p
 def test_plain_output_is_a_line_every_ten_poses(heard) -> None:
     console = Console(file=StringIO(), width=200)
     view = PlainView(console)
-    view.shows(Shown(step="4 of 6  MEASURE"))
+    view.shows(SessionStatus(step="4 of 6  MEASURE"))
     for done in range(25):
-        view.shows(Shown(step="4 of 6  MEASURE", progress=progress(done), left_s=600.0))
+        view.shows(SessionStatus(step="4 of 6  MEASURE", progress=progress(done), left_s=600.0))
     assert console.file.getvalue().splitlines() == [
         "4 of 6  MEASURE",
         "10 of 78 poses, about 10 min left",
@@ -231,7 +231,9 @@ def test_the_page_is_told_the_same_and_what_it_draws_by() -> None:
 
     feed = Feed()
     view = PageView(feed)
-    shown = Shown(State.RUNNING, progress=progress(), left_s=60.0, forecast=Forecast(5, 2e-5, corrections={"a": 1.0}))
+    shown = SessionStatus(
+        State.RUNNING, progress=progress(), left_s=60.0, forecast=Forecast(5, 2e-5, corrections={"a": 1.0})
+    )
     view.shows(shown)
     view.shows(shown)
     *once, last, again = feed.told[:2] + feed.told[2:]
@@ -281,5 +283,5 @@ def test_what_a_person_is_asked_is_drawn_at_once(teller) -> None:
     console = Console(file=StringIO(), width=80, force_terminal=True)
     view = TerminalView(console)
     with view.opened():
-        view.shows(Shown(asked="put the fixture at place 2"))
+        view.shows(SessionStatus(asked="put the fixture at place 2"))
         assert "put the fixture at place 2" in console.file.getvalue()

@@ -20,7 +20,7 @@ from benchmarks.stops import emulated_rig, without_encoders
 from calibeam.cli import run
 from calibeam.emulation import Emulation
 from calibeam.session.forecast import ahead_of_blocks
-from calibeam.session.reporter import Teller
+from calibeam.session.reporter import StatusReporter
 from drivers.ur.reader import UrReader
 
 from .conftest import RIG_FILE
@@ -52,23 +52,23 @@ def arguments(tmp_path, plan) -> Iterator[list[str]]:
 @pytest.fixture
 def interrupted(monkeypatch) -> None:
     """Ctrl-C at the first sample, which is heard before the next; and on again once it is paused."""
-    take, turn, pausing = Teller.sample, Teller.state, threading.Event()
+    take, turn, pausing = StatusReporter.sample, StatusReporter.state, threading.Event()
 
-    def sample(teller: Teller, sample: Sample) -> None:
+    def sample(teller: StatusReporter, sample: Sample) -> None:
         take(teller, sample)
         if not pausing.is_set():
             os.kill(os.getpid(), signal.SIGINT)
             assert pausing.wait(PATIENCE_S)
 
-    def state(teller: Teller, state: State) -> None:
+    def state(teller: StatusReporter, state: State) -> None:
         turn(teller, state)
         if state is State.PAUSING:
             pausing.set()
         elif state is State.PAUSED:
             os.kill(os.getpid(), signal.SIGCONT)
 
-    monkeypatch.setattr(Teller, "sample", sample)
-    monkeypatch.setattr(Teller, "state", state)
+    monkeypatch.setattr(StatusReporter, "sample", sample)
+    monkeypatch.setattr(StatusReporter, "state", state)
 
 
 def test_a_word_typed_ahead_leaves_the_arm_where_it_stands(arguments, tmp_path, typist, capsys) -> None:
@@ -94,7 +94,9 @@ def reported_rad(rig_file: Path) -> np.ndarray:
 @pytest.mark.usefixtures("interrupted")
 def test_paused_resumed_and_gone_on_with(arguments, tmp_path, capsys, monkeypatch) -> None:
     concluded: list[Path] = []
-    monkeypatch.setattr("calibeam.results.session_results.conclude", lambda path, console: concluded.append(path))
+    monkeypatch.setattr(
+        "calibeam.results.session_results.write_session_results", lambda path, console: concluded.append(path)
+    )
     log = tmp_path / "out" / "session.log"
     code = run(arguments)
     said = log.read_text()
