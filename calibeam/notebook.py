@@ -9,7 +9,7 @@ The same functions stand behind the command line; docs/python.md has all of it a
 """
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -26,12 +26,15 @@ from calibrate.errors import DataError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from calibeam.results.identification import JudgedModel
+    from calibeam.results.identification import JudgedModel, ReadingErrors
     from calibrate.diagnose.schema import DiagnosisFile
     from calibrate.model_file import ModelFile, ModelParameter
     from calibrate.physics.predicting import Placed
 
 Floats = NDArray[np.float64]
+
+BEFORE, AFTER = "#d55e00", "#0072b2"  # Okabe and Ito, Color Universal Design, 2008
+MICRO = 1e6
 
 
 @dataclass(frozen=True)
@@ -167,9 +170,7 @@ class Session:
 
         Lengths of the misfit in µm on a logarithmic axis, one panel an instrument and quantity.
         """
-        from calibeam.notebook_plot import errors_along_session
-
-        return errors_along_session(self._modelled.errors)
+        return _errors_along_session(self._modelled.errors)
 
     def report(self, path: Path | str, *, diagnosis: bool = False) -> Path:
         """Write the report, one HTML file that needs no other; returns its path. With `diagnosis` also its pages.
@@ -209,3 +210,30 @@ def open_recording(path: Path | str) -> Session:
 
 def _model(found: "JudgedModel") -> Model:
     return Model(found.model, found.verdict.trust.value, found.verdict.sentence, found.verdict.reasons)
+
+
+def _errors_along_session(found: "Sequence[ReadingErrors]") -> "Figure":
+    """One panel a quantity; µm, of orientations µrad, on a logarithmic axis."""
+    from matplotlib.figure import Figure  # takes a second to load
+
+    figure = Figure(figsize=(8.0, 1.0 + 2.4 * len(found)), layout="constrained")
+    for axes, one in zip(figure.subplots(len(found), 1, squeeze=False).ravel(), found, strict=True):
+        number = np.arange(len(one.after)) + 1
+        for values, colour, mark, label in (
+            (one.before, BEFORE, "x", "arm as drawn"),
+            (one.after, AFTER, "o", "identified"),
+        ):
+            axes.plot(number, MICRO * _positive(values), mark, ms=4, color=colour, label=f"{label}: {_rms(values)} rms")
+        unit = "µm" if one.unit == "m" else "µrad"
+        axes.set(yscale="log", xlabel="reading", ylabel=f"error ({unit})", title=one.title)
+        axes.legend(loc="best", fontsize=9)
+    return figure
+
+
+def _positive(values: Floats) -> Floats:
+    """What a logarithmic axis can show; NaN draws nothing."""
+    return np.where(values > 0.0, values, np.nan)
+
+
+def _rms(values: Floats) -> str:
+    return f"{MICRO * float(np.sqrt(np.mean(values**2))):.3g}"

@@ -32,13 +32,125 @@ ACCURACY_UM = 20.0  # as Job.goal_m
 
 
 @dataclass(frozen=True)
-class PageAsked:
-    """Whether there is a live page, and where."""
+class RobotOptions:
+    """What is asked of a session on a robot.
 
-    wanted: bool = False
-    host: str = "127.0.0.1"
-    port: int = 8765
-    token: str | None = None
+    Parameters
+    ----------
+    continue_
+        Go on with the session in this folder, in a further recording beside the first.
+    stands
+        With --continue: the fixture has not been touched since. Else it is asked, or counts as moved.
+    place
+        A further place of the fixture: X Y Z of PSD 1 in the base (m), and its turn about z (degrees).
+    accuracy_um
+        Predicted error of the beam in free space that is good enough: how many more poses it takes is told.
+    yes
+        Ask nothing: the cell is clear, the arm may move.
+
+    """
+
+    continue_: Annotated[bool, Parameter(name="--continue")] = False
+    stands: bool = False
+    place: Annotated[tuple[float, float, float, float] | None, Parameter(negative="")] = None
+    accuracy_um: float = ACCURACY_UM
+    yes: bool = False
+
+    @property
+    def given(self) -> dict[str, bool]:
+        """Which of them are not as they are without a word."""
+        return {
+            "--continue": self.continue_,
+            "--stands": self.stands,
+            "--place": self.place is not None,
+            "--accuracy-um": self.accuracy_um != ACCURACY_UM,
+            "--yes": self.yes,
+        }
+
+
+@dataclass(frozen=True)
+class PageOptions:
+    """Whether there is a live page, and where.
+
+    Parameters
+    ----------
+    live
+        Also a page for browsers, with spots, arm, devices and a STOP (no safety stop).
+    live_host
+        Address of the page; anywhere but on loopback it wants a token.
+    live_port
+        Port of the page; 0 takes any that is free.
+    live_token
+        Word without which the page is not shown; made at random where one is needed.
+
+    """
+
+    live: bool = False
+    live_host: str = "127.0.0.1"
+    live_port: int = 8765
+    live_token: str | None = None
+
+
+@dataclass(frozen=True)
+class EmulatorOptions:
+    """Where emulators are reached beside their wires.
+
+    Parameters
+    ----------
+    control
+        Side channel of emulators, HOST:PORT as `calibeam emulate` prints it: the emulated fixture, or hand, is moved
+        through it, instead of asking a person.
+    time_scale
+        Of the emulators, if it is not 1.
+
+    """
+
+    control: str | None = None
+    time_scale: float = 1.0
+
+    def address(self) -> tuple[str, int] | None:
+        """Host and port of the side channel. AcquisitionError for what is none."""
+        return None if self.control is None else _host_and_port(self.control)
+
+
+@dataclass(frozen=True)
+class HandOptions:
+    """What is asked of a session with a measuring arm.
+
+    Parameters
+    ----------
+    postures
+        Of a measuring arm: readings in each cone.
+    lengths
+        Of a measuring arm: how often each bar position is measured.
+    verify
+        Of a measuring arm: take what `calibeam verify` judges by, instead of what the arm is identified from.
+
+    """
+
+    postures: int = GuidedOptions.postures
+    lengths: int = GuidedOptions.lengths
+    verify: bool = False
+
+    @property
+    def given(self) -> dict[str, bool]:
+        """Which of them are not as they are without a word; --verify has a refusal of its own."""
+        return {
+            "--postures": self.postures != GuidedOptions.postures,
+            "--lengths": self.lengths != GuidedOptions.lengths,
+        }
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What every session is asked for, whoever moves the arm."""
+
+    rig: Rig
+    text: str
+    out: Path
+    plan: Path | None
+    seed: int
+    emulators: EmulatorOptions
 
 
 def session(
@@ -47,20 +159,10 @@ def session(
     out: Path = Path("session"),
     plan: Path | None = None,
     seed: int = 1,
-    continue_: Annotated[bool, Parameter(name="--continue")] = False,
-    stands: bool = False,
-    place: Annotated[tuple[float, float, float, float] | None, Parameter(negative="")] = None,
-    accuracy_um: float = ACCURACY_UM,
-    yes: bool = False,
-    live: bool = False,
-    live_host: str = PageAsked.host,
-    live_port: int = PageAsked.port,
-    live_token: str | None = PageAsked.token,
-    control: str | None = None,
-    time_scale: float = 1.0,
-    postures: int = GuidedOptions.postures,
-    lengths: int = GuidedOptions.lengths,
-    verify: bool = False,
+    robot: Annotated[RobotOptions, Parameter(name="*")] = RobotOptions(),
+    page: Annotated[PageOptions, Parameter(name="*")] = PageOptions(),
+    emulators: Annotated[EmulatorOptions, Parameter(name="*")] = EmulatorOptions(),
+    hand: Annotated[HandOptions, Parameter(name="*")] = HandOptions(),
 ) -> None:
     """Run a session: check, plan, align, centre, measure, report.
 
@@ -82,85 +184,72 @@ def session(
         A plan of joint poses, as `calibeam diagnose --plan-out` writes it: these are taken, and no others.
     seed
         Of the poses of a session without a plan.
-    continue_
-        Go on with the session in this folder, in a further recording beside the first.
-    stands
-        With --continue: the fixture has not been touched since. Else it is asked, or counts as moved.
-    place
-        A further place of the fixture: X Y Z of PSD 1 in the base (m), and its turn about z (degrees).
-    accuracy_um
-        Predicted error of the beam in free space that is good enough: how many more poses it takes is told.
-    yes
-        Ask nothing: the cell is clear, the arm may move.
-    live
-        Also a page for browsers, with spots, arm, devices and a STOP (no safety stop).
-    live_host
-        Address of the page; anywhere but on loopback it wants a token.
-    live_port
-        Port of the page; 0 takes any that is free.
-    live_token
-        Word without which the page is not shown; made at random where one is needed.
-    control
-        Side channel of emulators, HOST:PORT as `calibeam emulate` prints it: the emulated fixture, or hand, is moved
-        through it, instead of asking a person.
-    time_scale
-        Of the emulators, if it is not 1.
-    postures
-        Of a measuring arm: readings in each cone.
-    lengths
-        Of a measuring arm: how often each bar position is measured.
-    verify
-        Of a measuring arm: take what `calibeam verify` judges by, instead of what the arm is identified from.
+    robot
+        Of an arm that a controller moves.
+    page
+        Of the live page.
+    emulators
+        Of emulated devices.
+    hand
+        Of a measuring arm.
 
     """
-    console = Console()
-    loaded, text = load_rig(rig), rig_text(rig)
-    _check_verify(loaded, plan, verify=verify)
-    page = PageAsked(live, live_host, live_port, live_token)
-    _check_meant(
-        loaded,
-        of_robot={
-            "--continue": continue_,
-            "--stands": stands,
-            "--place": place is not None,
-            "--accuracy-um": accuracy_um != ACCURACY_UM,
-            "--yes": yes,
-            "--live": page != PageAsked(),
-        },
-        of_hand={"--postures": postures != GuidedOptions.postures, "--lengths": lengths != GuidedOptions.lengths},
-    )
-    if is_guided(loaded):
-        options = GuidedOptions(postures, lengths, seed)
-        return _guided(loaded, text, out, plan, options, control, time_scale, console, verify=verify)
-    check_session(loaded)
-    poses = None if plan is None else read_pose_plan(plan, loaded)
-    asking = at_terminal()
+    wanted = Wanted(load_rig(rig), rig_text(rig), out, plan, seed, emulators)
+    _check_verify(wanted.rig, plan, verify=hand.verify)
+    of_robot = {**robot.given, "--live": page != PageOptions()}
+    if is_guided(wanted.rig):
+        _refuse_ignored(wanted.rig, of_robot, "a rig that a controller moves, and a hand moves this one")
+        _session_by_hand(wanted, hand, Console())
+    else:
+        _refuse_ignored(wanted.rig, hand.given, "a measuring arm")
+        _session_of_robot(wanted, robot, page, Console())
+
+
+def _session_of_robot(wanted: Wanted, robot: RobotOptions, page: PageOptions, console: Console) -> None:
+    """The session of an arm that a controller moves."""
+    check_session(wanted.rig)
+    poses = None if wanted.plan is None else read_pose_plan(wanted.plan, wanted.rig)
+    asking, addresses = at_terminal(), addresses_of(wanted.rig, hurry=wanted.emulators.time_scale)
+    pose_text = "" if wanted.plan is None else wanted.plan.read_text(encoding="utf-8")
+    control = wanted.emulators.address()
     job = Job(
-        loaded,
-        text,
-        out,
-        addresses_of(loaded, hurry=time_scale),
-        PlanOptions(seed=seed),
+        wanted.rig,
+        wanted.text,
+        wanted.out,
+        addresses,
+        PlanOptions(seed=wanted.seed),
         poses,
-        "" if plan is None else plan.read_text(encoding="utf-8"),
-        accuracy_um * 1e-6,
-        None if control is None else _through(*_host_and_port(control)),
+        pose_text,
+        robot.accuracy_um * 1e-6,
+        None if control is None else _through(*control),
     )
-    earlier = _earlier(job, go_on=continue_, place=place)
-    agrees = yes or (control is not None and asking is None and moves_nothing_real(job.addresses.robot))
-    with _page(loaded, page, console) as feed:
-        run_session(job, console, earlier, feed, asking=asking, agrees=agrees, stands=stands)
-    return None
+    earlier = _earlier(job, go_on=robot.continue_, place=robot.place)
+    agrees = robot.yes or (control is not None and asking is None and moves_nothing_real(job.addresses.robot))
+    with _page(wanted.rig, page, console) as feed:
+        run_session(job, console, earlier, feed, asking=asking, agrees=agrees, stands=robot.stands)
+
+
+def _session_by_hand(wanted: Wanted, hand: HandOptions, console: Console) -> None:
+    """The session of a measuring arm: a person moves the probe, or an emulated hand."""
+    rig, plan, verify = wanted.rig, wanted.plan, hand.verify
+    options = GuidedOptions(hand.postures, hand.lengths, wanted.seed)
+    poses = None if plan is None else read_pose_plan(plan, rig)
+    visits = plan_of(rig, options, verify=verify) if poses is None else planned_visits(poses, rig)
+    emulated = wanted.emulators.control is not None
+    encoders = encoder_address(rig, hurry=wanted.emulators.time_scale, emulated=emulated)
+    control = wanted.emulators.address()
+    ask = None if control is None else partial(_asked, *control)
+    run_guided(rig, wanted.text, wanted.out, encoders, visits, console, seed=wanted.seed, ask=ask, conclude=not verify)
 
 
 @contextmanager
-def _page(rig: Rig, asked: PageAsked, console: Console) -> Generator[Feed]:
-    if not asked.wanted:
+def _page(rig: Rig, asked: PageOptions, console: Console) -> Generator[Feed]:
+    if not asked.live:
         yield SILENT
         return
     from calibeam.live.page import PageAddress, live_page  # the server takes half a second to load
 
-    with live_page(rig, SystemClock(), PageAddress(asked.host, asked.port, asked.token)) as page:
+    with live_page(rig, SystemClock(), PageAddress(asked.live_host, asked.live_port, asked.live_token)) as page:
         console.print(f"live page: {page.url}", highlight=False, markup=False, soft_wrap=True)
         yield page.feed
 
@@ -180,26 +269,6 @@ def _earlier(job: Job, *, go_on: bool, place: tuple[float, float, float, float] 
     return with_place(earlier, new_place(with_places(job.rig, job.text, earlier.added)[0], place))
 
 
-def _guided(
-    rig: Rig,
-    text: str,
-    out: Path,
-    plan: Path | None,
-    options: GuidedOptions,
-    control: str | None,
-    time_scale: float,
-    console: Console,
-    *,
-    verify: bool,
-) -> None:
-    """The session of a measuring arm: a person moves the probe, or an emulated hand."""
-    poses = None if plan is None else read_pose_plan(plan, rig)
-    visits = plan_of(rig, options, verify=verify) if poses is None else planned_visits(poses, rig)
-    address = encoder_address(rig, hurry=time_scale, emulated=control is not None)
-    ask = None if control is None else partial(_asked, *_host_and_port(control))
-    run_guided(rig, text, out, address, visits, console, seed=options.seed, ask=ask, conclude=not verify)
-
-
 def _check_verify(rig: Rig, plan: Path | None, *, verify: bool) -> None:
     """AcquisitionError where --verify cannot be meant."""
     if verify and not is_guided(rig):
@@ -211,13 +280,11 @@ def _check_verify(rig: Rig, plan: Path | None, *, verify: bool) -> None:
         )
 
 
-def _check_meant(rig: Rig, of_robot: Mapping[str, bool], of_hand: Mapping[str, bool]) -> None:
+def _refuse_ignored(rig: Rig, given: Mapping[str, bool], kind: str) -> None:
     """AcquisitionError where an option was given that would be ignored for this kind of rig."""
-    by_hand = is_guided(rig)
-    given = [name for name, is_given in (of_robot if by_hand else of_hand).items() if is_given]
-    if given:
-        kind = "a rig that a controller moves, and a hand moves this one" if by_hand else "a measuring arm"
-        raise AcquisitionError(f"rig {rig.name}: {', '.join(given)}: meant for {kind}; leave out what is named")
+    names = [name for name, is_given in given.items() if is_given]
+    if names:
+        raise AcquisitionError(f"rig {rig.name}: {', '.join(names)}: meant for {kind}; leave out what is named")
 
 
 def _asked(host: str, port: int, verb: str, /, **arguments: Any) -> Any:

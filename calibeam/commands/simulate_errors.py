@@ -1,7 +1,7 @@
 """`calibeam simulate-errors`: what errors of an arm make of its probe: budget, ranking, worst postures."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import msgspec
 from cyclopts import Parameter, validators
@@ -16,6 +16,9 @@ from calibeam.software import SOFTWARE
 from calibrate.error_simulation.machine import Machine, identified_machine, machine_of
 from calibrate.error_simulation.plan import NOTHING_STATED, read_error_plan
 from calibrate.error_simulation.stated import sources_of
+
+if TYPE_CHECKING:
+    from calibrate.error_simulation.simulate import Simulation
 
 Count = Annotated[int, Parameter(validator=validators.Number(gte=1))]
 
@@ -81,11 +84,26 @@ def simulate_errors_command(
     else:
         print_error_simulation(console, found)
     if out is not None:
-        from calibeam.error_files import write_simulation
-
         files = write_simulation(out, found)
         if not json_:
             console.print(f"written: {', '.join(map(str, files))}", markup=False, highlight=False, soft_wrap=True)
+
+
+def write_simulation(folder: Path, simulation: "Simulation") -> tuple[Path, ...]:
+    """errors.json, errors.html, and every figure as an SVG of its own. DataError, OSError where that cannot be."""
+    from calibeam.motion.figures import write_figure  # matplotlib takes a second to load
+    from calibrate.error_simulation.record import write_record
+    from calibrate.report.error_simulation.figures import PICTURES
+    from calibrate.report.error_simulation.page import write_page_of
+
+    folder.mkdir(parents=True, exist_ok=True)
+    write_record(folder / "errors.json", simulation, SOFTWARE)
+    page = write_page_of(folder / "errors.html", simulation, SOFTWARE)
+    figures: list[Path] = []
+    for one in PICTURES:
+        figures.append(folder / f"errors-{one.name}.svg")
+        write_figure(figures[-1], one.width_in, one.height_in, one.painter(simulation))
+    return (folder / "errors.json", page, *figures)
 
 
 def _machine(path: Path) -> tuple[Machine, Rig, bool]:
