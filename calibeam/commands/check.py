@@ -1,7 +1,4 @@
-"""`calibeam check`: every device of a rig, or what is in a recording.
-
-`calibeam check` of a recording, or of a folder of log segments: what is in it, and what is wrong with it.
-"""
+"""`calibeam check`: every device of a rig, or what is in a recording or a folder of log segments, and what is wrong."""
 
 import json
 from dataclasses import asdict

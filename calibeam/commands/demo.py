@@ -1,6 +1,6 @@
 """`calibeam demo`: the whole job on emulated devices, and then the truth that was concealed from it.
 
-Compares identified zeros with the concealed truth, and prints both. The truth is opened only after the fit.
+The truth is opened only after the fit.
 """
 
 import threading

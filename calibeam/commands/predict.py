@@ -1,6 +1,6 @@
 """`calibeam predict`: what a model says the instruments should read at given samples, with the physics it carries.
 
-predicted.csv: one row per sample, the shortest text of every number, nothing where there is none.
+predicted.csv has one row per sample, the shortest text of every number, nothing where there is none.
 """
 
 import csv

@@ -1,8 +1,7 @@
 """`calibeam report`: (re)write the report of a recording, alone or against an earlier calibration of the same arm.
 
-An earlier calibration, from whatever is left of it: a model.json, the folder of a session, or a recording.
-
-The first screen of a report for scripts: what `calibeam report --json` prints, version 1 (docs/report.md).
+The earlier calibration is a model.json, the folder of a session, or a recording. What --json prints is version 1 of
+docs/report.md.
 """
 
 from pathlib import Path

@@ -58,7 +58,7 @@ class RobotOptions:
 
     @property
     def given(self) -> dict[str, bool]:
-        """Which of them are not as they are without a word."""
+        """Which of them were given."""
         return {
             "--continue": self.continue_,
             "--stands": self.stands,
@@ -134,7 +134,7 @@ class HandOptions:
 
     @property
     def given(self) -> dict[str, bool]:
-        """Which of them are not as they are without a word; --verify has a refusal of its own."""
+        """Which of them were given; --verify has a refusal of its own."""
         return {
             "--postures": self.postures != GuidedOptions.postures,
             "--lengths": self.lengths != GuidedOptions.lengths,

@@ -1,6 +1,6 @@
-"""The driver of the encoders that a rig file names, for a session and for a log.
+"""Encoders of a rig: their driver, for a session and for a log, and what a second of their samples shows.
 
-What a second of a device's samples tells of it: how fast and how noisy they are, and what is wrong with them.
+Rate, noise and faults are judged for the other devices, too, by the check of the devices and by the live page.
 """
 
 import math

@@ -1,6 +1,6 @@
-"""A session that is recorded: runs the plan, and whatever happens the arm is stopped and the file is whole.
+"""A session that is recorded: whatever happens, the arm is stopped and the file is whole.
 
-Samples and events of a session go into the recording.
+The journal writes samples and events of the session into the recording.
 """
 
 import signal

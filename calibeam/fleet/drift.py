@@ -11,8 +11,6 @@ Student's law gets the sum of both.
 
 Many robots times many joints are many chances: p-values are held against each other by Holm's procedure (Scand. J.
 Stat. 6, 1979), so that of a hundred fleets in which nothing drifts at most five show any drift at all.
-
-Zeros of one joint of one robot over time, gathered from the rows of a fleet.
 """
 
 from collections.abc import Iterable, Sequence
@@ -32,7 +30,7 @@ YEAR_S = 365.25 * 86400.0
 
 @dataclass(frozen=True)
 class Series:
-    """In the order of time."""
+    """Zeros of one joint of one robot, gathered from the rows of a fleet, in the order of time."""
 
     robot: str
     joint: int

@@ -1,6 +1,6 @@
-"""One recording of a fleet: what is kept of it, small enough for thousands.
+"""A recording of a fleet as a task for a worker and as a row of the table.
 
-What a worker is asked to do, and what is answered when it cannot: small, frozen, made of file names.
+Both are frozen and small enough for thousands of recordings.
 """
 
 import signal

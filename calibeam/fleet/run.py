@@ -1,6 +1,6 @@
-"""A run over a fleet: what is new or changed is judged by workers, every row is kept as it comes, then all are told.
+"""A run over a fleet: workers read what is new or changed, and every row is kept as it comes.
 
-What need not be done again: the same content, by the same program, at least as thoroughly.
+A recording is not read again if its content and the program are the same and it was diagnosed as thoroughly.
 """
 
 from collections.abc import Callable, Iterable, Sequence, Set

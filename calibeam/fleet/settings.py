@@ -1,7 +1,4 @@
-"""Names in a folder of results.
-
-Which workers a fleet is given to.
-"""
+"""What a run over a fleet is given: its workers, and the names of the files that it leaves."""
 
 import os
 from dataclasses import dataclass, field

@@ -1,6 +1,6 @@
-"""A fleet in short: counts, drifts, shared causes, failures; what terminal, page and --json all say.
+"""A fleet in short: counts, drifts, shared causes, failures, for the terminal, the page and --json.
 
-Which causes several robots share: one robot's trouble is its own, that of many comes from a part or a method.
+A cause that one robot shows is its own; a cause that several robots share comes from a part or a method.
 """
 
 from collections.abc import Iterable

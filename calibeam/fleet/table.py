@@ -1,8 +1,7 @@
-"""fleet.parquet: one row a recording, one column a number; reads back to the same rows.
+"""The rows of a fleet on disk: fleet.parquet, and a journal while a run is not over.
 
-Rows on the disk as they come, one JSON line each: whatever ends a run, what was done is done.
-
-At the end, and before the next run begins, the lines are merged into the table. One run at a time has the folder.
+The journal is one JSON line a row, so that a run that is killed loses nothing. At the end, and before the next run
+begins, its lines are merged into the table. One run at a time has the folder.
 """
 
 import fcntl

@@ -1,11 +1,8 @@
 """The process that reads recordings for one worker: a task a line on standard input, a row a line on standard output.
 
 Whatever a recording does to it, to crash, to hang, to eat all memory, does it to this process alone. It ends with the
-worker (end of input, even in the middle of a task), and when nothing was asked for a while.
-
-One recording of a fleet: read, identified, diagnosed where asked; whatever is wrong with it becomes its row.
-
-What calibration changes in free space: how far the arm as drawn puts the target from where the identified has it.
+worker (end of input, even in the middle of a task), and when nothing was asked for a while. Each recording is read,
+identified, and diagnosed where asked; what is wrong with it stands in its row.
 """
 
 import faulthandler

@@ -1,8 +1,6 @@
-"""The emulated hand behind the side channel, as a guide: it does what a person would be asked to do.
+"""The emulated hand as a guide: it does what a person would be asked to do, over the side channel or without wires.
 
-A guided session on the emulated hand without wires, its own time instead of anybody's clock: for benchmarks.
-
-What the wires add, quantisation of the encoders, is done here too; nothing is ever lost or late.
+Without wires it has its own time, for benchmarks. Quantisation of the encoders is included; nothing is lost or late.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,6 +1,6 @@
-"""A whole guided session: connect, guide, record, and conclude.
+"""A whole guided session: connect, guide, record, write the results.
 
-What a person at the arm sees: where to put the probe next, each joint's way, coverage, repeatability so far.
+A person at the arm sees where to put the probe next, each joint's way, coverage, and repeatability so far.
 """
 
 from collections.abc import Callable, Generator

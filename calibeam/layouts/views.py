@@ -1,7 +1,4 @@
-"""What a recording shows to viewers without set-up: its thinned topics and their fields.
-
-Which curves stand together, whatever the viewer: the faces, spots, joints, motion, health.
-"""
+"""What viewers show of a recording without set-up: its thinned topics, and which curves stand together."""
 
 from dataclasses import dataclass
 from pathlib import Path

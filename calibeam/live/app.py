@@ -1,6 +1,6 @@
 """The web application: the page as static files, one websocket that it listens to, and STOP.
 
-The beat of the page: the newest 30 times a second, how things stand 4 times, and nothing while nobody looks.
+While a page is open it gets the newest picture 30 times a second and the state 4 times a second.
 """
 
 import asyncio

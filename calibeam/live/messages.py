@@ -1,8 +1,7 @@
-"""What goes to a page, as JSON: once what the rig is, a few times a second how things stand, 30 times what is now.
+"""What goes to a page, as JSON: once the rig, a few times a second the state, 30 times a second the picture.
 
-Ages instead of times of day: a phone's clock is not this machine's.
-
-The two detector faces as they are now: where the light is, how much of it, and in words what is wrong with it.
+Ages instead of times of day: a phone's clock is not this machine's. A face is described by where the light is, how
+much of it there is, and what is wrong with it.
 """
 
 from math import isfinite

@@ -1,8 +1,7 @@
 """STOP: from any thread, in every state, as often as it is pressed; and what became of it.
 
-Where the rig says so, a session ends like by STOP when no page answers any more: docs/decisions/0028.
-
-In a thread of its own, so that a server that hangs is noticed as a page that is gone.
+Where the rig asks for it, a session also ends when no page answers any more (docs/decisions/0028). That is watched in
+a thread of its own, so that a server that hangs is noticed as a page that does not answer.
 """
 
 import threading

@@ -1,6 +1,4 @@
-"""One motion by hand: planned, drawn, shown to the person, driven when they agree.
-
-Ctrl-C and words at the keyboard while the arm moves: pause, hold, abort; resume, stop, halt.
+"""One motion by hand: planned, drawn, shown to the person, driven when they agree; stopped by Ctrl-C and keys.
 
 First Ctrl-C: rest at the next place, or brake along the path where that is further than a second. Again: brake, where
 it does not brake yet, then give up. SIGTERM and a closed terminal give up at once. While the motion is held a line is

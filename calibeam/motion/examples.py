@@ -1,11 +1,10 @@
 """The examples of the source on a controller: joint and straight motion, a blend, a belt, two pins with their teaching.
 
-Each plans, streams, and keeps what the controller said beside what was planned. The cell of the examples is this
+Each plans, streams, and keeps what the controller reported beside what was planned. The cell of the examples is this
 file's; a rig on site has its own tasks.
 
-By how much an arm follows its set-points: what was sent beside what was heard, both by the host's clock.
-
-heard(t) = sent(t) - lag d(sent)/dt, the first term of Taylor's series: good while the lag is short against the blends.
+The lag of an arm behind its set-points, both by the host's clock: reported(t) = sent(t) - lag d(sent)/dt, the first
+term of Taylor's series, good while the lag is short against the blends.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,9 +1,4 @@
-"""What a person checks the examples by: planned and as the controller said, drawn on top of each other.
-
-The cell in a drawing of motion, and the colours of such drawings on white.
-
-Which plots an example leaves, and the figures beside them.
-"""
+"""Drawings of motion: planned and reported positions on top of each other, and the cell around them."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path

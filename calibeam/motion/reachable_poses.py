@@ -2,9 +2,9 @@
 
 Before two detectors: random spots, stand-offs and rolls, by every branch of the inverse kinematics. For a device that
 measures positions: joint angles drawn evenly. Collisions are those of calibeam's motion (acquisition/motion/cell.py)
-and the table of a session (acquisition/aiming/reach.py); between its own links a cell of boxes knows none.
+and the table of a session (acquisition/aiming/reach.py); a cell of boxes knows no collision between the arm's links.
 
-Places where a fixture could stand: on rings about the base, at some heights, turned towards the arm as it is now.
+The fixture may also stand at further stations: on rings about the base, at some heights, turned towards the arm.
 """
 
 from collections.abc import Callable

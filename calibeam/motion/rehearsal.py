@@ -6,7 +6,6 @@ the true ways differ by what zeros of degrees do; each passes the same gate agai
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,16 +100,6 @@ def rehearse(rig: Rig, options: PlanOptions, plan: PosePlan | None = None) -> Re
                 said = RehearsedPose(stop.placement, stop.name, stop.q_rad, str(why))
         stops.append(said)
     return Rehearsal(arm, home_rad, tuple(stops), tuple(paper.ways), tuple(places))
-
-
-def draw_session(rig: Rig, path: Path, options: PlanOptions, plan: PosePlan | None = None) -> str:
-    """Leaves the drawing, an SVG; one sentence for a person: how many poses, what cannot be had, where it is drawn."""
-    from calibeam.motion import figures, rehearsal_figure  # matplotlib takes a second to load
-
-    rehearsed = rehearse(rig, options, plan)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figures.write_figure(path, 13.0, 5.0, lambda figure: rehearsal_figure.draw_rehearsal(figure, rehearsed, rig))
-    return f"{rehearsed.says}; drawn in {path}"
 
 
 def _aimed(rig: Rig, options: PlanOptions, paper: PaperArm) -> Iterator[RehearsedPose]:

@@ -1,20 +1,32 @@
 """The drawing of a session on paper: the laser's ways from above and from the side, the cell, the joints' ranges."""
 
+from pathlib import Path
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from acquisition.plan import PlanOptions
+from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig_schema import Rig
-from calibeam.motion.figures import draw_cell
+from calibeam.motion.figures import draw_cell, write_figure
 from calibeam.motion.gate_of_rig import cell_of
-from calibeam.motion.rehearsal import Rehearsal
+from calibeam.motion.rehearsal import Rehearsal, rehearse
 from calibrate.report.tones import Tone, tone_of
 
 Floats = NDArray[np.float64]
 
 WAY_POINTS = 40  # of a way by joints, between two poses
 MARGIN_M = 0.4  # round what is drawn; boxes may go on beyond it
+
+
+def draw_session(rig: Rig, path: Path, options: PlanOptions, plan: PosePlan | None = None) -> str:
+    """Leaves the drawing, an SVG; one sentence for a person: how many poses, what cannot be had, where it is drawn."""
+    rehearsed = rehearse(rig, options, plan)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_figure(path, 13.0, 5.0, lambda figure: draw_rehearsal(figure, rehearsed, rig))
+    return f"{rehearsed.says}; drawn in {path}"
 
 
 def draw_rehearsal(figure: Figure, rehearsed: Rehearsal, rig: Rig) -> None:

@@ -1,10 +1,6 @@
-"""A refitted model as a person reads it in a terminal: what is left of the readings, and each effect with its size.
+"""An identified arm in a terminal: gross errors, alarms, rank, numbers with their uncertainty, proofs, verdict.
 
-The first sentence of a report as the last words in a terminal, so that both say the same.
-
-Proofs of an identification as lines for a terminal.
-
-An identified arm as a person reads it in a terminal: blunders, alarms, rank, numbers with their doubt, verdict.
+The verdict is the first sentence of the report. A model that was refitted by --model is printed here, too.
 """
 
 from collections.abc import Callable, Iterator

@@ -1,7 +1,4 @@
-"""A comparison as a person reads it in a terminal.
-
-A diagnosis as a person reads it in a terminal: verdict, causes with their size, proof, doubt, what to do next.
-"""
+"""A diagnosis or a comparison in a terminal: verdict, causes with their size, proof, uncertainty, what to do next."""
 
 from collections.abc import Iterator
 

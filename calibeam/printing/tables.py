@@ -1,7 +1,4 @@
-"""An error simulation as a person reads it in a terminal.
-
-A tool found by single axes as a person reads it in a terminal: the verdict first, then values with uncertainty.
-"""
+"""Tools found by single axes, and error simulations, in a terminal: verdict first, then values with uncertainty."""
 
 from collections.abc import Iterator
 

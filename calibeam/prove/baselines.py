@@ -1,18 +1,6 @@
-"""All rivals, one line each, and which of them are installed: none is needed to run, only to compare.
+"""Other methods that a diagnosis is compared with: they learn what geometry alone leaves, and are asked where and why.
 
-What a rival method is: it learns what geometry alone leaves, and is asked where and why.
-
-What a learner without ports is given: every number of a sample that the diagnosis has, too. None is the answer.
-
-Gradient-boosted trees: Friedman, Annals of Statistics 29(5), 2001. scikit-learn, GradientBoostingRegressor.
-
-Gaussian process over all features, one length for all, noise found with it: Rasmussen, Williams, 2006, ch. 2, 5.
-
-scikit-learn, GaussianProcessRegressor.
-
-Sparse regression over a library of functions, without ports: Brunton, Proctor, Kutz, PNAS 113(15), 2016.
-
-PySINDy's own sequentially thresholded least squares over features and all their products of two.
+They get every number of a sample that the diagnosis has. None of them is needed to run, only to compare.
 """
 
 import warnings
@@ -31,14 +19,14 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Learnt:
-    """What it predicts of unseen samples, and what it would tell a person."""
+    """What a method predicts of unseen samples, and what it would report to a person."""
 
     predicted: Floats  # (sample, channel) in sigmas
     says: str
 
 
 class Method(Protocol):
-    """A rival: one file, one line in methods.METHODS."""
+    """A method: one class, one line in METHODS."""
 
     @property
     def name(self) -> str: ...
@@ -93,7 +81,10 @@ TOLD = 3  # features
 
 
 class GradientBoosting:
-    """Says which features it used most."""
+    """Reports which features it used most.
+
+    Friedman, Annals of Statistics 29(5), 2001. scikit-learn, GradientBoostingRegressor.
+    """
 
     name = "gradient boosting"
     needs = "sklearn"
@@ -113,7 +104,10 @@ class GradientBoosting:
 
 
 class GaussianProcess:
-    """Smooth in everything at once."""
+    """Smooth in everything at once: all features, one length for all, noise found with it.
+
+    Rasmussen, Williams, 2006, ch. 2, 5. scikit-learn, GaussianProcessRegressor.
+    """
 
     name = "Gaussian process"
     needs = "sklearn"
@@ -138,7 +132,11 @@ INNER = 5
 
 
 class SparseRegression:
-    """Says which functions it kept."""
+    """A library of functions, without ports; reports which functions it kept.
+
+    Brunton, Proctor, Kutz, PNAS 113(15), 2016. PySINDy's own sequentially thresholded least squares over features and
+    all their products of two.
+    """
 
     name = "sparse regression (PySINDy)"
     needs = "pysindy"

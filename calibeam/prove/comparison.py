@@ -1,10 +1,8 @@
-"""Oracle and rivals on the unseen samples of one revealed case: who removes how much, and what do they say?
+"""The oracle and other methods on the unseen samples of a revealed case: who removes how much, and what do they report?
 
-The oracle: geometry and exactly the terms of the catalogue that are true, refitted. What a perfect search would get.
-
-It is told places and physics by the opened seal; sizes, and which variant of a term fits best, it finds from the data.
-
-Asks the oracle and other methods about some of the cases, in worker processes, after the seals are open.
+The oracle refits geometry and exactly the true terms of the catalogue: what a perfect search would get. It gets places
+and physics from the opened seal; sizes, and which variant of a term fits best, it finds from the data. Some of the
+cases are compared, in worker processes, after the seals are open.
 """
 
 from collections.abc import Callable, Sequence

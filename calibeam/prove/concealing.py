@@ -1,11 +1,8 @@
 """Conceals cases in worker processes: recordings for the diagnosis, seals for the end, hashes for the public.
 
-Concealed cases with streams: a fault of motion, stamps or second encoders, in a recording as a session leaves it.
-
-A concealed session that goes the whole way: emulated PSD box, CAN encoders and controller, recorded as on site.
-
-The emulators get what is hidden over their standard input, never through a file; the recording holds the rig as it is
-believed, and nothing of the world.
+A case with streams has a fault of motion, stamps or second encoders, in a recording as a session leaves it. A case on
+wires goes the whole way: emulated PSD box, CAN encoders and controller, recorded as on site. The emulators get what is
+hidden over their standard input, never through a file; the recording holds the assumed rig and nothing of the world.
 """
 
 import json

@@ -1,6 +1,6 @@
 """`python -m calibeam.prove.misses proof.json`: every case in which something went wrong, one line each.
 
-Each case in words: what was hidden, what was said, what of that is wrong.
+Also each case in words: what was hidden, what was reported, what of that is wrong.
 """
 
 import sys
@@ -9,9 +9,7 @@ from pathlib import Path
 
 import msgspec
 
-from calibeam.prove.record import UNKNOWN, CaseScore, ProofFile
-
-PLAIN = 0.6  # effect over noise from which a cause has to be found and named
+from calibeam.prove.record import PLAIN, UNKNOWN, CaseScore, ProofFile
 
 
 def hidden_words(case: CaseScore) -> str:

@@ -1,9 +1,4 @@
-"""proof.html: the sums, the confusion matrix, and each case's story: what was hidden, what was said.
-
-A proof in five sentences: what was found, what was said for nothing, and what it is worth.
-
-The confusion matrix: what was hidden against what was said first, one row a kind of physics.
-"""
+"""proof.html: five sentences, the sums, the confusion matrix, and each case: what was hidden, what was reported."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -15,10 +10,9 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from calibeam.prove.misses import faults, hidden_briefly, hidden_words, said_words
-from calibeam.prove.record import UNKNOWN, CaseScore, ProofFile
+from calibeam.prove.record import PLAIN, UNKNOWN, CaseScore, ProofFile
 from calibeam.prove.tally import (
     NONE,
-    PLAIN,
     ProofFigure,
     TallyLine,
     at_once,
@@ -88,7 +82,6 @@ def _faulty(cases: Sequence[CaseScore]) -> str:
     return f"{wrong} of {len(cases)} cases hold something that a strict reader would not let pass; they stand first."
 
 
-PLAIN_ENR = 0.6  # effect over noise
 SINGLE = ("one", "disturbed", "outside", "streams")
 NOTHING = "nothing"
 FAILED = "failed"
@@ -102,7 +95,7 @@ def confusion(cases: Sequence[CaseScore]) -> tuple[list[str], list[str], NDArray
     """Words hidden, words said, counts. Of cases with none or one cause; several at once have no single answer."""
     pairs: Counter[tuple[str, str]] = Counter()
     for case in cases:
-        if case.kind in SINGLE and case.defects and case.defects[0].enr >= PLAIN_ENR:
+        if case.kind in SINGLE and case.defects and case.defects[0].enr >= PLAIN:
             pairs[case.defects[0].physics, _said(case)] += 1
         elif not case.defects:
             pairs[NOTHING, _said(case)] += 1

@@ -9,9 +9,8 @@ from pathlib import Path
 
 import msgspec
 
-from calibeam.prove.record import CaseScore, ProofFile
+from calibeam.prove.record import PLAIN, CaseScore, ProofFile
 from calibeam.prove.tally import (
-    PLAIN,
     TallyLine,
     at_once,
     by_enr,

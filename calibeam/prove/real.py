@@ -1,15 +1,9 @@
-"""Real recordings: what is found, what remains, and what is inferred of columns that were hidden on purpose.
+"""Real recordings: what is found, what remains, and what is inferred of columns that were hidden on purpose; real.html.
 
-A column hidden: what the diagnosis infers of a cause it was not told, against the column that we kept.
-
-A cause that is not recorded can only be met as something that changes with time; if the inferred course over time is
-that of the hidden column, the diagnosis saw the cause through the arm.
-
-A joint column hidden: the model of all other poses has to say, from what the instrument saw, where the joint stood.
-
-The column is known to us, so here truth is real and not simulated.
-
-real.html: of each real recording what was found, what remains, and what was inferred of columns kept back.
+The hidden column is known to us, so here truth is real and not simulated. A cause that is not recorded can only be met
+as something that changes with time; if the inferred course over time is that of the hidden column, the diagnosis saw
+the cause through the arm. Where a joint column is hidden, the model of all other poses has to find where that joint
+stood from what the instrument measured.
 """
 
 from collections.abc import Callable, Mapping, Sequence

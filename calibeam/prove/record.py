@@ -1,6 +1,6 @@
-"""proof.json: what was concealed, what was said, and how the two compare. docs/proof.md explains every key.
+"""proof.json: what was concealed, what was reported, and how the two compare. docs/proof.md explains every key.
 
-The truth of a case as the seal holds it: the part that a score needs, with types.
+Also the truth of a case as the seal holds it: the part that a score needs, with types.
 """
 
 from collections.abc import Sequence
@@ -11,6 +11,7 @@ import msgspec
 SCHEMA = 1
 UNKNOWN = "unknown"
 DIAGNOSIS = "diagnosis"  # among the methods that are compared
+PLAIN = 0.6  # effect over noise from which a cause has to be found and named
 CONFIDENT = 0.9  # a name with less is a suspicion, and said as one
 
 

@@ -1,15 +1,13 @@
-"""Scores one case: what was said against what was hidden.
+"""Scores one case: what was reported against what was hidden.
 
-Places that no measurement of these instruments can tell apart: each rule with its reason. Everything else is wrong.
+Places that no measurement of these instruments can tell apart count as one; each such rule has its reason. The rules
+are few on purpose: where a diagnosis may say "or", it has to name the alternative itself.
 
-Short on purpose: where a diagnosis may say "or", it has to say so itself, as a rival.
+The noise that no model can explain is known, because the concealing side keeps the exact readings.
 
-What no model can explain: the noise that the concealing side really added, known because exact readings are.
-
-Error in free space against the world's truth: where a model puts the tool, and where it truly is.
-
-Where the base frame stands is nobody's error, so the best rigid motion between both is taken out first. A beam has no
-point that is its own: its error is the distance of the true beam's points, at working distances, from the said line.
+Error in free space is where the model puts the tool against where it truly is. Where the base frame stands is nobody's
+error, so the best rigid motion between both is taken out first. A beam has no point that is its own: its error is the
+distance of the true beam's points, at working distances, from the reported line.
 """
 
 import re

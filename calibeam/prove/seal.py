@@ -3,7 +3,7 @@
 The key never leaves the memory of the process that reveals, so that no other process can read the truth, whatever
 folder it finds. Stream cipher: truth XOR SHAKE-256(key), FIPS 202, section 6.3; each key is used once.
 
-Where a proof keeps what: recordings and answers on one side, seals on the other.
+The layout of a proof keeps recordings and answers on one side, seals on the other.
 """
 
 import hashlib

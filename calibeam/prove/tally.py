@@ -1,8 +1,6 @@
-"""Sums of a proof: shares by kind of case, by effect over noise, by instrument, by effect.
+"""Sums of a proof: shares by kind of case, by effect over noise, by instrument, by effect; error in free space.
 
-Shares with their uncertainty: Wilson, J. Am. Stat. Assoc. 22, 1927; the level also holds for shares near 0 and 1.
-
-Error in free space against the world's truth, summed up: geometry alone, with what was found, with what is true.
+Shares have the interval of Wilson, J. Am. Stat. Assoc. 22, 1927, whose level also holds near 0 and 1.
 """
 
 import math
@@ -13,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.stats import binomtest
 
-from calibeam.prove.record import DIAGNOSIS, UNKNOWN, CaseScore, DefectScore
+from calibeam.prove.record import DIAGNOSIS, PLAIN, UNKNOWN, CaseScore, DefectScore
 
 LEVEL = 0.95
 NO_BREAK = "\u00a0"
@@ -102,7 +100,6 @@ def _free_space_line(label: str, cases: Sequence[CaseScore]) -> FreeSpaceLine:
 
 
 BINS = (0.0, 0.15, 0.3, 0.6, 1.0, 2.0, 5.0, np.inf)  # effect over noise
-PLAIN = 0.6  # effect over noise from which a cause has to be found and named
 SINGLE = ("one", "disturbed")
 NONE = "-"  # no case of that kind
 

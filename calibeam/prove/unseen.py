@@ -1,10 +1,7 @@
-"""The poses that are asked, and the answer: where two models put the tool there.
+"""Where two models, geometry alone and with the physics that was found, put the tool at poses that nobody measured.
 
-A model that cannot say it leaves its part out.
-
-Where both models, geometry alone and with the physics that was found, put the tool at poses that nobody measured.
-
-What was asked: joint readings and approach, standing, unloaded, all else as at the first sample.
+The poses are asked by a file: joint readings and approach, standing, unloaded, all else as at the first sample. A model
+that has no answer leaves its part of the answer file out.
 """
 
 from collections.abc import Mapping

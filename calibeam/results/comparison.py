@@ -1,6 +1,6 @@
 """Two recordings of one motion, measured and simulated: aligned, compared link by link, their difference diagnosed.
 
-compare.json, version 1: what `calibeam compare` writes; docs/formats.md tells it to other programs.
+compare.json, version 1, is described in docs/formats.md.
 """
 
 from dataclasses import replace

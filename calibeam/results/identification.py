@@ -1,8 +1,6 @@
-"""From any recording to its model and the verdict on it.
+"""From any recording or session folder to a model of the arm and the verdict on it, whatever instruments it holds.
 
-How an identification ends for a script: good, partial, or failed with one sentence that says where and why.
-
-From any recording or session folder to a model of the arm, whatever instruments it holds.
+For a script an identification ends good, partial, or failed with one sentence that says where and why.
 """
 
 from collections.abc import Generator, Sequence

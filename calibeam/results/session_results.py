@@ -1,8 +1,6 @@
-"""What follows a recording: identify, diagnose, write model.json, diagnosis.json, report.html beside it, print.
+"""What follows a recording: identify, diagnose, write model.json, diagnosis.json and report.html beside it, print.
 
 Needs no device any more.
-
-The report of a recording, with its diagnosis and an earlier calibration where there are any.
 """
 
 from collections.abc import Generator

@@ -1,14 +1,12 @@
-"""What a session's samples tell so far, and how many more of its poses make it accurate enough.
+"""What a session's samples determine so far, and how many more of its poses make it accurate enough.
 
 The error is that of the beam in free space, as the covariance of the fit so far predicts it: the same fit, noise and
 target as identification and pose design have (calibrate/identification, calibrate/pose_design), at the values and
-under the noise found so far. What these samples cannot tell is said instead of a number.
+under the noise found so far. For what these samples do not determine the reason is given instead of a number.
 
-Where the arm will about stand at the poses that a session still has to take: what a forecast counts on.
-
-Postures are those of the rig as drawn; a pose out of reach is left out here, and said by the drawing of the plan.
-
-Forecasts made beside the session, while the arm is on its way: the newest samples count, the session never waits.
+Postures still to come are those of the nominal rig; a pose out of reach is left out here and reported by the drawing
+of the plan. Forecasts are made beside the session, while the arm is on its way: the newest samples count, and the
+session never waits.
 """
 
 import threading

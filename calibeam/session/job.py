@@ -1,8 +1,6 @@
-"""What a session on site is asked for, and the part of it that is measured next.
+"""What a session on site is asked for, what earlier parts in the same folder have taken, and what is measured next.
 
-What earlier parts of a session in the same folder have taken, and under which places: read from their recordings.
-
-Places that a session adds to those of its rig file: where the fixture was moved, or stands in addition.
+The fixture may have been moved, or stand at stations beyond those of the rig file: these are added to the plan.
 """
 
 import hashlib

@@ -5,9 +5,8 @@ time, or once paused, it aborts. Where there is no terminal only Ctrl-C is heard
 closed terminal abort. Ctrl-Z pauses: a stopped process would read no device. After a freeze of this program what was
 typed in it is dropped, and SIGCONT resumes nothing.
 
-What is typed, without what a terminal sends for arrows, function keys and the mouse: letters behind an ESC.
-
-Taken letter by letter, an arrow up (ESC [ A) would abort, and F3 (ESC O R) would set a paused arm going.
+What a terminal sends for arrows, function keys and the mouse, letters behind an ESC, is taken out first: letter by
+letter an arrow up (ESC [ A) would abort, and F3 (ESC O R) would set a paused arm going.
 Source of the forms: ECMA-48, 5.4 (control sequences); xterm, "Control Sequences" (ESC O, mouse of X10); Linux
 console_codes(4) (F1 to F5 as ESC [ [ A and so on). A SPACE never belongs to one, so that it always pauses.
 """

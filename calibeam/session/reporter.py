@@ -1,4 +1,4 @@
-"""Tells everybody who listens how a session stands; the owner of what is shown."""
+"""Reports how a session stands to everybody who listens; the owner of what is shown."""
 
 import threading
 from collections.abc import Callable, Mapping, Sequence

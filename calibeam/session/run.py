@@ -183,7 +183,7 @@ class OnSite:
 
     def _plan(self, part: Part) -> None:
         """Gone through and drawn before anything moves."""
-        from calibeam.motion.rehearsal import draw_session  # matplotlib takes a second to load
+        from calibeam.motion.rehearsal_figure import draw_session  # matplotlib takes a second to load
 
         self.teller.step("plan")
         drawing = next_part(self._job.out).with_suffix(".plan.svg")

@@ -1,8 +1,7 @@
-"""What is known of a running session at this moment, and who is told of it.
+"""What is known of a running session at this moment, and who is informed of it.
 
-Time left, from the pace so far: time in which the arm worked, over the poses that it took.
-
-How good the samples of a session are so far: spots, settling, how much of the joints' ranges they have been at.
+Time left comes from the pace so far: time in which the arm worked, over the poses that it took. Quality is that of the
+samples so far: spots, settling, and how much of the joints' ranges they have been at.
 """
 
 from dataclasses import dataclass

@@ -1,12 +1,7 @@
-"""A session in a terminal, for somebody with gloves a step away: what is going on in colour and capitals, few words.
+"""Who follows a session: a terminal, plain lines where there is none, the live page, and session.log.
 
-The view stays at the bottom; what is said scrolls by above it, and stands in the log.
-
-A session on something that is no terminal: plain lines, few of them.
-
-A session on the live page.
-
-The log beside a recording, session.log: one line a happening, with its time; nothing that was said is lost.
+The terminal is for somebody with gloves a step away: what is going on in colour and capitals, few words. The view
+stays at the bottom; what is reported scrolls by above it. The log has one line a happening, with its time.
 """
 
 from collections.abc import Callable, Generator

@@ -10,7 +10,8 @@ from acquisition.plan import PlanOptions
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
 from acquisition.recording.rig import load_rig
 from acquisition.recording.rig_schema import MotionBox, Rig
-from calibeam.motion.rehearsal import draw_session, rehearse
+from calibeam.motion.rehearsal import rehearse
+from calibeam.motion.rehearsal_figure import draw_session
 
 RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
 FEW = PlanOptions(centred=1, off_centre=1, repeats=0)
