@@ -50,19 +50,19 @@ class Measuring:
     ) -> None:
         self._job, self._part, self._ahead = job, part, ahead
         self._bench, self._writer, self._clock = bench, writer, clock
-        self._teller, self._person = told
+        self._reporter, self._person = told
         self._samples: list[Sample] = []
         self._forecaster = Forecaster(self._forecast, self._no_forecast)
         self._reins = Reins(
             bench.stop,
             clock,
             lambda: bench.supervisor.failure,
-            self._teller.state,
+            self._reporter.state,
             hold_arm=bench.hold,
-            undelivered=self._teller.undelivered,
+            undelivered=self._reporter.undelivered,
             rests_in_s=bench.rests_in_s,
             ease_arm=bench.ease,
-            pausing=lambda rests_in_s, eased: self._teller.pausing(rests_in_s, bench.ease_s if eased else None),
+            pausing=lambda rests_in_s, eased: self._reporter.pausing(rests_in_s, bench.ease_s if eased else None),
         )
         self._session = self._session_of(sight)
 
@@ -73,7 +73,7 @@ class Measuring:
                 summary = kept(self._bench, self._writer, self._clock, self._session, self._run(more))
             except PartialResult as early:
                 INTERRUPTS.close()  # a recording is being closed
-                self._teller.ended_early(early)
+                self._reporter.ended_early(early)
                 raise
         end_event(self._writer, self._clock, summary)
         return summary
@@ -89,9 +89,9 @@ class Measuring:
 
     def _session_of(self, sight: Sight | None) -> Session | PlannedSession:
         rig, options, earlier = self._part.rig, self._job.options, self._part.earlier.taken
-        journal = ReportingJournal(RecordingJournal(self._writer, self._clock), self._teller, self._took)
+        journal = ReportingJournal(RecordingJournal(self._writer, self._clock), self._reporter, self._took)
         learner, home_rad = FittedLearner(rig), np.array(rig.motion.home_rad)
-        tell, limits, reins = self._teller.progress, Limits(step_rad=rig.motion.step_limit_rad), self._reins
+        tell, limits, reins = self._reporter.progress, Limits(step_rad=rig.motion.step_limit_rad), self._reins
         if self._part.plan is not None:
             return PlannedSession(
                 self._bench, learner, journal, options, home_rad, tell=tell, sight=sight, reins=reins, earlier=earlier
@@ -114,18 +114,18 @@ class Measuring:
             self._forecaster.ask(Asked(list(samples), self._behind()))
 
     def _behind(self) -> int:
-        progress = self._teller.shown.progress
+        progress = self._reporter.shown.progress
         return 0 if progress is None else progress.done + progress.skipped
 
     def _forecast(self, asked: Asked) -> None:
-        self._teller.forecast(self._made(asked))
+        self._reporter.forecast(self._made(asked))
 
     def _made(self, asked: Asked) -> Forecast:
         taken = [*self._part.earlier.taken.values(), *asked.samples]
         return forecast(self._part.rig, taken, self._ahead.after(asked.taken_of_plan), self._job.goal_m)
 
     def _no_forecast(self, why: Exception) -> None:
-        self._teller.said(f"no more forecasts in this session: {type(why).__name__}: {why}", loud=False)
+        self._reporter.report(f"no more forecasts in this session: {type(why).__name__}: {why}", on_screen=False)
 
 
 @contextmanager

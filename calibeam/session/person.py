@@ -17,14 +17,14 @@ class Person:
     def __init__(
         self,
         console: Console,
-        teller: StatusReporter,
+        reporter: StatusReporter,
         asking: Asking | None,
         *,
         agrees: bool,
         view: Callable[[], AbstractContextManager[None]] = nullcontext,
     ) -> None:
         """`view` is open while the arm is under way."""
-        self._console, self._teller, self._view = console, teller, view
+        self._console, self._reporter, self._view = console, reporter, view
         self._asking, self._agrees = asking, agrees
         self._keys: Keys | None = None
 
@@ -54,8 +54,8 @@ class Person:
             raise AcquisitionError(
                 f"{text}: nobody can be asked, standard input is closed or no terminal; run the session in a terminal"
             )
-        self._teller.said(text)
-        self._teller.asked(f"{text}, then press ENTER")
+        self._reporter.report(text)
+        self._reporter.asked(f"{text}, then press ENTER")
         try:
             if self._console.is_terminal:
                 self._asking.wait_until_seen()
@@ -63,14 +63,14 @@ class Person:
                 raise AcquisitionError(f"{text}: nobody can be asked, the terminal cannot be written to")
             self._keys.wait(ENTER)
         finally:
-            self._teller.asked("")
+            self._reporter.asked("")
 
     def choose(self, text: str, choices: Mapping[str, str], default: str, at_end: str) -> str:
         """One of the letters; the default where nobody is asked, `at_end` where the input ends instead."""
         if self._asking is None or self._agrees:
             return default
         answer = self._asking.choice(text, choices, default) or at_end
-        self._teller.said(f"{text} {answer}", loud=False)
+        self._reporter.report(f"{text} {answer}", on_screen=False)
         return answer
 
     def numbers(self, text: str, count: int) -> tuple[float, ...] | None:

@@ -38,21 +38,21 @@ class StatusReporter:
         number = STEPS.index(name) + 1
         with self._turn:
             self._now(step=f"{number} of {len(STEPS)}  {name.upper()}")
-            self.said(self.shown.step, loud=False)  # those who show it see it change
+            self.report(self.shown.step, on_screen=False)  # those who show it see it change
 
-    def said(self, text: str, *, loud: bool = True) -> None:
+    def report(self, text: str, *, on_screen: bool = True) -> None:
         """One line for a person."""
         with self._turn:
             for listener in self._listeners:
                 with suppress(OSError):  # a terminal that was closed ends no session
-                    listener.said(text, loud)
+                    listener.report(text, on_screen)
 
     def progress(self, progress: Progress) -> None:
         """From the session, as acquisition.progress.Tell."""
         with self._turn:
             before = self.shown.progress
             if before is None or (before.placement, before.first) != (progress.placement, progress.first):
-                self.said(f"place {progress.placement}, PSD {progress.first} first")
+                self.report(f"place {progress.placement}, PSD {progress.first} first")
             self._pace.work(progress.phase is not Phase.PLACE and self.shown.state in WORKING)
             self._now(progress=progress, left_s=self._pace.left_s(progress.left))
 
@@ -63,11 +63,11 @@ class StatusReporter:
                 return
             self._pace.work(state in WORKING)
             self._now(state=state)
-            self.said(state.value)
+            self.report(state.value)
 
     def ended_early(self, early: PartialResult) -> None:
         """At once, for closing the recording takes a second."""
-        self.said(
+        self.report(
             f"THE ARM WAS STOPPED: {early}" if isinstance(early.__cause__, DeviceError) else f"ended early: {early}"
         )
 
@@ -76,7 +76,7 @@ class StatusReporter:
         with self._turn:
             self._now(undelivered="" if trouble is None else str(trouble))
             told = "no stop is outstanding any more" if trouble is None else f"{UNDELIVERED.upper()}: {trouble}"
-            self.said(told)
+            self.report(told)
 
     def pausing(self, rests_in_s: float, eased_s: float | None) -> None:
         """From the reins: when the arm rests (s, at most); `eased_s`: it is braked softly for that, in this time."""
@@ -86,7 +86,7 @@ class StatusReporter:
             what = f"pause: the motion under way ends within {_up(rests_in_s)} s, no other begins"
         else:
             what = "pause: the arm stands, the reading under way is finished"
-        self.said(f"{what}; SPACE or Ctrl-C again brakes at once, r goes on")
+        self.report(f"{what}; SPACE or Ctrl-C again brakes at once, r goes on")
 
     def asked(self, text: str) -> None:
         """A person is waited for; "": no more."""
@@ -106,13 +106,13 @@ class StatusReporter:
                 progress=progress,
                 left_s=None if progress is None else self._pace.left_s(progress.left),
             )
-            self.said(_of_sample(sample, progress), loud=False)
+            self.report(_of_sample(sample, progress), on_screen=False)
 
     def forecast(self, forecast: Forecast) -> None:
         """From the thread that makes them."""
         with self._turn:
             self._now(forecast=forecast)
-            self.said(f"accuracy after {forecast.samples} poses: {forecast.says}", loud=False)
+            self.report(f"accuracy after {forecast.samples} poses: {forecast.says}", on_screen=False)
 
     def _now(self, **changed: Any) -> None:
         self.shown = replace(self.shown, **changed)
@@ -124,21 +124,21 @@ class StatusReporter:
 class ReportingJournal:
     """Implements acquisition.journal.Journal: what goes into the recording is told as well."""
 
-    def __init__(self, journal: Journal, teller: StatusReporter, took: Callable[[list[Sample]], None]) -> None:
+    def __init__(self, journal: Journal, reporter: StatusReporter, took: Callable[[list[Sample]], None]) -> None:
         """`took`: all samples so far, after each."""
-        self._journal, self._teller, self._took = journal, teller, took
+        self._journal, self._reporter, self._took = journal, reporter, took
         self.samples: list[Sample] = []
 
     def sample(self, sample: Sample) -> None:
         self._journal.sample(sample)
         self.samples.append(sample)
-        self._teller.sample(sample)
+        self._reporter.sample(sample)
         self._took(self.samples)
 
     def event(self, kind: str, detail: Mapping[str, Any]) -> None:
         self._journal.event(kind, detail)
         if text := _of_event(kind, detail):
-            self._teller.said(text, loud=kind == "skipped")
+            self._reporter.report(text, on_screen=kind == "skipped")
 
 
 def _up(seconds: float) -> str:

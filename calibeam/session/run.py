@@ -57,9 +57,9 @@ class OnSite:
         self._job, self._console, self._clock, self._feed = job, console, clock, feed
         terminal = TerminalView(console) if asking is not None and console.is_terminal else None
         view: Listener = PlainView(console) if terminal is None else terminal
-        self.teller = StatusReporter(job.rig, clock, (LogFile(job.out / NAME), view, PageView(feed)))
+        self.reporter = StatusReporter(job.rig, clock, (LogFile(job.out / NAME), view, PageView(feed)))
         opened = {} if terminal is None else {"view": terminal.opened}
-        self._person = Person(console, self.teller, asking, agrees=agrees, **opened)
+        self._person = Person(console, self.reporter, asking, agrees=agrees, **opened)
         self._half_size_m = FittedLearner(job.rig).optics.half_size_m
 
     def run(self, earlier: EarlierParts, *, stands: bool) -> None:
@@ -73,11 +73,11 @@ class OnSite:
             with self._kept() if broken else nullcontext():
                 part = part_of(self._job, earlier, self._half_size_m)
                 if part.left == 0:
-                    self.teller.said("everything that was planned is taken")
+                    self.reporter.report("everything that was planned is taken")
                     break
                 self._plan(part)
                 if not agreed:
-                    self.teller.step("arm")
+                    self.reporter.step("arm")
                     self._person.arm()
                     agreed = True
             try:
@@ -91,7 +91,7 @@ class OnSite:
             if place is None:
                 break
             earlier = with_place(read_earlier_parts(self._job.out, self._job.rig), place)
-        self.teller.step("result")
+        self.reporter.step("result")
         files = parts(self._job.out)
         from calibeam.results.session_results import (
             write_session_results,  # a second of libraries that no device waits for
@@ -111,9 +111,9 @@ class OnSite:
 
     def _devices(self) -> None:
         """One line each; goes on when all are good, or a person says so. DeviceRefused where one cannot be had."""
-        self.teller.step("devices")
+        self.reporter.step("devices")
         if self._job.addresses.hurry != 1.0:
-            self.teller.said("emulators at another pace than real time: their devices are not judged")
+            self.reporter.report("emulators at another pace than real time: their devices are not judged")
             return
         while True:
             checks = list(self._told())
@@ -136,7 +136,7 @@ class OnSite:
         if not isinstance(early.__cause__, DeviceError):
             return False
         INTERRUPTS.heed()
-        self.teller.asked("the arm was stopped; answer at the terminal whether the session goes on")
+        self.reporter.asked("the arm was stopped; answer at the terminal whether the session goes on")
         try:
             answer = self._person.choose(
                 "the arm was stopped, and the recording is closed:",
@@ -150,7 +150,7 @@ class OnSite:
         except KeyboardInterrupt:
             return False
         finally:
-            self.teller.asked("")
+            self.reporter.asked("")
         if answer != "g":
             INTERRUPTS.close()  # the exit code is decided
         return answer == "g"
@@ -162,7 +162,7 @@ class OnSite:
 
     def _told(self) -> Iterator[DeviceCheck]:
         for check in check_devices(self._job.rig, self._clock):
-            self.teller.said(check.line)
+            self.reporter.report(check.line)
             yield check
 
     def _since(self, earlier: EarlierParts, *, stands: bool) -> EarlierParts:
@@ -178,28 +178,30 @@ class OnSite:
         if stands or self._person.choose(question, told, "n", "n") == "y":
             return earlier
         place = same_place(part.rig, standing)
-        self.teller.said(f"place {standing} is measured anew as place {place.id}; what was taken there still counts")
+        self.reporter.report(
+            f"place {standing} is measured anew as place {place.id}; what was taken there still counts"
+        )
         return with_fixture_moved(earlier, place, standing)
 
     def _plan(self, part: Part) -> None:
         """Gone through and drawn before anything moves."""
         from calibeam.motion.rehearsal_figure import draw_session  # matplotlib takes a second to load
 
-        self.teller.step("plan")
+        self.reporter.step("plan")
         drawing = next_part(self._job.out).with_suffix(".plan.svg")
-        self.teller.said(draw_session(part.rig, drawing, part.options, part.plan))
+        self.reporter.report(draw_session(part.rig, drawing, part.options, part.plan))
         before = f", {len(part.earlier.taken)} taken before" if part.earlier.begun else ""
         about = clock_words(POSE_S * part.left / self._job.addresses.hurry)
-        self.teller.said(f"{part.left} readings to take, repeats among them{before}; about {about}")
+        self.reporter.report(f"{part.left} readings to take, repeats among them{before}; about {about}")
 
     def _measure(self, part: Part) -> Placement | None:
         """A part; a further place that a person wants, None: it is enough."""
-        self.teller.step("measure")
+        self.reporter.step("measure")
         ahead = ahead_of_blocks(part.rig, part.blocks) if part.plan is None else ahead_of_plan(part.rig, part.plan)
         path = next_part(self._job.out)
         try:
             with measuring(
-                self._job, part, ahead, path, self._clock, (self.teller, self._person), self._feed
+                self._job, part, ahead, path, self._clock, (self.reporter, self._person), self._feed
             ) as session:
                 summary, rounds = session.take(), 0
                 while True:
@@ -208,29 +210,31 @@ class OnSite:
                     if answer != MORE or session.placement is None:
                         break
                     rounds += 1
-                    self.teller.step("measure")
+                    self.reporter.step("measure")
                     summary = session.take(more_at(part, session.placement, self._half_size_m, part.options, rounds))
         except KeyboardInterrupt as why:  # at a question, while the arm stands
             INTERRUPTS.close()
             raise PartialResult(f"{interruption(why)}; what was taken is kept in {path}; {GO_ON}") from why
         except PartialResult as early:
             raise PartialResult(f"{early}; {GO_ON}") from early.__cause__
-        self.teller.said(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {path}")
+        self.reporter.report(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {path}")
         return self._new_place(part) if answer == PLACE else None
 
     def _look(self, session: Measuring, summary: Summary, part: Part) -> None:
         """How good it is."""
-        self.teller.step("look")
-        quality = self.teller.shown.quality
+        self.reporter.step("look")
+        quality = self.reporter.shown.quality
         settled = "" if quality is None or not quality.unsettled else f", {quality.unsettled} of them did not settle"
-        self.teller.said(f"{len(part.earlier.taken) + len(summary.samples)} poses{settled}; {summary.skipped} left out")
+        self.reporter.report(
+            f"{len(part.earlier.taken) + len(summary.samples)} poses{settled}; {summary.skipped} left out"
+        )
         try:
             forecast = session.forecast_now()
         except Exception as why:  # as in forecaster.py: what was measured is worth more than a forecast of it
-            self.teller.said(f"no forecast: {type(why).__name__}: {why}")
+            self.reporter.report(f"no forecast: {type(why).__name__}: {why}")
             return
-        self.teller.forecast(forecast)
-        self.teller.said(f"predicted error of the beam in free space: {forecast.says}")
+        self.reporter.forecast(forecast)
+        self.reporter.report(f"predicted error of the beam in free space: {forecast.says}")
 
     def _decide(self, part: Part) -> str:
         choices = {FINISH: "finish: identify, diagnose, report"}
@@ -244,7 +248,7 @@ class OnSite:
         if numbers is None:
             return None
         place = new_place(part.rig, numbers)
-        self.teller.said(f"place {place.id}; to keep it, add to the rig file:{placement_text(place)}")
+        self.reporter.report(f"place {place.id}; to keep it, add to the rig file:{placement_text(place)}")
         return place
 
 

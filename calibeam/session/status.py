@@ -134,8 +134,8 @@ class SessionStatus:
 class Listener(Protocol):
     """Terminal, log file or page. Told from several threads, one at a time; never raises."""
 
-    def said(self, text: str, loud: bool) -> None:
-        """One line; those that are not loud are for the log."""
+    def report(self, text: str, on_screen: bool) -> None:
+        """One line; those that are not for the screen stand in the log alone."""
         ...
 
     def shows(self, shown: SessionStatus) -> None:

@@ -32,21 +32,21 @@ class PlainView:
         self._console = console
         self._told, self._step = 0, ""
 
-    def said(self, text: str, loud: bool) -> None:
-        if loud:
+    def report(self, text: str, on_screen: bool) -> None:
+        if on_screen:
             self._console.print(text, highlight=False, markup=False, soft_wrap=True)
 
     def shows(self, shown: SessionStatus) -> None:
         if shown.step != self._step:
             self._step = shown.step
-            self.said(shown.step, loud=True)
+            self.report(shown.step, on_screen=True)
         progress = shown.progress
         if progress is None or progress.done < self._told + EVERY:
             return
         self._told = progress.done
         left = "" if shown.left_s is None else f", about {clock_words(shown.left_s)} left"
         accuracy = "" if shown.forecast is None else f"; accuracy {shown.forecast.says}"
-        self.said(f"{progress.done} of {progress.total} poses{left}{accuracy}", loud=True)
+        self.report(f"{progress.done} of {progress.total} poses{left}{accuracy}", on_screen=True)
 
 
 class PageView:
@@ -57,8 +57,8 @@ class PageView:
         self._stands: tuple[int, int] | None = None
         self._samples = -1
 
-    def said(self, text: str, loud: bool) -> None:
-        if loud:
+    def report(self, text: str, on_screen: bool) -> None:
+        if on_screen:
             self._feed.said(text)
 
     def shows(self, shown: SessionStatus) -> None:
@@ -87,7 +87,7 @@ class LogFile:
     def __init__(self, path: Path, now: Callable[[], datetime] = utc_now) -> None:
         self.path, self._now = path, now
 
-    def said(self, text: str, loud: bool) -> None:
+    def report(self, text: str, on_screen: bool) -> None:
         stamp = self._now().isoformat(timespec="milliseconds").replace("+00:00", "Z")
         lines = "".join(f"{stamp} {line}\n" for line in text.splitlines())
         with suppress(OSError), self.path.open("a", encoding="utf-8") as file:
@@ -142,8 +142,10 @@ class TerminalView:
             with suppress(OSError):  # the terminal was closed
                 live.stop()  # draws it once more
 
-    def said(self, text: str, loud: bool) -> None:
-        if loud and not (self._live is not None and text in {state.value for state in State}):  # the view shows these
+    def report(self, text: str, on_screen: bool) -> None:
+        if on_screen and not (
+            self._live is not None and text in {state.value for state in State}
+        ):  # the view shows these
             self._console.print(text, highlight=False, markup=False, soft_wrap=self._live is None)
 
     def shows(self, shown: SessionStatus) -> None:

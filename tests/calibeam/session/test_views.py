@@ -51,8 +51,8 @@ class Heard:
         self.lines: list[tuple[str, bool]] = []
         self.shown: list[SessionStatus] = []
 
-    def said(self, text: str, loud: bool) -> None:
-        self.lines.append((text, loud))
+    def report(self, text: str, on_screen: bool) -> None:
+        self.lines.append((text, on_screen))
 
     def shows(self, shown: SessionStatus) -> None:
         self.shown.append(shown)
@@ -79,7 +79,7 @@ def heard() -> Heard:
 
 
 @pytest.fixture
-def teller(rig, clock, heard) -> StatusReporter:
+def reporter(rig, clock, heard) -> StatusReporter:
     return StatusReporter(rig, clock, (heard,))
 
 
@@ -103,13 +103,13 @@ def test_the_view_says_in_capitals_what_goes_on_and_which_keys_serve(state, larg
     assert "34 um; 12 more poses bring it under 20 um" in text
 
 
-def test_the_view_fits_a_terminal_of_eighty_columns(teller, samples) -> None:
-    journal = ReportingJournal(Kept(), teller, lambda all_: None)
-    teller.state(State.RUNNING)
-    teller.progress(progress())
+def test_the_view_fits_a_terminal_of_eighty_columns(reporter, samples) -> None:
+    journal = ReportingJournal(Kept(), reporter, lambda all_: None)
+    reporter.state(State.RUNNING)
+    reporter.progress(progress())
     for sample in samples[:9]:
         journal.sample(sample)
-    lines = told(teller.shown).splitlines()
+    lines = told(reporter.shown).splitlines()
     assert max(map(len, (line.rstrip() for line in lines))) <= 80
     assert len(lines) < 24
     assert sum("°" in line for line in lines) == 3  # six joints, two a line
@@ -120,28 +120,28 @@ def test_the_keys_fit_a_terminal_of_eighty_columns(keys) -> None:
     assert max(map(len, f"   {keys}".splitlines())) <= 80
 
 
-def test_a_stop_that_does_not_reach_the_arm_is_the_largest_thing_on_the_screen(teller, heard) -> None:
-    teller.asked("put the fixture at place 2")
-    teller.undelivered(DeviceLost("robot: no way to the controller"))
-    text = told(teller.shown)
+def test_a_stop_that_does_not_reach_the_arm_is_the_largest_thing_on_the_screen(reporter, heard) -> None:
+    reporter.asked("put the fixture at place 2")
+    reporter.undelivered(DeviceLost("robot: no way to the controller"))
+    text = told(reporter.shown)
     assert "STOP NOT DELIVERED, PRESS THE RED EMERGENCY STOP" in text
     assert "robot: no way to the controller" in text
     assert heard.lines[-1] == (
         "STOP NOT DELIVERED, PRESS THE RED EMERGENCY STOP: robot: no way to the controller",
         True,
     )
-    teller.undelivered(None)
-    assert "NOT DELIVERED" not in told(teller.shown)
+    reporter.undelivered(None)
+    assert "NOT DELIVERED" not in told(reporter.shown)
 
 
-def test_a_dark_face_is_said(teller, samples) -> None:
-    journal = ReportingJournal(Kept(), teller, lambda all_: None)
+def test_a_dark_face_is_said(reporter, samples) -> None:
+    journal = ReportingJournal(Kept(), reporter, lambda all_: None)
     look = samples[0].look
     from dataclasses import replace
 
     dark = replace(look, psd2=replace(look.psd2, x_m=np.nan, y_m=np.nan))
     journal.sample(replace(samples[0], look=dark))
-    assert "dark" in told(teller.shown)
+    assert "dark" in told(reporter.shown)
 
 
 def test_who_is_asked_sees_nothing_else() -> None:
@@ -151,21 +151,21 @@ def test_who_is_asked_sees_nothing_else() -> None:
     assert "SPACE" not in text
 
 
-def test_time_left_counts_only_when_the_arm_works(teller, clock, samples) -> None:
-    journal = ReportingJournal(Kept(), teller, lambda all_: None)
-    teller.state(State.RUNNING)
-    teller.progress(progress(0))
+def test_time_left_counts_only_when_the_arm_works(reporter, clock, samples) -> None:
+    journal = ReportingJournal(Kept(), reporter, lambda all_: None)
+    reporter.state(State.RUNNING)
+    reporter.progress(progress(0))
     for sample in samples[:4]:
         clock.time_s += 10.0
         journal.sample(sample)
-    teller.state(State.PAUSED)
+    reporter.state(State.PAUSED)
     clock.time_s += 3600.0
-    teller.state(State.RUNNING)
-    teller.asked("put the fixture there")
+    reporter.state(State.RUNNING)
+    reporter.asked("put the fixture there")
     clock.time_s += 3600.0
-    teller.asked("")
-    teller.progress(progress(4))
-    assert teller.shown.left_s == pytest.approx(74 * 10.0)
+    reporter.asked("")
+    reporter.progress(progress(4))
+    assert reporter.shown.left_s == pytest.approx(74 * 10.0)
 
 
 def test_the_first_poses_give_no_time(clock) -> None:
@@ -181,9 +181,9 @@ def test_times_are_told_as_anybody_plans_by_them(seconds, words) -> None:
     assert clock_words(seconds) == words
 
 
-def test_every_sample_and_everything_left_out_stands_in_the_log(teller, heard, samples) -> None:
-    journal = ReportingJournal(Kept(), teller, lambda all_: None)
-    teller.progress(progress(0))
+def test_every_sample_and_everything_left_out_stands_in_the_log(reporter, heard, samples) -> None:
+    journal = ReportingJournal(Kept(), reporter, lambda all_: None)
+    reporter.progress(progress(0))
     journal.sample(samples[0])
     journal.event("skipped", {"placement": 1, "why": "no light, or saturated, when read"})
     journal.event("sample", {"pose": {}})
@@ -194,12 +194,12 @@ def test_every_sample_and_everything_left_out_stands_in_the_log(teller, heard, s
 
 def test_the_log_has_a_time_in_every_line_and_outlives_a_disk_that_is_full(tmp_path) -> None:
     log = LogFile(tmp_path / "session.log", lambda: datetime(2026, 11, 21, 16, 30, tzinfo=UTC))
-    log.said("one\ntwo", True)
-    log.said("three", False)
+    log.report("one\ntwo", True)
+    log.report("three", False)
     assert (tmp_path / "session.log").read_text().splitlines() == [
         f"2026-11-21T16:30:00.000Z {word}" for word in ("one", "two", "three")
     ]
-    LogFile(tmp_path / "missing" / "session.log").said("nobody hears it", True)
+    LogFile(tmp_path / "missing" / "session.log").report("nobody hears it", True)
 
 
 def test_plain_output_is_a_line_every_ten_poses(heard) -> None:
@@ -241,28 +241,28 @@ def test_the_page_is_told_the_same_and_what_it_draws_by() -> None:
     assert last == again == PageProgress("collect", 3, 78, 60.0, "accuracy: not determined yet: ")
 
 
-def person(teller, asking: Asking | None, *, agrees: bool) -> Person:
-    return Person(Console(quiet=True), teller, asking, agrees=agrees)
+def person(reporter, asking: Asking | None, *, agrees: bool) -> Person:
+    return Person(Console(quiet=True), reporter, asking, agrees=agrees)
 
 
-def test_where_nobody_can_be_asked_the_arm_does_not_move_without_yes(teller) -> None:
+def test_where_nobody_can_be_asked_the_arm_does_not_move_without_yes(reporter) -> None:
     with pytest.raises(AcquisitionError, match="--yes"):
-        person(teller, None, agrees=False).arm()
-    person(teller, None, agrees=True).arm()
+        person(reporter, None, agrees=False).arm()
+    person(reporter, None, agrees=True).arm()
 
 
-def test_a_script_gets_what_is_safe_and_nobody_puts_a_fixture_for_it(teller) -> None:
-    alone = person(teller, None, agrees=True)
+def test_a_script_gets_what_is_safe_and_nobody_puts_a_fixture_for_it(reporter) -> None:
+    alone = person(reporter, None, agrees=True)
     assert alone.choose("does it stand?", {"y": "yes", "n": "no"}, "n", "n") == "n"
     with pytest.raises(AcquisitionError, match="nobody can be asked"):
         alone.place("put the fixture at place 2")
 
 
-def test_the_question_for_the_fixture_is_on_the_screen_before_an_enter_counts(teller, heard, typist) -> None:
+def test_the_question_for_the_fixture_is_on_the_screen_before_an_enter_counts(reporter, heard, typist) -> None:
     """Typed ahead, and typed while the question is being drawn: neither is an answer."""
-    reins = Reins(lambda: None, changed=teller.state)
+    reins = Reins(lambda: None, changed=reporter.state)
     reins.tell(Event.START)
-    asked = person(teller, Asking(typist.terminal), agrees=False)
+    asked = person(reporter, Asking(typist.terminal), agrees=False)
     typist.ahead("\n")
     typist.answers("then press ENTER", "\n")
     with Keys(reins, typist.terminal) as keys, asked.at(keys):
@@ -278,7 +278,7 @@ def test_the_question_for_the_fixture_is_on_the_screen_before_an_enter_counts(te
     assert [shown.asked for shown in heard.shown][-2:] == ["put the fixture at place 2, then press ENTER", ""]
 
 
-def test_what_a_person_is_asked_is_drawn_at_once(teller) -> None:
+def test_what_a_person_is_asked_is_drawn_at_once(reporter) -> None:
     """Not at the next turn of the view, up to a quarter of a second later."""
     console = Console(file=StringIO(), width=80, force_terminal=True)
     view = TerminalView(console)
