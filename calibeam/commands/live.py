@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from acquisition.recording.rig import load_rig
 from acquisition.recording.rig_schema import Rig
-from calibeam.motion.arm import read_geometry
+from calibeam.geometry_only import read_geometry
 from calibrate.errors import DataError
 from calibrate.model_file import corrections
 from drivers.clock import SystemClock

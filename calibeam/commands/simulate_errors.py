@@ -9,7 +9,7 @@ from rich.console import Console
 
 from acquisition.recording.rig import load_rig
 from acquisition.recording.rig_schema import Rig
-from calibeam.motion.arm import read_geometry
+from calibeam.geometry_only import read_geometry
 from calibeam.printing.progress import progress_bar
 from calibeam.printing.tables import print_error_simulation
 from calibeam.software import SOFTWARE

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from acquisition.recording.read import read
-from calibeam.motion.arm import read_geometry
+from calibeam.geometry_only import read_geometry
 from calibeam.outcome import CheckFailed
 from calibeam.software import SOFTWARE
 from calibrate.report.quantities import DASH, length

@@ -15,7 +15,7 @@ from acquisition.motion.paths.segments import Pace
 from acquisition.motion.setpoints import solve_rate_hz
 from acquisition.recording.rig_schema import ArmModel, Rig
 from acquisition.streams import Pump
-from calibeam.motion.arm import read_geometry
+from calibeam.geometry_only import read_geometry
 from calibrate.arms.rig_arm import RigArm
 from calibrate.errors import DataError
 from calibrate.model_file import corrections
