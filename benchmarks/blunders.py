@@ -13,7 +13,7 @@ import numpy as np
 from numpy.random import Generator
 
 from acquisition.recording.read import read
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from acquisition.recording.samples import Samples
 from benchmarks.blundered import ROWS, WHOLE_FILE, Made, Mistake
 from benchmarks.healthy import INSTRUMENTS, Drawn

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from acquisition.bench import Bench, Look
 from acquisition.plan import PlanOptions
+from acquisition.recording.mcap.writer import RecordingWriter
 from acquisition.recording.rig import load_rig, rig_text
-from acquisition.recording.writer import RecordingWriter
 from acquisition.sample import Sample
 from acquisition.servo.centring import Limits
 from acquisition.servo.status import Status

@@ -26,7 +26,7 @@ from acquisition.camera.sight import Sight
 from acquisition.errors import UnreachableError
 from acquisition.motion.rigid import inverse, transform
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from acquisition.sample import Sample
 from calibeam.direct import DirectBench, direct_bench
 from calibeam.direct_eye import DirectEye

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording.columns import ORIENTATION, POSITION, SPOTS
 from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import Bar, Rig
+from acquisition.recording.rig.schema import Bar, Rig
 from acquisition.recording.samples import Samples
 from benchmarks.drawn_sessions import POSITION_SIGMA_M, T_BASE_DEVICE, TARGET_M, Bench, forward, frame, reach
 

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
+from acquisition.recording.mcap.recover import recover
 from acquisition.recording.read import read
-from acquisition.recording.recover import recover
 
 KILLS = 100
 SEED = 1
@@ -23,7 +23,7 @@ RECORDER = """
 import os, sys, time
 import numpy as np
 from acquisition.recording.stream import Channel
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording.mcap.writer import RecordingWriter
 from drivers.clock import SystemClock
 
 clock = SystemClock()

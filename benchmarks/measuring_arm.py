@@ -23,7 +23,7 @@ from acquisition.guided.reading import Reading
 from acquisition.guided.session import GuidedSession
 from acquisition.guided.stillness import Motion, StillRule
 from acquisition.recording.rig import load_rig, plain_rig, rig_sha256, rig_text
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from benchmarks.slices import Slices
 from calibeam.guided.arm import BelievedGuidedArm
 from calibeam.guided.direct import COUNTS, DirectHand

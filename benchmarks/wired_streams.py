@@ -11,10 +11,10 @@ import msgspec
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
+from acquisition.recording.mcap.writer import RecordingWriter
 from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import load_rig, rig_text
-from acquisition.recording.writer import RecordingWriter
 from benchmarks.disturbed import Trouble
 from calibeam.diagnosis import diagnose_recording
 from calibeam.progress_bar import progress_bar

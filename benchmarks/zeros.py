@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from acquisition.plan import PlanOptions
+from acquisition.recording.mcap.writer import RecordingWriter
 from acquisition.recording.read import read
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording.rig.schema import Rig
 from acquisition.session import Session
 from calibeam.any_session import identify_session
 from calibeam.direct import direct_bench

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from acquisition.recording.errors import RigFileError
-from acquisition.recording.rig_schema import Camera, Rig
+from acquisition.recording.rig.schema import Camera, Rig
 from drivers.clock import Clock
 
 if TYPE_CHECKING:

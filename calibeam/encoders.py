@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 from msgspec import structs
 
-from acquisition.recording.rig_devices import EncoderDriver, EncodersDevice
+from acquisition.recording.rig.devices import EncoderDriver, EncodersDevice
 from drivers.can_dbc.description import joint_signals
 from drivers.can_dbc.device import CanDbcEncoders
 from drivers.cia406.device import Cia406Encoders

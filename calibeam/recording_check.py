@@ -7,11 +7,11 @@ import msgspec
 import numpy as np
 from rich.console import Console
 
-from acquisition.recording.check import Finding, check
-from acquisition.recording.clock_model import ClockModel, ClockStatus, clock_model
+from acquisition.recording.check_recording import Finding, check
+from acquisition.recording.device_clock import ClockModel, ClockStatus, clock_model
+from acquisition.recording.mcap.segments import segments
 from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
-from acquisition.recording.segments import segments
 from acquisition.recording.stream import Floats, Stream
 
 SAME_S = 1.0  # longer than any driver keeps a sample

@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 
 from acquisition.recording.errors import RigFileError
-from acquisition.recording.rig_devices import RobotDevice, RobotDriver
+from acquisition.recording.rig.devices import RobotDevice, RobotDriver
 from drivers.clock import Clock
 from drivers.device import Device, Movable
 from drivers.errors import DeviceRefused

@@ -11,7 +11,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.bounds import (
+from acquisition.recording.errors import shown
+from acquisition.recording.files.bounds import (
     Correction,
     Count,
     FileText,
@@ -24,8 +25,7 @@ from acquisition.recording.bounds import (
     Statistic,
     Whole,
 )
-from acquisition.recording.errors import shown
-from acquisition.recording.json_file import JsonKind, read_json
+from acquisition.recording.files.json_file import JsonKind, read_json
 from calibrate.errors import DataError
 from calibrate.older_models import with_present_names
 from calibrate.parameters import Parameter

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording.rig import parse_rig
-from acquisition.recording.rig_schema import ArmModel, Rig
+from acquisition.recording.rig.schema import ArmModel, Rig
 from acquisition.recording.samples import Samples
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.eccentric import with_discs

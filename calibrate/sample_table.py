@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.columns import POSITION
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.alignment import Alignment, align, align_with_tool
 from calibrate.arms.model import KinematicModel

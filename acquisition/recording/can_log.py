@@ -23,7 +23,6 @@ import numpy as np
 from can.io.blf import BLFParseError
 from can.io.generic import MessageReader, MessageWriter
 
-from acquisition.recording.bounds import TIME_S
 from acquisition.recording.can_frames import (
     CHANNELS_NOTE,
     CLASSIC_BYTES,
@@ -37,9 +36,10 @@ from acquisition.recording.can_frames import (
 )
 from acquisition.recording.can_message import frame_of, message_of
 from acquisition.recording.errors import RecordingError, shown
+from acquisition.recording.files.bounds import TIME_S
+from acquisition.recording.mcap.writer import RecordingWriter
 from acquisition.recording.recording import Recording
 from acquisition.recording.stream_writer import StreamWriter
-from acquisition.recording.writer import RecordingWriter
 
 BLOCK = 10_000  # frames at a time into the recording
 MALFORMED = (  # what python-can's readers raise on lines and bytes that make no sense

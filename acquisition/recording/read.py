@@ -7,7 +7,6 @@ import msgspec
 from mcap.records import Header
 
 from acquisition.recording.errors import RecordingError
-from acquisition.recording.folder import RIG, read_folder
 from acquisition.recording.layout import (
     END_METADATA,
     FORMAT_VERSION,
@@ -17,14 +16,15 @@ from acquisition.recording.layout import (
     RECOVERY_METADATA,
     RIG_METADATA,
 )
-from acquisition.recording.mcap_content import Content
-from acquisition.recording.mcap_scan import Scan
-from acquisition.recording.parts import joined, parts
+from acquisition.recording.mcap.parts import joined, parts
+from acquisition.recording.mcap.read import Content
+from acquisition.recording.mcap.scan import Scan
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import parse_rig, rig_sha256
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from acquisition.recording.sample_rules import checked_samples, no_samples
 from acquisition.recording.samples import Samples
+from acquisition.recording.session_folder.folder import RIG, read_folder
 
 
 def read(path: Path | str) -> Recording:

@@ -3,8 +3,8 @@
 import math
 from collections.abc import Iterator
 
+from acquisition.recording.rig.schema import Rig
 from acquisition.recording.rig_lines import KeyPath
-from acquisition.recording.rig_schema import Rig
 
 Fault = tuple[KeyPath, str]
 SHORTEST = 1e-6  # feels right: no hand writes a direction so short

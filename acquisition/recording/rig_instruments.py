@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator
 
-from acquisition.recording.rig_devices import EncoderDriver, EncodersDevice, PsdDevice, PsdDriver, PsdHead
+from acquisition.recording.rig.devices import EncoderDriver, EncodersDevice, PsdDevice, PsdDriver, PsdHead
+from acquisition.recording.rig.schema import Rig
 from acquisition.recording.rig_lines import KeyPath
-from acquisition.recording.rig_schema import Rig
 
 PSD: KeyPath = ("devices", "psd")
 ENCODERS: KeyPath = ("devices", "encoders")

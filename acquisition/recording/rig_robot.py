@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator
 
-from acquisition.recording.rig_devices import RobotDevice, RobotDriver
+from acquisition.recording.rig.devices import RobotDevice, RobotDriver
+from acquisition.recording.rig.schema import Rig
 from acquisition.recording.rig_lines import KeyPath
-from acquisition.recording.rig_schema import Rig
 
 PATH: KeyPath = ("devices", "robot")
 FASTEST_POLL_HZ = 500.0

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.bounds import LENGTH_M, most_of
 from acquisition.recording.columns import (
     COMPLETE_PER_JOINT,
     ORIENTATION,
@@ -23,7 +22,8 @@ from acquisition.recording.columns import (
     required,
 )
 from acquisition.recording.errors import SamplesError, shown
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.files.bounds import LENGTH_M, most_of
+from acquisition.recording.rig.schema import Rig
 from acquisition.recording.samples import Cell, Samples
 
 Table = Mapping[str, NDArray[Any]]

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from acquisition.recording.errors import RecordingError, SamplesError, shown
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from acquisition.recording.sample_rules import checked_samples
 from acquisition.recording.samples import Cell, Samples, cells_of
 

@@ -11,8 +11,8 @@ import msgspec
 
 from acquisition.recording.columns import Kind, kind_of
 from acquisition.recording.layout import SAMPLES_TOPIC
-from acquisition.recording.mcap_file import McapFile
-from acquisition.recording.messages import Field, FieldType, MessageType, Presence, message_type, packed
+from acquisition.recording.mcap.layout import Field, FieldType, MessageType, Presence, message_type, packed
+from acquisition.recording.mcap.mcap_file import McapFile
 from acquisition.recording.samples import Cell
 
 _FIELD_TYPE = {Kind.NUMBER: FieldType.DOUBLE, Kind.INTEGER: FieldType.INT64, Kind.TEXT: FieldType.STRING}

@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.recording.errors import SamplesError, shown
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from acquisition.recording.sample_rules import checked_samples
 from acquisition.recording.samples import Samples, cells_of
 from acquisition.recording.samples_csv import check_header
-from acquisition.recording.tables import TableFormat, write_table
+from acquisition.recording.session_folder.tables import TableFormat, write_table
 
 
 def read_parquet(path: Path, rig: Rig) -> Samples:

@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.layout import END_METADATA
-from acquisition.recording.mcap_file import McapFile
+from acquisition.recording.mcap.mcap_file import McapFile
+from acquisition.recording.mcap.write_thread import StreamEncoder
 from acquisition.recording.spool import Spool
-from acquisition.recording.stream_encoder import StreamEncoder
 
 # A killed process loses what waits and what is being written, as long again: together 0.1 s. With an own thread the
 # sync costs the others nothing.

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from acquisition.recording.mcap.write_thread import Piece
 from acquisition.recording.stream import Channel, Floats, Gap
-from acquisition.recording.stream_encoder import Piece
 
 LARGEST = np.iinfo(np.int64).max
 

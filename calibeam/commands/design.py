@@ -11,7 +11,7 @@ from rich.console import Console
 
 from acquisition.recording.pose_plan import write_pose_plan
 from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from calibeam.progress_bar import progress_bar
 from calibeam.software import SOFTWARE
 

@@ -8,7 +8,7 @@ from cyclopts import Parameter, validators
 from rich.console import Console
 
 from acquisition.recording.read import read
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from calibeam.any_session import Planned, identify_session, write_session_model
 from calibeam.ending import naming, refuse_nothing, tell_unfinished
 from calibeam.refitted_lines import refitted_lines

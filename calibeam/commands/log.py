@@ -10,8 +10,8 @@ from cyclopts import App, Parameter
 from rich.console import Console
 
 from acquisition.recording.errors import RecordingError
+from acquisition.recording.mcap.segments import Rotation
 from acquisition.recording.rig import load_rig, rig_text
-from acquisition.recording.segments import Rotation
 from calibeam.encoder_log import EncoderLog, State
 from calibeam.outcome import PartialResult
 from drivers.clock import Clock, SystemClock

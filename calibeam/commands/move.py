@@ -14,7 +14,7 @@ from acquisition.motion.paths.segments import By, Segment
 from acquisition.motion.task.place import Place
 from acquisition.motion.task.task_file import read_task
 from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 
 Floats = NDArray[np.float64]
 

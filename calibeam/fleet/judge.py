@@ -9,7 +9,7 @@ import msgspec
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from calibeam.diagnosis import diagnose_recording
 from calibeam.fleet.found import content_sha256
 from calibeam.fleet.free_space import drawn_against_identified

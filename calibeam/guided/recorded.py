@@ -13,10 +13,10 @@ from acquisition.guided.reading import Reading
 from acquisition.guided.session import GuidedSession, Summary
 from acquisition.guided.wired import WiredEncoderWatch
 from acquisition.recording.errors import RecordingError, RigFileError
-from acquisition.recording.rig_devices import EncodersDevice
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording.rig.devices import EncodersDevice
+from acquisition.recording.rig.schema import Rig
 from acquisition.recording.stream import Channel, Event
-from acquisition.recording.writer import RecordingWriter
 from acquisition.streams import Pump
 from acquisition.supervisor import Supervisor
 from calibeam.encoders import VIEWED, emulated_encoders, encoder_driver, identities_of

@@ -9,8 +9,8 @@ from mcap.records import Channel, Schema
 
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.layout import EVENTS_TOPIC, GAPS_TOPIC, SAMPLES_TOPIC, VIEW_TOPIC
-from acquisition.recording.mcap_scan import Scan
-from acquisition.recording.parts import parts
+from acquisition.recording.mcap.parts import parts
+from acquisition.recording.mcap.scan import Scan
 
 TIME = "host_s"  # of every message: an axis, not a curve
 OTHERS = (EVENTS_TOPIC, SAMPLES_TOPIC, GAPS_TOPIC)

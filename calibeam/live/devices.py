@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from acquisition.guarded import Guarded, one_error_tree
 from acquisition.recording.errors import RigFileError
-from acquisition.recording.rig_schema import Devices, Rig
+from acquisition.recording.rig.schema import Devices, Rig
 from calibeam.encoders import encoder_driver
 from calibeam.live.feed import Feed
 from calibeam.psd import psd_driver, psd_view

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from acquisition.recording.mcap.writer import RecordingWriter
 from acquisition.recording.stream import Channel, Event
-from acquisition.recording.writer import RecordingWriter
 from calibeam.software import SOFTWARE
 from simulators.conceal.belief import rig_document
 from simulators.conceal.case import Case

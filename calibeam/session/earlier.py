@@ -8,10 +8,10 @@ import msgspec
 
 from acquisition.plan import PoseKey
 from acquisition.recording.errors import RecordingError, shown
-from acquisition.recording.parts import differs, parts
+from acquisition.recording.mcap.parts import differs, parts
 from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
-from acquisition.recording.rig_schema import Placement, Rig
+from acquisition.recording.rig.schema import Placement, Rig
 from acquisition.sample import Sample, sample_of
 
 PLACE_EVENT, STANDS_IN = "placement", "place added"

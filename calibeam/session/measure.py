@@ -10,8 +10,8 @@ import numpy as np
 from acquisition.camera.sight import Sight
 from acquisition.plan import Block
 from acquisition.planned_session import PlannedSession
+from acquisition.recording.mcap.writer import RecordingWriter
 from acquisition.recording.stream import Event
-from acquisition.recording.writer import RecordingWriter
 from acquisition.reins import Reins
 from acquisition.sample import Sample
 from acquisition.servo.centring import Limits

@@ -8,7 +8,7 @@ import msgspec
 from acquisition.recording.errors import RigFileError
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig import parse_rig
-from acquisition.recording.rig_schema import Placement, Pose, Rig
+from acquisition.recording.rig.schema import Placement, Pose, Rig
 
 TEXT = """
 # added by the session

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.columns import SPOTS
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.arms.catalogue import arm_of
 from calibrate.blunders.finding import Blunder, BlunderKind

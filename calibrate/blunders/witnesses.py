@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.blunders.witness import Witness
 from calibrate.sensors.catalogue import SENSORS

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording.columns import POSITION, SEAT
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.arms.catalogue import arm_of
 from calibrate.blunders.bad_rows import bad_rows

@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Rig, Tolerance
+from acquisition.recording.rig.schema import Rig, Tolerance
 from acquisition.recording.samples import Samples
 from calibrate.arms.belief import LinkBelief
 from calibrate.arms.catalogue import arm_of

@@ -13,7 +13,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from acquisition.recording.rig import parse_rig
-from acquisition.recording.rig_schema import ArmModel, Rig
+from acquisition.recording.rig.schema import ArmModel, Rig
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.compiled import PER_PART
 from calibrate.arms.serial import chain_frames

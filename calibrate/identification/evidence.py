@@ -6,7 +6,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.fit import Fit, Status
 from calibrate.identifiability import Identifiability, analyse

@@ -7,7 +7,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.special import ndtr, stdtrit
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.blunders.finding import Blunder
 from calibrate.fit import FAR_START, Fit, Status

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from acquisition.recording.bounds import ARM_M
 from acquisition.recording.columns import POSITION
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.files.bounds import ARM_M
+from acquisition.recording.rig.schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.arms.catalogue import arm_of
 from calibrate.blunders.conventions import wrong_convention

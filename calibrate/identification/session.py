@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.columns import SPOTS
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.arms.belief import FREE
 from calibrate.arms.catalogue import arm_of

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.columns import ORIENTATION, POSITION
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.blunders.finding import BlunderKind
 from calibrate.blunders.other_session import rows_of_another_session

@@ -3,7 +3,7 @@
 from acquisition.recording.fingerprint import readings_sha256
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import parse_rig
-from acquisition.recording.rig_schema import Arm, Rig
+from acquisition.recording.rig.schema import Arm, Rig
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from calibeam.direct import DirectBench, direct_bench
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"

@@ -15,13 +15,13 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from acquisition.recording import mcap_file
 from acquisition.recording.can_frames import FrameFlag, frames_of
 from acquisition.recording.disk_file import DiskFile
+from acquisition.recording.mcap import mcap_file
+from acquisition.recording.mcap.segments import Rotation, segments
 from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import parse_rig
-from acquisition.recording.segments import Rotation, segments
 from calibeam import encoder_log
 from calibeam.cli import run
 from calibeam.encoder_log import EncoderLog, State

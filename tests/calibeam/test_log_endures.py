@@ -11,12 +11,13 @@ import can
 import numpy as np
 import pytest
 
-from acquisition.recording import disk_file, mcap_file
-from acquisition.recording.mcap_file import McapFile
-from acquisition.recording.messages import EVENT, packed
+from acquisition.recording import disk_file
+from acquisition.recording.mcap import mcap_file
+from acquisition.recording.mcap.layout import EVENT, packed
+from acquisition.recording.mcap.mcap_file import McapFile
+from acquisition.recording.mcap.segments import Rotation, segments
 from acquisition.recording.read import read
 from acquisition.recording.rig import parse_rig
-from acquisition.recording.segments import Rotation, segments
 from calibeam import encoder_log
 from calibeam.encoder_log import LOOK_S, EncoderLog, State
 from drivers.device import Block, Channel

@@ -13,11 +13,11 @@ import pytest
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
+from acquisition.recording.mcap.writer import RecordingWriter
 from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import rig_text
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording.rig.schema import Rig
 from acquisition.session import Summary
 from calibeam.emulation import Emulation
 from calibeam.outcome import PartialResult

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import ArmModel
+from acquisition.recording.rig.schema import ArmModel
 from calibrate.arms.convert import convert
 from calibrate.believed import BelievedRig
 from calibrate.believed_fixture import Light

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import Bar, KnownDistance, Pose
+from acquisition.recording.rig.schema import Bar, KnownDistance, Pose
 from acquisition.recording.samples import Samples
 from calibrate.arms.catalogue import arm_of
 from calibrate.errors import DataError

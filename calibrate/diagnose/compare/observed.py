@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording.columns import ORIENTATION, POSITION, per_joint
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from acquisition.recording.samples import Samples
 from calibrate.diagnose.compare.chain import Difference, Pair, columns_of
 from calibrate.diagnose.compare.seated import is_seated

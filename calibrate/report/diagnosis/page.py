@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from acquisition.recording.recording import Recording
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.errors import DataError
 from calibrate.report.diagnosis import limits, overview

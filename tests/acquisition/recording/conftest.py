@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from acquisition.recording.mcap.writer import RecordingWriter
 from acquisition.recording.rig import parse_rig
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording.rig.schema import Rig
 
 ROOT = Path(__file__).parents[3]
 

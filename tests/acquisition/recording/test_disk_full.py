@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.recording import mcap_file
 from acquisition.recording.disk_file import DiskFile
 from acquisition.recording.errors import RecordingError
+from acquisition.recording.mcap import mcap_file
+from acquisition.recording.mcap.writer import RecordingWriter
 from acquisition.recording.read import read
 from acquisition.recording.spool import Spool
 from acquisition.recording.stream import Channel
 from acquisition.recording.stream_writer import StreamWriter
-from acquisition.recording.writer import RecordingWriter
 
 Open = Callable[..., RecordingWriter]
 SPOT = Channel("spot_x_m", "m")
@@ -152,7 +152,7 @@ import resource, sys
 import numpy as np
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.stream import Channel
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording.mcap.writer import RecordingWriter
 
 class Standing:
     def now_s(self):

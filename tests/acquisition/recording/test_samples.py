@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from acquisition.recording.errors import SamplesError
 from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from acquisition.recording.sample_rules import checked_samples
 from acquisition.recording.samples import Samples
 from acquisition.recording.samples_csv import parse_csv, read_csv, write_csv

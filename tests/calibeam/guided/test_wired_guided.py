@@ -12,9 +12,9 @@ from rich.console import Console
 from acquisition.guided.plan import GuidedOptions, Visit, calibration_plan
 from acquisition.guided.session import Summary
 from acquisition.guided.target import BarEnd, Cone
+from acquisition.recording.mcap.writer import RecordingWriter
 from acquisition.recording.read import read
 from acquisition.recording.rig import load_rig, rig_text
-from acquisition.recording.writer import RecordingWriter
 from calibeam.emulation import Emulation
 from calibeam.guided.arm import BelievedGuidedArm
 from calibeam.guided.hand import EmulatedHand

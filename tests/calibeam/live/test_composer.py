@@ -8,7 +8,7 @@ import pytest
 from msgspec import structs
 
 from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import Placement, Pose
+from acquisition.recording.rig.schema import Placement, Pose
 from calibeam.live.composer import Composer
 from calibeam.live.feed import Progress
 from calibeam.live.latest import Latest

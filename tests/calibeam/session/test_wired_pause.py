@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from acquisition.plan import PlanOptions, blocks
-from acquisition.recording.parts import parts
+from acquisition.recording.mcap.parts import parts
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan, write_pose_plan
 from acquisition.recording.read import read
 from acquisition.recording.rig import load_rig

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import ArmModel
+from acquisition.recording.rig.schema import ArmModel
 from calibrate.arms.catalogue import arm_of
 
 RIG = Path(__file__).parents[3] / "rigs" / "arm-cmm-reference.toml"

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording.read import read
 from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import Bar
+from acquisition.recording.rig.schema import Bar
 from acquisition.recording.samples import Samples
 
 TOOL = np.array([0.021, -0.012, 0.083])

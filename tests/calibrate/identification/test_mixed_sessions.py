@@ -4,7 +4,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from acquisition.recording.rig_schema import KnownDistance, Pose
+from acquisition.recording.rig.schema import KnownDistance, Pose
 from acquisition.recording.samples import Samples
 from calibrate.fit import Status
 from calibrate.fit_plan import FitPlan

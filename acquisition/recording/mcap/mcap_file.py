@@ -10,7 +10,7 @@ from mcap.writer import Writer
 
 from acquisition.recording.disk_file import DiskFile, create_file
 from acquisition.recording.layout import CHECKSUM, PROFILE, checksum
-from acquisition.recording.messages import MessageType
+from acquisition.recording.mcap.layout import MessageType
 
 
 class _ChunkIndexes:

@@ -10,7 +10,7 @@ from google.protobuf.message import DecodeError
 from mcap.records import Channel as McapChannel
 from mcap.records import Message, Metadata, Schema
 
-from acquisition.recording.bounds import TIME_S, Label, Name, Statistic
+from acquisition.recording.files.bounds import TIME_S, Label, Name, Statistic
 from acquisition.recording.layout import (
     CHECKSUM,
     EVENTS_TOPIC,
@@ -20,7 +20,7 @@ from acquisition.recording.layout import (
     STREAM_TOPIC,
     checksum,
 )
-from acquisition.recording.messages import MessageType, embedded_type
+from acquisition.recording.mcap.layout import MessageType, embedded_type
 from acquisition.recording.samples import Cell
 from acquisition.recording.stream import Channel, Event, Gap, Stream
 

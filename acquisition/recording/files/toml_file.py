@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from acquisition.recording.errors import shown
-from acquisition.recording.rig_faults import explain
+from acquisition.recording.files.explain import explain
 from acquisition.recording.rig_lines import KeyPath, key_lines, line_of
 
 T = TypeVar("T")

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct, field
 
-from acquisition.recording.bounds import (
+from acquisition.recording.files.bounds import (
     Acceleration,
     Factor,
     Few,

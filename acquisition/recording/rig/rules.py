@@ -6,13 +6,13 @@ Every rule yields faults as (key path, what is wrong and what to do); the reader
 import math
 from collections.abc import Iterator
 
-from acquisition.recording.bounds import ARM_M
+from acquisition.recording.files.bounds import ARM_M
+from acquisition.recording.files.explain import in_metres, section
+from acquisition.recording.rig.schema import ArmModel, Joint, Pose, Rig
 from acquisition.recording.rig_artefacts import artefact_faults
-from acquisition.recording.rig_faults import in_metres, section
 from acquisition.recording.rig_instruments import instrument_faults
 from acquisition.recording.rig_lines import KeyPath
 from acquisition.recording.rig_robot import robot_faults
-from acquisition.recording.rig_schema import ArmModel, Joint, Pose, Rig
 
 Fault = tuple[KeyPath, str]
 

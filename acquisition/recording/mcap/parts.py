@@ -11,7 +11,7 @@ import numpy as np
 from acquisition.recording.columns import Kind, kind_of
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.recording import Recording
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from acquisition.recording.samples import Samples
 
 FIRST = "recording.mcap"

@@ -14,9 +14,9 @@ import msgspec
 from msgspec.structs import fields
 
 from acquisition.recording.errors import shown
+from acquisition.recording.files.quantity import si_name, spelt, suffix_of
+from acquisition.recording.rig.schema import EMULATION_KEYS, Rig
 from acquisition.recording.rig_lines import KeyPath
-from acquisition.recording.rig_quantity import si_name, spelt, suffix_of
-from acquisition.recording.rig_schema import EMULATION_KEYS, Rig
 
 _PLACE = re.compile(r"^(?P<says>.*?)(?: - at (?P<key>`key` in )?`\$(?P<path>[^`]*)`)?$", re.DOTALL)
 _STEP = re.compile(r"\.([A-Za-z0-9_-]+)|\[([0-9]+)\]|\[(\.\.\.)\]")

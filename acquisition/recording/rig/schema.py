@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct, field
 
-from acquisition.recording.bounds import (
+from acquisition.recording.files.bounds import (
     JOINTS,
     ZERO,
     Acceleration,
@@ -47,7 +47,7 @@ from acquisition.recording.bounds import (
     Speed,
     Vector,
 )
-from acquisition.recording.rig_devices import Devices
+from acquisition.recording.rig.devices import Devices
 
 
 class ArmModel(enum.Enum):

@@ -8,7 +8,7 @@ from typing import Any, TypeVar, cast
 import msgspec
 
 from acquisition.recording.errors import shown
-from acquisition.recording.rig_faults import located, plain
+from acquisition.recording.files.explain import located, plain
 
 T = TypeVar("T")
 

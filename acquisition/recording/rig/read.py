@@ -8,14 +8,14 @@ from typing import Any, cast
 
 import msgspec
 
-from acquisition.recording.bounds import most_of
 from acquisition.recording.errors import RigFileError, shown
-from acquisition.recording.rig_faults import spelled, unknown_key
+from acquisition.recording.files.bounds import most_of
+from acquisition.recording.files.explain import spelled, unknown_key
+from acquisition.recording.files.quantity import si_value, suffix_of
+from acquisition.recording.files.toml_file import TomlFile, parse_toml, read_text
+from acquisition.recording.rig.rules import faults
+from acquisition.recording.rig.schema import EMULATION_KEYS, ArmModel, Rig
 from acquisition.recording.rig_lines import KeyPath
-from acquisition.recording.rig_quantity import si_value, suffix_of
-from acquisition.recording.rig_rules import faults
-from acquisition.recording.rig_schema import EMULATION_KEYS, ArmModel, Rig
-from acquisition.recording.toml_file import TomlFile, parse_toml, read_text
 
 
 def load_rig(path: Path | str) -> Rig:

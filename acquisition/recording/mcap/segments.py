@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike
 
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.layout import BEFORE_NOTE, SEGMENT_NOTE
+from acquisition.recording.mcap.writer import Clock, RecordingWriter
 from acquisition.recording.stream import Channel, Event, Gap
 from acquisition.recording.stream_writer import StreamWriter
-from acquisition.recording.writer import Clock, RecordingWriter
 
 _NAME = re.compile(r"segment-(\d+)\.mcap")
 

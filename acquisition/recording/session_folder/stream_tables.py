@@ -18,7 +18,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.bounds import (
+from acquisition.recording.errors import RecordingError, shown
+from acquisition.recording.files.bounds import (
     BY_UNIT,
     COUNT,
     TIME_S,
@@ -30,11 +31,10 @@ from acquisition.recording.bounds import (
     NotNegative,
     Sentence,
 )
-from acquisition.recording.errors import RecordingError, shown
-from acquisition.recording.json_file import JsonKind, read_json
+from acquisition.recording.files.json_file import JsonKind, read_json
 from acquisition.recording.recording import Recording
+from acquisition.recording.session_folder.tables import EVENTS, GAPS, TableFormat, table_name, write_tables
 from acquisition.recording.stream import Channel, Event, Gap, Stream, check_declaration, scalar_names
-from acquisition.recording.tables import EVENTS, GAPS, TableFormat, table_name, write_tables
 
 FOLDER, ABOUT = "streams", "streams.json"
 KIND = JsonKind(ABOUT, "export the recording again with --streams", "export the recording again", RecordingError)

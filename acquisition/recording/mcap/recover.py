@@ -24,9 +24,9 @@ from acquisition.recording.layout import (
     RIG_METADATA,
     checksum,
 )
-from acquisition.recording.mcap_file import McapFile
-from acquisition.recording.mcap_scan import Scan
-from acquisition.recording.messages import MessageType, embedded_type
+from acquisition.recording.mcap.layout import MessageType, embedded_type
+from acquisition.recording.mcap.mcap_file import McapFile
+from acquisition.recording.mcap.scan import Scan
 from acquisition.recording.read import read
 from acquisition.recording.rig import rig_sha256
 

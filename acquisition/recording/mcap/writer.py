@@ -29,8 +29,9 @@ from acquisition.recording.layout import (
     STREAM_METADATA,
     log_ns,
 )
-from acquisition.recording.mcap_file import McapFile
-from acquisition.recording.messages import EVENT, GAP, MessageType, packed
+from acquisition.recording.mcap.layout import EVENT, GAP, MessageType, packed
+from acquisition.recording.mcap.mcap_file import McapFile
+from acquisition.recording.mcap.write_thread import Piece, StreamEncoder, channels_json
 from acquisition.recording.rig import parse_rig, rig_sha256
 from acquisition.recording.sample_rules import checked_samples
 from acquisition.recording.samples import Cell
@@ -38,7 +39,6 @@ from acquisition.recording.samples_encoder import SamplesEncoder
 from acquisition.recording.scribe import Entry, Scribe
 from acquisition.recording.spool import Spool
 from acquisition.recording.stream import Channel, Event, Gap, check_declaration
-from acquisition.recording.stream_encoder import Piece, StreamEncoder, channels_json
 from acquisition.recording.stream_writer import StreamWriter
 
 ANSWER_S = 30.0  # a disk that takes longer than this for what waits is reported, not waited for

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.layout import STREAM_TOPIC, VIEW_TOPIC, log_ns
-from acquisition.recording.mcap_file import McapFile
-from acquisition.recording.messages import Field, FieldType, MessageType, Presence, message_type, packed
+from acquisition.recording.mcap.layout import Field, FieldType, MessageType, Presence, message_type, packed
+from acquisition.recording.mcap.mcap_file import McapFile
 from acquisition.recording.stream import Channel, Floats, scalar_names
 
 BATCH = 100  # samples a message: a tenth of the time and of the size of single ones, measured with this library

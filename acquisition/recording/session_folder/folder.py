@@ -5,12 +5,12 @@ from pathlib import Path
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import parse_rig, rig_text
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig.schema import Rig
 from acquisition.recording.samples import Samples
 from acquisition.recording.samples_csv import read_csv, write_csv
 from acquisition.recording.samples_parquet import read_parquet, write_parquet
-from acquisition.recording.stream_tables import with_streams
-from acquisition.recording.tables import TableFormat
+from acquisition.recording.session_folder.stream_tables import with_streams
+from acquisition.recording.session_folder.tables import TableFormat
 
 RIG = "rig.toml"
 CSV = "samples.csv"
