@@ -18,9 +18,9 @@ from acquisition.recording.can_frames import (
     block_of,
     channels,
 )
-from acquisition.recording.can_message import frame_of
+from acquisition.recording.can_log import frame_of
 from acquisition.recording.errors import RecordingError
-from acquisition.recording.stream import Channel
+from acquisition.recording.recording import Channel
 from drivers.clock import Clock
 
 _ERROR = int(FrameFlag.ERROR)  # comparing with a member of an enumeration takes ten times as long

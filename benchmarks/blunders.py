@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.random import Generator
 
-from acquisition.recording.read import read
+from acquisition.recording.mcap.read import read
 from acquisition.recording.rig.schema import Rig
 from acquisition.recording.samples import Samples
 from benchmarks.blundered import ROWS, WHOLE_FILE, Made, Mistake

@@ -8,11 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.recording.errors import RecordingError
+from acquisition.recording.mcap.read import read
 from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
+from acquisition.recording.recording import Channel, Event, Recording
 from acquisition.recording.rig import rig_text
-from acquisition.recording.stream import Channel, Event
 
 CUTS = FLIPS = 2000
 SEED = 3

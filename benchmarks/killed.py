@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
+from acquisition.recording.mcap.read import read
 from acquisition.recording.mcap.recover import recover
-from acquisition.recording.read import read
 
 KILLS = 100
 SEED = 1
@@ -22,7 +22,7 @@ BOUND_S = 0.1  # what may be lost, and one batch
 RECORDER = """
 import os, sys, time
 import numpy as np
-from acquisition.recording.stream import Channel
+from acquisition.recording.recording import Channel
 from acquisition.recording.mcap.writer import RecordingWriter
 from drivers.clock import SystemClock
 

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
+from acquisition.recording.mcap.read import read
 from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.read import read
+from acquisition.recording.recording import Channel
 from acquisition.recording.rig import plain_rig, rig_text
-from acquisition.recording.stream import Channel
 from acquisition.streams import Pump
 from drivers.clock import SystemClock
 from drivers.ur.reader import UrReader

@@ -11,8 +11,8 @@ import msgspec
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
+from acquisition.recording.mcap.read import read
 from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import load_rig, rig_text
 from benchmarks.disturbed import Trouble

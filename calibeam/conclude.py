@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from acquisition.recording.read import read
+from acquisition.recording.mcap.read import read
 from acquisition.recording.recording import Recording
 from calibeam.any_session import identify_session, write_session_model
 from calibeam.diagnosis import diagnosed_to

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from acquisition.recording.read import read
+from acquisition.recording.mcap.read import read
 from acquisition.recording.recording import Recording
 from calibeam.modelled import modelled
 from calibrate.diagnose.file import read_diagnosis

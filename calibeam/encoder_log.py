@@ -16,8 +16,8 @@ from acquisition.frame_log import FrameLog
 from acquisition.guarded import Guarded
 from acquisition.recording.mcap.segments import Rotation, SegmentedRecording, SegmentStream
 from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording.recording import Channel, Gap
 from acquisition.recording.rig.devices import EncodersDevice
-from acquisition.recording.stream import Channel, Gap
 from acquisition.reopening import Reopening
 from acquisition.streams import Pump
 from calibeam.encoders import VIEWED, encoder_driver, identities_of, names_of

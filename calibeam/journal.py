@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.stream import Event
+from acquisition.recording.recording import Event
 from acquisition.sample import Sample
 from drivers.clock import Clock
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.read import read
+from acquisition.recording.mcap.read import read
 from acquisition.recording.recording import Recording
 from acquisition.recording.samples import Samples
 from calibrate.errors import DataError

@@ -18,11 +18,11 @@ from acquisition.plan import PlanOptions
 from acquisition.planned_session import PlannedSession
 from acquisition.progress import Progress
 from acquisition.recording.errors import RecordingError
+from acquisition.recording.mcap.read import read
 from acquisition.recording.mcap.writer import RecordingWriter
 from acquisition.recording.pose_plan import PosePlan
-from acquisition.recording.read import read
+from acquisition.recording.recording import Event
 from acquisition.recording.rig.schema import Rig
-from acquisition.recording.stream import Event
 from acquisition.servo.centring import Limits
 from acquisition.session import Session, Summary
 from calibeam.emulation import EmulationError

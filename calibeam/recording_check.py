@@ -9,10 +9,9 @@ from rich.console import Console
 
 from acquisition.recording.check_recording import Finding, check
 from acquisition.recording.device_clock import ClockModel, ClockStatus, clock_model
+from acquisition.recording.mcap.read import read
 from acquisition.recording.mcap.segments import segments
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
-from acquisition.recording.stream import Floats, Stream
+from acquisition.recording.recording import Floats, Recording, Stream
 
 SAME_S = 1.0  # longer than any driver keeps a sample
 MOST_LINES = 20  # findings of one file told one by one; a script gets all of them with --json

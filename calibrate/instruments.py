@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.columns import POSITION
 from acquisition.recording.rig.schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording.samples import POSITION, Samples
 from calibrate.alignment import Alignment
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.model import KinematicModel

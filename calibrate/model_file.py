@@ -191,7 +191,7 @@ class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     bootstrap: BootstrapRecord | None = None
     plan: FileText | None = None
     fit: FitRecord | None = None  # absent in models of earlier versions
-    readings_sha256: Label | None = None  # which readings it was made of (acquisition/recording/fingerprint.py)
+    readings_sha256: Label | None = None  # which readings it was made of (acquisition/recording/samples.py)
     effects: Many[Effect] = ()
     needs: Many[Name] = ()
     session: SessionRecord | None = None

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.recording.can_frames import CHANNELS_NOTE, FLAGS, FrameFlag, is_frames
-from acquisition.recording.layout import SEGMENT_NOTE
-from acquisition.recording.recording import Recording
-from acquisition.recording.stream import Floats, Stream
+from acquisition.recording.mcap.layout import SEGMENT_NOTE
+from acquisition.recording.recording import Floats, Recording, Stream
 
 LOG_NOTES = (SEGMENT_NOTE, CHANNELS_NOTE)
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from acquisition.recording.can_log import SUFFIXES, export_can, import_can
 from acquisition.recording.errors import RecordingError
-from acquisition.recording.read import read
+from acquisition.recording.mcap.read import read
 from acquisition.recording.rig import rig_text
 from acquisition.recording.session_folder.folder import export
 from acquisition.recording.session_folder.import_folder import import_folder

@@ -7,7 +7,7 @@ import msgspec
 from cyclopts import Parameter, validators
 from rich.console import Console
 
-from acquisition.recording.read import read
+from acquisition.recording.mcap.read import read
 from acquisition.recording.rig.schema import Rig
 from calibeam.any_session import Planned, identify_session, write_session_model
 from calibeam.ending import naming, refuse_nothing, tell_unfinished

@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 
 from acquisition.recording.errors import RecordingError
-from acquisition.recording.read import read
+from acquisition.recording.mcap.read import read
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig.schema import Rig
 from calibeam.diagnosis import diagnose_recording

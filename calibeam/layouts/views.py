@@ -8,7 +8,7 @@ from google.protobuf.message import DecodeError
 from mcap.records import Channel, Schema
 
 from acquisition.recording.errors import RecordingError
-from acquisition.recording.layout import EVENTS_TOPIC, GAPS_TOPIC, SAMPLES_TOPIC, VIEW_TOPIC
+from acquisition.recording.mcap.layout import EVENTS_TOPIC, GAPS_TOPIC, SAMPLES_TOPIC, VIEW_TOPIC
 from acquisition.recording.mcap.parts import parts
 from acquisition.recording.mcap.scan import Scan
 

@@ -3,8 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import POSITION, SPOTS
-from acquisition.recording.samples import Samples
+from acquisition.recording.samples import POSITION, SPOTS, Samples
 from calibeam.prove.truth import Truth
 
 Floats = NDArray[np.float64]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.stream import Channel, Event
+from acquisition.recording.recording import Channel, Event
 from calibeam.software import SOFTWARE
 from simulators.conceal.belief import rig_document
 from simulators.conceal.case import Case

@@ -10,7 +10,7 @@ import numpy as np
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.read import read
+from acquisition.recording.mcap.read import read
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import parse_rig, plain_rig, rig_text
 from calibeam.emulation import EmulationError

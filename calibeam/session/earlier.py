@@ -9,7 +9,7 @@ import msgspec
 from acquisition.plan import PoseKey
 from acquisition.recording.errors import RecordingError, shown
 from acquisition.recording.mcap.parts import differs, parts
-from acquisition.recording.read import read
+from acquisition.recording.mcap.read import read
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig.schema import Placement, Rig
 from acquisition.sample import Sample, sample_of

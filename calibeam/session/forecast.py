@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import SPOTS, per_joint
 from acquisition.recording.rig.schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording.samples import SPOTS, Samples, per_joint
 from acquisition.sample import Sample
 from calibrate.arms.catalogue import arm_of
 from calibrate.fit import Status

@@ -11,7 +11,7 @@ from acquisition.camera.sight import Sight
 from acquisition.plan import Block
 from acquisition.planned_session import PlannedSession
 from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.stream import Event
+from acquisition.recording.recording import Event
 from acquisition.reins import Reins
 from acquisition.sample import Sample
 from acquisition.servo.centring import Limits

@@ -21,8 +21,8 @@ from acquisition.recording.files.bounds import (
     Radians,
     RadiansOrNone,
 )
+from acquisition.recording.files.explain import KeyPath
 from acquisition.recording.files.toml_file import parse_toml, read_text
-from acquisition.recording.rig_lines import KeyPath
 from calibrate.error_simulation.law import Law
 from calibrate.errors import DataError
 

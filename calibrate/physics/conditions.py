@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import SEAT
-from acquisition.recording.samples import Samples
+from acquisition.recording.samples import SEAT, Samples
 from calibrate.diagnose.driver_values import moves_of, temperatures_of
 from calibrate.effects.drivers import Drivers
 

@@ -7,8 +7,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import WIRE as COLUMN
 from acquisition.recording.rig.schema import Rig
+from acquisition.recording.samples import WIRE as COLUMN
 from acquisition.recording.samples import Samples
 from calibrate.alignment import trilaterate
 from calibrate.blunders.finding import BlunderKind

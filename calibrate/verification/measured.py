@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import BAR, SEAT
 from acquisition.recording.rig.schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording.samples import BAR, SEAT, Samples
 from calibrate.errors import DataError
 from calibrate.predict import Predictor
 from calibrate.sensors.bar import bar_pairs

@@ -11,8 +11,8 @@ from rich.console import Console
 
 from acquisition.plan import PlanOptions
 from acquisition.recording.errors import RigFileError
+from acquisition.recording.mcap.read import read
 from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.read import read
 from acquisition.recording.rig import load_rig, rig_text
 from calibeam.camera import camera_sight
 from calibeam.cli import run

@@ -11,12 +11,11 @@ import can
 import numpy as np
 import pytest
 
-from acquisition.recording import disk_file
 from acquisition.recording.mcap import mcap_file
 from acquisition.recording.mcap.layout import EVENT, packed
 from acquisition.recording.mcap.mcap_file import McapFile
+from acquisition.recording.mcap.read import read
 from acquisition.recording.mcap.segments import Rotation, segments
-from acquisition.recording.read import read
 from acquisition.recording.rig import parse_rig
 from calibeam import encoder_log
 from calibeam.encoder_log import LOOK_S, EncoderLog, State
@@ -84,7 +83,7 @@ def grown(
     """By how much `size` grows between two segments of one log."""
     clock, sizes = LockStep(), dict[int, float]()
     monkeypatch.setattr(encoder_log, "encoder_driver", lambda device, clock, tap: Encoders(clock, tap))
-    monkeypatch.setattr(disk_file.os, "fsync", lambda descriptor: None)  # the disk's time, and no memory
+    monkeypatch.setattr(mcap_file.os, "fsync", lambda descriptor: None)  # the disk's time, and no memory
     rotation = Rotation(age_s=2.5 * LOOK_S)  # three blocks each
     device = parse_rig(RIG.read_text(), "rig").devices.encoders
     assert device is not None

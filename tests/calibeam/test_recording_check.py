@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording.recording import Channel
 from acquisition.recording.rig import rig_text
-from acquisition.recording.stream import Channel
 from calibeam.cli import run
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"

@@ -13,8 +13,8 @@ import pytest
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
+from acquisition.recording.mcap.read import read
 from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.read import read
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import rig_text
 from acquisition.recording.rig.schema import Rig

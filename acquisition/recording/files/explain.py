@@ -15,8 +15,8 @@ from msgspec.structs import fields
 
 from acquisition.recording.errors import shown
 from acquisition.recording.files.quantity import si_name, spelt, suffix_of
-from acquisition.recording.rig.schema import EMULATION_KEYS, Rig
-from acquisition.recording.rig_lines import KeyPath
+
+KeyPath = tuple[str | int, ...]  # ("arm", "joint", 0, "a_m"): elements of arrays are counted from 0
 
 _PLACE = re.compile(r"^(?P<says>.*?)(?: - at (?P<key>`key` in )?`\$(?P<path>[^`]*)`)?$", re.DOTALL)
 _STEP = re.compile(r"\.([A-Za-z0-9_-]+)|\[([0-9]+)\]|\[(\.\.\.)\]")
@@ -27,7 +27,7 @@ MILLIMETRES = 1000  # in a metre
 LONGEST_KEY = 100  # characters that are compared with known words
 
 
-def explain(error: msgspec.ValidationError, document: Mapping[str, Any], root: Any = Rig) -> tuple[KeyPath, str]:
+def explain(error: msgspec.ValidationError, document: Mapping[str, Any], root: Any) -> tuple[KeyPath, str]:
     """The key at fault and a sentence about it, from the message of msgspec (0.22: "what - at `$.path[0].to`")."""
     path, says, value = located(error, document, root)
     if unknown := _UNKNOWN.search(says):
@@ -63,10 +63,8 @@ def unknown_key(key: str, path: KeyPath, known: Sequence[str]) -> str:
     return f"{says}; did you mean '{near[0]}'?" if near else f"{says}; known are {shown(', '.join(known))}"
 
 
-def known_keys(path: KeyPath, document: Mapping[str, Any], root: Any = Rig) -> tuple[str, ...]:
+def known_keys(path: KeyPath, document: Mapping[str, Any], root: Any) -> tuple[str, ...]:
     """The keys that the file may have at this place."""
-    if path == ("emulation",):
-        return EMULATION_KEYS
     found = _type_at(path, document, root)
     return tuple(field.encode_name for field in fields(found)) if _is_struct(found) else ()
 

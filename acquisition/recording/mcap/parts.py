@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.recording.columns import Kind, kind_of
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig.schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording.samples import Kind, Samples, kind_of
 
 FIRST = "recording.mcap"
 _LATER = re.compile(r"recording-(\d{4})\.mcap")

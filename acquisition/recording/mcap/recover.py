@@ -14,7 +14,7 @@ from google.protobuf.message import DecodeError
 from mcap.records import Channel, Header, Message, Metadata, Schema
 
 from acquisition.recording.errors import RecordingError
-from acquisition.recording.layout import (
+from acquisition.recording.mcap.layout import (
     CHECKSUM,
     END_METADATA,
     FORMAT_VERSION,
@@ -22,12 +22,13 @@ from acquisition.recording.layout import (
     RECORDING_METADATA,
     RECOVERY_METADATA,
     RIG_METADATA,
+    MessageType,
     checksum,
+    embedded_type,
 )
-from acquisition.recording.mcap.layout import MessageType, embedded_type
 from acquisition.recording.mcap.mcap_file import McapFile
+from acquisition.recording.mcap.read import read
 from acquisition.recording.mcap.scan import Scan
-from acquisition.recording.read import read
 from acquisition.recording.rig import rig_sha256
 
 FLUSH_BYTES = 4 * 2**20

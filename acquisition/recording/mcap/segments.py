@@ -15,10 +15,9 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from acquisition.recording.errors import RecordingError
-from acquisition.recording.layout import BEFORE_NOTE, SEGMENT_NOTE
-from acquisition.recording.mcap.writer import Clock, RecordingWriter
-from acquisition.recording.stream import Channel, Event, Gap
-from acquisition.recording.stream_writer import StreamWriter
+from acquisition.recording.mcap.layout import BEFORE_NOTE, SEGMENT_NOTE
+from acquisition.recording.mcap.writer import Clock, RecordingWriter, StreamWriter
+from acquisition.recording.recording import Channel, Event, Gap
 
 _NAME = re.compile(r"segment-(\d+)\.mcap")
 

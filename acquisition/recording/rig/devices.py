@@ -1,6 +1,6 @@
 """[devices] of a rig file as frozen records: which instruments there are, and how each is reached.
 
-As in the rest of the file (rig_schema), a key that is not declared here is refused.
+As in the rest of the file (schema.py), a key that is not declared here is refused.
 """
 
 import enum

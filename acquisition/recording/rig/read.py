@@ -10,12 +10,11 @@ import msgspec
 
 from acquisition.recording.errors import RigFileError, shown
 from acquisition.recording.files.bounds import most_of
-from acquisition.recording.files.explain import spelled, unknown_key
+from acquisition.recording.files.explain import KeyPath, spelled, unknown_key
 from acquisition.recording.files.quantity import si_value, suffix_of
 from acquisition.recording.files.toml_file import TomlFile, parse_toml, read_text
 from acquisition.recording.rig.rules import faults
 from acquisition.recording.rig.schema import EMULATION_KEYS, ArmModel, Rig
-from acquisition.recording.rig_lines import KeyPath
 
 
 def load_rig(path: Path | str) -> Rig:

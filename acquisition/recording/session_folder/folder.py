@@ -7,10 +7,8 @@ from acquisition.recording.recording import Recording
 from acquisition.recording.rig import parse_rig, rig_text
 from acquisition.recording.rig.schema import Rig
 from acquisition.recording.samples import Samples
-from acquisition.recording.samples_csv import read_csv, write_csv
-from acquisition.recording.samples_parquet import read_parquet, write_parquet
 from acquisition.recording.session_folder.stream_tables import with_streams
-from acquisition.recording.session_folder.tables import TableFormat
+from acquisition.recording.session_folder.tables import TableFormat, read_csv, read_parquet, write_csv, write_parquet
 
 RIG = "rig.toml"
 CSV = "samples.csv"

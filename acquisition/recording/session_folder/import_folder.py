@@ -10,11 +10,10 @@ from pathlib import Path
 
 from acquisition.recording.errors import RecordingError, shown
 from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.recording import Recording
+from acquisition.recording.recording import Recording, Stream
 from acquisition.recording.session_folder.folder import read_folder
-from acquisition.recording.stream import Stream
 
-WAITING = 16 * 2**20  # bytes given to the writer before it is waited for: a quarter of what may wait (spool.py)
+WAITING = 16 * 2**20  # bytes given to the writer before it is waited for: a quarter of what may wait (write_thread.py)
 BLOCK = 1000  # rows of a stream at a time; a viewer loads little more than the time it shows
 
 

@@ -32,9 +32,8 @@ from acquisition.recording.files.bounds import (
     Sentence,
 )
 from acquisition.recording.files.json_file import JsonKind, read_json
-from acquisition.recording.recording import Recording
+from acquisition.recording.recording import Channel, Event, Gap, Recording, Stream, check_declaration, scalar_names
 from acquisition.recording.session_folder.tables import EVENTS, GAPS, TableFormat, table_name, write_tables
-from acquisition.recording.stream import Channel, Event, Gap, Stream, check_declaration, scalar_names
 
 FOLDER, ABOUT = "streams", "streams.json"
 KIND = JsonKind(ABOUT, "export the recording again with --streams", "export the recording again", RecordingError)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording.errors import RecordingError, RigFileError, SamplesError
-from acquisition.recording.read import read
+from acquisition.recording.mcap.read import read
 from acquisition.recording.session_folder.folder import export
 from acquisition.recording.session_folder.import_folder import import_folder
 

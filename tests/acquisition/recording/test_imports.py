@@ -5,7 +5,7 @@ import sys
 
 PROGRAM = """
 import sys
-import acquisition.recording.check_recording, acquisition.recording.session_folder.folder, acquisition.recording.read, acquisition.recording.rig
+import acquisition.recording.check_recording, acquisition.recording.mcap.read
 print(sorted({"serial", "can", "canopen", "socket", "ssl", "asyncio", "drivers"} & set(sys.modules)))
 """
 

@@ -13,7 +13,7 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.stream import Channel, Event
+from acquisition.recording.recording import Channel, Event
 
 Open = Callable[..., RecordingWriter]
 

@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 
 from acquisition.recording.errors import RecordingError
+from acquisition.recording.mcap.read import read
 from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
+from acquisition.recording.recording import Channel, Event, Gap, Recording, Stream
 from acquisition.recording.session_folder.folder import export
 from acquisition.recording.session_folder.import_folder import import_folder
 from acquisition.recording.session_folder.stream_tables import write_streams
 from acquisition.recording.session_folder.tables import TableFormat
-from acquisition.recording.stream import Channel, Event, Gap, Stream
 
 COUNT = 2500  # more than a block
 

@@ -9,10 +9,10 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from acquisition.recording.columns import SPOTS
 from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording.recording import Channel, Event
 from acquisition.recording.rig import rig_text
-from acquisition.recording.stream import Channel, Event
+from acquisition.recording.samples import SPOTS
 from calibeam.cli import run
 from calibeam.commands.demo import RIG
 from calibeam.site import VIEWED

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording.can_frames import block_of, channels
-from acquisition.recording.can_message import frame_of
+from acquisition.recording.can_log import frame_of
 from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording.recording import Channel, Event, Gap
 from acquisition.recording.rig import load_rig, rig_sha256, rig_text
-from acquisition.recording.stream import Channel, Event, Gap
 from calibeam.fleet.found import recordings
 from calibeam.fleet.judge import judged
 from calibeam.fleet.order import Task

@@ -11,8 +11,8 @@ import pytest
 
 from acquisition.plan import PlanOptions, blocks
 from acquisition.recording.mcap.parts import parts
+from acquisition.recording.mcap.read import read
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan, write_pose_plan
-from acquisition.recording.read import read
 from acquisition.recording.rig import load_rig
 from acquisition.sample import Sample
 from acquisition.session_states import State

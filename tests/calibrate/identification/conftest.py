@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.read import read
+from acquisition.recording.mcap.read import read
 from acquisition.recording.rig import load_rig
 from acquisition.recording.rig.schema import Bar
 from acquisition.recording.samples import Samples
