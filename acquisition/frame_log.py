@@ -8,6 +8,7 @@ import can
 import numpy as np
 from numpy.typing import ArrayLike
 
+from acquisition.recording import Channel, RecordingError
 from acquisition.recording.can_frames import (
     CLASSIC_BYTES,
     FD_BYTES,
@@ -19,8 +20,6 @@ from acquisition.recording.can_frames import (
     channels,
 )
 from acquisition.recording.can_log import frame_of
-from acquisition.recording.errors import RecordingError
-from acquisition.recording.recording import Channel
 from drivers.clock import Clock
 
 _ERROR = int(FrameFlag.ERROR)  # comparing with a member of an enumeration takes ten times as long

@@ -15,9 +15,8 @@ import can
 import numpy as np
 
 from acquisition.frame_log import FrameLog
+from acquisition.recording import RecordingWriter, read
 from acquisition.recording.can_frames import DATA, STREAM
-from acquisition.recording.mcap.read import read
-from acquisition.recording.mcap.writer import RecordingWriter
 from acquisition.recording.rig import rig_text
 from drivers.clock import SystemClock
 from drivers.transports.can_interfaces import bus_opener

@@ -18,7 +18,7 @@ from acquisition.aiming.reach import reach
 from acquisition.aiming.search import Found, Search
 from acquisition.believed import BelievedArm, FixtureOptics
 from acquisition.errors import UnreachableError
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig
 from acquisition.servo.centring import Limits, centre
 from acquisition.servo.law import FixedGuess
 from acquisition.servo.measured import Measured

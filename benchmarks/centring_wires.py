@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from acquisition.bench import Bench, Look
 from acquisition.plan import PlanOptions
-from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording import RecordingWriter
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.sample import Sample
 from acquisition.servo.centring import Limits

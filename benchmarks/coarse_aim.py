@@ -25,8 +25,7 @@ from acquisition.camera.model import CameraFit, CameraModel
 from acquisition.camera.sight import Sight
 from acquisition.errors import UnreachableError
 from acquisition.motion.rigid import inverse, transform
-from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig, load_rig, plain_rig, rig_text
 from acquisition.sample import Sample
 from calibeam.direct import DirectBench, direct_bench
 from calibeam.direct_eye import DirectEye

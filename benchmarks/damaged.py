@@ -7,10 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.recording.errors import RecordingError
-from acquisition.recording.mcap.read import read
-from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.recording import Channel, Event, Recording
+from acquisition.recording import Channel, Event, Recording, RecordingError, RecordingWriter, read
 from acquisition.recording.rig import rig_text
 
 CUTS = FLIPS = 2000

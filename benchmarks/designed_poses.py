@@ -16,12 +16,9 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.plan import PlanOptions
 from acquisition.planned_session import PlannedSession
-from acquisition.recording.mcap.read import read
-from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording import Recording, RecordingWriter, read
 from acquisition.recording.pose_plan import PosePlan
-from acquisition.recording.recording import Recording
-from acquisition.recording.rig import load_rig, plain_rig, rig_sha256, rig_text
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig, load_rig, plain_rig, rig_sha256, rig_text
 from benchmarks.slices import Slices
 from calibeam.any_session import Planned, identify_session
 from calibeam.direct import direct_bench

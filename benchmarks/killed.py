@@ -12,8 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.recording.mcap.read import read
-from acquisition.recording.mcap.recover import recover
+from acquisition.recording import read, recover
 
 KILLS = 100
 SEED = 1

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from acquisition.psd_view import PsdView
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig
 from calibeam.live.feed import Feed
 from calibrate.believed import BelievedRig
 from calibrate.believed_fixture import Light

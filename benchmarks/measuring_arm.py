@@ -22,8 +22,7 @@ from acquisition.guided.plan import GuidedOptions, calibration_plan
 from acquisition.guided.reading import Reading
 from acquisition.guided.session import GuidedSession
 from acquisition.guided.stillness import Motion, StillRule
-from acquisition.recording.rig import load_rig, plain_rig, rig_sha256, rig_text
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig, load_rig, plain_rig, rig_sha256, rig_text
 from benchmarks.slices import Slices
 from calibeam.guided.arm import BelievedGuidedArm
 from calibeam.guided.direct import COUNTS, DirectHand

@@ -12,12 +12,9 @@ import numpy as np
 
 from acquisition.plan import PlanOptions
 from acquisition.planned_session import PlannedSession
-from acquisition.recording.mcap.read import read
-from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording import Recording, RecordingWriter, Samples, read
 from acquisition.recording.pose_plan import read_pose_plan
-from acquisition.recording.recording import Recording
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from acquisition.recording.samples import Samples
 from acquisition.session import Session
 from calibeam.diagnosis import diagnose_recording, plan_next
 from calibeam.direct import DirectBench

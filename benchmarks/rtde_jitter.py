@@ -12,9 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.recording.mcap.read import read
-from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.recording import Channel
+from acquisition.recording import Channel, RecordingWriter, read
 from acquisition.recording.rig import plain_rig, rig_text
 from acquisition.streams import Pump
 from drivers.clock import SystemClock

@@ -14,9 +14,7 @@ from numpy.typing import NDArray
 
 from acquisition.bench import Look
 from acquisition.plan import PlanOptions
-from acquisition.recording.mcap.read import read
-from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.recording import Channel, Recording
+from acquisition.recording import Channel, Recording, RecordingWriter, read
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
 from acquisition.session import Session
 from benchmarks.disturbed import DisturbedWorld, Trouble

@@ -11,9 +11,7 @@ import msgspec
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.mcap.read import read
-from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording, RecordingWriter, read
 from acquisition.recording.rig import load_rig, rig_text
 from benchmarks.disturbed import Trouble
 from calibeam.diagnosis import diagnose_recording

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.mcap.read import read
-from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording import RecordingWriter, read
+from acquisition.recording.rig import Rig
 from acquisition.session import Session
 from calibeam.any_session import identify_session
 from calibeam.direct import direct_bench

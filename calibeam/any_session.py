@@ -6,9 +6,8 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording, readings_sha256
 from acquisition.recording.rig import rig_sha256
-from acquisition.recording.samples import readings_sha256
 from calibrate.fit_plan import DEFAULT, FitPlan, read_plan
 from calibrate.identification.identify import identify
 from calibrate.identification.record import record_of

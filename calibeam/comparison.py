@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from acquisition.recording.recording import Recording
-from acquisition.recording.samples import Samples
+from acquisition.recording import Recording, Samples
 from calibeam.comparison_record import ComparisonFile, LinkRecord, StreamRecord
 from calibeam.diagnosis import diagnose_recording
 from calibeam.software import SOFTWARE

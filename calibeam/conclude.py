@@ -9,8 +9,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from acquisition.recording.mcap.read import read
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording, read
 from calibeam.any_session import identify_session, write_session_model
 from calibeam.diagnosis import diagnosed_to
 from calibeam.diagnosis_lines import print_diagnosis

@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from acquisition.recording.mcap.read import read
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording, read
 from calibeam.modelled import modelled
 from calibrate.diagnose.file import read_diagnosis
 from calibrate.model_file import read_model

@@ -14,9 +14,8 @@ import can
 
 from acquisition.frame_log import FrameLog
 from acquisition.guarded import Guarded
-from acquisition.recording.mcap.segments import Rotation, SegmentedRecording, SegmentStream
-from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.recording import Channel, Gap
+from acquisition.recording import Channel, Gap, RecordingWriter
+from acquisition.recording.mcap import Rotation, SegmentedRecording, SegmentStream
 from acquisition.recording.rig.devices import EncodersDevice
 from acquisition.reopening import Reopening
 from acquisition.streams import Pump

@@ -3,8 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.recording import Event
+from acquisition.recording import Event, RecordingWriter
 from acquisition.sample import Sample
 from drivers.clock import Clock
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.cia406.objects import EMERGENCY_TEXTS
+from drivers.cia406.codec import EMERGENCY_TEXTS
 from drivers.device import Block
 from drivers.psd_daq.messages import FaceIdentity
 from drivers.psd_faces import FaceKind, layer_mismatch

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording
 from calibeam.any_session import Planned, identify_session, session_model
 from calibeam.ending import UNFINISHED, refuse_nothing
 from calibrate.fit import Status

@@ -7,8 +7,8 @@ from typing import Any, Protocol
 from msgspec import structs
 
 from acquisition.psd_view import PsdView
+from acquisition.recording.rig import Rig
 from acquisition.recording.rig.devices import PsdDevice, PsdDriver
-from acquisition.recording.rig.schema import Rig
 from drivers.clock import Clock
 from drivers.device import Device
 from drivers.errors import DeviceRefused

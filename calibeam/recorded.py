@@ -17,12 +17,9 @@ from acquisition.errors import AcquisitionError
 from acquisition.plan import PlanOptions
 from acquisition.planned_session import PlannedSession
 from acquisition.progress import Progress
-from acquisition.recording.errors import RecordingError
-from acquisition.recording.mcap.read import read
-from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording import Event, RecordingError, RecordingWriter, read
 from acquisition.recording.pose_plan import PosePlan
-from acquisition.recording.recording import Event
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig
 from acquisition.servo.centring import Limits
 from acquisition.session import Session, Summary
 from calibeam.emulation import EmulationError

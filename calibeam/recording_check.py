@@ -7,11 +7,10 @@ import msgspec
 import numpy as np
 from rich.console import Console
 
-from acquisition.recording.check_recording import Finding, check
+from acquisition.recording import Finding, Recording, Stream, check, read
 from acquisition.recording.device_clock import ClockModel, ClockStatus, clock_model
-from acquisition.recording.mcap.read import read
-from acquisition.recording.mcap.segments import segments
-from acquisition.recording.recording import Floats, Recording, Stream
+from acquisition.recording.mcap import segments
+from acquisition.recording.samples import Floats
 
 SAME_S = 1.0  # longer than any driver keeps a sample
 MOST_LINES = 20  # findings of one file told one by one; a script gets all of them with --json

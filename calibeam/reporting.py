@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording
 from calibeam.any_session import identify_session, session_model
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.model_file import ModelFile

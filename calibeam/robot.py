@@ -6,7 +6,7 @@ from typing import Any
 
 import msgspec
 
-from acquisition.recording.errors import RigFileError
+from acquisition.recording import RigFileError
 from acquisition.recording.rig.devices import RobotDevice, RobotDriver
 from drivers.clock import Clock
 from drivers.device import Device, Movable

@@ -6,7 +6,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig
 from calibeam.evidence_lines import lines_of
 from calibeam.verdict_line import print_verdict
 from calibrate.default_belief import said_of

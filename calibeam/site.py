@@ -10,11 +10,9 @@ from typing import Any
 from acquisition.errors import StoppedError
 from acquisition.guarded import Guarded
 from acquisition.psd_view import PsdView, psd_window
-from acquisition.recording.errors import RecordingError, RigFileError
-from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.recording import Channel, Event
+from acquisition.recording import Channel, Event, RecordingError, RecordingWriter, RigFileError
+from acquisition.recording.rig import Rig
 from acquisition.recording.rig.devices import EncodersDevice, PsdDevice, RobotDevice
-from acquisition.recording.rig.schema import Rig
 from acquisition.streams import Pump
 from acquisition.supervisor import Supervisor
 from acquisition.wired import Pumps, Speeds, WiredBench

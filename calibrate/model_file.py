@@ -5,13 +5,14 @@ Angles are rad, lengths m. A joint's true angle is its reading plus `joint<i>.ze
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.errors import shown
+from acquisition.recording import TYPE_CHECKING
+from acquisition.recording.files import JsonKind, read_json, shown
 from acquisition.recording.files.bounds import (
     Correction,
     Count,
@@ -25,7 +26,6 @@ from acquisition.recording.files.bounds import (
     Statistic,
     Whole,
 )
-from acquisition.recording.files.json_file import JsonKind, read_json
 from calibrate.errors import DataError
 from calibrate.older_models import with_present_names
 from calibrate.parameters import Parameter

@@ -7,8 +7,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig.schema import Rig
-from acquisition.recording.samples import POSITION, Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import POSITION
 from calibrate.alignment import Alignment, align, align_with_tool
 from calibrate.arms.model import KinematicModel
 from calibrate.errors import DataError

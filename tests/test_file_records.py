@@ -13,7 +13,7 @@ from acquisition.camera import model as camera
 from acquisition.motion.task.task_file import TaskEntries
 from acquisition.recording.mcap import read
 from acquisition.recording.pose_plan import PosePlan
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig
 from acquisition.recording.session_folder.stream_tables import StreamsAbout
 from calibeam.fleet.row import Row
 from calibrate.diagnose.schema import DiagnosisFile

@@ -20,7 +20,7 @@ from acquisition.journal import Journal
 from acquisition.learner import Learner
 from acquisition.motion.rigid import transform
 from acquisition.navigator import Navigator
-from acquisition.recording.rig.schema import Camera
+from acquisition.recording.rig import Camera
 
 Floats = NDArray[np.float64]
 

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from acquisition.errors import AcquisitionError
 from acquisition.guided.target import BarEnd, Cone, SphereSpot, Target, Vector
 from acquisition.recording.pose_plan import PosePlan
-from acquisition.recording.rig.schema import BarPosition, Rig, Sphere
+from acquisition.recording.rig import Rig, Sphere
+from acquisition.recording.rig.schema import BarPosition
 
 Floats = NDArray[np.float64]
 GOLDEN_RAD = np.pi * (3.0 - np.sqrt(5.0))

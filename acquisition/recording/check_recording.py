@@ -8,7 +8,8 @@ import numpy as np
 
 from acquisition.recording.can_frames import CHANNELS_NOTE, FLAGS, FrameFlag, is_frames
 from acquisition.recording.mcap.layout import SEGMENT_NOTE
-from acquisition.recording.recording import Floats, Recording, Stream
+from acquisition.recording.recording import Recording, Stream
+from acquisition.recording.samples import Floats
 
 LOG_NOTES = (SEGMENT_NOTE, CHANNELS_NOTE)
 

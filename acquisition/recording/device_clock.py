@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.recording.recording import Floats, Stream
+from acquisition.recording.recording import Stream
+from acquisition.recording.samples import Floats
 
 FEWEST = 10  # samples
 SHORTEST_S = 1.0  # of device time: below it a delay of a millisecond looks like a rate of 0.1 %

@@ -14,10 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig.schema import Rig
-from acquisition.recording.samples import Samples
-
-Floats = NDArray[np.float64]
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import Floats, Samples
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _STREAM_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.errors import SamplesError, shown
 from acquisition.recording.files.bounds import LENGTH_M, most_of
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig
 from acquisition.recording.samples import (
     COMPLETE_PER_JOINT,
     ORIENTATION,

@@ -5,7 +5,7 @@ from pathlib import Path
 import msgspec
 from rich.console import Console
 
-from acquisition.recording.mcap.read import read
+from acquisition.recording import read
 from calibeam.comparison import compare
 from calibeam.comparison_lines import print_comparison
 from calibeam.comparison_record import write_comparison

@@ -7,7 +7,7 @@ from pathlib import Path
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.errors import RecordingError
+from acquisition.recording import RecordingError
 from acquisition.recording.rig import load_rig, rig_text
 from calibeam.emulation import Emulation
 from calibeam.progress_bar import progress_bar

@@ -5,7 +5,7 @@ from pathlib import Path
 import msgspec
 from rich.console import Console
 
-from acquisition.recording.mcap.read import read
+from acquisition.recording import read
 from calibeam.diagnosis import diagnose_recording, plan_next, refuse_wrong_file
 from calibeam.diagnosis_lines import print_diagnosis
 from calibeam.ending import naming

@@ -7,8 +7,8 @@ import msgspec
 from cyclopts import Parameter, validators
 from rich.console import Console
 
-from acquisition.recording.mcap.read import read
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording import read
+from acquisition.recording.rig import Rig
 from calibeam.any_session import Planned, identify_session, write_session_model
 from calibeam.ending import naming, refuse_nothing, tell_unfinished
 from calibeam.refitted_lines import refitted_lines

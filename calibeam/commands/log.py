@@ -9,8 +9,8 @@ import msgspec
 from cyclopts import App, Parameter
 from rich.console import Console
 
-from acquisition.recording.errors import RecordingError
-from acquisition.recording.mcap.segments import Rotation
+from acquisition.recording import RecordingError
+from acquisition.recording.mcap import Rotation
 from acquisition.recording.rig import load_rig, rig_text
 from calibeam.encoder_log import EncoderLog, State
 from calibeam.outcome import PartialResult

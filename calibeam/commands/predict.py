@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from acquisition.recording.session_folder.tables import read_csv, read_parquet
+from acquisition.recording.session_folder import read_csv, read_parquet
 from calibeam.predicted_csv import write_predicted
 from calibrate.model_file import read_model
 from calibrate.physics.predicting import predict_with_physics

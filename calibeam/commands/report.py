@@ -4,7 +4,7 @@ from pathlib import Path
 
 import msgspec
 
-from acquisition.recording.mcap.read import read
+from acquisition.recording import read
 from calibeam.earlier import earlier_calibration
 from calibeam.ending import naming
 from calibeam.reporting import write_any_report

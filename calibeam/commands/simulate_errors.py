@@ -7,8 +7,7 @@ import msgspec
 from cyclopts import Parameter, validators
 from rich.console import Console
 
-from acquisition.recording.rig import load_rig
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig, load_rig
 from calibeam.error_lines import print_simulation
 from calibeam.geometry_only import read_geometry
 from calibeam.progress_bar import progress_bar

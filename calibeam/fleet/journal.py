@@ -9,7 +9,8 @@ from typing import IO, Self
 
 import msgspec
 
-from acquisition.recording.errors import RecordingError, shown
+from acquisition.recording import RecordingError
+from acquisition.recording.files import shown
 from calibeam.fleet.layout import JOURNAL, TABLE
 from calibeam.fleet.row import Row
 from calibeam.fleet.table import read_rows, write_rows

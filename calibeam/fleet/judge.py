@@ -6,10 +6,8 @@ from typing import Any
 
 import msgspec
 
-from acquisition.recording.errors import RecordingError
-from acquisition.recording.mcap.read import read
-from acquisition.recording.recording import Recording
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording import Recording, RecordingError, read
+from acquisition.recording.rig import Rig
 from calibeam.diagnosis import diagnose_recording
 from calibeam.fleet.found import content_sha256
 from calibeam.fleet.free_space import drawn_against_identified

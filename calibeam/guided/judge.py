@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from acquisition.guided.judge import Doubt
 from acquisition.guided.reading import Reading
 from acquisition.guided.target import BarEnd, Cone
-from acquisition.recording.rig.schema import Rig, Tolerance
+from acquisition.recording.rig import Rig, Tolerance
 from calibeam.guided.refit import LIMIT_SIGMAS, Refit, believed, refitted, visits_of
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.eccentric import with_discs

@@ -12,11 +12,9 @@ from acquisition.guided.plan import Visit
 from acquisition.guided.reading import Reading
 from acquisition.guided.session import GuidedSession, Summary
 from acquisition.guided.wired import WiredEncoderWatch
-from acquisition.recording.errors import RecordingError, RigFileError
-from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.recording import Channel, Event
+from acquisition.recording import Channel, Event, RecordingError, RecordingWriter, RigFileError
+from acquisition.recording.rig import Rig
 from acquisition.recording.rig.devices import EncodersDevice
-from acquisition.recording.rig.schema import Rig
 from acquisition.streams import Pump
 from acquisition.supervisor import Supervisor
 from calibeam.encoders import VIEWED, emulated_encoders, encoder_driver, identities_of

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from acquisition.guided.guide import Guide
 from acquisition.guided.plan import GuidedOptions, Visit, by_kind, calibration_plan, verification_plan
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig
 from calibeam.guided.hand import EmulatedHand
 from calibeam.guided.recorded import EncoderAddress, record_guided, watching
 from calibeam.guided.view import PersonGuide

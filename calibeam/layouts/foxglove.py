@@ -7,7 +7,7 @@ paths are topic.field (docs.foxglove.dev, Message path syntax).
 from collections.abc import Sequence
 from typing import Any
 
-from acquisition.recording.mcap.layout import EVENTS_TOPIC
+from acquisition.recording.mcap import EVENTS_TOPIC
 from calibeam.layouts.panels import Panel, panels
 from calibeam.layouts.views import Views
 

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 
 from msgspec import Struct
 
+from acquisition.recording.rig import Rig
 from acquisition.recording.rig.devices import EncoderDriver
-from acquisition.recording.rig.schema import Rig
 from calibeam.listened import LEAST_RATE
 from calibeam.live.latest import Heard
 

@@ -15,7 +15,7 @@ from urllib.parse import quote
 import uvicorn
 
 from acquisition.errors import AcquisitionError
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig
 from calibeam.live.access import LOOPBACK_NAMES, Rules, is_loopback
 from calibeam.live.alone import watched_pages
 from calibeam.live.app import live_app

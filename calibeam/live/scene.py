@@ -7,7 +7,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig
 from calibeam.motion.arm import motion_arm
 from calibrate.believed import BelievedRig
 from calibrate.believed_fixture import Light

@@ -13,7 +13,7 @@ from acquisition.motion.gate import Gate
 from acquisition.motion.inverse.solver import Solver
 from acquisition.motion.paths.segments import Segment
 from acquisition.motion.plan import Plan
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig
 from calibeam.asking import YES, Asking, at_terminal, someone
 from calibeam.motion.gate_of_rig import cell_of, gate_of, solver_of
 from calibeam.motion.keys import keys_of

@@ -13,7 +13,7 @@ from acquisition.motion.inverse.closed_form import closed_form
 from acquisition.motion.inverse.solver import Solver
 from acquisition.motion.paths.segments import Pace
 from acquisition.motion.setpoints import solve_rate_hz
-from acquisition.recording.rig.schema import ArmModel, Rig
+from acquisition.recording.rig import ArmModel, Rig
 from acquisition.streams import Pump
 from calibeam.geometry_only import read_geometry
 from calibeam.motion.arm import motion_arm

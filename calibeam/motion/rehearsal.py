@@ -19,7 +19,7 @@ from acquisition.motion.gated_arm import GatedArm
 from acquisition.navigator import FINDING_STAND_OFF_M
 from acquisition.plan import PlanOptions, blocks
 from acquisition.recording.pose_plan import PosePlan
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig
 from calibeam.learner import FittedLearner
 from calibeam.motion.arm import MotionArm, motion_arm
 from calibeam.motion.gate_of_rig import cell_of

@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig
 from calibeam.motion.cell_figure import draw_cell
 from calibeam.motion.gate_of_rig import cell_of
 from calibeam.motion.rehearsal import Rehearsal

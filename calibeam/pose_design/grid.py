@@ -3,7 +3,7 @@
 import msgspec
 import numpy as np
 
-from acquisition.recording.rig.schema import Placement, Pose, Rig
+from acquisition.recording.rig import Placement, Pose, Rig
 from calibrate.arms.convert import pose_of
 from calibrate.rigid import transform
 

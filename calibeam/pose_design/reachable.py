@@ -16,7 +16,7 @@ from acquisition.aiming.reach import clear_of_table
 from acquisition.motion.cell import body_points
 from acquisition.motion.inverse.solve import all_solutions
 from acquisition.plan import PlanOptions
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig
 from calibeam.motion.gate_of_rig import cell_of, solver_of
 from calibrate.believed import BelievedRig
 from calibrate.believed_fixture import Light

@@ -29,7 +29,7 @@ class NoSimulators:
 
 def answer(recording: Path, asked: Path, out: Path) -> None:
     """Writes diagnosis.json and, where both models say it, unseen.npz with the tool at the poses asked."""
-    from acquisition.recording.mcap.read import read
+    from acquisition.recording import read
     from calibeam.diagnosis import diagnose_recording
     from calibeam.prove.unseen_file import read_asked, write_unseen
     from calibeam.prove.unseen_poses import tool_at

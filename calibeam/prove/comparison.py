@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.mcap.read import read
+from acquisition.recording import read
 from calibeam.prove.baselines.features import features
 from calibeam.prove.baselines.method import Method
 from calibeam.prove.baselines.methods import installed

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording
 from calibrate.chain import Chain
 from calibrate.diagnose.fitted import Fitted, fit_geometry
 from calibrate.diagnose.folds import splits_of

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
 from calibrate.diagnose.schema import CurveRecord, DiagnosisFile
 
 Floats = NDArray[np.float64]

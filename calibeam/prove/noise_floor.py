@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.samples import POSITION, SPOTS, Samples
+from acquisition.recording import Samples
+from acquisition.recording.samples import POSITION, SPOTS
 from calibeam.prove.truth import Truth
 
 Floats = NDArray[np.float64]

@@ -8,11 +8,8 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from acquisition.recording.mcap.read import read
-from acquisition.recording.recording import Recording
-from acquisition.recording.samples import Samples
-from acquisition.recording.session_folder.folder import CSV, RIG
-from acquisition.recording.session_folder.tables import write_csv
+from acquisition.recording import Recording, Samples, read
+from acquisition.recording.session_folder import CSV, RIG, write_csv
 from calibeam.prove.diagnosing import Answered, diagnose_cases
 from calibeam.prove.hidden_angle import HiddenAngle, hidden_angles
 from calibeam.prove.hidden_column import HiddenColumn, against_hidden

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from acquisition.recording.mcap.read import read
+from acquisition.recording import read
 from calibeam.prove.concealing import Concealed
 from calibeam.prove.diagnosing import Answered
 from calibeam.prove.equivalent import same_name, same_place

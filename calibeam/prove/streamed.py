@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.recording import Channel, Event
+from acquisition.recording import Channel, Event, RecordingWriter
 from calibeam.software import SOFTWARE
 from simulators.conceal.belief import rig_document
 from simulators.conceal.case import Case

@@ -10,8 +10,7 @@ import numpy as np
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.mcap.read import read
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording, read
 from acquisition.recording.rig import parse_rig, plain_rig, rig_text
 from calibeam.emulation import EmulationError
 from calibeam.outcome import PartialResult

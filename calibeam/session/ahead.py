@@ -14,7 +14,7 @@ from acquisition.aiming.reach import reach
 from acquisition.errors import UnreachableError
 from acquisition.plan import Block, PoseKey
 from acquisition.recording.pose_plan import PosePlan
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.believed import BelievedRig
 from calibrate.pose_design.candidates import Candidates
 

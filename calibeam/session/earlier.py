@@ -7,11 +7,10 @@ from pathlib import Path
 import msgspec
 
 from acquisition.plan import PoseKey
-from acquisition.recording.errors import RecordingError, shown
-from acquisition.recording.mcap.parts import differs, parts
-from acquisition.recording.mcap.read import read
-from acquisition.recording.recording import Recording
-from acquisition.recording.rig.schema import Placement, Rig
+from acquisition.recording import Recording, RecordingError, read
+from acquisition.recording.files import shown
+from acquisition.recording.mcap import differs, parts
+from acquisition.recording.rig import Placement, Rig
 from acquisition.sample import Sample, sample_of
 
 PLACE_EVENT, STANDS_IN = "placement", "place added"

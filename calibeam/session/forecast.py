@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig.schema import Rig
-from acquisition.recording.samples import SPOTS, Samples, per_joint
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import SPOTS, per_joint
 from acquisition.sample import Sample
 from calibrate.arms.catalogue import arm_of
 from calibrate.fit import Status

@@ -8,7 +8,7 @@ from pathlib import Path
 from acquisition.errors import AcquisitionError
 from acquisition.plan import Block, PlanOptions, PoseKey, blocks
 from acquisition.recording.pose_plan import PosePlan
-from acquisition.recording.rig.schema import Placement, Rig
+from acquisition.recording.rig import Placement, Rig
 from calibeam.session.earlier import PLAN_NOTE, SEED_NOTE, Earlier
 from calibeam.session.places import moved_plan, with_places
 from calibeam.site import Addresses

@@ -5,10 +5,9 @@ from collections.abc import Mapping, Sequence
 
 import msgspec
 
-from acquisition.recording.errors import RigFileError
+from acquisition.recording import RigFileError
 from acquisition.recording.pose_plan import PosePlan
-from acquisition.recording.rig import parse_rig
-from acquisition.recording.rig.schema import Placement, Pose, Rig
+from acquisition.recording.rig import Placement, Pose, Rig, parse_rig
 
 TEXT = """
 # added by the session

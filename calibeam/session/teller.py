@@ -10,7 +10,7 @@ import numpy as np
 
 from acquisition.journal import Journal
 from acquisition.progress import Phase, Progress
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig
 from acquisition.sample import Sample
 from acquisition.session_states import State
 from calibeam.outcome import PartialResult

@@ -10,8 +10,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig.schema import Rig
-from acquisition.recording.samples import SPOTS, Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import SPOTS
 from calibrate.arms.catalogue import arm_of
 from calibrate.blunders.finding import Blunder, BlunderKind
 from calibrate.blunders.witness import thinned

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from acquisition.recording.rig.schema import Rig
-from acquisition.recording.samples import Samples, joint_of, per_joint
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import joint_of, per_joint
 from calibrate.diagnose.session import Session
 from calibrate.effects.drivers import Drivers, Readout
 from calibrate.sensors.catalogue import SENSORS

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from acquisition.recording.rig import parse_rig
-from acquisition.recording.rig.schema import ArmModel, Rig
+from acquisition.recording.rig import ArmModel, Rig, parse_rig
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.compiled import PER_PART
 from calibrate.arms.serial import chain_frames

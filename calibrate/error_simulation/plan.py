@@ -6,7 +6,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from acquisition.recording.errors import shown
+from acquisition.recording.files import KeyPath, parse_toml, read_text, shown
 from acquisition.recording.files.bounds import (
     Expansion,
     Few,
@@ -21,8 +21,6 @@ from acquisition.recording.files.bounds import (
     Radians,
     RadiansOrNone,
 )
-from acquisition.recording.files.explain import KeyPath
-from acquisition.recording.files.toml_file import parse_toml, read_text
 from calibrate.error_simulation.law import Law
 from calibrate.errors import DataError
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.arms.model import KinematicModel
 from calibrate.dual_psd_rig import laser_of
 from calibrate.parameters import Parameter, index_of

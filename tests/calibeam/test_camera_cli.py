@@ -10,9 +10,7 @@ import pytest
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.errors import RigFileError
-from acquisition.recording.mcap.read import read
-from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording import RecordingWriter, RigFileError, read
 from acquisition.recording.rig import load_rig, rig_text
 from calibeam.camera import camera_sight
 from calibeam.cli import run

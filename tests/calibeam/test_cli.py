@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from acquisition.recording.mcap.read import read
+from acquisition.recording import read
 from calibeam.cli import run
 from calibeam.conclude import conclude
 from calibeam.emulation import Emulation

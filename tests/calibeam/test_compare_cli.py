@@ -8,10 +8,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from acquisition.recording.mcap.read import read
-from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.recording import Channel
-from acquisition.recording.session_folder.tables import write_csv
+from acquisition.recording import Channel, RecordingWriter, read
+from acquisition.recording.session_folder import write_csv
 from benchmarks.stream_cases import servo_scene
 from calibeam.cli import run
 from simulators.conceal.case import conceal

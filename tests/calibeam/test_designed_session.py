@@ -6,11 +6,9 @@ import numpy as np
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.mcap.read import read
-from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording import RecordingWriter, Samples, read
 from acquisition.recording.pose_plan import PosePlan, read_pose_plan, write_pose_plan
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from acquisition.recording.samples import Samples
 from calibeam.direct import direct_bench
 from calibeam.pose_design.reachable import candidates_of
 from calibeam.progress_bar import progress_bar

@@ -15,12 +15,10 @@ import numpy as np
 import pytest
 from msgspec import structs
 
+from acquisition.recording import Recording, read
 from acquisition.recording.can_frames import FrameFlag, frames_of
-from acquisition.recording.mcap import mcap_file
+from acquisition.recording.mcap import Rotation, mcap_file, segments
 from acquisition.recording.mcap.mcap_file import DiskFile
-from acquisition.recording.mcap.read import read
-from acquisition.recording.mcap.segments import Rotation, segments
-from acquisition.recording.recording import Recording
 from acquisition.recording.rig import parse_rig
 from calibeam import encoder_log
 from calibeam.cli import run

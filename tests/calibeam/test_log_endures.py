@@ -11,11 +11,10 @@ import can
 import numpy as np
 import pytest
 
-from acquisition.recording.mcap import mcap_file
+from acquisition.recording import read
+from acquisition.recording.mcap import Rotation, mcap_file, segments
 from acquisition.recording.mcap.layout import EVENT, packed
 from acquisition.recording.mcap.mcap_file import McapFile
-from acquisition.recording.mcap.read import read
-from acquisition.recording.mcap.segments import Rotation, segments
 from acquisition.recording.rig import parse_rig
 from calibeam import encoder_log
 from calibeam.encoder_log import LOOK_S, EncoderLog, State

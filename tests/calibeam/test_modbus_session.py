@@ -8,8 +8,7 @@ import pytest
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.mcap.read import read
-from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording import RecordingWriter, read
 from acquisition.recording.rig import load_rig, rig_text
 from calibeam.emulation import Emulation
 from calibeam.progress_bar import progress_bar

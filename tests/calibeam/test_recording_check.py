@@ -7,8 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.recording import Channel
+from acquisition.recording import Channel, RecordingWriter
 from acquisition.recording.rig import rig_text
 from calibeam.cli import run
 

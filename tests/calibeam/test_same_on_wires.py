@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording import RecordingWriter
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.sample import Sample
 from acquisition.session import Session

@@ -9,10 +9,8 @@ import pytest
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.mcap.read import read
-from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording import RecordingWriter, Samples, read
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from acquisition.recording.samples import Samples
 from acquisition.session import Session
 from calibeam.any_session import Planned, identify_session, session_model
 from calibeam.direct import direct_bench

@@ -7,9 +7,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from acquisition.recording.mcap.read import read
+from acquisition.recording import read, readings_sha256
 from acquisition.recording.rig import load_rig, rig_sha256, rig_text
-from acquisition.recording.samples import readings_sha256
 from calibeam.cli import run
 from calibeam.guided.arm import BelievedGuidedArm
 from calibrate.arms.catalogue import arm_of

@@ -13,11 +13,8 @@ import pytest
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.mcap.read import read
-from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.recording import Recording
-from acquisition.recording.rig import rig_text
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording import Recording, RecordingWriter, read
+from acquisition.recording.rig import Rig, rig_text
 from acquisition.session import Summary
 from calibeam.emulation import Emulation
 from calibeam.outcome import PartialResult

@@ -34,14 +34,13 @@ from acquisition.recording.mcap.layout import (
     checksum,
     embedded_type,
 )
-from acquisition.recording.mcap.parts import joined, parts
 from acquisition.recording.mcap.scan import Scan
+from acquisition.recording.mcap.session_parts import joined, parts
 from acquisition.recording.recording import Channel, Event, Gap, Recording, Stream
-from acquisition.recording.rig import parse_rig, rig_sha256
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig, parse_rig, rig_sha256
 from acquisition.recording.sample_rules import checked_samples, no_samples
 from acquisition.recording.samples import Cell, Samples
-from acquisition.recording.session_folder.folder import RIG, read_folder
+from acquisition.recording.session_folder import RIG, read_folder
 
 _CLOCKS = ("host_s", "device_s", "sequence")
 

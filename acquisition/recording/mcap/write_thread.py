@@ -38,8 +38,8 @@ from acquisition.recording.mcap.layout import (
     packed,
 )
 from acquisition.recording.mcap.mcap_file import McapFile
-from acquisition.recording.recording import Channel, Floats, scalar_names
-from acquisition.recording.samples import Cell, Kind, kind_of
+from acquisition.recording.recording import Channel, scalar_names
+from acquisition.recording.samples import Cell, Floats, Kind, kind_of
 
 BATCH = 100  # samples a message: a tenth of the time and of the size of single ones, measured with this library
 VIEW_S = 0.05  # 20 Hz: as fast as an eye follows a curve

@@ -48,10 +48,10 @@ from acquisition.recording.mcap.write_thread import (
     StreamEncoder,
     channels_json,
 )
-from acquisition.recording.recording import Channel, Event, Floats, Gap, check_declaration
+from acquisition.recording.recording import Channel, Event, Gap, check_declaration
 from acquisition.recording.rig import parse_rig, rig_sha256
 from acquisition.recording.sample_rules import checked_samples
-from acquisition.recording.samples import Cell
+from acquisition.recording.samples import Cell, Floats
 
 ANSWER_S = 30.0  # a disk that takes longer than this for what waits is reported, not waited for
 LARGEST = np.iinfo(np.int64).max

@@ -4,8 +4,7 @@ from pathlib import Path
 
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.recording import Recording
-from acquisition.recording.rig import parse_rig, rig_text
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig, parse_rig, rig_text
 from acquisition.recording.samples import Samples
 from acquisition.recording.session_folder.stream_tables import with_streams
 from acquisition.recording.session_folder.tables import TableFormat, read_csv, read_parquet, write_csv, write_parquet

@@ -18,7 +18,7 @@ import numpy as np
 
 from acquisition.recording.errors import RecordingError, SamplesError, shown
 from acquisition.recording.recording import Channel, Recording, Stream, scalar_names
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig
 from acquisition.recording.sample_rules import checked_samples
 from acquisition.recording.samples import Cell, Samples, cells_of
 

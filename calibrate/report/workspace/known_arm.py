@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.arms.model import KinematicModel
 from calibrate.identifiability import Identifiability
 from calibrate.model_file import Covariance, Fields, FreeSpaceRecord

@@ -12,7 +12,8 @@ from acquisition.recording.mcap.read import read
 from acquisition.recording.mcap.writer import RecordingWriter
 from acquisition.recording.recording import Channel
 from acquisition.recording.rig import load_rig, parse_rig
-from acquisition.recording.session_folder.tables import TableFormat, parse_csv, write_tables
+from acquisition.recording.session_folder import TableFormat
+from acquisition.recording.session_folder.tables import parse_csv, write_tables
 
 RIG = """schema = 1
 name = "two-joint"

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from acquisition.recording.errors import RecordingError
-from acquisition.recording.mcap.parts import next_part, parts
 from acquisition.recording.mcap.read import read
+from acquisition.recording.mcap.session_parts import next_part, parts
 from acquisition.recording.mcap.writer import RecordingWriter
 from acquisition.recording.recording import Channel, Event
 

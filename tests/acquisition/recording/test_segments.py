@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from acquisition.recording.check_recording import check
+from acquisition.recording.mcap.log_segments import Rotation, SegmentedRecording, SegmentStream, segments
 from acquisition.recording.mcap.read import read
-from acquisition.recording.mcap.segments import Rotation, SegmentedRecording, SegmentStream, segments
 from acquisition.recording.mcap.writer import RecordingWriter
 from acquisition.recording.recording import Channel, Gap
 

@@ -12,10 +12,8 @@ from acquisition.recording.errors import RecordingError
 from acquisition.recording.mcap.read import read
 from acquisition.recording.mcap.writer import RecordingWriter
 from acquisition.recording.recording import Channel, Event, Gap, Recording, Stream
-from acquisition.recording.session_folder.folder import export
-from acquisition.recording.session_folder.import_folder import import_folder
-from acquisition.recording.session_folder.stream_tables import write_streams
-from acquisition.recording.session_folder.tables import TableFormat
+from acquisition.recording.session_folder import TableFormat, export, write_streams
+from acquisition.recording.session_folder.folder_import import import_folder
 
 COUNT = 2500  # more than a block
 

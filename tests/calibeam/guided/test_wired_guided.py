@@ -12,8 +12,7 @@ from rich.console import Console
 from acquisition.guided.plan import GuidedOptions, Visit, calibration_plan
 from acquisition.guided.session import Summary
 from acquisition.guided.target import BarEnd, Cone
-from acquisition.recording.mcap.read import read
-from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording import RecordingWriter, read
 from acquisition.recording.rig import load_rig, rig_text
 from calibeam.emulation import Emulation
 from calibeam.guided.arm import BelievedGuidedArm

@@ -9,8 +9,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.recording import Channel, Event
+from acquisition.recording import Channel, Event, RecordingWriter
 from acquisition.recording.rig import rig_text
 from acquisition.recording.samples import SPOTS
 from calibeam.cli import run

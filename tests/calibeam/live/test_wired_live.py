@@ -10,7 +10,7 @@ import pytest
 from msgspec import structs
 from websockets.sync.client import connect
 
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig
 from calibeam.emulation import Emulation
 from calibeam.live.devices import devices_of, reading
 from calibeam.live.page import LivePage, PageAddress, live_page

@@ -8,8 +8,8 @@ import pytest
 
 from acquisition.plan import PlanOptions
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
-from acquisition.recording.rig import load_rig
-from acquisition.recording.rig.schema import MotionBox, Rig
+from acquisition.recording.rig import Rig, load_rig
+from acquisition.recording.rig.schema import MotionBox
 from calibeam.motion.rehearsal import draw_session, rehearse
 
 RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"

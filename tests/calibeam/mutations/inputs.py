@@ -18,10 +18,9 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from acquisition.recording import Channel, Event, Gap, RecordingWriter
 from acquisition.recording.can_frames import block_of, channels
 from acquisition.recording.can_log import frame_of
-from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.recording import Channel, Event, Gap
 from acquisition.recording.rig import load_rig, rig_sha256, rig_text
 from calibeam.fleet.found import recordings
 from calibeam.fleet.judge import judged

@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from acquisition.recording.mcap.read import read
+from acquisition.recording import read
 from calibeam.prove.baselines.features import features
 from calibeam.prove.comparison import GEOMETRY, compare
 from calibeam.prove.hidden_angle import SEED, hidden_angles

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
 from calibeam.prove.hidden_column import against_hidden
 from calibeam.prove.real import real_sets
 from calibrate.diagnose.schema import CurveRecord, DiagnosisFile, FindingRecord

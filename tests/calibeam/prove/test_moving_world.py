@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording import RecordingWriter
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.session import Session
 from calibeam.direct import DirectBench

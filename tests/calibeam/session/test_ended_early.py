@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from acquisition.errors import StoppedError
-from acquisition.recording.errors import RecordingError
+from acquisition.recording import RecordingError
 from calibeam.outcome import PartialResult
 from calibeam.recorded import kept
 from drivers.errors import DeviceLost

@@ -7,10 +7,8 @@ import pytest
 
 from acquisition.errors import AcquisitionError
 from acquisition.plan import PlanOptions, PoseKey
-from acquisition.recording.errors import RecordingError, RigFileError
-from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording import Event, RecordingError, RecordingWriter, RigFileError
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
-from acquisition.recording.recording import Event
 from acquisition.recording.rig import parse_rig
 from calibeam.session.earlier import Earlier, earlier_of
 from calibeam.session.job import MORE, Job, more_at, moved, notes_of, part_of, with_place

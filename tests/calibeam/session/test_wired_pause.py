@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from acquisition.plan import PlanOptions, blocks
-from acquisition.recording.mcap.parts import parts
-from acquisition.recording.mcap.read import read
+from acquisition.recording import read
+from acquisition.recording.mcap import parts
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan, write_pose_plan
 from acquisition.recording.rig import load_rig
 from acquisition.sample import Sample

@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from acquisition.recording.mcap.read import read
+from acquisition.recording import read
 from simulators.conceal.belief import rig_document
 from simulators.conceal.case import conceal
 from simulators.conceal.chain import stand

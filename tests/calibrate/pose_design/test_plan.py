@@ -176,7 +176,8 @@ def test_poses_are_enough_behind_the_last_steep_stretch():
 def test_poses_before_a_tracker_are_designed_too(rig):
     import msgspec
 
-    from acquisition.recording.rig.schema import Pose, Tool
+    from acquisition.recording.rig import Pose
+    from acquisition.recording.rig.schema import Tool
     from calibrate.rigid import transform
 
     tracked = msgspec.structs.replace(

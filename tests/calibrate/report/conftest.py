@@ -8,11 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.mcap.read import read
-from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording, RecordingWriter, Samples, read
 from acquisition.recording.rig import load_rig, parse_rig, plain_rig, rig_sha256, rig_text
-from acquisition.recording.samples import Samples
 from acquisition.session import Session
 from calibeam.any_session import identify_session, session_model
 from calibeam.direct import direct_bench

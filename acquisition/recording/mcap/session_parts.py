@@ -10,7 +10,7 @@ import numpy as np
 
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.recording import Recording
-from acquisition.recording.rig.schema import Rig
+from acquisition.recording.rig import Rig
 from acquisition.recording.samples import Kind, Samples, kind_of
 
 FIRST = "recording.mcap"
