@@ -37,7 +37,7 @@ DAMAGE = (
 )
 
 
-Content = Header | Schema | Channel | Message | Metadata
+ContentRecord = Header | Schema | Channel | Message | Metadata
 
 
 class Scan:
@@ -48,7 +48,7 @@ class Scan:
         self.damage: list[str] = []
         self.whole = False
 
-    def records(self) -> Iterator[Content]:
+    def records(self) -> Iterator[ContentRecord]:
         """The records that carry content: header, metadata, and what stands in batches.
 
         RecordingError if the file is missing, empty or not MCAP.
@@ -65,7 +65,7 @@ class Scan:
                 f"{self._path}: cannot read the recording ({error.strerror}); check the path"
             ) from error
 
-    def _contents(self, file: IO[bytes], size: int) -> Iterator[Content]:
+    def _contents(self, file: IO[bytes], size: int) -> Iterator[ContentRecord]:
         """Piece by piece: after bytes that make no sense the reading goes on at the next batch, if there is one."""
         begin: int | None = 0
         while begin is not None:
@@ -73,7 +73,7 @@ class Scan:
             failed_at = yield from self._piece(file, size, first=begin == 0)
             begin = None if failed_at is None else next_batch(file, failed_at + 1, size)
 
-    def _piece(self, file: IO[bytes], size: int, *, first: bool) -> Generator[Content, None, int | None]:
+    def _piece(self, file: IO[bytes], size: int, *, first: bool) -> Generator[ContentRecord, None, int | None]:
         """Records from here on; where they make no sense any more, or None at the end."""
         reader = StreamReader(file, skip_magic=not first, emit_chunks=True, validate_crcs=True, record_size_limit=size)
         records = iter(reader.records)
