@@ -11,7 +11,6 @@ import canopen
 
 from drivers.cia406 import objects
 from drivers.cia406.angle import SPEED_LIMIT_RAD_S, ContinuousAngle, Slip
-from drivers.cia406.bus_faults import BusFault, BusFaults
 from drivers.cia406.codec import Emergency, MappedNumber, mapped_number
 from drivers.cia406.configuration import (
     HEARTBEAT_MS,
@@ -21,6 +20,7 @@ from drivers.cia406.configuration import (
     set_direction,
 )
 from drivers.cia406.cycle import Row, SyncCycle
+from drivers.cia406.health import NodeWatch
 from drivers.cia406.network import (
     SEND_LIMIT_S,
     BoundedNetwork,
@@ -30,10 +30,10 @@ from drivers.cia406.network import (
 )
 from drivers.cia406.nodes import NMT_PRE_OPERATIONAL, NMT_START, configured, nmt
 from drivers.cia406.rows import WatchedRow, to_block
-from drivers.cia406.watch import NodeWatch
 from drivers.clock import Clock, SystemClock
 from drivers.device import Block, Channel
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale
+from drivers.transports.can_faults import BusFault, BusFaults
 from drivers.transports.can_interfaces import OpenBus, opened, received
 
 MAX_SYNC_HZ = 1000.0  # six encoders fill half of a bus of 1 Mbit/s
