@@ -18,8 +18,7 @@ from drivers.psd_daq.messages import Identity
 from drivers.psd_error_map import ErrorMap
 from drivers.psd_faces import Face, FaceKind
 from drivers.psd_kpa101.pair import BAUD as KPA101_BAUD
-from drivers.psd_kpa101.pair import Head, Kpa101Pair
-from drivers.psd_kpa101.wiring import Wiring
+from drivers.psd_kpa101.pair import Head, Kpa101Pair, Wiring
 from drivers.transports.serial_port import SerialAddress, open_serial
 from drivers.transports.transport import Transport
 

@@ -14,8 +14,7 @@ from drivers.errors import DeviceRefused
 from drivers.modbus.arm import LIFE_S, ModbusArm
 from drivers.modbus.line import ModbusLine, RtuAddress, TcpAddress
 from drivers.modbus.reader import ModbusReader
-from drivers.modbus.register import Register
-from drivers.modbus.register_map import RegisterMap
+from drivers.modbus.register_map import Register, RegisterMap
 from drivers.ur.control import WATCHDOG_HZ, UrControl
 from drivers.ur.reader import UrReader
 

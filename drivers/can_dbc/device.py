@@ -13,11 +13,10 @@ import numpy as np
 
 from drivers.can_dbc.description import JointSignal
 from drivers.cia406.angle import SPEED_LIMIT_RAD_S, ContinuousAngle
-from drivers.cia406.network import lost_as_device_lost, shut_down
 from drivers.clock import Clock, SystemClock
 from drivers.device import Block, Channel
 from drivers.errors import DeviceLost, DeviceStale
-from drivers.transports.can_faults import BusFaults
+from drivers.transports.can_faults import BusFaults, lost_as_device_lost, shut_down
 from drivers.transports.can_interfaces import OpenBus, opened
 
 SILENT_S = 0.5  # an encoder that sends nothing for so long is gone

@@ -9,31 +9,29 @@ from collections.abc import Callable, Sequence
 import can
 import canopen
 
-from drivers.cia406 import objects
+from drivers.cia406 import codec
 from drivers.cia406.angle import SPEED_LIMIT_RAD_S, ContinuousAngle, Slip
 from drivers.cia406.codec import Emergency, MappedNumber, mapped_number
 from drivers.cia406.configuration import (
     HEARTBEAT_MS,
+    NMT_PRE_OPERATIONAL,
+    NMT_START,
+    SEND_LIMIT_S,
+    BoundedNetwork,
     EncoderIdentity,
     EncoderObjects,
+    configured,
+    listening,
+    nmt,
     preset,
     set_direction,
 )
-from drivers.cia406.cycle import Row, SyncCycle
+from drivers.cia406.cycle import Row, SyncCycle, WatchedRow, to_block
 from drivers.cia406.health import NodeWatch
-from drivers.cia406.network import (
-    SEND_LIMIT_S,
-    BoundedNetwork,
-    listening,
-    lost_as_device_lost,
-    shut_down,
-)
-from drivers.cia406.nodes import NMT_PRE_OPERATIONAL, NMT_START, configured, nmt
-from drivers.cia406.rows import WatchedRow, to_block
 from drivers.clock import Clock, SystemClock
 from drivers.device import Block, Channel
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale
-from drivers.transports.can_faults import BusFault, BusFaults
+from drivers.transports.can_faults import BusFault, BusFaults, lost_as_device_lost, shut_down
 from drivers.transports.can_interfaces import OpenBus, opened, received
 
 MAX_SYNC_HZ = 1000.0  # six encoders fill half of a bus of 1 Mbit/s
@@ -42,7 +40,7 @@ HEARTBEAT_GOES_ON_S = 0.49  # of SILENT_S: a heartbeat this fresh is one of afte
 BATCH_S = 0.02  # rows gathered in one block; more only delays a reader
 TOGETHER_S = 1.1e-3  # answers wait so long for the next SYNC: at 1 kHz one waking a row in place of two or more
 HELD_UP_S = 0.05  # a thread that waits so much longer than it asked to was kept from running
-SYNC = can.Message(arbitration_id=objects.SYNC_ID, is_extended_id=False)
+SYNC = can.Message(arbitration_id=codec.SYNC_ID, is_extended_id=False)
 
 
 class Cia406Encoders:
@@ -222,7 +220,7 @@ class Cia406Encoders:
         self._watch.set_operational(True, start_s)
 
     def _position_of(self, identity: EncoderIdentity) -> MappedNumber:
-        number = mapped_number(identity.mapping, objects.POSITION)
+        number = mapped_number(identity.mapping, codec.POSITION)
         if number is None:
             raise DeviceRefused(f"{self.name}: encoder {identity.node} keeps its position (6004h) out of 1A01h")
         return number

@@ -1,12 +1,53 @@
-"""What encoders say of their own health: emergencies, heartbeats, a restart that nobody ordered."""
+"""What encoders say of their own health: emergencies, heartbeats, a restart that nobody ordered.
+
+A heartbeat that stays away is found within one and a half periods, without blaming nodes for a pause of the host: time
+counts only while the bus is heard, between two frames of anybody at most PAUSE_S. A host that slept, an adapter that
+was held up, an emulator that fell behind shows as a gap and makes nobody late. A bus on which nothing is heard at all
+is no question of heartbeats: then SYNC is without answer.
+"""
 
 from collections.abc import Sequence
 
-from drivers.cia406 import objects
-from drivers.cia406.codec import Emergency, emergency, heartbeat_state
-from drivers.cia406.heartbeats import Heartbeats
-from drivers.cia406.objects import NmtState
+from drivers.cia406 import codec
+from drivers.cia406.codec import Emergency, NmtState, emergency, heartbeat_state
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale
+
+LATE = 1.5  # periods
+PAUSE_S = 0.05  # longer than any node at 20 SYNCs a second is silent
+
+
+class Heartbeats:
+    """Alive time since the last heartbeat of every node, from `begin` on."""
+
+    def __init__(self, nodes: Sequence[int], period_s: float) -> None:
+        self._nodes = tuple(nodes)
+        self._limit_s = LATE * period_s
+        self._alive_s = 0.0
+        self._looked_s: float | None = None
+        self._heard_s: dict[int, float] = {}  # in alive time
+
+    def begin(self, now_s: float) -> None:
+        """All nodes start to send heartbeats now."""
+        self._alive_s, self._looked_s = 0.0, now_s
+        self._heard_s = dict.fromkeys(self._nodes, 0.0)
+
+    def look(self, now_s: float) -> None:
+        """A frame came."""
+        if self._looked_s is not None:
+            self._alive_s += min(max(now_s - self._looked_s, 0.0), PAUSE_S)
+            self._looked_s = now_s
+
+    def heard(self, node: int) -> None:
+        if node in self._heard_s:
+            self._heard_s[node] = self._alive_s
+
+    def late(self) -> tuple[int, ...]:
+        """Nodes whose heartbeat is overdue; each is told once, and again after as long."""
+        found = tuple(node for node, heard_s in self._heard_s.items() if self._alive_s - heard_s > self._limit_s)
+        for node in found:
+            self._heard_s[node] = self._alive_s
+        return found
+
 
 EMERGENCIES_KEPT = 256
 
@@ -58,9 +99,9 @@ class NodeWatch:
         function, node = can_id & ~0x7F, can_id & 0x7F
         if node not in self._nodes:
             return
-        if function == objects.EMERGENCY_ID:
+        if function == codec.EMERGENCY_ID:
             self._take_emergency(node, data, now_s)
-        elif function == objects.HEARTBEAT_ID and self._operational:
+        elif function == codec.HEARTBEAT_ID and self._operational:
             self._take_heartbeat(node, data, now_s)
 
     def heard_within(self, places: Sequence[int], limit_s: float, now_s: float) -> bool:

@@ -1,15 +1,16 @@
 """The PSD DAQ box as an instrument: who it is, its stream of photocurrents, in SI units.
 
-One thread uses it at a time, except `close`, which any thread may call. It starts no thread of its own.
+One thread uses it at a time, except `close`, which any thread may call. It starts no thread of its own. Where something
+else is at the port, the error message names what it answers.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from drivers.clock import Clock, SystemClock
 from drivers.device import Block, Channel
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale, WireError
-from drivers.psd_daq.codec import PsdDaqCodec
+from drivers.psd_daq.codec import PsdDaqCodec, RepeatFilter, SequenceCount, to_block
 from drivers.psd_daq.messages import (
     MAX_RATE_HZ,
     MIN_RATE_HZ,
@@ -26,9 +27,6 @@ from drivers.psd_daq.messages import (
     StartStream,
     StopStream,
 )
-from drivers.psd_daq.samples import to_block
-from drivers.psd_daq.sequence import RepeatFilter, SequenceCount
-from drivers.psd_daq.stranger import name_stranger
 from drivers.transports.transport import Transport
 
 BAUD = 3_000_000  # docs/protocols/psd-daq.md, "The line"
@@ -37,6 +35,35 @@ WRITE_S = 1.0
 READ_BYTES = 65536
 BAD_FRAMES_KEPT = 16
 Answer = TypeVar("Answer", Identity, Ack)
+PROBE_S = 0.3  # a line-oriented instrument echoes or answers an empty line within some 10 ms
+EMPTY_LINE = b"\r"  # the only thing sent to a stranger: it moves nothing
+
+
+def name_stranger(line: Transport, heard: bytes, bad: Sequence[BadFrame], clock: Clock) -> str | None:
+    """What answered instead, in words; None when the line stays silent."""
+    if bad and "protocol version" in bad[-1].reason:
+        return f"it speaks {bad[-1].reason}"
+    if heard:
+        return f"it sent {_shown(heard)}"
+    answer = _probe(line, clock)
+    if not answer:
+        return None
+    return (
+        f"it answers an empty line with {_shown(answer)}, as a CAN adapter (slcan) or another line-oriented device does"
+    )
+
+
+def _probe(line: Transport, clock: Clock) -> bytes:
+    line.write(EMPTY_LINE, PROBE_S)
+    deadline_s = clock.now_s() + PROBE_S
+    answer = b""
+    while not answer and (left_s := deadline_s - clock.now_s()) > 0.0:
+        answer = line.read(32, left_s)
+    return answer
+
+
+def _shown(data: bytes) -> str:
+    return f"{data[:32].hex(' ')} ({data[:32]!r})"
 
 
 class PsdDaq:

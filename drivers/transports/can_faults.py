@@ -1,15 +1,21 @@
 """What a CAN controller says of its bus: error frames, and the end of all sending, bus-off.
 
 Source of the bits: Linux, include/uapi/linux/can/error.h; python-can hands such frames on as they are, and other
-adapters' error frames without bits.
+adapters' error frames without bits. python-can and canopen raise CanError, OSError and pyserial's exceptions when an
+adapter has gone: here they become DeviceLost, with the cause kept.
 """
 
+from collections.abc import Generator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from typing import Any
 
 import can
+from serial import SerialException
 
-from drivers.errors import DeviceLost
+from drivers.errors import DeviceError, DeviceLost
 
+GONE = (can.CanError, SerialException, OSError)
 FAULTS_KEPT = 256
 BUS_OFF = 0x40  # CAN_ERR_BUSOFF
 CLASSES = {  # bit of the identifier -> what it stands for
@@ -69,3 +75,28 @@ class BusFaults:
             f"{self._name}: the CAN controller is bus-off{seen}; check bit rate, termination (60 Ohm across the lines) "
             "and wiring, then connect again"
         )
+
+
+@contextmanager
+def lost_as_device_lost(name: str, doing: str) -> Generator[None]:
+    """Converts what python-can raises when its adapter has gone."""
+    try:
+        yield
+    except DeviceError:  # ours already, though DeviceLost and DeviceStale are OSErrors too
+        raise
+    except GONE as cause:
+        raise DeviceLost(f"{name}: CAN adapter gone while {doing} ({cause}); check its cable and power") from cause
+
+
+def shut_down(bus: can.BusABC) -> None:
+    """Releases the bus also when its adapter has gone.
+
+    python-can's slcan first tells the adapter, and leaves the port open when that fails: then we close it.
+    """
+    try:
+        bus.shutdown()
+    except GONE:
+        port: Any = getattr(bus, "serialPortOrig", None)
+        if port is not None:
+            with suppress(OSError):
+                port.close()

@@ -16,7 +16,7 @@ from calibeam.cli import run
 from calibeam.commands.demo import RIG
 from calibeam.site import VIEWED
 from drivers.clock import SystemClock
-from drivers.ur.recipe import VARIABLES
+from drivers.ur.reader import VARIABLES
 
 SIX = (6,)
 
