@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.clock import Clock, SystemClock
-from drivers.device import Block, Channel
+from drivers.clock import Clock
+from drivers.device import Block, Channel, StreamDevice
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale, WireError
 from drivers.psd_daq.messages import FaceIdentity, Flag, Identity
 from drivers.psd_faces import FaceKind
@@ -102,7 +102,7 @@ class _Row:
     round_trip_s: tuple[float, float]
 
 
-class Kpa101Pair:
+class Kpa101Pair(StreamDevice[tuple[Kpa101Unit, ...]]):
     """A `drivers.device.Device`. Channels: photocurrent_a (8,), flags, difference_counts (4,), sum_counts (2,),
     round_trip_s (2,).
 
@@ -126,13 +126,12 @@ class Kpa101Pair:
             raise ValueError(
                 f"{name}: rate_hz {rate_hz!r}; two KPA101 at 115200 baud give {MIN_RATE_HZ:g} to {MAX_RATE_HZ:g}"
             )
-        self.name = name
+        super().__init__(name, clock)
         self.identity: Identity | None = None
         self.missed_replies = 0
         self._heads = heads
         self._period_s = 1.0 / rate_hz
         self._batch = max(1, round(BATCH_S * rate_hz))
-        self._clock: Clock = SystemClock() if clock is None else clock
         self._hurry = hurry
         self._units = tuple(
             Kpa101Unit(f"{name} unit {place}", open_line, self._clock) for place, open_line in enumerate(open_lines, 1)
@@ -145,15 +144,13 @@ class Kpa101Pair:
         """Runs of bytes that were no message, on both lines."""
         return sum(unit.junk_count for unit in self._units)
 
-    def connect(self) -> None:
+    def _open(self) -> tuple[Kpa101Unit, ...]:
+        return self._units
+
+    def _set_up(self, line: tuple[Kpa101Unit, ...]) -> None:
         """Both units identified and in monitor mode. DeviceLost, DeviceStale (silent), DeviceRefused (exchanged)."""
-        self.close()
-        try:
-            infos = [unit.connect() for unit in self._units]
-            self._check_serial_numbers(infos)
-        except BaseException:
-            self.close()
-            raise
+        infos = [unit.identify() for unit in line]
+        self._check_serial_numbers(infos)
         self.identity = self._identity(infos)
         self._start_s = self._clock.now_s()
         self._first += self._next + 1 if self._next else 0  # what passed between is not known to be nothing
@@ -185,8 +182,8 @@ class Kpa101Pair:
             raise self._no_samples(timeout_s, junk_before)
         return self._block(rows)
 
-    def close(self) -> None:
-        for unit in self._units:
+    def _release(self, line: tuple[Kpa101Unit, ...]) -> None:
+        for unit in line:
             unit.close()
 
     # --- sampling
