@@ -19,7 +19,7 @@ from acquisition.recording import RecordingWriter
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.sample import Sample
 from acquisition.servo.centring import Limits
-from acquisition.servo.status import Status
+from acquisition.servo.status import CentringStatus
 from acquisition.session import Session
 from calibeam.emulation import Emulation
 from calibeam.learner import FittedLearner
@@ -78,7 +78,7 @@ class RunsJournal:
     def event(self, kind: str, detail: Mapping[str, Any]) -> None:
         if kind != "centring" or detail["tolerance_m"] > Limits().tolerance_m:
             return
-        if detail["status"] != Status.CENTRED.name:
+        if detail["status"] != CentringStatus.CENTRED.name:
             self.failed.append(detail["status"])
             return
         motions = len(detail["purpose"]) - 1

@@ -20,7 +20,7 @@ from acquisition.aiming.pose import BeamTarget
 from acquisition.aiming.reach import reach
 from acquisition.aiming.search import Found, Search
 from acquisition.camera.board import Board
-from acquisition.camera.measuring import CameraMeasuring, Measured
+from acquisition.camera.measuring import CameraMeasuring, MeasuredCamera
 from acquisition.camera.model import CameraFit, CameraModel
 from acquisition.camera.sight import Sight
 from acquisition.errors import UnreachableError
@@ -57,7 +57,7 @@ class World:
     learner: FittedLearner
     eye: DirectEye
     placement: int
-    measured: Measured
+    measured: MeasuredCamera
     model: CameraModel | None  # that is aimed by
 
 

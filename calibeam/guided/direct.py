@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.guided.guide import Progress, Request
+from acquisition.guided.guide import GuidedProgress, Request
 from acquisition.guided.target import BarEnd, Cone, Target
 from acquisition.guided.window import Window
 from simulators.hand.hand import CannotReachError
@@ -49,7 +49,7 @@ class DirectHand:
         self.world.advance(self.world.arrives_s)  # nobody has to watch the way there
         return True
 
-    def tell(self, progress: Progress) -> None:
+    def tell(self, progress: GuidedProgress) -> None:
         """Nobody looks."""
 
 

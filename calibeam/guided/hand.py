@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from acquisition.guided.guide import Progress, Request
+from acquisition.guided.guide import GuidedProgress, Request
 from calibeam.emulation import EmulationError
 from calibeam.guided.direct import wish
 
@@ -14,7 +14,7 @@ CANNOT = "cannot put the probe"  # how simulators/hand/hand.py says that the arm
 class EmulatedHand:
     """Implements acquisition.guided.guide.Guide; what is told goes on to `show`."""
 
-    def __init__(self, ask: Ask, show: Callable[[Progress], None]) -> None:
+    def __init__(self, ask: Ask, show: Callable[[GuidedProgress], None]) -> None:
         self._ask, self._show = ask, show
 
     def ask(self, request: Request) -> bool:
@@ -26,5 +26,5 @@ class EmulatedHand:
             raise
         return True
 
-    def tell(self, progress: Progress) -> None:
+    def tell(self, progress: GuidedProgress) -> None:
         self._show(progress)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from acquisition.guided.guide import Guide
-from acquisition.guided.plan import Visit
+from acquisition.guided.plan import GuidedVisit
 from acquisition.guided.reading import Reading
-from acquisition.guided.session import GuidedSession, Summary
+from acquisition.guided.session import GuidedSession, GuidedSummary
 from acquisition.guided.wired import WiredEncoderWatch
 from acquisition.recording import Channel, Event, RecordingError, RecordingWriter, RigFileError
 from acquisition.recording.rig import Rig
@@ -107,13 +107,13 @@ def record_guided(
     watch: WiredEncoderWatch,
     rig: Rig,
     guide: Guide,
-    plan: tuple[Visit, ...],
+    plan: tuple[GuidedVisit, ...],
     writer: RecordingWriter,
     clock: Clock,
     *,
     seed: int = 1,
     patience_s: float = np.inf,
-) -> Summary:
+) -> GuidedSummary:
     """Run the plan. PartialResult when it ended early: what was taken is kept."""
     judge, journal = FittedJudge(rig), RecordingJournal(writer, clock)
     rng = np.random.default_rng(seed)

@@ -8,7 +8,7 @@ from typing import Any
 from rich.console import Console
 
 from acquisition.guided.guide import Guide
-from acquisition.guided.plan import GuidedOptions, Visit, by_kind, calibration_plan, verification_plan
+from acquisition.guided.plan import GuidedOptions, GuidedVisit, by_kind, calibration_plan, verification_plan
 from acquisition.recording.rig import Rig
 from calibeam.guided.hand import EmulatedHand
 from calibeam.guided.recorded import EncoderAddress, record_guided, watching
@@ -19,7 +19,7 @@ from drivers.clock import SystemClock
 HAND_PATIENCE_S = 30.0  # of emulated time: the longest reach takes 8 s
 
 
-def plan_of(rig: Rig, options: GuidedOptions, *, verify: bool) -> tuple[Visit, ...]:
+def plan_of(rig: Rig, options: GuidedOptions, *, verify: bool) -> tuple[GuidedVisit, ...]:
     """What is taken. AcquisitionError where the rig has not what it takes."""
     return verification_plan(rig) if verify else calibration_plan(rig, options)
 
@@ -29,7 +29,7 @@ def run_guided(
     rig_text: str,
     out: Path,
     address: EncoderAddress,
-    plan: tuple[Visit, ...],
+    plan: tuple[GuidedVisit, ...],
     console: Console,
     *,
     seed: int = 1,

@@ -9,7 +9,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from acquisition.guided.guide import Progress, Request
+from acquisition.guided.guide import GuidedProgress, Request
 
 CLOSE_RAD = 0.35  # a joint this near the wanted posture is good: nobody copies a picture better
 REFRESH_HZ = 5.0
@@ -41,17 +41,17 @@ class PersonGuide:
             self._said = text
         return True
 
-    def tell(self, progress: Progress) -> None:
+    def tell(self, progress: GuidedProgress) -> None:
         if self._live is not None:
             self._live.update(drawn(progress))
 
 
-def drawn(progress: Progress) -> Group:
+def drawn(progress: GuidedProgress) -> Group:
     """The whole view."""
     return Group(_head(progress), _joints(progress))
 
 
-def _head(progress: Progress) -> Text:
+def _head(progress: GuidedProgress) -> Text:
     text = Text(f"{progress.done} of {progress.planned} readings; {progress.request.target.says}: ")
     text.append(progress.says, style="bold green" if progress.says.startswith("taken") else "bold")
     if progress.repeatability_m is not None:
@@ -59,7 +59,7 @@ def _head(progress: Progress) -> Text:
     return text
 
 
-def _joints(progress: Progress) -> Table:
+def _joints(progress: GuidedProgress) -> Table:
     table = Table("joint", "now", "wanted", "", "range visited", box=None)
     each = zip(progress.q_rad, progress.request.posture_rad, strict=True)
     for joint, (now_rad, wanted_rad) in enumerate(each):

@@ -14,7 +14,7 @@ from types import FrameType
 from typing import TextIO
 
 from acquisition.motion.gate import Gate
-from acquisition.motion.states import State
+from acquisition.motion.states import MotionState
 from calibeam.asking import Asking, at_terminal
 from calibeam.interrupts import INTERRUPTS
 from drivers.errors import DeviceError
@@ -61,7 +61,7 @@ class Keys:
             print(f"{error}", file=self._out, flush=True)
 
     def _held(self) -> bool:
-        return self._gate.state is State.HELD
+        return self._gate.state is MotionState.HELD
 
     def _ask(self) -> None:
         if self._asking is not None and (self._thread is None or not self._thread.is_alive()):
@@ -72,7 +72,7 @@ class Keys:
         """Until the motion goes on or ends; the end of input means nothing, for Ctrl-C is still heard."""
 
         def over() -> bool:
-            return self._gate.state not in (State.HELD, State.PAUSING)
+            return self._gate.state not in (MotionState.HELD, MotionState.PAUSING)
 
         while not over():
             line = asking.ask(WORDS, "> ", over)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from acquisition.progress import Progress
-from acquisition.session_states import State
+from acquisition.session_states import RunState
 from calibeam.session.forecast import Forecast
 from calibeam.session.quality import Quality
 
@@ -15,7 +15,7 @@ UNDELIVERED = "stop not delivered, press the red emergency stop"
 class Shown:
     """None: nothing to say yet."""
 
-    state: State = State.IDLE
+    state: RunState = RunState.IDLE
     step: str = ""  # "4 of 7  measure"
     progress: Progress | None = None
     left_s: float | None = None
@@ -31,7 +31,7 @@ class Shown:
             return UNDELIVERED
         if self.asked:
             return "your turn"
-        if self.state is State.RUNNING and self.progress is not None:
+        if self.state is RunState.RUNNING and self.progress is not None:
             return self.progress.phase.value
         return self.state.value
 

@@ -24,7 +24,7 @@ BATCH_S = 0.02  # rows gathered in one block; more only delays a reader
 
 
 @dataclass(frozen=True)
-class _Row:
+class _EncoderRow:
     """One reading of each encoder, and the state of things at that time."""
 
     sequence: int
@@ -68,7 +68,7 @@ class CanDbcEncoders(StreamDevice[can.BusABC]):
         self._sequence = 0
         self._row: dict[int, tuple[float, float]] = {}  # place -> angle, host time
         self._heard_s: dict[int, float] = {}
-        self._rows: list[_Row] = []
+        self._rows: list[_EncoderRow] = []
 
     def _open(self) -> can.BusABC:
         return opened(self._open_bus, self.name)
@@ -157,7 +157,7 @@ class CanDbcEncoders(StreamDevice[can.BusABC]):
     def _finish(self, now_s: float) -> None:
         readings, self._row = self._row, {}
         slips_rad = tuple(angle.slip_rad for angle in self._angles)
-        self._rows.append(_Row(self._sequence, now_s, readings, slips_rad, self._faults.count))
+        self._rows.append(_EncoderRow(self._sequence, now_s, readings, slips_rad, self._faults.count))
         self._sequence += 1
 
     def _check_silence(self) -> None:
@@ -170,7 +170,7 @@ class CanDbcEncoders(StreamDevice[can.BusABC]):
                 "check its power, cable and termination"
             )
 
-    def _block(self, rows: Sequence[_Row]) -> Block:
+    def _block(self, rows: Sequence[_EncoderRow]) -> Block:
         nothing = (math.nan, math.nan)
         each = np.array([[row.readings.get(place, nothing) for place in range(len(self.joints))] for row in rows])
         host_s = np.array([row.done_s for row in rows])

@@ -94,7 +94,7 @@ class Head:
 
 
 @dataclass(frozen=True)
-class _Row:
+class _PairRow:
     sequence: int
     asked_s: float
     arrived_s: float
@@ -170,7 +170,7 @@ class Kpa101Pair(StreamDevice[tuple[Kpa101Unit, ...]]):
     def read(self, timeout_s: float) -> Block:
         deadline_s = self._clock.now_s() + timeout_s
         junk_before = self.bad_frame_count
-        rows: list[_Row] = []
+        rows: list[_PairRow] = []
         while len(rows) < self._batch and (now_s := self._clock.now_s()) < deadline_s:
             due_s = self._start_s + self._next * self._period_s
             if now_s < due_s:
@@ -188,7 +188,7 @@ class Kpa101Pair(StreamDevice[tuple[Kpa101Unit, ...]]):
 
     # --- sampling
 
-    def _sample(self, now_s: float, deadline_s: float) -> _Row | None:
+    def _sample(self, now_s: float, deadline_s: float) -> _PairRow | None:
         """Both units asked at once; None when one did not answer."""
         number = max(self._next, math.floor((now_s - self._start_s) / self._period_s))
         self._next = number + 1
@@ -205,12 +205,12 @@ class Kpa101Pair(StreamDevice[tuple[Kpa101Unit, ...]]):
         if len(readings) < len(self._units):
             return self._missed()
         trips_s = (arrived_s[0] - asked_s[0], arrived_s[1] - asked_s[1])
-        return _Row(self._first + number, asked_s[0], arrived_s[-1], (readings[0], readings[1]), trips_s)
+        return _PairRow(self._first + number, asked_s[0], arrived_s[-1], (readings[0], readings[1]), trips_s)
 
     def _missed(self) -> None:
         self.missed_replies += 1
 
-    def _block(self, rows: Sequence[_Row]) -> Block:
+    def _block(self, rows: Sequence[_PairRow]) -> Block:
         counts = np.array([[[r.x, r.y, r.sum] for r in row.readings] for row in rows], dtype=np.int64)
         signal_v = [head.wiring.volts(counts[:, place]) for place, head in enumerate(self._heads)]
         current_a = [

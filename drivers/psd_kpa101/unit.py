@@ -14,7 +14,6 @@ from drivers.psd_kpa101.codec import Kpa101Codec
 from drivers.psd_kpa101.messages import (
     Fault,
     Info,
-    Junk,
     Message,
     Mode,
     ModeIs,
@@ -25,6 +24,7 @@ from drivers.psd_kpa101.messages import (
     RequestReadings,
     SetMode,
     StopUpdates,
+    StrayBytes,
 )
 from drivers.transports.transport import Transport
 
@@ -42,7 +42,7 @@ class Kpa101Unit(StreamDevice[Transport]):
         super().__init__(name, clock)
         self.info: Info | None = None
         self.junk_count = 0
-        self.last_junk: Junk | None = None
+        self.last_junk: StrayBytes | None = None
         self._open_line = open_line
         self._codec = Kpa101Codec()
         self._in_doubt = False
@@ -127,7 +127,7 @@ class Kpa101Unit(StreamDevice[Transport]):
         data = self._opened().read(READ_BYTES, waits_s)
         messages = self._codec.feed(data) if data else self._codec.settle()
         for message in messages:
-            if isinstance(message, Junk):
+            if isinstance(message, StrayBytes):
                 self.junk_count += 1
                 self.last_junk = message
             else:

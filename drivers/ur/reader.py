@@ -29,11 +29,11 @@ from drivers.ur.rtde_codec import (
     DTYPES,
     ControllerVersion,
     Data,
-    Junk,
     Message,
     OutputsAnswer,
     ProtocolAnswer,
     RtdeCodec,
+    RtdeJunk,
     StartAnswer,
     TextMessage,
     Unknown,
@@ -185,7 +185,7 @@ class UrReader(StreamDevice[socket.socket]):
         """What has come; text is logged. WireError when it is no RTDE."""
         messages, self._unread = self._unread, []
         for message in messages:
-            if isinstance(message, Junk):
+            if isinstance(message, RtdeJunk):
                 raise WireError(
                     f"{self.place}: no RTDE at byte {message.offset} of the stream: {message.head.hex(' ')}; "
                     "is this the RTDE port of a UR controller (30004)?"

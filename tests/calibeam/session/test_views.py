@@ -12,7 +12,7 @@ from rich.console import Console
 from acquisition.errors import AcquisitionError
 from acquisition.progress import Phase, Progress
 from acquisition.reins import Reins
-from acquisition.session_states import Event, State
+from acquisition.session_states import RunEvent, RunState
 from calibeam.asking import Asking
 from calibeam.live.feed import SILENT
 from calibeam.live.feed import Progress as PageProgress
@@ -90,13 +90,13 @@ def teller(rig, clock, heard) -> Teller:
 @pytest.mark.parametrize(
     ("state", "large", "keys"),
     [
-        (State.RUNNING, "COLLECT", "SPACE pause"),
-        (State.PAUSING, "PAUSING, THE ARM COMES TO REST", "SPACE stop the arm now"),
-        (State.BREAKING, "STOPPING THE ARM", "a abort    h halt"),
-        (State.PAUSED, "PAUSED, THE ARM STANDS", "r go on    s finish here    a abort    h halt"),
-        (State.ABORTING, "ABORTING", "h halt"),
-        (State.HALTED, "HALTED, THE ARM IS HELD", "h say the stop again"),
-        (State.ABORTED, "ABORTED, THE ARM STANDS", ""),
+        (RunState.RUNNING, "COLLECT", "SPACE pause"),
+        (RunState.PAUSING, "PAUSING, THE ARM COMES TO REST", "SPACE stop the arm now"),
+        (RunState.BREAKING, "STOPPING THE ARM", "a abort    h halt"),
+        (RunState.PAUSED, "PAUSED, THE ARM STANDS", "r go on    s finish here    a abort    h halt"),
+        (RunState.ABORTING, "ABORTING", "h halt"),
+        (RunState.HALTED, "HALTED, THE ARM IS HELD", "h say the stop again"),
+        (RunState.ABORTED, "ABORTED, THE ARM STANDS", ""),
     ],
 )
 def test_the_view_says_in_capitals_what_goes_on_and_which_keys_serve(state, large, keys) -> None:
@@ -109,7 +109,7 @@ def test_the_view_says_in_capitals_what_goes_on_and_which_keys_serve(state, larg
 
 def test_the_view_fits_a_terminal_of_eighty_columns(teller, samples) -> None:
     journal = ToldJournal(Kept(), teller, lambda all_: None)
-    teller.state(State.RUNNING)
+    teller.state(RunState.RUNNING)
     teller.progress(progress())
     for sample in samples[:9]:
         journal.sample(sample)
@@ -149,7 +149,7 @@ def test_a_dark_face_is_said(teller, samples) -> None:
 
 
 def test_who_is_asked_sees_nothing_else() -> None:
-    text = told(Shown(State.RUNNING, progress=progress(), asked="put the fixture at place 2, then press ENTER"))
+    text = told(Shown(RunState.RUNNING, progress=progress(), asked="put the fixture at place 2, then press ENTER"))
     assert "YOUR TURN" in text
     assert "then press ENTER" in text
     assert "SPACE" not in text
@@ -157,14 +157,14 @@ def test_who_is_asked_sees_nothing_else() -> None:
 
 def test_time_left_counts_only_when_the_arm_works(teller, clock, samples) -> None:
     journal = ToldJournal(Kept(), teller, lambda all_: None)
-    teller.state(State.RUNNING)
+    teller.state(RunState.RUNNING)
     teller.progress(progress(0))
     for sample in samples[:4]:
         clock.time_s += 10.0
         journal.sample(sample)
-    teller.state(State.PAUSED)
+    teller.state(RunState.PAUSED)
     clock.time_s += 3600.0
-    teller.state(State.RUNNING)
+    teller.state(RunState.RUNNING)
     teller.asked("put the fixture there")
     clock.time_s += 3600.0
     teller.asked("")
@@ -235,7 +235,9 @@ def test_the_page_is_told_the_same_and_what_it_draws_by() -> None:
 
     feed = Feed()
     view = PageView(feed)
-    shown = Shown(State.RUNNING, progress=progress(), left_s=60.0, forecast=Forecast(5, 2e-5, corrections={"a": 1.0}))
+    shown = Shown(
+        RunState.RUNNING, progress=progress(), left_s=60.0, forecast=Forecast(5, 2e-5, corrections={"a": 1.0})
+    )
     view.shows(shown)
     view.shows(shown)
     *once, last, again = feed.told[:2] + feed.told[2:]
@@ -263,7 +265,7 @@ def test_a_script_gets_what_is_safe_and_nobody_puts_a_fixture_for_it(teller) -> 
 def test_the_question_for_the_fixture_is_on_the_screen_before_an_enter_counts(teller, heard, typist) -> None:
     """Typed ahead, and typed while the question is being drawn: neither is an answer."""
     reins = Reins(lambda: None, changed=teller.state)
-    reins.tell(Event.START)
+    reins.tell(RunEvent.START)
     asked = person(teller, Asking(typist.terminal), agrees=False)
     typist.ahead("\n")
     typist.answers("then press ENTER", "\n")

@@ -15,7 +15,7 @@ from acquisition.recording.mcap import parts
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan, write_pose_plan
 from acquisition.recording.rig import load_rig
 from acquisition.sample import Sample
-from acquisition.session_states import State
+from acquisition.session_states import RunState
 from benchmarks.stops import emulated_rig, without_encoders
 from calibeam.cli import run
 from calibeam.emulation import Emulation
@@ -60,11 +60,11 @@ def interrupted(monkeypatch) -> None:
             os.kill(os.getpid(), signal.SIGINT)
             assert pausing.wait(PATIENCE_S)
 
-    def state(teller: Teller, state: State) -> None:
+    def state(teller: Teller, state: RunState) -> None:
         turn(teller, state)
-        if state is State.PAUSING:
+        if state is RunState.PAUSING:
             pausing.set()
-        elif state is State.PAUSED:
+        elif state is RunState.PAUSED:
             os.kill(os.getpid(), signal.SIGCONT)
 
     monkeypatch.setattr(Teller, "sample", sample)
