@@ -8,6 +8,7 @@ import can
 import numpy as np
 from numpy.typing import ArrayLike
 
+from acquisition.recording import Channel, RecordingError
 from acquisition.recording.can_frames import (
     CLASSIC_BYTES,
     FD_BYTES,
@@ -18,9 +19,7 @@ from acquisition.recording.can_frames import (
     block_of,
     channels,
 )
-from acquisition.recording.can_message import frame_of
-from acquisition.recording.errors import RecordingError
-from acquisition.recording.stream import Channel
+from acquisition.recording.can_log import frame_of
 from drivers.clock import Clock
 
 _ERROR = int(FrameFlag.ERROR)  # comparing with a member of an enumeration takes ten times as long

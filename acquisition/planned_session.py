@@ -19,7 +19,7 @@ from acquisition.reined_bench import ReinedBench
 from acquisition.reins import EndedEarlyError, Reins
 from acquisition.sample import Sample
 from acquisition.session import NOTHING, Summary, Taken, usable
-from acquisition.session_states import Event
+from acquisition.session_states import RunEvent
 from acquisition.stepping import Stepping
 
 Floats = NDArray[np.float64]
@@ -79,7 +79,7 @@ class PlannedSession:
         `standing`: the place where the fixture is already.
         """
         check_planned(plan)
-        self._reins.tell(Event.START)
+        self._reins.tell(RunEvent.START)
         try:
             self._stepping.step(lambda: self._navigator.move(self._navigator.q_rad))
             index = 0

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable
 
 from acquisition.errors import StoppedError
-from acquisition.session_states import BROKEN, OVER, PAUSE_AGAIN_S, REST_S, Event, State, after
+from acquisition.session_states import BROKEN, OVER, PAUSE_AGAIN_S, REST_S, RunEvent, RunState, after
 from drivers.clock import Clock, SystemClock
 from drivers.errors import DeviceError
 
@@ -37,7 +37,7 @@ class Reins:
         stop_arm: Callable[[], None],
         clock: Clock | None = None,
         failure: Callable[[], Exception | None] = lambda: None,
-        changed: Callable[[State], None] = lambda state: None,
+        changed: Callable[[RunState], None] = lambda state: None,
         hold_arm: Callable[[], None] | None = None,
         undelivered: Callable[[DeviceError | None], None] = lambda trouble: None,
         rests_in_s: Callable[[], float] = lambda: 0.0,
@@ -49,17 +49,17 @@ class Reins:
         self._rests_in_s, self._ease_arm, self._pausing = rests_in_s, ease_arm or stop_arm, pausing
         self._eased = False  # the motion under way was braked softly, and the session has not taken note
         self._easing: threading.Thread | None = None
-        self._early: Event | None = None  # pause or abort, from before measuring began
+        self._early: RunEvent | None = None  # pause or abort, from before measuring began
         self._interrupts, self._interrupted_s = 0, float("-inf")
         self._why = ""
         self._clock: Clock = clock or SystemClock()
         self._news = threading.Condition()
-        self._state = State.IDLE
+        self._state = RunState.IDLE
         self._paused_s = float("-inf")
         self.trouble: DeviceError | None = None  # why the last stop could not be delivered
 
     @property
-    def state(self) -> State:
+    def state(self) -> RunState:
         return self._state
 
     # --- what a person may say, from any thread and in every state
@@ -69,9 +69,9 @@ class Reins:
         now_s = self._clock.now_s()
         self._interrupts = self._interrupts + 1 if now_s - self._interrupted_s <= PAUSE_AGAIN_S else 1
         self._interrupted_s = now_s
-        if self._interrupts > 2 or (self._state is State.PAUSED and self._interrupts == 1):
+        if self._interrupts > 2 or (self._state is RunState.PAUSED and self._interrupts == 1):
             self.abort()
-        elif self._state is not State.PAUSED:
+        elif self._state is not RunState.PAUSED:
             self.pause()
 
     def pause(self) -> None:
@@ -79,11 +79,11 @@ class Reins:
         now_s, before = self._clock.now_s(), self._state
         again = now_s - self._paused_s <= PAUSE_AGAIN_S
         self._paused_s = now_s
-        if again and before is State.PAUSING:
-            self.tell(Event.BREAK)
+        if again and before is RunState.PAUSING:
+            self.tell(RunEvent.BREAK)
             return
-        self.tell(Event.PAUSE)
-        if before in (State.RUNNING, State.ENDING):
+        self.tell(RunEvent.PAUSE)
+        if before in (RunState.RUNNING, RunState.ENDING):
             rests_in_s = self._rests_in_s()
             self._pausing(rests_in_s, rests_in_s > REST_S)
             self._ease(rests_in_s)
@@ -91,45 +91,45 @@ class Reins:
     def resume(self) -> None:
         """Go on from the last checkpoint."""
         self._paused_s = self._interrupted_s = float("-inf")
-        if self._state is State.PAUSED:
+        if self._state is RunState.PAUSED:
             self._keep(None)  # the arm stands, whatever became of the stop
-        self.tell(Event.RESUME)
+        self.tell(RunEvent.RESUME)
 
     def stop(self) -> None:
         """End at the next checkpoint, as a success."""
-        self.tell(Event.STOP)
+        self.tell(RunEvent.STOP)
 
     def abort(self, why: str = "") -> None:
         """Stop the arm and give the session up."""
         self._why = self._why or why
-        self.tell(Event.ABORT)
+        self.tell(RunEvent.ABORT)
 
     def halt(self) -> None:
         """Stop the arm now, whatever the state."""
-        self.tell(Event.HALT)
+        self.tell(RunEvent.HALT)
 
     def insist(self) -> None:
         """Say the stop once more while the session has not taken note; to be called a few times a second."""
         state = self._state
         if state in BROKEN:
             self._brake(state)
-        elif state is State.PAUSING:
+        elif state is RunState.PAUSING:
             self._ease(self._rests_in_s())
 
-    def tell(self, event: Event) -> None:
+    def tell(self, event: RunEvent) -> None:
         """Any event; where it stops the arm, the arm has been told when this returns."""
         with self._news:
             before, now = self._state, after(self._state, event)
-            if before in (State.IDLE, State.DONE):
-                if now is State.RUNNING and self._early is not None:
+            if before in (RunState.IDLE, RunState.DONE):
+                if now is RunState.RUNNING and self._early is not None:
                     now = after(now, self._early)
-                if event in (Event.START, Event.RESUME):
+                if event in (RunEvent.START, RunEvent.RESUME):
                     self._early = None
-                elif event is Event.ABORT or (event is Event.PAUSE and self._early is None):
+                elif event is RunEvent.ABORT or (event is RunEvent.PAUSE and self._early is None):
                     self._early = event
             self._state = now
             self._news.notify_all()
-        if event is Event.HALT or (now in BROKEN and now is not before):
+        if event is RunEvent.HALT or (now in BROKEN and now is not before):
             self._brake(now)
         if now is not before:
             self._changed(self._state)  # which may have gone on while the arm was being stopped
@@ -144,10 +144,10 @@ class Reins:
         if self._easing is not None:
             self._easing.join()  # a stop that arrives late would end the next motion
             self._easing = None
-        self.tell(Event.CHECKPOINT)
+        self.tell(RunEvent.CHECKPOINT)
         self._eased = waited = False
         with self._news:
-            while self._state is State.PAUSED and self._failure() is None:
+            while self._state is RunState.PAUSED and self._failure() is None:
                 waited = True
                 self._news.wait(WAKE_S)
         self.check_devices()
@@ -158,24 +158,24 @@ class Reins:
         """Raises what a device has failed with; the session is over then."""
         failure = self._failure()
         if failure is not None:
-            self.tell(Event.FAULT)
+            self.tell(RunEvent.FAULT)
             raise failure
 
     def finish(self) -> None:
         """The plan is at its end. StoppedError where a person gave it up in the last moment."""
-        self.tell(Event.FINISHED)
-        if self._state in (State.ABORTED, State.HALTED):
+        self.tell(RunEvent.FINISHED)
+        if self._state in (RunState.ABORTED, RunState.HALTED):
             self._raise_end()
 
     def check(self, *, begins: bool = False) -> None:
         """Before (`begins`) and after every motion. BrokenOffError where the step is broken off; StoppedError."""
-        if self._state is State.HALTED:
+        if self._state is RunState.HALTED:
             self._raise_end()
-        if self._state in BROKEN or self._eased or (begins and self._state is State.PAUSING):
+        if self._state in BROKEN or self._eased or (begins and self._state is RunState.PAUSING):
             raise BrokenOffError
 
     def _raise_end(self) -> None:
-        if self._state in (State.ABORTED, State.HALTED):
+        if self._state in (RunState.ABORTED, RunState.HALTED):
             why = f"{self._why}: " if self._why else ""
             raise StoppedError(f"{why}the session was {self._state.value}")
         if self._state in OVER:
@@ -190,8 +190,8 @@ class Reins:
             self._easing = threading.Thread(target=self._deliver, args=(self._ease_arm,), name="ease", daemon=True)
             self._easing.start()
 
-    def _brake(self, state: State) -> None:
-        self._deliver(self._stop_arm if state is State.BREAKING else self._hold_arm)
+    def _brake(self, state: RunState) -> None:
+        self._deliver(self._stop_arm if state is RunState.BREAKING else self._hold_arm)
 
     def _deliver(self, stop: Callable[[], None]) -> None:
         trouble = None

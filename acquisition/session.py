@@ -23,8 +23,8 @@ from acquisition.reined_bench import ReinedBench
 from acquisition.reins import EndedEarlyError, Reins
 from acquisition.sample import Sample
 from acquisition.servo.centring import Limits
-from acquisition.servo.status import Status
-from acquisition.session_states import Event
+from acquisition.servo.status import CentringStatus
+from acquisition.session_states import RunEvent
 from acquisition.stepping import Stepping
 
 Floats = NDArray[np.float64]
@@ -92,7 +92,7 @@ class Session:
         keys = [key for block in plan for key in block.pose_keys()]
         self._total += len(keys)
         self._before += sum(key in self._earlier for key in keys)
-        self._reins.tell(Event.START)
+        self._reins.tell(RunEvent.START)
         try:
             self._stepping.step(lambda: self._navigator.move(self._navigator.q_rad))
             if self._earlier and not self._samples:
@@ -147,7 +147,7 @@ class Session:
         except (UnreachableError, SpotLostError) as why:
             self._journal.event("skipped", {"placement": visit.placement, "why": str(why)})
             return None
-        centred = visit.centred and run.status is Status.CENTRED
+        centred = visit.centred and run.status is CentringStatus.CENTRED
         sample = self._record(visit, visit.key(), centred=centred)
         if centred:
             self._steps.append(run.steps)

@@ -14,7 +14,7 @@ PAUSE_AGAIN_S = 10.0
 REST_S = 1.0  # a motion that ends sooner is let arrive, and braked softly else
 
 
-class State(enum.Enum):
+class RunState(enum.Enum):
     """The value is what a person reads, in large letters."""
 
     IDLE = "ready"
@@ -29,7 +29,7 @@ class State(enum.Enum):
     HALTED = "halted, the arm is held"
 
 
-class Event(enum.Enum):
+class RunEvent(enum.Enum):
     """What a person, a device or the session itself says."""
 
     START = "measuring begins, or begins again"
@@ -44,43 +44,43 @@ class Event(enum.Enum):
     FAULT = "a device failed"
 
 
-OVER = (State.IDLE, State.DONE, State.ABORTED, State.HALTED)  # nothing is under way
-BROKEN = (State.BREAKING, State.ABORTING, State.HALTED)  # no motion may go on, and none may begin
+OVER = (RunState.IDLE, RunState.DONE, RunState.ABORTED, RunState.HALTED)  # nothing is under way
+BROKEN = (RunState.BREAKING, RunState.ABORTING, RunState.HALTED)  # no motion may go on, and none may begin
 
 _UNDER_WAY = {
-    Event.BREAK: State.BREAKING,
-    Event.STOP: State.ENDING,
-    Event.ABORT: State.ABORTING,
-    Event.HALT: State.HALTED,
-    Event.FINISHED: State.DONE,
-    Event.FAULT: State.ABORTED,
+    RunEvent.BREAK: RunState.BREAKING,
+    RunEvent.STOP: RunState.ENDING,
+    RunEvent.ABORT: RunState.ABORTING,
+    RunEvent.HALT: RunState.HALTED,
+    RunEvent.FINISHED: RunState.DONE,
+    RunEvent.FAULT: RunState.ABORTED,
 }
-_TABLE: dict[State, dict[Event, State]] = {
-    State.IDLE: {Event.START: State.RUNNING, Event.HALT: State.HALTED},
-    State.DONE: {Event.START: State.RUNNING, Event.HALT: State.HALTED},
-    State.ABORTED: {Event.HALT: State.HALTED},
-    State.HALTED: {},
-    State.RUNNING: {**_UNDER_WAY, Event.PAUSE: State.PAUSING},
-    State.PAUSING: {**_UNDER_WAY, Event.RESUME: State.RUNNING, Event.CHECKPOINT: State.PAUSED},
+_TABLE: dict[RunState, dict[RunEvent, RunState]] = {
+    RunState.IDLE: {RunEvent.START: RunState.RUNNING, RunEvent.HALT: RunState.HALTED},
+    RunState.DONE: {RunEvent.START: RunState.RUNNING, RunEvent.HALT: RunState.HALTED},
+    RunState.ABORTED: {RunEvent.HALT: RunState.HALTED},
+    RunState.HALTED: {},
+    RunState.RUNNING: {**_UNDER_WAY, RunEvent.PAUSE: RunState.PAUSING},
+    RunState.PAUSING: {**_UNDER_WAY, RunEvent.RESUME: RunState.RUNNING, RunEvent.CHECKPOINT: RunState.PAUSED},
     # A stop would let the motion go on that is being broken off: it is to be said once the arm stands.
-    State.BREAKING: {**_UNDER_WAY, Event.CHECKPOINT: State.PAUSED, Event.STOP: State.BREAKING},
-    State.PAUSED: {
-        Event.RESUME: State.RUNNING,
-        Event.STOP: State.DONE,
-        Event.ABORT: State.ABORTED,
-        Event.HALT: State.HALTED,
-        Event.FAULT: State.ABORTED,
+    RunState.BREAKING: {**_UNDER_WAY, RunEvent.CHECKPOINT: RunState.PAUSED, RunEvent.STOP: RunState.BREAKING},
+    RunState.PAUSED: {
+        RunEvent.RESUME: RunState.RUNNING,
+        RunEvent.STOP: RunState.DONE,
+        RunEvent.ABORT: RunState.ABORTED,
+        RunEvent.HALT: RunState.HALTED,
+        RunEvent.FAULT: RunState.ABORTED,
     },
-    State.ENDING: {**_UNDER_WAY, Event.PAUSE: State.PAUSING, Event.CHECKPOINT: State.DONE},
-    State.ABORTING: {
-        Event.HALT: State.HALTED,
-        Event.CHECKPOINT: State.ABORTED,
-        Event.FINISHED: State.ABORTED,
-        Event.FAULT: State.ABORTED,
+    RunState.ENDING: {**_UNDER_WAY, RunEvent.PAUSE: RunState.PAUSING, RunEvent.CHECKPOINT: RunState.DONE},
+    RunState.ABORTING: {
+        RunEvent.HALT: RunState.HALTED,
+        RunEvent.CHECKPOINT: RunState.ABORTED,
+        RunEvent.FINISHED: RunState.ABORTED,
+        RunEvent.FAULT: RunState.ABORTED,
     },
 }
 
 
-def after(state: State, event: Event) -> State:
+def after(state: RunState, event: RunEvent) -> RunState:
     """The state that follows; an event that means nothing in a state leaves it as it is."""
     return _TABLE[state].get(event, state)

@@ -8,7 +8,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
 
 Floats = NDArray[np.float64]
 

@@ -12,9 +12,8 @@ from pathlib import Path
 import numpy as np
 from numpy.random import Generator
 
-from acquisition.recording.read import read
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples, read
+from acquisition.recording.rig import Rig
 from benchmarks.blundered import ROWS, WHOLE_FILE, Made, Mistake
 from benchmarks.healthy import INSTRUMENTS, Drawn
 from calibrate.arms.catalogue import arm_of

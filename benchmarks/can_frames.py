@@ -15,10 +15,9 @@ import can
 import numpy as np
 
 from acquisition.frame_log import FrameLog
+from acquisition.recording import RecordingWriter, read
 from acquisition.recording.can_frames import DATA, STREAM
-from acquisition.recording.read import read
 from acquisition.recording.rig import rig_text
-from acquisition.recording.writer import RecordingWriter
 from drivers.clock import SystemClock
 from drivers.transports.can_interfaces import bus_opener
 from drivers.transports.can_tap import tapped

@@ -18,12 +18,12 @@ from acquisition.aiming.reach import reach
 from acquisition.aiming.search import Found, Search
 from acquisition.believed import BelievedArm, FixtureOptics
 from acquisition.errors import UnreachableError
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from acquisition.servo.centring import Limits, centre
 from acquisition.servo.law import FixedGuess
-from acquisition.servo.measured import Measured
+from acquisition.servo.measured import MeasuredStrategy
 from acquisition.servo.registered import Registered
-from acquisition.servo.status import Centring, Status
+from acquisition.servo.status import Centring, CentringStatus
 from acquisition.servo.strategy import Strategy
 from calibeam.learner import FittedLearner
 from tests.support.direct_bench import DirectBench, direct_bench
@@ -34,7 +34,7 @@ Make = Callable[[BelievedArm, FixtureOptics, Floats, int], Strategy]
 SESSIONS = "registered (sessions use it)"
 STRATEGIES: tuple[tuple[str, Make], ...] = (
     (SESSIONS, Registered),
-    ("measured Jacobian, Broyden", Measured),
+    ("measured Jacobian, Broyden", MeasuredStrategy),
     ("law (8), gain 0.3", lambda arm, optics, T, first: FixedGuess(arm, optics, T, first, 0.3)),
     ("law (8), gain 0.5", lambda arm, optics, T, first: FixedGuess(arm, optics, T, first, 0.5)),
     ("law (8), gain 0.7", lambda arm, optics, T, first: FixedGuess(arm, optics, T, first, 0.7)),
@@ -122,7 +122,7 @@ def _stand(
         return None
     strategy = Registered(arm, optics, T_true, target.first)
     stood = centre(bench, arm, strategy, found.q_rad, np.array(target.spots_m), Limits(tolerance_m=1e-3))
-    return stood.trace[-1].q_rad if stood.status is Status.CENTRED else None
+    return stood.trace[-1].q_rad if stood.status is CentringStatus.CENTRED else None
 
 
 def _wrong(T_true: Floats, rng: np.random.Generator, turn_rad: float) -> Floats:
@@ -169,7 +169,7 @@ def lines(runs: Mapping[str, list[Centring]]) -> list[str]:
     """The distribution, one line a strategy."""
     out = ["strategy                        to 5 um   median   p90   max   motions: runs"]
     for name, results in runs.items():
-        good = [run for run in results if run.status is Status.CENTRED]
+        good = [run for run in results if run.status is CentringStatus.CENTRED]
         steps = np.array([run.steps for run in good]) if good else np.zeros(1)
         histogram = " ".join(f"{k}:{n}" for k, n in enumerate(np.bincount(steps.astype(int))) if n)
         out.append(
@@ -177,7 +177,7 @@ def lines(runs: Mapping[str, list[Centring]]) -> list[str]:
             f"{steps.max():5.0f}   {histogram}"
         )
         out.append(f"    light lost once in {_lost(results, 1)} runs, more often in {_lost(results, 2, more=True)}")
-        ends = {run.status.name for run in results} - {Status.CENTRED.name}
+        ends = {run.status.name for run in results} - {CentringStatus.CENTRED.name}
         out += [f"    {status}: {sum(run.status.name == status for run in results)}" for status in sorted(ends)]
     return out
 

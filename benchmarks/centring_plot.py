@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from acquisition.servo.status import Centring, Status
+from acquisition.servo.status import Centring, CentringStatus
 from calibeam.motion.figures import PRINTED, write_figure
 
 LONGEST = 40  # steps that are drawn
@@ -20,7 +20,7 @@ def write_plot(path: Path, runs: Mapping[str, Sequence[Centring]]) -> None:
 
 def shares(results: Sequence[Centring]) -> np.ndarray:
     """(LONGEST + 1,) share of all runs that were centred after so many motions."""
-    steps = [run.steps for run in results if run.status is Status.CENTRED]
+    steps = [run.steps for run in results if run.status is CentringStatus.CENTRED]
     return np.array([sum(s <= k for s in steps) for k in range(LONGEST + 1)]) / len(results)
 
 

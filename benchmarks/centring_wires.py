@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from acquisition.bench import Bench, Look
 from acquisition.plan import PlanOptions
+from acquisition.recording import RecordingWriter
 from acquisition.recording.rig import load_rig, rig_text
-from acquisition.recording.writer import RecordingWriter
 from acquisition.sample import Sample
 from acquisition.servo.centring import Limits
-from acquisition.servo.status import Status
+from acquisition.servo.status import CentringStatus
 from acquisition.session import Session
 from calibeam.devices.site import addresses_of, connected
 from calibeam.emulation import Emulation
@@ -78,7 +78,7 @@ class RunsJournal:
     def event(self, kind: str, detail: Mapping[str, Any]) -> None:
         if kind != "centring" or detail["tolerance_m"] > Limits().tolerance_m:
             return
-        if detail["status"] != Status.CENTRED.name:
+        if detail["status"] != CentringStatus.CENTRED.name:
             self.failed.append(detail["status"])
             return
         motions = len(detail["purpose"]) - 1

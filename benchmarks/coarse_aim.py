@@ -20,13 +20,12 @@ from acquisition.aiming.pose import BeamTarget
 from acquisition.aiming.reach import reach
 from acquisition.aiming.search import Found, Search
 from acquisition.camera.board import Board
-from acquisition.camera.measuring import CameraMeasuring, Measured
+from acquisition.camera.measuring import CameraMeasuring, MeasuredCamera
 from acquisition.camera.model import CameraFit, CameraModel
 from acquisition.camera.sight import Sight
 from acquisition.errors import UnreachableError
 from acquisition.motion.rigid import inverse, transform
-from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig, load_rig, plain_rig, rig_text
 from acquisition.sample import Sample
 from calibeam.learner import FittedLearner
 from tests.support.direct_bench import DirectBench, DirectEye, direct_bench
@@ -57,7 +56,7 @@ class World:
     learner: FittedLearner
     eye: DirectEye
     placement: int
-    measured: Measured
+    measured: MeasuredCamera
     model: CameraModel | None  # that is aimed by
 
 

@@ -7,12 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.recording.errors import RecordingError
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
+from acquisition.recording import Channel, Event, Recording, RecordingError, RecordingWriter, read
 from acquisition.recording.rig import rig_text
-from acquisition.recording.stream import Channel, Event
-from acquisition.recording.writer import RecordingWriter
 
 CUTS = FLIPS = 2000
 SEED = 3

@@ -16,12 +16,9 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.plan import PlanOptions
 from acquisition.planned_session import PlannedSession
+from acquisition.recording import Recording, RecordingWriter, read
 from acquisition.recording.pose_plan import PosePlan
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
-from acquisition.recording.rig import load_rig, plain_rig, rig_sha256, rig_text
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording.rig import Rig, load_rig, plain_rig, rig_sha256, rig_text
 from benchmarks.slices import Slices
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.learner import FittedLearner

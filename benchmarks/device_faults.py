@@ -20,9 +20,8 @@ from typing import Any
 import numpy as np
 
 from acquisition.guarded import Guarded
-from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from acquisition.recording.rig_devices import PsdDriver, RobotDriver
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig, load_rig, plain_rig, rig_text
+from acquisition.recording.rig.devices import PsdDriver, RobotDriver
 from acquisition.streams import Pump
 from acquisition.supervisor import Supervisor
 from calibeam.devices.encoders import emulated_encoders, encoder_driver

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import beta
 
-from acquisition.recording.folder import read_folder
+from acquisition.recording.session_folder import read_folder
 from calibrate.diagnose.diagnosis import Verdict
 from calibrate.diagnose.doubt import Doubted, doubted
 from calibrate.diagnose.fitted import fit_geometry

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.recording.folder import read_folder
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording import RecordingWriter
+from acquisition.recording.session_folder import read_folder
 from simulators.conceal.case import Case, conceal
 from simulators.conceal.wanted import Wanted
 from simulators.conceal.write import write_case

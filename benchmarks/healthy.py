@@ -9,10 +9,9 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.columns import ORIENTATION, POSITION, SPOTS
-from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import Bar, Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Bar, Rig, load_rig
+from acquisition.recording.samples import ORIENTATION, POSITION, SPOTS
 from benchmarks.drawn_sessions import POSITION_SIGMA_M, T_BASE_DEVICE, TARGET_M, Bench, forward, frame, reach
 
 Floats = NDArray[np.float64]

@@ -12,8 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.recording.read import read
-from acquisition.recording.recover import recover
+from acquisition.recording import read, recover
 
 KILLS = 100
 SEED = 1
@@ -22,8 +21,8 @@ BOUND_S = 0.1  # what may be lost, and one batch
 RECORDER = """
 import os, sys, time
 import numpy as np
-from acquisition.recording.stream import Channel
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording.recording import Channel
+from acquisition.recording.mcap.writer import RecordingWriter
 from drivers.clock import SystemClock
 
 clock = SystemClock()

@@ -6,7 +6,7 @@ import threading
 import time
 from dataclasses import dataclass
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from benchmarks.live_feed import LivingRig
 from calibeam.live.page import PageAddress, live_page
 from drivers.clock import SystemClock

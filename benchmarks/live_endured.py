@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from playwright.sync_api import sync_playwright
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from benchmarks.live_feed import LivingRig
 from calibeam.live.page import PageAddress, live_page
 from drivers.clock import SystemClock

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from acquisition.aiming.pose import BeamTarget, flange_for
 from acquisition.aiming.reach import reach
 from acquisition.psd_view import PsdView
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibeam.live.feed import Feed
 from calibrate.believed import BelievedRig
 from drivers.clock import Clock

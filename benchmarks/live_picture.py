@@ -7,7 +7,7 @@ from pathlib import Path
 from PIL import Image
 from playwright.sync_api import sync_playwright
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from benchmarks.live_feed import LivingRig
 from calibeam.live.feed import Progress
 from calibeam.live.page import PageAddress, live_page

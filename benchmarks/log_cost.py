@@ -17,8 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.recording.read import read
-from acquisition.recording.segments import segments
+from acquisition.recording import read
+from acquisition.recording.mcap import segments
 
 FOR_S = 30.0
 RATE_HZ = 1000.0

@@ -21,9 +21,8 @@ from acquisition.guided.arm import GuidedArm
 from acquisition.guided.plan import GuidedOptions, calibration_plan
 from acquisition.guided.reading import Reading
 from acquisition.guided.session import GuidedSession
-from acquisition.guided.stillness import Motion, StillRule
-from acquisition.recording.rig import load_rig, plain_rig, rig_sha256, rig_text
-from acquisition.recording.rig_schema import Rig
+from acquisition.guided.stillness import ArmMotion, StillRule
+from acquisition.recording.rig import Rig, load_rig, plain_rig, rig_sha256, rig_text
 from benchmarks.slices import Slices
 from calibeam.guided.hand import COUNTS, DirectHand
 from calibeam.guided.judge import FittedJudge
@@ -173,7 +172,7 @@ def _dwelt(hand: DirectHand, arm: GuidedArm) -> tuple[Floats, Floats, Floats]:
     rule, world = StillRule(), hand.world
     world.advance(world.arrives_s)
     window = hand.dwell(rule.dwell_s)  # whole: what was seen on the way there, or before, does not count
-    while rule.judge(arm, window) is not Motion.STILL:
+    while rule.judge(arm, window) is not ArmMotion.STILL:
         window = hand.dwell(rule.dwell_s)
     held = window.last(rule.dwell_s)
     shafts = np.array([world.shaft_at_rad(t_s) for t_s in held.t_s])

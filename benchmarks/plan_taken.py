@@ -12,12 +12,9 @@ import numpy as np
 
 from acquisition.plan import PlanOptions
 from acquisition.planned_session import PlannedSession
+from acquisition.recording import Recording, RecordingWriter, Samples, read
 from acquisition.recording.pose_plan import read_pose_plan
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from acquisition.recording.samples import Samples
-from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.learner import FittedLearner

@@ -4,7 +4,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from acquisition.recording.read import read
+from acquisition.recording import read
 from calibeam.results.diagnosis import diagnose_recording
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.report.diagnosis.words import before_after, free_space_words, micrometres, place_words, verdict_words

@@ -12,10 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.recording.read import read
+from acquisition.recording import Channel, RecordingWriter, read
 from acquisition.recording.rig import plain_rig, rig_text
-from acquisition.recording.stream import Channel
-from acquisition.recording.writer import RecordingWriter
 from acquisition.streams import Pump
 from drivers.clock import SystemClock
 from drivers.ur.reader import UrReader

@@ -19,10 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from acquisition.recording.columns import SPOTS
-from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import Placement, Pose, Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Placement, Pose, Rig, load_rig
+from acquisition.recording.samples import SPOTS
 from benchmarks import rival_pinocchio
 from benchmarks.drawn_sessions import T_BASE_DEVICE, TARGET_M, Bench, frame
 from calibrate.arms import compiled

@@ -25,9 +25,8 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.recording.errors import RecordingError
+from acquisition.recording import RecordingError, read
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan, write_pose_plan
-from acquisition.recording.read import read
 from acquisition.recording.rig import load_rig
 from calibeam.emulation import Emulation
 from drivers.errors import DeviceError

@@ -14,11 +14,8 @@ from numpy.typing import NDArray
 
 from acquisition.bench import Look
 from acquisition.plan import PlanOptions
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
+from acquisition.recording import Channel, Recording, RecordingWriter, read
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from acquisition.recording.stream import Channel
-from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
 from benchmarks.disturbed import DisturbedWorld, Trouble
 from calibeam.devices.recorder import RecordingJournal

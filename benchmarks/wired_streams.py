@@ -11,10 +11,8 @@ import msgspec
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording, RecordingWriter, read
 from acquisition.recording.rig import load_rig, rig_text
-from acquisition.recording.writer import RecordingWriter
 from benchmarks.disturbed import Trouble
 from calibeam.devices.recorder import record_session
 from calibeam.devices.site import addresses_of, connected

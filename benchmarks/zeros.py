@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.read import read
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording import RecordingWriter, read
+from acquisition.recording.rig import Rig
 from acquisition.session import Session
 from calibeam.commands.demo import ZeroAgainstTruth, compare_with_truth
 from calibeam.devices.recorder import RecordingJournal

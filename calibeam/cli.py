@@ -11,7 +11,8 @@ from rich.console import Console
 from rich.markup import escape
 
 from acquisition.errors import AcquisitionError
-from acquisition.recording.errors import RecordingError, RigFileError, SamplesError, brief
+from acquisition.recording import RecordingError, RigFileError, SamplesError
+from acquisition.recording.files import brief
 from calibeam.command_list import COMMANDS, GROUPS
 from calibeam.emulation import EmulationError
 from calibeam.interrupts import INTERRUPTS

@@ -4,7 +4,7 @@ import sys
 from ipaddress import ip_address
 from pathlib import Path
 
-from acquisition.recording.rig_devices import RobotDevice
+from acquisition.recording.rig.devices import RobotDevice
 from simulators.process import EmulatorProcess, EmulatorsError, ask_emulators
 
 __all__ = ["Emulation", "EmulationError", "ask_emulators", "moves_nothing_real"]

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from acquisition.sample import Sample
 from calibrate.believed import BelievedRig
 from calibrate.believed_arm import BelievedArm

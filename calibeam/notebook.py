@@ -13,14 +13,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
-from acquisition.recording.samples import Samples
+from acquisition.recording import TYPE_CHECKING, Recording, Samples, read
 from calibrate.errors import DataError
 
 if TYPE_CHECKING:

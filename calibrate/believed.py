@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.believed_arm import believed_arm
 from calibrate.believed_fixture import BelievedFixture, FixtureView, Light
 from calibrate.dual_psd_rig import dual_psd_chain, dual_psd_of

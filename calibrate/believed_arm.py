@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.arms.rig_arm import RigArm
 from calibrate.dual_psd_rig import laser_of
 from calibrate.parameters import values_by_name

@@ -2,7 +2,7 @@
 
 from msgspec.structs import replace
 
-from acquisition.recording.rig_schema import ArmModel, Pose, Rig
+from acquisition.recording.rig import ArmModel, Pose, Rig
 from calibrate.arms.convert import Conversion, convert, pose_of
 from calibrate.errors import DataError
 from calibrate.rigid import inverse, transform

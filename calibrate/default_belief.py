@@ -4,7 +4,7 @@ Nobody's statement: it holds a fit where data see little, and is no source of a 
 file has a [tolerance], what that leaves out is as docs/formats.md says.
 """
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.arms.belief import LinkBelief
 from calibrate.sensors.dual_psd import PairBelief
 

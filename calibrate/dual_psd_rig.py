@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.arms.catalogue import arm_of
 from calibrate.chain import Chain
 from calibrate.default_belief import links_of

@@ -10,10 +10,9 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct, field
 
-from acquisition.recording.bounds import Count, Few, Name, Positive
-from acquisition.recording.rig_lines import KeyPath
-from acquisition.recording.rig_schema import ArmModel
-from acquisition.recording.toml_file import parse_toml, read_text
+from acquisition.recording.files import KeyPath, parse_toml, read_text
+from acquisition.recording.files.bounds import Count, Few, Name, Positive
+from acquisition.recording.rig import ArmModel
 from calibrate.errors import DataError
 from calibrate.fit import DogLegRules, Loss, Method
 from calibrate.redundant import Redundant

@@ -5,13 +5,15 @@ Angles are rad, lengths m. A joint's true angle is its reading plus `joint<i>.ze
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.bounds import (
+from acquisition.recording import TYPE_CHECKING
+from acquisition.recording.files import JsonKind, read_json, shown
+from acquisition.recording.files.bounds import (
     Correction,
     Count,
     FileText,
@@ -24,8 +26,6 @@ from acquisition.recording.bounds import (
     Statistic,
     Whole,
 )
-from acquisition.recording.errors import shown
-from acquisition.recording.json_file import JsonKind, read_json
 from calibrate.errors import DataError
 from calibrate.older_models import with_present_names
 from calibrate.parameters import Parameter
@@ -191,7 +191,7 @@ class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     bootstrap: BootstrapRecord | None = None
     plan: FileText | None = None
     fit: FitRecord | None = None  # absent in models of earlier versions
-    readings_sha256: Label | None = None  # which readings it was made of (acquisition/recording/fingerprint.py)
+    readings_sha256: Label | None = None  # which readings it was made of (acquisition/recording/samples.py)
     effects: Many[Effect] = ()
     needs: Many[Name] = ()
     session: SessionRecord | None = None

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.rig import parse_rig
-from acquisition.recording.rig_schema import ArmModel, Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import ArmModel, Rig, parse_rig
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.eccentric import with_discs
 from calibrate.arms.model import KinematicModel

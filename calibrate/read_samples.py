@@ -5,7 +5,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
 from calibrate.errors import DataError
 from calibrate.observations import Observations
 

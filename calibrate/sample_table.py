@@ -7,9 +7,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import POSITION
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import POSITION
 from calibrate.alignment import Alignment, align, align_with_tool
 from calibrate.arms.model import KinematicModel
 from calibrate.errors import DataError

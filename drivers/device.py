@@ -5,14 +5,19 @@ device (verbs and SI units). Everything above the wire sees only what stands her
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.clock import Clock, SystemClock
+from drivers.errors import DeviceLost
+
 Floats = NDArray[np.float64]
+LineT = TypeVar("LineT")
 
 
 @dataclass(frozen=True)
@@ -55,6 +60,61 @@ class Device(Protocol):
     def close(self) -> None:
         """Release the port; safe in every state and more than once."""
         ...
+
+
+class StreamDevice(ABC, Generic[LineT]):
+    """What every `Device` with a line of its own does alike: open, set up or close again, know whether it is open.
+
+    One thread uses it at a time, except `close`, which any thread may call. A device adds `describe` and `read`.
+    """
+
+    def __init__(self, name: str, clock: Clock | None) -> None:
+        self.name = name
+        self._clock: Clock = SystemClock() if clock is None else clock
+        self._line: LineT | None = None
+
+    @property
+    def place(self) -> str:
+        """The device and where it is, for messages."""
+        return self.name
+
+    @abstractmethod
+    def _open(self) -> LineT:
+        """The line, opened. DeviceLost when there is none."""
+
+    @abstractmethod
+    def _set_up(self, line: LineT) -> None:
+        """From an open line to a stream: who is there, how it is to send. Whatever it raises closes the line."""
+
+    @abstractmethod
+    def _release(self, line: LineT) -> None:
+        """End the stream as far as the line still carries it, and free the line. Raises nothing for a dead line."""
+
+    def connect(self) -> None:
+        """Open the line and begin the stream, anew if it was open. DeviceLost, DeviceStale, DeviceRefused."""
+        self.close()
+        line = self._line = self._open()
+        try:
+            self._set_up(line)
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Release the line; safe in every state and more than once."""
+        line, self._line = self._line, None
+        if line is not None:
+            self._release(line)
+
+    def _opened(self) -> LineT:
+        line = self._line
+        if line is None:
+            raise DeviceLost(f"{self.place}: not connected; call connect() first")
+        return line
+
+    def _left_s(self, deadline_s: float) -> float:
+        """Host time until a deadline; not above 0 once it has passed."""
+        return deadline_s - self._clock.now_s()
 
 
 class Movable(Protocol):

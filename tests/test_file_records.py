@@ -11,10 +11,10 @@ from msgspec.structs import fields
 
 from acquisition.camera import model as camera
 from acquisition.motion.task.task_file import TaskEntries
-from acquisition.recording import mcap_content
+from acquisition.recording.mcap import read
 from acquisition.recording.pose_plan import PosePlan
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.stream_tables import StreamsAbout
+from acquisition.recording.rig import Rig
+from acquisition.recording.session_folder.stream_tables import StreamsAbout
 from calibeam.fleet.row import Row
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.error_simulation.plan import ErrorPlan
@@ -23,7 +23,7 @@ from calibrate.model_file import ModelFile
 
 ROOT = Path(__file__).parents[1]
 RECORDS = (Rig, PosePlan, FitPlan, ErrorPlan, TaskEntries, ModelFile, DiagnosisFile, Row, StreamsAbout)
-PRIVATE = (camera._File, mcap_content._ChannelRow)  # pyright: ignore[reportPrivateUsage] - records of one reader
+PRIVATE = (camera._File, read._ChannelRow)  # pyright: ignore[reportPrivateUsage] - records of one reader
 # Read by the program that wrote them, in one run or in a sealed folder; nobody edits them.
 OWN = {"Truth": "prove", "ProofFile": "prove", "Task": "fleet"}
 OUR_READERS = {"checked", "read_json"}

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.camera.eye import Grey
-from acquisition.recording.rig_schema import CameraBoard
+from acquisition.recording.rig.schema import CameraBoard
 
 Floats = NDArray[np.float64]
 

@@ -27,7 +27,7 @@ WORST_PX = 1.0  # rms: beyond it the lens is no pinhole with a bend, or the draw
 WORST_M, WORST_RAD = 0.02, 0.06
 
 
-class Status(Enum):
+class CameraStatus(Enum):
     """How a camera calibration ended; the value is the sentence for a person."""
 
     CALIBRATED = "lens and mount were found"
@@ -49,7 +49,7 @@ class View:
 class Calibration:
     """`model` and `fit` are None unless the status is CALIBRATED, or INCONSISTENT or POOR_LENS for `fit`."""
 
-    status: Status
+    status: CameraStatus
     model: CameraModel | None = None
     fit: CameraFit | None = None
 
@@ -57,21 +57,21 @@ class Calibration:
 def calibrate_camera(views: Sequence[View], start: CameraModel) -> Calibration:
     """`start`: the camera as drawn. Never raises for bad views."""
     if len(views) < LEAST_VIEWS:
-        return Calibration(Status.TOO_FEW_VIEWS)
+        return Calibration(CameraStatus.TOO_FEW_VIEWS)
     if _turn_rad(views) < LEAST_TURN_RAD:
-        return Calibration(Status.TOO_LITTLE_TURN)
+        return Calibration(CameraStatus.TOO_LITTLE_TURN)
     model, reprojection_px = _lens(views, start)
     poses = [board_poses(model, view.seen) for view in views]
     if reprojection_px > WORST_PX or not all(poses):
-        return Calibration(Status.POOR_LENS, fit=CameraFit(len(views), reprojection_px, np.nan, np.nan))
+        return Calibration(CameraStatus.POOR_LENS, fit=CameraFit(len(views), reprojection_px, np.nan, np.nan))
     T_camera_board = np.array([pose[0][0] for pose in poses])
     T_base_flange = np.array([view.T_base_flange for view in views])
     model = replace(model, T_flange_camera=_mount(T_base_flange, T_camera_board))
     board_m, board_rad = _scatter(T_base_flange @ model.T_flange_camera @ T_camera_board)
     fit = CameraFit(len(views), reprojection_px, board_m, board_rad)
     if board_m > WORST_M or board_rad > WORST_RAD:
-        return Calibration(Status.INCONSISTENT, fit=fit)
-    return Calibration(Status.CALIBRATED, model, fit)
+        return Calibration(CameraStatus.INCONSISTENT, fit=fit)
+    return Calibration(CameraStatus.CALIBRATED, model, fit)
 
 
 def _lens(views: Sequence[View], start: CameraModel) -> tuple[CameraModel, float]:

@@ -10,7 +10,7 @@ from acquisition.aiming.reach import reach
 from acquisition.bench import Bench
 from acquisition.camera.beam import Line, line_before, onto_beam
 from acquisition.camera.board import Board
-from acquisition.camera.calibration import Calibration, Status, View, calibrate_camera
+from acquisition.camera.calibration import Calibration, CameraStatus, View, calibrate_camera
 from acquisition.camera.eye import Eye
 from acquisition.camera.model import CameraFit, CameraModel, drawn
 from acquisition.camera.sight import Sight
@@ -21,7 +21,7 @@ from acquisition.learner import Learner
 from acquisition.motion.inverse.kinematics import flange
 from acquisition.motion.rigid import transform
 from acquisition.navigator import Navigator
-from acquisition.recording.rig_schema import Camera
+from acquisition.recording.rig import Camera
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ STEADY_S = 0.05  # of the spots that the beam is told by
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredCamera:
     """`calibration.model` is of lens and mount alone; `model` is what to aim by, None unless the beam was found too."""
 
     stops: int
@@ -46,7 +46,7 @@ class Measured:
     def says(self) -> str:
         """One sentence for a person."""
         fit = self.fit
-        if self.calibration.status is not Status.CALIBRATED:
+        if self.calibration.status is not CameraStatus.CALIBRATED:
             return self.calibration.status.value
         if fit is None or fit.beam_m is None or fit.beam_rad is None:
             return "lens and mount were found, but no pose had light on both faces and the board in the picture"
@@ -66,19 +66,19 @@ class CameraMeasuring:
         self._on_fixture = transform(camera.board.in_psd1.origin_m, camera.board.in_psd1.rotation_rad)
         self._rng = np.random.default_rng(1)
 
-    def run(self, placement: int) -> Measured:
+    def run(self, placement: int) -> MeasuredCamera:
         """Before the fixture at this place. UnreachableError where the board is not seen; NoLightError, DeviceError."""
         q_rad, fixture = self._stand_before(self._learner.T_base_fixture(placement))
         count, views = self._tour(q_rad, fixture)
         calibration = calibrate_camera(views, self._drawn)
         if calibration.model is None:
-            return Measured(count, len(views), calibration)
+            return MeasuredCamera(count, len(views), calibration)
         lines = self._lines(self._sight(calibration.model), placement)
         if not lines or calibration.fit is None:
-            return Measured(count, len(views), calibration)
+            return MeasuredCamera(count, len(views), calibration)
         model, beam_rad, beam_m = onto_beam(calibration.model, lines, self._learner.arm)
         fit = replace(calibration.fit, lit=len(lines), beam_m=beam_m, beam_rad=beam_rad)
-        return Measured(count, len(views), calibration, model, fit)
+        return MeasuredCamera(count, len(views), calibration, model, fit)
 
     def _sight(self, model: CameraModel) -> Sight:
         return Sight(self._eye, model, self._board, self._on_fixture)

@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from acquisition.errors import AcquisitionError
 from acquisition.motion.rigid import rotation_vector, transform
-from acquisition.recording.bounds import Correction, Count, Label, Pixels, Statistic, Vector
-from acquisition.recording.errors import shown
-from acquisition.recording.json_file import JsonKind, read_json
-from acquisition.recording.rig_schema import Camera, Pose
+from acquisition.recording.files import JsonKind, read_json, shown
+from acquisition.recording.files.bounds import Correction, Count, Label, Pixels, Statistic, Vector
+from acquisition.recording.rig import Camera, Pose
 
 Floats = NDArray[np.float64]
 

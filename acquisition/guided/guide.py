@@ -22,7 +22,7 @@ class Request:
 
 
 @dataclass(frozen=True, eq=False)
-class Progress:
+class GuidedProgress:
     """How the session stands, for the eye."""
 
     done: int  # readings
@@ -41,6 +41,6 @@ class Guide(Protocol):
         """False: whoever moves the probe says that it does not get there; another posture will be asked for."""
         ...
 
-    def tell(self, progress: Progress) -> None:
+    def tell(self, progress: GuidedProgress) -> None:
         """Now and then, and at every change."""
         ...

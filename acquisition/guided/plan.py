@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from acquisition.errors import AcquisitionError
 from acquisition.guided.target import BarEnd, Cone, SphereSpot, Target, Vector
 from acquisition.recording.pose_plan import PosePlan
-from acquisition.recording.rig_schema import BarPosition, Rig, Sphere
+from acquisition.recording.rig import Rig, Sphere
+from acquisition.recording.rig.schema import BarPosition
 
 Floats = NDArray[np.float64]
 GOLDEN_RAD = np.pi * (3.0 - np.sqrt(5.0))
@@ -35,7 +36,7 @@ class GuidedOptions:
 
 
 @dataclass(frozen=True)
-class Visit:
+class GuidedVisit:
     """Targets one after the other that only count together: a cone alone, both ends of a bar."""
 
     targets: tuple[Target, ...]
@@ -46,7 +47,7 @@ class Visit:
         return self.targets[0].says
 
 
-def calibration_plan(rig: Rig, options: GuidedOptions) -> tuple[Visit, ...]:
+def calibration_plan(rig: Rig, options: GuidedOptions) -> tuple[GuidedVisit, ...]:
     """Cones in half of their postures, bars, cones again. AcquisitionError for a rig without any length: see below.
 
     A probe that only sits in cones shows no length at all: an arm half as large would sit in them as well.
@@ -58,14 +59,14 @@ def calibration_plan(rig: Rig, options: GuidedOptions) -> tuple[Visit, ...]:
         )
     first = options.postures // 2
     cones = [Cone(seat.id, seat.origin_m) for seat in rig.seats.values()]
-    before = [Visit((cone,)) for cone in cones for _ in range(first)]
-    after = [Visit((cone,)) for cone in cones for _ in range(options.postures - first)]
+    before = [GuidedVisit((cone,)) for cone in cones for _ in range(first)]
+    after = [GuidedVisit((cone,)) for cone in cones for _ in range(options.postures - first)]
     return (*before, *_lengths(rig, options.lengths), *after)
 
 
-def planned_visits(plan: PosePlan, rig: Rig) -> tuple[Visit, ...]:
+def planned_visits(plan: PosePlan, rig: Rig) -> tuple[GuidedVisit, ...]:
     """The postures of a pose plan, each in its cone. AcquisitionError for a block without one of the rig's seats."""
-    out: list[Visit] = []
+    out: list[GuidedVisit] = []
     for number, block in enumerate(plan.block, start=1):
         seat = None if block.seat is None else rig.seats.get(block.seat)
         if seat is None:
@@ -75,11 +76,11 @@ def planned_visits(plan: PosePlan, rig: Rig) -> tuple[Visit, ...]:
                 "hand-held arm is only asked into cones"
             )
         cone = Cone(seat.id, seat.origin_m)
-        out += [Visit((cone,), pose.q_rad) for pose in block.pose]
+        out += [GuidedVisit((cone,), pose.q_rad) for pose in block.pose]
     return tuple(out)
 
 
-def verification_plan(rig: Rig, repeats: int = 3) -> tuple[Visit, ...]:
+def verification_plan(rig: Rig, repeats: int = 3) -> tuple[GuidedVisit, ...]:
     """Spheres, cones and bars as the tests of ISO 10360-12 and ASME B89.4.22 want them (docs/arm-cmm.md).
 
     A sphere is touched in the series below; a cone is taken in 10 articulations; every length `repeats` times.
@@ -96,10 +97,10 @@ SIZE_SERIES, LOCATION_SERIES, DIAMETER_SERIES = (0,), (1, 2, 3, 4, 5), (6, 7, 8)
 SERIES = {**dict.fromkeys(SIZE_SERIES, 25), **dict.fromkeys(LOCATION_SERIES, 5), **dict.fromkeys(DIAMETER_SERIES, 9)}
 
 
-def _lengths(rig: Rig, times: int) -> Iterator[Visit]:
+def _lengths(rig: Rig, times: int) -> Iterator[GuidedVisit]:
     for position in rig.bar_positions.values():
         a, b = (_end(rig, position, end) for end in "ab")
-        yield from (Visit((a, b)) for _ in range(times))
+        yield from (GuidedVisit((a, b)) for _ in range(times))
 
 
 def _end(rig: Rig, position: BarPosition, end: str) -> BarEnd:
@@ -109,16 +110,16 @@ def _end(rig: Rig, position: BarPosition, end: str) -> BarEnd:
     return BarEnd(position.id, position.bar, end, _vector(point))
 
 
-def _articulations(rig: Rig) -> Iterator[Visit]:
+def _articulations(rig: Rig) -> Iterator[GuidedVisit]:
     for seat in rig.seats.values():
-        yield from (Visit((Cone(seat.id, seat.origin_m),)) for _ in range(ARTICULATIONS_OF_A_CONE))
+        yield from (GuidedVisit((Cone(seat.id, seat.origin_m),)) for _ in range(ARTICULATIONS_OF_A_CONE))
 
 
-def _touches(rig: Rig) -> Iterator[Visit]:
+def _touches(rig: Rig) -> Iterator[GuidedVisit]:
     for sphere in rig.spheres.values():
         for series, touches in SERIES.items():
             for direction in hemisphere(touches):
-                yield Visit((_spot(rig, sphere, direction, series),))
+                yield GuidedVisit((_spot(rig, sphere, direction, series),))
 
 
 def _spot(rig: Rig, sphere: Sphere, direction: Floats, series: int) -> SphereSpot:
@@ -135,12 +136,12 @@ def hemisphere(count: int) -> Floats:
     return np.stack((radius * np.cos(GOLDEN_RAD * k), radius * np.sin(GOLDEN_RAD * k), z), axis=1)
 
 
-def readings_of(plan: tuple[Visit, ...]) -> int:
+def readings_of(plan: tuple[GuidedVisit, ...]) -> int:
     """How many rows the plan makes."""
     return sum(len(visit.targets) for visit in plan)
 
 
-def by_kind(plan: tuple[Visit, ...]) -> Mapping[str, int]:
+def by_kind(plan: tuple[GuidedVisit, ...]) -> Mapping[str, int]:
     """Readings of cones, bars and spheres."""
     kinds = {Cone: "cones", BarEnd: "bars", SphereSpot: "spheres"}
     counts = dict.fromkeys(kinds.values(), 0)

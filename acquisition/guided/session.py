@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from acquisition.guided.arm import GuidedArm
 from acquisition.guided.coverage import Coverage
-from acquisition.guided.guide import Guide, Progress, Request
+from acquisition.guided.guide import Guide, GuidedProgress, Request
 from acquisition.guided.judge import Judge
 from acquisition.guided.novelty import nothing_new
-from acquisition.guided.plan import Visit, readings_of
+from acquisition.guided.plan import GuidedVisit, readings_of
 from acquisition.guided.reading import Reading
-from acquisition.guided.stillness import Motion, StillRule
+from acquisition.guided.stillness import ArmMotion, StillRule
 from acquisition.guided.target import SphereSpot, Target
 from acquisition.guided.window import EncoderWatch, Window
 
@@ -27,7 +27,7 @@ LEARN_ALWAYS_UNTIL, LEARN_EVERY = 30, 5  # readings: later ones change little
 TELL_S = 0.2  # of the encoders' time
 
 
-class Journal(Protocol):
+class GuidedJournal(Protocol):
     """Where readings and events go."""
 
     def readings(self, readings: Sequence[Reading]) -> None: ...
@@ -36,7 +36,7 @@ class Journal(Protocol):
 
 
 @dataclass(frozen=True)
-class Summary:
+class GuidedSummary:
     """What a guided session brought."""
 
     readings: tuple[Reading, ...]
@@ -53,7 +53,7 @@ class GuidedSession:
     arm: GuidedArm
     guide: Guide
     judge: Judge
-    journal: Journal
+    journal: GuidedJournal
     rng: np.random.Generator
     rule: StillRule = field(default_factory=StillRule)
     patience_s: float = np.inf
@@ -72,14 +72,14 @@ class GuidedSession:
         """Readings so far, also after the session was cut short."""
         return len(self._taken)
 
-    def run(self, plan: Sequence[Visit]) -> Summary:
+    def run(self, plan: Sequence[GuidedVisit]) -> GuidedSummary:
         """Take every visit. DeviceError, RecordingError end it; what was taken is recorded by then."""
         self._planned = readings_of(tuple(plan))
         for visit in plan:
             self._take(visit)
-        return Summary(tuple(self._taken), **self._counts)
+        return GuidedSummary(tuple(self._taken), **self._counts)
 
-    def _take(self, visit: Visit) -> None:
+    def _take(self, visit: GuidedVisit) -> None:
         """All readings of a visit, again while they are in doubt."""
         for attempt in range(1, ATTEMPTS + 1):
             readings = [
@@ -110,7 +110,7 @@ class GuidedSession:
         if len(self._taken) <= LEARN_ALWAYS_UNTIL or len(self._taken) % LEARN_EVERY < len(readings):
             self.judge.learn(self._taken)
 
-    def _reading(self, target: Target, visit: Visit, attempt: int) -> Reading | None:
+    def _reading(self, target: Target, visit: GuidedVisit, attempt: int) -> Reading | None:
         """One still stretch at the target; None when whoever moves the probe does not get there in time."""
         wanted_rad = self._posture(target) if visit.posture_rad is None else np.array(visit.posture_rad)
         request = Request(target, wanted_rad, attempt)
@@ -123,7 +123,7 @@ class GuidedSession:
             now_s = float(window.t_s[-1])
             asked_s = now_s if asked_s is None else asked_s
             motion = self.rule.judge(self.arm, window)
-            place = self._place(target, visit, window) if motion is Motion.STILL else motion.value
+            place = self._place(target, visit, window) if motion is ArmMotion.STILL else motion.value
             if place is None:
                 return self._accepted(target, window)
             if now_s - told_s >= TELL_S:
@@ -132,7 +132,7 @@ class GuidedSession:
             if now_s - asked_s > self.patience_s:
                 return None
 
-    def _place(self, target: Target, visit: Visit, window: Window) -> str | None:
+    def _place(self, target: Target, visit: GuidedVisit, window: Window) -> str | None:
         """What is wrong with a still probe's place; None: nothing. A plan of postures may ask for one twice."""
         mean_rad = window.last(self.rule.dwell_s).q_rad.mean(axis=0)
         if self._last_rad is not None and np.abs(mean_rad - self._last_rad).max() < ANEW_RAD:
@@ -170,7 +170,7 @@ class GuidedSession:
 
     def _tell(self, request: Request, says: str, window: Window) -> None:
         self.guide.tell(
-            Progress(
+            GuidedProgress(
                 len(self._taken),
                 self._planned,
                 says,

@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 PARTS = 4  # that a dwell is cut into; a slip shows between their means
 
 
-class Motion(Enum):
+class ArmMotion(Enum):
     """What a window shows."""
 
     SHORT = "too few samples yet"
@@ -37,17 +37,17 @@ class StillRule:
         0.01  # swing of a joint: beyond, the probe's place at the mean angle is not its mean place: 10 um
     )
 
-    def judge(self, arm: GuidedArm, window: Window) -> Motion:
+    def judge(self, arm: GuidedArm, window: Window) -> ArmMotion:
         """Of the last `dwell_s` of a window."""
         held = window.last(self.dwell_s)
         if len(held) < self.least or held.t_s[-1] - held.t_s[0] < 0.8 * self.dwell_s:
-            return Motion.SHORT
+            return ArmMotion.SHORT
         tips_m = arm.tip_m(held.q_rad)
         swing_rad = float(np.ptp(held.q_rad, axis=0).max())
         places_m, noise_m = self._places(tips_m)
         way_m = float(np.ptp(places_m, axis=0).max())
         stays = way_m <= max(self.place_m, self.sigmas * noise_m)
-        return Motion.STILL if stays and swing_rad <= self.joint_rad else Motion.MOVING
+        return ArmMotion.STILL if stays and swing_rad <= self.joint_rad else ArmMotion.MOVING
 
     @staticmethod
     def _places(tips_m: Floats) -> tuple[Floats, float]:

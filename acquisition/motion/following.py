@@ -13,7 +13,7 @@ from acquisition.motion.errors import InterruptedMotionError, RefusedMotionError
 from acquisition.motion.paths.segments import Pace
 from acquisition.motion.paths.solved import SolvedPath
 from acquisition.motion.setpoints import LookAhead
-from acquisition.motion.states import OVER, Event, State
+from acquisition.motion.states import OVER, MotionEvent, MotionState
 from acquisition.motion.under_way import UnderWay
 from drivers.clock import Clock
 
@@ -29,7 +29,7 @@ class SetPoints(Protocol):
 
 
 @dataclass(frozen=True)
-class Stream:
+class SetPointStream:
     """How set-points go out. `solve_hz` from the structure, `hz` of the controller."""
 
     hz: float = 500.0  # UR e-Series control cycle
@@ -55,8 +55,8 @@ class Followed:
 class Said:
     """The gate, as the stream sees it. `braked`: the brake is at its end."""
 
-    state: Callable[[], State]
-    tell: Callable[[Event], None]
+    state: Callable[[], MotionState]
+    tell: Callable[[MotionEvent], None]
     braked: Callable[[], None]
 
 
@@ -64,7 +64,14 @@ class Following:
     """The one owner of a stream, from its first set-point to its last."""
 
     def __init__(
-        self, arm: SetPoints, stream: Stream, clock: Clock, points: LookAhead, checked: UnderWay, pace: Pace, said: Said
+        self,
+        arm: SetPoints,
+        stream: SetPointStream,
+        clock: Clock,
+        points: LookAhead,
+        checked: UnderWay,
+        pace: Pace,
+        said: Said,
     ) -> None:
         self._arm, self._stream, self._clock, self._points, self._said = arm, stream, clock, points, said
         self._checked, self._pace, self._period_s = checked, pace, 1.0 / stream.hz
@@ -80,13 +87,13 @@ class Following:
         self._q_rad, self._speed_rad_s = start_rad, np.zeros_like(start_rad)
         while self._said.state() not in OVER:
             watch()
-            if self._said.state() is State.ENDING:
+            if self._said.state() is MotionState.ENDING:
                 self._brake(watch)
                 return
             self._ramp()
             late_s = self._wait()
             watch()  # again: most of a cycle is spent waiting, and nothing may be sent after a halt
-            if self._said.state() is State.HALTED:
+            if self._said.state() is MotionState.HALTED:
                 return
             if late_s > self._stream.rested_s:
                 self._points.restart((self._cycle - 1) * self._period_s)
@@ -94,7 +101,7 @@ class Following:
             self._send(self._next())
             self._rest(act)
             if self._points.reached_s >= self._points.path.ends_s:
-                self._said.tell(Event.FINISHED)
+                self._said.tell(MotionEvent.FINISHED)
 
     def _next(self) -> Floats:
         try:
@@ -104,7 +111,7 @@ class Following:
 
     def _ramp(self) -> None:
         """Path time slows down to a hold, and up again after it, within the acceleration of every joint."""
-        waits = self._said.state() is State.HELD or self._action is not None
+        waits = self._said.state() is MotionState.HELD or self._action is not None
         change = self._period_s / self._brake_s
         self._points.scale += float(np.clip((0.0 if waits else 1.0) - self._points.scale, -change, change))
 
@@ -125,8 +132,8 @@ class Following:
 
     def _go_on(self) -> None:
         """At once: the path rests, so that no joint feels it."""
-        self._said.tell(Event.RESTED)
-        self._points.scale = 0.0 if self._said.state() is State.HELD else 1.0
+        self._said.tell(MotionEvent.RESTED)
+        self._points.scale = 0.0 if self._said.state() is MotionState.HELD else 1.0
 
     def _brake(self, watch: Callable[[], None]) -> None:
         acceleration = self._pace.acceleration_rad_s2
@@ -138,7 +145,7 @@ class Following:
         for q_rad in steps:
             self._wait()
             watch()
-            if self._said.state() is not State.ENDING:
+            if self._said.state() is not MotionState.ENDING:
                 return
             self._send(q_rad)
         self._said.braked()

@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 from acquisition.motion.acting import Acting
 from acquisition.motion.cell import Cell
 from acquisition.motion.errors import InterruptedMotionError, RefusedMotionError
-from acquisition.motion.following import Followed, Following, Said, SetPoints, Stream
+from acquisition.motion.following import Followed, Following, Said, SetPoints, SetPointStream
 from acquisition.motion.inverse.solver import Solver
 from acquisition.motion.paths.path import STANDING
 from acquisition.motion.paths.segments import By, Pace, Segment
 from acquisition.motion.paths.solved import SolvedPath
 from acquisition.motion.plan import BeltAt, Plan, plan
 from acquisition.motion.setpoints import BeltNow, LookAhead
-from acquisition.motion.states import OVER, PAUSE_AGAIN_S, REST_S, Event, State, after
+from acquisition.motion.states import OVER, PAUSE_AGAIN_S, REST_S, MotionEvent, MotionState, after
 from acquisition.motion.under_way import UnderWay
 from drivers.clock import Clock
 from drivers.errors import DeviceRefused
@@ -39,18 +39,20 @@ ELSEWHERE_RAD = 1e-3  # an arm further from where its plan begins was moved mean
 class Gate:
     """The one owner of a motion's state."""
 
-    def __init__(self, solver: Solver, pace: Pace, cell: Cell, arm: SetPoints, stream: Stream, clock: Clock) -> None:
+    def __init__(
+        self, solver: Solver, pace: Pace, cell: Cell, arm: SetPoints, stream: SetPointStream, clock: Clock
+    ) -> None:
         self._solver, self._pace, self._cell = solver, pace, cell
         self._arm, self._stream, self._clock = arm, stream, clock
         self._lock = threading.RLock()  # a signal handler may come in the middle of itself
-        self._state = State.IDLE
+        self._state = MotionState.IDLE
         self._paused_s = -np.inf
         self._points: LookAhead | None = None
         self._made: Plan | None = None
-        self._wanted_end = State.DONE
+        self._wanted_end = MotionState.DONE
 
     @property
-    def state(self) -> State:
+    def state(self) -> MotionState:
         return self._state
 
     def plan(self, start_rad: Floats, segments: Sequence[Segment], belt: BeltAt = lambda t_s: STANDING) -> Plan:
@@ -67,13 +69,13 @@ class Gate:
         now_s = self._clock.now_s()
         again = now_s - self._paused_s <= PAUSE_AGAIN_S
         self._paused_s = now_s
-        at_once = again and self._state is State.PAUSING
-        self._tell(Event.HOLD if at_once or self.rests_in_s() > REST_S else Event.PAUSE)
+        at_once = again and self._state is MotionState.PAUSING
+        self._tell(MotionEvent.HOLD if at_once or self.rests_in_s() > REST_S else MotionEvent.PAUSE)
 
     def rests_in_s(self) -> float:
         """Until the next rest of the path, or its end, at the planned speed; 0 where nothing moves."""
         points = self._points
-        if points is None or self._state not in (State.MOVING, State.PAUSING):
+        if points is None or self._state not in (MotionState.MOVING, MotionState.PAUSING):
             return 0.0
         here_s = points.reached_s
         rests_s = [t_s for t_s, _ in points.path.rests if t_s > here_s]
@@ -87,23 +89,23 @@ class Gate:
 
     def hold(self) -> None:
         """Brake on the path, and stay ready to go on."""
-        self._tell(Event.HOLD)
+        self._tell(MotionEvent.HOLD)
 
     def resume(self) -> None:
         """Go on along the path."""
-        self._tell(Event.RESUME)
+        self._tell(MotionEvent.RESUME)
 
     def abort(self) -> None:
         """Brake within the limits and give up; `run` raises InterruptedMotionError."""
-        self._end(Event.ABORT, State.ABORTED)
+        self._end(MotionEvent.ABORT, MotionState.ABORTED)
 
     def stop(self) -> None:
         """Brake within the limits and end as a success."""
-        self._end(Event.STOP, State.DONE)
+        self._end(MotionEvent.STOP, MotionState.DONE)
 
     def halt(self) -> None:
         """Stop the arm now, through the controller, whatever the state. DeviceError where that fails."""
-        self._tell(Event.HALT)
+        self._tell(MotionEvent.HALT)
         self._arm.stop()
 
     # --- the motion
@@ -124,18 +126,18 @@ class Gate:
         aborted, halted, set-points too late, or one that leaves limits, speed or cell. DeviceError of the arm.
         """
         self._check(made, now_rad)
-        self._tell(Event.START)
+        self._tell(MotionEvent.START)
         try:
             following = self._following(made, belt)
-            if self._state is State.PAUSING:  # while it was solved
-                self._tell(Event.HOLD)
+            if self._state is MotionState.PAUSING:  # while it was solved
+                self._tell(MotionEvent.HOLD)
             following.run(made.start_rad, act, watch)
             if self._halted():
                 self._arm.stop()  # once more: a set-point may have crossed the halt on its way
             else:
                 self._arm.servo_stop(self._brake_rad_s2)
         except BaseException as error:  # also Ctrl-C, and in the middle of the clean-up
-            self._tell(Event.FAULT)
+            self._tell(MotionEvent.FAULT)
             self._arm.stop()
             if isinstance(error, DeviceRefused) and self._halted():  # a set-point that came after the halt
                 raise InterruptedMotionError(HALTED) from error
@@ -144,7 +146,7 @@ class Gate:
             self._points = None
         if self._halted():
             raise InterruptedMotionError(HALTED)
-        if self._state is State.ABORTED:
+        if self._state is MotionState.ABORTED:
             raise InterruptedMotionError("the motion was aborted; the arm stands")
         return following.followed
 
@@ -158,11 +160,11 @@ class Gate:
 
     def _braked(self) -> None:
         with self._lock:
-            if self._state is State.ENDING:
+            if self._state is MotionState.ENDING:
                 self._state = self._wanted_end
 
     def _halted(self) -> bool:
-        return self._state is State.HALTED
+        return self._state is MotionState.HALTED
 
     @property
     def _brake_rad_s2(self) -> float:
@@ -180,13 +182,13 @@ class Gate:
                 f"joint {joint + 1} stands {np.degrees(off[joint]):.2f} deg from where the plan begins; plan again"
             )
 
-    def _end(self, event: Event, end: State) -> None:
+    def _end(self, event: MotionEvent, end: MotionState) -> None:
         """The first one that ends a motion says how; a stop after an abort does not make a success of it."""
         with self._lock:
-            if self._state is not State.ENDING:
+            if self._state is not MotionState.ENDING:
                 self._wanted_end = end
             self._tell(event)
 
-    def _tell(self, event: Event) -> None:
+    def _tell(self, event: MotionEvent) -> None:
         with self._lock:
             self._state = after(self._state, event)

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from acquisition.motion.cell import Cell, body_points, entered
 from acquisition.motion.errors import RefusedMotionError
 from acquisition.motion.inverse.solver import Solver
-from acquisition.motion.paths.path import STANDING, Belt, Path
+from acquisition.motion.paths.path import STANDING, BeltState, Path
 from acquisition.motion.paths.segments import By, Pace, Segment
 
 Floats = NDArray[np.float64]
-BeltAt = Callable[[float], Belt]  # as it is expected at a time of the path
+BeltAt = Callable[[float], BeltState]  # as it is expected at a time of the path
 
 SAMPLE_S = 0.02  # a twentieth of a transition, and 5 mm of way at reduced speed
 GRIP_EVERY = 5  # samples, a tenth of a second: the grip changes with the posture, slowly

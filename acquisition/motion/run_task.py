@@ -11,7 +11,7 @@ from acquisition.motion.errors import TaskError
 from acquisition.motion.following import Followed
 from acquisition.motion.gate import Gate
 from acquisition.motion.inverse.solver import Solver
-from acquisition.motion.paths.path import STANDING, Belt
+from acquisition.motion.paths.path import STANDING, BeltState
 from acquisition.motion.plan import Plan
 from acquisition.motion.setpoints import BeltNow
 from acquisition.motion.task.graph import TaskGraph
@@ -101,6 +101,6 @@ def run_task(gate: Gate, task: Task, around: Around) -> Ran:
     return ran
 
 
-def _expected(belt: Belt) -> Callable[[float], Belt]:
+def _expected(belt: BeltState) -> Callable[[float], BeltState]:
     """The belt as it will be if it keeps its speed."""
-    return lambda t_s: Belt(belt.s_m + belt.rate_m_s * t_s, belt.rate_m_s)
+    return lambda t_s: BeltState(belt.s_m + belt.rate_m_s * t_s, belt.rate_m_s)

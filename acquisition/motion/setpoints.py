@@ -12,10 +12,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.motion.paths.path import Belt
+from acquisition.motion.paths.path import BeltState
 
 Floats = NDArray[np.float64]
-BeltNow = Callable[[], Belt]
+BeltNow = Callable[[], BeltState]
 
 
 class Followable(Protocol):
@@ -25,7 +25,7 @@ class Followable(Protocol):
     def ends_s(self) -> float: ...
     @property
     def rests(self) -> list[tuple[float, str]]: ...
-    def at(self, t_s: float, belt: Belt) -> Floats: ...
+    def at(self, t_s: float, belt: BeltState) -> Floats: ...
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class LookAhead:
     def _solved(self) -> Floats:
         """Two periods ahead of the belt that is read now, and the arm's own lag."""
         belt = self._belt()
-        ahead = Belt(belt.s_m + belt.rate_m_s * (2.0 * self._period_s + self._lag_s), belt.rate_m_s)
+        ahead = BeltState(belt.s_m + belt.rate_m_s * (2.0 * self._period_s + self._lag_s), belt.rate_m_s)
         q_rad = self.path.at(self._path_s, ahead)
         self._path_s += self.scale * self._period_s
         return q_rad

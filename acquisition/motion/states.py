@@ -13,7 +13,7 @@ PAUSE_AGAIN_S = 10.0
 REST_S = 1.0
 
 
-class State(enum.Enum):
+class MotionState(enum.Enum):
     """The value is the sentence for a person."""
 
     IDLE = "nothing moves"
@@ -26,7 +26,7 @@ class State(enum.Enum):
     HALTED = "stopped without clean-up"
 
 
-class Event(enum.Enum):
+class MotionEvent(enum.Enum):
     """What a person, a device or the path itself says."""
 
     START = "start"
@@ -41,29 +41,38 @@ class Event(enum.Enum):
     FAULT = "a device failed, or set-points were late"
 
 
-OVER = (State.IDLE, State.DONE, State.ABORTED, State.HALTED)  # nothing is under way
+OVER = (MotionState.IDLE, MotionState.DONE, MotionState.ABORTED, MotionState.HALTED)  # nothing is under way
 
 _UNDER_WAY = {
-    Event.ABORT: State.ENDING,
-    Event.STOP: State.ENDING,
-    Event.HALT: State.HALTED,
-    Event.FAULT: State.ABORTED,
+    MotionEvent.ABORT: MotionState.ENDING,
+    MotionEvent.STOP: MotionState.ENDING,
+    MotionEvent.HALT: MotionState.HALTED,
+    MotionEvent.FAULT: MotionState.ABORTED,
 }
-_TABLE: dict[State, dict[Event, State]] = {
-    **{state: {Event.START: State.MOVING, Event.HALT: State.HALTED} for state in OVER},
-    State.MOVING: {**_UNDER_WAY, Event.PAUSE: State.PAUSING, Event.HOLD: State.HELD, Event.FINISHED: State.DONE},
-    State.PAUSING: {
+_TABLE: dict[MotionState, dict[MotionEvent, MotionState]] = {
+    **{state: {MotionEvent.START: MotionState.MOVING, MotionEvent.HALT: MotionState.HALTED} for state in OVER},
+    MotionState.MOVING: {
         **_UNDER_WAY,
-        Event.HOLD: State.HELD,
-        Event.RESUME: State.MOVING,
-        Event.RESTED: State.HELD,
-        Event.FINISHED: State.DONE,
+        MotionEvent.PAUSE: MotionState.PAUSING,
+        MotionEvent.HOLD: MotionState.HELD,
+        MotionEvent.FINISHED: MotionState.DONE,
     },
-    State.HELD: {**_UNDER_WAY, Event.RESUME: State.MOVING},
-    State.ENDING: {Event.HALT: State.HALTED, Event.FAULT: State.ABORTED, Event.FINISHED: State.DONE},
+    MotionState.PAUSING: {
+        **_UNDER_WAY,
+        MotionEvent.HOLD: MotionState.HELD,
+        MotionEvent.RESUME: MotionState.MOVING,
+        MotionEvent.RESTED: MotionState.HELD,
+        MotionEvent.FINISHED: MotionState.DONE,
+    },
+    MotionState.HELD: {**_UNDER_WAY, MotionEvent.RESUME: MotionState.MOVING},
+    MotionState.ENDING: {
+        MotionEvent.HALT: MotionState.HALTED,
+        MotionEvent.FAULT: MotionState.ABORTED,
+        MotionEvent.FINISHED: MotionState.DONE,
+    },
 }
 
 
-def after(state: State, event: Event) -> State:
+def after(state: MotionState, event: MotionEvent) -> MotionState:
     """The state that follows; an event that means nothing in a state leaves it as it is."""
     return _TABLE[state].get(event, state)

@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.stream import Channel, Floats, Stream
+from acquisition.recording.recording import Channel, Stream
+from acquisition.recording.samples import Floats
 
 STREAM, FD_STREAM = "can", "can-fd"  # in a log: frames up to 8 bytes; longer ones, counted by themselves
 CLASSIC_BYTES, FD_BYTES = 8, 64  # ISO 11898-1: longest payload of a frame

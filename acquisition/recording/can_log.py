@@ -4,6 +4,8 @@ A file's channels become streams: `can`, or `can-<channel>` where it names them.
 host time counts from the first frame, whose date is the recording's start. Where a recording has lost its date, times
 in the file count from its first frame. Formats that need a data base or another
 package (.db, .mf4) are not taken: python-can's .db writer loses frames when it is stopped.
+
+Apart from `can_frames`, because this loads python-can, and a fit reads recordings without it.
 """
 
 import math
@@ -13,6 +15,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -23,23 +26,59 @@ import numpy as np
 from can.io.blf import BLFParseError
 from can.io.generic import MessageReader, MessageWriter
 
-from acquisition.recording.bounds import TIME_S
 from acquisition.recording.can_frames import (
     CHANNELS_NOTE,
     CLASSIC_BYTES,
     FD_BYTES,
     Frame,
+    FrameFlag,
     block_of,
     channels,
     frames_of,
     is_frames,
     stream_names,
 )
-from acquisition.recording.can_message import frame_of, message_of
 from acquisition.recording.errors import RecordingError, shown
+from acquisition.recording.files.bounds import TIME_S
+from acquisition.recording.mcap.writer import RecordingWriter, StreamWriter
 from acquisition.recording.recording import Recording
-from acquisition.recording.stream_writer import StreamWriter
-from acquisition.recording.writer import RecordingWriter
+
+_FLAGS = (
+    ("is_extended_id", int(FrameFlag.EXTENDED)),
+    ("is_remote_frame", int(FrameFlag.REMOTE)),
+    ("is_error_frame", int(FrameFlag.ERROR)),
+    ("is_fd", int(FrameFlag.FD)),
+    ("bitrate_switch", int(FrameFlag.BIT_RATE_SWITCH)),
+    ("error_state_indicator", int(FrameFlag.ERROR_STATE)),
+)
+_SENT = int(FrameFlag.SENT)
+_flagged = attrgetter(*(name for name, _ in _FLAGS))  # in one call: nearly all frames have none of them
+
+
+def frame_of(message: can.Message, host_s: float, *, sent: bool) -> Frame:
+    """A frame as it was heard, or sent, at host time `host_s`."""
+    flags, data = _SENT if sent else 0, message.data
+    if True in _flagged(message):
+        flags |= sum(flag for name, flag in _FLAGS if getattr(message, name))
+        data = b"" if message.is_remote_frame else data
+    stamp_s = math.nan if sent or not message.timestamp else message.timestamp
+    return Frame(host_s, stamp_s, message.arbitration_id, flags, message.dlc, bytes(data))
+
+
+def message_of(frame: Frame, time_s: float, channel: int | str | None) -> can.Message:
+    """A frame for python-can's files; `time_s` since 1970. ValueError for one that cannot be a CAN frame."""
+    named = {name: bool(frame.flags & flag) for name, flag in _FLAGS}
+    return can.Message(
+        timestamp=time_s,
+        arbitration_id=frame.can_id,
+        dlc=frame.length,
+        data=None if frame.flags & FrameFlag.REMOTE else frame.data,
+        channel=channel,
+        is_rx=not frame.flags & _SENT,
+        check=True,
+        **named,
+    )
+
 
 BLOCK = 10_000  # frames at a time into the recording
 MALFORMED = (  # what python-can's readers raise on lines and bytes that make no sense

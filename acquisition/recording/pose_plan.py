@@ -8,11 +8,11 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta, Struct
 
-from acquisition.recording.bounds import Identity, Kilograms, Many, Metres, Name, PerJoint, Radians, Sentence
 from acquisition.recording.errors import RigFileError, shown
-from acquisition.recording.rig_lines import KeyPath
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.toml_file import parse_toml, read_text
+from acquisition.recording.files.bounds import Identity, Kilograms, Many, Metres, Name, PerJoint, Radians, Sentence
+from acquisition.recording.files.explain import KeyPath
+from acquisition.recording.files.toml_file import parse_toml, read_text
+from acquisition.recording.rig import Rig
 
 Way = Annotated[int, Meta(ge=-1, le=1)]
 Spots = tuple[Metres, Metres, Metres, Metres]

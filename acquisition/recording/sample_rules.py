@@ -10,21 +10,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.bounds import LENGTH_M, most_of
-from acquisition.recording.columns import (
+from acquisition.recording.errors import SamplesError, shown
+from acquisition.recording.files.bounds import LENGTH_M, most_of
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import (
     COMPLETE_PER_JOINT,
     ORIENTATION,
     POSITION,
     SPOTS,
+    Cell,
     Kind,
+    Samples,
     joint_of,
     kind_of,
     per_joint,
     required,
 )
-from acquisition.recording.errors import SamplesError, shown
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Cell, Samples
 
 Table = Mapping[str, NDArray[Any]]
 Fault = tuple[int | None, str, str]  # row from 0, column, what is wrong and what to do

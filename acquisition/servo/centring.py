@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from acquisition.believed import BelievedArm
 from acquisition.bench import Bench, Look
-from acquisition.servo.status import Centring, Status, Step
+from acquisition.servo.status import Centring, CentringStatus, Step
 from acquisition.servo.strategy import Proposal, Strategy
 
 Floats = NDArray[np.float64]
@@ -45,25 +45,25 @@ class Loop:
         self._q_rad = q_rad
         look = self._see(q_rad, "start")
         if not _both_lit(look):
-            return self._end(Status.NO_LIGHT, look)
+            return self._end(CentringStatus.NO_LIGHT, look)
         self._strategy.learn(q_rad, look.spots_m())
         best_m, since_best = np.inf, 0
         while True:
             error_m = float(np.max(np.abs(look.spots_m() - target_m)))
             if error_m <= self._limits.tolerance_m:
-                return self._end(Status.CENTRED, look)
+                return self._end(CentringStatus.CENTRED, look)
             best_m, since_best = (error_m, 0) if error_m < best_m else (best_m, since_best + 1)
             if since_best >= self._limits.cycle and best_m < self._limits.cycle_m:
-                return self._end(Status.LIMIT_CYCLE, look)
+                return self._end(CentringStatus.LIMIT_CYCLE, look)
             if len(self._trace) > self._limits.max_steps:
-                return self._end(Status.OUT_OF_STEPS, look)
+                return self._end(CentringStatus.OUT_OF_STEPS, look)
             proposal = self._limited(self._strategy.propose(target_m))
             if not self._in_range(self._q_rad + proposal.step_rad):
-                return self._end(Status.JOINT_LIMIT, look)
+                return self._end(CentringStatus.JOINT_LIMIT, look)
             losses = self._losses
             taken = self._take(proposal)
             if not _both_lit(taken):
-                return self._end(Status.SPOT_LOST, taken)
+                return self._end(CentringStatus.SPOT_LOST, taken)
             if 0 < self._losses == losses:
                 self._trust_again(proposal, (look.spots_m() - target_m, taken.spots_m() - target_m))
             look = taken if not proposal.stay else look
@@ -123,7 +123,7 @@ class Loop:
     def _in_range(self, q_rad: Floats) -> bool:
         return bool(np.all(q_rad >= self._arm.lower_rad) and np.all(q_rad <= self._arm.upper_rad))
 
-    def _end(self, status: Status, look: Look) -> Centring:
+    def _end(self, status: CentringStatus, look: Look) -> Centring:
         return Centring(status, self._strategy.name, tuple(self._trace), look)
 
 

@@ -19,7 +19,7 @@ LEVER_M = 0.1  # turns beam angles into metres: about the distance between the t
 UPDATE_FLOOR_RAD = 1e-4  # shorter steps say more about noise than about the Jacobian
 
 
-class Measured:
+class MeasuredStrategy:
     """Four probes along the directions that the guess thinks independent, then quasi-Newton steps."""
 
     name = "measured"

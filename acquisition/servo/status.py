@@ -13,7 +13,7 @@ from acquisition.bench import Look
 Floats = NDArray[np.float64]
 
 
-class Status(Enum):
+class CentringStatus(Enum):
     """Every way in which centring ends; the value is the sentence for a person."""
 
     CENTRED = "all four spot coordinates are within the tolerance"
@@ -37,7 +37,7 @@ class Step:
 class Centring:
     """A finished run. `steps` counts motions; the starting look is not one."""
 
-    status: Status
+    status: CentringStatus
     strategy: str
     trace: Sequence[Step]
     look: Look  # the last one

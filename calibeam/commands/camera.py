@@ -4,7 +4,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from acquisition.recording.errors import RigFileError
+from acquisition.recording import RigFileError
 from acquisition.recording.rig import load_rig, rig_text
 from calibeam.asking import YES, at_terminal, someone
 from calibeam.devices.recorder import new_recording

@@ -10,13 +10,11 @@ import numpy as np
 from cyclopts import Parameter
 from rich.console import Console
 
-from acquisition.recording.check import Finding, check
-from acquisition.recording.clock_model import ClockModel, ClockStatus, clock_model
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
+from acquisition.recording import Finding, Recording, Stream, check, read
+from acquisition.recording.device_clock import ClockModel, ClockStatus, clock_model
+from acquisition.recording.mcap import segments
 from acquisition.recording.rig import load_rig
-from acquisition.recording.segments import segments
-from acquisition.recording.stream import Floats, Stream
+from acquisition.recording.samples import Floats
 from calibeam.devices.check import check_devices
 from calibeam.outcome import CheckFailed
 from drivers.clock import SystemClock

@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.errors import RecordingError
+from acquisition.recording import RecordingError
 from acquisition.recording.rig import load_rig, rig_text
 from calibeam.devices.recorder import new_recording, record_session
 from calibeam.devices.site import addresses_of, check_session, connected

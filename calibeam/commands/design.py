@@ -2,16 +2,16 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import msgspec
 import numpy as np
 from cyclopts import Parameter, validators
 from rich.console import Console
 
+from acquisition.recording import TYPE_CHECKING
 from acquisition.recording.pose_plan import write_pose_plan
-from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig, load_rig
 from calibeam.printing.progress import progress_bar
 from calibeam.software import SOFTWARE
 

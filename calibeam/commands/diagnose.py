@@ -5,7 +5,7 @@ from pathlib import Path
 import msgspec
 from rich.console import Console
 
-from acquisition.recording.read import read
+from acquisition.recording import read
 from calibeam.printing.results import print_diagnosis
 from calibeam.results.diagnosis import diagnose_recording, plan_next, refuse_wrong_file
 from calibeam.results.identification import naming_source

@@ -2,14 +2,11 @@
 
 from pathlib import Path
 
+from acquisition.recording import RecordingError, read
 from acquisition.recording.can_log import SUFFIXES, export_can, import_can
-from acquisition.recording.errors import RecordingError
-from acquisition.recording.folder import export
-from acquisition.recording.import_folder import import_folder
-from acquisition.recording.read import read
 from acquisition.recording.rig import rig_text
-from acquisition.recording.stream_tables import write_streams
-from acquisition.recording.tables import TableFormat
+from acquisition.recording.session_folder import TableFormat, export, write_streams
+from acquisition.recording.session_folder.folder_import import import_folder
 from calibeam.outcome import PartialResult
 from calibeam.software import SOFTWARE
 

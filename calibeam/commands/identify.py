@@ -7,8 +7,8 @@ import msgspec
 from cyclopts import Parameter, validators
 from rich.console import Console
 
-from acquisition.recording.read import read
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording import read
+from acquisition.recording.rig import Rig
 from calibeam.printing.identification import print_identification, refitted_lines
 from calibeam.results.identification import (
     Planned,

@@ -7,8 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig, load_rig
 from calibeam.geometry_only import read_geometry
 from calibrate.errors import DataError
 from calibrate.model_file import corrections

@@ -13,8 +13,7 @@ from acquisition.motion.inverse.solver import Solver
 from acquisition.motion.paths.segments import By, Segment
 from acquisition.motion.task.place import Place
 from acquisition.motion.task.task_file import read_task
-from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig, load_rig
 
 Floats = NDArray[np.float64]
 

@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.samples_csv import read_csv
-from acquisition.recording.samples_parquet import read_parquet
+from acquisition.recording.session_folder import read_csv, read_parquet
 from calibrate.model_file import read_model
 from calibrate.physics.predicting import predict_with_physics
 from calibrate.predict import Predictor

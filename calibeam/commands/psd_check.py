@@ -10,9 +10,10 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from acquisition.psd_view import psd_window
-from acquisition.recording.errors import SamplesError, shown
+from acquisition.recording import SamplesError
+from acquisition.recording.files import shown
 from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_devices import PsdDevice
+from acquisition.recording.rig.devices import PsdDevice
 from calibeam.asking import Asking, NotAgreedError, at_terminal, someone
 from calibeam.devices.psd import PsdInstrument, psd_driver
 from drivers.clock import SystemClock

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import msgspec
 
-from acquisition.recording.recover import recover
+from acquisition.recording import recover
 from acquisition.recording.rig import rig_text
 from calibeam.outcome import PartialResult
 

@@ -9,8 +9,7 @@ from typing import Literal
 
 import msgspec
 
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording, read
 from calibeam.printing.identification import verdict_words
 from calibeam.results.identification import identify_and_judge, naming_source
 from calibeam.results.session_results import write_recording_report

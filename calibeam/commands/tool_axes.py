@@ -8,12 +8,10 @@ from numpy.typing import NDArray
 from rich.console import Console
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.columns import ORIENTATION, POSITION
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
-from acquisition.recording.rig import rig_sha256
-from acquisition.recording.rig_quantity import si_value
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording import Recording, read
+from acquisition.recording.files import si_value
+from acquisition.recording.rig import Rig, rig_sha256
+from acquisition.recording.samples import ORIENTATION, POSITION
 from calibeam.outcome import PartialResult
 from calibeam.printing.tables import print_tool_axes
 from calibeam.software import SOFTWARE

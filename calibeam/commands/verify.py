@@ -8,7 +8,7 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
-from acquisition.recording.read import read
+from acquisition.recording import read
 from calibeam.geometry_only import read_geometry
 from calibeam.outcome import CheckFailed
 from calibeam.software import SOFTWARE

@@ -3,10 +3,10 @@
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from acquisition.recording.errors import RigFileError
-from acquisition.recording.rig_schema import Camera, Rig
+from acquisition.recording import TYPE_CHECKING, RigFileError
+from acquisition.recording.rig import Camera, Rig
 from drivers.clock import Clock
 
 if TYPE_CHECKING:

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from acquisition.errors import AcquisitionError
 from acquisition.guarded import one_error_tree
 from acquisition.psd_view import psd_window
-from acquisition.recording.errors import RigFileError, brief
-from acquisition.recording.rig_devices import EncoderDriver, RobotDriver
-from acquisition.recording.rig_schema import Camera, Rig
+from acquisition.recording import RigFileError
+from acquisition.recording.files import brief
+from acquisition.recording.rig import Camera, Rig
+from acquisition.recording.rig.devices import EncoderDriver, RobotDriver
 from calibeam.devices.camera import camera_sight
 from calibeam.devices.encoders import (
     bus_trouble,

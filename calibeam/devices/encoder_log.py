@@ -14,10 +14,9 @@ import can
 
 from acquisition.frame_log import FrameLog
 from acquisition.guarded import Guarded
-from acquisition.recording.rig_devices import EncodersDevice
-from acquisition.recording.segments import Rotation, SegmentedRecording, SegmentStream
-from acquisition.recording.stream import Channel, Gap
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording import Channel, Gap, RecordingWriter
+from acquisition.recording.mcap import Rotation, SegmentedRecording, SegmentStream
+from acquisition.recording.rig.devices import EncodersDevice
 from acquisition.reopening import Reopening
 from acquisition.streams import Pump
 from calibeam.devices.encoders import VIEWED, encoder_driver, identities_of, names_of

@@ -13,11 +13,11 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_devices import EncoderDriver, EncodersDevice
+from acquisition.recording.rig.devices import EncoderDriver, EncodersDevice
 from drivers.can_dbc.description import joint_signals
 from drivers.can_dbc.device import CanDbcEncoders
+from drivers.cia406.codec import EMERGENCY_TEXTS
 from drivers.cia406.device import Cia406Encoders
-from drivers.cia406.objects import EMERGENCY_TEXTS
 from drivers.clock import Clock
 from drivers.device import Block, Device
 from drivers.errors import DeviceRefused

@@ -7,8 +7,8 @@ from typing import Any, Protocol
 from msgspec import structs
 
 from acquisition.psd_view import PsdView
-from acquisition.recording.rig_devices import PsdDevice, PsdDriver
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
+from acquisition.recording.rig.devices import PsdDevice, PsdDriver
 from drivers.clock import Clock
 from drivers.device import Device
 from drivers.errors import DeviceRefused
@@ -18,8 +18,7 @@ from drivers.psd_daq.messages import Identity
 from drivers.psd_error_map import ErrorMap
 from drivers.psd_faces import Face, FaceKind
 from drivers.psd_kpa101.pair import BAUD as KPA101_BAUD
-from drivers.psd_kpa101.pair import Head, Kpa101Pair
-from drivers.psd_kpa101.wiring import Wiring
+from drivers.psd_kpa101.pair import Head, Kpa101Pair, Wiring
 from drivers.transports.serial_port import SerialAddress, open_serial
 from drivers.transports.transport import Transport
 

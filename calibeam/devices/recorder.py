@@ -20,12 +20,9 @@ from acquisition.errors import AcquisitionError
 from acquisition.plan import PlanOptions
 from acquisition.planned_session import PlannedSession
 from acquisition.progress import Progress
-from acquisition.recording.errors import RecordingError
+from acquisition.recording import Event, RecordingError, RecordingWriter, read
 from acquisition.recording.pose_plan import PosePlan
-from acquisition.recording.read import read
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.stream import Event
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording.rig import Rig
 from acquisition.sample import Sample
 from acquisition.servo.centring import Limits
 from acquisition.session import Session, Summary

@@ -6,16 +6,15 @@ from typing import Any
 
 import msgspec
 
-from acquisition.recording.errors import RigFileError
-from acquisition.recording.rig_devices import RobotDevice, RobotDriver
+from acquisition.recording import RigFileError
+from acquisition.recording.rig.devices import RobotDevice, RobotDriver
 from drivers.clock import Clock
 from drivers.device import Device, Movable
 from drivers.errors import DeviceRefused
 from drivers.modbus.arm import LIFE_S, ModbusArm
 from drivers.modbus.line import ModbusLine, RtuAddress, TcpAddress
 from drivers.modbus.reader import ModbusReader
-from drivers.modbus.register import Register
-from drivers.modbus.register_map import RegisterMap
+from drivers.modbus.register_map import Register, RegisterMap
 from drivers.ur.control import WATCHDOG_HZ, UrControl
 from drivers.ur.reader import UrReader
 

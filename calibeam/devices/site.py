@@ -10,11 +10,9 @@ from typing import Any
 from acquisition.errors import StoppedError
 from acquisition.guarded import Guarded
 from acquisition.psd_view import PsdView, psd_window
-from acquisition.recording.errors import RecordingError, RigFileError
-from acquisition.recording.rig_devices import EncodersDevice, PsdDevice, RobotDevice
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.stream import Channel, Event
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording import Channel, Event, RecordingError, RecordingWriter, RigFileError
+from acquisition.recording.rig import Rig
+from acquisition.recording.rig.devices import EncodersDevice, PsdDevice, RobotDevice
 from acquisition.streams import Pump
 from acquisition.supervisor import Supervisor
 from acquisition.wired import Pumps, Speeds, WiredBench

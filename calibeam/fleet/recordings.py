@@ -86,7 +86,7 @@ def parts_of(path: Path) -> list[Path]:
         return [path]
     if (path / RIG).is_file():
         return [path / name for name in (RIG, *SAMPLES) if (path / name).exists()]
-    from acquisition.recording.parts import parts  # with numpy: a worker, which loads this file, does without
+    from acquisition.recording.mcap import parts  # with numpy: a worker, which loads this file, does without
 
     return parts(path)
 

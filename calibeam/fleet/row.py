@@ -13,7 +13,7 @@ from typing import Annotated
 
 import msgspec
 
-from acquisition.recording.bounds import (
+from acquisition.recording.files.bounds import (
     Correction,
     Count,
     Few,

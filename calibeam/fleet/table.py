@@ -13,7 +13,8 @@ import msgspec
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from acquisition.recording.errors import RecordingError, shown
+from acquisition.recording import RecordingError
+from acquisition.recording.files import shown
 from calibeam.devices.recorder import uninterrupted
 from calibeam.fleet.row import Row
 from calibeam.fleet.settings import JOURNAL, TABLE

@@ -18,10 +18,8 @@ import msgspec
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.errors import RecordingError
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording import Recording, RecordingError, read
+from acquisition.recording.rig import Rig
 from calibeam.fleet.recordings import content_sha256
 from calibeam.fleet.row import Cause, Outcome, Row, Task, Zero
 from calibeam.results.diagnosis import diagnose_recording

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.guided.guide import Progress, Request
+from acquisition.guided.guide import GuidedProgress, Request
 from acquisition.guided.target import BarEnd, Cone, Target
 from acquisition.guided.window import Window
 from calibeam.emulation import EmulationError
@@ -50,7 +50,7 @@ class DirectHand:
         self.world.advance(self.world.arrives_s)  # nobody has to watch the way there
         return True
 
-    def tell(self, progress: Progress) -> None:
+    def tell(self, progress: GuidedProgress) -> None:
         """Nobody looks."""
 
 
@@ -71,7 +71,7 @@ CANNOT = "cannot put the probe"  # how simulators/hand/hand.py says that the arm
 class EmulatedHand:
     """Implements acquisition.guided.guide.Guide; what is told goes on to `show`."""
 
-    def __init__(self, ask: Ask, show: Callable[[Progress], None]) -> None:
+    def __init__(self, ask: Ask, show: Callable[[GuidedProgress], None]) -> None:
         self._ask, self._show = ask, show
 
     def ask(self, request: Request) -> bool:
@@ -83,5 +83,5 @@ class EmulatedHand:
             raise
         return True
 
-    def tell(self, progress: Progress) -> None:
+    def tell(self, progress: GuidedProgress) -> None:
         self._show(progress)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from acquisition.guided.judge import Doubt
 from acquisition.guided.reading import Reading
 from acquisition.guided.target import BarEnd, Cone
-from acquisition.recording.rig_schema import Rig, Tolerance
+from acquisition.recording.rig import Rig, Tolerance
 from calibeam.guided.refit import LIMIT_SIGMAS, Refit, assumed_prior, refit_arm, visits_of
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.eccentric import with_discs

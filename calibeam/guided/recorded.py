@@ -12,16 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.guided.guide import Guide
-from acquisition.guided.plan import Visit
+from acquisition.guided.plan import GuidedVisit
 from acquisition.guided.reading import Reading
-from acquisition.guided.session import GuidedSession, Summary
+from acquisition.guided.session import GuidedSession, GuidedSummary
 from acquisition.guided.wired import WiredEncoderWatch
 from acquisition.motion.inverse.solve import AtPoint, refine, within
-from acquisition.recording.errors import RecordingError, RigFileError
-from acquisition.recording.rig_devices import EncodersDevice
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.stream import Channel, Event
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording import Channel, Event, RecordingError, RecordingWriter, RigFileError
+from acquisition.recording.rig import Rig
+from acquisition.recording.rig.devices import EncodersDevice
 from acquisition.streams import Pump
 from acquisition.supervisor import Supervisor
 from calibeam.devices.encoders import VIEWED, emulated_encoders, encoder_driver, identities_of
@@ -126,13 +124,13 @@ def record_guided(
     watch: WiredEncoderWatch,
     rig: Rig,
     guide: Guide,
-    plan: tuple[Visit, ...],
+    plan: tuple[GuidedVisit, ...],
     writer: RecordingWriter,
     clock: Clock,
     *,
     seed: int = 1,
     patience_s: float = np.inf,
-) -> Summary:
+) -> GuidedSummary:
     """Run the plan. PartialResult when it ended early: what was taken is kept."""
     judge, journal = FittedJudge(rig), GuidedJournal(writer, clock)
     rng = np.random.default_rng(seed)

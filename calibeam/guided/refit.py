@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from acquisition.guided.reading import Reading
 from acquisition.guided.target import Cone
-from acquisition.recording.columns import BAR
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import BAR
 from calibrate.fit import FAR_START, NEAR_START, solve
 from calibrate.identification.session import instruments_for_fit
 from calibrate.joint_problem import JointProblem

@@ -14,9 +14,9 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from acquisition.guided.guide import Guide, Progress, Request
-from acquisition.guided.plan import GuidedOptions, Visit, by_kind, calibration_plan, verification_plan
-from acquisition.recording.rig_schema import Rig
+from acquisition.guided.guide import Guide, GuidedProgress, Request
+from acquisition.guided.plan import GuidedOptions, GuidedVisit, by_kind, calibration_plan, verification_plan
+from acquisition.recording.rig import Rig
 from calibeam.devices.recorder import new_recording
 from calibeam.guided.hand import EmulatedHand
 from calibeam.guided.recorded import EncoderAddress, record_guided, watching
@@ -52,17 +52,17 @@ class PersonGuide:
             self._said = text
         return True
 
-    def tell(self, progress: Progress) -> None:
+    def tell(self, progress: GuidedProgress) -> None:
         if self._live is not None:
             self._live.update(drawn(progress))
 
 
-def drawn(progress: Progress) -> Group:
+def drawn(progress: GuidedProgress) -> Group:
     """The whole view."""
     return Group(_head(progress), _joints(progress))
 
 
-def _head(progress: Progress) -> Text:
+def _head(progress: GuidedProgress) -> Text:
     text = Text(f"{progress.done} of {progress.planned} readings; {progress.request.target.says}: ")
     text.append(progress.says, style="bold green" if progress.says.startswith("taken") else "bold")
     if progress.repeatability_m is not None:
@@ -70,7 +70,7 @@ def _head(progress: Progress) -> Text:
     return text
 
 
-def _joints(progress: Progress) -> Table:
+def _joints(progress: GuidedProgress) -> Table:
     table = Table("joint", "now", "wanted", "", "range visited", box=None)
     each = zip(progress.q_rad, progress.request.posture_rad, strict=True)
     for joint, (now_rad, wanted_rad) in enumerate(each):
@@ -95,7 +95,7 @@ def _way(now_rad: float, wanted_rad: float) -> str:
 HAND_PATIENCE_S = 30.0  # of emulated time: the longest reach takes 8 s
 
 
-def plan_of(rig: Rig, options: GuidedOptions, *, verify: bool) -> tuple[Visit, ...]:
+def plan_of(rig: Rig, options: GuidedOptions, *, verify: bool) -> tuple[GuidedVisit, ...]:
     """What is taken. AcquisitionError where the rig has not what it takes."""
     return verification_plan(rig) if verify else calibration_plan(rig, options)
 
@@ -105,7 +105,7 @@ def run_guided(
     rig_text: str,
     out: Path,
     address: EncoderAddress,
-    plan: tuple[Visit, ...],
+    plan: tuple[GuidedVisit, ...],
     console: Console,
     *,
     seed: int = 1,

@@ -7,7 +7,7 @@ paths are topic.field (docs.foxglove.dev, Message path syntax).
 from collections.abc import Sequence
 from typing import Any
 
-from acquisition.recording.layout import EVENTS_TOPIC
+from acquisition.recording.mcap import EVENTS_TOPIC
 from calibeam.layouts.views import Panel, Views, panels
 
 FLAGS = "flags"  # whole numbers that stand for states

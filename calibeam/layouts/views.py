@@ -7,10 +7,8 @@ from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from google.protobuf.message import DecodeError
 from mcap.records import Channel, Schema
 
-from acquisition.recording.errors import RecordingError
-from acquisition.recording.layout import EVENTS_TOPIC, GAPS_TOPIC, SAMPLES_TOPIC, VIEW_TOPIC
-from acquisition.recording.mcap_scan import Scan
-from acquisition.recording.parts import parts
+from acquisition.recording import RecordingError
+from acquisition.recording.mcap import EVENTS_TOPIC, GAPS_TOPIC, SAMPLES_TOPIC, VIEW_TOPIC, Scan, parts
 
 TIME = "host_s"  # of every message: an axis, not a curve
 OTHERS = (EVENTS_TOPIC, SAMPLES_TOPIC, GAPS_TOPIC)

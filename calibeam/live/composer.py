@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibeam.live.health import Watch, asked_rates
 from calibeam.live.latest import DeviceReadings, Latest
 from calibeam.live.messages import (

@@ -6,8 +6,9 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
 from acquisition.guarded import Guarded, one_error_tree
-from acquisition.recording.errors import RigFileError
-from acquisition.recording.rig_schema import Devices, Rig
+from acquisition.recording import RigFileError
+from acquisition.recording.rig import Rig
+from acquisition.recording.rig.schema import Devices
 from calibeam.devices.encoders import encoder_driver
 from calibeam.devices.psd import psd_driver, psd_view
 from calibeam.devices.robot import robot_of

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from acquisition.psd_view import PsdView
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from drivers.device import Block
 
 PAGE_STOP = "STOP was pressed on the live page; see why, then go on with a new session"

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 
 from msgspec import Struct
 
-from acquisition.recording.rig_devices import EncoderDriver
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
+from acquisition.recording.rig.devices import EncoderDriver
 from calibeam.devices.encoders import LEAST_RATE
 from calibeam.live.latest import DeviceReadings
 

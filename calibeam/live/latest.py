@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from acquisition.psd_view import PsdView
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibeam.live.feed import Progress
 from calibeam.live.stopping import Stop
 from drivers.clock import Clock

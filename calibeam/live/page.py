@@ -15,7 +15,7 @@ from urllib.parse import quote
 import uvicorn
 
 from acquisition.errors import AcquisitionError
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibeam.live.access import LOOPBACK_NAMES, Rules, is_loopback
 from calibeam.live.app import live_app
 from calibeam.live.composer import Composer

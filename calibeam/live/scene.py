@@ -7,7 +7,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.arms.rig_arm import RigArm
 from calibrate.believed import BelievedRig
 from calibrate.believed_fixture import Light

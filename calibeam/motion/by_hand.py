@@ -24,8 +24,8 @@ from acquisition.motion.gate import Gate
 from acquisition.motion.inverse.solver import Solver
 from acquisition.motion.paths.segments import Segment
 from acquisition.motion.plan import Plan
-from acquisition.motion.states import State
-from acquisition.recording.rig_schema import Rig
+from acquisition.motion.states import MotionState
+from acquisition.recording.rig import Rig
 from calibeam.asking import YES, Asking, at_terminal, someone
 from calibeam.interrupts import INTERRUPTS
 from calibeam.motion.gate_of_rig import cell_of, gate_of, solver_of
@@ -75,7 +75,7 @@ class MotionKeys:
             print(f"{error}", file=self._out, flush=True)
 
     def _held(self) -> bool:
-        return self._gate.state is State.HELD
+        return self._gate.state is MotionState.HELD
 
     def _ask(self) -> None:
         if self._asking is not None and (self._thread is None or not self._thread.is_alive()):
@@ -86,7 +86,7 @@ class MotionKeys:
         """Until the motion goes on or ends; the end of input means nothing, for Ctrl-C is still heard."""
 
         def over() -> bool:
-            return self._gate.state not in (State.HELD, State.PAUSING)
+            return self._gate.state not in (MotionState.HELD, MotionState.PAUSING)
 
         while not over():
             line = asking.ask(WORDS, "> ", over)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from acquisition.motion.following import Followed
 from acquisition.motion.gate import Gate
 from acquisition.motion.inverse.solver import Solver
-from acquisition.motion.paths.path import Belt
+from acquisition.motion.paths.path import BeltState
 from acquisition.motion.paths.segments import By, Segment
 from acquisition.motion.plan import Plan
 from acquisition.motion.rigid import apart, transform
@@ -105,7 +105,7 @@ class ExampleResult:
     q_rad: Floats
     corners: tuple[Floats, ...]  # (4, 4) of the tool at every target that stands
     lag_s: float  # by which the arm followed its set-points
-    belt: Callable[[float], Belt] | None = None  # by controller time since the sweep began
+    belt: Callable[[float], BeltState] | None = None  # by controller time since the sweep began
     figures: Mapping[str, float] | None = None
 
 
@@ -164,8 +164,8 @@ def belt(stage: Stage) -> ExampleResult:
     task = read_task(TASKS / "conveyor.toml")
     begin_s = [0.0]
 
-    def now() -> Belt:
-        return Belt(BELT_M_S * (stage.robot.clock.now_s() - begin_s[0]), BELT_M_S)
+    def now() -> BeltState:
+        return BeltState(BELT_M_S * (stage.robot.clock.now_s() - begin_s[0]), BELT_M_S)
 
     def read(name: str) -> Floats:
         begin_s[0] = stage.robot.clock.now_s()  # the part comes into the picture as it is read
@@ -247,8 +247,8 @@ def _newest(stage: Stage) -> Floats:
     return out
 
 
-def _belt(t_s: float) -> Belt:
-    return Belt(BELT_M_S * t_s, BELT_M_S)
+def _belt(t_s: float) -> BeltState:
+    return BeltState(BELT_M_S * t_s, BELT_M_S)
 
 
 EXAMPLES: Mapping[str, Callable[[Stage], ExampleResult]] = {

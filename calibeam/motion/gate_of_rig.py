@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.motion.cell import Box, Cell, SlowArea
-from acquisition.motion.following import SetPoints, Stream
+from acquisition.motion.following import SetPoints, SetPointStream
 from acquisition.motion.gate import Gate
 from acquisition.motion.gated_arm import GatedArm
 from acquisition.motion.inverse.closed_form import closed_form
 from acquisition.motion.inverse.solver import Solver
 from acquisition.motion.paths.segments import Pace
 from acquisition.motion.setpoints import solve_rate_hz
-from acquisition.recording.rig_schema import ArmModel, Rig
+from acquisition.recording.rig import ArmModel, Rig
 from acquisition.streams import Pump
 from calibeam.geometry_only import read_geometry
 from calibrate.arms.rig_arm import RigArm
@@ -75,5 +75,5 @@ def gated_arm(arm: Movable, rig: Rig, robot: Pump) -> GatedArm:
 def gate_of(rig: Rig, solver: Solver, arm: SetPoints, clock: Clock, speed_share: float = 1.0) -> Gate:
     """Ready to plan and run."""
     solve_hz = solve_rate_hz(rig.motion.structural_hz, UR_STREAM_HZ)
-    stream = Stream(hz=UR_STREAM_HZ, solve_hz=solve_hz, lag_s=rig.motion.lag_s)
+    stream = SetPointStream(hz=UR_STREAM_HZ, solve_hz=solve_hz, lag_s=rig.motion.lag_s)
     return Gate(solver, pace_of(rig, speed_share), cell_of(rig), arm, stream, clock)

@@ -19,7 +19,7 @@ from acquisition.aiming.reach import clear_of_table
 from acquisition.motion.cell import body_points
 from acquisition.motion.inverse.solve import all_solutions
 from acquisition.plan import PlanOptions
-from acquisition.recording.rig_schema import Placement, Pose, Rig
+from acquisition.recording.rig import Placement, Pose, Rig
 from calibeam.motion.gate_of_rig import cell_of, solver_of
 from calibrate.arms.convert import pose_of
 from calibrate.believed import BelievedRig

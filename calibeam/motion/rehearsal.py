@@ -18,7 +18,7 @@ from acquisition.motion.gated_arm import GatedArm
 from acquisition.navigator import FINDING_STAND_OFF_M
 from acquisition.plan import PlanOptions, blocks
 from acquisition.recording.pose_plan import PosePlan
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibeam.learner import FittedLearner
 from calibeam.motion.gate_of_rig import cell_of
 from calibrate.arms.rig_arm import RigArm

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.motion.following import SetPoints
-from acquisition.recording.errors import RigFileError
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording import RigFileError
+from acquisition.recording.rig import Rig
 from acquisition.streams import Pump
 from acquisition.supervisor import Supervisor
 from calibeam.devices.recorder import uninterrupted

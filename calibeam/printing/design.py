@@ -6,7 +6,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.diagnose.diagnosis import Named
 from calibrate.diagnose.smallest_visible import Smallest
 from calibrate.pose_design.design import Design

@@ -9,7 +9,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.default_belief import said_of
 from calibrate.identification.estimates import ONLY_BELIEVED, JointZero
 from calibrate.identification.evidence_record import parameter_records

@@ -29,7 +29,7 @@ class NoSimulators:
 
 def answer(recording: Path, asked: Path, out: Path) -> None:
     """Writes diagnosis.json and, where both models say it, unseen.npz with the tool at the poses asked."""
-    from acquisition.recording.read import read
+    from acquisition.recording import read
     from calibeam.prove.unseen import read_asked, tool_at, write_unseen
     from calibeam.results.diagnosis import diagnose_recording
     from calibrate.diagnose.file import write_diagnosis

@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.read import read
+from acquisition.recording import read
 from calibeam.prove.baselines import Method, features, installed
 from calibeam.prove.record import DIAGNOSIS, BaselineScore, CaseScore, TrueDefect, Truth
 from calibeam.prove.scoring import errors_m, same_place

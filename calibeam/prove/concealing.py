@@ -15,11 +15,8 @@ import numpy as np
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
+from acquisition.recording import Channel, Event, Recording, RecordingWriter, read
 from acquisition.recording.rig import parse_rig, plain_rig, rig_text
-from acquisition.recording.stream import Channel, Event
-from acquisition.recording.writer import RecordingWriter
 from calibeam.devices.recorder import new_recording, record_session
 from calibeam.devices.site import addresses_of, connected
 from calibeam.emulation import EmulationError

@@ -16,11 +16,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from acquisition.recording.folder import CSV, RIG
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
-from acquisition.recording.samples import Samples
-from acquisition.recording.samples_csv import write_csv
+from acquisition.recording import Recording, Samples, read
+from acquisition.recording.session_folder import CSV, RIG, write_csv
 from calibeam.prove.diagnosing import Answered, diagnose_cases
 from calibeam.prove.seal import Layout
 from calibrate.chain import Chain

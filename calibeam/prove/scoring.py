@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.columns import POSITION, SPOTS
-from acquisition.recording.read import read
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples, read
+from acquisition.recording.samples import POSITION, SPOTS
 from calibeam.prove.concealing import Concealed
 from calibeam.prove.diagnosing import Answered
 from calibeam.prove.record import UNKNOWN, CaseScore, DefectScore, FreeSpace, NamedCause, SizeScore, TrueDefect, Truth

@@ -9,8 +9,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from acquisition.recording.recording import Recording
-from acquisition.recording.samples import Samples
+from acquisition.recording import Recording, Samples
 from calibeam.results.diagnosis import diagnose_recording
 from calibeam.software import SOFTWARE
 from calibrate.diagnose.compare.chain import READINGS, Difference, differences

@@ -5,8 +5,8 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from acquisition.recording import Recording
 from acquisition.recording.pose_plan import write_pose_plan
-from acquisition.recording.recording import Recording
 from acquisition.recording.rig import rig_sha256
 from calibrate.diagnose.contests import separating
 from calibrate.diagnose.file import write_diagnosis

@@ -12,8 +12,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.fingerprint import readings_sha256
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording, readings_sha256
 from acquisition.recording.rig import rig_sha256
 from calibeam.outcome import PartialResult
 from calibrate.errors import DataError

@@ -9,8 +9,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording, read
 from calibeam.outcome import PartialResult, interruption
 from calibeam.printing.identification import print_identification
 from calibeam.printing.results import print_diagnosis

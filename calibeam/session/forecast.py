@@ -21,10 +21,10 @@ from acquisition.aiming.pose import flange_for
 from acquisition.aiming.reach import reach
 from acquisition.errors import UnreachableError
 from acquisition.plan import Block, PoseKey
-from acquisition.recording.columns import SPOTS, per_joint
+from acquisition.recording import Samples
 from acquisition.recording.pose_plan import PosePlan
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import SPOTS, per_joint
 from acquisition.sample import Sample
 from calibrate.arms.catalogue import arm_of
 from calibrate.believed import BelievedRig

@@ -13,13 +13,11 @@ import msgspec
 
 from acquisition.errors import AcquisitionError
 from acquisition.plan import Block, PlanOptions, PoseKey, blocks
-from acquisition.recording.errors import RecordingError, RigFileError, shown
-from acquisition.recording.parts import differs, parts
+from acquisition.recording import Recording, RecordingError, RigFileError, read
+from acquisition.recording.files import shown
+from acquisition.recording.mcap import differs, parts
 from acquisition.recording.pose_plan import PosePlan
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
-from acquisition.recording.rig import parse_rig
-from acquisition.recording.rig_schema import Placement, Pose, Rig
+from acquisition.recording.rig import Placement, Pose, Rig, parse_rig
 from acquisition.sample import Sample, sample_of
 from calibeam.devices.site import Addresses
 

@@ -27,7 +27,7 @@ from typing import Self
 
 from acquisition.errors import StoppedError
 from acquisition.reins import Reins
-from acquisition.session_states import BROKEN, OVER, State
+from acquisition.session_states import BROKEN, OVER, RunState
 from acquisition.supervisor import FROZEN_S
 from calibeam.asking import in_foreground
 from calibeam.interrupts import INTERRUPTS
@@ -141,7 +141,7 @@ class Keys:
     def __exit__(self, *error: object) -> None:
         """KeyboardInterrupt where a signal that ends the session came when nothing was under way any more."""
         self._opened.close()
-        if self._ended_by and error[0] is None and self._reins.state in (State.IDLE, State.DONE):
+        if self._ended_by and error[0] is None and self._reins.state in (RunState.IDLE, RunState.DONE):
             raise KeyboardInterrupt(self._ended_by)
 
     def _close(self) -> None:

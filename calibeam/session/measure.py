@@ -10,8 +10,7 @@ import numpy as np
 from acquisition.camera.sight import Sight
 from acquisition.plan import Block
 from acquisition.planned_session import PlannedSession
-from acquisition.recording.stream import Event
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording import Event, RecordingWriter
 from acquisition.reins import Reins
 from acquisition.sample import Sample
 from acquisition.servo.centring import Limits

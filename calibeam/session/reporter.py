@@ -10,9 +10,9 @@ import numpy as np
 
 from acquisition.journal import Journal
 from acquisition.progress import Phase, Progress
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from acquisition.sample import Sample
-from acquisition.session_states import State
+from acquisition.session_states import RunState
 from calibeam.outcome import PartialResult
 from calibeam.session.forecast import Forecast
 from calibeam.session.status import UNDELIVERED, Listener, Pace, QualityKeeper, SessionStatus
@@ -21,7 +21,7 @@ from drivers.clock import Clock
 from drivers.errors import DeviceError
 
 STEPS = ("devices", "plan", "arm", "measure", "look", "result")
-WORKING = (State.RUNNING, State.PAUSING, State.ENDING)
+WORKING = (RunState.RUNNING, RunState.PAUSING, RunState.ENDING)
 
 
 class StatusReporter:
@@ -56,7 +56,7 @@ class StatusReporter:
             self._pace.work(progress.phase is not Phase.PLACE and self.shown.state in WORKING)
             self._now(progress=progress, left_s=self._pace.left_s(progress.left))
 
-    def state(self, state: State) -> None:
+    def state(self, state: RunState) -> None:
         """From the reins, from several threads: the same one may come twice."""
         with self._turn:
             if state is self.shown.state:

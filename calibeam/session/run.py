@@ -12,8 +12,8 @@ from rich.console import Console
 
 from acquisition.errors import AcquisitionError
 from acquisition.planned_session import check_planned
-from acquisition.recording.parts import next_part, parts
-from acquisition.recording.rig_schema import Placement
+from acquisition.recording.mcap import next_part, parts
+from acquisition.recording.rig import Placement
 from acquisition.session import Summary
 from calibeam.asking import Asking
 from calibeam.devices.check import DeviceCheck, check_devices

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from acquisition.guided.coverage import Coverage
 from acquisition.progress import Progress
 from acquisition.sample import Sample
-from acquisition.session_states import State
+from acquisition.session_states import RunState
 from calibeam.session.forecast import Forecast
 from drivers.clock import Clock
 
@@ -110,7 +110,7 @@ UNDELIVERED = "stop not delivered, press the red emergency stop"
 class SessionStatus:
     """None: nothing to say yet."""
 
-    state: State = State.IDLE
+    state: RunState = RunState.IDLE
     step: str = ""  # "4 of 7  measure"
     progress: Progress | None = None
     left_s: float | None = None
@@ -126,7 +126,7 @@ class SessionStatus:
             return UNDELIVERED
         if self.asked:
             return "your turn"
-        if self.state is State.RUNNING and self.progress is not None:
+        if self.state is RunState.RUNNING and self.progress is not None:
             return self.progress.phase.value
         return self.state.value
 

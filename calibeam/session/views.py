@@ -17,7 +17,7 @@ from rich.table import Table
 from rich.text import Text
 
 from acquisition.progress import Progress
-from acquisition.session_states import State
+from acquisition.session_states import RunState
 from calibeam.live.feed import Feed
 from calibeam.live.feed import Progress as PageProgress
 from calibeam.session.status import Quality, SessionStatus, clock_words
@@ -102,22 +102,22 @@ BAR = 30  # characters
 SOON_S = 0.01  # half a window of acquisition/settling.py: nearer it does not look
 MOVES, WAITS, STOPS, ASKS = "bold white on green", "bold black on yellow", "bold white on red", "bold black on cyan"
 STYLES = {
-    State.PAUSING: WAITS,
-    State.PAUSED: WAITS,
-    State.ENDING: WAITS,
-    State.BREAKING: STOPS,
-    State.ABORTING: STOPS,
-    State.ABORTED: STOPS,
-    State.HALTED: STOPS,
+    RunState.PAUSING: WAITS,
+    RunState.PAUSED: WAITS,
+    RunState.ENDING: WAITS,
+    RunState.BREAKING: STOPS,
+    RunState.ABORTING: STOPS,
+    RunState.ABORTED: STOPS,
+    RunState.HALTED: STOPS,
 }
 KEYS = {
-    State.RUNNING: "SPACE pause    s finish here    a abort    h halt",
-    State.PAUSING: "SPACE stop the arm now    r go on    s finish here    a abort    h halt",
-    State.BREAKING: "a abort    h halt",
-    State.PAUSED: "r go on    s finish here    a abort    h halt\n   leave the fixture where it is",
-    State.ENDING: "SPACE SPACE stop the arm now    a abort    h halt",
-    State.ABORTING: "h halt",
-    State.HALTED: "h say the stop again",
+    RunState.RUNNING: "SPACE pause    s finish here    a abort    h halt",
+    RunState.PAUSING: "SPACE stop the arm now    r go on    s finish here    a abort    h halt",
+    RunState.BREAKING: "a abort    h halt",
+    RunState.PAUSED: "r go on    s finish here    a abort    h halt\n   leave the fixture where it is",
+    RunState.ENDING: "SPACE SPACE stop the arm now    a abort    h halt",
+    RunState.ABORTING: "h halt",
+    RunState.HALTED: "h say the stop again",
 }
 
 
@@ -144,7 +144,7 @@ class TerminalView:
 
     def report(self, text: str, on_screen: bool) -> None:
         if on_screen and not (
-            self._live is not None and text in {state.value for state in State}
+            self._live is not None and text in {state.value for state in RunState}
         ):  # the view shows these
             self._console.print(text, highlight=False, markup=False, soft_wrap=self._live is None)
 

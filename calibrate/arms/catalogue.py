@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from acquisition.recording.rig_schema import Arm, ArmModel, Rig
+from acquisition.recording.rig import Arm, ArmModel, Rig
 from calibrate.arms.belief import HELD_AS_DRAWN, LinkBelief
 from calibrate.arms.dh import DhArm, DhLink
 from calibrate.arms.local_poe import LocalPoeArm

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.rig_schema import Arm, ArmModel, Joint, Pose
+from acquisition.recording.rig import Arm, ArmModel, Joint, Pose
 from calibrate.arms.belief import HELD_AS_DRAWN
 from calibrate.arms.catalogue import ARMS
 from calibrate.arms.dh import DhLink

@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.serial import SerialArm, chain_frames
 from calibrate.parameters import values_by_name

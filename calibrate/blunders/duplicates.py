@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from acquisition.recording.columns import Kind, kind_of
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.samples import Kind, kind_of
 from calibrate.blunders.finding import Blunder, BlunderKind, rows_in_words
 
 READINGS = ("psd1_x_m", "x_m", "wire_m")  # columns of instruments whose noise never repeats to the last digit

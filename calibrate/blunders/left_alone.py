@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from acquisition.recording.columns import BAR, BAR_END, SEAT
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.samples import BAR, BAR_END, SEAT
 from calibrate.blunders.finding import Blunder, BlunderKind
 
 AGAIN = "take both again, or remove it too"

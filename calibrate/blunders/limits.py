@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
 from calibrate.blunders.finding import Blunder, BlunderKind
 
 Floats = NDArray[np.float64]

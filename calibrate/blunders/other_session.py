@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.columns import POSITION
+from acquisition.recording.samples import POSITION
 from calibrate.blunders.finding import Blunder, BlunderKind, runs_of
 from calibrate.blunders.rough_fit import frame_between, rough_fit
 from calibrate.blunders.shots import Shots, outlying, robust_scale

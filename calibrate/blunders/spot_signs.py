@@ -10,9 +10,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import SPOTS
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import SPOTS
 from calibrate.arms.catalogue import arm_of
 from calibrate.blunders.finding import Blunder, BlunderKind
 from calibrate.blunders.witness import thinned

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
 from calibrate.blunders.witness import Witness
 from calibrate.sensors.catalogue import SENSORS
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.columns import POSITION, SEAT
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import POSITION, SEAT
 from calibrate.arms.catalogue import arm_of
 from calibrate.blunders.bad_rows import bad_rows
 from calibrate.blunders.finding import Blunder, BlunderKind

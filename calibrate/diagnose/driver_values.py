@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
 from calibrate.diagnose.session import Session
 from calibrate.effects.conditions import conditions_of, temperatures_of
 from calibrate.effects.drivers import Drivers, Readout

@@ -11,8 +11,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import per_joint
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.samples import per_joint
 from calibrate.diagnose.augmented import Around, Augmented, columns_of, plain_sizes
 from calibrate.diagnose.driver_values import drivers_of
 from calibrate.diagnose.extended import alike

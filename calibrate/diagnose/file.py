@@ -5,8 +5,7 @@ from typing import Any
 
 import msgspec
 
-from acquisition.recording.errors import shown
-from acquisition.recording.json_file import JsonKind, read_json
+from acquisition.recording.files import JsonKind, read_json, shown
 from calibrate.diagnose.schema import SCHEMA, DiagnosisFile
 from calibrate.errors import DataError
 

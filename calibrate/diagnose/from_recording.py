@@ -7,8 +7,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
 from calibrate.blunders.finding import Blunder, BlunderKind
 from calibrate.diagnose.beyond_noise import beyond_noise
 from calibrate.diagnose.blunders_first import Cleared, blunders_first

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import SEAT
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
+from acquisition.recording.samples import SEAT
 from calibrate.diagnose.contests import NextPoses
 from calibrate.diagnose.fitted import Fitted
 

@@ -4,7 +4,7 @@ from typing import Literal
 
 import msgspec
 
-from acquisition.recording.bounds import Count, Label, Many, Name, Number, Sentence, Statistic, Whole
+from acquisition.recording.files.bounds import Count, Label, Many, Name, Number, Sentence, Statistic, Whole
 
 SCHEMA = 1
 

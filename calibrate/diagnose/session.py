@@ -11,8 +11,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Rig, Tolerance
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig, Tolerance
 from calibrate.arms.belief import LinkBelief
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.serial import SerialArm

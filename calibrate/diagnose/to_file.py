@@ -6,7 +6,7 @@ from importlib.metadata import version
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording
 from acquisition.recording.rig import rig_sha256
 from calibrate.blunders.finding import Blunder
 from calibrate.diagnose.bench import Bench

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from acquisition.recording.columns import joint_of, per_joint
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.samples import joint_of, per_joint
 from calibrate.sensors.catalogue import SENSORS
 
 Floats = NDArray[np.float64]

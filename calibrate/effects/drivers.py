@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.effects.conditions import Conditions
 from calibrate.sensors.catalogue import names_with
 from calibrate.sensors.kind import Trait

@@ -8,7 +8,7 @@ link and joint are assigned by convention, the axis is one).
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import ArmModel
+from acquisition.recording.rig import ArmModel
 from calibrate.effects.drivers import Drivers
 
 Floats = NDArray[np.float64]

@@ -11,7 +11,7 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import ArmModel, Rig
+from acquisition.recording.rig import ArmModel, Rig
 from calibrate.effects.drivers import Drivers
 from calibrate.rigid import inverse, transform
 

@@ -18,7 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from acquisition.recording.rig_schema import EncoderSide
+from acquisition.recording.rig.schema import EncoderSide
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.form import Form
 from calibrate.effects.ports import Place, Port

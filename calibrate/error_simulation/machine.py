@@ -12,8 +12,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from acquisition.recording.rig import parse_rig
-from acquisition.recording.rig_schema import ArmModel, Rig
+from acquisition.recording.rig import ArmModel, Rig, parse_rig
 from calibrate.arms.compiled import PER_PART
 from calibrate.arms.rig_arm import RigArm
 from calibrate.converted_rig import rig_in_model

@@ -6,7 +6,8 @@ from typing import Literal
 
 from msgspec import Struct
 
-from acquisition.recording.bounds import (
+from acquisition.recording.files import KeyPath, parse_toml, read_text, shown
+from acquisition.recording.files.bounds import (
     Expansion,
     Few,
     Kelvin,
@@ -20,9 +21,6 @@ from acquisition.recording.bounds import (
     Radians,
     RadiansOrNone,
 )
-from acquisition.recording.errors import shown
-from acquisition.recording.rig_lines import KeyPath
-from acquisition.recording.toml_file import parse_toml, read_text
 from calibrate.error_simulation.law import Law
 from calibrate.errors import DataError
 

@@ -8,7 +8,7 @@ import difflib
 from collections.abc import Iterable, Iterator
 from fnmatch import fnmatchcase
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.error_simulation.kinds import ANGLES, LENGTHS, Possible, half_step_rad, possible
 from calibrate.error_simulation.law import Law
 from calibrate.error_simulation.machine import Machine

@@ -1,6 +1,6 @@
 """D-H table of an identified arm as CSV: base, one row a joint with Hayati's tilt, flange."""
 
-from acquisition.recording.rig_schema import ArmModel, Pose
+from acquisition.recording.rig import ArmModel, Pose
 from calibrate.arms.convert import Conversion, convert, pose_of
 from calibrate.export.identified import SIGN, IdentifiedArm
 

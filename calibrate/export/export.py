@@ -4,7 +4,7 @@ import enum
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.export.dh_csv import dh_csv_text
 from calibrate.export.identified import IdentifiedArm, identified_arm
 from calibrate.export.json_text import json_text

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.convert import corrected_parts
 from calibrate.arms.eccentric import COSINE, SINE

@@ -2,7 +2,7 @@
 
 import msgspec
 
-from acquisition.recording.rig_schema import ArmModel
+from acquisition.recording.rig import ArmModel
 from calibrate.arms.convert import convert, pose_of
 from calibrate.export.dh_csv import FRAME, TABLE, dh_numbers
 from calibrate.export.identified import SIGN, IdentifiedArm

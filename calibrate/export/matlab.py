@@ -6,7 +6,7 @@ the fixed transform stands in front of the turn about z.
 
 from collections.abc import Iterable
 
-from acquisition.recording.rig_schema import ArmModel
+from acquisition.recording.rig import ArmModel
 from calibrate.arms.convert import convert
 from calibrate.export.dh_csv import dh_numbers
 from calibrate.export.identified import SIGN, IdentifiedArm

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
 from calibrate.effects.ports import Perturbation
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile

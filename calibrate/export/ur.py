@@ -10,7 +10,7 @@ the YAML and the checksums of the .conf are computed by the controller and canno
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import ArmModel
+from acquisition.recording.rig import ArmModel
 from calibrate.arms.convert import Conversion, convert, corrected_parts, pose_of
 from calibrate.arms.table import NearParallel
 from calibrate.errors import DataError

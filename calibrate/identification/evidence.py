@@ -6,8 +6,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
 from calibrate.fit import Fit, Status
 from calibrate.identifiability import Identifiability, analyse
 from calibrate.identification.held_out import Splitting, proof, splits_of

@@ -8,8 +8,8 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.special import ndtr, stdtrit
 
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
 from calibrate.blunders.finding import Blunder
 from calibrate.fit import FAR_START, Fit, Status
 from calibrate.identifiability import Identifiability

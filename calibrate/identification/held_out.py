@@ -6,8 +6,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import SEAT, SPOTS
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.samples import SEAT, SPOTS
 from calibrate.fit import Fit
 from calibrate.identification.result import Proven, Unseen
 from calibrate.identification.rounds import Fitted

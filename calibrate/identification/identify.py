@@ -11,10 +11,10 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from acquisition.recording.bounds import ARM_M
-from acquisition.recording.columns import POSITION
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.files.bounds import ARM_M
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import POSITION
 from calibrate.arms.catalogue import arm_of
 from calibrate.blunders.conventions import wrong_convention
 from calibrate.blunders.degrees import as_radians, beyond_limits

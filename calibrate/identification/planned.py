@@ -7,8 +7,8 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
 from calibrate.arms.belief import LINK_PLAUSIBLE
 from calibrate.converted_rig import rig_in_model
 from calibrate.errors import DataError

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import SPOTS
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import SPOTS
 from calibrate.arms.belief import FREE
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.eccentric import with_discs

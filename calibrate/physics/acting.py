@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.serial import SerialArm
 from calibrate.diagnose.causes import cause

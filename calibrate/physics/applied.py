@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import required
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.samples import required
 from calibrate.effects.ports import Perturbation, Port
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile

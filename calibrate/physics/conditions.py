@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import SEAT
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.samples import SEAT
 from calibrate.effects.conditions import moves_of, temperatures_of
 from calibrate.effects.drivers import Drivers
 

@@ -9,10 +9,8 @@ from msgspec import structs
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from acquisition.recording.fingerprint import readings_sha256
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording, Samples, readings_sha256
 from acquisition.recording.rig import rig_sha256
-from acquisition.recording.samples import Samples
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.blunders_first import Cleared
 from calibrate.diagnose.curve import Curve

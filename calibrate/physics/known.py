@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.fingerprint import readings_sha256
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples, readings_sha256
 from calibrate.diagnose.assumed import Assumed, Stated
 from calibrate.diagnose.fitted import Fitted, fit_from_model, fit_geometry, given
 from calibrate.diagnose.linearised import Accepted

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
 from calibrate.effects.ports import Perturbation, Port
 from calibrate.model_file import ModelFile
 from calibrate.physics.acting import Acting, arm_in, flange_frames, moved_columns

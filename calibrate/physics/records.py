@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
-from acquisition.recording.bounds import Instant, Label, Many, Name, Number, Statistic, Whole
-from acquisition.recording.errors import shown
+from acquisition.recording.files import shown
+from acquisition.recording.files.bounds import Instant, Label, Many, Name, Number, Statistic, Whole
 
 Component = Annotated[int, Meta(ge=0, le=15)]  # of a port: six of a frame, one for each joint of the joints
 Waves = Annotated[int, Meta(ge=1, le=64)]  # of a curve over each of its drivers

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 from msgspec import structs
 
-from acquisition.recording.fingerprint import readings_sha256
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording, readings_sha256
 from calibrate.diagnose.blunders_first import blunders_first
 from calibrate.diagnose.fitted import fit_geometry
 from calibrate.diagnose.session import session_of

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
 from calibrate.diagnose.augmented import encoder_channels
 from calibrate.diagnose.ported import look
 from calibrate.effects.ports import Perturbation

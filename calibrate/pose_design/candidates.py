@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import POSITION, SPOTS, per_joint
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.samples import POSITION, SPOTS, per_joint
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

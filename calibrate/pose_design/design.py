@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.pose_plan import PosePlan
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.errors import DataError
 from calibrate.pose_design.candidates import Candidates
 from calibrate.pose_design.criteria import CRITERIA

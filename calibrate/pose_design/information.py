@@ -11,7 +11,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.arms.catalogue import arm_of
 from calibrate.identifiability import STRUCTURAL
 from calibrate.identification.session import instruments_for_fit

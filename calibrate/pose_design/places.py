@@ -12,7 +12,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Placement
+from acquisition.recording.rig import Placement
 from calibrate.parameters import index_of, priors
 from calibrate.pose_design.candidates import Candidates
 from calibrate.pose_design.information import Information

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.diagnose.diagnosis import Named
 from calibrate.pose_design.design import Design
 from calibrate.pose_design.places import Places

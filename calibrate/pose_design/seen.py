@@ -11,7 +11,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.diagnosis import Named
 from calibrate.diagnose.findings import named

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.arms.model import KinematicModel
 from calibrate.arms.rig_arm import limits_of
 from calibrate.dual_psd_rig import laser_of

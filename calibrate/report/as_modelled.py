@@ -7,7 +7,7 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording
 from calibrate.errors import DataError
 from calibrate.fit_plan import DEFAULT, parse_plan
 from calibrate.identification.planned import rig_as_planned, samples_as_planned

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.stream import Event
+from acquisition.recording import Event
 
 Floats = NDArray[np.float64]
 

@@ -5,9 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.check import check
-from acquisition.recording.recording import Recording
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording import Recording, check
+from acquisition.recording.rig import Rig
 from calibrate.report.elements import Html, table, tag
 from calibrate.report.quantities import fixed, significant
 

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording
 from calibrate.arms.model import KinematicModel
 from calibrate.errors import DataError
 from calibrate.fit import solve

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.recording.recording import Recording
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording import Recording
+from acquisition.recording.rig import Rig
 from calibrate.dual_psd_rig import dual_psd_chain
 from calibrate.fit_plan import DEFAULT, parse_plan
 from calibrate.identification.planned import rig_as_planned

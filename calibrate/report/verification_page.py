@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording
 from calibrate.report.elements import Html, bullets, figure, panels, section, table, tag
 from calibrate.report.page import page, write_page
 from calibrate.report.quantities import DASH, fixed, length, significant

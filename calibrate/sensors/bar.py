@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import BAR, BAR_END
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import BAR, BAR_END
 from calibrate.blunders.least_distance import least_distance
 from calibrate.blunders.witness import Otherwise, Strain, Witness, drawn_point_m, filled, thinned
 from calibrate.errors import DataError

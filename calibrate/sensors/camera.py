@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
 from calibrate.alignment import align_with_tool
 from calibrate.blunders.witness import Otherwise, Strain, Witness, filled, stacked, thinned
 from calibrate.chain import Chain

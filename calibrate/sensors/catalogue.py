@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
 from calibrate.sensors import (
     bar,
     camera,

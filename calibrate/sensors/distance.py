@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import POSITION
+from acquisition.recording.samples import POSITION
 from calibrate.errors import DataError
 from calibrate.sample_table import SampleTable
 from calibrate.sensors import full_pose, position

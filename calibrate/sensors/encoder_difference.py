@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import per_joint
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.samples import per_joint
 from calibrate.chain import Chain
 from calibrate.errors import DataError
 from calibrate.parameters import Parameter

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.columns import ORIENTATION, POSITION
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import ORIENTATION, POSITION
 from calibrate.blunders.finding import BlunderKind
 from calibrate.blunders.least_distance import weights
 from calibrate.blunders.rough_fit import turn_between

@@ -11,7 +11,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import SPOTS
+from acquisition.recording.samples import SPOTS
 from calibrate.chain import Chain
 from calibrate.errors import DataError
 from calibrate.parameters import Parameter

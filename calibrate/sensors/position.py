@@ -7,9 +7,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import ORIENTATION, POSITION
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import ORIENTATION, POSITION
 from calibrate.blunders.finding import BlunderKind
 from calibrate.blunders.other_session import rows_of_another_session
 from calibrate.blunders.rough_fit import rough_fit

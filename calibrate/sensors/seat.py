@@ -11,9 +11,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import BAR, SEAT
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import BAR, SEAT
 from calibrate.alignment import pivot
 from calibrate.blunders.least_distance import weights
 from calibrate.blunders.witness import Otherwise, Strain, Witness, drawn_point_m, filled

@@ -7,9 +7,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import WIRE as COLUMN
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import WIRE as COLUMN
 from calibrate.alignment import trilaterate
 from calibrate.blunders.finding import BlunderKind
 from calibrate.blunders.least_distance import least_distance

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import BAR, SEAT
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import BAR, SEAT
 from calibrate.errors import DataError
 from calibrate.predict import Predictor
 from calibrate.sensors.bar import bar_pairs

@@ -1,9 +1,7 @@
 """Whether a model may be judged by a recording: it has to be of this arm, and made of other readings."""
 
-from acquisition.recording.fingerprint import readings_sha256
-from acquisition.recording.recording import Recording
-from acquisition.recording.rig import parse_rig
-from acquisition.recording.rig_schema import Arm, Rig
+from acquisition.recording import Recording, readings_sha256
+from acquisition.recording.rig import Arm, Rig, parse_rig
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
 

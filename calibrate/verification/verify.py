@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording
 from calibrate.model_file import ModelFile
 from calibrate.predict import Predictor
 from calibrate.verification import b89_4_22, iso10360_12

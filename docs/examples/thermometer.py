@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.recording.stream import Channel as Declared
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording import Channel as Declared
+from acquisition.recording import RecordingWriter
 from drivers.clock import Clock, SystemClock
 from drivers.device import Block, Channel
 from drivers.errors import DeviceLost, DeviceStale, WireError

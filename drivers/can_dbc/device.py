@@ -13,11 +13,10 @@ import numpy as np
 
 from drivers.can_dbc.description import JointSignal
 from drivers.cia406.angle import SPEED_LIMIT_RAD_S, ContinuousAngle
-from drivers.cia406.bus_faults import BusFaults
-from drivers.cia406.network import lost_as_device_lost, shut_down
-from drivers.clock import Clock, SystemClock
-from drivers.device import Block, Channel
-from drivers.errors import DeviceLost, DeviceStale
+from drivers.clock import Clock
+from drivers.device import Block, Channel, StreamDevice
+from drivers.errors import DeviceStale
+from drivers.transports.can_faults import BusFaults, lost_as_device_lost, shut_down
 from drivers.transports.can_interfaces import OpenBus, opened
 
 SILENT_S = 0.5  # an encoder that sends nothing for so long is gone
@@ -25,7 +24,7 @@ BATCH_S = 0.02  # rows gathered in one block; more only delays a reader
 
 
 @dataclass(frozen=True)
-class _Row:
+class _EncoderRow:
     """One reading of each encoder, and the state of things at that time."""
 
     sequence: int
@@ -35,7 +34,7 @@ class _Row:
     bus_errors: int
 
 
-class CanDbcEncoders:
+class CanDbcEncoders(StreamDevice[can.BusABC]):
     """A `drivers.device.Device`. Channels: position_rad (joint,), NaN where none came; age_s (joint,); slip_rad
     (joint,); bus_errors, error frames so far.
 
@@ -56,13 +55,11 @@ class CanDbcEncoders:
         """ValueError for no joints."""
         if not joints:
             raise ValueError(f"{name}: no signals; name one per joint")
-        self.name = name
+        super().__init__(name, clock)
         self.joints = tuple(joints)
         self.bad_frames = 0
         self._open_bus = open_bus
-        self._clock: Clock = SystemClock() if clock is None else clock
         self._limits = speed_limit_rad_s, acceleration_limit_rad_s2
-        self._bus: can.BusABC | None = None
         self._faults = BusFaults(name)
         self._angles = self._new_angles()
         self._places: dict[tuple[int, bool], list[int]] = {}
@@ -71,21 +68,18 @@ class CanDbcEncoders:
         self._sequence = 0
         self._row: dict[int, tuple[float, float]] = {}  # place -> angle, host time
         self._heard_s: dict[int, float] = {}
-        self._rows: list[_Row] = []
+        self._rows: list[_EncoderRow] = []
 
-    def connect(self) -> None:
-        """Open the bus and hear every encoder once. DeviceLost (no bus), DeviceStale naming those that are silent."""
-        self.close()
-        self._bus = opened(self._open_bus, self.name)
+    def _open(self) -> can.BusABC:
+        return opened(self._open_bus, self.name)
+
+    def _set_up(self, line: can.BusABC) -> None:
+        """Hear every encoder once. DeviceStale naming those that are silent."""
         self._angles = self._new_angles()
         self._row.clear()
         if self._sequence:
             self._sequence += 1  # what passed between is not known to be nothing
-        try:
-            self._hear_all()
-        except BaseException:
-            self.close()
-            raise
+        self._hear_all()
 
     def describe(self) -> tuple[Channel, ...]:
         shape = (len(self.joints),)
@@ -100,7 +94,7 @@ class CanDbcEncoders:
     def read(self, timeout_s: float) -> Block:
         began_s = self._clock.now_s()
         with lost_as_device_lost(self.name, "reading"):
-            while (left_s := began_s + timeout_s - self._clock.now_s()) > 0.0:
+            while (left_s := self._left_s(began_s + timeout_s)) > 0.0:
                 self._take(self._receive(left_s))
                 if self._rows and self._clock.now_s() - began_s >= BATCH_S:
                     break
@@ -110,10 +104,8 @@ class CanDbcEncoders:
         rows, self._rows = self._rows, []
         return self._block(rows)
 
-    def close(self) -> None:
-        bus, self._bus = self._bus, None
-        if bus is not None:
-            shut_down(bus)
+    def _release(self, line: can.BusABC) -> None:
+        shut_down(line)
 
     # --- frames
 
@@ -121,7 +113,7 @@ class CanDbcEncoders:
         until_s = self._clock.now_s() + 2.0 * SILENT_S
         self._heard_s, before = {}, len(self._rows)
         with lost_as_device_lost(self.name, "opening"):
-            while len(self._heard_s) < len(self.joints) and (left_s := until_s - self._clock.now_s()) > 0.0:
+            while len(self._heard_s) < len(self.joints) and (left_s := self._left_s(until_s)) > 0.0:
                 self._take(self._receive(left_s))
         del self._rows[before:]  # of encoders that were not all there yet
         silent = [joint.name for place, joint in enumerate(self.joints) if place not in self._heard_s]
@@ -132,9 +124,7 @@ class CanDbcEncoders:
             )
 
     def _receive(self, timeout_s: float) -> can.Message | None:
-        bus = self._bus
-        if bus is None:
-            raise DeviceLost(f"{self.name}: not connected; call connect() first")
+        bus = self._opened()
         try:
             return bus.recv(min(max(timeout_s, 0.0), SILENT_S))
         except (ValueError, IndexError):  # python-can's parser on a damaged line of a serial adapter
@@ -167,7 +157,7 @@ class CanDbcEncoders:
     def _finish(self, now_s: float) -> None:
         readings, self._row = self._row, {}
         slips_rad = tuple(angle.slip_rad for angle in self._angles)
-        self._rows.append(_Row(self._sequence, now_s, readings, slips_rad, self._faults.count))
+        self._rows.append(_EncoderRow(self._sequence, now_s, readings, slips_rad, self._faults.count))
         self._sequence += 1
 
     def _check_silence(self) -> None:
@@ -180,7 +170,7 @@ class CanDbcEncoders:
                 "check its power, cable and termination"
             )
 
-    def _block(self, rows: Sequence[_Row]) -> Block:
+    def _block(self, rows: Sequence[_EncoderRow]) -> Block:
         nothing = (math.nan, math.nan)
         each = np.array([[row.readings.get(place, nothing) for place in range(len(self.joints))] for row in rows])
         host_s = np.array([row.done_s for row in rows])

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from drivers.cia406.objects import Operating
+from drivers.cia406.codec import Operating
 
 SPEED_LIMIT_RAD_S = (
     100.0  # 16 turns a second: no arm joint turns so fast, even in an emulation run at ten times the pace

@@ -1,4 +1,4 @@
-"""SYNCs and their answers, and when the next SYNC is due. No I/O: times and frames come in, rows come out.
+"""SYNCs and their answers, and when the next SYNC is due. No I/O: times and frames come in, rows and blocks come out.
 
 An answer says nothing of the SYNC that it answers: a node's answers belong to the SYNCs in their order. That is certain
 only when in the end each node has answered as often as it was asked. So rows are held until nothing is on the way any
@@ -9,7 +9,13 @@ the sequence.
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+
+from drivers.device import Block
 
 ANSWER_LIMIT_S = 0.1  # answers take some ms; measured with an emulator on a busy host: now and then 50 ms
 HOLD_S = 0.1  # rows are told of no later than this, and what waits for the file is no more
@@ -149,3 +155,29 @@ class SyncCycle:
             return
         gives_up_s = self._under_way[0].sent_s + ANSWER_LIMIT_S
         self.wakes_s = min(gives_up_s, self._due_s) if self._has_room else gives_up_s
+
+
+@dataclass(frozen=True)
+class WatchedRow:
+    """Positions with the state of things at that time: of every node, and of the bus."""
+
+    row: Row
+    emergency_codes: tuple[int, ...]
+    slip_rad: tuple[float, ...]
+    bus_errors: int
+
+
+def to_block(rows: Sequence[WatchedRow]) -> Block:
+    """One block of at least one row; device_s is when the SYNC was sent."""
+    values = {
+        "position_rad": np.array([each.row.position_rad for each in rows]),
+        "emergency_code": np.array([each.emergency_codes for each in rows], dtype=np.uint16),
+        "slip_rad": np.array([each.slip_rad for each in rows], dtype=np.float64),
+        "bus_errors": np.array([each.bus_errors for each in rows], dtype=np.uint32),
+    }
+    return Block(
+        host_s=np.array([each.row.arrived_s for each in rows]),
+        device_s=np.array([each.row.sent_s for each in rows]),
+        sequence=np.array([each.row.sequence for each in rows], dtype=np.int64),
+        values=MappingProxyType(values),
+    )

@@ -9,31 +9,29 @@ from collections.abc import Callable, Sequence
 import can
 import canopen
 
-from drivers.cia406 import objects
+from drivers.cia406 import codec
 from drivers.cia406.angle import SPEED_LIMIT_RAD_S, ContinuousAngle, Slip
-from drivers.cia406.bus_faults import BusFault, BusFaults
 from drivers.cia406.codec import Emergency, MappedNumber, mapped_number
 from drivers.cia406.configuration import (
     HEARTBEAT_MS,
+    NMT_PRE_OPERATIONAL,
+    NMT_START,
+    SEND_LIMIT_S,
+    BoundedNetwork,
     EncoderIdentity,
     EncoderObjects,
+    configured,
+    listening,
+    nmt,
     preset,
     set_direction,
 )
-from drivers.cia406.cycle import Row, SyncCycle
-from drivers.cia406.network import (
-    SEND_LIMIT_S,
-    BoundedNetwork,
-    listening,
-    lost_as_device_lost,
-    shut_down,
-)
-from drivers.cia406.nodes import NMT_PRE_OPERATIONAL, NMT_START, configured, nmt
-from drivers.cia406.rows import WatchedRow, to_block
-from drivers.cia406.watch import NodeWatch
-from drivers.clock import Clock, SystemClock
-from drivers.device import Block, Channel
+from drivers.cia406.cycle import Row, SyncCycle, WatchedRow, to_block
+from drivers.cia406.health import NodeWatch
+from drivers.clock import Clock
+from drivers.device import Block, Channel, StreamDevice
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale
+from drivers.transports.can_faults import BusFault, BusFaults, lost_as_device_lost, shut_down
 from drivers.transports.can_interfaces import OpenBus, opened, received
 
 MAX_SYNC_HZ = 1000.0  # six encoders fill half of a bus of 1 Mbit/s
@@ -42,10 +40,10 @@ HEARTBEAT_GOES_ON_S = 0.49  # of SILENT_S: a heartbeat this fresh is one of afte
 BATCH_S = 0.02  # rows gathered in one block; more only delays a reader
 TOGETHER_S = 1.1e-3  # answers wait so long for the next SYNC: at 1 kHz one waking a row in place of two or more
 HELD_UP_S = 0.05  # a thread that waits so much longer than it asked to was kept from running
-SYNC = can.Message(arbitration_id=objects.SYNC_ID, is_extended_id=False)
+SYNC = can.Message(arbitration_id=codec.SYNC_ID, is_extended_id=False)
 
 
-class Cia406Encoders:
+class Cia406Encoders(StreamDevice[can.BusABC]):
     """A `drivers.device.Device`. Channels: position_rad (node,), NaN where no answer came; emergency_code (node,);
     slip_rad (node,), the sum of all steps that were no motion; bus_errors, error frames so far.
 
@@ -71,15 +69,13 @@ class Cia406Encoders:
         ValueError for a rate beyond 1 to 1000 Hz, no nodes, one twice, or one that CANopen does not have.
         """
         _check(name, nodes, sync_hz)
-        self.name = name
+        super().__init__(name, clock)
         self.nodes = tuple(nodes)
         self.identities: tuple[EncoderIdentity, ...] = ()
         self._open_bus = open_bus
         self._period_s = 1.0 / sync_hz
         self._batch = max(1, round(BATCH_S * sync_hz))
-        self._clock: Clock = SystemClock() if clock is None else clock
         self._limits = speed_limit_rad_s, acceleration_limit_rad_s2
-        self._bus: can.BusABC | None = None
         self._operational = False
         self._cycle = SyncCycle(len(self.nodes), self._period_s, 0.0, 0)
         self._angles: tuple[ContinuousAngle, ...] = ()
@@ -113,17 +109,6 @@ class Cia406Encoders:
         return self._bad_lines + self._watch.bad_frames
 
     # --- verbs
-
-    def connect(self) -> None:
-        """Find, check and start every encoder. DeviceLost (no bus), DeviceStale (nodes missing), DeviceRefused."""
-        self.close()
-        bus = self._bus = opened(self._open_bus, self.name)
-        try:
-            with lost_as_device_lost(self.name, "setting up"):
-                self._set_up(bus)
-        except BaseException:
-            self.close()
-            raise
 
     def describe(self) -> tuple[Channel, ...]:
         """The resolution, that of the coarsest encoder, is known once connected."""
@@ -170,21 +155,26 @@ class Cia406Encoders:
         """Which way of turning makes the encoder's own count rise; angles stay counter-clockwise positive."""
         self._change(self._place(node), lambda encoder: set_direction(encoder, counter_clockwise=counter_clockwise))
 
-    def close(self) -> None:
-        bus, self._bus = self._bus, None
-        if bus is None:
-            return
+    # --- setting up
+
+    def _open(self) -> can.BusABC:
+        return opened(self._open_bus, self.name)
+
+    def _set_up(self, line: can.BusABC) -> None:
+        """Find, check and start every encoder. DeviceLost (no bus), DeviceStale (nodes missing), DeviceRefused."""
+        with lost_as_device_lost(self.name, "setting up"):
+            self._start(line)
+
+    def _release(self, line: can.BusABC) -> None:
         try:
             with lost_as_device_lost(self.name, "closing"):
                 for node in self.nodes:
-                    bus.send(nmt(NMT_PRE_OPERATIONAL, node), SEND_LIMIT_S)
+                    line.send(nmt(NMT_PRE_OPERATIONAL, node), SEND_LIMIT_S)
         except DeviceLost:
             pass  # nobody is left to be told
         finally:
             self._stop_taking()
-            shut_down(bus)
-
-    # --- setting up
+            shut_down(line)
 
     def _place(self, node: int) -> int:
         if node not in self.nodes:
@@ -193,7 +183,7 @@ class Cia406Encoders:
 
     def _change(self, place: int, change: Callable[[EncoderObjects], None]) -> None:
         """Parameters are writable in the pre-operational state only (CiA 406); then everything is set up anew."""
-        bus, number = self._connected(), self.nodes[place]
+        bus, number = self._opened(), self.nodes[place]
         with lost_as_device_lost(self.name, "setting up"):
             self._stop_taking()
             network = BoundedNetwork(bus)
@@ -201,9 +191,9 @@ class Cia406Encoders:
                 remote = network.add_node(canopen.RemoteNode(number, canopen.ObjectDictionary()))
                 remote.nmt.send_command(NMT_PRE_OPERATIONAL)
                 change(EncoderObjects(self.name, number, remote))
-            self._set_up(bus)
+            self._start(bus)
 
-    def _set_up(self, bus: can.BusABC) -> None:
+    def _start(self, bus: can.BusABC) -> None:
         network = BoundedNetwork(bus)
         self._stop_taking()
         self._watch.forget_codes()
@@ -222,7 +212,7 @@ class Cia406Encoders:
         self._watch.set_operational(True, start_s)
 
     def _position_of(self, identity: EncoderIdentity) -> MappedNumber:
-        number = mapped_number(identity.mapping, objects.POSITION)
+        number = mapped_number(identity.mapping, codec.POSITION)
         if number is None:
             raise DeviceRefused(f"{self.name}: encoder {identity.node} keeps its position (6004h) out of 1A01h")
         return number
@@ -239,7 +229,7 @@ class Cia406Encoders:
         self._check_silence(now_s)
         due = self._cycle.sync_due(now_s)
         if due:
-            self._connected().send(SYNC, SEND_LIMIT_S)
+            self._opened().send(SYNC, SEND_LIMIT_S)
         return due
 
     def _receive(self, timeout_s: float) -> list[can.Message]:
@@ -248,7 +238,7 @@ class Cia406Encoders:
             self._clock.sleep_s(timeout_s)
             timeout_s = 0.0
         try:
-            return received(self._bus or self._connected(), max(timeout_s, 0.0))
+            return received(self._line or self._opened(), max(timeout_s, 0.0))
         except (ValueError, IndexError):  # python-can's parser on a damaged line of a serial adapter
             self._bad_lines += 1
             return []
@@ -287,7 +277,7 @@ class Cia406Encoders:
         silent = self._cycle.silent(SILENT_S, now_s)
         if not silent:
             return
-        self._faults.check(self._connected())
+        self._faults.check(self._opened())
         alive = self._watch.heard_within(silent, HEARTBEAT_GOES_ON_S, now_s)
         remedy = "its heartbeat goes on: check SYNC and TPDO2" if alive else "check its power, cable and termination"
         mute = ", ".join(str(self.nodes[place]) for place in silent)
@@ -297,12 +287,6 @@ class Cia406Encoders:
         for row in rows:
             slips_rad = tuple(angle.slip_rad for angle in self._angles)
             self._rows.append(WatchedRow(row, self._watch.codes, slips_rad, self._faults.count))
-
-    def _connected(self) -> can.BusABC:
-        bus = self._bus
-        if bus is None:
-            raise DeviceLost(f"{self.name}: not connected; call connect() first")
-        return bus
 
 
 def _check(name: str, nodes: Sequence[int], sync_hz: float) -> None:

@@ -16,7 +16,7 @@ from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from pymodbus.exceptions import ConnectionException, ModbusException
 
 from drivers.errors import DeviceError, DeviceLost, DeviceRefused, DeviceStale
-from drivers.modbus.register import INPUT
+from drivers.modbus.register_map import INPUT
 from drivers.transports.serial_port import find_port
 
 TIMEOUT_S = 0.25  # of one try; controllers answer within their cycle, some milliseconds; a line of 9600 baud in 0.1 s

@@ -2,15 +2,20 @@
 
 No length field is trusted: a frame ends at its 0x00, must pass its CRC and then fit its layout to the byte; a run of
 more than MAX_FRAME bytes without 0x00 is dropped. So the first whole frame after any damage is read again.
+
+The messages of samples become a block in SI units: their 32-bit sequence number wraps and starts anew, that of a block
+only rises.
 """
 
 import binascii
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 from cobs import cobs
 
+from drivers.device import Block
 from drivers.psd_daq.messages import (
     PROTOCOL_VERSION,
     Ack,
@@ -29,6 +34,7 @@ from drivers.psd_daq.messages import (
 )
 from drivers.psd_faces import FaceKind
 
+WRAP = 1 << 32
 MAX_SAMPLES = 32
 MAX_FRAME = 1200  # encoded bytes; 32 samples make 1117, see the table of sizes in the protocol document
 CRC_SEED = 0xFFFF  # CRC-16/CCITT-FALSE: polynomial 0x1021, not reflected, no final xor (catalogue of CRCs, G. Cook)
@@ -183,3 +189,59 @@ _BODIES: Mapping[int, Callable[[bytes], Message]] = {
     MessageType.NAK: _nak,
     MessageType.DATA: _samples,
 }
+
+
+class SequenceCount:
+    """Unwraps the box's count. After `restart` (a new stream) the count goes on behind a gap of at least one sample."""
+
+    def __init__(self) -> None:
+        self._next = 0  # rising number of the next sample, when none is lost
+        self._shift = 0  # rising minus raw number, of the present stream
+
+    def restart(self) -> None:
+        """The box counts from zero again; whatever it says next is behind all that was before."""
+        if self._next > 0:
+            self._next += 1  # what passed between the streams is not known to be nothing
+        self._shift = self._next
+
+    def unwrap(self, raw: int, count: int) -> int:
+        """The rising number of a frame's first sample, `count` samples long."""
+        while raw + self._shift < self._next - WRAP // 2:
+            self._shift += WRAP
+        rising = raw + self._shift
+        self._next = rising + count
+        return rising
+
+
+class RepeatFilter:
+    """Finds frames of one stream that came before: their samples must not count twice."""
+
+    def __init__(self) -> None:
+        self._next: int | None = None
+
+    def is_new(self, raw: int, count: int) -> bool:
+        """Whether the frame with this first sample, `count` samples long, begins behind all that were new."""
+        if self._next is not None and (raw - self._next) % WRAP >= WRAP // 2:
+            return False
+        self._next = (raw + count) % WRAP
+        return True
+
+
+def to_block(arrived: Sequence[tuple[float, Samples]], count: SequenceCount) -> Block:
+    """One block of all `arrived` (host time of arrival, samples), at least one, in the order they came."""
+    counts = [len(samples.flags) for _, samples in arrived]
+    values = {
+        "photocurrent_a": np.concatenate([samples.photocurrent_pa for _, samples in arrived]) * 1e-12,
+        "flags": np.concatenate([samples.flags for _, samples in arrived]).astype(np.uint16),
+        "temperature_degC": np.repeat([samples.temperature_degC for _, samples in arrived], counts),
+    }
+    starts = np.repeat([samples.time_us * 1e-6 for _, samples in arrived], counts)
+    periods = np.repeat([samples.period_ns * 1e-9 for _, samples in arrived], counts)
+    firsts = [count.unwrap(samples.sequence, len(samples.flags)) for _, samples in arrived]
+    within = np.concatenate([np.arange(n) for n in counts])
+    return Block(
+        host_s=np.repeat([host_s for host_s, _ in arrived], counts).astype(np.float64),
+        device_s=(starts + within * periods).astype(np.float64),
+        sequence=np.repeat(np.array(firsts, dtype=np.int64), counts) + within,
+        values=MappingProxyType(values),
+    )

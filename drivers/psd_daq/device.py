@@ -1,15 +1,16 @@
 """The PSD DAQ box as an instrument: who it is, its stream of photocurrents, in SI units.
 
-One thread uses it at a time, except `close`, which any thread may call. It starts no thread of its own.
+One thread uses it at a time, except `close`, which any thread may call. It starts no thread of its own. Where something
+else is at the port, the error message names what it answers.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from drivers.clock import Clock, SystemClock
-from drivers.device import Block, Channel
+from drivers.clock import Clock
+from drivers.device import Block, Channel, StreamDevice
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale, WireError
-from drivers.psd_daq.codec import PsdDaqCodec
+from drivers.psd_daq.codec import PsdDaqCodec, RepeatFilter, SequenceCount, to_block
 from drivers.psd_daq.messages import (
     MAX_RATE_HZ,
     MIN_RATE_HZ,
@@ -26,9 +27,6 @@ from drivers.psd_daq.messages import (
     StartStream,
     StopStream,
 )
-from drivers.psd_daq.samples import to_block
-from drivers.psd_daq.sequence import RepeatFilter, SequenceCount
-from drivers.psd_daq.stranger import name_stranger
 from drivers.transports.transport import Transport
 
 BAUD = 3_000_000  # docs/protocols/psd-daq.md, "The line"
@@ -37,9 +35,38 @@ WRITE_S = 1.0
 READ_BYTES = 65536
 BAD_FRAMES_KEPT = 16
 Answer = TypeVar("Answer", Identity, Ack)
+PROBE_S = 0.3  # a line-oriented instrument echoes or answers an empty line within some 10 ms
+EMPTY_LINE = b"\r"  # the only thing sent to a stranger: it moves nothing
 
 
-class PsdDaq:
+def name_stranger(line: Transport, heard: bytes, bad: Sequence[BadFrame], clock: Clock) -> str | None:
+    """What answered instead, in words; None when the line stays silent."""
+    if bad and "protocol version" in bad[-1].reason:
+        return f"it speaks {bad[-1].reason}"
+    if heard:
+        return f"it sent {_shown(heard)}"
+    answer = _probe(line, clock)
+    if not answer:
+        return None
+    return (
+        f"it answers an empty line with {_shown(answer)}, as a CAN adapter (slcan) or another line-oriented device does"
+    )
+
+
+def _probe(line: Transport, clock: Clock) -> bytes:
+    line.write(EMPTY_LINE, PROBE_S)
+    deadline_s = clock.now_s() + PROBE_S
+    answer = b""
+    while not answer and (left_s := deadline_s - clock.now_s()) > 0.0:
+        answer = line.read(32, left_s)
+    return answer
+
+
+def _shown(data: bytes) -> str:
+    return f"{data[:32].hex(' ')} ({data[:32]!r})"
+
+
+class PsdDaq(StreamDevice[Transport]):
     """A `drivers.device.Device`. Channels: photocurrent_a (8,), flags, temperature_degC.
 
     `open_line` is called by every `connect`, so a box that was unplugged is found again by serial number:
@@ -57,34 +84,37 @@ class PsdDaq:
         """ValueError when the rate is not whole hertz from 100 to 4000."""
         if not (MIN_RATE_HZ <= rate_hz <= MAX_RATE_HZ and float(rate_hz).is_integer()):
             raise ValueError(f"{name}: rate_hz {rate_hz!r}; give whole hertz from {MIN_RATE_HZ} to {MAX_RATE_HZ}")
-        self.name = name
+        super().__init__(name, clock)
         self.identity: Identity | None = None
         self.bad_frames: list[BadFrame] = []  # the last BAD_FRAMES_KEPT of this connection
         self.bad_frame_count = 0
         self._open_line = open_line
         self._rate_hz = int(rate_hz)
-        self._clock: Clock = SystemClock() if clock is None else clock
-        self._line: Transport | None = None
         self._codec = PsdDaqCodec()
         self._count = SequenceCount()
         self._repeats = RepeatFilter()
         self._pending: list[tuple[float, Samples]] = []  # host time of arrival, samples
 
-    def connect(self) -> None:
+    def _open(self) -> Transport:
+        return self._open_line()
+
+    def _set_up(self, line: Transport) -> None:
         """Identify the box and start its stream. DeviceLost, DeviceStale (silent), DeviceRefused (another device)."""
-        self.close()
-        self._line = self._open_line()
         self._codec = PsdDaqCodec()
         self.bad_frames = []
         self.bad_frame_count = 0
-        try:
-            self.identity = self._identify()
-            self._check_rate(self.identity)
-            self._ask(StartStream(self._rate_hz), MessageType.START_STREAM, Ack)
-        except BaseException:
-            self.close()
-            raise
+        self.identity = self._identify(line)
+        self._check_rate(self.identity)
+        self._ask(StartStream(self._rate_hz), MessageType.START_STREAM, Ack)
         self._count.restart()
+
+    def _release(self, line: Transport) -> None:
+        try:
+            line.write(self._codec.encode(StopStream()), WRITE_S)
+        except DeviceLost:
+            pass  # a box that has gone streams no more
+        finally:
+            line.close()
 
     def describe(self) -> tuple[Channel, ...]:
         """Full scale is known once connected."""
@@ -99,7 +129,7 @@ class PsdDaq:
         deadline_s = self._clock.now_s() + timeout_s
         refused_before = self.bad_frame_count
         while not self._pending:
-            left_s = deadline_s - self._clock.now_s()
+            left_s = self._left_s(deadline_s)
             if left_s <= 0.0:
                 raise self._no_samples(timeout_s, refused_before)
             self._receive(left_s)
@@ -114,22 +144,10 @@ class PsdDaq:
         """DeviceStale unless the box answers within a second; the stream goes on."""
         self._ask(Ping(), MessageType.PING, Ack)
 
-    def close(self) -> None:
-        line, self._line = self._line, None
-        if line is None:
-            return
-        try:
-            line.write(self._codec.encode(StopStream()), WRITE_S)
-        except DeviceLost:
-            pass  # a box that has gone streams no more
-        finally:
-            line.close()
-
     # --- commands
 
-    def _identify(self) -> Identity:
+    def _identify(self, line: Transport) -> Identity:
         """The first exchange on a fresh line: what is heard instead of an identity is evidence of who is there."""
-        line = self._opened()
         line.write(b"\0" + self._codec.encode(StopStream()), WRITE_S)  # a delimiter ends what another program left
         heard = bytearray()
         try:
@@ -155,7 +173,7 @@ class PsdDaq:
         line = self._opened()
         line.write(self._codec.encode(request), WRITE_S)
         deadline_s = self._clock.now_s() + ANSWER_S
-        while (left_s := deadline_s - self._clock.now_s()) > 0.0:
+        while (left_s := self._left_s(deadline_s)) > 0.0:
             for message in self._receive(left_s, heard):
                 if isinstance(message, answer) and (not isinstance(message, Ack) or message.request == kind):
                     return message
@@ -167,12 +185,6 @@ class PsdDaq:
         )
 
     # --- the line
-
-    def _opened(self) -> Transport:
-        line = self._line
-        if line is None:
-            raise DeviceLost(f"{self.name}: not connected; call connect() first")
-        return line
 
     def _receive(self, timeout_s: float, heard: bytearray | None = None) -> list[Message]:
         """Messages that came, except samples, which are kept for `read`."""

@@ -13,7 +13,6 @@ from collections.abc import Callable, Mapping
 from drivers.psd_kpa101.messages import (
     Fault,
     Info,
-    Junk,
     Message,
     MessageId,
     Mode,
@@ -28,6 +27,7 @@ from drivers.psd_kpa101.messages import (
     SetMode,
     Status,
     StopUpdates,
+    StrayBytes,
 )
 
 HOST, UNIT, WITH_DATA = 0x01, 0x50, 0x80
@@ -134,7 +134,7 @@ class Kpa101Codec:
 
     def _end_junk(self, messages: list[Message]) -> None:
         if self._junk_count:
-            messages.append(Junk(self._offset - self._junk_count, self._junk_count, bytes(self._junk)))
+            messages.append(StrayBytes(self._offset - self._junk_count, self._junk_count, bytes(self._junk)))
         self._junk.clear()
         self._junk_count = 0
 

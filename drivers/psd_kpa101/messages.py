@@ -124,7 +124,7 @@ class Other:
 
 
 @dataclass(frozen=True)
-class Junk:
+class StrayBytes:
     """Bytes that begin no message: where in the stream, how many, and the first 32 of them."""
 
     offset: int
@@ -133,4 +133,4 @@ class Junk:
 
 
 Request = RequestInfo | RequestReadings | RequestMode | SetMode | StopUpdates
-Message = Info | Readings | ModeIs | Status | Fault | Other | Junk
+Message = Info | Readings | ModeIs | Status | Fault | Other | StrayBytes

@@ -2,6 +2,10 @@
 
 A unit has no clock: `device_s` is the middle between question and last answer by the host's clock. The two faces are
 read `round_trip_s` apart at most. One thread uses it at a time, except `close`. It starts no thread of its own.
+
+`Wiring` is how counts read as volts, and volts as the currents of a face. Neither the sign of x nor the scale of the
+sum is certain from documents (clients differ, docs/protocols/kpa101.md): both are stated in the rig and measured by
+`selfcheck`.
 """
 
 import math
@@ -12,14 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.clock import Clock, SystemClock
-from drivers.device import Block, Channel
+from drivers.clock import Clock
+from drivers.device import Block, Channel, StreamDevice
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale, WireError
-from drivers.psd_daq.messages import FaceIdentity, Identity
+from drivers.psd_daq.messages import FaceIdentity, Flag, Identity
 from drivers.psd_faces import FaceKind
 from drivers.psd_kpa101.messages import FULL_COUNT, FULL_SCALE_V, FULL_SUM_COUNT, Info, Readings
 from drivers.psd_kpa101.unit import Kpa101Unit
-from drivers.psd_kpa101.wiring import HEADS, Wiring, currents, flags
 from drivers.transports.transport import Transport
 
 BAUD = 115_200
@@ -28,6 +31,51 @@ REPLY_S = 0.1  # as long as 48 readings take: a reply that late is given up
 BATCH_S = 0.02  # rows gathered in one block; more only delays a reader
 DIFFERENCES, SUMS = "difference_counts", "sum_counts"
 OpenLine = Callable[[], Transport]
+Floats = NDArray[np.float64]
+HEADS = (FaceKind.PIN_CUSHION, FaceKind.QUADRANT)  # PDP90A; PDQ80A, PDQ30C
+DARK_V = 0.02  # 0.2 % of full scale, as for the DAQ box: 66 counts of the differences
+SATURATED = (Flag.PSD1_SATURATED, Flag.PSD2_SATURATED)
+NO_LIGHT = (Flag.PSD1_NO_LIGHT, Flag.PSD2_NO_LIGHT)
+
+
+@dataclass(frozen=True)
+class Wiring:
+    """One unit and its head. ValueError for a sign that is none, or scales not above 0."""
+
+    x_sign: int = -1
+    y_sign: int = 1
+    sum_full_scale_v: float = 10.0  # at 65535 counts
+    transimpedance_v_a: float = 1e5  # of the head; 100 kV/A in a PDP90A; places no spot
+
+    def __post_init__(self) -> None:
+        if self.x_sign not in (-1, 1) or self.y_sign not in (-1, 1):
+            raise ValueError(f"x_sign {self.x_sign!r}, y_sign {self.y_sign!r}; give 1 or -1")
+        if not (self.sum_full_scale_v > 0.0 and self.transimpedance_v_a > 0.0):
+            raise ValueError(f"sum_full_scale_v and transimpedance_v_a must be above 0, not {self}")
+
+    def volts(self, counts: NDArray[np.int64]) -> Floats:
+        """(sample, 3) counts of x, y, sum to V."""
+        per_count = FULL_SCALE_V / FULL_COUNT
+        return counts.astype(np.float64) * np.array(
+            [self.x_sign * per_count, self.y_sign * per_count, self.sum_full_scale_v / FULL_SUM_COUNT]
+        )
+
+
+def currents(signal_v: Floats, transimpedance_v_a: float) -> Floats:
+    """Corner currents (sample, 4) A, in the order of a pin-cushion or quadrant face, with these differences and sum.
+
+    The unit tells three signals of four currents. Whatever the fourth was, the spot is a function of these three, so
+    currents with the same signals read as the same spot: nothing is lost, nothing added.
+    """
+    x, y, total = np.moveaxis(signal_v / transimpedance_v_a, -1, 0)
+    return 0.25 * np.stack([total - x + y, total + x + y, total + x - y, total - x - y], axis=-1)
+
+
+def flags(place: int, counts: NDArray[np.int64], signal_v: Floats) -> NDArray[np.uint16]:
+    """Flags (sample,) of unit `place`, 0 or 1: a count at its end, and no light."""
+    at_end = (np.abs(counts[:, :2]) >= FULL_COUNT).any(axis=1) | (counts[:, 2] >= FULL_SUM_COUNT)
+    dark = signal_v[:, 2] < DARK_V
+    return (at_end * int(SATURATED[place]) + dark * int(NO_LIGHT[place])).astype(np.uint16)
 
 
 @dataclass(frozen=True)
@@ -46,7 +94,7 @@ class Head:
 
 
 @dataclass(frozen=True)
-class _Row:
+class _PairRow:
     sequence: int
     asked_s: float
     arrived_s: float
@@ -54,7 +102,7 @@ class _Row:
     round_trip_s: tuple[float, float]
 
 
-class Kpa101Pair:
+class Kpa101Pair(StreamDevice[tuple[Kpa101Unit, ...]]):
     """A `drivers.device.Device`. Channels: photocurrent_a (8,), flags, difference_counts (4,), sum_counts (2,),
     round_trip_s (2,).
 
@@ -78,13 +126,12 @@ class Kpa101Pair:
             raise ValueError(
                 f"{name}: rate_hz {rate_hz!r}; two KPA101 at 115200 baud give {MIN_RATE_HZ:g} to {MAX_RATE_HZ:g}"
             )
-        self.name = name
+        super().__init__(name, clock)
         self.identity: Identity | None = None
         self.missed_replies = 0
         self._heads = heads
         self._period_s = 1.0 / rate_hz
         self._batch = max(1, round(BATCH_S * rate_hz))
-        self._clock: Clock = SystemClock() if clock is None else clock
         self._hurry = hurry
         self._units = tuple(
             Kpa101Unit(f"{name} unit {place}", open_line, self._clock) for place, open_line in enumerate(open_lines, 1)
@@ -97,15 +144,13 @@ class Kpa101Pair:
         """Runs of bytes that were no message, on both lines."""
         return sum(unit.junk_count for unit in self._units)
 
-    def connect(self) -> None:
+    def _open(self) -> tuple[Kpa101Unit, ...]:
+        return self._units
+
+    def _set_up(self, line: tuple[Kpa101Unit, ...]) -> None:
         """Both units identified and in monitor mode. DeviceLost, DeviceStale (silent), DeviceRefused (exchanged)."""
-        self.close()
-        try:
-            infos = [unit.connect() for unit in self._units]
-            self._check_serial_numbers(infos)
-        except BaseException:
-            self.close()
-            raise
+        infos = [unit.identify() for unit in line]
+        self._check_serial_numbers(infos)
         self.identity = self._identity(infos)
         self._start_s = self._clock.now_s()
         self._first += self._next + 1 if self._next else 0  # what passed between is not known to be nothing
@@ -125,7 +170,7 @@ class Kpa101Pair:
     def read(self, timeout_s: float) -> Block:
         deadline_s = self._clock.now_s() + timeout_s
         junk_before = self.bad_frame_count
-        rows: list[_Row] = []
+        rows: list[_PairRow] = []
         while len(rows) < self._batch and (now_s := self._clock.now_s()) < deadline_s:
             due_s = self._start_s + self._next * self._period_s
             if now_s < due_s:
@@ -137,13 +182,13 @@ class Kpa101Pair:
             raise self._no_samples(timeout_s, junk_before)
         return self._block(rows)
 
-    def close(self) -> None:
-        for unit in self._units:
+    def _release(self, line: tuple[Kpa101Unit, ...]) -> None:
+        for unit in line:
             unit.close()
 
     # --- sampling
 
-    def _sample(self, now_s: float, deadline_s: float) -> _Row | None:
+    def _sample(self, now_s: float, deadline_s: float) -> _PairRow | None:
         """Both units asked at once; None when one did not answer."""
         number = max(self._next, math.floor((now_s - self._start_s) / self._period_s))
         self._next = number + 1
@@ -160,12 +205,12 @@ class Kpa101Pair:
         if len(readings) < len(self._units):
             return self._missed()
         trips_s = (arrived_s[0] - asked_s[0], arrived_s[1] - asked_s[1])
-        return _Row(self._first + number, asked_s[0], arrived_s[-1], (readings[0], readings[1]), trips_s)
+        return _PairRow(self._first + number, asked_s[0], arrived_s[-1], (readings[0], readings[1]), trips_s)
 
     def _missed(self) -> None:
         self.missed_replies += 1
 
-    def _block(self, rows: Sequence[_Row]) -> Block:
+    def _block(self, rows: Sequence[_PairRow]) -> Block:
         counts = np.array([[[r.x, r.y, r.sum] for r in row.readings] for row in rows], dtype=np.int64)
         signal_v = [head.wiring.volts(counts[:, place]) for place, head in enumerate(self._heads)]
         current_a = [

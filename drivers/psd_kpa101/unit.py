@@ -8,12 +8,12 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from drivers.clock import Clock
-from drivers.errors import DeviceLost, DeviceRefused, DeviceStale
+from drivers.device import StreamDevice
+from drivers.errors import DeviceRefused, DeviceStale
 from drivers.psd_kpa101.codec import Kpa101Codec
 from drivers.psd_kpa101.messages import (
     Fault,
     Info,
-    Junk,
     Message,
     Mode,
     ModeIs,
@@ -24,6 +24,7 @@ from drivers.psd_kpa101.messages import (
     RequestReadings,
     SetMode,
     StopUpdates,
+    StrayBytes,
 )
 from drivers.transports.transport import Transport
 
@@ -34,41 +35,40 @@ READ_BYTES = 4096
 Answer = TypeVar("Answer", Info, ModeIs, Readings)
 
 
-class Kpa101Unit:
+class Kpa101Unit(StreamDevice[Transport]):
     """Opened by `connect`. DeviceLost, DeviceStale, DeviceRefused as every instrument raises them."""
 
     def __init__(self, name: str, open_line: Callable[[], Transport], clock: Clock) -> None:
-        self.name = name
+        super().__init__(name, clock)
+        self.info: Info | None = None
         self.junk_count = 0
-        self.last_junk: Junk | None = None
+        self.last_junk: StrayBytes | None = None
         self._open_line = open_line
-        self._clock = clock
-        self._line: Transport | None = None
         self._codec = Kpa101Codec()
         self._in_doubt = False
         self._heard: list[Message] = []
 
-    def connect(self) -> Info:
-        """The unit in monitor mode, quiet unless asked."""
-        self.close()
-        self._line = self._open_line()
+    def identify(self) -> Info:
+        """Connect, and say who is there: in monitor mode, quiet unless asked."""
+        self.connect()
+        assert self.info is not None  # noqa: S101 - asked for by `connect`
+        return self.info
+
+    def _open(self) -> Transport:
+        return self._open_line()
+
+    def _set_up(self, line: Transport) -> None:
         self._codec = Kpa101Codec()
         self.junk_count, self.last_junk, self._in_doubt = 0, None, False
-        try:
-            self._write(StopUpdates())
-            info = self.ask(RequestInfo(), Info)
-            self._write(SetMode(Mode.MONITOR))
-            mode = self.ask(RequestMode(), ModeIs).mode
-        except BaseException:
-            self.close()
-            raise
+        self._write(StopUpdates())
+        info = self.info = self.ask(RequestInfo(), Info)
+        self._write(SetMode(Mode.MONITOR))
+        mode = self.ask(RequestMode(), ModeIs).mode
         if mode != Mode.MONITOR:
-            self.close()
             raise DeviceRefused(
                 f"{self.name}: {info.model} {info.serial_number} stays in mode {mode}, not monitor (1); "
                 "does another program hold it in closed loop?"
             )
-        return info
 
     def ask(self, request: Request, kind: type[Answer]) -> Answer:
         self._write(request)
@@ -98,10 +98,8 @@ class Kpa101Unit:
         self._in_doubt = readings is None
         return readings
 
-    def close(self) -> None:
-        line, self._line = self._line, None
-        if line is not None:
-            line.close()
+    def _release(self, line: Transport) -> None:
+        line.close()
 
     def _write(self, request: Request) -> None:
         self._opened().write(self._codec.encode(request), WRITE_S)
@@ -119,7 +117,7 @@ class Kpa101Unit:
                         f"{message.text or 'no reason given'}"
                     )
             self._heard.clear()
-            left_s = deadline_s - self._clock.now_s()
+            left_s = self._left_s(deadline_s)
             if left_s <= 0.0:
                 return None
             self._listen(left_s)
@@ -129,7 +127,7 @@ class Kpa101Unit:
         data = self._opened().read(READ_BYTES, waits_s)
         messages = self._codec.feed(data) if data else self._codec.settle()
         for message in messages:
-            if isinstance(message, Junk):
+            if isinstance(message, StrayBytes):
                 self.junk_count += 1
                 self.last_junk = message
             else:
@@ -137,9 +135,3 @@ class Kpa101Unit:
 
     def _evidence(self) -> str:
         return f"; it sent {self.last_junk.first.hex(' ')}" if self.last_junk is not None else ""
-
-    def _opened(self) -> Transport:
-        line = self._line
-        if line is None:
-            raise DeviceLost(f"{self.name}: not connected; call connect() first")
-        return line

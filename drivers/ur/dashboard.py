@@ -34,7 +34,7 @@ class ArmState:
 
 
 @dataclass(frozen=True)
-class Identity:
+class ControllerIdentity:
     """Model and serial number, for example ("UR5", "20195000001"): an e-Series arm calls itself by its size only."""
 
     model: str
@@ -55,8 +55,8 @@ class UrDashboard:
         mode, safety, remote = self._converse(["robotmode", "safetystatus", "is in remote control"])
         return ArmState(_after_colon(mode), _after_colon(safety), "false" not in remote.lower())
 
-    def identity(self) -> Identity:
-        return Identity(*self._converse(["get robot model", "get serial number"]))
+    def identity(self) -> ControllerIdentity:
+        return ControllerIdentity(*self._converse(["get robot model", "get serial number"]))
 
     def stop(self) -> None:
         """Ends the running program; the arm brakes."""

@@ -5,6 +5,10 @@
 ur_rtde's own receive object drops samples by design (only the latest counts), so this one has its own codec. No thread
 of its own: whoever reads must read often enough for the socket buffer (0.5 s at least), or the controller drops samples
 and the gap shows in `sequence`.
+
+`VARIABLES` are the RTDE names, and the names and units under which they are recorded. Source: Universal Robots,
+"Real-Time Data Exchange (RTDE) Guide", table of controller outputs (units: rad, rad/s, A, degC, kg; states as
+numbers).
 """
 
 import contextlib
@@ -13,23 +17,23 @@ import math
 import select
 import socket
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
 
-from drivers.clock import Clock, SystemClock
-from drivers.device import Block, Channel
+from drivers.clock import Clock
+from drivers.device import Block, Channel, StreamDevice
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale, WireError
-from drivers.ur.recipe import NOT_FOUND, REQUIRED, TIMESTAMP, VARIABLES
 from drivers.ur.rtde_codec import (
     DTYPES,
     ControllerVersion,
     Data,
-    Junk,
     Message,
     OutputsAnswer,
     ProtocolAnswer,
     RtdeCodec,
+    RtdeJunk,
     StartAnswer,
     TextMessage,
     Unknown,
@@ -51,7 +55,44 @@ Answer = TypeVar("Answer", ProtocolAnswer, ControllerVersion, OutputsAnswer, Sta
 log = logging.getLogger(__name__)
 
 
-class UrReader:
+@dataclass(frozen=True)
+class Variable:
+    """One RTDE variable and its channel."""
+
+    rtde_name: str
+    channel: Channel
+
+
+TIMESTAMP = "timestamp"  # s since the controller's start: the device clock, no channel
+SIX = (6,)
+VARIABLES = (
+    Variable("target_q", Channel("target_q_rad", "rad", SIX)),
+    Variable("actual_q", Channel("actual_q_rad", "rad", SIX)),
+    Variable("actual_qd", Channel("actual_qd_rad_s", "rad/s", SIX)),
+    Variable("actual_current", Channel("actual_current_a", "A", SIX)),
+    Variable("joint_temperatures", Channel("joint_temperature_degC", "degC", SIX)),
+    Variable("robot_mode", Channel("robot_mode", "1")),
+    Variable("safety_mode", Channel("safety_mode", "1")),
+    Variable("safety_status_bits", Channel("safety_status_bits", "1")),
+    Variable("runtime_state", Channel("runtime_state", "1")),
+    Variable("robot_status_bits", Channel("robot_status_bits", "1")),
+    Variable("joint_mode", Channel("joint_mode", "1", SIX)),
+    Variable("speed_scaling", Channel("speed_scaling", "1")),
+    Variable("target_speed_fraction", Channel("speed_slider", "1")),
+    Variable("actual_TCP_pose", Channel("actual_tcp_pose_m_rad", "m, rad", SIX)),
+    Variable("tcp_offset", Channel("tcp_offset_m_rad", "m, rad", SIX)),  # from PolyScope 5.x on
+    Variable("actual_digital_input_bits", Channel("digital_inputs", "1")),
+    Variable("actual_digital_output_bits", Channel("digital_outputs", "1")),
+    Variable("standard_analog_input0", Channel("analog_input0", "1")),  # V or A, as the installation says
+    Variable("standard_analog_input1", Channel("analog_input1", "1")),
+    Variable("payload", Channel("payload_kg", "kg")),  # from PolyScope 3.11 / 5.5.1 on
+    Variable("payload_cog", Channel("payload_cog_m", "m", (3,))),
+)
+REQUIRED = (TIMESTAMP, "actual_q")  # without these there is nothing to record
+NOT_FOUND = "NOT_FOUND"
+
+
+class UrReader(StreamDevice[socket.socket]):
     """A `Device`: joints, currents, temperatures and states at up to 500 Hz."""
 
     def __init__(
@@ -63,12 +104,10 @@ class UrReader:
         name: str = "robot",
         clock: Clock | None = None,
     ) -> None:
-        self.name = name
+        super().__init__(name, clock)
         self.version: ControllerVersion | None = None
         self.missing: tuple[str, ...] = ()  # variables that this controller does not have
         self._host, self._port, self._rate_hz = host, port, rate_hz
-        self._clock: Clock = clock or SystemClock()
-        self._socket: socket.socket | None = None
         self._codec = RtdeCodec()
         self._channels: tuple[tuple[str, Channel], ...] = ()
         self._unread: list[Message] = []
@@ -78,20 +117,6 @@ class UrReader:
     @property
     def place(self) -> str:
         return f"{self.name} at {self._host}:{self._port}"
-
-    def connect(self) -> None:
-        """Opens the line and starts the stream.
-
-        DeviceLost: nobody there. DeviceStale: no answer. DeviceRefused or WireError: not an RTDE server of version 2.
-        """
-        self.close()
-        self._codec, self._unread, self._first_s, self._last_s = RtdeCodec(), [], None, -math.inf
-        self._open()
-        try:
-            self._negotiate()
-        except BaseException:
-            self.close()
-            raise
 
     def describe(self) -> tuple[Channel, ...]:
         """The channels of this controller; known after `connect`."""
@@ -108,35 +133,39 @@ class UrReader:
             packages = [message.packages for message in self._take_messages() if isinstance(message, Data)]
             if packages and len(new := self._new(np.concatenate(packages))):
                 return self._block(new)
-            if not self._receive(deadline_s - self._clock.now_s()):
+            if not self._receive(self._left_s(deadline_s)):
                 raise DeviceStale(
                     f"{self.place}: no sample for {timeout_s:.3g} s while the line is open; "
                     "the controller is hung or its stream is paused: look at the pendant, then connect again"
                 )
 
-    def close(self) -> None:
-        if self._socket is not None:
-            self._socket.close()
-            self._socket = None
-
     # --- the line
 
-    def _open(self) -> None:
+    def _set_up(self, line: socket.socket) -> None:
+        """Start the stream. DeviceStale: no answer. DeviceRefused or WireError: not an RTDE server of version 2."""
+        self._codec, self._unread, self._first_s, self._last_s = RtdeCodec(), [], None, -math.inf
+        self._negotiate()
+
+    def _release(self, line: socket.socket) -> None:
+        line.close()
+
+    def _open(self) -> socket.socket:
         try:
-            self._socket = socket.create_connection((self._host, self._port), CONNECT_TIMEOUT_S)
+            line = socket.create_connection((self._host, self._port), CONNECT_TIMEOUT_S)
         except OSError as error:
             raise DeviceLost(
                 f"{self.place}: cannot connect within {CONNECT_TIMEOUT_S:.3g} s ({error.strerror or error}); "
                 "check that the controller is on, the address in [devices.robot] and the network cable"
             ) from error
-        self._socket.setblocking(False)
-        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        line.setblocking(False)
+        line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         with contextlib.suppress(OSError):  # a system that grants less is good enough
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+            line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+        return line
 
     def _receive(self, timeout_s: float) -> bool:
         """Bytes into messages; False when none came in time. DeviceLost when the line is closed."""
-        line = self._line()
+        line = self._opened()
         # a timeout with fewer bytes than the low-water mark is no silence: read what there is
         waiter = select.poll()
         waiter.register(line, select.POLLIN)
@@ -156,7 +185,7 @@ class UrReader:
         """What has come; text is logged. WireError when it is no RTDE."""
         messages, self._unread = self._unread, []
         for message in messages:
-            if isinstance(message, Junk):
+            if isinstance(message, RtdeJunk):
                 raise WireError(
                     f"{self.place}: no RTDE at byte {message.offset} of the stream: {message.head.hex(' ')}; "
                     "is this the RTDE port of a UR controller (30004)?"
@@ -165,14 +194,9 @@ class UrReader:
                 log.info("%s: %s: %s", self.place, message.source, message.text)
         return messages
 
-    def _line(self) -> socket.socket:
-        if self._socket is None:
-            raise DeviceLost(f"{self.place}: not connected; call connect() first")
-        return self._socket
-
     def _send(self, data: bytes) -> None:
         try:
-            self._line().sendall(data)  # a few dozen bytes into an empty buffer: never partial
+            self._opened().sendall(data)  # a few dozen bytes into an empty buffer: never partial
         except OSError as error:
             raise self._lost(error.strerror or str(error)) from error
 
@@ -204,7 +228,7 @@ class UrReader:
         if not self._await(StartAnswer).accepted:
             raise DeviceRefused(f"{self.place}: the controller refuses to start the stream; restart it")
         size_bytes = 4 + sum(np.dtype(DTYPES[kind]).itemsize for kind in answer.types)
-        self._line().setsockopt(
+        self._opened().setsockopt(
             socket.SOL_SOCKET, socket.SO_RCVLOWAT, max(1, round(WAKE_S * self._rate_hz)) * size_bytes
         )
 
@@ -238,7 +262,7 @@ class UrReader:
                     self._unread = messages[index + 1 :] + self._unread
                     return message
                 self._refuse(message)
-            if not self._receive(deadline_s - self._clock.now_s()):
+            if not self._receive(self._left_s(deadline_s)):
                 raise DeviceStale(
                     f"{self.place}: no {kind.__name__} within {ANSWER_TIMEOUT_S:.3g} s; "
                     "is this the RTDE port of a UR controller (30004)?"

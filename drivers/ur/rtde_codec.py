@@ -123,7 +123,7 @@ class Unknown:
 
 
 @dataclass(frozen=True)
-class Junk:
+class RtdeJunk:
     """Bytes that are no RTDE frame; the stream cannot be found again, everything after them is dropped."""
 
     offset: int  # in the stream
@@ -131,7 +131,15 @@ class Junk:
 
 
 Message = (
-    ProtocolAnswer | ControllerVersion | TextMessage | OutputsAnswer | StartAnswer | PauseAnswer | Data | Unknown | Junk
+    ProtocolAnswer
+    | ControllerVersion
+    | TextMessage
+    | OutputsAnswer
+    | StartAnswer
+    | PauseAnswer
+    | Data
+    | Unknown
+    | RtdeJunk
 )
 
 
@@ -168,7 +176,7 @@ class RtdeCodec:
             size, kind = HEADER.unpack_from(buffer, at)
             if self._impossible(size, kind, buffer, at):
                 self._junk = True
-                messages.append(Junk(self._offset + at, buffer[at : at + HEAD_SHOWN]))
+                messages.append(RtdeJunk(self._offset + at, buffer[at : at + HEAD_SHOWN]))
                 return messages
             if len(buffer) - at < size:
                 break

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig, load_rig
 from tests.support.direct_bench import DirectBench, direct_bench
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"

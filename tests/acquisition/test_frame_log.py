@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from acquisition.frame_log import BLOCK_S, FrameLog
+from acquisition.recording import RecordingError
 from acquisition.recording.can_frames import FrameFlag
-from acquisition.recording.errors import RecordingError
 
 
 class Clock:

@@ -7,7 +7,7 @@ from acquisition.errors import StoppedError
 from acquisition.plan import PlanOptions, PoseKey, blocks
 from acquisition.reins import Reins
 from acquisition.session import Session
-from acquisition.session_states import State
+from acquisition.session_states import RunState
 from calibeam.learner import FittedLearner
 from drivers.errors import DeviceRefused
 from tests.support.direct_bench import DirectBench
@@ -52,9 +52,9 @@ def test_a_motion_broken_off_is_made_again_and_no_pose_is_lost(rig, bench, at) -
     """On the way to the first light, and between poses."""
     kept, states = Kept(), list[str]()
 
-    def changed(state: State) -> None:
+    def changed(state: RunState) -> None:
         states.append(state.name)
-        if state is State.PAUSED:
+        if state is RunState.PAUSED:
             reins.resume()
 
     reins = Reins(bench.stop, changed=changed)
@@ -74,7 +74,7 @@ def test_a_motion_broken_off_is_made_again_and_no_pose_is_lost(rig, bench, at) -
 
 
 def test_after_a_pause_every_joint_still_comes_from_the_side_that_is_told(rig, bench) -> None:
-    reins = Reins(bench.stop, changed=lambda state: reins.resume() if state is State.PAUSED else None)
+    reins = Reins(bench.stop, changed=lambda state: reins.resume() if state is RunState.PAUSED else None)
 
     class Watched(Kept):
         def sample(self, sample) -> None:

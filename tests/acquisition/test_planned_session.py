@@ -9,7 +9,7 @@ import pytest
 from acquisition.errors import AcquisitionError
 from acquisition.plan import PlanOptions
 from acquisition.planned_session import PlannedSession, check_planned
-from acquisition.recording.errors import RigFileError
+from acquisition.recording import RigFileError
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan, read_pose_plan, write_pose_plan
 from acquisition.session import Session
 from calibeam.learner import FittedLearner

@@ -7,7 +7,7 @@ import pytest
 from acquisition.errors import StoppedError
 from acquisition.reined_bench import ReinedBench
 from acquisition.reins import BrokenOffError, EndedEarlyError, Reins
-from acquisition.session_states import PAUSE_AGAIN_S, REST_S, Event, State
+from acquisition.session_states import PAUSE_AGAIN_S, REST_S, RunEvent, RunState
 from drivers.errors import DeviceError, DeviceLost, DeviceRefused
 
 
@@ -51,7 +51,7 @@ def clock() -> Clock:
 
 def running(stop=lambda: None, clock=None, **more) -> Reins:
     reins = Reins(stop, clock, **more)
-    reins.tell(Event.START)
+    reins.tell(RunEvent.START)
     return reins
 
 
@@ -71,7 +71,7 @@ def in_thread(act) -> tuple[threading.Thread, list]:
 
 def test_a_pause_waits_at_the_checkpoint_until_it_is_resumed(clock) -> None:
     paused = threading.Event()
-    reins = running(clock=clock, changed=lambda state: paused.set() if state is State.PAUSED else None)
+    reins = running(clock=clock, changed=lambda state: paused.set() if state is RunState.PAUSED else None)
     assert reins.checkpoint() is False
     reins.pause()
     thread, out = in_thread(reins.checkpoint)
@@ -82,7 +82,9 @@ def test_a_pause_waits_at_the_checkpoint_until_it_is_resumed(clock) -> None:
     assert out == [True]
 
 
-@pytest.mark.parametrize(("after_s", "state"), [(PAUSE_AGAIN_S, State.BREAKING), (PAUSE_AGAIN_S + 0.1, State.PAUSING)])
+@pytest.mark.parametrize(
+    ("after_s", "state"), [(PAUSE_AGAIN_S, RunState.BREAKING), (PAUSE_AGAIN_S + 0.1, RunState.PAUSING)]
+)
 def test_a_second_pause_within_ten_seconds_is_at_once(clock, after_s, state) -> None:
     reins = running(clock=clock)
     reins.interrupt()
@@ -96,13 +98,13 @@ def test_a_pause_after_a_resume_is_a_first_one(clock) -> None:
     reins.pause()
     reins.resume()
     reins.pause()
-    assert reins.state is State.PAUSING
+    assert reins.state is RunState.PAUSING
 
 
 def test_ctrl_c_while_paused_aborts(clock) -> None:
     reins = running(clock=clock)
     reins.pause()
-    reins.tell(Event.CHECKPOINT)
+    reins.tell(RunEvent.CHECKPOINT)
     clock.time_s += PAUSE_AGAIN_S + 0.1
     reins.interrupt()
     with pytest.raises(StoppedError, match="aborted"):
@@ -122,7 +124,7 @@ def test_a_device_that_fails_ends_the_pause() -> None:
     paused = threading.Event()
     reins = running(
         failure=lambda: failed[0] if failed else None,
-        changed=lambda state: paused.set() if state is State.PAUSED else None,
+        changed=lambda state: paused.set() if state is RunState.PAUSED else None,
     )
     reins.pause()
     thread, out = in_thread(reins.checkpoint)
@@ -130,7 +132,7 @@ def test_a_device_that_fails_ends_the_pause() -> None:
     failed.append(DeviceLost("psd: gone"))
     thread.join(10.0)
     assert isinstance(out[0], DeviceLost)
-    assert reins.state is State.ABORTED
+    assert reins.state is RunState.ABORTED
 
 
 def test_a_motion_under_way_is_broken_off_by_the_second_pause_and_is_no_failure_of_the_arm() -> None:
@@ -143,13 +145,13 @@ def test_a_motion_under_way_is_broken_off_by_the_second_pause_and_is_no_failure_
     reins.pause()
     thread.join(10.0)
     assert isinstance(out[0], BrokenOffError)
-    assert reins.state is State.BREAKING
+    assert reins.state is RunState.BREAKING
 
 
 def test_no_motion_begins_while_the_arm_is_being_stopped() -> None:
     arm = Arm()
     reins = running(arm.stop)
-    reins.tell(Event.BREAK)
+    reins.tell(RunEvent.BREAK)
     with pytest.raises(BrokenOffError):
         ReinedBench(arm, reins).move(None)
     assert arm.begun == 0
@@ -162,7 +164,7 @@ def test_a_stop_that_fell_before_the_motion_is_said_again() -> None:
 
     class Slips(Arm):
         def move(self, q_rad: object) -> None:
-            reins.tell(Event.BREAK)
+            reins.tell(RunEvent.BREAK)
             arm.stopped.clear()  # nothing moved yet, so this stop ended nothing
             arm.move(q_rad)
 
@@ -178,7 +180,7 @@ def test_a_motion_that_arrived_as_it_was_broken_off_counts_as_broken_off() -> No
     reins = running()
     thread, out = in_thread(lambda: ReinedBench(arm, reins).move(None))
     assert arm.moving.wait(10.0)
-    reins.tell(Event.BREAK)
+    reins.tell(RunEvent.BREAK)
     arm.arrive.set()
     thread.join(10.0)
     assert isinstance(out[0], BrokenOffError)
@@ -212,14 +214,14 @@ def test_a_stop_that_cannot_be_delivered_is_told_once_and_so_is_the_one_that_is(
             raise ways.pop()
 
     reins = running(stop, undelivered=told.append)
-    reins.tell(Event.BREAK)
+    reins.tell(RunEvent.BREAK)
     for _ in range(3):
         reins.insist()
     assert [str(trouble) for trouble in told] == ["robot: gone", "None"]
 
 
 @pytest.mark.parametrize(
-    ("say", "how"), [(Reins.abort, "hold"), (Reins.halt, "hold"), (lambda reins: reins.tell(Event.BREAK), "stop")]
+    ("say", "how"), [(Reins.abort, "hold"), (Reins.halt, "hold"), (lambda reins: reins.tell(RunEvent.BREAK), "stop")]
 )
 def test_only_a_pause_lets_the_arm_move_again(say, how) -> None:
     done: list[str] = []
@@ -232,7 +234,7 @@ def test_only_a_pause_lets_the_arm_move_again(say, how) -> None:
 def test_a_stop_said_while_the_arm_is_being_stopped_does_not_take_that_back() -> None:
     stops: list[int] = []
     reins = running(lambda: stops.append(1))
-    reins.tell(Event.BREAK)
+    reins.tell(RunEvent.BREAK)
     reins.stop()
     reins.insist()
     assert len(stops) == 2
@@ -272,7 +274,7 @@ def test_a_pause_while_the_session_ends_rests_the_arm_as_any_other(clock) -> Non
     reins = running(clock=clock, rests_in_s=lambda: 8.0, ease_arm=eased.set)
     reins.stop()
     reins.interrupt()
-    assert reins.state is State.PAUSING
+    assert reins.state is RunState.PAUSING
     assert eased.wait(10.0)
     with pytest.raises(BrokenOffError):
         reins.check(begins=True)
@@ -315,8 +317,8 @@ def test_a_motion_braked_by_a_pause_is_broken_off_also_after_a_resume(clock) -> 
 @pytest.mark.parametrize(
     ("moves", "states"),
     [
-        (True, [State.PAUSING, State.BREAKING, State.ABORTING, State.ABORTING]),
-        (False, [State.PAUSED, State.PAUSED, State.ABORTED, State.ABORTED]),
+        (True, [RunState.PAUSING, RunState.BREAKING, RunState.ABORTING, RunState.ABORTING]),
+        (False, [RunState.PAUSED, RunState.PAUSED, RunState.ABORTED, RunState.ABORTED]),
     ],
 )
 def test_ctrl_c_again_and_again(clock, moves, states) -> None:
@@ -325,5 +327,5 @@ def test_ctrl_c_again_and_again(clock, moves, states) -> None:
     for state in states:
         reins.interrupt()
         if not moves:
-            reins.tell(Event.CHECKPOINT)
+            reins.tell(RunEvent.CHECKPOINT)
         assert reins.state is state

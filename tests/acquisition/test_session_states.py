@@ -3,9 +3,9 @@
 import pytest
 
 from acquisition.reins import BrokenOffError, Reins
-from acquisition.session_states import BROKEN, OVER, Event, State, after
+from acquisition.session_states import BROKEN, OVER, RunEvent, RunState, after
 
-IDLE, RUNNING, PAUSING, BREAKING, PAUSED, ENDING, ABORTING, DONE, ABORTED, HALTED = State
+IDLE, RUNNING, PAUSING, BREAKING, PAUSED, ENDING, ABORTING, DONE, ABORTED, HALTED = RunState
 # START PAUSE BREAK RESUME STOP ABORT HALT CHECKPOINT FINISHED FAULT
 TABLE = {
     IDLE: (RUNNING, IDLE, IDLE, IDLE, IDLE, IDLE, HALTED, IDLE, IDLE, IDLE),
@@ -21,25 +21,25 @@ TABLE = {
 }
 WAYS = {  # from IDLE to each state, by events alone
     IDLE: (),
-    RUNNING: (Event.START,),
-    PAUSING: (Event.START, Event.PAUSE),
-    BREAKING: (Event.START, Event.BREAK),
-    PAUSED: (Event.START, Event.PAUSE, Event.CHECKPOINT),
-    ENDING: (Event.START, Event.STOP),
-    ABORTING: (Event.START, Event.ABORT),
-    DONE: (Event.START, Event.FINISHED),
-    ABORTED: (Event.START, Event.FAULT),
-    HALTED: (Event.HALT,),
+    RUNNING: (RunEvent.START,),
+    PAUSING: (RunEvent.START, RunEvent.PAUSE),
+    BREAKING: (RunEvent.START, RunEvent.BREAK),
+    PAUSED: (RunEvent.START, RunEvent.PAUSE, RunEvent.CHECKPOINT),
+    ENDING: (RunEvent.START, RunEvent.STOP),
+    ABORTING: (RunEvent.START, RunEvent.ABORT),
+    DONE: (RunEvent.START, RunEvent.FINISHED),
+    ABORTED: (RunEvent.START, RunEvent.FAULT),
+    HALTED: (RunEvent.HALT,),
 }
 PAIRS = [
     pytest.param(state, event, TABLE[state][k], id=f"{state.name}-{event.name}")
-    for state in State
-    for k, event in enumerate(Event)
+    for state in RunState
+    for k, event in enumerate(RunEvent)
 ]
 
 
 @pytest.mark.parametrize(("state", "event", "then"), PAIRS)
-def test_every_pair(state: State, event: Event, then: State) -> None:
+def test_every_pair(state: RunState, event: RunEvent, then: RunState) -> None:
     assert after(state, event) is then
     stops: list[int] = []
     reins = Reins(lambda: stops.append(1))
@@ -50,16 +50,16 @@ def test_every_pair(state: State, event: Event, then: State) -> None:
     reins.tell(event)
     assert reins.state is then
     # A halt always stops the arm; else it is stopped on the way into a state in which nothing may move.
-    assert bool(stops) is (event is Event.HALT or (then in BROKEN and then is not state))
+    assert bool(stops) is (event is RunEvent.HALT or (then in BROKEN and then is not state))
 
 
 def test_what_is_over_lets_no_motion_go_on_by_itself() -> None:
     for state in OVER:
-        assert all(after(state, event) in OVER for event in Event if event is not Event.START)
+        assert all(after(state, event) in OVER for event in RunEvent if event is not RunEvent.START)
 
 
-@pytest.mark.parametrize("state", State)
-def test_however_often_ctrl_c_comes_no_motion_begins_by_it_and_three_end_a_session(state: State) -> None:
+@pytest.mark.parametrize("state", RunState)
+def test_however_often_ctrl_c_comes_no_motion_begins_by_it_and_three_end_a_session(state: RunState) -> None:
     reins = Reins(lambda: None)
     for before in WAYS[state]:
         reins.tell(before)
@@ -73,13 +73,13 @@ def test_however_often_ctrl_c_comes_no_motion_begins_by_it_and_three_end_a_sessi
 
 @pytest.mark.parametrize("state", [IDLE, DONE])
 @pytest.mark.parametrize("times", [1, 2, 3])
-def test_ctrl_c_before_measuring_begins_holds_it_before_its_first_motion(state: State, times: int) -> None:
+def test_ctrl_c_before_measuring_begins_holds_it_before_its_first_motion(state: RunState, times: int) -> None:
     reins = Reins(lambda: None)
     for before in WAYS[state]:
         reins.tell(before)
     for _ in range(times):
         reins.interrupt()
-    reins.tell(Event.START)
+    reins.tell(RunEvent.START)
     assert reins.state is (PAUSING if times < 3 else ABORTING)
     with pytest.raises(BrokenOffError):
         reins.check(begins=True)
@@ -89,5 +89,5 @@ def test_a_pause_that_was_taken_back_before_measuring_begins_holds_nothing() -> 
     reins = Reins(lambda: None)
     reins.pause()
     reins.resume()
-    reins.tell(Event.START)
+    reins.tell(RunEvent.START)
     assert reins.state is RUNNING

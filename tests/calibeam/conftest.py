@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig, load_rig
 from calibeam.emulation import Emulation
 
 from .typist import Typist

@@ -10,10 +10,8 @@ import pytest
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.errors import RigFileError
-from acquisition.recording.read import read
+from acquisition.recording import RecordingWriter, RigFileError, read
 from acquisition.recording.rig import load_rig, rig_text
-from acquisition.recording.writer import RecordingWriter
 from calibeam.cli import run
 from calibeam.devices.camera import camera_sight
 from calibeam.devices.recorder import record_session

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from acquisition.recording.read import read
+from acquisition.recording import read
 from calibeam.cli import run
 from calibeam.devices.recorder import new_recording
 from calibeam.emulation import Emulation

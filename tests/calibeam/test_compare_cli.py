@@ -8,10 +8,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from acquisition.recording.read import read
-from acquisition.recording.samples_csv import write_csv
-from acquisition.recording.stream import Channel
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording import Channel, RecordingWriter, read
+from acquisition.recording.session_folder import write_csv
 from benchmarks.stream_cases import servo_scene
 from calibeam.cli import run
 from simulators.conceal.case import conceal

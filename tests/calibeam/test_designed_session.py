@@ -6,11 +6,9 @@ import numpy as np
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
+from acquisition.recording import RecordingWriter, Samples, read
 from acquisition.recording.pose_plan import PosePlan, read_pose_plan, write_pose_plan
-from acquisition.recording.read import read
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from acquisition.recording.samples import Samples
-from acquisition.recording.writer import RecordingWriter
 from calibeam.devices.recorder import record_session
 from calibeam.motion.reachable_poses import candidates_of
 from calibeam.printing.progress import progress_bar

@@ -6,9 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition.recording.read import read
-from acquisition.recording.stream import Channel
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording import Channel, RecordingWriter, read
 from benchmarks.stream_cases import servo_scene
 from benchmarks.stream_devices import devices_of_scene
 from calibeam.cli import run

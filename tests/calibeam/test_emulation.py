@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.recording.rig_devices import RobotDevice, RobotDriver
+from acquisition.recording.rig.devices import RobotDevice, RobotDriver
 from calibeam.emulation import moves_nothing_real
 
 

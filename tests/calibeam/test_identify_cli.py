@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.read import read
+from acquisition.recording import read
 from calibeam.cli import run
 from calibrate.fit import solve
 from calibrate.model_file import read_model

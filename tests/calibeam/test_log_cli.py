@@ -15,13 +15,11 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from acquisition.recording import mcap_file
+from acquisition.recording import Recording, read
 from acquisition.recording.can_frames import FrameFlag, frames_of
-from acquisition.recording.disk_file import DiskFile
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
+from acquisition.recording.mcap import Rotation, mcap_file, segments
+from acquisition.recording.mcap.mcap_file import DiskFile
 from acquisition.recording.rig import parse_rig
-from acquisition.recording.segments import Rotation, segments
 from calibeam.cli import run
 from calibeam.devices import encoder_log
 from calibeam.devices.encoder_log import EncoderLog, LogState

@@ -11,12 +11,11 @@ import can
 import numpy as np
 import pytest
 
-from acquisition.recording import disk_file, mcap_file
-from acquisition.recording.mcap_file import McapFile
-from acquisition.recording.messages import EVENT, packed
-from acquisition.recording.read import read
+from acquisition.recording import read
+from acquisition.recording.mcap import Rotation, mcap_file, segments
+from acquisition.recording.mcap.layout import EVENT, packed
+from acquisition.recording.mcap.mcap_file import McapFile
 from acquisition.recording.rig import parse_rig
-from acquisition.recording.segments import Rotation, segments
 from calibeam.devices import encoder_log
 from calibeam.devices.encoder_log import LOOK_S, EncoderLog, LogState
 from drivers.device import Block, Channel
@@ -83,7 +82,7 @@ def grown(
     """By how much `size` grows between two segments of one log."""
     clock, sizes = LockStep(), dict[int, float]()
     monkeypatch.setattr(encoder_log, "encoder_driver", lambda device, clock, tap: Encoders(clock, tap))
-    monkeypatch.setattr(disk_file.os, "fsync", lambda descriptor: None)  # the disk's time, and no memory
+    monkeypatch.setattr(mcap_file.os, "fsync", lambda descriptor: None)  # the disk's time, and no memory
     rotation = Rotation(age_s=2.5 * LOOK_S)  # three blocks each
     device = parse_rig(RIG.read_text(), "rig").devices.encoders
     assert device is not None

@@ -8,9 +8,8 @@ import pytest
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.read import read
+from acquisition.recording import RecordingWriter, read
 from acquisition.recording.rig import load_rig, rig_text
-from acquisition.recording.writer import RecordingWriter
 from calibeam.devices.recorder import record_session
 from calibeam.devices.site import addresses_of, check_session, connected
 from calibeam.emulation import Emulation

@@ -7,9 +7,8 @@ import msgspec
 import numpy as np
 import pytest
 
+from acquisition.recording import Channel, RecordingWriter
 from acquisition.recording.rig import rig_text
-from acquisition.recording.stream import Channel
-from acquisition.recording.writer import RecordingWriter
 from calibeam.cli import run
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"

@@ -10,8 +10,8 @@ import pytest
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
+from acquisition.recording import RecordingWriter
 from acquisition.recording.rig import load_rig, rig_text
-from acquisition.recording.writer import RecordingWriter
 from acquisition.sample import Sample
 from acquisition.session import Session
 from calibeam.devices.recorder import RecordingJournal, record_session

@@ -9,10 +9,8 @@ import pytest
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.read import read
+from acquisition.recording import RecordingWriter, Samples, read
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from acquisition.recording.samples import Samples
-from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.learner import FittedLearner

@@ -7,8 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from acquisition.recording.fingerprint import readings_sha256
-from acquisition.recording.read import read
+from acquisition.recording import read, readings_sha256
 from acquisition.recording.rig import load_rig, rig_sha256, rig_text
 from calibeam.cli import run
 from calibeam.guided.recorded import BelievedGuidedArm

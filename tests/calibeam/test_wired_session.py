@@ -13,11 +13,8 @@ import pytest
 from rich.console import Console
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
-from acquisition.recording.rig import rig_text
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording import Recording, RecordingWriter, read
+from acquisition.recording.rig import Rig, rig_text
 from acquisition.session import Summary
 from calibeam.devices.recorder import record_session
 from calibeam.devices.site import addresses_of, connected

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
 
 RIG = tomllib.loads((Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml").read_text())
 UR5E = np.array([[j["d_m"], j["a_m"], j["alpha_rad"]] for j in RIG["arm"]["joint"]])  # all theta offsets are zero

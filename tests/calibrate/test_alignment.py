@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.folder import read_folder
+from acquisition.recording.session_folder import read_folder
 from calibrate.alignment import align, align_with_tool, pivot, trilaterate
 from calibrate.errors import DataError
 from calibrate.instruments import instruments_of

@@ -4,8 +4,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import ArmModel
+from acquisition.recording.rig import ArmModel, load_rig
 from calibrate.arms.convert import convert
 from calibrate.believed import BelievedRig
 from calibrate.believed_fixture import Light

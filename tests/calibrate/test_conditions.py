@@ -6,8 +6,8 @@ import msgspec
 import numpy as np
 import pytest
 
+from acquisition.recording import Samples
 from acquisition.recording.rig import load_rig
-from acquisition.recording.samples import Samples
 from calibrate.arms.belief import FREE
 from calibrate.arms.catalogue import arm_of
 from calibrate.fit import Status

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from acquisition.recording.rig_schema import ArmModel
+from acquisition.recording.rig import ArmModel
 from calibrate.errors import DataError
 from calibrate.fit import DogLegRules, Loss, Method
 from calibrate.fit_plan import DEFAULT, BesideName, parse_plan, read_plan

@@ -9,9 +9,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import Bar, KnownDistance, Pose
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Bar, Pose, load_rig
+from acquisition.recording.rig.schema import KnownDistance
 from calibrate.arms.catalogue import arm_of
 from calibrate.errors import DataError
 from calibrate.fit import Status, solve

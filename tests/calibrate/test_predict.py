@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from acquisition.recording import Samples
 from acquisition.recording.rig import load_rig, rig_sha256, rig_text
-from acquisition.recording.samples import Samples
 from calibrate.errors import DataError
 from calibrate.identification.identify import identify
 from calibrate.identification.record import record_of

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
 from calibrate.errors import DataError
 from calibrate.read_samples import SIGMA_COLUMNS, observations
 

@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import chi2
 
+from acquisition.recording import Samples
 from acquisition.recording.rig import load_rig
-from acquisition.recording.samples import Samples
 from calibrate.diagnose.fitted import fit_geometry
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.session import session_of

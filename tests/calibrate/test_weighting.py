@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.testing import assert_allclose
 
-from acquisition.recording.rig_schema import Arm, ArmModel, Joint, Rig, Tolerance
+from acquisition.recording.rig import Arm, ArmModel, Joint, Rig, Tolerance
 from calibrate import weighting as weighting_module
 from calibrate.arms.catalogue import arm_of
 from calibrate.identifiability import analyse

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.read import read
+from acquisition.recording import read
 from calibeam.cli import run
 from calibeam.results.diagnosis import diagnose_to_file
 from calibrate.diagnose import to_file

@@ -21,7 +21,7 @@ from drivers.cia406.codec import emergency, heartbeat_state, mapped_number, mapp
 from drivers.psd_daq.codec import PsdDaqCodec, frame
 from drivers.psd_daq.messages import BadFrame, MessageType
 from drivers.psd_kpa101.codec import Kpa101Codec
-from drivers.psd_kpa101.messages import Junk
+from drivers.psd_kpa101.messages import StrayBytes
 from drivers.transports.slcan_bus import BlockSlcanBus
 from simulators.kpa101 import frames as kpa101
 
@@ -76,7 +76,7 @@ LINES = {
     "kpa101": Line(
         Kpa101Codec,
         (READING, kpa101.info(69250001, "KPA101", (1, 0, 7)), kpa101.refusal(0x0870, 3, "no"), kpa101.part(7, b"\1\0")),
-        (Junk,),
+        (StrayBytes,),
     ),
     "slcan": Line(
         SlcanLine, (b"t281400000400\r", b"T1ABCDEF0811223344AABBCCDD\r", b"t70115F\r"), (ValueError, IndexError)

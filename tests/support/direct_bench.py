@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from acquisition.bench import Look
 from acquisition.camera.eye import Grey
 from acquisition.psd_view import NO_LIGHT, PsdView, PsdWindow
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from acquisition.settling import SettleRule, stretch_to_average
 from drivers.psd_faces import Face, FaceKind
 from simulators.camera.emulator import Eye

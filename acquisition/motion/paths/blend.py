@@ -31,7 +31,7 @@ PROBE_S = 5e-3  # between the samples that slopes are read off: error of fourth 
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class BlendState:
     """Position, speed and acceleration (n,) at one moment, in whatever coordinates the blend is made in."""
 
     position: Floats
@@ -53,7 +53,7 @@ class Blend:
         return np.power(h, np.arange(6)) @ self.coefficients
 
 
-def blend(begin_s: float, begin: State, end_s: float, end: State) -> Blend:
+def blend(begin_s: float, begin: BlendState, end_s: float, end: BlendState) -> Blend:
     """The blend that meets both states."""
     span = end_s - begin_s
     rows = [begin.position, begin.speed * span, begin.acceleration * span**2]
@@ -61,9 +61,9 @@ def blend(begin_s: float, begin: State, end_s: float, end: State) -> Blend:
     return Blend(begin_s, end_s, _HERMITE @ np.stack(rows))
 
 
-def state_of(curve: Callable[[float], Floats], t_s: float) -> State:
+def state_of(curve: Callable[[float], Floats], t_s: float) -> BlendState:
     """Position, speed and acceleration of a smooth curve, by differences of fourth order."""
     a, b, c, d, e = (curve(t_s + k * PROBE_S) for k in (-2, -1, 0, 1, 2))
     speed = (a - 8.0 * b + 8.0 * d - e) / (12.0 * PROBE_S)
     acceleration = (-a + 16.0 * b - 30.0 * c + 16.0 * d - e) / (12.0 * PROBE_S**2)
-    return State(c, speed, acceleration)
+    return BlendState(c, speed, acceleration)

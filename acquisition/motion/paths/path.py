@@ -28,14 +28,14 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Belt:
+class BeltState:
     """How far the belt has gone, and how fast it is now."""
 
     s_m: float = 0.0
     rate_m_s: float = 0.0
 
 
-STANDING = Belt()
+STANDING = BeltState()
 WAY_POINTS = 5  # from the beginning of a transition to its corner; tacc is tenths of a second
 
 
@@ -90,12 +90,12 @@ class Path:
     def blending(self, t_s: float) -> bool:
         return self._blend is not None and t_s < self._blend.end_s
 
-    def at(self, t_s: float, belt: Belt = STANDING) -> Floats:
+    def at(self, t_s: float, belt: BeltState = STANDING) -> Floats:
         """Joint readings (joint,) at time t, not before an earlier one. RefusedMotionError names the segment."""
         try:
             while self._begun < len(self._segments) and t_s >= self._corner_s - self._tacc_s:
                 late_s = t_s - (self._corner_s - self._tacc_s)
-                self._begin(Belt(belt.s_m - belt.rate_m_s * late_s, belt.rate_m_s))
+                self._begin(BeltState(belt.s_m - belt.rate_m_s * late_s, belt.rate_m_s))
             if self.blending(t_s) and self._blend is not None:
                 point = self._leg.unflat(self._blend.at(t_s))
             else:
@@ -105,7 +105,7 @@ class Path:
             raise RefusedMotionError(f"{self.segment}: {error}") from error
         return self._q_rad
 
-    def _begin(self, belt: Belt) -> None:
+    def _begin(self, belt: BeltState) -> None:
         """The next leg, and the blend into it; the belt as it is when the blend begins."""
         segment, before, before_corner_s = self._segments[self._begun], self._leg, self._leg_corner_s
         self._begun += 1
@@ -115,7 +115,7 @@ class Path:
         for ahead_s in np.linspace(0.0, self._tacc_s, WAY_POINTS + 1)[1:]:  # in steps, so that the branch is kept
             point = before.point(begin_s + ahead_s - before_corner_s)
             corner_rad = before.joints(point, belt.s_m + belt.rate_m_s * ahead_s, corner_rad)
-        at_corner = Belt(belt.s_m + belt.rate_m_s * self._tacc_s, belt.rate_m_s)
+        at_corner = BeltState(belt.s_m + belt.rate_m_s * self._tacc_s, belt.rate_m_s)
         leg = self._leg_to(segment, corner_rad, at_corner)
 
         def as_before(t_s: float) -> Floats:
@@ -134,7 +134,7 @@ class Path:
         if segment.by is By.STAND and self._begun < len(self._segments):
             self.rests.append((end_s, segment.action))
 
-    def _leg_to(self, segment: Segment, from_rad: Floats, belt: Belt) -> Leg:
+    def _leg_to(self, segment: Segment, from_rad: Floats, belt: BeltState) -> Leg:
         """From the corner, where the arm would stand at `from_rad`, with the belt as it is there."""
         place = segment.place
         if segment.by is By.LINE or (segment.by is By.STAND and (place.coord is not None or self._on_line)):
@@ -156,7 +156,7 @@ class Path:
             return self._solver.nearest(T_base_flange, from_rad)
         return self._near(T_base_flange, expected)
 
-    def _chasing(self, segment: Segment, place: Place, from_rad: Floats, end_rad: Floats, belt: Belt) -> JointLeg:
+    def _chasing(self, segment: Segment, place: Place, from_rad: Floats, end_rad: Floats, belt: BeltState) -> JointLeg:
         """To a place on a belt that runs: the end is solved for the start of the leg and for its end."""
         end2_rad, duration_s = end_rad, self._joint_time_s(segment, end_rad - from_rad)
         for _ in range(3):  # the end moves on while the arm comes: settles by the ratio of their speeds
@@ -173,7 +173,7 @@ class Path:
             return self._solver.kept(T_base_flange, near_rad)
         return self._solver.nearest(T_base_flange, near_rad)
 
-    def _line(self, segment: Segment, from_rad: Floats, belt: Belt) -> LineLeg:
+    def _line(self, segment: Segment, from_rad: Floats, belt: BeltState) -> LineLeg:
         place = segment.place
         leg = LineLeg(self._solver, place, np.eye(4), drive_between(np.eye(4), np.eye(4)), 1.0)
         start = leg.from_joints(from_rad, belt.s_m)  # 2POS1

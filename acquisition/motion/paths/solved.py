@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.motion.paths.path import STANDING, Belt, Path
+from acquisition.motion.paths.path import STANDING, BeltState, Path
 
 Floats = NDArray[np.float64]
 
@@ -20,7 +20,7 @@ class SolvedPath:
         self._q_rad = np.array(solved)
         self.ends_s, self.rests = path.ends_s, path.rests
 
-    def at(self, t_s: float, belt: Belt = STANDING) -> Floats:
+    def at(self, t_s: float, belt: BeltState = STANDING) -> Floats:
         """Joint readings (joint,) at time t; at the end it stays."""
         place = min(t_s / self._period_s, len(self._q_rad) - 1.0)
         before = min(int(place + 1e-9), len(self._q_rad) - 2)

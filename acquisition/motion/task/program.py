@@ -12,7 +12,7 @@ from typing import Literal
 from msgspec import Struct
 
 from acquisition.motion.errors import TaskError
-from acquisition.recording.bounds import Few, Name, Seconds, Whole
+from acquisition.recording.files.bounds import Few, Name, Seconds, Whole
 
 
 class Move(Struct, frozen=True, forbid_unknown_fields=True, tag="move", tag_field="do"):

@@ -22,8 +22,8 @@ from acquisition.motion.task.equation import Equation, parse_equation
 from acquisition.motion.task.graph import TaskGraph
 from acquisition.motion.task.program import Step, filled, loops
 from acquisition.motion.task.transforms import Belt, Constant, Source, Unread, Untaught
-from acquisition.recording.bounds import ZERO, Direction, Few, Line, Name, Rotation, Vector
-from acquisition.recording.toml_file import parse_toml, read_text
+from acquisition.recording.files import parse_toml, read_text
+from acquisition.recording.files.bounds import ZERO, Direction, Few, Line, Name, Rotation, Vector
 
 
 class TransformEntry(Struct, frozen=True, forbid_unknown_fields=True):

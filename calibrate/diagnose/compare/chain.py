@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.columns import ORIENTATION, POSITION, SPOTS, per_joint
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import ORIENTATION, POSITION, SPOTS, per_joint
 from calibrate.alignment import align
 from calibrate.arms.catalogue import arm_of
 from calibrate.diagnose.compare.seated import LENGTH, bar_differences, is_seated, tip_differences

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import BAR, BAR_END, SEAT, per_joint
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.samples import BAR, BAR_END, SEAT, per_joint
 from calibrate.diagnose.compare.seated import NONE, lengths_of
 from calibrate.errors import DataError
 

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.columns import ORIENTATION, POSITION, per_joint
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import ORIENTATION, POSITION, per_joint
 from calibrate.diagnose.compare.chain import Difference, Pair, columns_of
 from calibrate.diagnose.compare.seated import is_seated
 from calibrate.diagnose.fitted import Fitted, fit_geometry

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from acquisition.recording.columns import SPOTS
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import SPOTS
 from calibrate.diagnose.compare.chain import READINGS, Difference, Pair, columns_of
 from calibrate.diagnose.compare.own_noise import chance_of_structure, scatter_of
 from calibrate.sensors import bar

@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.columns import BAR, BAR_END, SEAT
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.samples import BAR, BAR_END, SEAT
 from calibrate.predict import Predictor
 
 Floats = NDArray[np.float64]

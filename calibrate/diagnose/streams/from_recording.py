@@ -1,6 +1,6 @@
 """The streams of a recording beside its diagnosis: what is wrong with them, by the model that was fitted."""
 
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording
 from calibrate.diagnose.fitted import Fitted
 from calibrate.diagnose.streams.between_encoders import causes_of
 from calibrate.diagnose.streams.examine import StreamReport, examine

@@ -8,8 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.recording import Recording
-from acquisition.recording.stream import Stream
+from acquisition.recording import Recording, Stream
 from calibrate.diagnose.streams.coarse_clock import Ticks, straight_line
 from calibrate.diagnose.streams.track import Track
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording
 from calibrate.diagnose.streams.recorded import Device
 from calibrate.diagnose.streams.settling import Window
 

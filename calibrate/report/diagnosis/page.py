@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from acquisition.recording.recording import Recording
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording import Recording
+from acquisition.recording.rig import Rig
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.errors import DataError
 from calibrate.report.diagnosis import limits, overview

@@ -1,7 +1,6 @@
 """What the rig file draws of the parameters of an arm, so that corrections about different drawings can be compared."""
 
-from acquisition.recording.rig import parse_rig
-from acquisition.recording.rig_schema import ArmModel, Joint, Rig
+from acquisition.recording.rig import ArmModel, Joint, Rig, parse_rig
 from calibrate.converted_rig import rig_in_model
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from acquisition.recording.recording import Recording
-from acquisition.recording.rig_schema import ArmModel, Rig
+from acquisition.recording import Recording
+from acquisition.recording.rig import ArmModel, Rig
 from calibrate.converted_rig import rig_in_model
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.errors import DataError

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.model_file import Covariance, ModelFile, ModelParameter
 from calibrate.report.drift.drawing import drawn_values, redrawn
 

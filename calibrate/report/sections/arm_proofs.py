@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.model_file import ModelFile
 from calibrate.report.elements import Html, section, table, tag
 from calibrate.report.free_space_table import free_space

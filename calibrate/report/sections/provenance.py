@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording
 from acquisition.recording.rig import rig_sha256
 from calibrate.report.elements import Html, facts, folded, section, tag
 from calibrate.report.quantities import significant

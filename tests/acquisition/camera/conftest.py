@@ -5,8 +5,7 @@ from typing import Any
 
 import pytest
 
-from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig, load_rig, plain_rig, rig_text
 
 RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd-camera.toml"
 

@@ -8,7 +8,7 @@ import pytest
 
 from acquisition.camera import measuring
 from acquisition.camera.board import Board
-from acquisition.camera.calibration import Status, calibrate_camera
+from acquisition.camera.calibration import CameraStatus, calibrate_camera
 from acquisition.camera.model import CameraFit, drawn, read_model, write_model
 from acquisition.errors import AcquisitionError
 from acquisition.motion.rigid import apart, transform
@@ -34,7 +34,7 @@ def toured(rig, exact):
 
 def test_lens_and_mount_are_found(toured) -> None:
     _, found, truth = toured
-    assert found.status is Status.CALIBRATED
+    assert found.status is CameraStatus.CALIBRATED
     assert found.model.matrix_px[0, 0] == pytest.approx(truth.focal_px, rel=0.01)
     assert found.model.matrix_px[:2, 2] == pytest.approx(truth.centre_px, abs=5.0)
     off_m, off_rad = apart(found.model.T_flange_camera, truth.T_flange_camera)
@@ -45,7 +45,7 @@ def test_lens_and_mount_are_found(toured) -> None:
 
 
 def test_few_views_are_refused(rig, toured) -> None:
-    assert calibrate_camera(toured[0][:5], drawn(rig.camera)).status is Status.TOO_FEW_VIEWS
+    assert calibrate_camera(toured[0][:5], drawn(rig.camera)).status is CameraStatus.TOO_FEW_VIEWS
 
 
 def test_a_flange_that_turned_about_one_axis_only_does_not_tell_the_mount(rig, toured) -> None:
@@ -55,7 +55,7 @@ def test_a_flange_that_turned_about_one_axis_only_does_not_tell_the_mount(rig, t
         for k, v in enumerate(toured[0])
     ]
     found = calibrate_camera(turned, drawn(rig.camera))
-    assert found.status is Status.TOO_LITTLE_TURN
+    assert found.status is CameraStatus.TOO_LITTLE_TURN
     assert found.model is None
 
 
@@ -63,7 +63,7 @@ def test_a_board_with_another_gap_is_no_lens(rig, toured) -> None:
     wrong = [
         replace(v, seen=replace(v.seen, points_m=v.seen.points_m + 0.003 * np.sign(v.seen.points_m))) for v in toured[0]
     ]
-    assert calibrate_camera(wrong, drawn(rig.camera)).status is Status.POOR_LENS
+    assert calibrate_camera(wrong, drawn(rig.camera)).status is CameraStatus.POOR_LENS
 
 
 def test_a_board_that_was_moved_on_the_way_is_inconsistent(rig, toured) -> None:
@@ -72,7 +72,7 @@ def test_a_board_that_was_moved_on_the_way_is_inconsistent(rig, toured) -> None:
         for k, v in enumerate(toured[0])
     ]
     found = calibrate_camera(moved, drawn(rig.camera))
-    assert found.status is Status.INCONSISTENT
+    assert found.status is CameraStatus.INCONSISTENT
     assert found.model is None
 
 

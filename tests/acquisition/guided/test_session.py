@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.guided.judge import Doubt
-from acquisition.guided.plan import Visit
+from acquisition.guided.plan import GuidedVisit
 from acquisition.guided.session import GuidedSession
 from acquisition.guided.target import BarEnd, Cone, SphereSpot
 from acquisition.guided.window import Window
@@ -86,7 +86,7 @@ def session(hand, **kinds):
 
 def test_a_still_probe_is_read_and_the_row_says_where_it_was():
     made, journal = session(Hand())
-    summary = made.run([Visit((CONE,)), Visit((A, B)), Visit((CONE,))])
+    summary = made.run([GuidedVisit((CONE,)), GuidedVisit((A, B)), GuidedVisit((CONE,))])
     assert len(summary.readings) == made.taken == 4
     assert [row.get("bar_end") for row in journal.rows] == [None, "a", "b", None]
     assert journal.rows[0]["seat"] == 1
@@ -97,7 +97,7 @@ def test_a_still_probe_is_read_and_the_row_says_where_it_was():
 def test_a_slip_is_not_kept_but_asked_for_again():
     hand = Hand(off_m={2: 5e-4})
     made, journal = session(hand)
-    summary = made.run([Visit((CONE,)), Visit((CONE,))])
+    summary = made.run([GuidedVisit((CONE,)), GuidedVisit((CONE,))])
     assert (len(summary.readings), summary.slips) == (2, 1)
     assert [kind for kind, _ in journal.events] == ["slip"]
     assert hand.requests[2].attempt == 2
@@ -106,21 +106,21 @@ def test_a_slip_is_not_kept_but_asked_for_again():
 def test_both_ends_are_taken_again_when_their_length_cannot_be():
     hand = Hand(off_m={2: 5e-4})
     made, journal = session(hand)
-    made.run([Visit((A, B))])
+    made.run([GuidedVisit((A, B))])
     assert [request.target.end for request in hand.requests] == ["a", "b", "a", "b"]
     assert len(journal.rows) == 2
 
 
 def test_what_stays_in_doubt_is_taken_and_told():
     made, journal = session(Hand(off_m=dict.fromkeys(range(1, 10), 5e-4)))
-    summary = made.run([Visit((CONE,))])
+    summary = made.run([GuidedVisit((CONE,))])
     assert (len(summary.readings), summary.slips, summary.doubted) == (1, 3, 1)
     assert journal.events[-1][0] == "doubted"
 
 
 def test_a_probe_that_does_not_come_is_left_out_in_the_end():
     made, journal = session(Hand(absent=range(1, 10)))
-    summary = made.run([Visit((CONE,))])
+    summary = made.run([GuidedVisit((CONE,))])
     assert (len(summary.readings), summary.skipped) == (0, 1)
     assert journal.events == [("skipped", {"target": "cone 1", "why": "no reading in 4 attempts"})]
 
@@ -128,7 +128,7 @@ def test_a_probe_that_does_not_come_is_left_out_in_the_end():
 def test_a_still_probe_elsewhere_is_told_and_waited_for():
     hand = Hand(off_m=dict.fromkeys(range(1, 10), 0.2))
     made, _ = session(hand, patience_s=5.0)
-    assert made.run([Visit((CONE,))]).skipped == 1
+    assert made.run([GuidedVisit((CONE,))]).skipped == 1
     assert "200 mm from cone 1" in hand.told[0].says
 
 
@@ -136,7 +136,7 @@ def test_the_same_standstill_is_read_once():
     hand = Hand()
     made, _ = session(hand, patience_s=5.0)
     still = (0.5, 0.0, 0.1, 0.2, 0.3, 0.4)
-    summary = made.run([Visit((CONE,), still), Visit((CONE,), still)])
+    summary = made.run([GuidedVisit((CONE,), still), GuidedVisit((CONE,), still)])
     assert (len(summary.readings), summary.skipped) == (1, 1)
 
 
@@ -159,7 +159,7 @@ class Copies(Hand):
 def test_a_cone_is_not_read_twice_in_one_posture():
     hand = Copies(times=1)
     made, _ = session(hand, patience_s=5.0)
-    first, second = made.run([Visit((CONE,)), Visit((CONE,))]).readings
+    first, second = made.run([GuidedVisit((CONE,)), GuidedVisit((CONE,))]).readings
     assert np.abs(first.q_rad - second.q_rad).max() > 0.1
     assert "turn some joint by 6 deg" in hand.told[0].says
 
@@ -181,7 +181,7 @@ def test_a_sphere_is_not_touched_twice_at_one_spot():
     hand = Sways()
     made, _ = session(hand, patience_s=5.0)
     beside = [spot(0.5, 0.0, 0.1), spot(0.5, 0.0012, 0.1), spot(0.5, 0.003, 0.1)]
-    summary = made.run([Visit((one,)) for one in beside])
+    summary = made.run([GuidedVisit((one,)) for one in beside])
     assert (len(summary.readings), summary.skipped) == (2, 1)
     assert "2 mm or more beside every earlier spot" in hand.told[0].says
 
@@ -190,7 +190,7 @@ def test_a_touch_that_leaves_all_in_one_plane_is_refused_and_the_session_goes_on
     hand = Sways()
     made, _ = session(hand, patience_s=5.0)
     ring = [spot(0.5 + 0.01 * np.cos(a), 0.01 * np.sin(a), 0.1) for a in np.arange(5.0)]
-    summary = made.run([Visit((one,)) for one in (*ring, spot(0.5, 0.0, 0.11))])
+    summary = made.run([GuidedVisit((one,)) for one in (*ring, spot(0.5, 0.0, 0.11))])
     assert (len(summary.readings), summary.skipped) == (5, 1)
     assert any("in one plane" in progress.says for progress in hand.told)
 
@@ -198,5 +198,5 @@ def test_a_touch_that_leaves_all_in_one_plane_is_refused_and_the_session_goes_on
 def test_what_was_taken_before_the_encoders_went_is_kept():
     made, journal = session(Hand(gone_after=2))
     with pytest.raises(DeviceLost):
-        made.run([Visit((CONE,))] * 4)
+        made.run([GuidedVisit((CONE,))] * 4)
     assert made.taken == len(journal.rows) == 2

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from acquisition.guided.stillness import Motion, StillRule
+from acquisition.guided.stillness import ArmMotion, StillRule
 from acquisition.guided.window import Window
 
 T_S = np.arange(0.0, 0.6, 0.01)
@@ -33,31 +33,31 @@ def held(noise_m=1e-6, rows=60):
 def test_a_held_probe_is_still_though_its_joints_tremble():
     q = held()
     q[:, 4] = 3e-3 * np.sin(60.0 * T_S)
-    assert judged(q) is Motion.STILL
+    assert judged(q) is ArmMotion.STILL
 
 
 def test_a_probe_that_jumps_is_not_still():
     q = held()
     q[40:, 0] += 2e-4
-    assert judged(q) is Motion.MOVING
+    assert judged(q) is ArmMotion.MOVING
 
 
 def test_a_creeping_probe_is_not_still():
     q = held()
     q[:, 1] += 1e-4 * T_S
-    assert judged(q) is Motion.MOVING
+    assert judged(q) is ArmMotion.MOVING
 
 
 def test_coarse_readings_do_not_look_like_motion():
-    assert judged(held(noise_m=5e-5)) is Motion.STILL
+    assert judged(held(noise_m=5e-5)) is ArmMotion.STILL
 
 
 def test_joints_on_their_way_round_a_seated_ball_are_not_still():
     q = held()
     q[:, 5] = 0.1 * T_S
-    assert judged(q) is Motion.MOVING
+    assert judged(q) is ArmMotion.MOVING
 
 
 def test_a_short_stretch_says_nothing_yet():
-    assert judged(held(rows=20)) is Motion.SHORT
-    assert judged(held(rows=5)) is Motion.SHORT
+    assert judged(held(rows=20)) is ArmMotion.SHORT
+    assert judged(held(rows=5)) is ArmMotion.SHORT

@@ -7,14 +7,14 @@ import pytest
 
 from acquisition.motion.cell import Box, Cell, body_points
 from acquisition.motion.errors import InterruptedMotionError, RefusedMotionError
-from acquisition.motion.following import Stream
+from acquisition.motion.following import SetPointStream
 from acquisition.motion.gate import Gate
 from acquisition.motion.inverse.closed_form import closed_form
 from acquisition.motion.inverse.solver import Solver
-from acquisition.motion.paths.path import Belt
+from acquisition.motion.paths.path import BeltState
 from acquisition.motion.paths.segments import By, Pace, Segment
 from acquisition.motion.rigid import transform
-from acquisition.motion.states import REST_S, State
+from acquisition.motion.states import REST_S, MotionState
 from acquisition.motion.task.place import Place
 from drivers.errors import DeviceRefused
 from tests.acquisition.motion.conftest import ur5e
@@ -23,7 +23,7 @@ SOLVER = Solver(ur5e(1e-3), closed_form(ur5e()))
 HOME_RAD = np.array([0.3, -1.4, 1.6, -0.5, 1.3, 0.1])
 HOME = SOLVER.flange(HOME_RAD)
 PACE = Pace(np.full(6, 0.8), np.full(6, 4.0))
-STREAM = Stream(hz=100.0, solve_hz=50.0, rested_s=0.05)
+STREAM = SetPointStream(hz=100.0, solve_hz=50.0, rested_s=0.05)
 
 
 class JumpingClock:
@@ -79,7 +79,7 @@ def test_a_plan_is_followed_to_its_end_and_the_arm_stopped() -> None:
     gate = gate_of(arm)
     made = gate.plan(HOME_RAD, there(0.1, 0.05, 0.0))
     followed = gate.run(made, HOME_RAD)
-    assert gate.state is State.DONE
+    assert gate.state is MotionState.DONE
     assert arm.stops == ["servo_stop"]
     assert followed.missed == 0
     np.testing.assert_allclose(arm.q_rad[-1], HOME_RAD, atol=1e-9)
@@ -94,11 +94,11 @@ def test_stopped_at_any_time_it_brakes_within_the_limit(cycle: int, ending: str)
     made = gate.plan(HOME_RAD, there(0.15, 0.05, 0.0))
     if ending == "stop":
         gate.run(made, HOME_RAD)
-        assert gate.state is State.DONE
+        assert gate.state is MotionState.DONE
     else:
         with pytest.raises(InterruptedMotionError, match="aborted"):
             gate.run(made, HOME_RAD)
-        assert gate.state is State.ABORTED
+        assert gate.state is MotionState.ABORTED
     assert arm.stops == ["servo_stop"]
     longest_s = PACE.speed_rad_s[0] / PACE.acceleration_rad_s2[0]
     assert len(arm.q_rad) - cycle <= longest_s * STREAM.hz + 2
@@ -123,7 +123,7 @@ def test_held_and_resumed_it_stays_on_the_path() -> None:
         if n == 60:
             gate.hold()
         if n == 160:
-            assert gate.state is State.HELD
+            assert gate.state is MotionState.HELD
             gate.resume()
 
     arm = Arm(at)
@@ -132,7 +132,7 @@ def test_held_and_resumed_it_stays_on_the_path() -> None:
     gate.run(made, HOME_RAD)
     held = np.array(arm.q_rad[120:160])
     assert np.abs(held - held[0]).max() == 0.0
-    assert gate.state is State.DONE
+    assert gate.state is MotionState.DONE
     np.testing.assert_allclose(arm.q_rad[-1], HOME_RAD, atol=1e-9)
     nearest = [np.abs(made.q_rad - q).max(axis=1).min() for q in arm.q_rad]
     assert max(nearest) < 0.02  # samples of the plan are 20 ms apart, and joints make 0.8 rad/s
@@ -145,7 +145,7 @@ def test_paused_it_rests_at_the_next_action_and_twice_at_once() -> None:
         if not paused and gate.rests_in_s() < 0.5:
             paused.append(n)
             gate.pause()
-        if gate.state is State.HELD and len(arm.q_rad) > 40 and not pressed:
+        if gate.state is MotionState.HELD and len(arm.q_rad) > 40 and not pressed:
             pressed.append(n)
         if pressed and n == pressed[0] + 60:
             gate.resume()
@@ -172,7 +172,7 @@ def test_a_pause_rests_where_the_program_says_stop() -> None:
         if not paused and gate.rests_in_s() < 0.5:
             paused.append(n)
             gate.pause()
-        if gate.state is State.HELD:
+        if gate.state is MotionState.HELD:
             rested.append(arm.q_rad[-1])
             if len(rested) == 30:
                 gate.resume()
@@ -182,12 +182,12 @@ def test_a_pause_rests_where_the_program_says_stop() -> None:
     first, *_, last = there(0.1, 0.0, 0.0, action="GRASP")
     gate.run(gate.plan(HOME_RAD, [first, Segment("stop", By.STAND, first.place), last]), HOME_RAD)
     np.testing.assert_allclose(SOLVER.flange(rested[-1])[:3, 3], first.place.pos[:3, 3], atol=1e-6)
-    assert gate.state is State.DONE
+    assert gate.state is MotionState.DONE
 
 
-@pytest.mark.parametrize(("wait_s", "state"), [(5.0, State.HELD), (12.0, State.PAUSING)])
-def test_a_second_pause_brakes_at_once_within_ten_seconds_only(wait_s: float, state: State) -> None:
-    clock, seen, near = JumpingClock(), list[State](), list[int]()
+@pytest.mark.parametrize(("wait_s", "state"), [(5.0, MotionState.HELD), (12.0, MotionState.PAUSING)])
+def test_a_second_pause_brakes_at_once_within_ten_seconds_only(wait_s: float, state: MotionState) -> None:
+    clock, seen, near = JumpingClock(), list[MotionState](), list[int]()
 
     def at(n: int) -> None:
         if not near and gate.rests_in_s() > 0.5:
@@ -207,7 +207,7 @@ def test_a_second_pause_brakes_at_once_within_ten_seconds_only(wait_s: float, st
 
 
 def test_a_first_pause_far_from_the_next_rest_brakes_along_the_path() -> None:
-    said: list[tuple[float, State]] = []
+    said: list[tuple[float, MotionState]] = []
 
     def at(n: int) -> None:
         if n == 10:
@@ -222,7 +222,7 @@ def test_a_first_pause_far_from_the_next_rest_brakes_along_the_path() -> None:
     gate.run(gate.plan(HOME_RAD, there(0.4, 0.0, 0.0)), HOME_RAD)
     (left_s, _), (brake_s, state) = said
     assert left_s > REST_S > brake_s
-    assert state is State.HELD
+    assert state is MotionState.HELD
     assert np.abs(np.diff(arm.q_rad[10 + int(np.ceil(brake_s * STREAM.hz)) : 150], axis=0)).max() == 0.0
     assert largest_acceleration(arm) <= 2.0 * PACE.acceleration_rad_s2[0]  # the path's own, and the brake's
 
@@ -233,9 +233,9 @@ class Conveyor:
     def __init__(self, arm: Arm, way_m: Callable[[int], float]) -> None:
         self._arm, self._way_m = arm, way_m
 
-    def now(self) -> Belt:
+    def now(self) -> BeltState:
         sent = len(self._arm.q_rad)
-        return Belt(self._way_m(sent), (self._way_m(sent + 1) - self._way_m(sent)) * STREAM.hz)
+        return BeltState(self._way_m(sent), (self._way_m(sent + 1) - self._way_m(sent)) * STREAM.hz)
 
     @staticmethod
     def place(*shift: float) -> Place:
@@ -327,7 +327,7 @@ def test_a_stream_that_was_silent_too_long_is_given_up() -> None:
     with pytest.raises(InterruptedMotionError, match="1190 ms late"):
         gate.run(gate.plan(HOME_RAD, there(0.1, 0.05, 0.0)), HOME_RAD)
     assert arm.stops == ["stop"]
-    assert gate.state is State.ABORTED
+    assert gate.state is MotionState.ABORTED
 
 
 def test_halt_reaches_the_arm_in_every_state() -> None:
@@ -420,7 +420,7 @@ def test_nothing_is_sent_after_a_freeze_whatever_was_typed_in_it(word: str, held
         clock.t_s += seconds
         if len(arm.q_rad) == 60 and not sent:
             sent.append(len(arm.q_rad))
-            assert gate.state is (State.HELD if held else State.MOVING)
+            assert gate.state is (MotionState.HELD if held else MotionState.MOVING)
             clock.t_s += 5.0
             getattr(gate, word)()
 
@@ -429,4 +429,4 @@ def test_nothing_is_sent_after_a_freeze_whatever_was_typed_in_it(word: str, held
         gate.run(gate.plan(HOME_RAD, there(0.15, 0.05, 0.0)), HOME_RAD)
     assert len(arm.q_rad) == sent[0]
     assert arm.stops == ["stop"]
-    assert gate.state is State.ABORTED
+    assert gate.state is MotionState.ABORTED

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from acquisition.motion.errors import RefusedMotionError
 from acquisition.motion.inverse.closed_form import closed_form
 from acquisition.motion.inverse.solver import Solver
-from acquisition.motion.paths.blend import State, blend
+from acquisition.motion.paths.blend import BlendState, blend
 from acquisition.motion.paths.drive import drive_between
-from acquisition.motion.paths.path import Belt, Path
+from acquisition.motion.paths.path import BeltState, Path
 from acquisition.motion.paths.segments import By, Pace, Segment
 from acquisition.motion.rigid import apart, inverse, transform
 from acquisition.motion.task.place import Place
@@ -42,8 +42,8 @@ def place_at(shift, turn, tool, *, moving: bool, s0_m: float = 0.0) -> Place:
     return Place("carried", inverse(coord(s0_m)) @ wanted, T_flange_tool, coord, "CONV")
 
 
-def belt_at(t_s: float) -> Belt:
-    return Belt(RATE_M_S * t_s, RATE_M_S)
+def belt_at(t_s: float) -> BeltState:
+    return BeltState(RATE_M_S * t_s, RATE_M_S)
 
 
 def run(segments, step_s: float = 0.05) -> Path:
@@ -112,7 +112,7 @@ def test_a_path_without_its_transition_fails_the_same_judge(monkeypatch: pytest.
 def test_the_transition_of_straight_segments_is_the_quartic_of_the_source() -> None:
     A, B, C, tacc, T = np.array([0.3, -0.1]), np.array([0.5, 0.2]), np.array([0.1, 0.9]), 0.2, 1.3
     dC, dB, zero = C - B, A - B, np.zeros(2)
-    curve = blend(-tacc, State(A, -dB / tacc, zero), tacc, State(B + dC * tacc / T, dC / T, zero))
+    curve = blend(-tacc, BlendState(A, -dB / tacc, zero), tacc, BlendState(B + dC * tacc / T, dC / T, zero))
     for t in np.linspace(-tacc, tacc, 9):
         h = (t + tacc) / (2.0 * tacc)
         quartic = ((dC * tacc / T + dB) * (2.0 - h) * h**2 - 2.0 * dB) * h + B + dB

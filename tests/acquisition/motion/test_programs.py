@@ -7,11 +7,11 @@ import pytest
 
 from acquisition.motion.cell import Cell
 from acquisition.motion.errors import TaskError
-from acquisition.motion.following import Stream
+from acquisition.motion.following import SetPointStream
 from acquisition.motion.gate import Gate
 from acquisition.motion.inverse.closed_form import closed_form
 from acquisition.motion.inverse.solver import Solver
-from acquisition.motion.paths.path import Belt
+from acquisition.motion.paths.path import BeltState
 from acquisition.motion.paths.segments import Pace
 from acquisition.motion.rigid import apart, transform
 from acquisition.motion.run_task import Around, run_task, teach
@@ -53,7 +53,7 @@ def taught(task: Task) -> Task:
 
 
 def gate_of(arm: Arm) -> Gate:
-    return Gate(SOLVER, PACE, Cell(), arm, Stream(hz=50.0, solve_hz=50.0), JumpingClock())
+    return Gate(SOLVER, PACE, Cell(), arm, SetPointStream(hz=50.0, solve_hz=50.0), JumpingClock())
 
 
 def test_teaching_finds_every_transform_of_the_insertion() -> None:
@@ -112,8 +112,8 @@ def test_a_part_on_a_running_belt_is_gripped_where_it_is_by_then() -> None:
     OBJ = transform((0.1, 0.02, 0.03), (0.0, 3.141592653589793, 0.0))
     seen: list[float] = []
 
-    def belt() -> Belt:
-        return Belt(way_m(len(arm.q_rad)), rate_m_s)
+    def belt() -> BeltState:
+        return BeltState(way_m(len(arm.q_rad)), rate_m_s)
 
     def act(action: str) -> None:
         if action == "GRASP":

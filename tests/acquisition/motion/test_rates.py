@@ -5,7 +5,7 @@ import pytest
 
 from acquisition.motion.inverse.closed_form import closed_form
 from acquisition.motion.inverse.solver import Solver
-from acquisition.motion.paths.path import Belt, Path
+from acquisition.motion.paths.path import BeltState, Path
 from acquisition.motion.paths.segments import By, Pace, Segment
 from acquisition.motion.rigid import inverse, transform
 from acquisition.motion.setpoints import LookAhead, solve_rate_hz
@@ -57,9 +57,9 @@ def test_a_belt_that_stops_dead_is_overshot_by_two_periods_of_its_way() -> None:
     clock = {"t_s": 0.0}
     stop_s = 2.0 + 1e-6  # just after the belt was read, and read as running
 
-    def belt() -> Belt:
+    def belt() -> BeltState:
         t_s = clock["t_s"]
-        return Belt(V_M_S * min(t_s, stop_s), V_M_S if t_s < stop_s else 0.0)
+        return BeltState(V_M_S * min(t_s, stop_s), V_M_S if t_s < stop_s else 0.0)
 
     points = LookAhead(
         Path(SOLVER, POSTURE_RAD, [Segment("on belt", By.LINE, place)], PACE), SOLVE_HZ, belt, POSTURE_RAD
@@ -83,7 +83,7 @@ def test_a_lag_of_the_arm_that_is_known_does_not_leave_it_behind_a_belt(lag_s: f
     place = Place("part", inverse(base) @ T, np.eye(4), lambda s_m: transform((0.0, s_m, 0.0)) @ base, "CONV")
     now = {"t_s": 0.0}
     path = Path(SOLVER, POSTURE_RAD, [Segment("on belt", By.LINE, place)], PACE)
-    belt = lambda: Belt(V_M_S * now["t_s"], V_M_S)  # noqa: E731
+    belt = lambda: BeltState(V_M_S * now["t_s"], V_M_S)  # noqa: E731
     points = LookAhead(path, SOLVE_HZ, belt, POSTURE_RAD, lag_s if known else 0.0)
     sent = []
     for n in range(int(2.5 * 500)):

@@ -2,12 +2,12 @@
 
 import pytest
 
-from acquisition.motion.states import OVER, Event, State, after
+from acquisition.motion.states import OVER, MotionEvent, MotionState, after
 
-S, E = State, Event
+S, E = MotionState, MotionEvent
 CHANGES = {
     **{(s, E.START): S.MOVING for s in OVER},
-    **{(s, E.HALT): S.HALTED for s in State},
+    **{(s, E.HALT): S.HALTED for s in MotionState},
     **{(s, e): S.ENDING for s in (S.MOVING, S.PAUSING, S.HELD) for e in (E.ABORT, E.STOP)},
     **{(s, E.FAULT): S.ABORTED for s in (S.MOVING, S.PAUSING, S.HELD, S.ENDING)},
     **{(s, E.FINISHED): S.DONE for s in (S.MOVING, S.PAUSING, S.ENDING)},
@@ -18,7 +18,7 @@ CHANGES = {
 }
 
 
-@pytest.mark.parametrize("state", State)
-@pytest.mark.parametrize("event", Event)
-def test_what_follows(state: State, event: Event) -> None:
+@pytest.mark.parametrize("state", MotionState)
+@pytest.mark.parametrize("event", MotionEvent)
+def test_what_follows(state: MotionState, event: MotionEvent) -> None:
     assert after(state, event) is CHANGES.get((state, event), state)

@@ -5,9 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.recording.rig import parse_rig
-from acquisition.recording.rig_schema import Rig
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording.rig import Rig, parse_rig
 
 ROOT = Path(__file__).parents[3]
 

@@ -6,7 +6,7 @@ import pytest
 
 from acquisition.recording.errors import RigFileError, SamplesError
 from acquisition.recording.rig import parse_rig, rig_text
-from acquisition.recording.samples_csv import parse_csv
+from acquisition.recording.session_folder.tables import parse_csv
 
 
 @pytest.fixture

@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 
 from acquisition.recording.can_frames import Frame, FrameFlag, block_of, channels, frames_of, stream_names
-from acquisition.recording.can_log import SUFFIXES, export_can, import_can
-from acquisition.recording.can_message import frame_of
-from acquisition.recording.check import Problem, check
+from acquisition.recording.can_log import SUFFIXES, export_can, frame_of, import_can
+from acquisition.recording.check_recording import Problem, check
 from acquisition.recording.errors import RecordingError
-from acquisition.recording.read import read
+from acquisition.recording.mcap.read import read
+from acquisition.recording.mcap.writer import RecordingWriter
 from acquisition.recording.recording import Recording
-from acquisition.recording.writer import RecordingWriter
 
 Open = Callable[..., RecordingWriter]
 START_S = 1_790_000_000.25  # in 2026

@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from acquisition.recording.check import Problem, check
-from acquisition.recording.read import read
-from acquisition.recording.stream import Channel
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording.check_recording import Problem, check
+from acquisition.recording.mcap.read import read
+from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording.recording import Channel
 
 Open = Callable[..., RecordingWriter]
 SPOT = Channel("spot_x_m", "m")

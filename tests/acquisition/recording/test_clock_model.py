@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from acquisition.recording.clock_model import ClockStatus, clock_model
-from acquisition.recording.stream import Floats, Stream
+from acquisition.recording.device_clock import ClockStatus, clock_model
+from acquisition.recording.recording import Stream
+from acquisition.recording.samples import Floats
 
 OFFSET_S, RATE, LEAST_S = 1e5, 1.0 + 23e-6, 2e-4
 

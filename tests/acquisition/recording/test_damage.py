@@ -13,13 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.recording import mcap_file
-from acquisition.recording import writer as writer_module
 from acquisition.recording.errors import RecordingError
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
-from acquisition.recording.stream import Channel, Event
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording.mcap import mcap_file
+from acquisition.recording.mcap import writer as writer_module
+from acquisition.recording.mcap.read import read
+from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording.recording import Channel, Event, Recording
 
 BATCHES = 24
 CHUNK = 0x06  # MCAP specification, "Records"
@@ -193,8 +192,8 @@ def test_a_recording_of_a_version_without_checksums_is_read(
 RECORD_UNTIL_KILLED = """
 import os, sys, time
 import numpy as np
-from acquisition.recording.stream import Channel
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording.recording import Channel
+from acquisition.recording.mcap.writer import RecordingWriter
 
 class HostClock:
     def now_s(self):

@@ -11,14 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.recording import mcap_file
-from acquisition.recording.disk_file import DiskFile
 from acquisition.recording.errors import RecordingError
-from acquisition.recording.read import read
-from acquisition.recording.spool import Spool
-from acquisition.recording.stream import Channel
-from acquisition.recording.stream_writer import StreamWriter
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording.mcap import mcap_file
+from acquisition.recording.mcap.mcap_file import DiskFile
+from acquisition.recording.mcap.read import read
+from acquisition.recording.mcap.write_thread import Spool
+from acquisition.recording.mcap.writer import RecordingWriter, StreamWriter
+from acquisition.recording.recording import Channel
 
 Open = Callable[..., RecordingWriter]
 SPOT = Channel("spot_x_m", "m")
@@ -151,8 +150,8 @@ RECORD_UNTIL_FULL = """
 import resource, sys
 import numpy as np
 from acquisition.recording.errors import RecordingError
-from acquisition.recording.stream import Channel
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording.recording import Channel
+from acquisition.recording.mcap.writer import RecordingWriter
 
 class Standing:
     def now_s(self):

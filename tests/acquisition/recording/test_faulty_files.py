@@ -5,15 +5,15 @@ from pathlib import Path
 import can
 import pytest
 
-from acquisition.recording.bounds import most_of
 from acquisition.recording.can_log import export_can, import_can
 from acquisition.recording.errors import MESSAGE_LENGTH, VALUE_LENGTH, RecordingError, RigFileError, SamplesError, shown
-from acquisition.recording.read import read
+from acquisition.recording.files.bounds import most_of
+from acquisition.recording.mcap.read import read
+from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording.recording import Channel
 from acquisition.recording.rig import load_rig, parse_rig
-from acquisition.recording.samples_csv import parse_csv
-from acquisition.recording.stream import Channel
-from acquisition.recording.tables import TableFormat, write_tables
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording.session_folder import TableFormat
+from acquisition.recording.session_folder.tables import parse_csv, write_tables
 
 RIG = """schema = 1
 name = "two-joint"

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from acquisition.recording.errors import RecordingError, RigFileError, SamplesError
-from acquisition.recording.folder import export
-from acquisition.recording.import_folder import import_folder
-from acquisition.recording.read import read
+from acquisition.recording.mcap.read import read
+from acquisition.recording.session_folder import export
+from acquisition.recording.session_folder.folder_import import import_folder
 
 CSV = "t_s,q1_rad,q2_rad,humidity %,temp_a_degC,temp_A_degC\n0.1,0.30000000000000004,-2.0,,20.25,1e-300\n7,1,2,40.5,,\n"
 

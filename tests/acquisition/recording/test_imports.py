@@ -1,11 +1,16 @@
-"""Reading a recording needs no port: fits run where no instrument can be reached."""
+"""Reading a recording needs no port: fits run where no instrument can be reached. Others come in by the faces."""
 
+import ast
+import importlib
 import subprocess
 import sys
+from pathlib import Path
+
+import pytest
 
 PROGRAM = """
 import sys
-import acquisition.recording.check, acquisition.recording.folder, acquisition.recording.read, acquisition.recording.rig
+import acquisition.recording.check_recording, acquisition.recording.mcap.read
 print(sorted({"serial", "can", "canopen", "socket", "ssl", "asyncio", "drivers"} & set(sys.modules)))
 """
 
@@ -13,3 +18,46 @@ print(sorted({"serial", "can", "canopen", "socket", "ssl", "asyncio", "drivers"}
 def test_reading_loads_no_library_of_ports() -> None:
     said = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=60.0, check=True)
     assert said.stdout.strip() == "[]"
+
+
+ROOT = Path(__file__).parents[3]
+PACKAGE = "acquisition.recording"
+FACES = (PACKAGE, f"{PACKAGE}.files", f"{PACKAGE}.mcap", f"{PACKAGE}.rig", f"{PACKAGE}.session_folder")
+DOORS = {  # single modules that are open beside the faces: vocabularies, and what loads a library of its own
+    *FACES,
+    *(
+        f"{PACKAGE}.{name}"
+        for name in (
+            "can_frames",
+            "can_log",
+            "device_clock",
+            "files.bounds",
+            "pose_plan",
+            "rig.devices",
+            "rig.schema",
+            "samples",
+            "session_folder.folder_import",
+        )
+    ),
+}
+
+
+def test_products_come_in_by_a_face() -> None:
+    reaching = set[str]()
+    for folder in ("acquisition", "calibrate", "calibeam"):
+        for path in (ROOT / folder).rglob("*.py"):
+            if PACKAGE.replace(".", "/") in path.as_posix():
+                continue
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                module = node.module or "" if isinstance(node, ast.ImportFrom) else ""
+                if module.startswith(PACKAGE) and module not in DOORS:
+                    reaching.add(f"{path.relative_to(ROOT)}: {module}")
+    assert not reaching
+
+
+@pytest.mark.parametrize("face", FACES)
+def test_a_face_has_what_it_names_and_not_more_than_fifteen(face: str) -> None:
+    module = importlib.import_module(face)
+    assert module.__doc__
+    assert len(module.__all__) <= 15
+    assert [name for name in module.__all__ if not hasattr(module, name)] == []

@@ -12,8 +12,8 @@ from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from acquisition.recording.stream import Channel, Event
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording.recording import Channel, Event
 
 Open = Callable[..., RecordingWriter]
 

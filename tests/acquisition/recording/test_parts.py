@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from acquisition.recording.errors import RecordingError
-from acquisition.recording.parts import next_part, parts
-from acquisition.recording.read import read
-from acquisition.recording.stream import Channel, Event
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording.mcap.read import read
+from acquisition.recording.mcap.session_parts import next_part, parts
+from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording.recording import Channel, Event
 
 RIG = (Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml").read_text()
 BEGUN = datetime(2026, 3, 1, 8, 0, 0, tzinfo=UTC)

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from acquisition.recording.errors import RecordingError, RigFileError, SamplesError
-from acquisition.recording.read import read
-from acquisition.recording.stream import Channel, Event, Gap
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording.mcap.read import read
+from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording.recording import Channel, Event, Gap
 
 Open = Callable[..., RecordingWriter]
 

@@ -12,14 +12,20 @@ import pytest
 from mcap.reader import make_reader
 
 from acquisition.recording.errors import RecordingError
-from acquisition.recording.layout import FORMAT_VERSION, RECORDING_METADATA, RIG_METADATA
-from acquisition.recording.mcap_file import McapFile
-from acquisition.recording.messages import EVENT, MessageType, packed
-from acquisition.recording.read import read
-from acquisition.recording.recover import recover
+from acquisition.recording.mcap.layout import (
+    EVENT,
+    FORMAT_VERSION,
+    RECORDING_METADATA,
+    RIG_METADATA,
+    MessageType,
+    packed,
+)
+from acquisition.recording.mcap.mcap_file import McapFile
+from acquisition.recording.mcap.read import read
+from acquisition.recording.mcap.recover import recover
+from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording.recording import Channel, Event
 from acquisition.recording.rig import rig_sha256
-from acquisition.recording.stream import Channel, Event
-from acquisition.recording.writer import RecordingWriter
 
 BATCHES = 12
 Open = Callable[..., RecordingWriter]

@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from acquisition.recording.errors import RigFileError
-from acquisition.recording.rig import load_rig, parse_rig, plain_rig
-from acquisition.recording.rig_schema import ArmModel
+from acquisition.recording.rig import ArmModel, load_rig, parse_rig, plain_rig
 
 Edit = Callable[[str, str], str]
 

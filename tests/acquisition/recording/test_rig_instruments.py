@@ -7,7 +7,7 @@ import pytest
 
 from acquisition.recording.errors import RigFileError
 from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_devices import EncoderDriver, PsdDriver
+from acquisition.recording.rig.devices import EncoderDriver, PsdDriver
 
 ROOT = Path(__file__).parents[3]
 PAIR = (ROOT / "rigs" / "ur5e-dual-kpa101.toml").read_text()

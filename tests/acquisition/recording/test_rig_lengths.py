@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.recording.bounds import ARM_M, PART_M, ROOM_M
 from acquisition.recording.errors import MESSAGE_LENGTH, RigFileError, SamplesError
+from acquisition.recording.files.bounds import ARM_M, PART_M, ROOM_M
 from acquisition.recording.rig import load_rig, parse_rig
-from acquisition.recording.samples_csv import parse_csv
+from acquisition.recording.session_folder.tables import parse_csv
 
 RIG = """schema = 1
 name = "kuka-tracker"

@@ -4,7 +4,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from acquisition.recording.rig_lines import KeyPath, key_lines, line_of
+from acquisition.recording.files.explain import KeyPath
+from acquisition.recording.files.toml_file import key_lines, line_of
 
 UNUSUAL = '''\
 title = """

@@ -6,7 +6,7 @@ import pytest
 
 from acquisition.recording.errors import RigFileError
 from acquisition.recording.rig import load_rig, parse_rig, rig_text
-from acquisition.recording.rig_devices import RegisterType, RobotDriver
+from acquisition.recording.rig.devices import RegisterType, RobotDriver
 
 RIGS = Path(__file__).parents[3] / "rigs"
 TEXT = rig_text(RIGS / "irb120-modbus.toml")

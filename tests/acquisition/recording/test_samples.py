@@ -13,12 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acquisition.recording.errors import SamplesError
-from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig, load_rig
 from acquisition.recording.sample_rules import checked_samples
 from acquisition.recording.samples import Samples
-from acquisition.recording.samples_csv import parse_csv, read_csv, write_csv
-from acquisition.recording.samples_parquet import read_parquet
+from acquisition.recording.session_folder import read_csv, read_parquet, write_csv
+from acquisition.recording.session_folder.tables import parse_csv
 
 CSV = """\
 t_s,q1_rad,q2_rad,placement,first_psd,psd1_x_m,psd1_y_m,psd2_x_m,psd2_y_m,enc1_rad,enc2_rad,bar,bar_end,temp_room_degC

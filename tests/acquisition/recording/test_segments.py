@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.recording.check import check
-from acquisition.recording.read import read
-from acquisition.recording.segments import Rotation, SegmentedRecording, SegmentStream, segments
-from acquisition.recording.stream import Channel, Gap
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording.check_recording import check
+from acquisition.recording.mcap.log_segments import Rotation, SegmentedRecording, SegmentStream, segments
+from acquisition.recording.mcap.read import read
+from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording.recording import Channel, Gap
 
 Open = Callable[..., RecordingWriter]
 

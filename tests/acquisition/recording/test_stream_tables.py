@@ -9,14 +9,11 @@ import numpy as np
 import pytest
 
 from acquisition.recording.errors import RecordingError
-from acquisition.recording.folder import export
-from acquisition.recording.import_folder import import_folder
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
-from acquisition.recording.stream import Channel, Event, Gap, Stream
-from acquisition.recording.stream_tables import write_streams
-from acquisition.recording.tables import TableFormat
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording.mcap.read import read
+from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording.recording import Channel, Event, Gap, Recording, Stream
+from acquisition.recording.session_folder import TableFormat, export, write_streams
+from acquisition.recording.session_folder.folder_import import import_folder
 
 COUNT = 2500  # more than a block
 

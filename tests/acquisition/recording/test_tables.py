@@ -8,12 +8,11 @@ import pyarrow.csv
 import pyarrow.parquet
 import pytest
 
-from acquisition.recording.folder import export
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
-from acquisition.recording.stream import Channel, Event
-from acquisition.recording.tables import TableFormat, write_tables
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording.mcap.read import read
+from acquisition.recording.mcap.writer import RecordingWriter
+from acquisition.recording.recording import Channel, Event, Recording
+from acquisition.recording.session_folder import TableFormat, export
+from acquisition.recording.session_folder.tables import write_tables
 
 READERS = {TableFormat.CSV: pyarrow.csv.read_csv, TableFormat.PARQUET: pyarrow.parquet.read_table}
 COUNT = 300

@@ -9,9 +9,9 @@ import pytest
 from acquisition.bench import Look, Spot
 from acquisition.servo.centring import Limits, centre
 from acquisition.servo.law import FixedGuess
-from acquisition.servo.measured import Measured
+from acquisition.servo.measured import MeasuredStrategy
 from acquisition.servo.registered import Registered
-from acquisition.servo.status import Status
+from acquisition.servo.status import CentringStatus
 from acquisition.servo.strategy import Proposal
 from benchmarks.centring import random_start
 from benchmarks.centring import run as benchmark
@@ -62,14 +62,14 @@ ONE = np.array([1.0, 0, 0, 0, 0, 0])
 def test_already_centred_takes_no_motion() -> None:
     bench = Plane(np.zeros(6))
     run = centre(bench, Wide(), Stubborn(ONE), np.zeros(6), np.zeros(4))
-    assert run.status is Status.CENTRED
+    assert run.status is CentringStatus.CENTRED
     assert run.steps == 0
     assert bench.moves == []
 
 
 def test_no_light_at_the_start_is_said() -> None:
     run = centre(Plane(0.5 * ONE), Wide(), Stubborn(ONE), 0.5 * ONE, np.zeros(4))
-    assert run.status is Status.NO_LIGHT
+    assert run.status is CentringStatus.NO_LIGHT
 
 
 def test_a_step_that_loses_the_light_is_halved_until_it_is_back() -> None:
@@ -102,7 +102,7 @@ def test_a_light_that_does_not_come_back_is_said_and_the_last_look_is_dark() -> 
 
     start = 0.05 * ONE
     run = centre(Blown(start), Wide(), Stubborn(0.01 * ONE), start, np.zeros(4))
-    assert run.status is Status.SPOT_LOST
+    assert run.status is CentringStatus.SPOT_LOST
     assert not run.look.psd1.lit
 
 
@@ -118,13 +118,13 @@ def test_a_step_out_of_the_joint_range_is_not_taken() -> None:
 
     bench = Plane(np.zeros(6))
     run = centre(bench, Narrow(), Stubborn(0.09 * ONE), np.zeros(6), np.full(4, 1.0))
-    assert run.status is Status.JOINT_LIMIT
+    assert run.status is CentringStatus.JOINT_LIMIT
     assert bench.moves == []
 
 
 def test_steps_run_out() -> None:
     run = centre(Plane(np.zeros(6)), Wide(), Stubborn(1e-4 * ONE), np.zeros(6), np.full(4, 1.0), Limits(max_steps=7))
-    assert run.status is Status.OUT_OF_STEPS
+    assert run.status is CentringStatus.OUT_OF_STEPS
     assert run.steps == 7
 
 
@@ -136,10 +136,10 @@ def test_a_tolerance_below_the_repeatability_ends_in_a_named_limit_cycle() -> No
 
     start = 2e-5 * ONE
     run = centre(Plane(start), Wide(), Jumpy(4e-5 * ONE), start, np.zeros(4), Limits(tolerance_m=1e-6))
-    assert run.status is Status.LIMIT_CYCLE
+    assert run.status is CentringStatus.LIMIT_CYCLE
 
 
-STRATEGIES: dict[str, Callable] = {"registered": Registered, "measured": Measured}
+STRATEGIES: dict[str, Callable] = {"registered": Registered, "measured": MeasuredStrategy}
 
 
 @pytest.mark.parametrize("name", STRATEGIES)
@@ -150,7 +150,7 @@ def test_reaches_5_um_with_the_fixture_pose_wrong_by_up_to_80_deg_and_50_mm(
     start = random_start(rig, plain_rig, case, np.random.default_rng(700 + case))
     strategy = STRATEGIES[name](start.learner.arm, start.learner.optics, start.T_guess, start.first)
     run = centre(start.bench, start.learner.arm, strategy, start.q_rad, np.zeros(4))
-    assert run.status is Status.CENTRED
+    assert run.status is CentringStatus.CENTRED
     assert np.max(np.abs(run.look.spots_m())) <= 5e-6
 
 
@@ -159,13 +159,13 @@ def test_law_8_with_a_guess_wrong_by_25_deg_converges_with_ripple(rig, plain_rig
     start = random_start(rig, plain_rig, first - 1, np.random.default_rng(40 + first), turn_rad=np.deg2rad(25.0))
     strategy = FixedGuess(start.learner.arm, start.learner.optics, start.T_guess, first, gain=0.6)
     run = centre(start.bench, start.learner.arm, strategy, start.q_rad, np.zeros(4), Limits(max_steps=60))
-    assert run.status is Status.CENTRED
+    assert run.status is CentringStatus.CENTRED
 
 
 def test_centring_from_anywhere_keeps_its_promise(rig, plain_rig) -> None:
     """The benchmark in small: 10 random starts, fixture pose wrong by up to 80 deg and 50 mm, both orders."""
     runs = benchmark(rig, plain_rig, cases=range(10), seed=77, strategies=("registered (sessions use it)",))
     assert max(run.losses for run in runs["registered (sessions use it)"]) <= 1
-    steps = [run.steps for run in runs["registered (sessions use it)"] if run.status is Status.CENTRED]
+    steps = [run.steps for run in runs["registered (sessions use it)"] if run.status is CentringStatus.CENTRED]
     assert len(steps) == 10
     assert np.median(steps) <= 6

@@ -3,7 +3,7 @@
 import numpy as np
 
 from acquisition.servo.grip import LEAST_GRIP, grip, rolled
-from acquisition.servo.measured import Measured
+from acquisition.servo.measured import MeasuredStrategy
 from benchmarks.centring import random_start
 from calibeam.learner import FittedLearner
 
@@ -32,7 +32,7 @@ def test_a_probe_that_was_shortened_teaches_what_a_whole_one_does(rig, plain_rig
     start = random_start(rig, plain_rig, 0, np.random.default_rng(701))
     columns = []
     for share in (1.0, 0.25):
-        strategy = Measured(start.learner.arm, start.learner.optics, start.T_guess, start.first)
+        strategy = MeasuredStrategy(start.learner.arm, start.learner.optics, start.T_guess, start.first)
         start.bench.move(start.q_rad)
         strategy.learn(start.q_rad, start.bench.look(0.05).spots_m())
         q_rad = start.q_rad + share * strategy.propose(np.zeros(4)).step_rad

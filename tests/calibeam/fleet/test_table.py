@@ -4,7 +4,7 @@ import msgspec
 import pyarrow.parquet as pq
 import pytest
 
-from acquisition.recording.errors import RecordingError
+from acquisition.recording import RecordingError
 from calibeam.fleet.row import Cause, Outcome, Row, Zero
 from calibeam.fleet.settings import JOURNAL
 from calibeam.fleet.table import Journal, read_rows, write_rows

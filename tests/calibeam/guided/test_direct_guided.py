@@ -7,7 +7,7 @@ import pytest
 
 from acquisition.guided.plan import GuidedOptions, calibration_plan
 from acquisition.guided.reading import Reading
-from acquisition.guided.session import GuidedSession, Summary
+from acquisition.guided.session import GuidedSession, GuidedSummary
 from acquisition.guided.target import BarEnd, Cone
 from acquisition.recording.rig import load_rig, plain_rig, rig_sha256, rig_text
 from calibeam.guided.hand import DirectHand
@@ -40,7 +40,7 @@ def world(seed: int, **emulation: float) -> HandWorld:
     return HandWorld.from_rig({**PLAIN, "emulation": {**PLAIN["emulation"], **emulation}}, seed=seed)
 
 
-def session(hand: DirectHand, plan) -> tuple[Summary, Journal]:
+def session(hand: DirectHand, plan) -> tuple[GuidedSummary, Journal]:
     journal = Journal()
     made = GuidedSession(
         hand, BelievedGuidedArm.of_rig(RIG), hand, FittedJudge(RIG), journal, np.random.default_rng(1), patience_s=30.0
@@ -49,7 +49,7 @@ def session(hand: DirectHand, plan) -> tuple[Summary, Journal]:
 
 
 @pytest.fixture(scope="module")
-def taken() -> tuple[HandWorld, Summary, Journal]:
+def taken() -> tuple[HandWorld, GuidedSummary, Journal]:
     """A small session of an arm whose hand slips one time in eight."""
     made = world(3, slip_share=0.12)
     summary, journal = session(DirectHand(made, 0.05), calibration_plan(RIG, GuidedOptions(postures=7, lengths=1)))

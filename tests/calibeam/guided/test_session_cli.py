@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_devices import Devices
+from acquisition.recording.rig.devices import Devices
 from calibeam.cli import run
 from calibeam.guided.recorded import is_guided
 

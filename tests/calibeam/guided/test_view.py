@@ -6,7 +6,7 @@ import numpy as np
 from rich.console import Console
 
 from acquisition.guided.coverage import Coverage
-from acquisition.guided.guide import Progress, Request
+from acquisition.guided.guide import GuidedProgress, Request
 from acquisition.guided.target import BarEnd, Cone
 from calibeam.guided.run import PersonGuide, drawn
 
@@ -17,7 +17,7 @@ def progress(says="moving", repeatability_m=None):
     coverage = Coverage(np.full(2, -np.pi), np.full(2, np.pi))
     coverage.add(np.array([-3.0, 0.1]))
     request = Request(CONE, np.array([0.1, -1.5]), 1)
-    return Progress(3, 40, says, np.array([0.0, 0.5]), request, coverage, repeatability_m)
+    return GuidedProgress(3, 40, says, np.array([0.0, 0.5]), request, coverage, repeatability_m)
 
 
 def shown(what) -> str:

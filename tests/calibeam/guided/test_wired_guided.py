@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from acquisition.guided.plan import GuidedOptions, Visit, calibration_plan
-from acquisition.guided.session import Summary
+from acquisition.guided.plan import GuidedOptions, GuidedVisit, calibration_plan
+from acquisition.guided.session import GuidedSummary
 from acquisition.guided.target import BarEnd, Cone
-from acquisition.recording.read import read
+from acquisition.recording import RecordingWriter, read
 from acquisition.recording.rig import load_rig, rig_text
-from acquisition.recording.writer import RecordingWriter
 from calibeam.emulation import Emulation
 from calibeam.guided.hand import EmulatedHand
 from calibeam.guided.recorded import BelievedGuidedArm, encoder_address, record_guided, watching
@@ -26,7 +25,7 @@ from simulators.hand.truth import read_hand_truth
 RIG_FILE = Path(__file__).parents[3] / "rigs" / "arm-cmm-reference.toml"
 RIG = load_rig(RIG_FILE)
 PACE = 10.0
-CONES = tuple(Visit((Cone(seat.id, seat.origin_m),)) for seat in list(RIG.seats.values())[:2] for _ in range(3))
+CONES = tuple(GuidedVisit((Cone(seat.id, seat.origin_m),)) for seat in list(RIG.seats.values())[:2] for _ in range(3))
 BAR = next(visit for visit in calibration_plan(RIG, GuidedOptions()) if isinstance(visit.targets[0], BarEnd))
 PLAN = (*CONES, BAR)
 
@@ -38,7 +37,7 @@ class Takes:
         self.emulation, self.path = emulation, path
         self.trouble: tuple[int, Callable[[], None]] | None = None
 
-    def run(self) -> Summary:
+    def run(self) -> GuidedSummary:
         clock = SystemClock()
         address = encoder_address(RIG, self.emulation.address["can"], PACE)
         person = PersonGuide(Console(quiet=True))

@@ -9,15 +9,14 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from acquisition.recording.columns import SPOTS
+from acquisition.recording import Channel, Event, RecordingWriter
 from acquisition.recording.rig import rig_text
-from acquisition.recording.stream import Channel, Event
-from acquisition.recording.writer import RecordingWriter
+from acquisition.recording.samples import SPOTS
 from calibeam.cli import run
 from calibeam.commands.demo import RIG
 from calibeam.devices.site import VIEWED
 from drivers.clock import SystemClock
-from drivers.ur.recipe import VARIABLES
+from drivers.ur.reader import VARIABLES
 
 SIX = (6,)
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import Placement, Pose
+from acquisition.recording.rig import Placement, Pose, load_rig
 from calibeam.live.composer import Composer
 from calibeam.live.feed import Progress
 from calibeam.live.latest import Latest

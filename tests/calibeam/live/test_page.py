@@ -9,7 +9,8 @@ import pytest
 from msgspec import structs
 from websockets.sync.client import ClientConnection, connect
 
-from acquisition.recording.rig_schema import Live, Rig
+from acquisition.recording.rig import Rig
+from acquisition.recording.rig.schema import Live
 from benchmarks.live_feed import LivingRig
 from calibeam.live.latest import Latest
 from calibeam.live.page import LivePage, PageAddress, PageError, live_page

@@ -10,7 +10,7 @@ import pytest
 from msgspec import structs
 from websockets.sync.client import connect
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibeam.devices.robot import robot_of
 from calibeam.devices.site import addresses_of
 from calibeam.emulation import Emulation

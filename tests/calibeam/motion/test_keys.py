@@ -5,7 +5,7 @@ import signal
 
 import pytest
 
-from acquisition.motion.states import Event, State, after
+from acquisition.motion.states import MotionEvent, MotionState, after
 from calibeam.asking import Asking
 from calibeam.interrupts import INTERRUPTS
 from calibeam.motion.by_hand import WORDS, MotionKeys, keys_of
@@ -16,37 +16,37 @@ PATIENCE_S = 30.0
 class Told:
     """A gate that keeps what it was told, and follows the table of states; it is paused twice within ten seconds."""
 
-    def __init__(self, state: State) -> None:
+    def __init__(self, state: MotionState) -> None:
         self.state, self.told = state, []
         self.brake_s = 0.4
 
     def rests_in_s(self) -> float:
         return 0.7
 
-    def _tell(self, event: Event) -> None:
+    def _tell(self, event: MotionEvent) -> None:
         self.told.append(event.value)
         self.state = after(self.state, event)
 
     def pause(self) -> None:
-        self._tell(Event.HOLD if self.state is State.PAUSING else Event.PAUSE)
+        self._tell(MotionEvent.HOLD if self.state is MotionState.PAUSING else MotionEvent.PAUSE)
 
     def resume(self) -> None:
-        self._tell(Event.RESUME)
+        self._tell(MotionEvent.RESUME)
 
     def stop(self) -> None:
-        self._tell(Event.STOP)
+        self._tell(MotionEvent.STOP)
 
     def abort(self) -> None:
-        self._tell(Event.ABORT)
+        self._tell(MotionEvent.ABORT)
 
     def halt(self) -> None:
-        self._tell(Event.HALT)
+        self._tell(MotionEvent.HALT)
 
 
 def test_ctrl_c_pauses_then_holds_then_gives_up() -> None:
-    gate, out = Told(State.MOVING), io.StringIO()
+    gate, out = Told(MotionState.MOVING), io.StringIO()
     keys = MotionKeys(gate, None, out)  # type: ignore[arg-type]
-    for state in (State.PAUSING, State.HELD, State.ENDING):
+    for state in (MotionState.PAUSING, MotionState.HELD, MotionState.ENDING):
         keys.interrupted()
         assert gate.state is state
     assert gate.told == ["pause", "hold", "abort"]
@@ -56,20 +56,20 @@ def test_ctrl_c_pauses_then_holds_then_gives_up() -> None:
 
 @pytest.mark.parametrize(("word", "told"), [("r\n", "resume"), ("Stop", "stop"), ("a", "abort"), ("h", "halt")])
 def test_words(word: str, told: str) -> None:
-    gate = Told(State.HELD)
+    gate = Told(MotionState.HELD)
     MotionKeys(gate, None, io.StringIO()).word(word)  # type: ignore[arg-type]
     assert gate.told == [told]
 
 
 @pytest.mark.parametrize("word", ["what", "rest", "", "\x1b[A"])
 def test_another_word_does_nothing(word: str) -> None:
-    gate = Told(State.HELD)
+    gate = Told(MotionState.HELD)
     MotionKeys(gate, None, io.StringIO()).word(word)  # type: ignore[arg-type]
     assert gate.told == []
 
 
 def test_a_word_typed_ahead_does_not_resume(typist) -> None:
-    gate = Told(State.MOVING)
+    gate = Told(MotionState.MOVING)
     typist.ahead("r\n")
     typist.answers("> ", "what\n", "s\n")
     keys = MotionKeys(gate, Asking(typist.terminal), io.StringIO())  # type: ignore[arg-type]
@@ -81,9 +81,9 @@ def test_a_word_typed_ahead_does_not_resume(typist) -> None:
 
 
 def test_a_closed_terminal_gives_up() -> None:
-    gate = Told(State.MOVING)
+    gate = Told(MotionState.MOVING)
     MotionKeys(gate, None, io.StringIO()).ended()  # type: ignore[arg-type]
-    assert gate.state is State.ENDING
+    assert gate.state is MotionState.ENDING
 
 
 @pytest.mark.parametrize(
@@ -91,7 +91,7 @@ def test_a_closed_terminal_gives_up() -> None:
 )
 def test_signals_reach_the_gate_while_it_is_followed_and_no_longer(monkeypatch, number, told) -> None:
     monkeypatch.setattr(INTERRUPTS, "leave_terminal", lambda: None)
-    before, gate = signal.getsignal(number), Told(State.MOVING)
+    before, gate = signal.getsignal(number), Told(MotionState.MOVING)
     with keys_of(gate):  # type: ignore[arg-type]
         signal.raise_signal(number)
     assert gate.told == [told]
@@ -99,7 +99,7 @@ def test_signals_reach_the_gate_while_it_is_followed_and_no_longer(monkeypatch, 
 
 
 def test_the_keyboard_is_left_when_the_held_motion_ends(typist) -> None:
-    gate = Told(State.MOVING)
+    gate = Told(MotionState.MOVING)
     keys = MotionKeys(gate, Asking(typist.terminal), io.StringIO())  # type: ignore[arg-type]
     keys.interrupted()
     assert typist.shows("> ")

@@ -8,8 +8,8 @@ import pytest
 
 from acquisition.plan import PlanOptions
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
-from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import MotionBox, Rig
+from acquisition.recording.rig import Rig, load_rig
+from acquisition.recording.rig.schema import MotionBox
 from calibeam.motion.rehearsal import rehearse
 from calibeam.motion.rehearsal_figure import draw_session
 

@@ -18,11 +18,10 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from acquisition.recording import Channel, Event, Gap, RecordingWriter
 from acquisition.recording.can_frames import block_of, channels
-from acquisition.recording.can_message import frame_of
+from acquisition.recording.can_log import frame_of
 from acquisition.recording.rig import load_rig, rig_sha256, rig_text
-from acquisition.recording.stream import Channel, Event, Gap
-from acquisition.recording.writer import RecordingWriter
 from calibeam.fleet.recordings import find_recordings
 from calibeam.fleet.row import Task
 from calibeam.fleet.table import write_rows

@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from acquisition.recording.read import read
+from acquisition.recording import read
 from calibeam.prove.baselines import features
 from calibeam.prove.comparison import GEOMETRY, compare, fold_of, oracle_terms
 from calibeam.prove.real import SEED, hidden_angles

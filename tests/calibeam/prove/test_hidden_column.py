@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
 from calibeam.prove.real import against_hidden, real_sets
 from calibrate.diagnose.schema import CurveRecord, DiagnosisFile, FindingRecord
 from calibrate.errors import DataError

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from acquisition.plan import PlanOptions
+from acquisition.recording import RecordingWriter
 from acquisition.recording.rig import load_rig, rig_text
-from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.learner import FittedLearner

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.recording.read import read
+from acquisition.recording import read
 from calibeam.prove.concealing import conceal_on_wires
 from simulators.conceal.observe import observe
 from simulators.conceal.wanted import Wanted

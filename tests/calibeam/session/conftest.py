@@ -7,8 +7,7 @@ import pytest
 
 from acquisition.bench import Look, Spot
 from acquisition.plan import PlanOptions, blocks
-from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig, load_rig
 from acquisition.sample import Sample
 from calibeam.session.forecast import Ahead, ahead_of_blocks
 from calibrate.believed import BelievedRig

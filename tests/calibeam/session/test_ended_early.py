@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from acquisition.errors import StoppedError
-from acquisition.recording.errors import RecordingError
+from acquisition.recording import RecordingError
 from calibeam.devices.recorder import kept
 from calibeam.outcome import PartialResult
 from drivers.errors import DeviceLost

@@ -7,11 +7,9 @@ import pytest
 
 from acquisition.errors import AcquisitionError
 from acquisition.plan import PlanOptions, PoseKey
-from acquisition.recording.errors import RecordingError, RigFileError
+from acquisition.recording import Event, RecordingError, RecordingWriter, RigFileError
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
 from acquisition.recording.rig import parse_rig
-from acquisition.recording.stream import Event
-from acquisition.recording.writer import RecordingWriter
 from calibeam.devices.site import addresses_of
 from calibeam.session.job import (
     MORE,

@@ -13,7 +13,7 @@ import pytest
 
 from acquisition.errors import StoppedError
 from acquisition.reins import Reins
-from acquisition.session_states import Event, State
+from acquisition.session_states import RunEvent, RunState
 from calibeam.session.keys import ENTER, Keys
 from drivers.errors import DeviceLost
 
@@ -24,16 +24,16 @@ class Followed:
     """Reins that tell when they come into a state."""
 
     def __init__(self) -> None:
-        self._came = {state: threading.Event() for state in State}
-        self.states: list[State] = []
+        self._came = {state: threading.Event() for state in RunState}
+        self.states: list[RunState] = []
         self.reins = Reins(lambda: None, changed=self._changed)
-        self.reins.tell(Event.START)
+        self.reins.tell(RunEvent.START)
 
-    def _changed(self, state: State) -> None:
+    def _changed(self, state: RunState) -> None:
         self.states.append(state)
         self._came[state].set()
 
-    def comes_to(self, state: State) -> bool:
+    def comes_to(self, state: RunState) -> bool:
         return self._came[state].wait(PATIENCE_S)
 
 
@@ -52,8 +52,8 @@ def terminal():
 
 @pytest.mark.parametrize(
     ("typed", "state"),
-    [(" ", State.PAUSING), ("p", State.PAUSING), ("PP", State.BREAKING), ("s", State.ENDING), ("A", State.ABORTING),
-     ("h", State.HALTED), ("pr", State.RUNNING), ("x", State.RUNNING)],
+    [(" ", RunState.PAUSING), ("p", RunState.PAUSING), ("PP", RunState.BREAKING), ("s", RunState.ENDING),
+     ("A", RunState.ABORTING), ("h", RunState.HALTED), ("pr", RunState.RUNNING), ("x", RunState.RUNNING)],
 )  # fmt: skip
 def test_every_key(followed, typed, state) -> None:
     keys = Keys(followed.reins, None)
@@ -68,7 +68,7 @@ def test_keys_come_without_enter_and_the_terminal_is_as_it_was(followed, termina
     with Keys(followed.reins, theirs):
         assert not termios.tcgetattr(theirs)[3] & termios.ICANON
         os.write(ours, b" ")
-        assert followed.comes_to(State.PAUSING)
+        assert followed.comes_to(RunState.PAUSING)
     assert termios.tcgetattr(theirs) == before
 
 
@@ -76,10 +76,10 @@ def test_arrows_and_function_keys_mean_nothing(followed, terminal) -> None:
     """Up, Home, F3, wheel: else abort, halt, resume, abort."""
     with Keys(followed.reins, terminal[1]):
         os.write(terminal[0], b"\x1b[A\x1b[H\x1bOR\x1b[<64;1;1M ")
-        assert followed.comes_to(State.PAUSING)
+        assert followed.comes_to(RunState.PAUSING)
         os.write(terminal[0], b"\x1bORs")
-        assert followed.comes_to(State.ENDING)
-    assert followed.states == [State.RUNNING, State.PAUSING, State.ENDING]
+        assert followed.comes_to(RunState.ENDING)
+    assert followed.states == [RunState.RUNNING, RunState.PAUSING, RunState.ENDING]
 
 
 def test_the_terminal_is_as_it_was_after_an_error_too(followed, terminal) -> None:
@@ -90,7 +90,9 @@ def test_the_terminal_is_as_it_was_after_an_error_too(followed, terminal) -> Non
 
 
 @pytest.mark.parametrize(
-    ("number", "state"), [(signal.SIGINT, State.PAUSING), (signal.SIGTSTP, State.PAUSING)], ids=["Ctrl-C", "Ctrl-Z"]
+    ("number", "state"),
+    [(signal.SIGINT, RunState.PAUSING), (signal.SIGTSTP, RunState.PAUSING)],
+    ids=["Ctrl-C", "Ctrl-Z"],
 )
 def test_signals_pause(followed, number, state) -> None:
     before: Callable[..., object] = signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -106,10 +108,10 @@ def test_signals_pause(followed, number, state) -> None:
 def test_without_a_terminal_a_pause_ends_by_the_signal_that_continues(followed) -> None:
     with Keys(followed.reins, None):
         followed.reins.pause()
-        followed.reins.tell(Event.CHECKPOINT)
-        followed._came[State.RUNNING].clear()
+        followed.reins.tell(RunEvent.CHECKPOINT)
+        followed._came[RunState.RUNNING].clear()
         os.kill(os.getpid(), signal.SIGCONT)
-        assert followed.comes_to(State.RUNNING)
+        assert followed.comes_to(RunState.RUNNING)
 
 
 def test_who_asks_gets_the_answer_and_no_pause(followed) -> None:
@@ -122,7 +124,7 @@ def test_who_asks_gets_the_answer_and_no_pause(followed) -> None:
         keys.pressed("\r")
         asked.join(0.01)
     assert answers == [ENTER]
-    assert followed.reins.state is State.RUNNING
+    assert followed.reins.state is RunState.RUNNING
 
 
 def test_an_enter_too_many_answers_no_later_question() -> None:
@@ -136,7 +138,7 @@ def test_an_enter_too_many_answers_no_later_question() -> None:
         return DeviceLost("psd: nobody answers") if len(looks) == 3 else None
 
     reins = Reins(lambda: None, failure=meanwhile)
-    reins.tell(Event.START)
+    reins.tell(RunEvent.START)
     keys = Keys(reins, None)
     assert keys.wait(ENTER) == ENTER
     with pytest.raises(DeviceLost, match="nobody answers"):
@@ -145,10 +147,10 @@ def test_an_enter_too_many_answers_no_later_question() -> None:
 
 def test_a_device_that_fails_ends_the_question() -> None:
     reins = Reins(lambda: None, failure=lambda: StoppedError("STOP was pressed on the live page"))
-    reins.tell(Event.START)
+    reins.tell(RunEvent.START)
     with pytest.raises(StoppedError, match="live page"):
         Keys(reins, None).wait(ENTER)
-    assert reins.state is State.ABORTED
+    assert reins.state is RunState.ABORTED
 
 
 def test_an_abort_ends_the_question(followed) -> None:
@@ -161,7 +163,7 @@ def test_an_abort_ends_the_question(followed) -> None:
 def test_a_signal_that_ends_the_session_aborts_it(followed, number, why) -> None:
     with Keys(followed.reins, None):
         os.kill(os.getpid(), number)
-        assert followed.comes_to(State.ABORTING)
+        assert followed.comes_to(RunState.ABORTING)
         with pytest.raises(StoppedError, match=f"^{why}: the session was aborted"):
             followed.reins.checkpoint()
 

@@ -12,7 +12,7 @@ from rich.console import Console
 from acquisition.errors import AcquisitionError
 from acquisition.progress import Phase, Progress
 from acquisition.reins import Reins
-from acquisition.session_states import Event, State
+from acquisition.session_states import RunEvent, RunState
 from calibeam.asking import Asking
 from calibeam.live.feed import SILENT
 from calibeam.live.feed import Progress as PageProgress
@@ -86,13 +86,13 @@ def reporter(rig, clock, heard) -> StatusReporter:
 @pytest.mark.parametrize(
     ("state", "large", "keys"),
     [
-        (State.RUNNING, "COLLECT", "SPACE pause"),
-        (State.PAUSING, "PAUSING, THE ARM COMES TO REST", "SPACE stop the arm now"),
-        (State.BREAKING, "STOPPING THE ARM", "a abort    h halt"),
-        (State.PAUSED, "PAUSED, THE ARM STANDS", "r go on    s finish here    a abort    h halt"),
-        (State.ABORTING, "ABORTING", "h halt"),
-        (State.HALTED, "HALTED, THE ARM IS HELD", "h say the stop again"),
-        (State.ABORTED, "ABORTED, THE ARM STANDS", ""),
+        (RunState.RUNNING, "COLLECT", "SPACE pause"),
+        (RunState.PAUSING, "PAUSING, THE ARM COMES TO REST", "SPACE stop the arm now"),
+        (RunState.BREAKING, "STOPPING THE ARM", "a abort    h halt"),
+        (RunState.PAUSED, "PAUSED, THE ARM STANDS", "r go on    s finish here    a abort    h halt"),
+        (RunState.ABORTING, "ABORTING", "h halt"),
+        (RunState.HALTED, "HALTED, THE ARM IS HELD", "h say the stop again"),
+        (RunState.ABORTED, "ABORTED, THE ARM STANDS", ""),
     ],
 )
 def test_the_view_says_in_capitals_what_goes_on_and_which_keys_serve(state, large, keys) -> None:
@@ -105,7 +105,7 @@ def test_the_view_says_in_capitals_what_goes_on_and_which_keys_serve(state, larg
 
 def test_the_view_fits_a_terminal_of_eighty_columns(reporter, samples) -> None:
     journal = ReportingJournal(Kept(), reporter, lambda all_: None)
-    reporter.state(State.RUNNING)
+    reporter.state(RunState.RUNNING)
     reporter.progress(progress())
     for sample in samples[:9]:
         journal.sample(sample)
@@ -145,7 +145,9 @@ def test_a_dark_face_is_said(reporter, samples) -> None:
 
 
 def test_who_is_asked_sees_nothing_else() -> None:
-    text = told(SessionStatus(State.RUNNING, progress=progress(), asked="put the fixture at place 2, then press ENTER"))
+    text = told(
+        SessionStatus(RunState.RUNNING, progress=progress(), asked="put the fixture at place 2, then press ENTER")
+    )
     assert "YOUR TURN" in text
     assert "then press ENTER" in text
     assert "SPACE" not in text
@@ -153,14 +155,14 @@ def test_who_is_asked_sees_nothing_else() -> None:
 
 def test_time_left_counts_only_when_the_arm_works(reporter, clock, samples) -> None:
     journal = ReportingJournal(Kept(), reporter, lambda all_: None)
-    reporter.state(State.RUNNING)
+    reporter.state(RunState.RUNNING)
     reporter.progress(progress(0))
     for sample in samples[:4]:
         clock.time_s += 10.0
         journal.sample(sample)
-    reporter.state(State.PAUSED)
+    reporter.state(RunState.PAUSED)
     clock.time_s += 3600.0
-    reporter.state(State.RUNNING)
+    reporter.state(RunState.RUNNING)
     reporter.asked("put the fixture there")
     clock.time_s += 3600.0
     reporter.asked("")
@@ -232,7 +234,7 @@ def test_the_page_is_told_the_same_and_what_it_draws_by() -> None:
     feed = Feed()
     view = PageView(feed)
     shown = SessionStatus(
-        State.RUNNING, progress=progress(), left_s=60.0, forecast=Forecast(5, 2e-5, corrections={"a": 1.0})
+        RunState.RUNNING, progress=progress(), left_s=60.0, forecast=Forecast(5, 2e-5, corrections={"a": 1.0})
     )
     view.shows(shown)
     view.shows(shown)
@@ -261,7 +263,7 @@ def test_a_script_gets_what_is_safe_and_nobody_puts_a_fixture_for_it(reporter) -
 def test_the_question_for_the_fixture_is_on_the_screen_before_an_enter_counts(reporter, heard, typist) -> None:
     """Typed ahead, and typed while the question is being drawn: neither is an answer."""
     reins = Reins(lambda: None, changed=reporter.state)
-    reins.tell(Event.START)
+    reins.tell(RunEvent.START)
     asked = person(reporter, Asking(typist.terminal), agrees=False)
     typist.ahead("\n")
     typist.answers("then press ENTER", "\n")

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from acquisition.plan import PlanOptions, blocks
-from acquisition.recording.parts import parts
+from acquisition.recording import read
+from acquisition.recording.mcap import parts
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan, write_pose_plan
-from acquisition.recording.read import read
 from acquisition.recording.rig import load_rig
 from acquisition.sample import Sample
-from acquisition.session_states import State
+from acquisition.session_states import RunState
 from benchmarks.stops import emulated_rig, without_encoders
 from calibeam.cli import run
 from calibeam.emulation import Emulation
@@ -60,11 +60,11 @@ def interrupted(monkeypatch) -> None:
             os.kill(os.getpid(), signal.SIGINT)
             assert pausing.wait(PATIENCE_S)
 
-    def state(teller: StatusReporter, state: State) -> None:
+    def state(teller: StatusReporter, state: RunState) -> None:
         turn(teller, state)
-        if state is State.PAUSING:
+        if state is RunState.PAUSING:
             pausing.set()
-        elif state is State.PAUSED:
+        elif state is RunState.PAUSED:
             os.kill(os.getpid(), signal.SIGCONT)
 
     monkeypatch.setattr(StatusReporter, "sample", sample)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.recording.read import read
+from acquisition.recording import read
 from benchmarks.stops import CRUISES_RAD_S, GO_CUE, MOVES_RAD_S, Staged, staged, travelling
 
 from .conftest import RIG_FILE

@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import ArmModel
+from acquisition.recording.rig import ArmModel, load_rig
 from calibrate.arms.catalogue import arm_of
 
 RIG = Path(__file__).parents[3] / "rigs" / "arm-cmm-reference.toml"

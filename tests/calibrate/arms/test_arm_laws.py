@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.rig_schema import Arm, ArmModel, Joint, Pose, Rig, Tolerance
+from acquisition.recording.rig import Arm, ArmModel, Joint, Pose, Rig, Tolerance
 from calibrate.arms.belief import FREE, HELD_AS_DRAWN, LinkBelief
 from calibrate.arms.catalogue import ARMS, arm_of
 

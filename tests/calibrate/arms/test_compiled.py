@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from acquisition.recording.rig_schema import Arm, ArmModel, Joint, Pose, Rig, Tolerance
+from acquisition.recording.rig import Arm, ArmModel, Joint, Pose, Rig, Tolerance
 from calibrate.arms import compiled
 from calibrate.arms.catalogue import ARMS, arm_of
 from calibrate.arms.serial import point_by_parameter

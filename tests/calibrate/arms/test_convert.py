@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import Arm, ArmModel, Joint, Pose, Rig
+from acquisition.recording.rig import Arm, ArmModel, Joint, Pose, Rig, load_rig
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.convert import convert
 from calibrate.arms.table import NearParallel

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.rig_schema import Arm, ArmModel, Joint, Pose, Rig
+from acquisition.recording.rig import Arm, ArmModel, Joint, Pose, Rig
 from calibrate.arms.catalogue import ARMS, arm_of
 
 FLANGE = Pose((0.01, -0.02, 0.03), (0.1, 0.2, -0.3))

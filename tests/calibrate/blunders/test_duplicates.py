@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig import parse_rig
-from acquisition.recording.samples_csv import parse_csv
+from acquisition.recording.session_folder.tables import parse_csv
 from calibrate.blunders.duplicates import duplicated_rows
 
 RIG = """schema = 1

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from acquisition.recording.errors import MESSAGE_LENGTH, brief
+from acquisition.recording.errors import MESSAGE_LENGTH
+from acquisition.recording.files import brief
 from calibrate.blunders.conventions import wrong_convention
 from calibrate.blunders.finding import BlunderKind
 from calibrate.sensors.position import PositionWitness

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
 from calibrate.blunders.finding import Blunder, BlunderKind
 from calibrate.blunders.left_alone import left_alone
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from acquisition.recording import Samples
 from acquisition.recording.rig import load_rig
-from acquisition.recording.samples import Samples
 from calibrate.blunders.finding import BlunderKind
 from calibrate.blunders.spot_signs import mirrored_axes
 from calibrate.errors import DataError

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from acquisition.recording import Samples
 from acquisition.recording.rig import load_rig
-from acquisition.recording.samples import Samples
 from calibrate.arms.catalogue import arm_of
 from calibrate.blunders.conventions import wrong_convention
 from calibrate.blunders.finding import BlunderKind

@@ -1,6 +1,6 @@
 """Sessions of the concealed bench, read as a diagnosis reads them: the truth stays sealed."""
 
-from acquisition.recording.read import read
+from acquisition.recording import read
 from simulators.conceal.case import conceal
 from simulators.conceal.wanted import Wanted
 from simulators.conceal.write import write_case

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Rig
+from acquisition.recording.rig import Rig
 from calibrate.diagnose.linearised import Accepted, Rows, Unseen
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.ports import Place, Port

@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from acquisition.recording.read import read
+from acquisition.recording import read
 from simulators.arm.rigid import inverse, turned
 from simulators.conceal.belief import rig_document
 from simulators.conceal.case import conceal

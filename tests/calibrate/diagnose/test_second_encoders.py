@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from acquisition.recording.read import read
+from acquisition.recording import read
 from calibeam.cli import run
 from calibrate.diagnose.diagnosis import Verdict
 from calibrate.diagnose.from_recording import diagnose_samples

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.recording.read import read
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples, read
 from calibrate.diagnose.fitted import Fitted, fit_geometry
 from calibrate.diagnose.session import session_of
 from calibrate.effects.drivers import Drivers

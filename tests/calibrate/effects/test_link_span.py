@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from acquisition.recording.rig_schema import ArmModel
+from acquisition.recording.rig import ArmModel
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.convert import convert
 from calibrate.diagnose.ported import flange_twists, perturbed_frames

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from acquisition.recording.rig_schema import ArmModel, Pose
+from acquisition.recording.rig import ArmModel, Pose
 from calibrate.effects.backlash import EFFECT as BACKLASH
 from calibrate.effects.base_compliance import EFFECT as BASE
 from calibrate.effects.gravity import stated_torque_nm

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import ArmModel, Rig
+from acquisition.recording.rig import ArmModel, Rig, load_rig
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.convert import convert
 from calibrate.errors import DataError

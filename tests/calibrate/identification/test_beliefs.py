@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import ArmModel
+from acquisition.recording.rig import ArmModel, load_rig
 from calibrate.default_belief import PAIR, WIDE, said_of
 from calibrate.fit_plan import DEFAULT, FitPlan
 from calibrate.identification.identify import identify

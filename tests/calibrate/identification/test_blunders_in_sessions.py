@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
 from calibrate.blunders.finding import BlunderKind
 from calibrate.errors import DataError
 from calibrate.identification.identify import identify

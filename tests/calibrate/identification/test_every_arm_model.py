@@ -4,7 +4,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from acquisition.recording.rig_schema import ArmModel
+from acquisition.recording.rig import ArmModel
 from calibrate.arms.convert import convert
 from calibrate.export.export import ExportForm, export_text
 from calibrate.fit import Status

@@ -4,8 +4,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from acquisition.recording.rig_schema import KnownDistance, Pose
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
+from acquisition.recording.rig import Pose
+from acquisition.recording.rig.schema import KnownDistance
 from calibrate.fit import Status
 from calibrate.fit_plan import FitPlan
 from calibrate.identification.identify import identify

@@ -4,7 +4,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from acquisition.recording.rig_schema import ArmModel
+from acquisition.recording.rig import ArmModel
 from calibrate.errors import DataError
 from calibrate.fit_plan import AnglesName, FitPlan, LossName, RedundantName, SolverName, parse_plan
 from calibrate.identification.identify import identify

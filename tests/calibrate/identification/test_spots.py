@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from acquisition.recording import Samples
 from acquisition.recording.rig import load_rig
-from acquisition.recording.samples import Samples
 from calibrate.blunders.finding import BlunderKind
 from calibrate.errors import DataError
 from calibrate.fit_plan import FitPlan

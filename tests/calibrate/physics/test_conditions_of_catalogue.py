@@ -13,8 +13,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from acquisition.recording.read import read
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples, read
 from calibrate.diagnose.blunders_first import Cleared
 from calibrate.diagnose.curve import Curve
 from calibrate.diagnose.fitted import fit_geometry

@@ -4,7 +4,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
 from calibrate.errors import DataError
 from calibrate.physics.predicting import predict_with_physics
 

@@ -89,7 +89,7 @@ def test_no_candidate_comes_near_a_keep_out_box(rig):
     import msgspec
 
     from acquisition.motion.cell import body_points
-    from acquisition.recording.rig_schema import MotionBox
+    from acquisition.recording.rig.schema import MotionBox
     from calibeam.motion.gate_of_rig import cell_of, solver_of
 
     box = MotionBox("post", (0.1, 0.2, 0.0), (0.2, 0.3, 0.6))
@@ -175,7 +175,8 @@ def test_poses_are_enough_behind_the_last_steep_stretch():
 def test_poses_before_a_tracker_are_designed_too(rig):
     import msgspec
 
-    from acquisition.recording.rig_schema import Pose, Tool
+    from acquisition.recording.rig import Pose
+    from acquisition.recording.rig.schema import Tool
     from calibrate.rigid import transform
 
     tracked = msgspec.structs.replace(

@@ -8,11 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from acquisition.plan import PlanOptions
-from acquisition.recording.read import read
-from acquisition.recording.recording import Recording
+from acquisition.recording import Recording, RecordingWriter, Samples, read
 from acquisition.recording.rig import load_rig, parse_rig, plain_rig, rig_sha256, rig_text
-from acquisition.recording.samples import Samples
-from acquisition.recording.writer import RecordingWriter
 from acquisition.session import Session
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.learner import FittedLearner

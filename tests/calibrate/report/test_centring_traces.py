@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.recording.stream import Event
+from acquisition.recording import Event
 from calibrate.report.centring_traces import traces_of
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
 
 PLACE = ("camera_x_m", "camera_y_m", "camera_z_m")
 TURN = ("camera_rx_rad", "camera_ry_rad", "camera_rz_rad")

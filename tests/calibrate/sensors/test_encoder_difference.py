@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
 from calibrate.errors import DataError
 from calibrate.sensors.catalogue import unused_columns
 from calibrate.sensors.encoder_difference import differences, encoder_angles, not_following

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.rig_schema import Arm, ArmModel, Joint, Rig
+from acquisition.recording.rig import Arm, ArmModel, Joint, Rig
 from calibrate.arms.catalogue import arm_of
 from calibrate.tool_axes.arm_prior import ArmErrors, assumed_prior
 from calibrate.tool_axes.tool import calibrate_tool

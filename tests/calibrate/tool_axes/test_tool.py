@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.rig_schema import Arm, ArmModel, Joint, Rig
+from acquisition.recording.rig import Arm, ArmModel, Joint, Rig
 from calibrate.arms.catalogue import arm_of
 from calibrate.errors import DataError
 from calibrate.fit import Status

@@ -6,9 +6,9 @@ import msgspec
 import numpy as np
 import pytest
 
+from acquisition.recording import Samples
 from acquisition.recording.rig import load_rig
-from acquisition.recording.rig_schema import PermissibleErrors
-from acquisition.recording.samples import Samples
+from acquisition.recording.rig.schema import PermissibleErrors
 from calibrate.errors import DataError
 from calibrate.verification import b89_4_22, iso10360_12
 from calibrate.verification.figure import Judgement

@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.cia406.codec import MappedObject, emergency, heartbeat_state, mapped_number, mapped_object
-from drivers.cia406.objects import NmtState
+from drivers.cia406.codec import MappedObject, NmtState, emergency, heartbeat_state, mapped_number, mapped_object
 
 POSITION_ONLY = (mapped_object(0x60040020),)
 ALARMS_FIRST = (mapped_object(0x65030010), mapped_object(0x60040020))

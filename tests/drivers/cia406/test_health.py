@@ -8,7 +8,7 @@ import pytest
 
 from drivers.cia406.configuration import HEARTBEAT_MS
 from drivers.cia406.device import Cia406Encoders
-from drivers.cia406.heartbeats import Heartbeats
+from drivers.cia406.health import Heartbeats
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale
 
 PERIOD_S = HEARTBEAT_MS * 1e-3

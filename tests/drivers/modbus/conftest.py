@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from acquisition.recording.rig_devices import RobotDevice
+from acquisition.recording.rig.devices import RobotDevice
 from calibeam.devices.robot import emulated_robot, robot_of
 from drivers.clock import SystemClock
 from drivers.device import Device, Movable

@@ -6,8 +6,7 @@ import pytest
 
 from drivers.errors import DeviceRefused, DeviceStale
 from drivers.modbus.arm import BEGIN_LIMIT_S, ModbusArm, State
-from drivers.modbus.register import Register
-from drivers.modbus.register_map import ANSWERS, COMMANDS, RegisterMap
+from drivers.modbus.register_map import ANSWERS, COMMANDS, Register, RegisterMap
 
 from .conftest import HOME
 

@@ -8,8 +8,7 @@ import pytest
 from drivers.errors import DeviceError, DeviceLost, DeviceRefused, DeviceStale
 from drivers.modbus.arm import ModbusArm
 from drivers.modbus.line import RETRIES, TIMEOUT_S, ModbusLine, TcpAddress
-from drivers.modbus.register import Register
-from drivers.modbus.register_map import RegisterMap
+from drivers.modbus.register_map import Register, RegisterMap
 from tests.drivers.modbus.conftest import HOME
 
 FAR = HOME + np.array([2.0, 0.0, 0.0, 0.0, 0.0, 0.0])

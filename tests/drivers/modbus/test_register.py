@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymodbus.client import ModbusTcpClient
 
-from drivers.modbus.register import DTYPES, Register
-from drivers.modbus.register_map import RegisterMap, Request
+from drivers.modbus.register_map import DTYPES, Register, RegisterMap, Request
 
 PYMODBUS = ModbusTcpClient("127.0.0.1")
 SIX = [0.1, -0.2, 0.3, 0.0, 3.0, -3.0]

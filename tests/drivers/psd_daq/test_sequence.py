@@ -1,6 +1,6 @@
 """The box's 32-bit count as one that only rises."""
 
-from drivers.psd_daq.sequence import WRAP, RepeatFilter, SequenceCount
+from drivers.psd_daq.codec import WRAP, RepeatFilter, SequenceCount
 
 
 def test_a_wrap_goes_on_counting():

@@ -9,8 +9,7 @@ import pytest
 
 from drivers.errors import DeviceLost
 from drivers.psd_faces import FaceKind
-from drivers.psd_kpa101.pair import Head, Kpa101Pair
-from drivers.psd_kpa101.wiring import Wiring
+from drivers.psd_kpa101.pair import Head, Kpa101Pair, Wiring
 from simulators.host.loop import Host
 from simulators.kpa101.emulator import build
 from simulators.wire import Bench

@@ -8,8 +8,7 @@ from drivers.clock import SystemClock
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale, WireError
 from drivers.psd_daq.messages import Flag
 from drivers.psd_faces import Face, FaceKind
-from drivers.psd_kpa101.pair import BAUD, Head, Kpa101Pair, counts_of
-from drivers.psd_kpa101.wiring import Wiring
+from drivers.psd_kpa101.pair import BAUD, Head, Kpa101Pair, Wiring, counts_of
 from drivers.transports.serial_port import SerialAddress, SerialLine, open_serial
 
 LENGTH_M = 0.01

@@ -10,7 +10,7 @@ from contextlib import suppress
 import can
 import pytest
 
-from acquisition.recording.can_message import frame_of
+from acquisition.recording.can_log import frame_of
 from drivers.transports.slcan_bus import LONGEST_LINE, BlockSlcanBus
 
 LINES = (

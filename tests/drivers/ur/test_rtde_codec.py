@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from drivers.ur.rtde_codec import (
     ControllerVersion,
     Data,
-    Junk,
     Message,
     OutputsAnswer,
     PauseAnswer,
     ProtocolAnswer,
     RtdeCodec,
+    RtdeJunk,
     StartAnswer,
     TextMessage,
     Unknown,
@@ -110,7 +110,7 @@ def test_packages_of_another_recipe_are_not_mixed_in() -> None:
 def test_what_is_no_frame_is_junk_with_its_place_and_nothing_follows(rubbish: bytes) -> None:
     codec = RtdeCodec()
     assert codec.feed(frame("S", b"\x01")) == [StartAnswer(True)]
-    assert codec.feed(rubbish + b"more") == [Junk(4, (rubbish + b"more")[:32])]
+    assert codec.feed(rubbish + b"more") == [RtdeJunk(4, (rubbish + b"more")[:32])]
     assert codec.feed(frame("S", b"\x01")) == []
 
 

@@ -13,11 +13,11 @@ import pytest
 from drivers.ur.rtde_codec import (
     ControllerVersion,
     Data,
-    Junk,
     OutputsAnswer,
     PauseAnswer,
     ProtocolAnswer,
     RtdeCodec,
+    RtdeJunk,
     StartAnswer,
     TextMessage,
     Unknown,
@@ -25,7 +25,7 @@ from drivers.ur.rtde_codec import (
 from tests.mutated import mutated
 
 DECLARED = (
-    ControllerVersion, Data, Junk, OutputsAnswer, PauseAnswer, ProtocolAnswer, StartAnswer, TextMessage, Unknown
+    ControllerVersion, Data, RtdeJunk, OutputsAnswer, PauseAnswer, ProtocolAnswer, StartAnswer, TextMessage, Unknown
 )  # fmt: skip
 NAMES, TYPES = ("timestamp", "actual_q", "robot_mode", "flag"), ("DOUBLE", "VECTOR6D", "INT32", "BOOL")
 MOST_KEPT = 65535  # one frame
@@ -72,7 +72,7 @@ def under_fire(count: int, seed: int) -> int:
         messages = codec.feed(data[:cut]) + codec.feed(data[cut:])
         assert all(isinstance(message, DECLARED) for message in messages), data.hex()
         assert len(codec._pending) <= MOST_KEPT, data.hex()
-        if any(isinstance(message, Junk) for message in messages):
+        if any(isinstance(message, RtdeJunk) for message in messages):
             assert codec.feed(PROBE) == [], data.hex()
             codec, ended = negotiated(), ended + 1
             assert stamps(codec.feed(PROBE)) == [PROBE_S]
@@ -101,13 +101,13 @@ def test_damage_inside_a_frame_costs_that_frame_only() -> None:
 def test_a_package_of_another_size_than_its_recipe_ends_the_stream_at_once(size: int) -> None:
     codec = negotiated()
     (found,) = codec.feed(struct.pack(">H", size) + package(0)[2:8])
-    assert found == Junk(0, struct.pack(">H", size) + package(0)[2:8])
+    assert found == RtdeJunk(0, struct.pack(">H", size) + package(0)[2:8])
     assert codec.feed(PROBE) == []
 
 
 @pytest.mark.parametrize("kind", "VvMSP")
 def test_a_length_that_an_answer_cannot_have_ends_the_stream_at_once(kind: str) -> None:
-    assert isinstance(negotiated().feed(struct.pack(">HB", 65535, ord(kind)))[0], Junk)
+    assert isinstance(negotiated().feed(struct.pack(">HB", 65535, ord(kind)))[0], RtdeJunk)
 
 
 def test_no_length_field_reserves_memory() -> None:
@@ -116,7 +116,7 @@ def test_no_length_field_reserves_memory() -> None:
     tracemalloc.start()
     try:
         for data in inputs:
-            if any(isinstance(message, Junk) for message in codec.feed(data)):
+            if any(isinstance(message, RtdeJunk) for message in codec.feed(data)):
                 codec = negotiated()
         _, peak = tracemalloc.get_traced_memory()
     finally:

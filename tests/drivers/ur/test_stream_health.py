@@ -9,8 +9,7 @@ import pytest
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale
 from drivers.ur import pulse
 from drivers.ur.pulse import Pulse, check_stream
-from drivers.ur.reader import UrReader
-from drivers.ur.recipe import VARIABLES
+from drivers.ur.reader import VARIABLES, UrReader
 
 
 def frame(kind: str, payload: bytes = b"") -> bytes:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.recording.folder import read_folder
+from acquisition.recording.session_folder import read_folder
 from simulators.conceal.__main__ import main
 from simulators.conceal.case import Case, conceal
 from simulators.conceal.seated import seated_tip_m

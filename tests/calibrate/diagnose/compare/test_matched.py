@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from acquisition.recording.samples import Samples
+from acquisition.recording import Samples
 from calibrate.diagnose.compare.matched import SAME_RAD, match
 from calibrate.errors import DataError
 

@@ -1,0 +1,52 @@
+"""The recording's file: MCAP with embedded protobuf descriptions, whole at any instant while it is written.
+
+`RecordingWriter` and `read` (both in `acquisition.recording`) are what most need. Here is the rest: long recordings in
+segments, sessions of several parts, the topics of a file for programs that read it without its records. A new kind of
+message is a `MessageType` in `layout`, an encoder in `write_thread` and a `_take_...` in `read`.
+"""
+
+import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from acquisition.recording.mcap.layout import EVENTS_TOPIC, GAPS_TOPIC, SAMPLES_TOPIC, VIEW_TOPIC
+    from acquisition.recording.mcap.log_segments import Rotation, SegmentedRecording, SegmentStream, segments
+    from acquisition.recording.mcap.scan import Scan
+    from acquisition.recording.mcap.session_parts import differs, next_part, parts
+
+__all__ = [
+    "EVENTS_TOPIC",
+    "GAPS_TOPIC",
+    "SAMPLES_TOPIC",
+    "VIEW_TOPIC",
+    "Rotation",
+    "Scan",
+    "SegmentStream",
+    "SegmentedRecording",
+    "differs",
+    "next_part",
+    "parts",
+    "segments",
+]
+
+_MODULE_OF = {
+    "EVENTS_TOPIC": "layout",
+    "GAPS_TOPIC": "layout",
+    "SAMPLES_TOPIC": "layout",
+    "VIEW_TOPIC": "layout",
+    "Rotation": "log_segments",
+    "Scan": "scan",
+    "SegmentStream": "log_segments",
+    "SegmentedRecording": "log_segments",
+    "differs": "session_parts",
+    "next_part": "session_parts",
+    "parts": "session_parts",
+    "segments": "log_segments",
+}
+
+
+def __getattr__(name: str) -> object:
+    """The name, from its module, loaded only now: reading must not load what only writing needs."""
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_MODULE_OF[name]}"), name)

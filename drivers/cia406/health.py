@@ -1,0 +1,134 @@
+"""What encoders say of their own health: emergencies, heartbeats, a restart that nobody ordered.
+
+A heartbeat that stays away is found within one and a half periods, without blaming nodes for a pause of the host: time
+counts only while the bus is heard, between two frames of anybody at most PAUSE_S. A host that slept, an adapter that
+was held up, an emulator that fell behind shows as a gap and makes nobody late. A bus on which nothing is heard at all
+is no question of heartbeats: then SYNC is without answer.
+"""
+
+from collections.abc import Sequence
+
+from drivers.cia406 import codec
+from drivers.cia406.codec import Emergency, NmtState, emergency, heartbeat_state
+from drivers.errors import DeviceLost, DeviceRefused, DeviceStale
+
+LATE = 1.5  # periods
+PAUSE_S = 0.05  # longer than any node at 20 SYNCs a second is silent
+
+
+class Heartbeats:
+    """Alive time since the last heartbeat of every node, from `begin` on."""
+
+    def __init__(self, nodes: Sequence[int], period_s: float) -> None:
+        self._nodes = tuple(nodes)
+        self._limit_s = LATE * period_s
+        self._alive_s = 0.0
+        self._looked_s: float | None = None
+        self._heard_s: dict[int, float] = {}  # in alive time
+
+    def begin(self, now_s: float) -> None:
+        """All nodes start to send heartbeats now."""
+        self._alive_s, self._looked_s = 0.0, now_s
+        self._heard_s = dict.fromkeys(self._nodes, 0.0)
+
+    def look(self, now_s: float) -> None:
+        """A frame came."""
+        if self._looked_s is not None:
+            self._alive_s += min(max(now_s - self._looked_s, 0.0), PAUSE_S)
+            self._looked_s = now_s
+
+    def heard(self, node: int) -> None:
+        if node in self._heard_s:
+            self._heard_s[node] = self._alive_s
+
+    def late(self) -> tuple[int, ...]:
+        """Nodes whose heartbeat is overdue; each is told once, and again after as long."""
+        found = tuple(node for node, heard_s in self._heard_s.items() if self._alive_s - heard_s > self._limit_s)
+        for node in found:
+            self._heard_s[node] = self._alive_s
+        return found
+
+
+EMERGENCIES_KEPT = 256
+
+
+class NodeWatch:
+    """Takes every frame that is not a position. `codes` holds each node's last emergency code, 0 for none."""
+
+    def __init__(self, name: str, nodes: Sequence[int], heartbeat_s: float) -> None:
+        """`heartbeat_s`: the period that the nodes are told, in host time."""
+        self.emergencies: tuple[Emergency, ...] = ()  # the newest EMERGENCIES_KEPT, in the order they came
+        self.codes = tuple(0 for _ in nodes)
+        self.bad_frames = 0
+        self._name = name
+        self._nodes = tuple(nodes)
+        self._heard_s: dict[int, float] = {}  # last heartbeat
+        self._operational = False
+        self._started: set[int] = set()  # nodes that have said that they are operational
+        self._heartbeats = Heartbeats(nodes, heartbeat_s)
+
+    def set_operational(self, operational: bool, now_s: float) -> None:
+        """From now on a boot-up, or another state than operational, is a fault; or no longer.
+
+        Not the other states before a node has said "operational": a heartbeat may cross the start command on its way.
+        """
+        self._operational = operational
+        self._heard_s = {}
+        self._started = set()
+        self._heartbeats.begin(now_s)
+
+    def look(self, now_s: float) -> None:
+        """A frame of anybody came, `now_s`."""
+        self._heartbeats.look(now_s)
+
+    def check_heartbeats(self) -> None:
+        """DeviceStale naming the nodes whose heartbeat stays away; call when nothing waits to be received."""
+        late = self._heartbeats.late() if self._operational else ()
+        if late:
+            raise DeviceStale(
+                f"{self._name}: encoder {', '.join(map(str, late))} has sent no heartbeat for 1.5 periods; "
+                "check its power and cable, and whether another master changed its 1017h"
+            )
+
+    def forget_codes(self) -> None:
+        """Nodes were configured anew: what they reported before is history."""
+        self.codes = tuple(0 for _ in self._nodes)
+
+    def take(self, can_id: int, data: bytes, now_s: float) -> None:
+        """DeviceLost on a restart, DeviceRefused when a node was told to leave the operational state."""
+        function, node = can_id & ~0x7F, can_id & 0x7F
+        if node not in self._nodes:
+            return
+        if function == codec.EMERGENCY_ID:
+            self._take_emergency(node, data, now_s)
+        elif function == codec.HEARTBEAT_ID and self._operational:
+            self._take_heartbeat(node, data, now_s)
+
+    def heard_within(self, places: Sequence[int], limit_s: float, now_s: float) -> bool:
+        """True when the heartbeat of every node at these places came within `limit_s`."""
+        return all(now_s - self._heard_s.get(self._nodes[place], -limit_s) < limit_s for place in places)
+
+    def _take_emergency(self, node: int, data: bytes, now_s: float) -> None:
+        message = emergency(now_s, node, data)
+        if message is None:
+            self.bad_frames += 1
+            return
+        self.emergencies = (*self.emergencies, message)[-EMERGENCIES_KEPT:]
+        at = self._nodes.index(node)
+        self.codes = (*self.codes[:at], message.code, *self.codes[at + 1 :])
+
+    def _take_heartbeat(self, node: int, data: bytes, now_s: float) -> None:
+        state = heartbeat_state(data)
+        self._heard_s[node] = now_s
+        self._heartbeats.heard(node)
+        if state is NmtState.BOOT_UP:
+            raise DeviceLost(
+                f"{self._name}: encoder {node} has restarted by itself (boot-up while operational); "
+                "check its power supply and cable, then connect again"
+            )
+        if state is NmtState.OPERATIONAL:
+            self._started.add(node)
+        elif state is not None and node in self._started:
+            raise DeviceRefused(
+                f"{self._name}: encoder {node} is {state.name}, not operational; did another CANopen master stop it?"
+            )
