@@ -1,11 +1,12 @@
 """What a model says of a later recording: its values and their covariance, and effects that it brings along."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording.samples import Samples
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.term import Size, Term
 
@@ -55,6 +56,12 @@ class Stated(Term):
     columns: Floats = field(kw_only=True)  # (row, width, value)
     added: Floats = field(kw_only=True)  # (row, width) at the values `about`
     about: Floats = field(kw_only=True)  # (value,)
+    elsewhere: Callable[[Samples], tuple[Floats, Floats]] = field(kw_only=True)  # `columns` and `added` of other rows
+
+    def at(self, samples: Samples) -> "Stated":
+        """The same at other rows. DataError where the effect cannot be evaluated there."""
+        columns, added = self.elsewhere(samples)
+        return replace(self, columns=columns, added=added)
 
     def basis(self, drivers: Drivers, inner: Floats) -> Floats:
         return self.columns

@@ -72,6 +72,11 @@ class Fitted:
         return self._split[1][self.problem.given :]
 
     @property
+    def brought(self) -> tuple[Accepted, ...]:
+        """Terms of the model beside which this is sought."""
+        return self._split[1][: self.problem.given]
+
+    @property
     def samples(self) -> int:
         return len(self.active)
 
