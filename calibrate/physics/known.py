@@ -37,6 +37,8 @@ Floats = NDArray[np.float64]
 ANEW = ("device.", "camera.", "marker.", "encoder")  # set up or found anew for each recording: nothing is known of it
 FOUND = ("tool", seat.POINTS)  # corrections about points that were found in closed form, in `about` of the model
 AXES = ("x", "y", "z")
+STRAIGHT = 1e-3  # m, rad or a factor: its square, over a metre, is a micrometre
+LOOSE = 1e3  # sigmas of an effect's value: never held beyond what the model says of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +122,9 @@ def _later(model: ModelFile, session: Session) -> Fitted:
     scale = np.concatenate([plausible_sizes(session.parameters), np.zeros(len(names) - len(session.parameters))])[at]
     scale = np.where(scale > 0.0, scale, np.sqrt(np.diag(covariance)))
     told = replace(session, stated=frozenset(known))
-    return fit_from_model(told, geometry, terms, Assumed.of(at, start[at], covariance, scale), start)
+    own = at < len(session.parameters)
+    unit = np.where(own, np.minimum(scale, STRAIGHT), LOOSE * np.sqrt(np.diag(covariance)))
+    return fit_from_model(told, geometry, terms, Assumed.of(at, start[at], covariance, scale), start, unit)
 
 
 def _values(model: ModelFile, session: Session, geometry: Fitted) -> Floats:

@@ -24,18 +24,22 @@ from calibrate.diagnose.session import session_of
 from calibrate.model_file import read_model
 from calibrate.physics.known import known_before
 
-from .halves import diagnosed_and_predicted, written_halves
+from .halves import written_halves
+from .pairs import Pair, all_at_once, device, tool
 
 JOINT, MOVED_RAD = 5, 2e-4
 
 
 @pytest.fixture(scope="module")
-def soft(tmp_path_factory):
-    """A tracker's session of an arm with a soft joint: folder, model, hidden defect."""
-    folder = tmp_path_factory.mktemp("soft")
-    recording, unseen, case, _ = written_halves(folder, **wanted(4.0))
-    model, _ = diagnosed_and_predicted(folder, recording, unseen)
-    return folder, model, case.hidden[0].defect
+def pair(tmp_path_factory):
+    """A tracker's session of an arm with a soft joint."""
+    return Pair(tmp_path_factory.mktemp("soft"), **wanted(4.0))
+
+
+@pytest.fixture(scope="module")
+def soft(pair):
+    """Folder, model, hidden defect."""
+    return pair.folder, json.loads(pair.model.read_text()), pair.case.hidden[0].defect
 
 
 def wanted(enr):
@@ -89,6 +93,18 @@ def test_a_joint_zero_that_has_moved_is_named_with_its_size(soft, capsys):
     assert changed["by"] == pytest.approx(-MOVED_RAD, abs=4.0 * changed["sigma"])
     assert changed["sigma"] < 0.2 * MOVED_RAD
     assert f"changed: joint{JOINT}.zero by" in capsys.readouterr().out
+
+
+def test_a_tool_that_has_moved_is_named_wherever_the_tracker_stands_now(soft, pair):
+    """Tool and last link trade decimetres for nothing: by their curvature they could hide it (Assumed.held_near)."""
+    folder, _, _ = soft
+    moved_m = np.array([80e-6, -60e-6, 50e-6])
+    change = all_at_once(tool(moved_m), device(np.array([1e-3, 2e-3, -1e-3]), np.array([1e-3, 0.0, 2e-3])))
+    found = asked(folder, pair.later("tool", change))
+    assert [(f["where"], f["physics"]) for f in found["findings"]] == [("tool.point", "tool-moved")]
+    by, sigma = ([c[k] for c in found["changed"]] for k in ("by", "sigma"))
+    assert np.all(np.abs(by - moved_m) < 3.0 * np.array(sigma))
+    assert max(sigma) < 5e-6
 
 
 def test_a_joint_that_has_become_softer_is_named_with_its_size(soft, tmp_path):
