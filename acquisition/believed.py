@@ -8,18 +8,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.motion.inverse.kinematics import Kinematics
+
 Floats = NDArray[np.float64]
 
 
-class BelievedArm(Protocol):
+class BelievedArm(Kinematics, Protocol):
     """The arm with its laser as believed now. `q_rad` (joint,) are the controller's readings."""
-
-    lower_rad: Floats
-    upper_rad: Floats
-
-    def frames(self, q_rad: Floats) -> Floats:
-        """T_base_frame of the base and of every link, (joint + 1, 4, 4); the last is the flange."""
-        ...
 
     def beam(self, q_rad: Floats) -> tuple[Floats, Floats]:
         """Origin (3,) m and unit direction (3,) of the laser beam in the base frame."""
@@ -63,8 +58,10 @@ def spots_by_joints(
     arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, q_rad: Floats, first: int
 ) -> Floats:
     """d(spots)/dq, (4, joint): Jp Ad(T) Jr of Deng, Ding, Zhang 2019, equation (6)."""
-    R = T_base_fixture[:3, :3]
-    beam_jacobian = arm.beam_jacobian(q_rad)
-    in_fixture_frame = np.vstack([R.T @ beam_jacobian[:3], R.T @ beam_jacobian[3:]])
     sensor = optics.spots_by_beam(*in_fixture(T_base_fixture, *arm.beam(q_rad)), first)
-    return sensor @ in_fixture_frame
+    return sensor @ beam_by_joints(arm, T_base_fixture, q_rad)
+
+
+def beam_by_joints(arm: BelievedArm, T_base_fixture: Floats, q_rad: Floats) -> Floats:
+    """d(origin, direction)/dq, (6, joint), of the beam as seen from the fixture."""
+    return (T_base_fixture[:3, :3].T @ arm.beam_jacobian(q_rad).reshape(2, 3, -1)).reshape(6, -1)

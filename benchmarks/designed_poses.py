@@ -31,7 +31,7 @@ from calibeam.pose_design.reachable import candidates_of
 from calibeam.prove.free_space import errors_m
 from calibeam.prove.truth import FreeSpace
 from calibeam.prove.unseen_poses import Beam
-from calibrate.believed_arm import BelievedArm
+from calibrate.believed_arm import believed_arm
 from calibrate.fit_plan import FitPlan
 from calibrate.pose_design.candidates import Candidates
 from calibrate.pose_design.criteria import CRITERIA
@@ -116,7 +116,7 @@ def _found(recording: Recording, q_rad: Floats) -> Beam:
     """The laser's beam on the identified arm."""
     result = identify_session(recording, plan_without_proofs())
     values = dict(zip((p.name for p in result.parameters), result.theta.tolist(), strict=True))
-    arm = BelievedArm(recording.rig, values)
+    arm = believed_arm(recording.rig, values)
     beams = [arm.beam(q) for q in q_rad]
     return Beam(np.array([origin for origin, _ in beams]), np.array([direction for _, direction in beams]))
 

@@ -9,10 +9,10 @@ import numpy as np
 from acquisition.motion.inverse.closed_form import closed_form
 from acquisition.motion.inverse.solve import solve_many
 from acquisition.recording.rig import load_rig
-from calibeam.motion.arm import MotionArm
 from calibrate.arms.belief import HELD_AS_DRAWN
 from calibrate.arms.catalogue import dh_rows
 from calibrate.arms.dh import DhArm, DhLink
+from calibrate.arms.rig_arm import RigArm
 
 POSES = 10_000
 OFF = 1e-3  # m and rad, one sigma of every parameter of a calibrated arm here
@@ -47,8 +47,8 @@ def lines(rig: Path) -> Iterator[str]:
 
 def _measured(rows: tuple[DhLink, ...], lower: np.ndarray, upper: np.ndarray, off: float) -> str:
     model, rng = DhArm(rows, HELD_AS_DRAWN), np.random.default_rng(1)
-    nominal = MotionArm(model, np.zeros(len(model.parameters)), lower, upper)
-    arm = MotionArm(model, off * rng.normal(size=len(model.parameters)), lower, upper)
+    nominal = RigArm.of(model, np.zeros(len(model.parameters)), lower, upper)
+    arm = RigArm.of(model, off * rng.normal(size=len(model.parameters)), lower, upper)
     T = arm.frames(rng.uniform(lower, upper, (POSES, 6)))[:, -1]
     starts = closed_form(nominal)
     begin_s = time.process_time()

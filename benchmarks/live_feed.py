@@ -38,7 +38,7 @@ def lit_posture(rig: Rig, placement: int = 1, first: int = 1) -> Floats:
     home_rad = np.array(rig.motion.home_rad)
     for start in home_rad + np.random.default_rng(1).normal(0.0, 0.6, (300, rig.n_joints)):
         found = least_squares(lambda q: np.concatenate(believed.beam(q)) - wanted, start, xtol=1e-14, ftol=1e-14)
-        above = believed.arm.frames(found.x)[2:, 2, 3].min() > 0.1
+        above = believed.arm.frames(found.x[None])[0, 2:, 2, 3].min() > 0.1
         inside = np.all((found.x > believed.arm.lower_rad) & (found.x < believed.arm.upper_rad))
         if (
             found.cost < 1e-16

@@ -96,7 +96,7 @@ def run(rig_path: Path, seeds: range, options: GuidedOptions | None = None, **em
 
 
 def _one(rig: Rig, text: str, plain: Mapping[str, Any], seed: int, options: GuidedOptions) -> Outcome:
-    hand, arm = DirectHand(HandWorld.from_rig(plain, seed=seed), PERIOD_S), BelievedGuidedArm(rig)
+    hand, arm = DirectHand(HandWorld.from_rig(plain, seed=seed), PERIOD_S), BelievedGuidedArm.of_rig(rig)
     rng = np.random.default_rng([seed, 8])
     session = GuidedSession(hand, arm, hand, FittedJudge(rig), Nobody(), rng, patience_s=PATIENCE_S)
     summary = session.run(calibration_plan(rig, options))

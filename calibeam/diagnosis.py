@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from acquisition.recording.pose_plan import write_pose_plan
@@ -19,6 +20,7 @@ from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
 from calibrate.physics.known import known_before
 from calibrate.physics.news import beside_known, only_new
+from calibrate.sensors.catalogue import unused_columns
 
 SEED = 1  # of nulls, splits and bootstraps: the same recording always gives the same diagnosis
 
@@ -33,6 +35,11 @@ def diagnose_recording(recording: Recording, model: ModelFile | None = None) -> 
             f"the model is of rig '{model.rig.name}', whose file is another than that of {recording.path.name}; "
             "give the model that was identified with this rig, or none"
         )
+    found, file = _diagnosed(recording, model)
+    return found, msgspec.structs.replace(file, next=(*file.next, *unused_columns(recording.samples)))
+
+
+def _diagnosed(recording: Recording, model: ModelFile | None) -> tuple[Diagnosed, DiagnosisFile]:
     rng = np.random.default_rng(SEED)
     if model is None:
         found = diagnose_samples(recording.rig, recording.samples, rng)

@@ -7,11 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.rig_schema import Rig
-from calibrate.believed_arm import BelievedArm, turned
+from calibrate.believed_arm import believed_arm
 from calibrate.believed_fixture import BelievedFixture, FixtureView, Light
 from calibrate.dual_psd_rig import dual_psd_chain, dual_psd_of
 from calibrate.errors import DataError
 from calibrate.parameters import values_by_name
+from calibrate.sensors import optics
 
 Floats = NDArray[np.float64]
 
@@ -34,7 +35,7 @@ class BelievedRig:
         sensor, chain = dual_psd_of(rig, ids, np.ones_like(ids)), dual_psd_chain(rig, ids, np.ones_like(ids))
         phi = values_by_name(chain.parameters, corrections or {})[len(chain.model.parameters) :]
         pair, half_size_m = sensor.T_psd1_psd2(phi), sensor.fixture.half_size_m
-        self.arm = BelievedArm(rig, corrections)
+        self.arm = believed_arm(rig, corrections)
         self.fixture = BelievedFixture(pair, half_size_m)
         self.T_psd1_psd2 = pair
         self._gain = phi[4:8]
@@ -61,10 +62,6 @@ class BelievedRig:
         """T_base_flange (4, 4) at joint readings (joint,)."""
         return self.arm.flange(q_rad)
 
-    def joint_jacobian(self, q_rad: Floats) -> Floats:
-        """(6, joint) base-frame twist [v; w] of the flange by each joint."""
-        return self.arm.joint_jacobian(q_rad)
-
     def beam(self, q_rad: Floats) -> tuple[Floats, Floats]:
         """Origin (3,) m and unit direction (3,) of the laser beam in the base."""
         return self.arm.beam(q_rad)
@@ -72,13 +69,9 @@ class BelievedRig:
     def expect(self, q_rad: Floats, placement: int, first_psd: int) -> Expected:
         """Spots and their derivative. DataError for an unknown placement or order."""
         view = self._view(placement, first_psd)
-        T = self.arm.frames(q_rad)
-        origin, direction = self.arm.beam_from(T[-1])
-        hit = view.strike(origin, direction)
-        meet = origin + hit.travel[:, None] * direction  # (face, 3) on the unreflected beam
-        velocity = turned(meet[:, None, :] - T[:-1, :3, 3], T[:-1, :3, 2])  # (face, joint, 3)
-        by_joint = (hit.by_origin @ velocity.transpose(0, 2, 1)).reshape(4, -1)
-        return Expected(hit.spots_m * self._gain, by_joint * self._gain[:, None], hit.light)
+        hit = view.strike(*self.arm.beam(q_rad))
+        by_joint = optics.by_beam(hit) @ self.arm.beam_jacobian(q_rad)
+        return Expected(hit.spots_m.ravel() * self._gain, by_joint * self._gain[:, None], view.light(hit))
 
     def spots(self, q_rad: Floats, placement: int, first_psd: int) -> Floats:
         """(4,) m, as in `expect`."""
@@ -86,8 +79,9 @@ class BelievedRig:
 
     def struck(self, T_base_flange: Floats, placement: int, first_psd: int) -> tuple[Floats, Light]:
         """Spots (4,) m and where the beam goes, as in `expect`, of a flange pose (4, 4): five times as fast."""
-        hit = self._view(placement, first_psd).strike(*self.arm.beam_from(T_base_flange))
-        return hit.spots_m * self._gain, hit.light
+        view = self._view(placement, first_psd)
+        hit = view.strike(*self.arm.beam_from(T_base_flange))
+        return hit.spots_m.ravel() * self._gain, view.light(hit)
 
     def _view(self, placement: int, first_psd: int) -> FixtureView:
         view = self._views.get((placement, first_psd))

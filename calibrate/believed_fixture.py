@@ -1,6 +1,5 @@
 """The believed dual-PSD fixture, one beam at a time: spots, derivative by the beam, and the beam for given spots."""
 
-from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
@@ -21,16 +20,6 @@ class Light(Enum):
     WRONG_WAY = "the beam comes from behind a face, leads away from it, or meets the faces in the other order"
 
 
-@dataclass(frozen=True)
-class SingleStrike:
-    """One beam on the planes of both faces."""
-
-    spots_m: Floats  # (4,) psd1_x, psd1_y, psd2_x, psd2_y
-    by_origin: Floats  # (2, 2, 3) face, x y: d spots / d origin
-    travel: Floats  # (2,) path to each plane in units of |direction|
-    light: Light
-
-
 class FixtureView:
     """Both faces as an unreflected beam sees them in one order, from a frame where the fixture is at T_frame_psd1."""
 
@@ -38,26 +27,19 @@ class FixtureView:
         """DataError unless `first_psd` is 1 or 2."""
         if first_psd not in (1, 2):
             raise DataError(f"first_psd {first_psd}: the beam strikes PSD 1 or PSD 2 first; give 1 or 2")
-        faces = optics.unfolded_faces(T_frame_psd1, T_psd1_psd2, first_psd)
-        self._linear, self._shift_m = faces[:, :3, :3].copy(), faces[:, :3, 3].copy()
+        self._faces = optics.unfolded_faces(T_frame_psd1, T_psd1_psd2, first_psd)
         self._first_row, self._half_size_m = first_psd - 1, half_size_m
 
-    def strike(self, origin_m: Floats, direction: Floats) -> SingleStrike:
+    def strike(self, origin_m: Floats, direction: Floats) -> optics.Strike:
         """Origin (3,) and direction (3,) in the frame of the view; infinite spots for a beam along a face."""
-        p = self._linear @ origin_m + self._shift_m
-        d = self._linear @ direction
-        with np.errstate(divide="ignore", invalid="ignore"):
-            travel = -p[:, 2] / d[:, 2]
-            spots = p[:, :2] + travel[:, None] * d[:, :2]
-            lean = d[:, :2] / d[:, 2:]
-            slope = self._linear[:, :2] - lean[:, :, None] * self._linear[:, 2:]
-        return SingleStrike(spots.ravel(), slope, travel, self._light(spots, travel, d[:, 2]))
+        return optics.strike(optics.Beam(origin_m, direction), self._faces)
 
-    def _light(self, spots: Floats, travel: Floats, facing: Floats) -> Light:
-        first, second = float(travel[self._first_row]), float(travel[1 - self._first_row])
-        if not (0.0 < first < second and float(facing[0]) < 0.0 and float(facing[1]) < 0.0):
+    def light(self, hit: optics.Strike) -> Light:
+        """Where the beam goes that strikes there."""
+        first, second = float(hit.travel_m[self._first_row]), float(hit.travel_m[1 - self._first_row])
+        if not (0.0 < first < second and float(hit.facing.max()) < 0.0):
             return Light.WRONG_WAY
-        return Light.BOTH_LIT if float(np.abs(spots).max()) <= self._half_size_m else Light.OFF_FACE
+        return Light.BOTH_LIT if float(np.abs(hit.spots_m).max()) <= self._half_size_m else Light.OFF_FACE
 
 
 class BelievedFixture:
@@ -70,16 +52,16 @@ class BelievedFixture:
 
     def spots(self, origin_m: Floats, direction: Floats, first: int) -> Floats:
         """(4,) m psd1 x, y, psd2 x, y, on the faces continued as planes."""
-        return self._view(first).strike(origin_m, direction).spots_m
+        return self._view(first).strike(origin_m, direction).spots_m.ravel()
 
     def spots_by_beam(self, origin_m: Floats, direction: Floats, first: int) -> Floats:
         """(4, 6) d(spots)/d(origin, direction)."""
-        hit = self._view(first).strike(origin_m, direction)
-        return np.concatenate([hit.by_origin, hit.travel[:, None, None] * hit.by_origin], axis=2).reshape(4, 6)
+        return optics.by_beam(self._view(first).strike(origin_m, direction))
 
     def light(self, origin_m: Floats, direction: Floats, first: int) -> Light:
         """Whether that beam really lights both faces in that order."""
-        return self._view(first).strike(origin_m, direction).light
+        view = self._view(first)
+        return view.light(view.strike(origin_m, direction))
 
     def line(self, spots_m: Floats, first: int) -> tuple[Floats, Floats]:
         """The incoming beam for these spots (4,) m: its point on the first face (3,) and unit direction (3,).

@@ -1,4 +1,7 @@
-"""Several instruments in one fit: blocks of whitened rows side by side, parameters of one name are one unknown."""
+"""Several instruments in one fit: blocks of whitened rows side by side, parameters of one name are one unknown.
+
+Rows of one sample whose noise is shared with second encoders are made independent (calibrate/shared_scatter.py).
+"""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,6 +13,7 @@ from numpy.typing import NDArray
 from calibrate.errors import DataError
 from calibrate.parameters import Parameter, index_of
 from calibrate.problem import LeastSquares, Problem
+from calibrate.shared_scatter import SharedScatter
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -33,6 +37,23 @@ class Block(LeastSquares, Protocol):
         ...
 
 
+@dataclass(frozen=True, eq=False)
+class Witnessed:
+    """What blocks share with the rows of one of them, all of which are kept, whatever is selected."""
+
+    scatter: SharedScatter  # over the rows of the blocks
+    problem: Problem  # all rows of the witness
+
+    def added(self, block: Problem, index: int, seen: Floats) -> Floats:
+        """(row * k, ...) whitened, what the witness' rows (row, channel, ...) add to those of a block."""
+        lever = self.scatter.levers[index]
+        if lever is None:
+            return np.zeros((block.rows * block.observed.shape[1], *seen.shape[2:]))
+        nothing = np.zeros((block.rows, block.observed.shape[1], *seen.shape[2:]))
+        alone = self.scatter.alone(index, nothing, seen).reshape(*nothing.shape[:2], -1)
+        return (block.whitener @ alone).reshape(-1, *seen.shape[2:])
+
+
 @dataclass(frozen=True)
 class JointProblem:
     """LeastSquares over the union of the blocks' parameters, in the order of their first appearance.
@@ -44,6 +65,7 @@ class JointProblem:
 
     blocks: tuple[Block, ...]
     chosen: tuple[Parameter, ...] | None = None
+    witnessed: Witnessed | None = None
 
     def __post_init__(self) -> None:
         if not self.blocks:
@@ -69,21 +91,49 @@ class JointProblem:
 
     @property
     def log_det_noise(self) -> float:
-        """Logarithm of the determinant of the covariance of all residual values; blocks are independent."""
+        """Logarithm of the determinant of the covariance of all residual values, which are independent as whitened."""
         return sum(block.log_det_noise for block in self.blocks)
 
     def residual(self, theta: Floats) -> Floats:
-        parts = [block.residual(theta[columns]) for block, columns in zip(self.blocks, self._columns, strict=True)]
-        return np.concatenate(parts)
+        return np.concatenate(self._residuals(theta))
+
+    def _residuals(self, theta: Floats) -> list[Floats]:
+        """Of each block (residual value,)."""
+        return [self.residual_of(i, theta) for i in range(len(self.blocks))]
+
+    def residual_of(self, index: int, theta: Floats) -> Floats:
+        """(residual value,) of one block, whitened, from the values (param,) of the whole fit."""
+        block = self.blocks[index]
+        own = block.residual(self.of_block(index, theta))
+        if self.witnessed is None or not isinstance(block, Problem) or self.witnessed.scatter.levers[index] is None:
+            return own
+        of_witness = self.of_block(self.witnessed.scatter.witness, theta)
+        return own + self.witnessed.added(block, index, self.witnessed.problem.misfit(of_witness))
 
     def jacobian(self, theta: Floats) -> Floats:
         parts = [block.jacobian(theta[columns]) for block, columns in zip(self.blocks, self._columns, strict=True)]
         out = np.zeros((sum(len(part) for part in parts), len(self.parameters)))
         first = 0
-        for part, columns in zip(parts, self._columns, strict=True):
+        for i, (part, columns) in enumerate(zip(parts, self._columns, strict=True)):
             out[first : first + len(part), columns] = part
+            self._share_slope(i, theta, out[first : first + len(part)])
             first += len(part)
         return out
+
+    def jacobian_of(self, index: int, theta: Floats) -> Floats:
+        """(residual value, param) of one block by all parameters."""
+        out = self.spread(index, self.blocks[index].jacobian(self.of_block(index, theta)))
+        self._share_slope(index, theta, out)
+        return out
+
+    def _share_slope(self, index: int, theta: Floats, out: Floats) -> None:
+        """Adds what a block shares with the witness to its rows (residual value, param)."""
+        block = self.blocks[index]
+        if self.witnessed is None or not isinstance(block, Problem) or self.witnessed.scatter.levers[index] is None:
+            return
+        witness, seen = self.witnessed.scatter.witness, self.witnessed.problem
+        slope = seen.chain.jacobian(self.of_block(witness, theta), seen.q_rad)
+        out[:, self._columns[witness]] += self.witnessed.added(block, index, slope)
 
     def with_parameters(self, parameters: tuple[Parameter, ...]) -> "JointProblem":
         """The same blocks with these held, bounded or believed otherwise."""
@@ -91,15 +141,16 @@ class JointProblem:
 
     def with_blocks(self, blocks: tuple[Block, ...]) -> "JointProblem":
         """Other weights, the same unknowns."""
-        return JointProblem(blocks, self.parameters)
+        return JointProblem(blocks, self.parameters, self.witnessed)
 
     def select(self, rows: Indices) -> "JointProblem":
         """Some of the rows, counted through all blocks; unknowns stay, also those that no row left speaks of."""
-        cut: list[Block] = []
-        for block, first in zip(self.blocks, self.first_rows, strict=True):
-            own = rows[(rows >= first) & (rows < first + block.rows)] - first
-            cut.append(block.select(own))
-        return self.with_blocks(tuple(cut))
+        each = zip(self.blocks, self.first_rows, strict=True)
+        own = [rows[(rows >= first) & (rows < first + block.rows)] - first for block, first in each]
+        cut = self.with_blocks(tuple(block.select(r) for block, r in zip(self.blocks, own, strict=True)))
+        if self.witnessed is None:
+            return cut
+        return replace(cut, witnessed=replace(self.witnessed, scatter=self.witnessed.scatter.select(own)))
 
     def fulfilled(self, theta: Floats) -> "JointProblem":
         """Where rank is to be judged: conditions at joint readings that fulfil them (Problem.fulfilled)."""
@@ -120,8 +171,8 @@ class JointProblem:
     def by_row(self, theta: Floats) -> Floats:
         """(rows,) sum of the squared whitened residuals of each row: chi-square of k where nothing is wrong."""
         parts = [
-            np.sum(block.residual(theta[columns]).reshape(block.rows, -1) ** 2, axis=1) if block.rows else np.zeros(0)
-            for block, columns in zip(self.blocks, self._columns, strict=True)
+            np.sum(residual.reshape(block.rows, -1) ** 2, axis=1) if block.rows else np.zeros(0)
+            for block, residual in zip(self.blocks, self._residuals(theta), strict=True)
         ]
         return np.concatenate(parts)
 

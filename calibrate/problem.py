@@ -103,12 +103,7 @@ class Problem:
         """
         if not self.condition:
             return self
-        q_rad = self.q_rad
-        for _ in range(NEWTON_STEPS):
-            left = self.chain.expect(theta, q_rad) - self.observed
-            back = np.linalg.pinv(self.chain.by_joint(theta, q_rad), rcond=SINGULAR)
-            q_rad = q_rad - np.einsum("nji,ni->nj", back, left)
-        return replace(self, q_rad=q_rad)
+        return replace(self, q_rad=self.chain.readings_for(theta, self.q_rad, self.observed, SINGULAR, NEWTON_STEPS))
 
 
 def whitener_of(covariance: Floats) -> Floats:

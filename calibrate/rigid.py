@@ -13,10 +13,12 @@ Floats = NDArray[np.float64]
 
 
 def transform(origin_m: ArrayLike, rotation_rad: ArrayLike) -> Floats:
-    """(4, 4) from an origin (3,) and a rotation vector (3,)."""
-    out = np.eye(4)
-    out[:3, :3] = Rotation.from_rotvec(np.asarray(rotation_rad, dtype=float)).as_matrix()
-    out[:3, 3] = np.asarray(origin_m, dtype=float)
+    """(4, 4) from an origin (3,) and a rotation vector (3,), or a row of them (row, 4, 4) from two of (row, 3)."""
+    vector = np.asarray(rotation_rad, dtype=float)
+    out = np.zeros((*vector.shape[:-1], 4, 4))
+    out[..., :3, :3] = Rotation.from_rotvec(vector).as_matrix()
+    out[..., :3, 3] = np.asarray(origin_m, dtype=float)
+    out[..., 3, 3] = 1.0
     return out
 
 
@@ -84,8 +86,8 @@ def left_jacobian(rotation_rad: Floats) -> Floats:
 
 
 def pose_offset(deviation: Floats) -> Floats:
-    """(4, 4) change of a pose, applied on its right, from shift (m) and rotation vector (rad) in one (6,)."""
-    return transform(deviation[:3], deviation[3:])
+    """(4, 4) change of a pose, applied on its right, from shift (m) and rotation vector (rad) in one (6,), or a row."""
+    return transform(deviation[..., :3], deviation[..., 3:])
 
 
 def pose_offset_twists(T_base_nominal: Floats, deviation: Floats) -> Floats:

@@ -2,8 +2,9 @@
 
 Noise of a row is joint repeatability mapped through the arm, G G' joint^2 with G the derivative by the readings, plus
 the instrument's own. Which pose a row belongs to is known to the instrument alone, so this holds for pairs of poses
-too. Neighbouring distances share a pose, which their weights respect. Rows of two instruments at one pose (a position
-and a wire) are taken as independent, and sizes of noise are found as if all rows were.
+too. Neighbouring distances share a pose, which their weights respect. What second encoders see of the joints at a pose
+is taken out of the rows of the others there (calibrate/shared_scatter.py). Otherwise rows of two instruments at one
+pose (a position and a wire) are taken as independent, and sizes of noise are found as if all rows were.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,9 +17,10 @@ from numpy.typing import NDArray
 
 from calibrate import variance
 from calibrate.errors import naming_undetermined
-from calibrate.joint_problem import Block, JointProblem
+from calibrate.joint_problem import Block, JointProblem, Witnessed
 from calibrate.parameters import Parameter, priors, start_values
 from calibrate.problem import Problem
+from calibrate.shared_scatter import Lever, SharedScatter, levers_of, shares_found, witness_of
 from calibrate.variance import FIXED, NoisyRows, VarianceFactors, as_believed, covariance_of
 
 Floats = NDArray[np.float64]
@@ -82,6 +84,7 @@ class Weighting:
     joint_rad: float  # believed repeatability of one joint reading
     known: tuple[Block, ...] = ()
     chosen: tuple[Parameter, ...] | None = None  # `parameters` held or believed otherwise, in the same order
+    shares: Floats | None = None  # (channel,) of what second encoders read that is the links' own; None: not yet known
 
     @cached_property
     def sources(self) -> tuple[str, ...]:
@@ -110,7 +113,50 @@ class Weighting:
             instrument.weighted(self.unweighted.of_block(i, theta), self.joint_rad, self._sources_of(i), size)
             for i, instrument in enumerate(self.measured)
         ]
-        return JointProblem((*blocks, *self.known), self.chosen)
+        shared = self._shared(theta)
+        if shared is None:
+            return JointProblem((*blocks, *self.known), self.chosen)
+        seen = blocks[shared.witness]
+        form = np.linalg.inv(np.einsum("nji,njk->ik", seen.whitener, seen.whitener) / seen.rows)
+        blocks = [_wider(block, shared.unseen(i, form)) for i, block in enumerate(blocks)]
+        return JointProblem((*blocks, *self.known), self.chosen, Witnessed(shared, seen))
+
+    def sharing(self, theta: Floats, factors: VarianceFactors) -> "Weighting":
+        """The same with what second encoders share with the other instruments, found at an estimate."""
+        witness = witness_of([m.problem.chain for m in self.measured])
+        if witness is None or len(self.measured) == 1:
+            return self
+        problem, levers = self.problem(theta, factors), self._levers(theta)
+        misfits = [m.problem.misfit(self.unweighted.of_block(i, theta)) for i, m in enumerate(self.measured)]
+        whiteners = [block.whitener for block in problem.blocks if isinstance(block, Problem)]
+        every = [np.arange(m.problem.rows) for m in self.measured]
+        return replace(self, shares=shares_found(misfits, levers, whiteners[: len(every)], every, witness))
+
+    def shared_rad(self, factors: VarianceFactors) -> tuple[float, float]:
+        """Joint repeatability that second encoders have taken out of the others' rows, rms of all joints, one sigma."""
+        witness = witness_of([m.problem.chain for m in self.measured])
+        if self.shares is None or witness is None:
+            return 0.0, 0.0
+        (source, sigma), *_ = self.measured[witness].own_sigma.items()
+        at, size = self.sources.index(source), float(np.sqrt(np.mean(self.shares**2)) * np.median(sigma))
+        return size * float(factors.factor[at]), size * float(factors.factor_sigma[at])
+
+    def _levers(self, theta: Floats) -> tuple[Lever | None, ...]:
+        by_joint = [
+            m.problem.chain.by_joint(self.unweighted.of_block(i, theta), m.problem.q_rad)
+            for i, m in enumerate(self.measured)
+        ]
+        chains, samples = [m.problem.chain for m in self.measured], [m.sample_rows for m in self.measured]
+        found = levers_of(chains, samples, by_joint)
+        return tuple(
+            None if m.own_correlation is not None else lever for m, lever in zip(self.measured, found, strict=True)
+        )
+
+    def _shared(self, theta: Floats) -> SharedScatter | None:
+        witness = witness_of([m.problem.chain for m in self.measured])
+        if self.shares is None or witness is None:
+            return None
+        return SharedScatter(witness, self.shares, (*self._levers(theta), *(None for _ in self.known)))
 
     def noise(
         self, parameters: tuple[Parameter, ...], theta: Floats, start: VarianceFactors | None = None
@@ -157,14 +203,23 @@ class Weighting:
         free = np.flatnonzero([p.free for p in parameters])
         information = 1.0 / priors(parameters)[free] ** 2
         deviation = (theta - start_values(parameters))[free]
-        jacobian = self.unweighted.with_parameters(parameters)
+        jacobian, shared = self.unweighted.with_parameters(parameters), self._shared(theta)
+
+        def linear(i: int, instrument: Measured) -> tuple[Floats, Floats]:
+            problem, own = instrument.problem, jacobian.of_block(i, theta)
+            return problem.misfit(own), jacobian.spread(i, problem.chain.jacobian(own, problem.q_rad))[..., free]
+
+        witness = None if shared is None else linear(shared.witness, self.measured[shared.witness])
         rows: list[NoisyRows] = []
         for i, every in enumerate(self.measured):
-            instrument = _thinned(every)
-            problem, own = instrument.problem, jacobian.of_block(i, theta)
-            spread = jacobian.spread(i, problem.chain.jacobian(own, problem.q_rad))[..., free]
-            parts = instrument.parts(own, self.joint_rad)
-            rows.append(NoisyRows(problem.misfit(own), spread, parts, self._sources_of(i)))
+            some = _thin(every)
+            instrument = every if some is None else every.select(some)
+            misfit, spread = linear(i, instrument)
+            if shared is not None and witness is not None:
+                misfit = shared.alone(i, misfit, witness[0], some)
+                spread = shared.alone(i, spread, witness[1], some)
+            parts = instrument.parts(jacobian.of_block(i, theta), self.joint_rad)
+            rows.append(NoisyRows(misfit, spread, parts, self._sources_of(i)))
         for i, block in enumerate(self.known, start=len(self.measured)):
             own = jacobian.of_block(i, theta)
             spread = jacobian.spread(i, block.jacobian(own)[:, None])[..., free]
@@ -182,9 +237,15 @@ def parts_of(by_joint: Floats, joint_rad: float, own_sigma: Floats) -> Floats:
     return np.stack([arm, own])
 
 
-def _thinned(instrument: Measured) -> Measured:
-    """Evenly spread rows, no more than ENOUGH."""
+def _thin(instrument: Measured) -> Indices | None:
+    """Evenly spread rows, no more than ENOUGH; None: all of them."""
     n = instrument.problem.rows
-    if n <= ENOUGH:
-        return instrument
-    return instrument.select(np.linspace(0, n - 1, ENOUGH).astype(np.intp))
+    return None if n <= ENOUGH else np.linspace(0, n - 1, ENOUGH).astype(np.intp)
+
+
+def _wider(problem: Problem, more: Floats | None) -> Problem:
+    """With this covariance (row, k, k) added to that of its rows."""
+    if more is None:
+        return problem
+    unwhitener = np.linalg.inv(problem.whitener)
+    return problem.with_covariance(unwhitener @ np.swapaxes(unwhitener, 1, 2) + more)

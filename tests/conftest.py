@@ -1,5 +1,6 @@
 """Loaded before any test: the same thread setting that the program has. Marks the tests that talk in real time."""
 
+import re
 from functools import cache
 from pathlib import Path
 
@@ -39,6 +40,14 @@ WIRED = (
     "simulators/psd_daq",
     "simulators/ur",
 )
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """A file of which `-m` takes nothing is not even imported: what is on wires is known by its path."""
+    asked = str(config.getoption("markexpr"))
+    if collection_path.suffix == ".py" and re.search(r"\bwired\b", asked):
+        return on_wires(collection_path) == ("not wired" in asked) or None
+    return None
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

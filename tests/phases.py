@@ -94,8 +94,14 @@ def run(phase: Phase, results: Path) -> Outcome:
     print(f"\n===== {phase.name} =====", flush=True)
     begin_s = time.monotonic()
     command = [sys.executable, "-m", "pytest", *phase.arguments, f"--junitxml={results}"]
-    code = subprocess.run(command, cwd=ROOT, env={**os.environ, **phase.environment}, check=False).returncode
+    code = subprocess.run(command, cwd=ROOT, env=_environment(phase), check=False).returncode
     return Outcome(phase.name, code, *_counts(results, code), time.monotonic() - begin_s)
+
+
+def _environment(phase: Phase) -> dict[str, str]:
+    """The caller's and the phase's own. Bytecode is kept, or every process of every test compiles our sources again."""
+    kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    return {**kept, **phase.environment}
 
 
 def table(outcomes: list[Outcome]) -> list[str]:

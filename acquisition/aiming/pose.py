@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.believed import BelievedArm, FixtureOptics
+from acquisition.motion.inverse.kinematics import flange
 
 Floats = NDArray[np.float64]
 
@@ -54,7 +55,7 @@ def flange_for(arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, 
 def laser_in_flange(arm: BelievedArm) -> tuple[Floats, Floats]:
     """Laser origin (3,) m and direction (3,) in the flange frame, read off the believed arm at its zero."""
     q_rad = np.zeros(arm.lower_rad.size)
-    T = arm.frames(q_rad)[-1]
+    T = flange(arm, q_rad)
     origin_m, direction = arm.beam(q_rad)
     return T[:3, :3].T @ (origin_m - T[:3, 3]), T[:3, :3].T @ direction
 

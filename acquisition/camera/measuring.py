@@ -18,6 +18,7 @@ from acquisition.camera.tour import stops
 from acquisition.errors import SpotLostError, UnreachableError
 from acquisition.journal import Journal
 from acquisition.learner import Learner
+from acquisition.motion.inverse.kinematics import flange
 from acquisition.motion.rigid import transform
 from acquisition.navigator import Navigator
 from acquisition.recording.rig_schema import Camera
@@ -112,7 +113,7 @@ class CameraMeasuring:
             count += 1
             seen = self._board.find(self._eye.picture())
             if seen is not None:
-                views.append(View(seen, arm.frames(self._readings())[-1]))
+                views.append(View(seen, flange(arm, self._readings())))
         return count, views
 
     def _lines(self, sight: Sight, placement: int) -> list[Line]:

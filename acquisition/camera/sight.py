@@ -12,6 +12,7 @@ from acquisition.believed import BelievedArm
 from acquisition.camera.board import Board, Seen
 from acquisition.camera.eye import Eye
 from acquisition.camera.model import CameraModel
+from acquisition.motion.inverse.kinematics import flange
 from acquisition.motion.rigid import apart, inverse
 
 Floats = NDArray[np.float64]
@@ -54,7 +55,7 @@ class Sight:
         None where the board is not in the picture. DeviceError of the camera.
         """
         seen = self.before_camera(arm, q_rad, T_base_fixture)
-        return None if seen is None else arm.frames(q_rad)[-1] @ self._model.T_flange_camera @ seen
+        return None if seen is None else flange(arm, q_rad) @ self._model.T_flange_camera @ seen
 
     def sees_board(self) -> bool:
         """Whether the board is in the picture now. DeviceError of the camera."""
@@ -66,6 +67,6 @@ class Sight:
         poses = [] if seen is None else board_poses(self._model, seen)
         if not poses:
             return None
-        believed = inverse(arm.frames(q_rad)[-1] @ self._model.T_flange_camera) @ T_base_fixture
+        believed = inverse(flange(arm, q_rad) @ self._model.T_flange_camera) @ T_base_fixture
         alike = [T @ self._T_board_psd1 for T, rms in poses if rms <= ALIKE * poses[0][1]]
         return min(alike, key=lambda T: apart(T, believed)[1])

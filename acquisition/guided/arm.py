@@ -11,8 +11,13 @@ Floats = NDArray[np.float64]
 class GuidedArm(Protocol):
     """A measuring arm as believed."""
 
-    lower_rad: Floats  # (n,) of the readings
-    upper_rad: Floats
+    @property
+    def lower_rad(self) -> Floats:
+        """(n,) smallest readings."""
+        ...
+
+    @property
+    def upper_rad(self) -> Floats: ...
 
     def tip_m(self, q_rad: Floats) -> Floats:
         """(row, 3) middle of the probe's ball in the base, for readings (row, n)."""

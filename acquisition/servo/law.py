@@ -9,7 +9,7 @@ by the guess T, not the place where the sensor is linearised.
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.believed import BelievedArm, FixtureOptics
+from acquisition.believed import BelievedArm, FixtureOptics, beam_by_joints, in_fixture
 from acquisition.servo.strategy import Proposal
 
 Floats = NDArray[np.float64]
@@ -33,12 +33,9 @@ def correction(
     Of a lower `rank` it leaves out what the arm can do least.
     """
     hit_m, direction = optics.line(spots_m, first)
-    R = T_base_fixture[:3, :3]
     stand_off_m = stand_off(arm, optics, T_base_fixture, q_rad, spots_m, first)
-    beam_jacobian = arm.beam_jacobian(q_rad)
-    robot = np.vstack([R.T @ beam_jacobian[:3], R.T @ beam_jacobian[3:]])
     sensor = optics.spots_by_beam(hit_m - stand_off_m * direction, direction, first)
-    left, sizes, right = np.linalg.svd(sensor @ robot, full_matrices=False)
+    left, sizes, right = np.linalg.svd(sensor @ beam_by_joints(arm, T_base_fixture, q_rad), full_matrices=False)
     return right[:rank].T @ ((left[:, :rank].T @ error_m) / sizes[:rank])
 
 
@@ -47,8 +44,7 @@ def stand_off(
 ) -> float:
     """From the laser to the first face along the beam (m), as believed, within what can be."""
     hit_m, direction = optics.line(spots_m, first)
-    origin_base_m, _ = arm.beam(q_rad)
-    origin_m = T_base_fixture[:3, :3].T @ (origin_base_m - T_base_fixture[:3, 3])
+    origin_m, _ = in_fixture(T_base_fixture, *arm.beam(q_rad))
     return float(np.clip((hit_m - origin_m) @ direction, *STAND_OFF_RANGE_M))
 
 

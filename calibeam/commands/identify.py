@@ -20,6 +20,7 @@ from calibrate.identification.planned import rig_as_planned
 from calibrate.model_file import ModelFile, corrections, read_model, write_model
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_verdict import session_verdict
+from calibrate.sensors.catalogue import unused_columns
 
 SUFFIX = {
     ExportForm.URDF: ".urdf",
@@ -101,6 +102,8 @@ def _identify(
     refuse_nothing(result.status, result.estimates)
     model = write_session_model(result, source, out, planned)
     print_identification(console, result, session_verdict(session_evidence(source, model)), source.rig)
+    for sentence in unused_columns(source.samples):
+        console.print(sentence, markup=False, highlight=False)
     console.print(f"model: {out}", markup=False)
     _export(console, rig_as_planned(source.rig, planned.plan), out, export)
     return result.status

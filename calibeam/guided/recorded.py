@@ -119,7 +119,7 @@ def record_guided(
     """Run the plan. PartialResult when it ended early: what was taken is kept."""
     judge, journal = FittedJudge(rig), RecordingJournal(writer, clock)
     rng = np.random.default_rng(seed)
-    session = GuidedSession(watch, BelievedGuidedArm(rig), guide, judge, journal, rng, patience_s=patience_s)
+    session = GuidedSession(watch, BelievedGuidedArm.of_rig(rig), guide, judge, journal, rng, patience_s=patience_s)
     try:
         summary = session.run(plan)
     except Interrupted as why:

@@ -8,7 +8,7 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from acquisition.recording.rig_schema import Rig
-from calibeam.motion.arm import motion_arm
+from calibrate.arms.rig_arm import RigArm
 from calibrate.believed import BelievedRig
 from calibrate.believed_fixture import Light
 from calibrate.dual_psd_rig import dual_psd_chain
@@ -56,10 +56,7 @@ class Scene:
         """T_base_frame (joint + 1, 4, 4); None for readings of another arm, or of a joint that does not answer."""
         if q_rad.shape != (self._rig.n_joints,) or not np.isfinite(q_rad).all():
             return None
-        if self._believed is not None:
-            return self._believed.arm.frames(q_rad)
-        frames: Floats = self._arm.frames(q_rad[None])[0]
-        return frames
+        return self._arm.frames(q_rad[None])[0]
 
     def beam(self, T_base_flange: Floats, standing: Standing | None) -> Beam | None:
         """None for a rig without laser and fixture."""
@@ -109,7 +106,7 @@ class Scene:
 
     def _rebuild(self) -> None:
         rig, tool, fixture = self._rig, self._rig.tool, self._rig.fixture
-        self._arm = motion_arm(rig, self._corrections)
+        self._arm = RigArm.of_rig(rig, self._corrections)
         self._believed: BelievedRig | None = None
         self._faces: dict[int, tuple[Points, Points]] = {}  # by placement: T_base_face of PSD 1, PSD 2, as lists
         self._half_size_m = 0.0 if fixture is None else fixture.half_size_m

@@ -16,7 +16,7 @@ from acquisition.motion.setpoints import solve_rate_hz
 from acquisition.recording.rig_schema import ArmModel, Rig
 from acquisition.streams import Pump
 from calibeam.geometry_only import read_geometry
-from calibeam.motion.arm import motion_arm
+from calibrate.arms.rig_arm import RigArm
 from calibrate.errors import DataError
 from calibrate.model_file import corrections
 from drivers.clock import Clock
@@ -32,11 +32,11 @@ UR_STREAM_HZ = 500.0  # e-Series control cycle; the older series takes a set-poi
 def solver_of(rig: Rig, model: Path | None = None) -> Solver:
     """Inverse kinematics of the rig's arm as drawn, or as identified. DataError for a model of another arm."""
     if model is None:
-        return Solver(motion_arm(rig), closed_form(motion_arm(rig)))
+        return Solver(RigArm.of_rig(rig), closed_form(RigArm.of_rig(rig)))
     identified = read_geometry(model)
     if identified.rig.name != rig.name:
         raise DataError(f"{model}: this model is of rig '{identified.rig.name}', not of '{rig.name}'; take its own")
-    return Solver(motion_arm(rig, corrections(identified)), closed_form(motion_arm(rig)))
+    return Solver(RigArm.of_rig(rig, corrections(identified)), closed_form(RigArm.of_rig(rig)))
 
 
 def pace_of(rig: Rig, speed_share: float = 1.0) -> Pace:
@@ -69,7 +69,7 @@ def gated_arm(arm: Movable, rig: Rig, robot: Pump) -> GatedArm:
         out: Floats = block.values["actual_q_rad"][-1]
         return out
 
-    return GatedArm(arm, motion_arm(rig), cell_of(rig), now)
+    return GatedArm(arm, RigArm.of_rig(rig), cell_of(rig), now)
 
 
 def gate_of(rig: Rig, solver: Solver, arm: SetPoints, clock: Clock, speed_share: float = 1.0) -> Gate:

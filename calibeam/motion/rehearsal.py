@@ -21,8 +21,8 @@ from acquisition.plan import PlanOptions, blocks
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig_schema import Rig
 from calibeam.learner import FittedLearner
-from calibeam.motion.arm import MotionArm, motion_arm
 from calibeam.motion.gate_of_rig import cell_of
+from calibrate.arms.rig_arm import RigArm
 
 Floats = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ class Stop:
 class Rehearsal:
     """The stops in order; `ways` (pose, joint) from one that was had to the next, `places` their fixture places."""
 
-    arm: MotionArm
+    arm: RigArm
     home_rad: Floats
     stops: tuple[Stop, ...]
     ways: tuple[Floats, ...]
@@ -85,7 +85,7 @@ class PaperArm:
 
 def rehearse(rig: Rig, options: PlanOptions, plan: PosePlan | None = None) -> Rehearsal:
     """What a session of `options`, or of a plan of poses, is about to do, from the rig's home_rad on."""
-    arm = motion_arm(rig)
+    arm = RigArm.of_rig(rig)
     home_rad = np.zeros(rig.n_joints) if rig.motion.home_rad is None else np.array(rig.motion.home_rad)
     paper = PaperArm(home_rad)
     gated = GatedArm(paper, arm, cell_of(rig), lambda: paper.q_rad)

@@ -18,6 +18,7 @@ from calibeam.session.forecast import Forecast
 from calibeam.session.pace import Pace
 from calibeam.session.quality import Keeper
 from calibeam.session.shown import UNDELIVERED, Listener, Shown
+from calibrate.arms.rig_arm import limits_of
 from drivers.clock import Clock
 from drivers.errors import DeviceError
 
@@ -29,8 +30,7 @@ class Teller:
     """Verbs for every part of a session, from any thread."""
 
     def __init__(self, rig: Rig, clock: Clock, listeners: Sequence[Listener]) -> None:
-        joints = rig.arm.joints
-        self._keeper = Keeper(np.array([j.lower_rad for j in joints]), np.array([j.upper_rad for j in joints]))
+        self._keeper = Keeper(*limits_of(rig))
         self._pace, self._listeners = Pace(clock), listeners
         self._turn = threading.RLock()
         self.shown = Shown()

@@ -38,7 +38,7 @@ class LocalPoeArm(SerialArm):
         super().__init__(n, parameters + last, tuple(frames.tolist()))
 
     def fixed_parts(self, theta: Floats) -> Floats:
-        return self._parts @ np.array([pose_offset(error) for error in theta[self._error_columns]])
+        return self._parts @ pose_offset(theta[self._error_columns])
 
     def angle_offset_rad(self, theta: Floats) -> Floats:
         return theta[self._zero_columns]
@@ -47,9 +47,10 @@ class LocalPoeArm(SerialArm):
         """Shifts act in front of the part's own turn; a turn is seen from behind by the transposed left Jacobian."""
         out = np.zeros((len(self.parameters), 6))
         out[self._zero_columns, 5] = 1.0
-        for columns, error in zip(self._error_columns, theta[self._error_columns], strict=True):
-            out[columns[:3], :3] = pose_offset(error)[:3, :3]  # row k: its transpose times unit vector k
-            out[columns[3:], 3:] = left_jacobian(error[3:])  # row k: right Jacobian = transpose, column k
+        errors = theta[self._error_columns]
+        shifts, turns = self._error_columns[:, :3], self._error_columns[:, 3:]
+        out[shifts, :3] = pose_offset(errors)[:, :3, :3]  # row k: its transpose times unit vector k
+        out[turns, 3:] = left_jacobian(errors[:, 3:])  # row k: right Jacobian = transpose, column k
         return out
 
 

@@ -34,4 +34,6 @@ def least_distance(rows: Callable[[Floats], tuple[Floats, Floats]], start: Float
 
 def weights(distance: Floats) -> Floats:
     """(row,) one over distances (row,)."""
-    return np.asarray(1.0 / np.maximum(distance, FLOOR * float(np.median(distance)) + 1e-12))
+    ordered = np.sort(distance)  # numpy.median costs ten times as much on so few
+    median = 0.5 * float(ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2])
+    return np.asarray(1.0 / np.maximum(distance, FLOOR * median + 1e-12))

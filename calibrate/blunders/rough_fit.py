@@ -53,5 +53,5 @@ def frame_between(a_m: Floats, b_m: Floats, weight: Floats, *, mirrored: bool = 
 def turn_between(a: Floats, b: Floats, weight: Floats, *, mirrored: bool = False) -> Floats:
     """(3, 3) linear with linear @ a nearest to b, both (vector, 3), weights (vector,)."""
     U, _, Vt = np.linalg.svd((b * weight[:, None]).T @ a)
-    sign = np.linalg.det(U) * np.linalg.det(Vt) * (-1.0 if mirrored else 1.0)
-    return np.asarray(U @ np.diag([1.0, 1.0, np.sign(sign)]) @ Vt, dtype=np.float64)
+    sign = np.sign(np.linalg.det(U @ Vt)) * (-1.0 if mirrored else 1.0)
+    return np.asarray((U * [1.0, 1.0, sign]) @ Vt, dtype=np.float64)

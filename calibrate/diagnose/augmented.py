@@ -15,6 +15,7 @@ from calibrate.effects.drivers import Drivers
 from calibrate.effects.ports import Perturbation, Place, Port
 from calibrate.joint_problem import JointProblem
 from calibrate.parameters import Parameter
+from calibrate.shared_scatter import SharedScatter
 from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
@@ -49,12 +50,13 @@ class Augmented:
     sizes: tuple[Floats, ...]  # of each term (coefficient,) that would be plain to see; inf where it does nothing
     given: int = 0  # terms, the first ones, that a model brought along: to a search they are geometry
     assumed: Assumed | None = None  # what that model states of the values
+    shared: SharedScatter | None = None  # scatter that instruments have in common; a weight, too
     last: dict[bytes, Around] = field(default_factory=dict[bytes, Around])
     slopes: dict[bytes, list[Floats]] = field(default_factory=dict[bytes, list[Floats]])
 
-    def under(self, whiteners: tuple[Floats, ...]) -> "Augmented":
+    def under(self, whiteners: tuple[Floats, ...], shared: SharedScatter | None = None) -> "Augmented":
         """The same with other weights: what was computed last without weights is kept."""
-        return replace(self, whiteners=whiteners)
+        return replace(self, whiteners=whiteners, shared=shared)
 
     def refreshed(self, drivers: Drivers) -> "Augmented":
         """The same with other drivers."""
@@ -125,10 +127,9 @@ class Augmented:
 
     def residual(self, theta: Floats) -> Floats:
         at, geometry = self.around(theta), theta[: len(self.session.parameters)]
-        parts = [
-            np.einsum("nij,nj->ni", W, at.expected[i][rows] - m.problem.observed[rows]).ravel()
-            for i, (m, rows, W) in enumerate(zip(self.session.measured, self.rows, self.whiteners, strict=True))
-        ]
+        misfits = [e - m.problem.observed for m, e in zip(self.session.measured, at.expected, strict=True)]
+        each = zip(self.apart(misfits), self.rows, self.whiteners, strict=True)
+        parts = [np.einsum("nij,nj->ni", W, misfit[rows]).ravel() for misfit, rows, W in each]
         joint, first = self.session.weighting.unweighted, len(self.session.measured)
         parts += [
             block.residual(joint.of_block(first + i, geometry)) for i, block in enumerate(self.session.weighting.known)
@@ -137,10 +138,7 @@ class Augmented:
         return np.concatenate(parts)
 
     def jacobian(self, theta: Floats) -> Floats:
-        parts = [
-            (W @ full[rows]).reshape(-1, full.shape[-1])
-            for full, rows, W in zip(self._slopes(theta), self.rows, self.whiteners, strict=True)
-        ]
+        parts = [whitened.reshape(-1, whitened.shape[-1]) for whitened in self.whitened(self._slopes(theta))]
         joint, geometry = self.session.weighting.unweighted, theta[: len(self.session.parameters)]
         extra = len(theta) - len(geometry)
         for i, block in enumerate(self.session.weighting.known, start=len(self.session.measured)):
@@ -148,6 +146,14 @@ class Augmented:
             parts.append(np.concatenate([known, np.zeros((len(known), extra))], axis=1))
         parts += [] if self.assumed is None else [self.assumed.jacobian(len(theta))]
         return np.concatenate(parts)
+
+    def apart(self, parts: Sequence[Floats]) -> list[Floats]:
+        """Rows (row, k, ...) of every instrument less what they share with those of the second encoders."""
+        return list(parts) if self.shared is None else self.shared.apart(parts)
+
+    def whitened(self, columns: Sequence[Floats]) -> list[Floats]:
+        """Of each instrument's active rows (active row, k, m), from columns (row, k, m) of all of them."""
+        return [W @ c[rows] for W, c, rows in zip(self.whiteners, self.apart(columns), self.rows, strict=True)]
 
     def _slopes(self, theta: Floats) -> list[Floats]:
         """Of each instrument (row, k, value) without weights; kept, since weights change more often than values."""

@@ -27,7 +27,8 @@ def beyond_noise(model: Fitted, missing: Sequence[Missing]) -> Unexplained | Non
     believed = session.rig.noise
     if believed.position_m is None or believed.joint_rad is not None:
         return None  # where joints are said to scatter, too, the fit has found how much of it is theirs
-    for measured, scatter, rows in zip(session.measured, model.scatters, model.problem.rows, strict=True):
+    whole, rows_of = model.noise.whole(model.problem.rows), model.problem.rows
+    for measured, scatter, rows in zip(session.measured, whole, rows_of, strict=True):
         if Trait.CERTIFIED not in kind_of(measured.name).traits or len(rows) == 0:
             continue
         stated = float(np.sqrt(np.mean(believed_sigma(measured)[rows][:, :LENGTHS] ** 2)))

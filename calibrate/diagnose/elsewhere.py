@@ -27,6 +27,7 @@ from calibrate.effects.term import Term
 from calibrate.errors import DataError
 from calibrate.parameters import plausible_sizes, priors
 from calibrate.problem import whitener_of
+from calibrate.shared_scatter import SharedScatter, levers_of
 from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
@@ -59,6 +60,7 @@ class Elsewhere:
     around: Around
     rows: tuple[Ints, ...]  # of each instrument: those that the fit has seen, then those of new poses
     whiteners: tuple[Floats, ...]
+    shared: SharedScatter | None
 
     def carried(self, accepted: Accepted) -> Accepted | None:
         """With the coefficients that give the measured poses what they had; None: a term that knows those only."""
@@ -92,7 +94,8 @@ class Elsewhere:
     def added(self, accepted: Accepted) -> tuple[Floats, Floats]:
         """What a carried term adds to the readings: (row,) of the measured rows, (pose, k) of the new ones."""
         amount = accepted.term.amount(self.drivers, accepted.coefficients, accepted.inner)[..., None]
-        seen = self._whitened(columns_of(self.session, accepted.term.port, amount, self.around))
+        columns = columns_of(self.session, accepted.term.port, amount, self.around)
+        seen = self._problem((), ()).whitened(columns)
         measured, new = self._parted(seen)
         return measured[:, 0], new[..., 0]
 
@@ -102,9 +105,7 @@ class Elsewhere:
         """
         terms, known = (*self.brought, *terms), self.state.problem
         sizes = plain_sizes(self.session, terms, self.drivers, self.whiteners, self.rows)
-        problem = Augmented(
-            self.session, terms, self.drivers, self.rows, self.whiteners, sizes, known.given, known.assumed
-        )
+        problem = replace(self._problem(terms, sizes), given=known.given, assumed=known.assumed)
         values = np.concatenate([self.state.geometry, problem.start[len(self.state.geometry) :]])
         parameters = problem.parameters
         free = np.flatnonzero([p.free for p in parameters])
@@ -116,8 +117,9 @@ class Elsewhere:
         measured, new = self._parted(seen)
         return np.concatenate([measured, parts[-1], np.diag(scale / sigma)]), new
 
-    def _whitened(self, columns: Sequence[Floats]) -> list[Floats]:
-        return [W @ c[rows] for W, c, rows in zip(self.whiteners, columns, self.rows, strict=True)]
+    def _problem(self, terms: tuple[Accepted, ...], sizes: tuple[Floats, ...]) -> Augmented:
+        bare = Augmented(self.session, terms, self.drivers, self.rows, self.whiteners, sizes)
+        return replace(bare, shared=self.shared)
 
     def _parted(self, seen: Sequence[Floats]) -> tuple[Floats, Floats]:
         """(row, m) of measured rows and (pose, k of all instruments, m) of new ones, zero where none reads."""
@@ -144,9 +146,10 @@ def elsewhere(state: Fitted, poses: NewPoses) -> Elsewhere:
         for seen, m, longer in zip(state.problem.rows, state.session.measured, measured, strict=True)
     )
     whiteners = tuple(_whiteners(state, i, n, poses, measured[i]) for i in range(len(measured)))
-    bare = Augmented(session, (), None, rows, whiteners, ()).around(state.geometry)
-    drivers = _drivers(session, bare, state, poses)
-    found = Elsewhere(state, session, drivers, bare, rows, whiteners)
+    plain = Augmented(session, (), None, rows, whiteners, ())
+    bare = plain.around(state.geometry)
+    drivers, shared = _drivers(session, bare, state, poses), _shared(state, plain, bare)
+    found = Elsewhere(state, session, drivers, bare, rows, whiteners, shared)
     carried = (*found.brought, *(a for a in map(found.carried, state.accepted) if a is not None))
     with_terms = Augmented(session, carried, drivers, rows, whiteners, ())
     values = np.concatenate([state.geometry, with_terms.start[len(state.geometry) :]])
@@ -197,6 +200,15 @@ def _whiteners(state: Fitted, i: int, n: int, poses: NewPoses, longer: Measured)
     at = np.searchsorted(sample, poses.like[new]) if np.all(np.diff(sample) >= 0) else np.zeros(len(new), dtype=np.intp)
     like = scatter.covariance[np.minimum(at, len(sample) - 1)]
     return np.concatenate([known, whitener_of(like)])
+
+
+def _shared(state: Fitted, longer: Augmented, at: Around) -> SharedScatter | None:
+    """What instruments share at new poses, where second encoders answer as well."""
+    shared, measured = state.noise.shared, longer.session.measured
+    if shared is None:
+        return None
+    chains, by_joint = [m.problem.chain for m in measured], [longer.by_joint(at, i) for i in range(len(measured))]
+    return replace(shared, levers=levers_of(chains, [m.sample_rows for m in measured], by_joint))
 
 
 def _drivers(session: Session, at: Around, state: Fitted, poses: NewPoses) -> Drivers:

@@ -15,7 +15,7 @@ from calibrate.diagnose.assumed import Assumed
 from calibrate.diagnose.augmented import Around, Augmented, plain_sizes
 from calibrate.diagnose.driver_values import drivers_of
 from calibrate.diagnose.linearised import Accepted, Rows, Unseen
-from calibrate.diagnose.noise_of_fit import covariance_at, scatters_of, trusted, whiteners_of
+from calibrate.diagnose.noise_of_fit import Noise, covariance_at, noise_of, whiteners_of
 from calibrate.diagnose.scatter import Scatter, likelihood_of
 from calibrate.diagnose.session import Session
 from calibrate.diagnose.unmet_places import places_found
@@ -53,7 +53,7 @@ class Fitted:
     active: Ints  # samples that the fit sees, sorted
     problem: Augmented
     values: Floats  # of the problem's parameters
-    scatters: tuple[Scatter, ...]  # of each instrument, over its active rows
+    noise: Noise  # of each instrument, over its active rows
     covariance: Floats  # (value, value) posterior; zero for held ones
     steps: int = 0  # of the solver, in all rounds of weights
     stop: Stop = Stop.ROUNDS  # the rule that ended the last round
@@ -77,6 +77,11 @@ class Fitted:
         return self._split[1][: self.problem.given]
 
     @property
+    def scatters(self) -> tuple[Scatter, ...]:
+        """Of each instrument, over its active rows: of what it does not share with another."""
+        return self.noise.scatters
+
+    @property
     def samples(self) -> int:
         return len(self.active)
 
@@ -85,8 +90,8 @@ class Fitted:
         return sum(int(np.sum(s.weights < SWALLOWED)) for s in self.scatters)
 
     def trusting(self) -> "Fitted":
-        scatters = trusted(self.scatters)
-        return replace(self, problem=self.problem.under(whiteners_of(scatters)), scatters=scatters)
+        noise = self.noise.trusted
+        return replace(self, problem=noise.under(self.problem), noise=noise)
 
     @cached_property
     def around(self) -> Around:
@@ -157,10 +162,7 @@ class Fitted:
 
     def columns(self, term: Term, inner: Floats) -> Floats:
         parts = self.problem.columns(term.port, term.basis(self.drivers, inner), self.around)
-        data = [
-            (W @ c[rows]).reshape(-1, c.shape[-1])
-            for c, rows, W in zip(parts, self.problem.rows, self.problem.whiteners, strict=True)
-        ]
+        data = [whitened.reshape(-1, whitened.shape[-1]) for whitened in self.problem.whitened(parts)]
         rest = len(self.rows.residual) - len(self._labels[0])
         return np.concatenate([*data, np.zeros((rest, data[0].shape[1]))])
 
@@ -170,9 +172,9 @@ class Fitted:
 
     def refitted(self, accepted: Sequence[Accepted]) -> "Fitted":
         kept = {a.term.key for a in self.accepted}
-        fits = [self._refitted(tuple(accepted), self.scatters)]
+        fits = [self._refitted(tuple(accepted), self.noise)]
         if any(a.term.key not in kept and _makes_outliers(a.term) for a in accepted):
-            fits.append(self._refitted(tuple(accepted), trusted(self.scatters)))
+            fits.append(self._refitted(tuple(accepted), self.noise.trusted))
         return min(fits, key=lambda fit: fit.minus_two_log_likelihood)
 
     def select(self, samples: Ints) -> "Fitted":
@@ -182,23 +184,24 @@ class Fitted:
         rows = _rows_of(self.session, np.sort(samples))
         moved = places_found(self.problem, self.values, self.scatters, rows, len(self._labels[0]))
         at = self.problem.around(moved)
+        misfits = [m.problem.observed - e for m, e in zip(self.session.measured, at.expected, strict=True)]
+        apart = misfits if self.noise.shared is None else self.noise.shared.apart(misfits)
         out: list[Unseen] = []
         for i, (m, r) in enumerate(zip(self.session.measured, rows, strict=True)):
             if len(r) == 0 or len(self.problem.rows[i]) == 0:  # without a row in the fit nobody knows its noise
                 continue
-            misfit = m.problem.observed[r] - at.expected[i][r]
             W = whitener_of(covariance_at(self.scatters[i], self.problem.rows[i], r))
-            out.append(Unseen(m.name, m.sample_rows[r, -1], misfit, np.einsum("nij,nj->ni", W, misfit)))
+            out.append(Unseen(m.name, m.sample_rows[r, -1], misfits[i][r], np.einsum("nij,nj->ni", W, apart[i][r])))
         return tuple(out)
 
-    def _refitted(self, accepted: tuple[Accepted, ...], scatters: tuple[Scatter, ...]) -> "Fitted":
+    def _refitted(self, accepted: tuple[Accepted, ...], noise: Noise) -> "Fitted":
         given, assumed = self.problem.given, self.problem.assumed
         terms = (*self._split[1][:given], *accepted)
-        drivers, whiteners, rows = self.drivers if terms else None, whiteners_of(scatters), self.problem.rows
+        drivers, whiteners, rows = self.drivers if terms else None, whiteners_of(noise.scatters), self.problem.rows
         sizes = plain_sizes(self.session, terms, drivers, whiteners, rows)
         problem = Augmented(self.session, terms, drivers, rows, whiteners, sizes, given, assumed)
         start = np.concatenate([self.geometry, problem.start[len(self.geometry) :]])
-        return _settled(_turn(problem, self.active, start, scatters))
+        return _settled(_turn(problem, self.active, start, noise))
 
 
 def fit_geometry(session: Session, active: Ints | None = None) -> Fitted:
@@ -214,7 +217,7 @@ def fit_geometry(session: Session, active: Ints | None = None) -> Fitted:
     fits: list[Fitted] = []
     for loss in (Loss.SQUARE, Loss.HUBER):
         rough = solve(problem, start=session.start, damping=FAR_START, loss=loss)
-        fits.append(_settled(_turn(problem, chosen, rough.theta, scatters_of(problem, rough))))
+        fits.append(_settled(_turn(problem, chosen, rough.theta, noise_of(problem, rough))))
         if all(np.all(s.weights > WILD) for s in fits[0].scatters):
             break
     return min(fits, key=lambda fit: fit.minus_two_log_likelihood)
@@ -232,13 +235,13 @@ def fit_from_model(
 
     `unit` (assumed value,): a step over which readings are linear.
     """
-    scatters = trusted(geometry.scatters)
-    whiteners, rows = whiteners_of(scatters), geometry.problem.rows
+    noise = geometry.noise.trusted
+    whiteners, rows = whiteners_of(noise.scatters), geometry.problem.rows
     sizes = plain_sizes(session, terms, geometry.drivers, whiteners, rows)
     problem = Augmented(session, terms, geometry.drivers, rows, whiteners, sizes, len(terms))
     free = np.flatnonzero([p.free for p in problem.parameters])
     near = assumed.held_near(problem.jacobian(start), np.setdiff1d(free, assumed.at), unit)
-    return _settled(_turn(replace(problem, assumed=near), geometry.active, start, scatters))
+    return _settled(_turn(replace(problem, assumed=near), geometry.active, start, noise))
 
 
 def _makes_outliers(term: Term) -> bool:
@@ -252,31 +255,33 @@ def _settled(fitted: Fitted) -> Fitted:
         last, problem = fitted.minus_two_log_likelihood, fitted.problem
         if fitted.problem.terms and turn <= REFRESHED:
             problem = problem.refreshed(fitted.drivers)
-        new = _turn(problem, fitted.active, fitted.values, fitted.scatters, FEW_STEPS)
+        new = _turn(problem, fitted.active, fitted.values, fitted.noise, FEW_STEPS)
         fitted = replace(new, steps=fitted.steps + new.steps)
         if turn + 1 >= FEWEST_TURNS and abs(last - fitted.minus_two_log_likelihood) < SETTLED:
             return replace(fitted, stop=Stop.LIKELIHOOD)
     return fitted
 
 
-def _turn(problem: Augmented, active: Ints, start: Floats, scatters: tuple[Scatter, ...], steps: int = STEPS) -> Fitted:
+def _turn(problem: Augmented, active: Ints, start: Floats, noise: Noise, steps: int = STEPS) -> Fitted:
     """Least squares under the noise so far, then the noise that is left."""
-    problem = problem.under(whiteners_of(scatters))
+    problem = noise.under(problem)
     fit = solve(problem, start=start, damping=DAMPING, max_steps=steps, tolerance=TOLERANCE)
-    return Fitted(problem.session, active, problem, fit.theta, scatters_of(problem, fit), fit.covariance, fit.steps)
+    return Fitted(problem.session, active, problem, fit.theta, noise_of(problem, fit), fit.covariance, fit.steps)
 
 
 def _cut(state: Fitted, active: Ints) -> Fitted:
-    rows = _rows_of(state.session, active)
+    rows, shared = _rows_of(state.session, active), state.noise.shared
+    each = zip(state.session.measured, state.around.expected, strict=True)
+    misfits = [m.problem.observed - expected for m, expected in each]
+    apart = misfits if shared is None else shared.apart(misfits)
     scatters: list[Scatter] = []
-    for i, (m, r) in enumerate(zip(state.session.measured, rows, strict=True)):
+    for i, r in enumerate(rows):
         covariance = covariance_at(state.scatters[i], state.problem.rows[i], r)
-        value, weights = likelihood_of(m.problem.observed[r] - state.around.expected[i][r], covariance)
+        value, weights = likelihood_of(apart[i][r], covariance)
         scatters.append(Scatter(covariance, weights, value, state.scatters[i].free))
-    problem = replace(
-        state.problem, rows=rows, whiteners=whiteners_of(tuple(scatters)), last=dict(state.problem.last), slopes={}
-    )
-    return replace(state, active=active, problem=problem, scatters=tuple(scatters))
+    noise = Noise(tuple(scatters), shared)
+    problem = replace(noise.under(state.problem), rows=rows, last=dict(state.problem.last), slopes={})
+    return replace(state, active=active, problem=problem, noise=noise)
 
 
 def _rows_of(session: Session, active: Ints) -> tuple[Ints, ...]:

@@ -1,13 +1,13 @@
 """Which samples a proof leaves out: at random, each place in turn, the end of the session. Repeats stay together."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
 from calibrate.effects.drivers import Drivers
+from calibrate.uncertainty.splits import Split, by_place, last_block
 
 Ints = NDArray[np.intp]
 
@@ -16,24 +16,14 @@ MOST = 3  # places that are left out in turn, the largest ones: each costs two r
 FEWEST = 10  # samples of a place, and of anything that is left out
 
 
-@dataclass(frozen=True)
-class Split:
-    """Each fold is predicted from all samples that are not in it."""
-
-    name: str
-    unseen: tuple[Ints, ...]
-
-
 def splits_of(drivers: Drivers, samples: Ints, rng: Generator) -> tuple[Split, ...]:
     """Those that a session allows."""
     found = [Split("random", _at_random(drivers, samples, rng))]
     place = places(drivers)[samples]
-    folds = [samples[place == p] for p in np.unique(place[place >= 0])]
-    folds = sorted((fold for fold in folds if len(fold) >= FEWEST), key=len, reverse=True)[:MOST]
+    folds = sorted(by_place(place, FEWEST).unseen, key=len, reverse=True)[:MOST]
     if len(folds) > 1:
-        found.append(Split("place", tuple(folds)))
-    order = samples[np.argsort(drivers.t_s[samples], kind="stable")]
-    found.append(Split("last block", (np.sort(order[len(order) - max(1, round(SHARE * len(order))) :]),)))
+        found.append(Split("place", tuple(samples[fold] for fold in folds)))
+    found.append(Split("last block", tuple(samples[fold] for fold in last_block(drivers.t_s[samples], SHARE).unseen)))
     return tuple(split for split in found if _proves(split, len(samples)))
 
 

@@ -1,32 +1,82 @@
 """Noise of every instrument at a fit: how large, how far each observation is trusted, and what whitens it."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.diagnose.augmented import Augmented
-from calibrate.diagnose.scatter import Scatter, scatter_of
+from calibrate.diagnose.scatter import Scatter, likelihood_of, scatter_of
 from calibrate.fit import Fit
 from calibrate.identification.session import believed_sigma
 from calibrate.parameters import priors
 from calibrate.problem import whitener_of
+from calibrate.shared_scatter import SharedScatter, levers_of, shares_found, witness_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 MOST_FITTED = 0.2  # of the rows that are left over, at least, when noise is judged
+GLITCH = 0.3  # weight of a reading of the second encoders from which on it is believed less than fully: five sigmas off
 
 
-def scatters_of(problem: Augmented, fit: Fit) -> tuple[Scatter, ...]:
-    """Noise of every instrument at the values of a fit."""
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Of all instruments, over the active rows."""
+
+    scatters: tuple[Scatter, ...]  # of each instrument, without what it shares
+    shared: SharedScatter | None = None  # over all rows; None: nothing
+
+    def under(self, problem: Augmented) -> Augmented:
+        """The problem with weights from this noise."""
+        return problem.under(whiteners_of(self.scatters), self.shared)
+
+    @property
+    def trusted(self) -> "Noise":
+        """The same, every observation with its full weight."""
+        return replace(self, scatters=tuple(replace(s, weights=np.ones(len(s.weights))) for s in self.scatters))
+
+    def whole(self, rows: tuple[Ints, ...]) -> tuple[Scatter, ...]:
+        """Of each instrument by itself, as one meets it who does not know the others; `rows` are the active ones."""
+        if self.shared is None:
+            return self.scatters
+        form = middle_of(self.scatters[self.shared.witness])
+        shared = [self.shared.whole(i, form) for i in range(len(self.scatters))]
+        each = zip(self.scatters, shared, rows, strict=True)
+        return tuple(s if more is None else replace(s, covariance=s.covariance + more[r]) for s, more, r in each)
+
+
+def noise_of(problem: Augmented, fit: Fit) -> Noise:
+    """Noise of every instrument at the values of a fit; what they share with second encoders is found first."""
     at, larger = problem.around(fit.theta), freedom(problem, fit.covariance)
-    out: list[Scatter] = []
-    for i, (m, rows) in enumerate(zip(problem.session.measured, problem.rows, strict=True)):
-        residual = m.problem.observed[rows] - at.expected[i][rows]
-        found = scatter_of(residual, problem.by_joint(at, i)[rows], believed_sigma(m)[rows])
-        out.append(replace(found, covariance=found.covariance * larger))
-    return tuple(out)
+    measured = problem.session.measured
+    residuals = [m.problem.observed - expected for m, expected in zip(measured, at.expected, strict=True)]
+    by_joint = [problem.by_joint(at, i) for i in range(len(measured))]
+
+    def found(i: int, residual: Floats) -> Scatter:
+        rows = problem.rows[i]
+        scatter = scatter_of(residual[rows], by_joint[i][rows], believed_sigma(measured[i])[rows])
+        return replace(scatter, covariance=scatter.covariance * larger)
+
+    witness = witness_of([m.problem.chain for m in measured])
+    if witness is None or len(measured) == 1 or len(problem.rows[witness]) == 0:
+        return Noise(tuple(found(i, residual) for i, residual in enumerate(residuals)))
+    seen = found(witness, residuals[witness])
+    trust = _trust(seen, residuals[witness], problem.rows[witness])
+    chains, samples = [m.problem.chain for m in measured], [m.sample_rows for m in measured]
+    levers = levers_of(chains, samples, by_joint, trust)
+    share = shares_found(residuals, levers, problem.whiteners, problem.rows, witness)
+    shared = SharedScatter(witness, share, levers)
+    out = [seen if i == witness else found(i, alone) for i, alone in enumerate(shared.apart(residuals))]
+    more = [shared.unseen(i, middle_of(seen)) for i in range(len(out))]
+    each = zip(out, more, problem.rows, strict=True)
+    return Noise(tuple(s if m is None else replace(s, covariance=s.covariance + m[r]) for s, m, r in each), shared)
+
+
+def _trust(seen: Scatter, residual: Floats, known: Ints) -> Floats:
+    """(row,) of all readings of the second encoders, active or not."""
+    _, weights = likelihood_of(residual, covariance_at(seen, known, np.arange(len(residual))))
+    return np.clip(weights / GLITCH, 0.0, 1.0)
 
 
 def freedom(problem: Augmented, covariance: Floats) -> float:
@@ -46,18 +96,17 @@ def whiteners_of(scatters: tuple[Scatter, ...]) -> tuple[Floats, ...]:
     return tuple(whitener_of(s.covariance) * np.sqrt(s.weights)[:, None, None] for s in scatters)
 
 
-def trusted(scatters: tuple[Scatter, ...]) -> tuple[Scatter, ...]:
-    """The same noise, every observation with its full weight."""
-    return tuple(replace(s, weights=np.ones(len(s.weights))) for s in scatters)
-
-
 def covariance_at(scatter: Scatter, known: Ints, rows: Ints) -> Floats:
     """(row, k, k) noise at rows: as found where the fit has seen them, else the middle one of those it has."""
     if len(scatter.covariance) == 0:  # nobody knows: as good as no weight
         return np.broadcast_to(np.eye(scatter.covariance.shape[-1]), (len(rows), *scatter.covariance.shape[1:]))
-    # A whole one of them: medians of single entries together need be no covariance.
-    middle = np.argsort(np.trace(scatter.covariance, axis1=1, axis2=2))[len(scatter.covariance) // 2]
-    out = np.broadcast_to(scatter.covariance[middle], (len(rows), *scatter.covariance.shape[1:])).copy()
+    out = np.broadcast_to(middle_of(scatter), (len(rows), *scatter.covariance.shape[1:])).copy()
     seen = np.isin(rows, known)
     out[seen] = scatter.covariance[np.searchsorted(known, rows[seen])]
     return out
+
+
+def middle_of(scatter: Scatter) -> Floats:
+    """(k, k) of a usual row: a whole one of them, since medians of single entries together need be no covariance."""
+    middle = np.argsort(np.trace(scatter.covariance, axis1=1, axis2=2))[len(scatter.covariance) // 2]
+    return scatter.covariance[middle]

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from calibrate.diagnose.folds import Split, splits_of, units
+from calibrate.diagnose.folds import splits_of, units
 from calibrate.diagnose.linearised import State, Unseen
 from calibrate.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
+from calibrate.uncertainty.splits import Split
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -80,7 +81,7 @@ def _proof(bare: State, full: State, samples: Ints, split: Split, rng: Generator
         before += _lengths(without)
         after += _lengths(full.select(known).refitted(full.accepted).held_out(fold) if full.accepted else without)
     names = sorted({u.instrument for u in before})
-    return [_compared(split.name, name, before, after, units(bare.drivers), rng) for name in names]
+    return [_compared(split.says, name, before, after, units(bare.drivers), rng) for name in names]
 
 
 def _lengths(unseen: Sequence[Unseen]) -> list[Unseen]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from calibrate.arms.rig_arm import limits_of
 from calibrate.diagnose.elsewhere import NewPoses
 from calibrate.diagnose.fitted import Fitted
 from calibrate.observation_model import ObservationModel
@@ -22,7 +23,8 @@ TRIES = 3  # as many, since some never land
 SHARE_RECORDED = 0.25
 BETWEEN = (-0.5, 1.5)  # of the way from one recorded pose to another
 SPREAD_RAD = 0.1
-STEPS, STEP_RAD, DAMPING = 12, 0.3, 1e-8
+STEPS, STEP_RAD = 12, 0.3
+SINGULAR = 1e-4  # of the quickest direction
 LANDED_M = 1e-6
 ROOM_M = 0.05  # beyond the box in which the flange has been
 
@@ -78,15 +80,10 @@ def _landed(state: Fitted, like: Ints, q_rad: Floats, rng: Generator) -> tuple[B
 
 
 def _met(chain: ObservationModel, theta: Floats, q_rad: Floats, rng: Generator) -> Floats:
-    """Newton's steps of least length, batch-wise, onto the faces or into the cone."""
+    """Onto the faces or into the cone; NaN where that cannot be."""
     target = chain.sensor.aims(chain.expect(theta, q_rad).shape[1], rng)
+    q_rad = chain.readings_for(theta, q_rad, target, SINGULAR, STEPS, STEP_RAD)
     with np.errstate(all="ignore"):
-        for _ in range(STEPS):
-            J, away = chain.by_joint(theta, q_rad), target - chain.expect(theta, q_rad)
-            square = J @ np.swapaxes(J, 1, 2) + DAMPING * np.eye(J.shape[1])
-            step = np.einsum("nki,nk->ni", J, np.linalg.solve(np.nan_to_num(square), away[..., None])[..., 0])
-            largest = np.max(np.abs(step), axis=1, keepdims=True)
-            q_rad = q_rad + np.nan_to_num(step * np.minimum(1.0, STEP_RAD / np.maximum(largest, 1e-12)))
         met = np.max(np.abs(chain.expect(theta, q_rad) - target), axis=1) < LANDED_M
     n_arm = len(chain.model.parameters)
     met &= chain.sensor.met(theta[n_arm:], chain.model.flange(theta[:n_arm], q_rad))
@@ -95,10 +92,10 @@ def _met(chain: ObservationModel, theta: Floats, q_rad: Floats, rng: Generator) 
 
 def _allowed(state: Fitted, q_rad: Floats) -> Bools:
     """(pose,) inside the joint limits, and where flange and links have been."""
-    arm, joints = state.session.arm, state.session.rig.arm.joints
+    arm, (lower_rad, upper_rad) = state.session.arm, limits_of(state.session.rig)
     theta = state.geometry[: len(arm.parameters)]
     q = np.nan_to_num(q_rad)
-    inside = np.all((q >= [j.lower_rad for j in joints]) & (q <= [j.upper_rad for j in joints]), axis=1)
+    inside = np.all((q >= lower_rad) & (q <= upper_rad), axis=1)
     been, there = state.drivers.frames, arm.frames(theta, q)
     low, high = been[:, -1, :3, 3].min(axis=0) - ROOM_M, been[:, -1, :3, 3].max(axis=0) + ROOM_M
     inside &= np.all((there[:, -1, :3, 3] >= low) & (there[:, -1, :3, 3] <= high), axis=1)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.rig_schema import Rig
+from calibrate.effects.conditions import Conditions
 from calibrate.sensors.catalogue import names_with
 from calibrate.sensors.kind import Trait
 
@@ -30,30 +31,13 @@ class Readout:
     joints: tuple[int, ...] = ()  # (k,) of second encoders, from 1
 
 
-@dataclass(frozen=True, eq=False)
-class Drivers:
-    """Of the whole session, in the order of its samples. None: not recorded."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Drivers(Conditions):
+    """Of the whole session, in the order of its samples."""
 
     rig: Rig
-    q_rad: Floats  # (pose, joint) as reported
-    t_s: Floats  # (pose,)
     frames: Floats  # (pose, joint + 1, 4, 4) B_0 ... B_n of the model with its terms
     readouts: Mapping[str, Readout]
-    approach: Floats | None  # (pose, joint) -1, 0, 1
-    approach_derived: bool  # from the order of the samples, not recorded
-    last_move_rad: Floats  # (pose, joint) from the sample before
-    qd_rad_s: Floats | None  # (pose, joint)
-    cmd_minus_q_rad: Floats | None  # (pose, joint)
-    temperatures_degC: Mapping[str, Floats]  # where -> (pose,), smoothed over time
-    payload_kg: Floats | None  # (pose,)
-    payload_com_m: Floats | None  # (pose, 3) in the flange frame
-    psd_sum_v: Floats | None  # (pose, 2)
-    extra: Mapping[str, Floats]  # every other numeric column, NaN filled
-    repeat: Ints | None  # (pose,) group, -1: none
-
-    @property
-    def n_joints(self) -> int:
-        return self.q_rad.shape[1]
 
     def having(self, trait: Trait) -> tuple[str, ...]:
         """Names of the instruments of the session that have it, in the order of the catalogue."""

@@ -14,41 +14,21 @@ from numpy.typing import NDArray
 
 from acquisition.recording.rig import parse_rig
 from acquisition.recording.rig_schema import ArmModel, Rig
-from calibrate.arms.catalogue import arm_of
 from calibrate.arms.compiled import PER_PART
-from calibrate.arms.serial import chain_frames
+from calibrate.arms.rig_arm import RigArm
 from calibrate.converted_rig import rig_in_model
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
-from calibrate.parameters import values_by_name
 from calibrate.rigid import cross
 
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Machine:
-    """Nominal or as identified; all arrays SI."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Machine(RigArm):
+    """Nominal or as identified; the probe is its tool's point."""
 
     name: str
-    fixed: Floats  # (joint + 1, 4, 4)
-    offset_rad: Floats  # (joint,) added to a reading
-    point_m: Floats  # (3,) in the flange
-    lower_rad: Floats  # (joint,)
-    upper_rad: Floats
-
-    @property
-    def n_joints(self) -> int:
-        return len(self.offset_rad)
-
-    def frames(self, q_rad: Floats) -> Floats:
-        """(pose, joint + 1, 4, 4) B_i behind fixed part i: joint i + 1 turns about its z, B_n is the flange."""
-        return chain_frames(self.fixed[0], self.fixed[1:], q_rad + self.offset_rad)
-
-    def probe_m(self, q_rad: Floats) -> Floats:
-        """(pose, 3) in the base."""
-        T = self.frames(q_rad)[:, -1]
-        return T[:, :3, :3] @ self.point_m + T[:, :3, 3]
 
     def by_slot(self, q_rad: Floats) -> Floats:
         """(pose, 3, slot) derivative of the probe by every slot (calibrate/arms/compiled.py), at no error.
@@ -79,14 +59,10 @@ def machine_of(
 
     The probe is at `about_tool_m`, else at tool.point_m, else at the flange's origin; `values` of the tool correct it.
     """
-    arm = arm_of(rig)
-    known = {p.name for p in arm.parameters}
-    theta = values_by_name(arm.parameters, {k: v for k, v in (values or {}).items() if k in known})
+    arm = RigArm.of_rig(rig, values)
     shift = [(values or {}).get(f"tool.{axis}", 0.0) for axis in ("x", "y", "z")]
     point = np.array((about_tool_m or rig.tool.point_m or (0.0, 0.0, 0.0))[:3]) + shift
-    joints = rig.arm.joints
-    lower, upper = np.array([j.lower_rad for j in joints]), np.array([j.upper_rad for j in joints])
-    return Machine(rig.name, arm.fixed_parts(theta), arm.angle_offset_rad(theta), point, lower, upper)
+    return Machine(**{**vars(arm), "point_m": point}, name=rig.name)
 
 
 def identified_machine(model: ModelFile) -> tuple[Machine, Rig]:

@@ -50,7 +50,7 @@ def worst_postures(
     for error, q in tops:
         if not any(_same(error, q, other) for other in kept):
             kept.append((error, q))
-    return tuple(Posture(q, machine.probe_m(q[None])[0], error) for error, q in kept[:count])
+    return tuple(Posture(q, machine.tip_m(q[None])[0], error) for error, q in kept[:count])
 
 
 def _climbed(machine: Machine, sources: Sequence[Source], start: Floats) -> tuple[float, Floats]:

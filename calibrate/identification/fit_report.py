@@ -1,5 +1,6 @@
 """From a settled fit to its result: estimates with their doubt, noise found, what was there before."""
 
+from dataclasses import replace
 from importlib.metadata import version
 
 import numpy as np
@@ -128,13 +129,25 @@ def _noise(fitted: Fitted) -> tuple[Noise, ...]:
     }
     if weighting.joint_rad > NEGLIGIBLE_RAD:
         believed[JOINT] = weighting.joint_rad
-    return tuple(
-        Noise(name, believed[name], believed[name] * float(f), believed[name] * float(s), at_zero)
+    found = {
+        name: Noise(name, believed[name], believed[name] * float(f), believed[name] * float(s), at_zero)
         for name, f, s, at_zero in zip(
             weighting.sources, factors.factor, factors.factor_sigma, factors.at_zero, strict=True
         )
         if name in believed
-    )
+    }
+    if JOINT in found:
+        found[JOINT] = _with_shared(found[JOINT], *weighting.shared_rad(factors))
+    return tuple(found.values())
+
+
+def _with_shared(joint: Noise, shared_rad: float, sigma_rad: float) -> Noise:
+    """Joint repeatability as found beyond second encoders, and what these have seen of it."""
+    if shared_rad == 0.0:
+        return joint
+    size = float(np.hypot(joint.found, shared_rad))
+    sigma = float(np.hypot(joint.found * joint.sigma, shared_rad * sigma_rad)) / size
+    return replace(joint, found=size, sigma=sigma, at_zero=False)
 
 
 def _found(fitted: Fitted, index: int, before: Floats) -> InstrumentFound:
@@ -160,7 +173,7 @@ def _repeats(fitted: Fitted, repeat: Ints | None) -> RepeatNoise | None:
         if measured.sample_rows.shape[1] > 1:
             continue
         block = fitted.problem.blocks[i]
-        residual = block.residual(fitted.problem.of_block(i, fitted.fit.theta)).reshape(block.rows, -1)
+        residual = fitted.problem.residual_of(i, fitted.fit.theta).reshape(block.rows, -1)
         found = against_repeats(fitted.fit, residual, repeat[measured.sample_rows[:, 0]])
         if found is not None:
             return found

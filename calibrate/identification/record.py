@@ -17,6 +17,7 @@ from calibrate.model_file import (
     covariance_record,
     fields_of,
 )
+from calibrate.sensors.catalogue import kind_of
 
 
 def record_of(result: Identification, rig: RigIdentity, arm_model: str, plan: str | None = None) -> ModelFile:
@@ -92,8 +93,9 @@ def _held_out(result: Identification) -> Fields | None:
     out: Fields = {"split": first.split, "chi_after": first.chi_after}
     for one in (unseen for unseen in result.held_out if unseen.split == first.split):
         out[f"{one.name}_observations"] = one.observations
-        out[f"{one.name}_rms_distance_before_m"] = one.rms_distance_before_m
-        out[f"{one.name}_rms_distance_after_m"] = one.rms_distance_after_m
+        unit = kind_of(one.name).quantities[0].unit
+        out[f"{one.name}_rms_distance_before_{unit}"] = one.rms_distance_before_m
+        out[f"{one.name}_rms_distance_after_{unit}"] = one.rms_distance_after_m
     return out
 
 

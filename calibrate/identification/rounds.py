@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 ROUNDS = 6  # of weights and fit in turn
 COARSE = 1e-2  # of chi2, a tenth of a sigma: a start need not be better
-SETTLED = 0.02  # of every log variance between two rounds: 1 % of a sigma
+SETTLED = 0.02  # of every log variance, and of shares, between two rounds: 1 % of a sigma
 BLUNT_ROUNDS = 8  # of least distances, to come away from a start that bad rows have pulled
 WARY_ROUNDS = 12  # of letting go of far rows
 NEAR = 0.1  # of the usual distance: closer rows all weigh the same
@@ -54,8 +54,11 @@ def settled_fit(
         if fitted.fit.status is Status.NOT_FINITE:
             break
         rank, theta = fitted.seen.rank, fitted.fit.theta
+        shares, weighting = weighting.shares, weighting.sharing(theta, fitted.factors)
         factors = weighting.noise(fitted.fit.parameters, theta, fitted.factors)
         change = float(np.max(np.abs(factors.log_variance - fitted.factors.log_variance)))
+        if weighting.shares is not None:
+            change = max(change, float(np.max(np.abs(weighting.shares - (0.0 if shares is None else shares)))))
         fitted = _round(weighting, factors, theta, NEAR_START, redundant, by)
         steps += fitted.fit.steps
         if change < SETTLED and fitted.seen.rank == rank:

@@ -16,11 +16,12 @@ from calibrate.arms.catalogue import arm_of
 from calibrate.arms.serial import SerialArm
 from calibrate.diagnose.causes import cause
 from calibrate.diagnose.curve import curve
-from calibrate.diagnose.driver_values import drivers_at, readout_at, temperatures_of
+from calibrate.diagnose.driver_values import drivers_at, readout_at
 from calibrate.diagnose.extended import alike, rearranged
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.ported import perturbed_frames
 from calibrate.effects.catalogue import EFFECTS
+from calibrate.effects.conditions import temperatures_of
 from calibrate.effects.drivers import Drivers, Readout
 from calibrate.effects.form import Form
 from calibrate.effects.gravity import likely_torque_nm

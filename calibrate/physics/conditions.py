@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.columns import SEAT
 from acquisition.recording.samples import Samples
-from calibrate.diagnose.driver_values import moves_of, temperatures_of
+from calibrate.effects.conditions import moves_of, temperatures_of
 from calibrate.effects.drivers import Drivers
 
 Floats = NDArray[np.float64]

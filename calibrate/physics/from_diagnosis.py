@@ -338,7 +338,7 @@ def _noise(fit: Fitted) -> Fields:
     """One sigma of a reading by column; of joint noise seen through the arm, at the middle row."""
     out: Fields = {}
     larger = freedom(fit.problem, fit.covariance)
-    for i, (m, scatter) in enumerate(zip(fit.session.measured, fit.scatters, strict=True)):
+    for i, (m, scatter) in enumerate(zip(fit.session.measured, fit.noise.whole(fit.problem.rows), strict=True)):
         misfit = m.problem.observed[fit.problem.rows[i]] - fit.around.expected[i][fit.problem.rows[i]]
         white = np.linalg.solve(np.linalg.cholesky(scatter.covariance), misfit[..., None])[..., 0]
         size = larger * _normal_size(np.sum(white**2, axis=1), misfit.shape[1])

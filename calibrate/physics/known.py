@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from acquisition.recording.fingerprint import readings_sha256
 from acquisition.recording.samples import Samples
 from calibrate.diagnose.assumed import Assumed, Stated
-from calibrate.diagnose.driver_values import moves_of
 from calibrate.diagnose.fitted import Fitted, fit_from_model, fit_geometry, given
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.session import Session
+from calibrate.effects.conditions import moves_of
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.since_model import RECORDING
 from calibrate.effects.term import Shape

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.rig_schema import Rig
 from calibrate.arms.model import KinematicModel
+from calibrate.arms.rig_arm import limits_of
 from calibrate.dual_psd_rig import laser_of
 from calibrate.parameters import Parameter, index_of
 from calibrate.rigid import cross_matrix
@@ -37,8 +38,7 @@ def target_of(
     rig: Rig, arm: KinematicModel, parameters: tuple[Parameter, ...], start: Floats, rng: Generator
 ) -> Target:
     """By the `parameters` of a fit, at their values `start`; those of the arm are among them."""
-    joints = rig.arm.joints
-    q = rng.uniform([j.lower_rad for j in joints], [j.upper_rad for j in joints], (POSES, len(joints)))
+    q = rng.uniform(*limits_of(rig), (POSES, rig.n_joints))
     column = index_of(parameters)
     own = [column[p.name] for p in arm.parameters]
     theta = start[own]

@@ -25,13 +25,12 @@ def deleted_misfit(problem: JointProblem, index: int, theta: Floats, covariance:
     block = problem.blocks[index]
     if not isinstance(block, Problem) or block.correlation is not None or block.condition:
         return None
-    own = problem.of_block(index, theta)
     shape = block.observed.shape
-    J = problem.spread(index, block.jacobian(own)).reshape(*shape, len(theta))
+    J = problem.jacobian_of(index, theta).reshape(*shape, len(theta))
     rest = np.eye(shape[1]) - np.einsum("nip,pq,njq->nij", J, covariance, J, optimize=True)
     told = np.linalg.eigvalsh(rest)[:, 0] > ALONE
     out = np.full(shape, np.nan)
-    residual = block.residual(own).reshape(shape)[told]
+    residual = problem.residual_of(index, theta).reshape(shape)[told]
     whitened = np.linalg.solve(rest[told], residual[..., None])
     out[told] = np.linalg.solve(block.whitener[told], whitened)[..., 0]
     return out

@@ -41,12 +41,17 @@ def proofs(model: ModelFile) -> tuple[UnseenRows, ...]:
         return model.proofs
     out: list[UnseenRows] = []
     for name in model.instruments:
-        before, after = _number(held, f"{name}_rms_distance_before_m"), _number(held, f"{name}_rms_distance_after_m")
+        before, after = (_distance(held, f"{name}_rms_distance_{state}") for state in ("before", "after"))
         if before is None or after is None:
             continue
         count, chi = int(_number(held, f"{name}_observations") or 0), _number(held, "chi_after")
         out.append(UnseenRows(str(held.get("split")), name, count, before, after, nan if chi is None else chi))
     return tuple(out)
+
+
+def _distance(held: Fields, key: str) -> float | None:
+    """In the unit that the key names; models of before December 2026 named all of them lengths."""
+    return next((value for unit in ("m", "rad") if (value := _number(held, f"{key}_{unit}")) is not None), None)
 
 
 def scatter(model: ModelFile) -> Scatter | None:

@@ -86,7 +86,7 @@ def most_centred(data: Observations, placement: int, first_psd: int | None = Non
 
 def _standing(rig: FittedRig, data: Observations, pose: int) -> StandingArm:
     q_rad, placement, first = data.q_rad[pose], int(data.placement[pose]), int(data.first_psd[pose])
-    frames = rig.believed.arm.frames(q_rad)
+    frames = rig.believed.arm.frames(q_rad[None])[0]
     laser_m, _ = rig.believed.beam(q_rad)
     beam_m = np.stack([laser_m, *rig.struck_m(placement, first, data.spots_m[pose])])
     return StandingArm(placement, first, _bones(frames, laser_m), frames[:-1, :3, 3], beam_m)

@@ -144,7 +144,7 @@ def _readings(
     if not isinstance(block, Problem):
         return ()
     old, new = (block.misfit(problem.of_block(index, theta)) for theta in (before, after))
-    whitened = block.residual(problem.of_block(index, after)).reshape(new.shape)
+    whitened = problem.residual_of(index, after).reshape(new.shape)
     rows, every = measured.sample_rows, kind_of(measured.name).quantities
     return tuple(
         Readings(measured.name, q.name, q.unit, rows, old[:, q.part], new[:, q.part], whitened[:, q.part])

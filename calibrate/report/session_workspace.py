@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from calibrate.arms.rig_arm import limits_of
 from calibrate.parameters import without_assumed
 from calibrate.report.deleted import deleted_misfit
 from calibrate.report.session_evidence import SessionEvidence
-from calibrate.report.workspace.known_arm import KnownArm, limits_of, scatter_of, unpredicted, whole_covariance
+from calibrate.report.workspace.known_arm import KnownArm, scatter_of, unpredicted, whole_covariance
 from calibrate.report.workspace.pictures import Measured
 from calibrate.report.workspace.room import target_at
 from calibrate.sensors.catalogue import names_with

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 
+from acquisition.recording.samples import Samples
 from calibrate.sensors import (
     bar,
     camera,
@@ -47,6 +48,11 @@ def thousandth_of(name: str) -> str:
 def names_with(trait: Trait) -> tuple[str, ...]:
     """Names of all sensors that have it."""
     return tuple(kind.name for kind in SENSORS if trait in kind.traits)
+
+
+def unused_columns(samples: Samples) -> tuple[str, ...]:
+    """A sentence for each column that holds readings of a sensor and cannot be used as such."""
+    return tuple(sentence for kind in SENSORS for sentence in kind.unused(samples))
 
 
 def used_with(asked: Iterable[str]) -> tuple[SensorKind, ...]:

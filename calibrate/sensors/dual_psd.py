@@ -217,9 +217,7 @@ class DualPsd(Usage):
 
     def _by_mount(self, hit: Strike, T_base_flange: Floats) -> Floats:
         across = T_base_flange[:, :3, :3] @ np.stack([self.mount.u, self.mount.v], axis=-1)  # (pose, 3, 2)
-        shift = hit.slope @ across[:, None]  # (pose, face, xy, uv)
-        tilt = hit.travel_m[..., None, None] * shift
-        return np.concatenate([shift, tilt], axis=-1).reshape(-1, 4, 4)
+        return (optics.by_beam(hit).reshape(-1, 4, 2, 3) @ across[:, None]).reshape(-1, 4, 4)
 
 
 def _beam_motions(T_psd1_psd2: Floats, first_psd: int) -> Floats:

@@ -113,6 +113,16 @@ def not_following(samples: Samples) -> tuple[str, ...]:
     return tuple(out)
 
 
+def _unused(samples: Samples) -> tuple[str, ...]:
+    names = per_joint("enc", "_rad", samples.n_joints)
+    return tuple(
+        f"{name} does not follow joint {names.index(name) + 1} and is not used: its readings differ from "
+        f"q{names.index(name) + 1}_rad by more than {FOLLOWS_RAD:g} rad; put it in the column of the joint that it "
+        "sits on, in rad, or remove it"
+        for name in not_following(samples)
+    )
+
+
 def encoder_angles(samples: Samples) -> Samples:
     """The samples with the second encoders' angles in the place of the controller's: sense and zero are its own.
 
@@ -171,4 +181,5 @@ KIND = SensorKind(
     traits=frozenset({Trait.BETWEEN_ENCODERS}),
     only_asked=True,
     build=_build,
+    unused=_unused,
 )

@@ -142,3 +142,4 @@ class SensorKind:
     observed: Callable[[Found, Samples], Columns | None] = lambda found, samples: None  # where no column of `reads` is
     used: Callable[[Found, Samples, Rows], tuple[Sensor, Floats]] | None = None  # at some rows, with its values
     place: Callable[[Samples], Ints] | None = None  # (row,) placement or seat of a row, 0: none
+    unused: Callable[[Samples], tuple[str, ...]] = lambda samples: ()  # columns that cannot be used, with the remedy

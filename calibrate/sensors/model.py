@@ -70,7 +70,17 @@ class Usage:
 
 
 class Used(Protocol):
-    """`Usage` as a protocol: how a sensor was used at the rows of a data set."""
+    """`Usage` as a protocol: how a sensor was used at the rows of a data set. Values are observed in `unit`."""
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]: ...
+
+    @property
+    def unit(self) -> str: ...
+
+    def select(self, rows: NDArray[np.intp]) -> Self:
+        """The same instrument at some of the rows."""
+        ...
 
     def about(self) -> About: ...
     def placed(self, about: About) -> Self: ...
@@ -87,15 +97,8 @@ class Used(Protocol):
 class Sensor(Used, Protocol):
     """An instrument together with how it was used at each pose of a data set (place, order, seat, ...).
 
-    A new instrument is one file with its entry (kind.py), and one line in catalogue.py. Values are observed in `unit`;
-    k of them at a pose.
+    A new instrument is one file with its entry (kind.py), and one line in catalogue.py. k values at a pose.
     """
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]: ...
-
-    @property
-    def unit(self) -> str: ...
 
     def expect(self, phi: Floats, T_base_flange: Floats) -> Floats:
         """(pose, k) readings for flange poses (pose, 4, 4) and parameter values phi (param,)."""
@@ -107,8 +110,4 @@ class Sensor(Used, Protocol):
 
     def by_parameter(self, phi: Floats, T_base_flange: Floats) -> Floats:
         """(pose, k, param) derivative by the sensor's own parameters."""
-        ...
-
-    def select(self, rows: NDArray[np.intp]) -> Self:
-        """The same instrument at some of the poses."""
         ...

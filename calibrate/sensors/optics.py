@@ -21,15 +21,15 @@ MIRROR_Z = np.diag([1.0, 1.0, -1.0, 1.0])
 
 @dataclass(frozen=True)
 class Beam:
-    """Laser lines in the base frame; the length of the direction is of no matter to a spot."""
+    """Laser lines in the base frame, one (3,) or many (pose, 3); the length of the direction does not move a spot."""
 
-    origin_m: Floats  # (pose, 3)
-    direction: Floats  # (pose, 3)
+    origin_m: Floats
+    direction: Floats
 
 
 @dataclass(frozen=True)
 class Strike:
-    """Meeting of each beam with the planes of both faces."""
+    """Meeting of each beam with the planes of both faces; of one beam all without the first axis."""
 
     spots_m: Floats  # (pose, 2, 2): face, x y
     travel_m: Floats  # (pose, 2) signed path from the laser in units of |direction|; negative: behind the laser
@@ -51,20 +51,26 @@ def unfolded_faces(T_base_psd1: Floats, T_psd1_psd2: Floats, first_psd: int) -> 
 
 
 def strike(beam: Beam, faces: Floats) -> Strike:
-    """Spots of every beam on both planes; `faces` (pose, 2, 4, 4) from `unfolded_faces`.
+    """Spots of every beam on both planes; `faces` (pose, 2, 4, 4), of one beam (2, 4, 4), from `unfolded_faces`.
 
     A beam parallel to a plane gives infinite values without a warning: the caller sees it in `facing` being 0.
     """
     linear = faces[..., :3, :3]
-    p = (linear @ beam.origin_m[:, None, :, None])[..., 0] + faces[..., :3, 3]
-    d = (linear @ beam.direction[:, None, :, None])[..., 0]
+    p = (linear @ beam.origin_m[..., None, :, None])[..., 0] + faces[..., :3, 3]
+    d = (linear @ beam.direction[..., None, :, None])[..., 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         travel = -p[..., 2] / d[..., 2]
         lean = d[..., :2] / d[..., 2:]  # spot shift per rise of the beam's origin off the face
         spots = p[..., :2] + travel[..., None] * d[..., :2]
         slope = linear[..., :2, :] - lean[..., None] * linear[..., 2:, :]
-        continuation = beam.origin_m[:, None, :] + travel[..., None] * beam.direction[:, None, :]
+        continuation = beam.origin_m[..., None, :] + travel[..., None] * beam.direction[..., None, :]
     return Strike(spots, travel, d[..., 2], slope, continuation)
+
+
+def by_beam(hit: Strike) -> Floats:
+    """(..., 4, 6) derivative of the spots by origin and direction of the beam."""
+    both = np.concatenate([hit.slope, hit.travel_m[..., None, None] * hit.slope], axis=-1)
+    return both.reshape(*both.shape[:-3], 4, 6)
 
 
 def by_twist(slope: Floats, point_m: Floats) -> Floats:

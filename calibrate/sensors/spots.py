@@ -104,19 +104,24 @@ def _placed(near: Floats, far: Floats, origin: Floats, beam: Floats, believed: F
     turn, shift = believed[:3, :3], believed[:3, 3]
     along = far - near
     along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
-    across = np.eye(3) - beam[:, :, None] * beam[:, None, :]
+    points = np.concatenate([near, far])
     for _ in range(TURNS):
         turn = turn_between(along, beam, weight)
-        points = np.stack([near @ turn.T, far @ turn.T], axis=1)
-        normal = 2.0 * np.einsum("n,nij->ij", weight, across)
+        gap = _across(origin - (points @ turn.T).reshape(2, -1, 3), beam)
+        normal = 2.0 * (weight.sum() * np.eye(3) - beam.T @ (weight[:, None] * beam))
         ridge = DAMPING * np.trace(normal) / 3.0
-        pull = np.einsum("n,nij,nkj->i", weight, across, origin[:, None] - points)
+        pull = weight @ (gap[0] + gap[1])
         shift = np.linalg.solve(normal + ridge * np.eye(3), pull + ridge * believed[:3, 3])
-        off = np.einsum("nij,nkj->nki", across, points + shift - origin[:, None])
-        distance = np.linalg.norm(off, axis=2).mean(axis=1)
+        off = _across(shift, beam) - gap
+        distance = np.sqrt(np.einsum("kni,kni->kn", off, off)).mean(axis=0)
         weight = weights(distance)
     turned = float(Rotation.from_matrix(turn @ believed[:3, :3].T).magnitude())
     return distance, float(np.linalg.norm(shift - believed[:3, 3])) + LEVER_M * turned
+
+
+def _across(vector: Floats, beam: Floats) -> Floats:
+    """(..., pose, 3) part of vectors, broadcast, across unit beams (pose, 3)."""
+    return vector - np.einsum("...i,...i->...", vector, beam)[..., None] * beam
 
 
 def fixture_of(rig: Rig) -> Fixture:

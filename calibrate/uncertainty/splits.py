@@ -32,13 +32,14 @@ def at_random(rows: int, rng: Generator, share: float = 0.2) -> Split:
     return Split(f"random {share:.0%} of the rows", (np.sort(chosen),))
 
 
-def by_place(place: NDArray[np.int64]) -> Split:
+def by_place(place: NDArray[np.int64] | Rows, fewest: int = 1) -> Split:
     """A fold for each placement, seat or place of the device, `place` (row,): what stands elsewhere is predicted.
 
-    Rows of a place below 0 have none and are never left out.
+    Rows of a place below 0 have none and are never left out; nor are those of a place with less than `fewest`.
     """
-    places = np.unique(place[place >= 0])
-    return Split(f"each of {len(places)} places in turn", tuple(np.flatnonzero(place == p) for p in places))
+    folds = tuple(np.flatnonzero(place == p) for p in np.unique(place[place >= 0]))
+    folds = tuple(fold for fold in folds if len(fold) >= fewest)
+    return Split(f"each of {len(folds)} places in turn", folds)
 
 
 def last_block(t_s: NDArray[np.float64], share: float = 0.2) -> Split:

@@ -32,7 +32,7 @@ def perfect_model() -> ModelFile:
 
 def session(folder: Path, off_m: float) -> Path:
     """A cone in ten postures of the drawn arm, every second one off; and a bar that is as long as it should be."""
-    arm, rng = BelievedGuidedArm(RIG), np.random.default_rng(1)
+    arm, rng = BelievedGuidedArm.of_rig(RIG), np.random.default_rng(1)
 
     def postures(point_m, count):
         starts = rng.uniform(arm.lower_rad, arm.upper_rad, (200, 6))

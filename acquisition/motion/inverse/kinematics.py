@@ -11,8 +11,13 @@ Floats = NDArray[np.float64]
 class Kinematics(Protocol):
     """An arm of turning joints, nominal or calibrated."""
 
-    lower_rad: Floats  # (joint,)
-    upper_rad: Floats
+    @property
+    def lower_rad(self) -> Floats:
+        """(joint,) smallest readings."""
+        ...
+
+    @property
+    def upper_rad(self) -> Floats: ...
 
     def frames(self, q_rad: Floats) -> Floats:
         """T_base_frame (pose, joint + 1, 4, 4) at joint readings (pose, joint); the last is the flange."""
@@ -25,9 +30,13 @@ def flange(arm: Kinematics, q_rad: Floats) -> Floats:
     return out
 
 
-def jacobian(frames: Floats) -> Floats:
-    """(pose, 6, joint): velocity of the flange origin (m) and turn (rad) in the base by each joint, of `frames`."""
-    axes, arms_m = frames[:, :-1, :3, 2], frames[:, -1:, :3, 3] - frames[:, :-1, :3, 3]
+def jacobian(frames: Floats, point_m: Floats | None = None) -> Floats:
+    """(pose, 6, joint): velocity of a point of the flange (m) and turn (rad) in the base by each joint, of `frames`.
+
+    `point_m` (pose, 3) in the base; None: the flange's origin.
+    """
+    moved_m = frames[:, -1, :3, 3] if point_m is None else point_m
+    axes, arms_m = frames[:, :-1, :3, 2], moved_m[:, None] - frames[:, :-1, :3, 3]
     out = np.empty((len(frames), 6, frames.shape[1] - 1))
     out[:, 0] = axes[..., 1] * arms_m[..., 2] - axes[..., 2] * arms_m[..., 1]
     out[:, 1] = axes[..., 2] * arms_m[..., 0] - axes[..., 0] * arms_m[..., 2]

@@ -1,4 +1,4 @@
-"""Joint readings for flange poses on any arm, one or many at a time: damped Newton steps from given starts.
+"""Joint readings for wanted flange poses, or places of a point, on any arm, many at a time: damped Newton steps.
 
 Source of the damping: T. Sugihara, Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method, IEEE
 Trans. Robotics 27 (2011) 984: the damping is the squared error itself, so the last steps are Newton's.
@@ -6,6 +6,7 @@ Trans. Robotics 27 (2011) 984: the damping is the squared error itself, so the l
 
 from dataclasses import dataclass
 from itertools import product
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from acquisition.motion.inverse.kinematics import Kinematics, jacobian
 from acquisition.motion.rigid import rotation_vector
 
 Floats = NDArray[np.float64]
+Rows = NDArray[np.intp]
 
 CLOSE = 1e-10  # m and rad: a tenth of what is promised, thousands of times the rounding of a 1 m arm
 MAX_STEPS = 40
@@ -37,22 +39,62 @@ class Solved:
     found: NDArray[np.bool_]
 
 
-def refine(
-    arm: Kinematics, T_base_flange: Floats, start_rad: Floats, max_steps: int = MAX_STEPS, close: float = CLOSE
-) -> Solved:
+class Goal(Protocol):
+    """What postures have to bring about; `rows` says which of them `frames` (pose, joint + 1, 4, 4) are."""
+
+    def missing(self, frames: Floats, rows: Rows) -> Floats:
+        """(pose, k) what is left, m and rad."""
+        ...
+
+    def by_joint(self, frames: Floats) -> Floats:
+        """(pose, k, joint)"""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class AtPose:
+    """The flange stands at `T_base_flange` (pose, 4, 4)."""
+
+    T_base_flange: Floats
+
+    def missing(self, frames: Floats, rows: Rows) -> Floats:
+        return _error(self.T_base_flange[rows], frames[:, -1])
+
+    def by_joint(self, frames: Floats) -> Floats:
+        return jacobian(frames)
+
+
+@dataclass(frozen=True, eq=False)
+class AtPoint:
+    """A point of the flange (3,) is at a point of the base (3,); how the flange is turned is of no matter."""
+
+    in_flange_m: Floats
+    in_base_m: Floats
+
+    def missing(self, frames: Floats, rows: Rows) -> Floats:
+        return self.in_base_m - self._place_m(frames)
+
+    def by_joint(self, frames: Floats) -> Floats:
+        return jacobian(frames, self._place_m(frames))[:, :3]
+
+    def _place_m(self, frames: Floats) -> Floats:
+        return frames[:, -1, :3, :3] @ self.in_flange_m + frames[:, -1, :3, 3]
+
+
+def refine(arm: Kinematics, goal: Goal, start_rad: Floats, max_steps: int = MAX_STEPS, close: float = CLOSE) -> Solved:
     """From one start (pose, joint) each, until within `close` (m and rad); joint limits are not looked at."""
     q_rad, found = start_rad.copy(), np.zeros(len(start_rad), dtype=bool)
     active = np.arange(len(start_rad))
     for _ in range(max_steps + 1):
         frames = arm.frames(q_rad[active])
-        error = _error(T_base_flange[active], frames[:, -1])
+        error = goal.missing(frames, active)
         size = np.max(np.abs(error), axis=1)
         found[active[size < close]] = True
         going = np.isfinite(size) & (size >= close)
         active, error, frames = active[going], error[going], frames[going]
         if active.size == 0:
             break
-        step = _step(jacobian(frames), error)
+        step = _step(goal.by_joint(frames), error)
         q_rad[active] += step * np.minimum(1.0, STEP_RAD / np.max(np.abs(step), axis=1, keepdims=True))
     return Solved(np.where(found[:, None], q_rad, np.nan), found)
 
@@ -94,7 +136,7 @@ def all_solutions(
         begin = starts(T_base_flange[None])[0]
     begin = np.concatenate([begin, near_rad[None]])
     begin = begin[np.all(np.isfinite(begin), axis=1)]
-    solved = refine(arm, np.broadcast_to(T_base_flange, (len(begin), 4, 4)), begin)
+    solved = refine(arm, AtPose(np.broadcast_to(T_base_flange, (len(begin), 4, 4))), begin)
     q_rad = unwound(solved.q_rad[solved.found], near_rad[None], arm)
     q_rad = q_rad[within(arm, q_rad)]
     q_rad = q_rad[np.argsort(np.linalg.norm(q_rad - near_rad, axis=1), kind="stable")]
@@ -131,7 +173,7 @@ def _try(
     if todo.size == 0:
         return
     pose, start = np.nonzero(np.all(np.isfinite(starts[todo]), axis=2))
-    solved = refine(arm, T[todo[pose]], starts[todo[pose], start], max_steps)
+    solved = refine(arm, AtPose(T[todo[pose]]), starts[todo[pose], start], max_steps)
     q = unwound(solved.q_rad, near[todo[pose]], arm)
     good = np.flatnonzero(solved.found & within(arm, q))
     which, first = np.unique(pose[good], return_index=True)
@@ -148,16 +190,16 @@ def _in_order(arm: Kinematics, branches: Floats, near: Floats) -> Floats:
 def _step(J: Floats, error: Floats) -> Floats:
     """(pose, joint); square arms by their own equations, others by the damped normal equations of the short side."""
     damping = np.sum(error**2, axis=1)[:, None, None] + 1e-15
-    short = J @ np.swapaxes(J, 1, 2)
+    short, one = J @ np.swapaxes(J, 1, 2), np.eye(J.shape[1])
     small = damping[:, 0, 0] < 1e-12
     out = np.empty((len(J), J.shape[2]))
     square = J.shape[1] == J.shape[2]
     newton = small & square
     if newton.any():
-        out[newton] = _solved(J[newton] + 1e-13 * np.eye(6), error[newton])
+        out[newton] = _solved(J[newton] + 1e-13 * one, error[newton])
     rest = ~newton
     if rest.any():
-        weights = _solved(short[rest] + damping[rest] * np.eye(6), error[rest])
+        weights = _solved(short[rest] + damping[rest] * one, error[rest])
         out[rest] = (np.swapaxes(J[rest], 1, 2) @ weights[..., None])[..., 0]
     return out
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from acquisition.errors import UnreachableError
 from acquisition.motion.inverse.closed_form import Starts
 from acquisition.motion.inverse.kinematics import Kinematics, flange, jacobian
-from acquisition.motion.inverse.solve import all_solutions, refine, within
+from acquisition.motion.inverse.solve import AtPose, all_solutions, refine, within
 
 Floats = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class Solver:
 
         UnreachableError where there is none near: beyond reach, or the branches meet there.
         """
-        solved = refine(self.arm, T_base_flange[None], near_rad[None], close=KEPT_CLOSE)
+        solved = refine(self.arm, AtPose(T_base_flange[None]), near_rad[None], close=KEPT_CLOSE)
         if solved.found[0] and float(np.max(np.abs(solved.q_rad[0] - near_rad))) < JUMP_RAD:
             return solved.q_rad[0]
         joint, worth = self.weakest(near_rad)
@@ -69,7 +69,7 @@ class Solver:
         """Whether a posture exists at all, and which joint's range it would leave."""
         begin = near_rad[None] if self.starts is None else self.starts(T_base_flange[None])[0]
         begin = begin[np.all(np.isfinite(begin), axis=1)]
-        solved = refine(self.arm, np.broadcast_to(T_base_flange, (len(begin), 4, 4)), begin)
+        solved = refine(self.arm, AtPose(np.broadcast_to(T_base_flange, (len(begin), 4, 4))), begin)
         q_rad = solved.q_rad[solved.found]
         q_rad = q_rad[~within(self.arm, q_rad)]
         if len(q_rad) == 0:

@@ -18,6 +18,7 @@ from scipy.stats import t as student
 from calibrate.diagnose.streams.between_encoders import Causes
 from calibrate.diagnose.streams.stands import Stand
 from calibrate.diagnose.streams.track import Curve, Track
+from calibrate.effects.conditions import MOVED_RAD
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +26,6 @@ ALARM = 1e-3  # over all joints and places
 SPARE = 5  # stands beyond the numbers that are fitted
 MOST = 5  # slips of one joint: then it is not slipping but loose
 ENOUGH = 12  # stands more, for what physics may ask for
-MOVED_RAD = 1e-4  # as in calibrate/diagnose/driver_values.py: a joint that went less far has not moved
 FLAT = 1e-9  # of a column: rounding
 EDGE_S = 0.1  # after the set-point stands, before readings count
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig_schema import Rig
 from calibrate.arms.model import KinematicModel
 from calibrate.identifiability import Identifiability
 from calibrate.model_file import Covariance, Fields, FreeSpaceRecord
@@ -42,11 +41,6 @@ def unpredicted(room: FreeSpaceRecord | None) -> str | None:
     if room.status == FreeSpaceStatus.PREDICTED.name:
         return None
     return f"{room.says} ({'; '.join(room.undetermined)})" if room.undetermined else room.says
-
-
-def limits_of(rig: Rig) -> tuple[Floats, Floats]:
-    """(joint,) smallest and largest angles."""
-    return np.array([j.lower_rad for j in rig.arm.joints]), np.array([j.upper_rad for j in rig.arm.joints])
 
 
 def scatter_of(noise: Fields) -> Scatter:

@@ -120,7 +120,7 @@ def test_of_two_poses_that_look_alike_the_one_that_was_believed_is_taken(camera_
     sight = sight_of(camera_rig, Once())
     board = camera_rig.camera.board
     to_fixture = np.linalg.inv(transform(board.in_psd1.origin_m, board.in_psd1.rotation_rad))
-    before = learner.arm.frames(q_rad)[-1] @ drawn(camera_rig.camera).T_flange_camera
+    before = learner.arm.flange(q_rad) @ drawn(camera_rig.camera).T_flange_camera
     for T, _ in poses:
         believed = before @ T @ to_fixture
         assert apart(sight.fixture(learner.arm, q_rad, believed), believed)[1] < 1e-9

@@ -54,5 +54,5 @@ def test_neither_elbow_nor_wrist_goes_below_the_table(rig, placement: int) -> No
         target = BeamTarget(1, (0.0, 0.0, 0.0, 0.0), 0.2, float(roll_rad))
         flange = flange_for(learner.arm, learner.optics, T, target)
         q_rad = reach(learner.arm, flange, np.array(rig.motion.home_rad), rng)
-        heights_m = learner.arm.frames(q_rad)[2:, 2, 3]
+        heights_m = learner.arm.frames(q_rad[None])[0, 2:, 2, 3]
         assert heights_m.min() > 0.0

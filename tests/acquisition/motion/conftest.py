@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig import load_rig
-from calibeam.motion.arm import MotionArm, motion_arm
 from calibrate.arms.belief import LinkBelief
 from calibrate.arms.dh import DhArm, DhLink
+from calibrate.arms.rig_arm import RigArm
 
 RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
 QUARTER = np.pi / 2.0
@@ -25,16 +25,16 @@ IRB120_UPPER_RAD = np.radians([165.0, 110.0, 70.0, 160.0, 120.0, 180.0])
 IRB120_LOWER_RAD = np.radians([-165.0, -110.0, -110.0, -160.0, -120.0, -180.0])
 
 
-def irb120(error: float = 0.0) -> MotionArm:
+def irb120(error: float = 0.0) -> RigArm:
     """`error`: one sigma of every parameter, m and rad; 0 is the drawing."""
     arm = DhArm(IRB120_ROWS, LinkBelief(3e-4, 5e-4))
     theta = error * np.random.default_rng(3).normal(size=len(arm.parameters))
-    return MotionArm(arm, theta, IRB120_LOWER_RAD, IRB120_UPPER_RAD)
+    return RigArm.of(arm, theta, IRB120_LOWER_RAD, IRB120_UPPER_RAD)
 
 
-def ur5e(error: float = 0.0) -> MotionArm:
+def ur5e(error: float = 0.0) -> RigArm:
     rig = load_rig(RIG)
-    drawn = motion_arm(rig)
+    drawn = RigArm.of_rig(rig)
     if error == 0.0:
         return drawn
     rows = tuple(
@@ -42,7 +42,7 @@ def ur5e(error: float = 0.0) -> MotionArm:
     )
     arm = DhArm(rows, LinkBelief(3e-4, 5e-4))
     theta = error * np.random.default_rng(4).normal(size=len(arm.parameters))
-    return MotionArm(arm, theta, drawn.lower_rad, drawn.upper_rad)
+    return RigArm.of(arm, theta, drawn.lower_rad, drawn.upper_rad)
 
 
 MAKERS = {"irb120": irb120, "ur5e": ur5e}

@@ -43,7 +43,7 @@ def world(seed: int, **emulation: float) -> HandWorld:
 def session(hand: DirectHand, plan) -> tuple[Summary, Journal]:
     journal = Journal()
     made = GuidedSession(
-        hand, BelievedGuidedArm(RIG), hand, FittedJudge(RIG), journal, np.random.default_rng(1), patience_s=30.0
+        hand, BelievedGuidedArm.of_rig(RIG), hand, FittedJudge(RIG), journal, np.random.default_rng(1), patience_s=30.0
     )
     return made.run(plan), journal
 
@@ -94,7 +94,7 @@ def test_the_arm_is_identified_to_micrometres_and_its_discs_with_it(taken) -> No
     true = made.arm.tip_m(shafts)
     spans = np.linalg.norm(tips[:, None] - tips[None], axis=2) - np.linalg.norm(true[:, None] - true[None], axis=2)
     assert np.sqrt(np.mean(spans**2)) < 15e-6
-    drawn = BelievedGuidedArm(RIG).tip_m(shafts)
+    drawn = BelievedGuidedArm.of_rig(RIG).tip_m(shafts)
     before = np.linalg.norm(drawn[:, None] - drawn[None], axis=2) - np.linalg.norm(true[:, None] - true[None], axis=2)
     assert np.sqrt(np.mean(before**2)) > 200e-6
     sizes = {p.name: p for p in found.estimates if "disc" in p.name}
@@ -141,7 +141,7 @@ def test_before_anything_is_known_nothing_is_doubted() -> None:
 
 
 def test_postures_bring_the_believed_probe_there_within_the_ranges() -> None:
-    arm = BelievedGuidedArm(RIG)
+    arm = BelievedGuidedArm.of_rig(RIG)
     starts = np.random.default_rng(1).uniform(arm.lower_rad, arm.upper_rad, (60, 6))
     found = arm.postures(starts, np.array([0.5, 0.1, 0.2]))
     assert len(found) > 10

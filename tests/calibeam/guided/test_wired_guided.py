@@ -82,7 +82,7 @@ def test_a_whole_session_is_in_the_recording(takes: Takes, tmp_path: Path) -> No
     assert end == {"samples": 8, "slips": summary.slips, "doubted": summary.doubted, "skipped": 0}
     # The arm of this seed is off by millimetres, and so are the cones; a probe in the air would be off by far more.
     truth = {seat.id: seat.origin_m for seat in read_hand_truth(tmp_path / "truth.json").seats}
-    tips = BelievedGuidedArm(RIG).tip_m(recording.samples.joints()[:6])
+    tips = BelievedGuidedArm.of_rig(RIG).tip_m(recording.samples.joints()[:6])
     apart = np.linalg.norm(tips - [truth[k] for k in (1, 1, 1, 2, 2, 2)], axis=1)
     assert apart.max() < 8e-3
 

@@ -43,6 +43,11 @@ RIGS = Path(__file__).parents[3] / "rigs"
 LINKS = [(0.0, np.pi / 2, 0.3), (0.4, 1.2, 0.0), (0.3, 0.3, 0.1)]  # a, alpha, d
 POINT_M = np.array([0.031, -0.012, 0.052])
 JOINT = "[[arm.joint]]\na_m = {}\nalpha_rad = {}\nd_m = {}\nlower_rad = -2.9\nupper_rad = 2.9\n"
+FEW_ERRORS = (  # every kind of source once or twice, where the whole arm has 87
+    ('"link*.x", "link*.y", "link*.z"', '"link1.*x", "link2.y"'),
+    ('"link*.roll", "link*.pitch", "link*.yaw"', '"link1.roll", "link2.*w"'),
+    ("joint*", "joint2"),
+)
 RIG = """schema = 1
 name = "three-joints"
 [arm]
@@ -112,7 +117,7 @@ def _guided(folder: Path) -> None:
     """A verification of the measuring arm, and its model, which is the arm as drawn."""
     source = RIGS / "arm-cmm-reference.toml"
     rig, rng = load_rig(source), np.random.default_rng(1)
-    arm = BelievedGuidedArm(rig)
+    arm = BelievedGuidedArm.of_rig(rig)
 
     def posture(point_m: tuple[float, ...]) -> Floats:
         return arm.postures(rng.uniform(arm.lower_rad, arm.upper_rad, (200, 6)), np.array(point_m))[0]
@@ -158,8 +163,10 @@ def _ur(folder: Path) -> None:
         (folder / name).write_text(text, encoding="utf-8")
     shutil.copy(RIGS / "encoders-plain.dbc", folder / "encoders.dbc")
     shutil.copy(RIGS / "tasks" / "conveyor.toml", folder / "task.toml")
-    errors = (RIGS / "errors" / "arm-cmm.toml").read_text("utf-8")
-    (folder / "errors.toml").write_text(errors.replace("heat.link5", "heat.link2"), encoding="utf-8")
+    errors = (RIGS / "errors" / "arm-cmm.toml").read_text("utf-8").replace("heat.link5", "heat.link2")
+    for narrower in FEW_ERRORS:
+        errors = errors.replace(*narrower)
+    (folder / "errors.toml").write_text(errors, encoding="utf-8")
     gain = (0.0, 0.01, 0.0, 0.0, 0.0)
     ErrorMap(0.01, gain, gain, (1e-6,) * 5, (1e-6,) * 5, 0.9).save(folder / "psd1.json")
     (folder / "camera.json").write_text(json.dumps(_camera(), indent=1), encoding="utf-8")

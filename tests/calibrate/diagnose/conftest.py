@@ -230,11 +230,23 @@ class World:
             repeat[members] = group
             q[members] = q[members[0]]
         drivers = Drivers(
-            cast(Rig, None), q, t, np.zeros((n, JOINTS + 1, 4, 4)), {},
-            rng.integers(0, 2, (n, JOINTS)) * 2.0 - 1.0, False,
-            np.zeros((n, JOINTS)), None, None, {}, None, None, None,
-            {"fan": rng.normal(size=n)} if extra is None else extra, repeat,
-        )  # fmt: skip
+            rig=cast(Rig, None),
+            q_rad=q,
+            t_s=t,
+            frames=np.zeros((n, JOINTS + 1, 4, 4)),
+            readouts={},
+            approach=rng.integers(0, 2, (n, JOINTS)) * 2.0 - 1.0,
+            approach_derived=False,
+            last_move_rad=np.zeros((n, JOINTS)),
+            qd_rad_s=None,
+            cmd_minus_q_rad=None,
+            temperatures_degC={},
+            payload_kg=None,
+            payload_com_m=None,
+            psd_sum_v=None,
+            extra={"fan": rng.normal(size=n)} if extra is None else extra,
+            repeat=repeat,
+        )
         features = np.concatenate([np.ones((n, 1)), np.cos(q), np.sin(q), np.cos(q[:, :2] + q[:, 2:])], axis=1)
         lever = np.einsum("nf,fkj->nkj", features, rng.normal(size=(features.shape[1], k, JOINTS))) / 3.0
         # Geometry: zeros of every joint, and any smooth combination that a link could make.

@@ -11,7 +11,7 @@ from calibrate.diagnose.folds import FEWEST, splits_of, units
 def random_split(world, samples):
     session = world.session(np.random.default_rng(4))
     drivers = replace(session.drivers, repeat=None)
-    return next(s for s in splits_of(drivers, np.arange(samples), np.random.default_rng(1)) if s.name == "random")
+    return next(s for s in splits_of(drivers, np.arange(samples), np.random.default_rng(1)) if s.says == "random")
 
 
 @pytest.mark.parametrize("samples", [20, 25, 40, 47])
@@ -30,6 +30,6 @@ def test_a_larger_session_leaves_out_one_share(world):
 
 def test_repeats_of_a_pose_are_left_out_together(world):
     drivers = world.session(np.random.default_rng(4)).drivers
-    split = next(s for s in splits_of(drivers, np.arange(200), np.random.default_rng(1)) if s.name == "random")
+    split = next(s for s in splits_of(drivers, np.arange(200), np.random.default_rng(1)) if s.says == "random")
     known = np.setdiff1d(np.arange(200), np.concatenate(split.unseen))
     assert not set(units(drivers)[known]) & set(units(drivers)[np.concatenate(split.unseen)])

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -11,6 +12,7 @@ from calibeam.cli import run
 from calibrate.diagnose.diagnosis import Verdict
 from calibrate.diagnose.from_recording import diagnose_samples
 from calibrate.model_file import read_model
+from calibrate.report.model_tests import proofs
 from calibrate.report.sections.zeros import zeros_of
 from calibrate.report.session_evidence import session_evidence
 
@@ -65,3 +67,36 @@ def test_a_report_by_the_model_takes_effects_out_of_both_encoders(tmp_path):
     (between,) = (r for r in evidence.readings if r.instrument == "encoder-difference")
     assert np.sqrt(np.mean(between.whitened**2)) < 1.2  # with the soft joint in it: 3 and more
     assert [z.joint for z in zeros_of(evidence)] == [1, 2, 3, 4, 5, 6]
+
+
+@pytest.mark.timeout(300)
+def test_a_column_of_another_shaft_is_named_with_its_remedy(tmp_path, capsys):
+    recording_of(tmp_path, family="tracker", samples=60, arm="ur5", seed=2, encoders="link")
+    table = tmp_path / "recording" / "samples.csv"
+    names, *lines = [line.split(",") for line in table.read_text().splitlines()]
+    away = np.random.default_rng(1).uniform(0.0, 6.0, len(lines))
+    at = names.index("enc2_rad")
+    wrong = [[*row[:at], repr(float(x)), *row[at + 1 :]] for row, x in zip(lines, away, strict=True)]
+    table.write_text("\n".join(",".join(row) for row in (names, *wrong)) + "\n")
+    folder, diagnosis = str(tmp_path / "recording"), tmp_path / "diagnosis.json"
+    assert run(["identify", folder, "--out", str(tmp_path / "model.json")]) == 0
+    assert " ".join(capsys.readouterr().out.split()).count("enc2_rad does not follow joint 2") == 1
+    assert run(["diagnose", folder, "--out", str(diagnosis)]) == 0
+    (sentence,) = (line for line in json.loads(diagnosis.read_text())["next"] if "enc2_rad" in line)
+    assert "remove it" in sentence
+    assert sentence in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.timeout(300)
+def test_distances_of_encoders_are_named_radians_and_older_names_are_read(tmp_path):
+    recording_of(tmp_path, family="tracker", samples=60, arm="ur5", seed=2, encoders="link")
+    plan, out = tmp_path / "fit.toml", tmp_path / "model.json"
+    plan.write_text('schema = 1\ninstruments = ["position", "encoder-difference"]\n')
+    assert run(["identify", str(tmp_path / "recording"), "--plan", str(plan), "--out", str(out)]) == 0
+    held = json.loads(out.read_text())["held_out"]
+    assert 1e-7 < held["encoder-difference_rms_distance_after_rad"] < 1e-4
+    assert "position_rms_distance_after_m" in held
+    assert not any(name.startswith("encoder-difference") and name.endswith("_m") for name in held)
+    model = msgspec.structs.replace(read_model(out), proofs=())
+    older = {name.removesuffix("_rad") + "_m" if name.endswith("_rad") else name: held[name] for name in held}
+    assert proofs(msgspec.structs.replace(model, held_out=older)) == proofs(model)

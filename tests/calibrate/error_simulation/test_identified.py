@@ -28,8 +28,8 @@ def test_an_identified_arm_puts_its_probe_where_it_is_predicted(result):
     model = record_of(result, RigIdentity(rig.name, rig_sha256(text), text), "dh")
     machine, _ = identified_machine(model)
     q = machine.drawn_poses(20, np.random.default_rng(1))
-    np.testing.assert_allclose(machine.probe_m(q), Predictor.of(model).tip_m(q), atol=1e-14)
-    assert np.abs(machine.probe_m(q) - machine_of(rig).probe_m(q)).max() > 1e-3  # zeros of some degrees
+    np.testing.assert_allclose(machine.tip_m(q), Predictor.of(model).tip_m(q), atol=1e-14)
+    assert np.abs(machine.tip_m(q) - machine_of(rig).tip_m(q)).max() > 1e-3  # zeros of some degrees
 
 
 def test_a_model_without_its_rig_is_refused(result):

@@ -24,7 +24,7 @@ def errors(machine, sources, q_rad, values):
 def test_an_arm_that_is_warmer_all_over_is_the_same_arm_larger(machine, poses, stated):
     source = stated({"what": ("heat.arm",), "scale_k": 1.0}, expansion_per_k=23e-6)
     grown = errors(machine, source, poses, [10.0])
-    np.testing.assert_allclose(grown, 230e-6 * machine.probe_m(poses), atol=1e-15)
+    np.testing.assert_allclose(grown, 230e-6 * machine.tip_m(poses), atol=1e-15)
 
 
 def test_an_eccentric_encoder_is_a_zero_that_goes_round(machine, poses, stated):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calibrate.arms.catalogue import arm_of
-from calibrate.believed_arm import BelievedArm
+from calibrate.believed_arm import believed_arm
 from calibrate.identification.session import instruments_for_fit
 from calibrate.pose_design.target import ALONG_M, POSES, target_of
 
@@ -24,7 +24,7 @@ def test_the_beam_moves_with_each_unknown_as_differences_say(rig, candidates):
     q = np.random.default_rng(3).uniform(*limits, (POSES, len(joints)))
 
     def beams(values):
-        arm = BelievedArm(rig, values)
+        arm = believed_arm(rig, values)
         each = [arm.beam(one) for one in q]
         return np.array([o for o, _ in each]), np.array([d for _, d in each])
 

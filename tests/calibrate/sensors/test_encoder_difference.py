@@ -5,6 +5,7 @@ import pytest
 
 from acquisition.recording.samples import Samples
 from calibrate.errors import DataError
+from calibrate.sensors.catalogue import unused_columns
 from calibrate.sensors.encoder_difference import differences, encoder_angles, not_following
 
 JOINTS, ROWS = 3, 40
@@ -42,6 +43,8 @@ def test_an_encoder_that_does_not_follow_its_joint_is_left_out_by_name():
     samples = table(enc2_rad=wild)
     assert differences(samples).used == (1, 3)
     assert not_following(samples) == ("enc2_rad",)
+    (sentence,) = unused_columns(samples)
+    assert sentence.startswith("enc2_rad does not follow joint 2")
     with pytest.raises(DataError, match="joint 2"):
         encoder_angles(samples)
 
