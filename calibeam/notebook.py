@@ -13,11 +13,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording import TYPE_CHECKING, Recording, Samples, read
+from acquisition.recording import Recording, Samples, read
 from calibrate.errors import DataError
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from calibrate.physics.predicting import Placed
 
 Floats = NDArray[np.float64]
+Frame = Literal["robot", "world"]  # of sigmas: the robot's own base frame, or that of the device or fixture
 
 BEFORE, AFTER = "#d55e00", "#0072b2"  # Okabe and Ito, Color Universal Design, 2008
 MICRO = 1e6
@@ -69,13 +71,20 @@ class Model:
         return self._placed(q_rad, conditions, same_session).T_base_flange
 
     def flange_sigma(
-        self, q_rad: Floats, conditions: "Mapping[str, Floats | float] | None" = None, *, same_session: bool = False
+        self,
+        q_rad: Floats,
+        conditions: "Mapping[str, Floats | float] | None" = None,
+        *,
+        same_session: bool = False,
+        frame: Frame = "robot",
     ) -> Floats:
         """(pose, 6) one sigma of `flange`: m along x, y, z of the base, rad about them. NaN without a covariance.
 
-        The place of the base counts: where nothing but a device of unknown place has seen the arm, that is most of it.
+        In the frame "robot": doubt of geometry and physics, as seen from the base frame that lies best on the arm over
+        its joint limits; where the base stands and how it is turned is no part of it. In the frame "world" that counts,
+        too: where only a device of unknown place has seen the arm, it is most of it. Without noise of any instrument.
         """
-        return self._placed(q_rad, conditions, same_session).flange_sigma
+        return self._placed(q_rad, conditions, same_session, frame).flange_sigma
 
     def tip(
         self, q_rad: Floats, conditions: "Mapping[str, Floats | float] | None" = None, *, same_session: bool = False
@@ -87,10 +96,15 @@ class Model:
         return self._placed(q_rad, conditions, same_session).tip_m
 
     def tip_sigma(
-        self, q_rad: Floats, conditions: "Mapping[str, Floats | float] | None" = None, *, same_session: bool = False
+        self,
+        q_rad: Floats,
+        conditions: "Mapping[str, Floats | float] | None" = None,
+        *,
+        same_session: bool = False,
+        frame: Frame = "robot",
     ) -> Floats:
-        """(pose, 3) one sigma of `tip`, m, the place of the base included. NaN without a covariance."""
-        return self._placed(q_rad, conditions, same_session).tip_sigma_m
+        """(pose, 3) one sigma of `tip`, m; what it contains in either frame: as of `flange_sigma`, and of the tool."""
+        return self._placed(q_rad, conditions, same_session, frame).tip_sigma_m
 
     def predict(self, samples: Mapping[str, NDArray[np.generic]], *, same_session: bool = False) -> dict[str, Floats]:
         """Columns of predicted.csv, name -> (row,), for columns of samples.csv; effects of the model are applied.
@@ -105,13 +119,23 @@ class Model:
         table = Samples({name: np.asarray(values) for name, values in samples.items()}, joints)
         return predict_with_physics(self.file, table, same_session).columns
 
-    def _placed(self, q_rad: Floats, conditions: "Mapping[str, Floats | float] | None", same_session: bool) -> "Placed":
+    def _placed(
+        self,
+        q_rad: Floats,
+        conditions: "Mapping[str, Floats | float] | None",
+        same_session: bool,
+        frame: Frame = "robot",
+    ) -> "Placed":
+        """ValueError for a frame of another name."""
         from calibrate.physics.predicting import placed
 
+        if frame not in get_args(Frame):
+            raise ValueError(f"frame '{frame}': give one of {', '.join(get_args(Frame))}")
         q = np.atleast_2d(np.asarray(q_rad, dtype=np.float64))
         columns = {name: np.broadcast_to(value, len(q)) for name, value in (conditions or {}).items()}
         joints = {f"q{i + 1}_rad": column for i, column in enumerate(q.T)}
-        found = placed(self.file, Samples({"t_s": np.zeros(len(q))} | columns | joints, q.shape[1]), same_session)
+        samples = Samples({"t_s": np.zeros(len(q))} | columns | joints, q.shape[1])
+        found = placed(self.file, samples, same_session, in_world=frame == "world")
         for note in found.notes:
             warnings.warn(note, stacklevel=3)
         return found

@@ -62,9 +62,10 @@ def plan_next(found: Diagnosed, path: Path) -> str:
     if found.physics is None:
         return "no plan: the file is to be put right first"
     physics = found.physics
-    if physics.model.problem.given:
-        return "no plan: beside the effects of a model none is made; diagnose without --model"
-    chosen = separating(physics.diagnosis, np.random.default_rng(SEED))
+    try:
+        chosen = separating(physics.diagnosis, np.random.default_rng(SEED))
+    except DataError as why:  # an effect of the known model that cannot be told at other poses
+        return f"no plan: {why}; diagnose without --model"
     if chosen is None:
         return "no plan: no finding has a rival that more poses could tell from it"
     plan = plan_of(chosen, physics.model)

@@ -1,11 +1,12 @@
 """What a model says of a later recording: its values and their covariance, and effects that it brings along."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording import Samples
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.term import Size, Term
 
@@ -15,6 +16,8 @@ Ints = NDArray[np.intp]
 # Of the largest variance, in plausible sizes: below, a file of double precision cannot tell it from rounding. It is
 # then taken as larger than it is.
 ROUNDING = 1e-14
+UNSEEN = 0.1  # sigmas of the data for a whole unit
+RANK = 1e-10  # of the largest singular value of scaled columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +26,7 @@ class Assumed:
 
     at: Ints  # (k,) index of each value in the fit
     mean: Floats  # (k,)
-    root: Floats  # (k, k) root' root is the inverse covariance
+    root: Floats  # (row, k) root' root is the inverse covariance
 
     @classmethod
     def of(cls, at: Ints, mean: Floats, covariance: Floats, plausible: Floats) -> "Assumed":
@@ -32,13 +35,35 @@ class Assumed:
         w = np.maximum(w, ROUNDING * max(float(w.max(initial=0.0)), 1e-300))
         return cls(at, mean, (V / np.sqrt(w)).T / plausible)
 
+    def held_near(self, slope: Floats, others: Ints, unit: Floats) -> "Assumed":
+        """The same, with the mean held to one `unit` (k,) along directions that it knows worse and the data not at all.
+
+        `slope` (row, value) of the whitened data, `others` the values that it says nothing of. What trades a tool for
+        the last link is unknown by decimetres, and a covariance is right to first order only: some millimetres that
+        way, for nothing, would hide a tool that has moved by a tenth of one.
+        """
+        free = slope[:, others]
+        size = np.linalg.norm(free, axis=0)
+        U, s, _ = np.linalg.svd(free[:, size > 0.0] / size[size > 0.0], full_matrices=False)
+        Q = U[:, s > RANK * s.max(initial=0.0)]
+        seen = slope[:, self.at] * unit
+        seen = seen - Q @ (Q.T @ seen)
+        _, known, Vt = np.linalg.svd(np.concatenate([self.root * unit, seen]), full_matrices=False)
+        weak = Vt[known < 1.0]
+        if len(weak) == 0:
+            return self
+        _, known, Vt = np.linalg.svd(
+            np.concatenate([seen @ weak.T, np.zeros((len(weak), len(weak)))]), full_matrices=False
+        )
+        return replace(self, root=np.concatenate([self.root, Vt[known < UNSEEN] @ weak / unit]))
+
     def residual(self, values: Floats) -> Floats:
-        """(k,)"""
+        """(row,)"""
         return np.asarray(self.root @ (values[self.at] - self.mean))
 
     def jacobian(self, count: int) -> Floats:
-        """(k, count)"""
-        out = np.zeros((len(self.at), count))
+        """(row, count)"""
+        out = np.zeros((len(self.root), count))
         out[:, self.at] = self.root
         return out
 
@@ -55,6 +80,12 @@ class Stated(Term):
     columns: Floats = field(kw_only=True)  # (row, width, value)
     added: Floats = field(kw_only=True)  # (row, width) at the values `about`
     about: Floats = field(kw_only=True)  # (value,)
+    elsewhere: Callable[[Samples], tuple[Floats, Floats]] = field(kw_only=True)  # `columns` and `added` of other rows
+
+    def at(self, samples: Samples) -> "Stated":
+        """The same at other rows. DataError where the effect cannot be evaluated there."""
+        columns, added = self.elsewhere(samples)
+        return replace(self, columns=columns, added=added)
 
     def basis(self, drivers: Drivers, inner: Floats) -> Floats:
         return self.columns

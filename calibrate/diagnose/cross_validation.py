@@ -19,7 +19,11 @@ NU = 5.0  # of the law of noise, as in calibrate/diagnose/scatter.py
 
 
 def predicts(bench: Bench, rng: Generator) -> Floats:
-    """(term,) 2 ln L of unseen rows that each accepted term gains; below zero it only fitted noise."""
+    """(term,) 2 ln L of unseen rows that each accepted term gains; below zero it only fitted noise.
+
+    Beside a model of another recording that recording counts, too: many rows of the new one bend a model until it
+    predicts them well, at the cost of all that was known. It is not held out, so each value costs two (Akaike 1974).
+    """
     rows = bench.state.rows
     data = np.flatnonzero(rows.data)
     labels = units(bench.state.drivers)[rows.sample[data]]
@@ -29,7 +33,9 @@ def predicts(bench: Bench, rng: Generator) -> Floats:
     for gone in bench.gone:
         # The span of the model without a term: the complement of what only the term spans.
         basis = bench.sight.basis - gone.span @ (gone.span.T @ bench.sight.basis)
-        out.append(_loss(basis, bench.sight.residual + gone.span @ gone.part, folds) - whole)
+        without = bench.sight.residual + gone.span @ gone.part
+        known = float(np.sum(without[rows.stated] ** 2) - np.sum(bench.sight.residual[rows.stated] ** 2))
+        out.append(_loss(basis, without, folds) - whole + max(known - 2.0 * gone.cost, 0.0))
     return np.array(out)
 
 

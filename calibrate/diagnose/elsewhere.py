@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Samples
 from acquisition.recording.samples import per_joint
+from calibrate.diagnose.assumed import Stated
 from calibrate.diagnose.augmented import Around, Augmented, columns_of, plain_sizes
 from calibrate.diagnose.driver_values import drivers_of
 from calibrate.diagnose.extended import alike
@@ -21,7 +22,9 @@ from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.session import Session
 from calibrate.effects.catalogue import terms_of
 from calibrate.effects.drivers import Drivers
+from calibrate.effects.since_model import changes
 from calibrate.effects.term import Term
+from calibrate.errors import DataError
 from calibrate.parameters import plausible_sizes, priors
 from calibrate.problem import whitener_of
 from calibrate.shared_scatter import SharedScatter, levers_of
@@ -61,6 +64,8 @@ class Elsewhere:
 
     def carried(self, accepted: Accepted) -> Accepted | None:
         """With the coefficients that give the measured poses what they had; None: a term that knows those only."""
+        if isinstance(accepted.term, Stated):
+            return replace(accepted, term=accepted.term.at(self.session.samples))
         term = self._terms.get(accepted.term.key)
         if term is None:
             return None
@@ -71,7 +76,20 @@ class Elsewhere:
     @cached_property
     def _terms(self) -> dict[tuple[object, ...], Term]:
         """By key, of the longer session: some terms know the poses that they were listed for."""
-        return {term.key: term for term in terms_of(self.drivers)}
+        since = () if self.state.problem.assumed is None else changes(self.drivers)
+        return {term.key: term for term in (*terms_of(self.drivers), *since)}
+
+    @cached_property
+    def brought(self) -> tuple[Accepted, ...]:
+        """Terms of a known model, which come first: what that model assumes is of their values, too.
+
+        DataError for one that cannot be told where poses have not been taken.
+        """
+        out = tuple(self.carried(a) for a in self.state.brought)
+        unknown = next((a for a, now in zip(self.state.brought, out, strict=True) if now is None), None)
+        if unknown is not None:
+            raise DataError(f"what {unknown.term.physics} of the model adds at poses not yet taken is not known")
+        return tuple(a for a in out if a is not None)
 
     def added(self, accepted: Accepted) -> tuple[Floats, Floats]:
         """What a carried term adds to the readings: (row,) of the measured rows, (pose, k) of the new ones."""
@@ -82,11 +100,12 @@ class Elsewhere:
         return measured[:, 0], new[..., 0]
 
     def fitted_along(self, terms: Sequence[Accepted]) -> tuple[Floats, Floats]:
-        """Derivatives by geometry and by carried terms, in plausible units: (row, m) of the measured rows and beliefs,
-        (pose, k, m) of the new poses.
+        """Derivatives by geometry and by carried terms, those of a known model included, in plausible units: (row, m)
+        of the measured rows and beliefs, (pose, k, m) of the new poses.
         """
+        terms, known = (*self.brought, *terms), self.state.problem
         sizes = plain_sizes(self.session, terms, self.drivers, self.whiteners, self.rows)
-        problem = self._problem(tuple(terms), sizes)
+        problem = replace(self._problem(terms, sizes), given=known.given, assumed=known.assumed)
         values = np.concatenate([self.state.geometry, problem.start[len(self.state.geometry) :]])
         parameters = problem.parameters
         free = np.flatnonzero([p.free for p in parameters])
@@ -131,7 +150,7 @@ def elsewhere(state: Fitted, poses: NewPoses) -> Elsewhere:
     bare = plain.around(state.geometry)
     drivers, shared = _drivers(session, bare, state, poses), _shared(state, plain, bare)
     found = Elsewhere(state, session, drivers, bare, rows, whiteners, shared)
-    carried = tuple(a for a in map(found.carried, state.accepted) if a is not None)
+    carried = (*found.brought, *(a for a in map(found.carried, state.accepted) if a is not None))
     with_terms = Augmented(session, carried, drivers, rows, whiteners, ())
     values = np.concatenate([state.geometry, with_terms.start[len(state.geometry) :]])
     around = with_terms.around(values)

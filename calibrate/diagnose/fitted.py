@@ -72,6 +72,11 @@ class Fitted:
         return self._split[1][self.problem.given :]
 
     @property
+    def brought(self) -> tuple[Accepted, ...]:
+        """Terms of the model beside which this is sought."""
+        return self._split[1][: self.problem.given]
+
+    @property
     def scatters(self) -> tuple[Scatter, ...]:
         """Of each instrument, over its active rows: of what it does not share with another."""
         return self.noise.scatters
@@ -115,8 +120,9 @@ class Fitted:
         free = np.flatnonzero([p.free for p in parameters])
         believed = free[np.isfinite(priors(parameters)[free])]
         scale, sigma = plausible_sizes(parameters), priors(parameters)
-        known = sum(block.rows for block in self.session.weighting.known)
-        known += 0 if self.problem.assumed is None else len(self.problem.assumed.at)
+        blocks = sum(block.rows for block in self.session.weighting.known)
+        assumed = 0 if self.problem.assumed is None else len(self.problem.assumed.root)
+        known = blocks + assumed
         residual = np.concatenate(
             [-self.problem.residual(self.values), -(self.values - start_values(parameters))[believed] / sigma[believed]]
         )
@@ -125,7 +131,8 @@ class Fitted:
         slope = self.problem.jacobian(self.values)[:, free] * scale[free]
         none = np.full(known + len(believed), -1, dtype=np.intp)
         labels = [np.concatenate([x, none]) for x in self._labels]
-        return Rows(residual, np.concatenate([slope, beliefs]), *labels, owner=self.problem.owner[free])
+        stated = len(self._labels[0]) + blocks + np.arange(assumed)
+        return Rows(residual, np.concatenate([slope, beliefs]), *labels, owner=self.problem.owner[free], stated=stated)
 
     @cached_property
     def _labels(self) -> tuple[Ints, Ints, Ints]:
@@ -222,14 +229,19 @@ def given(fit: Fitted) -> Fitted:
 
 
 def fit_from_model(
-    session: Session, geometry: Fitted, terms: tuple[Accepted, ...], assumed: Assumed, start: Floats
+    session: Session, geometry: Fitted, terms: tuple[Accepted, ...], assumed: Assumed, start: Floats, unit: Floats
 ) -> Fitted:
-    """A recording under what a model states of it, from `start` (value,). `geometry`: the same recording, alone."""
+    """A recording under what a model states of it, from `start` (value,). `geometry`: the same recording, alone.
+
+    `unit` (assumed value,): a step over which readings are linear.
+    """
     noise = geometry.noise.trusted
     whiteners, rows = whiteners_of(noise.scatters), geometry.problem.rows
     sizes = plain_sizes(session, terms, geometry.drivers, whiteners, rows)
-    problem = Augmented(session, terms, geometry.drivers, rows, whiteners, sizes, len(terms), assumed)
-    return _settled(_turn(problem, geometry.active, start, noise))
+    problem = Augmented(session, terms, geometry.drivers, rows, whiteners, sizes, len(terms))
+    free = np.flatnonzero([p.free for p in problem.parameters])
+    near = assumed.held_near(problem.jacobian(start), np.setdiff1d(free, assumed.at), unit)
+    return _settled(_turn(replace(problem, assumed=near), geometry.active, start, noise))
 
 
 def _makes_outliers(term: Term) -> bool:

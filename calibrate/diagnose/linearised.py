@@ -4,7 +4,7 @@
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol, Self
 
 import numpy as np
@@ -36,6 +36,7 @@ class Rows:
     group: Ints  # (row,) data rows of one observation (the k values read at one pose) share a number; -1 prior rows
     instrument: Ints  # (row,) index of the instrument, -1 prior rows
     owner: Ints  # (param,) of geometry: index in State.accepted whose value it is, -1: geometry proper
+    stated: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.intp))  # rows of what a known model states
 
     @property
     def data(self) -> NDArray[np.bool_]:

@@ -5,6 +5,7 @@ and would count them twice). On any other one its values enter with their covari
 to a session: where the device stands, and effects that hold for that session only.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,6 +36,8 @@ Floats = NDArray[np.float64]
 ANEW = ("device.", "camera.", "marker.", "encoder")  # set up or found anew for each recording: nothing is known of it
 FOUND = ("tool", seat.POINTS)  # corrections about points that were found in closed form, in `about` of the model
 AXES = ("x", "y", "z")
+STRAIGHT = 1e-3  # m, rad or a factor: its square, over a metre, is a micrometre
+LOOSE = 1e3  # sigmas of an effect's value: never held beyond what the model says of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,19 +105,25 @@ def _later(model: ModelFile, session: Session) -> Fitted:
     if model.covariance is None:
         raise ValueError("a model without a covariance states nothing of another recording")
     geometry = fit_geometry(session)
-    acts = effects_at(model, Predictor.of(model), _with_moves(session.samples), same_session=False)
-    names = [p.name for p in session.parameters] + [name for one in acts.found for name in _names(one)]
+
+    def found_at(samples: Samples) -> tuple[Acting, ...]:
+        return effects_at(model, Predictor.of(model), _with_moves(samples), same_session=False).found
+
+    acting_here = found_at(session.samples)
+    names = [p.name for p in session.parameters] + [name for one in acting_here for name in _names(one)]
     mine = {p.name for p in session.parameters if p.free and not p.name.startswith(ANEW)}
     mine |= set(names[len(session.parameters) :])
     known = [name for name in model.covariance.names if name in mine]
-    terms = tuple(_stated(one) for one in acts.found)
+    terms = tuple(_stated(one, k, found_at) for k, one in enumerate(acting_here))
     start = np.concatenate([_values(model, session, geometry), *(t.coefficients for t in terms)])
     at = np.array([names.index(name) for name in known], dtype=np.intp)
     covariance = _part(model.covariance, known)
     scale = np.concatenate([plausible_sizes(session.parameters), np.zeros(len(names) - len(session.parameters))])[at]
     scale = np.where(scale > 0.0, scale, np.sqrt(np.diag(covariance)))
     told = replace(session, stated=frozenset(known))
-    return fit_from_model(told, geometry, terms, Assumed.of(at, start[at], covariance, scale), start)
+    own = at < len(session.parameters)
+    unit = np.where(own, np.minimum(scale, STRAIGHT), LOOSE * np.sqrt(np.diag(covariance)))
+    return fit_from_model(told, geometry, terms, Assumed.of(at, start[at], covariance, scale), start, unit)
 
 
 def _values(model: ModelFile, session: Session, geometry: Fitted) -> Floats:
@@ -140,7 +149,13 @@ def _names(one: Acting) -> list[str]:
     return [*effect.coefficients, *(f"{effect.name}.{spec.name}" for spec in inner if not spec.discrete)]
 
 
-def _stated(one: Acting) -> Accepted:
+def _stated(one: Acting, k: int, found_at: Callable[[Samples], tuple[Acting, ...]]) -> Accepted:
+    """Number `k` of those that are found at the rows of any samples."""
+
+    def elsewhere(samples: Samples) -> tuple[Floats, Floats]:
+        there = found_at(samples)[k]
+        return there.by_value, there.amount
+
     accepted = one.carried.accepted
     smooth = [value for spec, value in zip(accepted.term.inner, accepted.inner, strict=True) if not spec.discrete]
     values = np.concatenate([accepted.coefficients, np.array(smooth, dtype=np.float64)])
@@ -154,6 +169,7 @@ def _stated(one: Acting) -> Accepted:
         columns=one.by_value,
         added=one.amount,
         about=values,
+        elsewhere=elsewhere,
     )
     return Accepted(stated, values, np.zeros(0))
 

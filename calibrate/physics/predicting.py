@@ -17,6 +17,7 @@ from calibrate.model_file import ModelFile
 from calibrate.physics.acting import Acting, arm_in, flange_frames, moved_columns
 from calibrate.physics.applied import Applied, effects_at
 from calibrate.physics.flanges import Flanges
+from calibrate.physics.own_frame import OwnFrame
 from calibrate.predict import Columns, Predictor, less_cones, readings, residuals
 
 Floats = NDArray[np.float64]
@@ -142,7 +143,10 @@ def _felt(at: At, predictor: Predictor, by: Perturbation, port: Port, amount: Fl
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """Where the arm holds flange and tip in its base, each row with one sigma; `notes` as in `Predicted`."""
+    """Where the arm holds flange and tip in its base, each row with one sigma; `notes` as in `Predicted`.
+
+    Sigmas are of the robot's own frame (own_frame.py) or of the world, as asked.
+    """
 
     T_base_flange: Floats  # (row, 4, 4)
     flange_sigma: Floats  # (row, 6) m along x, y, z of the base, rad about them; NaN without a covariance
@@ -151,15 +155,19 @@ class Placed:
     notes: tuple[str, ...]
 
 
-def placed(model: ModelFile, samples: Samples, same_session: bool = False) -> Placed:
-    """Flange and tip with the effects of the model, at joints and conditions of samples. DataError as above."""
+def placed(model: ModelFile, samples: Samples, same_session: bool = False, *, in_world: bool = False) -> Placed:
+    """Flange and tip with the effects of the model, at joints and conditions of samples. DataError as above.
+
+    `in_world`: sigmas contain how far it is known where the base stands.
+    """
     predictor = Predictor.of(model)
+    own = None if in_world else OwnFrame.of(predictor)
     applied = effects_at(model, predictor, samples, same_session)
     flange = _flange(predictor, applied, samples.joints())
     T = flange(predictor, applied.by)
 
     def at(predictor: Predictor, by: Perturbation) -> Columns:
-        now = flange(predictor, by)
+        now = flange(predictor, by) if own is None else own.back(predictor) @ flange(predictor, by)
         turn = Rotation.from_matrix(now[:, :3, :3] @ np.swapaxes(T[:, :3, :3], 1, 2)).as_rotvec()
         table = np.concatenate([now[:, :3, 3], turn, predictor.tip_at(now)], axis=1)
         return dict(zip(PLACED, table.T, strict=True))
