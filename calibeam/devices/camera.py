@@ -3,9 +3,9 @@
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from acquisition.recording import TYPE_CHECKING, RigFileError
+from acquisition.recording import RigFileError
 from acquisition.recording.rig import Camera, Rig
 from drivers.clock import Clock
 
