@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear
 
 from calibrate.observation_model import ObservationModel
 
@@ -152,5 +151,7 @@ def shares_found(
     told = np.any(X != 0.0, axis=0)
     out = np.zeros(len(told))
     if told.any():
+        from scipy.optimize import lsq_linear  # only where there are second encoders: identify starts sooner
+
         out[told] = lsq_linear(X[:, told], y, (0.0, 1.0), method="bvls").x
     return out

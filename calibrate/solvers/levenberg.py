@@ -44,6 +44,7 @@ def levenberg(rows: Rows, theta: Floats, rules: LevenbergRules) -> Ended:
     if not np.all(np.isfinite(residual)):
         return Ended(theta, residual, None, Stop.NOT_FINITE, 0)
     slope, damping, growth = rows.jacobian(theta), rules.damping, 2.0
+    least_promise = np.inf  # of the steps that were taken on the linear model's word alone
     for steps in range(rules.max_steps):
         if not np.all(np.isfinite(slope)):
             return Ended(theta, residual, None, Stop.NOT_FINITE, steps)
@@ -62,6 +63,9 @@ def levenberg(rows: Rows, theta: Floats, rules: LevenbergRules) -> Ended:
         new = rows.residual(trial)
         gain = gain_ratio(residual, new, slope @ rows.taken(theta, trial))
         if _lost_in_rounding(promised, residual, new):
+            if promised >= least_promise:  # such a step had left nothing to gain: the promise, too, is rounding by now
+                return Ended(theta, residual, slope, Stop.ROUNDING, steps)
+            least_promise = promised
             gain = 1.0  # the linear model is the better witness
         if gain > 0.0:
             theta, residual, slope = trial, new, rows.jacobian(trial)
