@@ -11,6 +11,7 @@ LATER = (
     "calibrate.report",
     "calibrate.diagnose",
     "calibrate.effects",
+    "calibrate.export.not_carried",  # of a model with effects
     "calibrate.physics",
     "calibrate.error_simulation",
     "calibrate.pose_design",
