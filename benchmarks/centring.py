@@ -20,9 +20,8 @@ from acquisition.believed import BelievedArm, FixtureOptics
 from acquisition.errors import UnreachableError
 from acquisition.recording.rig import Rig
 from acquisition.servo.centring import Limits, centre
-from acquisition.servo.law import FixedGuess
 from acquisition.servo.measured import MeasuredStrategy
-from acquisition.servo.registered import Registered
+from acquisition.servo.registered import FixedGuess, Registered
 from acquisition.servo.status import Centring, CentringStatus
 from acquisition.servo.strategy import Strategy
 from calibeam.learner import FittedLearner

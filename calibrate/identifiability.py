@@ -4,16 +4,19 @@ The whitened Jacobian is scaled by the plausible size of each parameter, so a si
 priors, where there are any) know this combination to 1/s of its plausible size. Below WEAK it is treated as unseen.
 Source: Schroer, Theory of kinematic modelling, 1993 (column scaling, rank by singular values); the rule that a
 parameter outside the range of J' has no estimate is Rao, Linear Statistical Inference, 2nd ed. 1973, ch. 4a.
+
+Parameter names put together for a person: what several frames have in common is said once.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.parameters import Parameter, plausible_sizes, priors
+from calibrate.sensors.catalogue import FRAMES
 from calibrate.solvers.linear import triangle_of
-from calibrate.words import in_words, plainly
 
 __all__ = ["WEAK", "Combination", "Identifiability", "analyse", "in_words"]
 
@@ -26,6 +29,11 @@ TRACE = 1e-5  # share of an unseen direction below which a parameter is not part
 NEGLIGIBLE = 0.1  # of a sigma: what an unseen combination, off by its plausible size, may shift a parameter by
 EQUAL = 1e-6  # of a length: two that differ by less are equally long
 SPOKEN = 0.02  # share of its largest member below which a member is not worth saying
+
+SINGLE = ("device", "tool", *(f.prefix for f in FRAMES if not f.one))
+SYMBOLS = {"offset": "d", "length": "a", "twist": "alpha", "tilt": "beta"}  # of a D-H table, Hayati's beta included
+NOUNS = {"placement": "fixture", "laser": "laser mount", "device": "base", **{f.prefix: f.noun for f in FRAMES}}
+NUMBERED = ("placement", *(f.prefix for f in FRAMES if f.one))  # the number does not matter to the reason
 
 
 @dataclass(frozen=True)
@@ -167,3 +175,62 @@ def _combination(share: list[float], names: tuple[str, ...], pivot: int, structu
     loud = SPOKEN * (share[others[0]] if others and share[others[0]] < SPOKEN else 1.0)  # a pair is never said as one
     spoken = (names[pivot], *(names[i] for i in sorted(others) if share[i] > loud))
     return Combination(spoken, tuple(names[i] for i in order), names[pivot], structural)
+
+
+def in_words(names: Sequence[str]) -> str:
+    """Names joined; what several placements or seats, a device, a tool or the laser mount share is said once.
+
+    >>> in_words(["joint1.zero", "placement1.x", "placement1.yaw", "placement2.x", "placement2.yaw"])
+    'joint1.zero + placement x, yaw'
+    """
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        owner, _, what = name.partition(".")
+        kind = owner.rstrip("0123456789")
+        if kind in NUMBERED:
+            owner = kind
+        elif owner == "laser":
+            owner = "laser mount"
+        elif owner not in SINGLE:
+            owner, what = name, ""
+        listed = groups.setdefault(owner, [])
+        if what and what not in listed:
+            listed.append(what)
+    return " + ".join(f"{owner} {', '.join(what)}" if what else owner for owner, what in groups.items())
+
+
+def plainly(names: Sequence[str]) -> str:
+    """The same in the words of who calibrates: D-H letters add up, the first of unlike things goes with the others.
+
+    >>> plainly(["link2.offset", "link3.offset"]), plainly(["joint1.zero", "device.yaw"])
+    ('d2 + d3', 'joint 1 zero with base yaw')
+    """
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        owner, what = _owner_and_what(name)
+        listed = groups.setdefault(owner, [])
+        if what and what not in listed:
+            listed.append(what)
+    said = [f"{owner} {', '.join(what)}" if what else owner for owner, what in groups.items()]
+    if all(_is_letter(name) for name in names) or len(said) == 1:
+        return " + ".join(said)
+    return f"{said[0]} with {' and '.join(said[1:])}"
+
+
+def _is_letter(name: str) -> bool:
+    owner, _, what = name.partition(".")
+    return owner.startswith("link") and what in SYMBOLS
+
+
+def _owner_and_what(name: str) -> tuple[str, str]:
+    """'link2.offset' -> 'd2', ''; 'placement3.yaw' -> 'fixture', 'yaw'; 'joint1.zero' -> 'joint 1 zero', ''."""
+    owner, _, what = name.partition(".")
+    kind = owner.rstrip("0123456789")
+    number = owner.removeprefix(kind)
+    if _is_letter(name):
+        return f"{SYMBOLS[what]}{number}", ""
+    if kind in NOUNS:
+        return NOUNS[kind], what
+    if kind == "joint":
+        return f"joint {number} {what}".strip(), ""
+    return f"{kind} {number}".strip(), what

@@ -17,7 +17,7 @@ JOINT_STEPS = {
 TURNED_PARTS = {
     "calibrate/arms": "the arm models themselves",
     "calibrate/diagnose/ported.py": "effects at every port of the chain",
-    "calibrate/physics/flanges.py": "the same, for the derivative by values",
+    "calibrate/physics/predicting.py": "the same, for the derivative by values",
 }
 
 

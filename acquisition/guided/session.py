@@ -1,4 +1,7 @@
-"""A guided session: asks for one posture after the other, takes a reading when the probe is still, rejects slips."""
+"""A guided session: asks for one posture after the other, takes a reading when the probe is still, rejects slips.
+
+Whether a still probe tells anything new: a cone in another posture, a sphere at another spot, no plane of spots.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -11,11 +14,10 @@ from acquisition.guided.arm import GuidedArm
 from acquisition.guided.coverage import Coverage
 from acquisition.guided.guide import Guide, GuidedProgress, Request
 from acquisition.guided.judge import Judge
-from acquisition.guided.novelty import nothing_new
 from acquisition.guided.plan import GuidedVisit, readings_of
 from acquisition.guided.reading import Reading
 from acquisition.guided.stillness import ArmMotion, StillRule
-from acquisition.guided.target import SphereSpot, Target
+from acquisition.guided.target import Cone, SphereSpot, Target
 from acquisition.guided.window import EncoderWatch, Window
 
 Floats = NDArray[np.float64]
@@ -25,6 +27,10 @@ NEAR_M = 0.05  # of the place in the rig file: cones stand about there, and the 
 ANEW_RAD = 3e-3  # a standstill is another one when some joint has moved so far since the last reading
 LEARN_ALWAYS_UNTIL, LEARN_EVERY = 30, 5  # readings: later ones change little
 TELL_S = 0.2  # of the encoders' time
+OTHER_RAD = 0.1  # of some joint: nearer postures have the same errors of the arm and show the encoders' scatter only
+APART_M = 2e-3  # of two spots of a series: the nearest of 25 that are evenly over half a ball of 31 mm are 4.4 mm apart
+FLAT_M = 3e-4  # rms about the plane of all spots: of the first five of those 25 it is 0.85 mm
+FLAT_FROM = 5  # spots: with fewer a plane says nothing yet
 
 
 class GuidedJournal(Protocol):
@@ -180,3 +186,35 @@ class GuidedSession:
                 self.judge.repeatability_m,
             )
         )
+
+
+def nothing_new(arm: GuidedArm, target: Target, q_rad: Floats, taken: Sequence[Reading]) -> str | None:
+    """What to do instead, for a person; None where a reading (n,) at the target says something new."""
+    if isinstance(target, Cone):
+        return _old_posture(q_rad, [one.q_rad for one in taken if one.target == target])
+    if isinstance(target, SphereSpot):
+        return _old_spot(arm, q_rad, [one.q_rad for one in taken if _of_series(one.target, target)])
+    return None
+
+
+def _of_series(other: Target, target: SphereSpot) -> bool:
+    return isinstance(other, SphereSpot) and (other.id, other.series) == (target.id, target.series)
+
+
+def _old_posture(q_rad: Floats, earlier: Sequence[Floats]) -> str | None:
+    if any(np.abs(q_rad - other).max() < OTHER_RAD for other in earlier):
+        return f"was read here in this posture; turn some joint by {np.degrees(OTHER_RAD):.0f} deg or more"
+    return None
+
+
+def _old_spot(arm: GuidedArm, q_rad: Floats, earlier: Sequence[Floats]) -> str | None:
+    """In one posture the believed arm is off by the same at every spot, so that their distances are good."""
+    if not earlier:
+        return None
+    tips_m = arm.tip_m(np.array([*earlier, q_rad]))
+    if np.linalg.norm(tips_m[:-1] - tips_m[-1], axis=1).min() < APART_M:
+        return f"was touched here; touch it {1e3 * APART_M:.0f} mm or more beside every earlier spot"
+    thick_m = np.linalg.svd(tips_m - tips_m.mean(axis=0), compute_uv=False)[-1] / np.sqrt(len(tips_m))
+    if len(tips_m) >= FLAT_FROM and thick_m < FLAT_M:
+        return "all spots so far and this one lie in one plane, which shows no sphere; touch it out of that plane"
+    return None

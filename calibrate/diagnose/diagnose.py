@@ -1,4 +1,7 @@
-"""The whole diagnosis of one fitted session: search, unknowns, proof, doubt, what to do next."""
+"""The whole diagnosis of one fitted session: search, unknowns, proof, doubt, what to do next.
+
+What to measure next where a cause has rivals: other poses, a change of temperature, or a second instrument.
+"""
 
 from collections.abc import Sequence
 
@@ -6,9 +9,9 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from calibrate.diagnose.advice import to_measure
-from calibrate.diagnose.diagnosis import Diagnosis, Rejected
+from calibrate.diagnose.diagnosis import Diagnosis, Finding, Named, Rejected, RivalName
 from calibrate.diagnose.doubt import doubted
+from calibrate.diagnose.drifts import parted_by_time
 from calibrate.diagnose.findings import named
 from calibrate.diagnose.linearised import State
 from calibrate.diagnose.noise_law import noise_law
@@ -18,6 +21,11 @@ from calibrate.effects.term import Missing
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+
+POSES = "measure poses that separate them (calibeam diagnose --plan-out)"
+# Temperature follows time unless the arm is cooled and warmed again (mismatch catalogue, confusable by nature).
+COOLED = "no pose tells them apart; measure on while the arm is cooled and warmed again"
+WITNESS = "alike at every pose to this instrument; watch either with a second one, or measure fixed marks again"
 
 
 def diagnose(state: State, rng: Generator, missing: Sequence[Missing] = ()) -> Diagnosis:
@@ -57,3 +65,21 @@ def _rejected(at: Search) -> tuple[Rejected, ...]:
             why = "not beyond what searching through noise finds"
         best[term.physics] = Rejected(named(term), gain, why)
     return tuple(best.values())
+
+
+def to_measure(findings: Sequence[Finding]) -> tuple[str, ...]:
+    """One sentence for each finding and remedy."""
+    out: list[str] = []
+    for finding in findings:
+        for remedy in (POSES, COOLED, WITNESS):
+            mine = [r.name for r in finding.rivals if _remedy(finding.name, r) == remedy]
+            if mine:
+                others = ", ".join(dict.fromkeys(name.beside(finding.name) for name in mine))
+                out.append(f"{finding.name.physics} at {finding.name.where} could also be {others}: {remedy}")
+    return tuple(out)
+
+
+def _remedy(name: Named, rival: RivalName) -> str:
+    if rival.alike:
+        return WITNESS
+    return COOLED if parted_by_time(name, rival.name) else POSES

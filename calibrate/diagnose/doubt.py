@@ -2,35 +2,66 @@
 
 Scatter through a port's lever, misfit that repeats, a drift whose temperature was not recorded: each one says which
 column is missing, and while structure is left over no name is final.
+
+Each accepted term by the name that a full refit likes best; of names that the data cannot tell apart, that of
+the fewest drivers and of the lowest harmonic (numbers are paid for by BIC already).
+
+The search compares candidates by linear scores, which are off by some units of BIC where robust weights or inner values
+would settle elsewhere.
+
+Does each term predict rows that the fit has not seen: exact for the linearised model, without a refit.
+Errors of a fold that was left out are (I - H_ff)^-1 r_f. Source: Cook, Weisberg, Residuals and Influence in Regression,
+1982, section 2.2 (several rows deleted).
+
+Which samples of a long session the search works on: its cost grows with their number, what it can tell but slowly.
+The model that is found is fitted to all of them afterwards.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
+from numpy.typing import NDArray
 
 from calibrate.diagnose.bench import Bench
-from calibrate.diagnose.best_names import with_best_names
-from calibrate.diagnose.cross_validation import predicts
 from calibrate.diagnose.diagnosis import Finding, Unexplained, Verdict
 from calibrate.diagnose.drifts import doubtful, suspects, untold
 from calibrate.diagnose.findings import findings_of
+from calibrate.diagnose.folds import k_folds, units
 from calibrate.diagnose.hidden_levers import TIME
 from calibrate.diagnose.lack_of_fit import LackOfFit, lack_of_fit
-from calibrate.diagnose.linearised import State
+from calibrate.diagnose.linearised import Accepted, State
 from calibrate.diagnose.pruning import without
+from calibrate.diagnose.rivals import Rival, rivals_of
 from calibrate.diagnose.score import gain_of
 from calibrate.diagnose.search import search
-from calibrate.diagnose.searching import Search
-from calibrate.diagnose.thinned import thinned
+from calibrate.diagnose.searching import BETTER, Search
 from calibrate.diagnose.unknown import with_unknowns
 from calibrate.diagnose.unrecorded import Unrecorded, unrecorded
-from calibrate.effects.term import Missing
+from calibrate.effects.term import Missing, Term
 
 SPEED = "qd"
 MOTION = ("approach", "last_move")
 SEVERAL = 3  # joints: one clock is simpler than slack in each
+
+# Of BIC: no more than a bare mention. Source: Kass, Raftery, Bayes factors, J. Am. Stat. Assoc. 90(430), 1995, section
+# 3.2.
+TIED = 2.0
+ROUNDS = 6
+WARMTH = "temp_"
+
+Rivals = tuple[tuple[Rival, ...], ...]
+
+Floats = NDArray[np.float64]
+
+FOLDS = 10
+RIDGE = 1e-9  # keeps a direction that only one fold knows finite
+NU = 5.0  # of the law of noise, as in calibrate/diagnose/scatter.py
+
+Ints = NDArray[np.intp]
+
+MOST = 1800  # rows, 600 positions: an effect of a fifth of the noise is plain to see in so many
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,3 +146,99 @@ def _repeated(misfit: LackOfFit | None) -> list[Unexplained]:
 
 def _records(lacking: Sequence[Missing]) -> tuple[str, ...]:
     return tuple(f"record {m.column}: without it {m.physics} cannot be told" for m in dict.fromkeys(lacking))
+
+
+def with_best_names(at: Search) -> tuple[Search, Rivals]:
+    """The search with names exchanged, and the rivals of each term in it."""
+    for _ in range(ROUNDS):
+        rivals = _rivals(at.bench)
+        changed = _exchanged(at, rivals)
+        if changed is None:
+            return at, rivals
+        at = changed
+    return at, _rivals(at.bench)
+
+
+def _rivals(bench: Bench) -> Rivals:
+    return tuple(() if a.term.open else rivals_of(bench, i) for i, a in enumerate(bench.state.accepted))
+
+
+def _exchanged(at: Search, rivals: Rivals) -> Search | None:
+    """With the first name exchanged that has a better one; None if there is none."""
+    for i, (own, mine) in enumerate(zip(at.state.accepted, rivals, strict=True)):
+        class_ = [(0.0, own), *((r.margin, r.accepted) for r in mine if r.refitted and r.plausible)]
+        class_ = [(margin + _price(at.bench, a.term), a) for margin, a in class_]
+        least = min(margin for margin, _ in class_)
+        near = [c for c in class_ if c[0] <= least + TIED]
+        best = min(near, key=lambda c: (len(c[1].term.depends_on), c[1].term.order or 1, *_rank(at, c, least, own)))[1]
+        if best is own:
+            continue
+        bench = Bench(at.state.refitted([best if j == i else a for j, a in enumerate(at.state.accepted)]))
+        dearer = _price(at.bench, best.term) - _price(at.bench, own.term)
+        if bench.bic + dearer <= at.bench.bic + TIED:
+            return replace(at.at(bench), p=at.p | {best.term.key: at.p.get(own.term.key, 0.0)})
+    return None
+
+
+def _rank(at: Search, candidate: tuple[float, Accepted], least: float, own: Accepted) -> tuple[float, int]:
+    """By margin; a hair's breadth is no reason: what nothing tells apart is named in the catalogue's order."""
+    margin, accepted = candidate
+    if margin <= least + BETTER:
+        return least, at.bench.menu.place_of(accepted.term)
+    return (margin - BETTER if accepted is own else margin), 0
+
+
+def _price(bench: Bench, term: Term) -> float:
+    """BIC of having picked a thermometer: the one at the place itself is free, any other one of many.
+
+    Source: extended BIC, Chen, Chen, Biometrika 95(3), 2008, gamma = 1.
+    """
+    driver, where = term.depends_on[0], term.port.where
+    if not driver.startswith(WARMTH) or where.startswith(driver.removeprefix(WARMTH) + "."):
+        return 0.0
+    return 2.0 * float(np.log(max(len(bench.state.drivers.temperatures_degC), 1)))
+
+
+def predicts(bench: Bench, rng: Generator) -> Floats:
+    """(term,) 2 ln L of unseen rows that each accepted term gains; below zero it only fitted noise.
+
+    Beside a model of another recording that recording counts, too: many rows of the new one bend a model until it
+    predicts them well, at the cost of all that was known. It is not held out, so each value costs two (Akaike 1974).
+    """
+    rows = bench.state.rows
+    data = np.flatnonzero(rows.data)
+    labels = units(bench.state.drivers)[rows.sample[data]]
+    folds = [data[f] for f in k_folds(labels, FOLDS, rng)]
+    whole = _loss(bench.sight.basis, bench.sight.residual, folds)
+    out: list[float] = []
+    for gone in bench.gone:
+        # The span of the model without a term: the complement of what only the term spans.
+        basis = bench.sight.basis - gone.span @ (gone.span.T @ bench.sight.basis)
+        without = bench.sight.residual + gone.span @ gone.part
+        known = float(np.sum(without[rows.stated] ** 2) - np.sum(bench.sight.residual[rows.stated] ** 2))
+        out.append(_loss(basis, without, folds) - whole + max(known - 2.0 * gone.cost, 0.0))
+    return np.array(out)
+
+
+def _loss(basis: Floats, residual: Floats, folds: list[NDArray[np.intp]]) -> float:
+    """-2 log L of Student's t law, rows apart. `basis` may be an orthonormal one less some directions."""
+    total, p = 0.0, basis.shape[1]
+    for fold in folds:
+        # (I - Q Q')^-1 r = r + Q (I - Q' Q)^-1 Q' r: a fold has more rows than the model has directions.
+        Q = basis[fold]
+        error = residual[fold] + Q @ np.linalg.solve((1.0 + RIDGE) * np.eye(p) - Q.T @ Q, Q.T @ residual[fold])
+        total += float(np.sum((NU + 1.0) * np.log1p(error**2 / NU)))
+    return total
+
+
+def thinned(state: State, rng: Generator) -> State:
+    """The state itself, or fitted to samples drawn at random; repeats stay together."""
+    samples = np.unique(state.rows.sample[state.rows.data])
+    most = MOST * len(samples) // max(int(state.rows.data.sum()), 1)
+    if len(samples) <= most:
+        return state
+    label = units(state.drivers)[samples]
+    names, count = np.unique(label, return_counts=True)
+    order = rng.permutation(len(names))
+    kept = names[order[np.cumsum(count[order]) <= most]]
+    return state.select(samples[np.isin(label, kept)]).refitted(())

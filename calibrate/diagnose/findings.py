@@ -1,10 +1,17 @@
-"""From accepted terms to findings: sizes with sigmas, share, rivals, picture, and one finding for one cause."""
+"""From accepted terms to findings: sizes with sigmas, share, rivals, picture, and one finding for one cause.
+
+Several names at one place of a machine that is sound elsewhere: pieces of one law that nobody has listed.
+Sines of a joint's angle and its torque build up any function of the pose, so a few of them that fit prove little.
+Faults that have nothing to do with each other are spread over a machine; three of them at one joint and next to none
+anywhere else are one cause.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import poisson
 
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.diagnosis import UNKNOWN, Finding, Named, RivalName
@@ -13,7 +20,6 @@ from calibrate.diagnose.pulled_back import pulled_back
 from calibrate.diagnose.rivals import Rival, confidences
 from calibrate.diagnose.score import gain_of, orthonormal
 from calibrate.diagnose.searching import Search
-from calibrate.diagnose.several_names import pieces
 from calibrate.diagnose.stated_sizes import sizes_of
 from calibrate.diagnose.unknown_cause import unknown_cause
 from calibrate.effects.term import Term
@@ -24,6 +30,10 @@ NOT_FINAL = 0.5  # of the confidence in a name that may be the rest of something
 ALIKE = 1e-6  # sine between what two names can make of the readings
 LEFTOVER = 0.1  # of what an unknown cause explains: a curve may leave so much of a law that it only resembles
 
+SEVERAL = 3  # two may share a joint
+BY_CHANCE = 0.01  # that so many faults meet at one of the places
+UNSEEN = 0.5  # of a fault, for those elsewhere that are too small to be found (Jeffreys' prior of a Poisson rate)
+
 
 def named(term: Term) -> Named:
     return Named(term.port.where, term.depends_on, term.shape.value, term.order, UNKNOWN if term.open else term.physics)
@@ -32,7 +42,7 @@ def named(term: Term) -> Named:
 def findings_of(
     at: Search, rivals: Sequence[Sequence[Rival]], predicts: Floats, final: bool = True
 ) -> tuple[Finding, ...]:
-    """Largest first. `rivals` of each term; `predicts` (term,) as calibrate/diagnose/cross_validation.py gives it.
+    """Largest first. `rivals` of each term; `predicts` (term,) as calibrate/diagnose/doubt.py gives it.
 
     All that is unknown at one port is one finding. `final`: no structure is left without a name; while some is, no
     name of physics is more likely than not.
@@ -113,3 +123,23 @@ def _no_leftovers(names: Sequence[Finding], unknown: Sequence[Finding]) -> list[
 
 def _leftover(finding: Finding, unknown: Finding) -> bool:
     return finding.name.where == unknown.name.where and set(finding.name.depends_on) <= set(unknown.name.depends_on)
+
+
+def pieces(accepted: Sequence[Accepted], places: int) -> list[tuple[int, ...]]:
+    """Groups of accepted names at one port that are no names but one unknown cause; `places` where a fault could be."""
+    found: dict[str, list[int]] = {}
+    for i, a in enumerate(accepted):
+        if not a.term.open and all(map(_of_pose, a.term.depends_on)):
+            found.setdefault(a.term.port.where, []).append(i)
+    names = sum(not a.term.open for a in accepted)
+    return [tuple(group) for group in found.values() if _meet_too_often(len(group), names - len(group), places)]
+
+
+def _meet_too_often(here: int, elsewhere: int, places: int) -> bool:
+    """Whether so many names at one of the places are no chance, at the rate of all others."""
+    rate = (elsewhere + UNSEEN) / max(places - 1, 1)
+    return here >= SEVERAL and float(poisson.sf(here - 1, rate)) * places < BY_CHANCE
+
+
+def _of_pose(driver: str) -> bool:
+    return driver.startswith("gravity_torque") or (driver[0] == "q" and driver[1:].isdigit())

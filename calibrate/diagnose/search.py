@@ -3,6 +3,9 @@
 Greedy selection alone is wrong as soon as two effects share a lever, so after every acceptance each chosen term is
 tried against all others. Sources: stepwise search with swaps, Miller, Subset selection in regression, 2002, section
 3.7; term-by-term model building of telescopes, Wallace, TPOINT.
+
+Steps that robust weights have swallowed: shots at a fixture that stood elsewhere for a while look like wild rows.
+Trusted again, they propose the step; it stays where a robust refit leaves no doubt.
 """
 
 from dataclasses import replace
@@ -11,11 +14,13 @@ from numpy.random import Generator
 
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.exchanging import merged, swapped
-from calibrate.diagnose.growing import grown
+from calibrate.diagnose.growing import admissible, grown
 from calibrate.diagnose.linearised import State
-from calibrate.diagnose.pruning import confirmed, tidied
-from calibrate.diagnose.searching import BETTER, Key, Search
-from calibrate.diagnose.swallowed import unswallowed
+from calibrate.diagnose.pruning import confirmed, p_of, tidied
+from calibrate.diagnose.score import gain_of
+from calibrate.diagnose.searching import BETTER, SURE_SLOW, Key, Search, null_at
+from calibrate.effects.term import Shape
+from calibrate.effects.time_laws import FEWEST_AFTER
 
 MOST = 30  # terms; beyond it the model form is wrong, not incomplete
 
@@ -43,3 +48,23 @@ def grown_out(at: Search) -> Search:
         else:
             break
     return tidied(confirmed(at))
+
+
+def unswallowed(at: Search) -> Search | None:
+    """With the best step for rows that nobody trusts; None if there are few of them, or no step explains them."""
+    if at.state.distrusted < FEWEST_AFTER:
+        return None
+    trusting = at.state.trusting()
+    steps = tuple(t for t in trusting.candidates() if t.shape is Shape.STEP and not t.open)
+    bench = Bench(trusting, Bench(trusting).menu_of(steps))
+    proposed = admissible(bench, bench.scores, None, 0.0, at.causes | at.banned)
+    if proposed is None:
+        return None
+    trial = Bench(at.state.refitted((*at.state.accepted, proposed.accepted)))
+    if trial.bic >= at.bench.bic or not trial.plausible[-1]:
+        return None
+    # Picked for its wild rows, so the null, which has none, is no judge: heavy tails make such steps, too.
+    if gain_of(trial.gone[-1], trial.sight) < SURE_SLOW:
+        return None
+    p = p_of(trial, null_at(trial, at.rng), len(trial.state.accepted) - 1)
+    return replace(at.at(trial), p=at.p | {proposed.term.key: p})

@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 def unknown_cause(at: Search, group: Sequence[int], predicts: Floats) -> Finding:
     """One finding for the accepted open terms `group`, all of one port, the largest one first in the picture.
 
-    `predicts` (term,) as calibrate/diagnose/cross_validation.py gives it. The share is a square, not divided by that of
+    `predicts` (term,) as calibrate/diagnose/doubt.py gives it. The share is a square, not divided by that of
     all findings.
     """
     bench = at.bench

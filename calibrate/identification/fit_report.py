@@ -1,4 +1,10 @@
-"""From a settled fit to its result: estimates with their doubt, noise found, what was there before."""
+"""From a settled fit to its result: estimates with their doubt, noise found, what was there before.
+
+How far an unseen combination can pull on each parameter: which of its members have a number all the same.
+What the data do not see is known no better than to its plausible size. A parameter that has a share of 1e-4 in it moves
+by 1e-4 of its own plausible size when the combination moves by all of that: it is determined, and what little it is
+pulled goes into its sigma. Where a combination bends (calibrate/unseen_along.py) the largest pull on its way counts.
+"""
 
 from dataclasses import replace
 from importlib.metadata import version
@@ -12,18 +18,19 @@ from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from calibrate.blunders.finding import Blunder
 from calibrate.fit import FAR_START, Fit, Status
-from calibrate.identifiability import Identifiability
+from calibrate.identifiability import STRUCTURAL, WEAK, Identifiability
 from calibrate.identification.estimates import HELD, ONLY_BELIEVED, Estimate, estimate_of, untold
 from calibrate.identification.evidence import Asked, evidence_of, rows_used
 from calibrate.identification.held_out import lengths
-from calibrate.identification.pull import TOLD, pull_along
 from calibrate.identification.result import FitEnd, Identification, InstrumentFound, Noise
 from calibrate.identification.rounds import Fitted
 from calibrate.identification.session import NEGLIGIBLE_RAD, about_of
-from calibrate.parameters import Parameter, hold, plausible_sizes, start_values, without_assumed
+from calibrate.parameters import Parameter, hold, plausible_sizes, priors, start_values, without_assumed
+from calibrate.problem import LeastSquares
+from calibrate.solvers.linear import triangle_of
 from calibrate.uncertainty.chi_square import RepeatNoise, against_repeats, against_stated
 from calibrate.uncertainty.likelihood import minus_2_log_likelihood
-from calibrate.unseen_along import analyse_along
+from calibrate.unseen_along import analyse_along, points_along
 from calibrate.weighting import JOINT
 
 Floats = NDArray[np.float64]
@@ -31,6 +38,9 @@ Ints = NDArray[np.int64]
 
 LEAST_DOF = 3.0  # a Satterthwaite number below this is itself a guess
 ONLY_PRIOR = 2.0 / np.sqrt(5.0)  # of a prior sigma: the data alone know it to twice that, see identifiability.WEAK
+
+TOLD = 0.05  # of the plausible size: a member of an unseen combination that can move no further is a number
+FAR = 3.0  # plausible sizes that the truth of an unseen combination may lie from where it was held
 
 
 def result_of(
@@ -178,3 +188,26 @@ def _repeats(fitted: Fitted, repeat: Ints | None) -> RepeatNoise | None:
         if found is not None:
             return found
     return None
+
+
+def pull_of_unseen(jacobian: Floats, parameters: tuple[Parameter, ...]) -> Floats:
+    """(param,) in its unit, for the whitened Jacobian (row, param): one sigma of what unseen combinations add.
+
+    Rank and scaling are those of identifiability.analyse.
+    """
+    free = np.flatnonzero([p.free for p in parameters])
+    scale, prior = plausible_sizes(parameters)[free], priors(parameters)[free]
+    rows = np.concatenate([jacobian[:, free] * scale, np.diag(scale / prior)])
+    _, s, Vt = np.linalg.svd(triangle_of(rows))
+    unseen = Vt[s <= max(WEAK, STRUCTURAL * s[0])]
+    out = np.zeros(len(parameters))
+    out[free] = FAR * scale * np.linalg.norm(unseen, axis=0)
+    return out
+
+
+def pull_along(
+    problem: LeastSquares, theta: Floats, parameters: tuple[Parameter, ...], seen: Identifiability
+) -> Floats:
+    """(param,) the same, the largest at `theta` and on the way along what is `seen` as unseen there."""
+    points = (theta, *points_along(seen, theta, parameters))
+    return np.max([pull_of_unseen(problem.jacobian(point), parameters) for point in points], axis=0)

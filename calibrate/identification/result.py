@@ -1,5 +1,9 @@
-"""An identified arm with everything that must travel with it."""
+"""An identified arm with everything that must travel with it.
 
+Whether a session holds any length at all: without one the size of the arm is not measured, whatever the fit says.
+"""
+
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import sqrt
 
@@ -11,10 +15,10 @@ from calibrate.fit import LossKind, Method, Status, Stop
 from calibrate.identifiability import Identifiability
 from calibrate.identification.estimates import Estimate, JointZero, joint_zeros
 from calibrate.identification.point_constraint import PointConstraints
-from calibrate.identification.scale import scale_alarms
 from calibrate.observability import Observability
 from calibrate.parameters import Parameter
-from calibrate.sensors.catalogue import kind_of
+from calibrate.sensors.catalogue import kind_of, names_with
+from calibrate.sensors.kind import Trait
 from calibrate.uncertainty.bootstrap import Bootstrap
 from calibrate.uncertainty.chi_square import Alarm, RepeatNoise, StatedNoise
 from calibrate.uncertainty.free_space import FreeSpaceError, Scatter
@@ -22,6 +26,8 @@ from calibrate.uncertainty.free_space import FreeSpaceError, Scatter
 Floats = NDArray[np.float64]
 
 POSE, POSITION = 6, 3  # values of a reading: x, y, z (m), then a turn (rad), which does not add to a length
+
+SCALELESS = set(names_with(Trait.SCALELESS))  # cones: an arm half as large would sit in cones half as far apart
 
 
 @dataclass(frozen=True)
@@ -163,3 +169,16 @@ def alarms_of(stated: StatedNoise, repeats: RepeatNoise | None) -> tuple[str, ..
     if repeats is not None and repeats.alarm is Alarm.LACK_OF_FIT:
         out.append(f"{repeats.alarm.value} (F = {repeats.ratio:.3g} over {repeats.groups} repeated poses)")
     return tuple(out)
+
+
+def scale_alarms(instruments: Iterable[str]) -> tuple[str, ...]:
+    """A sentence for a session of cones alone; none where any instrument measures a length.
+
+    A factor on all lengths of arm and seats leaves tip less seat at zero: a point-only fit cannot fix scale.
+    """
+    if set(instruments) != SCALELESS:
+        return ()
+    return (
+        "cones alone show no length: the size of the arm is that of the drawing, and every length that it measures is "
+        "as uncertain as that; measure a bar of known length ([[bar]], columns bar and bar_end) as well",
+    )

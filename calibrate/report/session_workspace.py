@@ -1,10 +1,18 @@
-"""What the pictures of the workspace need, from the evidence of a session of any instruments."""
+"""What the pictures of the workspace need, from the evidence of a session of any instruments.
+
+What each observation is missed by when the fit is made without it, without fitting again.
+With whitened residual r and derivative J of one observation and the posterior covariance C of the parameters,
+r / (1 - J C J') is its error in the fit of all others: exact for a linear model, to first order for this one.
+Source: Cook, Weisberg, Residuals and Influence in Regression, 1982, ch. 2.2 and, for several rows at once, ch. 3.6.
+"""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibrate.arms.rig_arm import limits_of
+from calibrate.joint_problem import JointProblem
 from calibrate.parameters import without_assumed
-from calibrate.report.deleted import deleted_misfit
+from calibrate.problem import Problem
 from calibrate.report.session_evidence import SessionEvidence
 from calibrate.report.workspace.known_arm import KnownArm, scatter_of, unpredicted, whole_covariance
 from calibrate.report.workspace.pictures import Measured
@@ -18,6 +26,10 @@ NOT_IN_SPACE = (
     "No measured errors are drawn: no instrument of this session says where the target is; errors of the readings are "
     "in the next chapter."
 )
+
+Floats = NDArray[np.float64]
+
+ALONE = 1e-6  # of 1 - J C J': below, the observation alone determines something, and nothing else predicts it
 
 
 def session_arm(evidence: SessionEvidence) -> KnownArm | str:
@@ -56,3 +68,23 @@ def session_measured(evidence: SessionEvidence, known: KnownArm) -> Measured | N
         points = target_at(known, known.theta, evidence.recording.samples.joints()[readings.rows[:, 0]])
         return Measured(points[told], readings.error_before[told], found[told])
     return None
+
+
+def deleted_misfit(problem: JointProblem, index: int, theta: Floats, covariance: Floats) -> Floats | None:
+    """(obs, k) misfit of block `index`, in the sensor's unit, each observation left out in turn; NaN where ALONE.
+
+    None for a block whose rows are not readings of their own. `covariance` (param, param) is under the weights of
+    `problem`.
+    """
+    block = problem.blocks[index]
+    if not isinstance(block, Problem) or block.correlation is not None or block.condition:
+        return None
+    shape = block.observed.shape
+    J = problem.jacobian_of(index, theta).reshape(*shape, len(theta))
+    rest = np.eye(shape[1]) - np.einsum("nip,pq,njq->nij", J, covariance, J, optimize=True)
+    told = np.linalg.eigvalsh(rest)[:, 0] > ALONE
+    out = np.full(shape, np.nan)
+    residual = problem.residual_of(index, theta).reshape(shape)[told]
+    whitened = np.linalg.solve(rest[told], residual[..., None])
+    out[told] = np.linalg.solve(block.whitener[told], whitened)[..., 0]
+    return out

@@ -3,17 +3,22 @@
 Each round solves a weighted least-squares problem that touches the loss from above, so the cost never rises (Lange,
 Hunter, Yang, J. Comput. Graph. Statist. 9(1), 2000). Covariance: Huber, Robust Statistics, 1981, eq. (7.6.3) with his
 correction K, for rows whose scale is stated; prior rows stay squares, with their own variance of one. All values of an
-observation share one weight, by its length (grouping.py).
+observation share one weight, by its length.
+
+Which residual values are of one observation: a bad shot is bad in all its coordinates, so it is weighted as one.
+What counts for a loss is then the Mahalanobis norm of an observation's whitened values. Sources: Maronna, Ann. Statist.
+4(1), 1976 (weights of the norm); Lange, Little, Taylor, JASA 84, 1989 (the multivariate t).
 """
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.problem import LeastSquares
-from calibrate.solvers.grouping import Groups
 from calibrate.solvers.levenberg import least_gain
 from calibrate.solvers.linear import covariance_of, promised_gain
 from calibrate.solvers.loss import Loss
@@ -24,6 +29,7 @@ Floats = NDArray[np.float64]
 Run = Callable[[Rows, Floats], Ended]
 
 MAX_ROUNDS = 200  # of weights; each shrinks the way to go by the share of distrusted rows, usually 2 to 10 times
+Widths = NDArray[np.intp]
 
 
 def reweighted(rows: Rows, theta: Floats, loss: Loss, run: Run, tolerance: float) -> Ended:
@@ -91,3 +97,41 @@ def robust_covariance(rows: Rows, theta: Floats, loss: Loss) -> Floats | None:
     if inverse is None:
         return None
     return inverse @ (spread * data.T @ data + beliefs.T @ beliefs) @ inverse
+
+
+@runtime_checkable
+class Grouped(Protocol):
+    """A problem that says how many residual values each of its observations has."""
+
+    @property
+    def row_widths(self) -> Widths:
+        """(observation,) values of each, in the order of the residual."""
+        ...
+
+
+@dataclass(frozen=True)
+class Groups:
+    """Observations of `widths` (observation,) values, one after the other."""
+
+    widths: Widths
+
+    @classmethod
+    def of(cls, problem: LeastSquares, rows: int) -> "Groups":
+        """As the problem says, else each of its `rows` values for itself."""
+        return cls(problem.row_widths if isinstance(problem, Grouped) else np.ones(rows, dtype=np.intp))
+
+    @cached_property
+    def _first(self) -> Widths:
+        return np.concatenate([[0], np.cumsum(self.widths)[:-1]]).astype(np.intp)
+
+    def norms(self, residual: Floats) -> Floats:
+        """(observation,) length of each observation's whitened residual (row,)."""
+        filled = self.widths > 0
+        out = np.zeros(len(self.widths))
+        if filled.any():
+            out[filled] = np.sqrt(np.add.reduceat(residual**2, self._first[filled]))
+        return out
+
+    def spread(self, values: Floats) -> Floats:
+        """(row,) from values (observation,)."""
+        return np.repeat(values, self.widths)

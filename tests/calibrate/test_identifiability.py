@@ -9,13 +9,12 @@ from acquisition.recording.rig import load_rig
 from calibrate.arms.catalogue import arm_of
 from calibrate.dual_psd_rig import laser_of
 from calibrate.fit import Status, solve
-from calibrate.identifiability import analyse, in_words
+from calibrate.identifiability import analyse, in_words, plainly
 from calibrate.identification.point_constraint import BOUND_RAD, Form, PointConstraint
 from calibrate.observability import observability
 from calibrate.parameters import Parameter
 from calibrate.redundant import Redundant, reduced
 from calibrate.unseen_along import analyse_along
-from calibrate.words import plainly
 
 
 def names(*which, prior=np.inf):

@@ -8,9 +8,8 @@ import pytest
 
 from acquisition.bench import Look, Spot
 from acquisition.servo.centring import Limits, centre
-from acquisition.servo.law import FixedGuess
 from acquisition.servo.measured import MeasuredStrategy
-from acquisition.servo.registered import Registered
+from acquisition.servo.registered import FixedGuess, Registered
 from acquisition.servo.status import CentringStatus
 from acquisition.servo.strategy import Proposal
 from benchmarks.centring import random_start

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from calibrate.diagnose.advice import COOLED, POSES, WITNESS, to_measure
+from calibrate.diagnose.diagnose import COOLED, POSES, WITNESS, to_measure
 from calibrate.diagnose.diagnosis import Finding, Named, RivalName
 
 GROWTH = Named("link2.length", ("temp_link2",), "linear", None, "link-thermal-growth")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calibrate.diagnose.bench import Bench
-from calibrate.diagnose.best_names import with_best_names
+from calibrate.diagnose.doubt import with_best_names
 from calibrate.diagnose.line_search import refined
 from calibrate.diagnose.searching import Search
 from calibrate.effects.term import Shape

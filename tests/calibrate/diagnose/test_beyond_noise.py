@@ -3,8 +3,8 @@
 import msgspec
 import pytest
 
-from calibrate.diagnose.beyond_noise import BELIEVED, beyond_noise
 from calibrate.diagnose.fitted import fit_geometry
+from calibrate.diagnose.from_recording import BELIEVED, beyond_noise
 from calibrate.diagnose.session import session_of
 from calibrate.effects.term import Missing
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from calibrate.diagnose.bench import Bench
-from calibrate.diagnose.cross_validation import predicts
 from calibrate.diagnose.diagnose import diagnose
 from calibrate.diagnose.diagnosis import Verdict
+from calibrate.diagnose.doubt import predicts
 from calibrate.diagnose.isolability import isolability
 from calibrate.diagnose.lack_of_fit import lack_of_fit
 from calibrate.diagnose.line_search import refined

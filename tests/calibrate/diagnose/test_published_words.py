@@ -7,7 +7,7 @@ import pytest
 
 from calibrate.diagnose.causes import causes_of
 from calibrate.diagnose.findings import named
-from calibrate.diagnose.picture_driver import picture_driver
+from calibrate.diagnose.pulled_back import picture_driver
 from calibrate.diagnose.streams.continuity import Fault
 from calibrate.diagnose.streams.to_file import EXPLAINS, USUAL
 from calibrate.effects.catalogue import EFFECTS, missing_of, terms_of

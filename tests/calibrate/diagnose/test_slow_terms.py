@@ -7,10 +7,9 @@ import pytest
 
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.line_search import refined
-from calibrate.diagnose.returning import fading
-from calibrate.diagnose.search import search
+from calibrate.diagnose.pruning import fading
+from calibrate.diagnose.search import search, unswallowed
 from calibrate.diagnose.searching import Search
-from calibrate.diagnose.swallowed import unswallowed
 
 
 def slip(session, joint):

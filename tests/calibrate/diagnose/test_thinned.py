@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from calibrate.diagnose.thinned import MOST, thinned
+from calibrate.diagnose.doubt import MOST, thinned
 
 from .conftest import World
 

@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 
 from calibrate.diagnose.bench import Bench
-from calibrate.diagnose.cross_validation import predicts
 from calibrate.diagnose.curve import curve
-from calibrate.diagnose.doubt import doubted
-from calibrate.diagnose.findings import findings_of
+from calibrate.diagnose.doubt import doubted, predicts
+from calibrate.diagnose.findings import findings_of, pieces
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.open_families import anything, fitted_curve, open_families
 from calibrate.diagnose.port_process import places_of, processes
 from calibrate.diagnose.score import removed
 from calibrate.diagnose.search import search
-from calibrate.diagnose.several_names import pieces
 from calibrate.diagnose.unknown import cancel, with_unknowns
 
 SIZE_RAD = 1.5
@@ -121,7 +119,7 @@ def test_terms_taken_out_come_back_into_what_a_curve_may_explain(world):
 
 def test_unseen_errors_are_those_of_leaving_rows_out(world):
     """Against a refit without the fold."""
-    from calibrate.diagnose.cross_validation import NU, _loss
+    from calibrate.diagnose.doubt import NU, _loss
 
     rng = np.random.default_rng(5)
     X, y = rng.normal(size=(60, 5)), rng.normal(size=60)

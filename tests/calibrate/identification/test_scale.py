@@ -2,7 +2,7 @@
 
 import pytest
 
-from calibrate.identification.scale import scale_alarms
+from calibrate.identification.result import scale_alarms
 
 
 def test_cones_alone_are_told_to_show_no_length() -> None:

@@ -10,7 +10,7 @@ from calibrate.arms.catalogue import arm_of
 from calibrate.diagnose.ported import perturbed_frames
 from calibrate.effects.ports import Perturbation
 from calibrate.parameters import start_values
-from calibrate.physics.flanges import Flanges
+from calibrate.physics.predicting import Flanges
 
 RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
 ROWS = 20
