@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import simulators.serve
+import simulators.world_of_rig
 from acquisition.recording.rig import plain_rig, rig_text
 from simulators.world.model import STEP_S
 from simulators.world.optics import Ray
@@ -115,7 +116,8 @@ def _about_z(beam: Ray, angle_rad: float) -> Ray:
 def main(rig: Path, trouble: str, seed: int, time_scale: float) -> None:
     """Serves until standard input closes."""
     DisturbedWorld.trouble = Trouble(**json.loads(trouble))
-    simulators.serve.World = DisturbedWorld  # the one line in which a server makes its world
+    assert hasattr(simulators.world_of_rig, "World")  # the one place in which a server's world is made
+    simulators.world_of_rig.World = DisturbedWorld
     options = simulators.serve.ServeOptions(
         robot_host="auto", seed=seed, time_scale=time_scale, links=False, end_with_stdin=True
     )

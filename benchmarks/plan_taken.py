@@ -27,7 +27,7 @@ from calibrate.diagnose.line_search import refined
 from calibrate.diagnose.session import session_of
 from simulators.conceal.case import conceal
 from simulators.conceal.wanted import Wanted
-from simulators.defects.defect import Defect
+from simulators.defects import Defect
 from simulators.world.world import World
 from tests.support.direct_bench import DirectBench
 

@@ -99,6 +99,9 @@ class StreamDevice(ABC, Generic[LineT]):
         except BaseException:
             self.close()
             raise
+        if self._line is not line:  # another thread closed it meanwhile; what was opened since must not stay open
+            self._release(line)
+            raise DeviceLost(f"{self.place}: closed while it was being connected; call connect() again")
 
     def close(self) -> None:
         """Release the line; safe in every state and more than once."""

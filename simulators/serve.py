@@ -15,7 +15,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from simulators.defects.mechanisms import defects_of
+from simulators.defects import defects_of
 from simulators.devices import (
     EmulatedDevices,
     addresses,

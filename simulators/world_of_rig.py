@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from simulators.defects.defect import Defect
+from simulators.defects import Defect
 from simulators.hand.rig import is_hand_held, read_hand_rig
 from simulators.hand.truth import write_hand_truth
 from simulators.hand.world import HandWorld

@@ -16,7 +16,7 @@ from acquisition.motion.plan import Plan
 from acquisition.motion.setpoints import BeltNow
 from acquisition.motion.task.graph import TaskGraph
 from acquisition.motion.task.program import Step, unrolled
-from acquisition.motion.task.sweeps import GRASP, next_sweep
+from acquisition.motion.task.sweeps import next_sweep
 from acquisition.motion.task.task_file import Task, Teach
 
 Floats = NDArray[np.float64]
@@ -60,11 +60,6 @@ class Ran:
 
     graph: TaskGraph
     sweeps: list[tuple[Plan, Followed]] = field(default_factory=list[tuple[Plan, Followed]])
-
-
-def hand_actions(hand: Hand) -> Callable[[str], None]:
-    """The actions of a program, done by a hand."""
-    return lambda action: hand.grasp() if action == GRASP else hand.release()
 
 
 def teach(graph: TaskGraph, steps: Sequence[Teach], solver: Solver, placed: Callable[[str], Floats]) -> TaskGraph:

@@ -107,7 +107,7 @@ def watching(address: EncoderAddress, writer: RecordingWriter, clock: Clock) -> 
 
 
 class GuidedJournal:
-    """Implements acquisition.guided.session.Journal."""
+    """Implements acquisition.guided.session.GuidedJournal."""
 
     def __init__(self, writer: RecordingWriter, clock: Clock) -> None:
         self._writer, self._clock = writer, clock

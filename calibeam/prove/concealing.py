@@ -37,7 +37,7 @@ from simulators.conceal.reveal import truth_document
 from simulators.conceal.toml_text import toml_text
 from simulators.conceal.wanted import ConcealError, Wanted
 from simulators.conceal.write import columns, csv_text
-from simulators.defects.mechanisms import written
+from simulators.defects import written
 from simulators.process import Emulators
 from simulators.streams.devices import HOST_S
 from simulators.streams.faults import FAULTS, Fault

@@ -13,7 +13,6 @@ from acquisition.recording import Recording, read
 from calibeam.outcome import PartialResult, interruption
 from calibeam.printing.identification import print_identification
 from calibeam.printing.results import print_diagnosis
-from calibeam.results.diagnosis import diagnose_to_file
 from calibeam.results.identification import identify_session, session_model, write_session_model
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.errors import DataError
@@ -100,6 +99,8 @@ def write_session_diagnosis(recording: Recording, folder: Path, console: Console
 
     None, with the reason printed, where there is too little to diagnose: model.json then stays as identified.
     """
+    from calibeam.results.diagnosis import diagnose_to_file  # a report alone starts without it
+
     path = folder / "diagnosis.json"
     try:
         found, file = diagnose_to_file(recording, path)

@@ -230,7 +230,7 @@ class OnSite:
         )
         try:
             forecast = session.forecast_now()
-        except Exception as why:  # as in forecaster.py: what was measured is worth more than a forecast of it
+        except Exception as why:  # as in forecast.py: what was measured is worth more than a forecast of it
             self.reporter.report(f"no forecast: {type(why).__name__}: {why}")
             return
         self.reporter.forecast(forecast)

@@ -24,7 +24,7 @@ PROFILE = 0x0196  # low word of 1000h: 406, encoders
 PDO_INVALID = 1 << 31
 SAVE = int.from_bytes(b"save", "little")  # 1010h:01
 EVERY_SYNC = 1  # transmission type
-EMERGENCY_ID, TPDO2_ID, HEARTBEAT_ID, SYNC_ID = 0x080, 0x280, 0x700, 0x080
+EMERGENCY_ID, HEARTBEAT_ID, SYNC_ID = 0x080, 0x700, 0x080
 
 
 class Operating(IntFlag):

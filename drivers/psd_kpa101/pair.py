@@ -1,4 +1,4 @@
-"""Two KPA101 units as one detector instrument: asked together, at fixed deadlines, told in the currents of both faces.
+"""Two KPA101 units as one detector instrument: asked together, at fixed deadlines, read as the currents of both faces.
 
 A unit has no clock: `device_s` is the middle between question and last answer by the host's clock. The two faces are
 read `round_trip_s` apart at most. One thread uses it at a time, except `close`. It starts no thread of its own.
@@ -107,7 +107,7 @@ class Kpa101Pair(StreamDevice[tuple[Kpa101Unit, ...]]):
     round_trip_s (2,).
 
     Counts are as sent: x, y of unit 1, then of unit 2; each unit's sum, which has a scale of its own. `photocurrent_a`
-    are corner currents with the same differences and sum, four for each face (see `wiring`), so that all that reads a
+    are corner currents with the same differences and sum, four for each face (see `Wiring`), so that all that reads a
     DAQ box reads a pair of units.
     """
 

@@ -143,13 +143,13 @@ class UrReader(StreamDevice[socket.socket]):
 
     def _set_up(self, line: socket.socket) -> None:
         """Start the stream. DeviceStale: no answer. DeviceRefused or WireError: not an RTDE server of version 2."""
-        self._codec, self._unread, self._first_s, self._last_s = RtdeCodec(), [], None, -math.inf
         self._negotiate()
 
     def _release(self, line: socket.socket) -> None:
         line.close()
 
     def _open(self) -> socket.socket:
+        self._codec, self._unread, self._first_s, self._last_s = RtdeCodec(), [], None, -math.inf
         try:
             line = socket.create_connection((self._host, self._port), CONNECT_TIMEOUT_S)
         except OSError as error:

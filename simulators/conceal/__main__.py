@@ -11,7 +11,7 @@ from pathlib import Path
 from simulators.conceal.case import conceal
 from simulators.conceal.wanted import FAMILIES, KINDS, ConcealError, Wanted
 from simulators.conceal.write import write_case
-from simulators.defects.mechanisms import MECHANISMS
+from simulators.defects import MECHANISMS
 
 
 def _parser() -> argparse.ArgumentParser:

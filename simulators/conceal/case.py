@@ -17,7 +17,7 @@ from simulators.conceal.scale import measure_distances, scale_of
 from simulators.conceal.seated import shaken_rad
 from simulators.conceal.second_encoders import at_the_flange, machine_like, over_noise, second_readings_rad
 from simulators.conceal.wanted import Wanted, draw_noise
-from simulators.defects.defect import Defect
+from simulators.defects import Defect
 
 Floats = NDArray[np.float64]
 

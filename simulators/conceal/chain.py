@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from simulators.arm.kinematics import Arm, Frames, forward
 from simulators.arm.statics import Load, weigh
 from simulators.conceal.rig import TrueRig
+from simulators.defects import Scene
 from simulators.defects.defect import Defect, MovesBase, MovesLink, MovesTool, ReadsAngle, TurnsJoint
-from simulators.defects.scene import Scene
 
 Floats = NDArray[np.float64]
 READING_STEPS = 12  # an error of slope 1e-2 shrinks to 1e-24

@@ -12,9 +12,7 @@ from simulators.conceal.rig import Artefacts, DualPsd
 from simulators.conceal.rigs import DrawnRig
 from simulators.conceal.scale import INVISIBLE, Scale
 from simulators.conceal.wanted import INSTRUMENT, ConcealError, Wanted
-from simulators.defects.defect import Defect
-from simulators.defects.mechanisms import MECHANISMS
-from simulators.defects.scene import Site, UnsuitedError
+from simulators.defects import MECHANISMS, Defect, Site, UnsuitedError
 
 CARRIES = 0.02  # of the largest torque's spread: a joint below it feels no weight
 

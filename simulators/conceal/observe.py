@@ -10,8 +10,7 @@ from simulators.conceal.chain import stand
 from simulators.conceal.readings import length_m, position_m, spots
 from simulators.conceal.rig import Device, DualPsd, TrueRig
 from simulators.conceal.seated import seated_readings, seated_tip_m
-from simulators.defects.defect import Defect
-from simulators.defects.scene import Scene
+from simulators.defects import Defect, Scene
 
 Floats = NDArray[np.float64]
 

@@ -21,9 +21,7 @@ from simulators.conceal.rig import TrueRig
 from simulators.conceal.rigs import DrawnRig
 from simulators.conceal.scale import INVISIBLE, measure_distances, scale_of
 from simulators.conceal.wanted import ConcealError, Wanted
-from simulators.defects.defect import Defect
-from simulators.defects.mechanisms import MECHANISMS
-from simulators.defects.scene import Scene, Site
+from simulators.defects import MECHANISMS, Defect, Scene, Site
 from simulators.world.exposure import temperatures
 from simulators.world.rig import WorldRig, read_rig
 from simulators.world.truth import draw_truth

@@ -16,8 +16,7 @@ from simulators.conceal.poses import free_poses, shots
 from simulators.conceal.rig import Artefacts, DualPsd, TrueRig
 from simulators.conceal.seated import seated_plan
 from simulators.conceal.wanted import ConcealError, Wanted
-from simulators.defects.defect import Defect
-from simulators.defects.scene import Scene
+from simulators.defects import Defect, Scene
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from simulators.arm.rigid import inverse, shifted
 from simulators.conceal.chain import Stance
 from simulators.conceal.rig import Device, DualPsd, TrueRig
+from simulators.defects import Light, Scene
 from simulators.defects.defect import (
     ChangesSums,
     Defect,
@@ -25,7 +26,6 @@ from simulators.defects.defect import (
     MovesDevice,
     MovesFixture,
 )
-from simulators.defects.scene import Light, Scene
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]

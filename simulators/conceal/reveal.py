@@ -14,7 +14,7 @@ from simulators.conceal.poses import free_poses
 from simulators.conceal.readings import tip_m
 from simulators.conceal.rig import ENCODER_RAD, Device, DualPsd, TrueRig
 from simulators.conceal.second_encoders import at_the_flange
-from simulators.defects.scene import Scene
+from simulators.defects import Scene
 
 Floats = NDArray[np.float64]
 FREE_POSES = 200

@@ -15,7 +15,7 @@ from simulators.conceal.case import Case
 from simulators.conceal.reveal import truth_document
 from simulators.conceal.rig import Artefacts
 from simulators.conceal.toml_text import toml_text
-from simulators.defects.scene import Scene
+from simulators.defects import Scene
 
 Floats = NDArray[np.float64]
 Column = Sequence[float | int | str | None]

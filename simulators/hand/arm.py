@@ -97,7 +97,7 @@ class TrueArm:
         return len(self.lower_rad)
 
     def off_centre_rad(self, shaft_rad: Floats) -> Floats:
-        """(row, n) what discs off their shafts add: exact, two points on a plane (defects/encoder_disc.py)."""
+        """(row, n) what discs off their shafts add: exact, two points on a plane (defects/encoder.py)."""
         turn_rad = shaft_rad - self._bearing_rad
         aside_m = self._eccentric_m * np.sin(turn_rad)
         return -np.arctan2(aside_m, RADIUS_M + self._eccentric_m * np.cos(turn_rad))

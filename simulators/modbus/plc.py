@@ -6,7 +6,6 @@ Written from docs/protocols/modbus.md; what a site's own program does beyond it 
 import math
 from collections.abc import Sequence
 from enum import IntEnum
-from typing import Protocol
 
 from simulators.modbus.register_map import RegisterMap
 from simulators.ur.motion import ArmController, MoveRefused
@@ -44,13 +43,6 @@ class Reason(IntEnum):
     PROTECTIVE_STOP = 4
     EMERGENCY_STOP = 5
     NOT_READY = 6
-
-
-class Clocked(Protocol):
-    """What is needed of a world."""
-
-    @property
-    def time_s(self) -> float: ...
 
 
 class MotionProgram:

@@ -12,7 +12,7 @@ from simulators.conceal.case import Case
 from simulators.conceal.observe import observe
 from simulators.conceal.reveal import at_start
 from simulators.conceal.rig import DualPsd, TrueRig
-from simulators.defects.scene import Scene
+from simulators.defects import Scene
 from simulators.streams.course import STAND_S, Course, course
 from simulators.streams.devices import (
     JOINT_NOISE_RAD,

@@ -16,7 +16,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.defects.scene import Scene
+from simulators.defects import Scene
 
 Floats = NDArray[np.float64]
 AMBIENT_DEGC = 22.0

@@ -19,6 +19,7 @@ from simulators.arm.kinematics import Arm, Frames
 from simulators.arm.rigid import inverse, moved
 from simulators.arm.statics import Load, weigh
 from simulators.conceal.readings import FULL_SUM_V
+from simulators.defects import Light, Scene
 from simulators.defects.defect import (
     ChangesSums,
     Defect,
@@ -30,7 +31,6 @@ from simulators.defects.defect import (
     ReadsAngle,
     TurnsJoint,
 )
-from simulators.defects.scene import Light, Scene
 from simulators.world.optics import Face, Ray, Spot, Spots, meet, reflect
 from simulators.world.rig import Pose
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simulators.defects.defect import Defect
+from simulators.defects import Defect
 from simulators.world.body import ArmBody
 from simulators.world.errors import WorldError
 from simulators.world.exposure import joint_temperature_degC, psd_temperature_degC

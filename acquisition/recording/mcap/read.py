@@ -161,7 +161,7 @@ class Content:
 def read(path: Path | str) -> Recording:
     """A recording or a session folder. Of a torn or damaged file every complete batch, with `complete` False.
 
-    A folder with recording.mcap and no rig.toml is all parts of that session together (parts.py).
+    A folder with recording.mcap and no rig.toml is all parts of that session together (session_parts.py).
 
     RecordingError when it is neither, or torn before the rig; RigFileError and SamplesError for what a folder holds.
     """

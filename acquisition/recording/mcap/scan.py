@@ -4,10 +4,9 @@ Reads from the front, because the index at the end is missing when a session was
 https://mcap.dev/spec. A batch whose checksum is wrong is left out and told; the batches after it are still
 read, also where the length of a record is damaged and the next batch must be searched for, or the disk gives no bytes.
 
-Where in damaged bytes the next batch may begin.
-
-A chunk record is 06, its length, start, end, uncompressed size (8 bytes each), CRC (4), and the name of its compression
-with a length before it: https://mcap.dev/spec, "Chunk". Whatever is found is proved or refused by its checksum.
+The search for the next batch in damaged bytes: a chunk record is 06, its length, start, end, uncompressed size (8 bytes
+each), CRC (4), and the name of its compression with a length before it: https://mcap.dev/spec, "Chunk". Whatever is
+found is proved or refused by its checksum.
 """
 
 import struct

@@ -11,7 +11,7 @@ from calibeam.prove.record import CaseScore, DefectScore, NamedCause
 from calibrate.effects.catalogue import EFFECTS
 from calibrate.errors import DataError
 from simulators.conceal.wanted import INSTRUMENT
-from simulators.defects.mechanisms import MECHANISMS
+from simulators.defects import MECHANISMS
 
 Case = Callable[..., CaseScore]
 Found = Callable[..., DefectScore]

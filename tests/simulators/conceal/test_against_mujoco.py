@@ -7,9 +7,9 @@ import pytest
 
 from simulators.arm.kinematics import Arm, forward
 from simulators.conceal.chain import balanced
+from simulators.defects import Scene
 from simulators.defects.base import SoftPedestal
 from simulators.defects.drive import SoftJoint
-from simulators.defects.scene import Scene
 from tests.simulators.conceal import mujoco_arm
 
 SceneOf = Callable[..., Scene]

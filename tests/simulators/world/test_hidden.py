@@ -11,9 +11,7 @@ from simulators.conceal.from_world import rig_of_world
 from simulators.conceal.observe import observe
 from simulators.conceal.poses import shots
 from simulators.conceal.rig import TrueRig
-from simulators.defects.defect import Defect
-from simulators.defects.mechanisms import MECHANISMS, WrittenError, defects_of, written
-from simulators.defects.scene import Scene, Site
+from simulators.defects import MECHANISMS, Defect, Scene, Site, WrittenError, defects_of, written
 from simulators.world.exposure import temperatures
 from simulators.world.rig import read_rig
 from simulators.world.truth import draw_truth
