@@ -5,8 +5,7 @@ In a notebook: `calibeam.open("recording.mcap")`, see docs/python.md.
 
 import os
 from pathlib import Path
-
-from acquisition.recording import TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from calibeam.notebook import Session

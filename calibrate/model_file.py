@@ -5,13 +5,12 @@ Angles are rad, lengths m. A joint's true angle is its reading plus `joint<i>.ze
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording import TYPE_CHECKING
 from acquisition.recording.files import JsonKind, read_json, shown
 from acquisition.recording.files.bounds import (
     Correction,

@@ -135,8 +135,9 @@ def shares_found(
     whiteners: Sequence[Floats],
     active: Sequence[Ints],
     witness: int,
-) -> Floats:
-    """(channel,) least squares of whitened misfits (row, k) on what the witness' own let expect, within 0 and 1.
+) -> tuple[Floats, Floats]:
+    """Shares (channel,) and their sigmas: least squares of whitened misfits (row, k) on what the witness' own let
+    expect, within 0 and 1. A share that nothing shows is 0 with sigma 0.
 
     `whiteners` (active row, k, k) of each instrument's `active` rows.
     """
@@ -149,9 +150,10 @@ def shares_found(
             values.append(np.einsum("nij,nj->ni", W, misfit[rows]).ravel())
     X, y = np.concatenate(columns), np.concatenate(values)
     told = np.any(X != 0.0, axis=0)
-    out = np.zeros(len(told))
+    out, sigma = np.zeros(len(told)), np.zeros(len(told))
     if told.any():
         from scipy.optimize import lsq_linear  # only where there are second encoders: identify starts sooner
 
         out[told] = lsq_linear(X[:, told], y, (0.0, 1.0), method="bvls").x
-    return out
+        sigma[told] = np.sqrt(np.diag(np.linalg.pinv(X[:, told].T @ X[:, told])))
+    return out, sigma

@@ -85,6 +85,7 @@ class Weighting:
     known: tuple[Block, ...] = ()
     chosen: tuple[Parameter, ...] | None = None  # `parameters` held or believed otherwise, in the same order
     shares: Floats | None = None  # (channel,) of what second encoders read that is the links' own; None: not yet known
+    share_sigmas: Floats | None = None  # (channel,)
 
     @cached_property
     def sources(self) -> tuple[str, ...]:
@@ -117,6 +118,8 @@ class Weighting:
         if shared is None:
             return JointProblem((*blocks, *self.known), self.chosen)
         seen = blocks[shared.witness]
+        if seen.rows == 0:
+            return JointProblem((*blocks, *self.known), self.chosen)
         form = np.linalg.inv(np.einsum("nji,njk->ik", seen.whitener, seen.whitener) / seen.rows)
         blocks = [_wider(block, shared.unseen(i, form)) for i, block in enumerate(blocks)]
         return JointProblem((*blocks, *self.known), self.chosen, Witnessed(shared, seen))
@@ -130,16 +133,19 @@ class Weighting:
         misfits = [m.problem.misfit(self.unweighted.of_block(i, theta)) for i, m in enumerate(self.measured)]
         whiteners = [block.whitener for block in problem.blocks if isinstance(block, Problem)]
         every = [np.arange(m.problem.rows) for m in self.measured]
-        return replace(self, shares=shares_found(misfits, levers, whiteners[: len(every)], every, witness))
+        shares, sigmas = shares_found(misfits, levers, whiteners[: len(every)], every, witness)
+        return replace(self, shares=shares, share_sigmas=sigmas)
 
     def shared_rad(self, factors: VarianceFactors) -> tuple[float, float]:
         """Joint repeatability that second encoders have taken out of the others' rows, rms of all joints, one sigma."""
         witness = witness_of([m.problem.chain for m in self.measured])
-        if self.shares is None or witness is None:
+        if self.shares is None or self.share_sigmas is None or witness is None or not np.any(self.shares):
             return 0.0, 0.0
         (source, sigma), *_ = self.measured[witness].own_sigma.items()
-        at, size = self.sources.index(source), float(np.sqrt(np.mean(self.shares**2)) * np.median(sigma))
-        return size * float(factors.factor[at]), size * float(factors.factor_sigma[at])
+        at, share = self.sources.index(source), float(np.sqrt(np.mean(self.shares**2)))
+        by_share = float(np.linalg.norm(self.shares * self.share_sigmas)) / (len(self.shares) * share)
+        size, spread = float(np.median(sigma) * factors.factor[at]), float(np.median(sigma) * factors.factor_sigma[at])
+        return share * size, float(np.hypot(share * spread, by_share * size))
 
     def _levers(self, theta: Floats) -> tuple[Lever | None, ...]:
         by_joint = [

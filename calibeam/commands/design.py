@@ -2,14 +2,13 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import msgspec
 import numpy as np
 from cyclopts import Parameter, validators
 from rich.console import Console
 
-from acquisition.recording import TYPE_CHECKING
 from acquisition.recording.pose_plan import write_pose_plan
 from acquisition.recording.rig import Rig, load_rig
 from calibeam.printing.progress import progress_bar

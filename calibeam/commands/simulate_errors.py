@@ -1,13 +1,12 @@
 """`calibeam simulate-errors`: what errors of an arm make of its probe: budget, ranking, worst postures."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import msgspec
 from cyclopts import Parameter, validators
 from rich.console import Console
 
-from acquisition.recording import TYPE_CHECKING
 from acquisition.recording.rig import Rig, load_rig
 from calibeam.geometry_only import read_geometry
 from calibeam.printing.progress import progress_bar

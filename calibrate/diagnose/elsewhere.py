@@ -138,7 +138,7 @@ class Elsewhere:
 def elsewhere(state: Fitted, poses: NewPoses) -> Elsewhere:
     """A fitted session, and what it says of new poses. Bars, which a hand lays out, read nothing there."""
     n = len(state.session.samples)
-    samples = _behind(state.session.samples, poses)
+    samples = _behind(state, poses)
     measured = tuple(_longer(m, n, poses, state, i) for i, m in enumerate(state.session.measured))
     session = replace(state.session, samples=samples, weighting=replace(state.session.weighting, measured=measured))
     rows = tuple(
@@ -157,7 +157,9 @@ def elsewhere(state: Fitted, poses: NewPoses) -> Elsewhere:
     return replace(found, drivers=_drivers(session, around, state, poses), around=around)
 
 
-def _behind(samples: Samples, poses: NewPoses) -> Samples:
+def _behind(state: Fitted, poses: NewPoses) -> Samples:
+    """The measured rows, then the new poses, each with the conditions of the pose that it is like and its own moves."""
+    samples = state.session.samples
     order = np.concatenate([np.arange(len(samples)), poses.like])
     columns = {name: values[order].copy() for name, values in samples.columns.items()}
     n, joints = len(samples), samples.n_joints
@@ -166,9 +168,9 @@ def _behind(samples: Samples, poses: NewPoses) -> Samples:
         columns[q][n:] = poses.q_rad[:, i]
         if cmd in columns:
             columns[cmd][n:] += moved[:, i]
-    for i, name in enumerate(per_joint("approach", "", joints)):
-        if name in columns:
-            columns[name][n:] = poses.approach[:, i]
+    moves, sides = _with_moves(state, poses)
+    columns |= dict(zip(per_joint("approach", "", joints), sides.T, strict=True))
+    columns |= dict(zip(per_joint("last_move", "_rad", joints), moves.T, strict=True))
     t_s = samples.column("t_s")
     columns["t_s"][n:] = t_s.max() + np.ptp(t_s) / max(n - 1, 1)
     if "repeat" in columns:
@@ -212,14 +214,26 @@ def _shared(state: Fitted, longer: Augmented, at: Around) -> SharedScatter | Non
 
 
 def _drivers(session: Session, at: Around, state: Fitted, poses: NewPoses) -> Drivers:
-    joint, n = session.weighting.unweighted, len(state.session.samples)
+    joint = session.weighting.unweighted
     expected = {m.name: e for m, e in zip(session.measured, at.expected, strict=True)}
     own = {m.name: joint.of_block(i, state.geometry) for i, m in enumerate(session.measured)}
     out = drivers_of(session, at.frames, expected, own)
-    usual = np.median(np.abs(out.last_move_rad[:n]), axis=0)
-    moves = np.concatenate([out.last_move_rad[:n], poses.approach * usual])
-    before = np.zeros((n, poses.approach.shape[1])) if out.approach is None else out.approach[:n]
+    moves, sides = _with_moves(state, poses)
     # Smoothed over the session's own time: new poses have the temperatures of those that they are like.
     known = state.drivers.temperatures_degC
     warm = {place: np.concatenate([values, values[poses.like]]) for place, values in known.items()}
-    return replace(out, last_move_rad=moves, approach=np.concatenate([before, poses.approach]), temperatures_degC=warm)
+    return replace(
+        out,
+        last_move_rad=moves,
+        approach=sides,
+        approach_derived=state.drivers.approach_derived,
+        temperatures_degC=warm,
+    )
+
+
+def _with_moves(state: Fitted, poses: NewPoses) -> tuple[Floats, Floats]:
+    """Last moves in rad and sides, (row, joint): of the measured rows as known, of new ones by their own approach."""
+    known, moves = state.drivers.approach, state.drivers.last_move_rad
+    before = np.zeros((len(moves), poses.approach.shape[1])) if known is None else known
+    usual = np.median(np.abs(moves), axis=0)
+    return np.concatenate([moves, poses.approach * usual]), np.concatenate([before, poses.approach])

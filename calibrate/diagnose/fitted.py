@@ -238,7 +238,7 @@ def fit_from_model(
     noise = geometry.noise.trusted
     whiteners, rows = whiteners_of(noise.scatters), geometry.problem.rows
     sizes = plain_sizes(session, terms, geometry.drivers, whiteners, rows)
-    problem = Augmented(session, terms, geometry.drivers, rows, whiteners, sizes, len(terms))
+    problem = noise.under(Augmented(session, terms, geometry.drivers, rows, whiteners, sizes, len(terms)))
     free = np.flatnonzero([p.free for p in problem.parameters])
     near = assumed.held_near(problem.jacobian(start), np.setdiff1d(free, assumed.at), unit)
     return _settled(_turn(replace(problem, assumed=near), geometry.active, start, noise))

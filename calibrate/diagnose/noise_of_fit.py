@@ -65,7 +65,7 @@ def noise_of(problem: Augmented, fit: Fit) -> Noise:
     trust = _trust(seen, residuals[witness], problem.rows[witness])
     chains, samples = [m.problem.chain for m in measured], [m.sample_rows for m in measured]
     levers = levers_of(chains, samples, by_joint, trust)
-    share = shares_found(residuals, levers, problem.whiteners, problem.rows, witness)
+    share, _ = shares_found(residuals, levers, problem.whiteners, problem.rows, witness)
     shared = SharedScatter(witness, share, levers)
     out = [seen if i == witness else found(i, alone) for i, alone in enumerate(shared.apart(residuals))]
     more = [shared.unseen(i, middle_of(seen)) for i in range(len(out))]

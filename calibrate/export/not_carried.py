@@ -99,12 +99,16 @@ def _over(
 
 
 def _drawn(recorded: Samples) -> Samples:
-    """Poses between the recorded angles, everything else as at recorded samples."""
+    """Poses between the recorded angles, everything else as at recorded samples: a command as far off its reading."""
     rng, q = np.random.default_rng(SEED), recorded.joints()
     like = rng.integers(len(recorded), size=POSES)
     columns = {name: values[like] for name, values in recorded.columns.items()}
     angles = rng.uniform(q.min(axis=0), q.max(axis=0), (POSES, q.shape[1]))
-    return Samples(columns | {f"q{j + 1}_rad": angle for j, angle in enumerate(angles.T)}, recorded.n_joints)
+    for j, angle in enumerate(angles.T, start=1):
+        if (command := f"cmd{j}_rad") in columns:
+            columns[command] += angle - columns[f"q{j}_rad"]
+        columns[f"q{j}_rad"] = angle
+    return Samples(columns, recorded.n_joints)
 
 
 def _length(moved: Moved) -> str:

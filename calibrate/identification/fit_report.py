@@ -40,6 +40,7 @@ LEAST_DOF = 3.0  # a Satterthwaite number below this is itself a guess
 ONLY_PRIOR = 2.0 / np.sqrt(5.0)  # of a prior sigma: the data alone know it to twice that, see identifiability.WEAK
 
 TOLD = 0.05  # of the plausible size: a member of an unseen combination that can move no further is a number
+SEEN = 2.0  # sigma: joint repeatability that second encoders have taken out, as against none
 FAR = 3.0  # plausible sizes that the truth of an unseen combination may lie from where it was held
 
 
@@ -92,7 +93,8 @@ def fit_places_only(fitted: Fitted) -> Fit:
 
 def _as_stated(fitted: Fitted) -> Fit:
     """The fit under the noise as believed, for its chi-square."""
-    problem = fitted.weighting.problem(fitted.fit.theta).with_parameters(fitted.fit.parameters)
+    alone = replace(fitted.weighting, shares=None)  # what encoders know of a row is part of the noise that is stated
+    problem = alone.problem(fitted.fit.theta).with_parameters(fitted.fit.parameters)
     return fitted.by.with_usual_rules.fit(problem, fitted.fit.theta)
 
 
@@ -157,7 +159,7 @@ def _with_shared(joint: Noise, shared_rad: float, sigma_rad: float) -> Noise:
         return joint
     size = float(np.hypot(joint.found, shared_rad))
     sigma = float(np.hypot(joint.found * joint.sigma, shared_rad * sigma_rad)) / size
-    return replace(joint, found=size, sigma=sigma, at_zero=False)
+    return replace(joint, found=size, sigma=sigma, at_zero=joint.at_zero and shared_rad < SEEN * sigma_rad)
 
 
 def _found(fitted: Fitted, index: int, before: Floats) -> InstrumentFound:

@@ -12,7 +12,7 @@ from calibrate.effects.ports import Perturbation, Port
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
 from calibrate.physics.acting import Acting, Carried, acting, drivers_under, listed, range_of
-from calibrate.physics.conditions import Completed, completed, joined, needed_columns
+from calibrate.physics.conditions import Completed, against, completed, joined, needed_columns
 from calibrate.physics.records import Effect
 from calibrate.predict import Predictor
 
@@ -114,7 +114,7 @@ def _of_missing(
     """Effects that a condition which rows lack acts on, each with what it would add if that were one standard deviation
     off its middle. A column can be read together with one that an effect needs and do nothing itself.
     """
-    off = np.where(rows, float(np.nanstd(recorded.column(name))), 0.0)
+    off = np.where(rows, float(np.nanstd(recorded.column(name) - against(name, recorded))), 0.0)
     columns = {**filled.samples.columns, name: filled.samples.column(name) + off}
     other = acting(carried, predictor, recorded, joined(recorded, Samples(columns, recorded.n_joints)))
     shifts = [(a, b.amount - a.amount) for a, b in zip(found, other, strict=True)]

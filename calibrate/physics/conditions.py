@@ -82,11 +82,17 @@ def completed(asked: Samples, recorded: Samples, needs: Iterable[str], same_sess
     for name in needs:
         values = np.asarray(columns.get(name, np.full(len(asked), np.nan)), dtype=np.float64)
         given = np.isfinite(asked.column(name)) if name in asked else np.isfinite(values)
-        known = recorded.column(name)
-        columns[name] = np.where(np.isfinite(values), values, float(np.nanmean(known)))
+        middle = against(name, asked) + float(np.nanmean(recorded.column(name) - against(name, recorded)))
+        columns[name] = np.where(np.isfinite(values), values, middle)
         if not given.all():
             missing[name] = ~given & ~(np.isfinite(values) & same_session)
     return Completed(Samples(columns, asked.n_joints), {name: rows for name, rows in missing.items() if rows.any()})
+
+
+def against(name: str, samples: Samples) -> Floats:
+    """(row,) what a condition is stated against: a commanded angle against the reading, all others against nothing."""
+    commanded = name.startswith("cmd") and name.endswith("_rad")
+    return samples.column("q" + name.removeprefix("cmd")) if commanded else np.zeros(len(samples))
 
 
 def joined(recorded: Samples, asked: Samples) -> Samples:
