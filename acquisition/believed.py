@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.motion.inverse.kinematics import Kinematics
+from acquisition.motion.kinematics import Kinematics
 
 Floats = NDArray[np.float64]
 

@@ -24,7 +24,7 @@ from acquisition.camera.measuring import CameraMeasuring, MeasuredCamera
 from acquisition.camera.model import CameraFit, CameraModel
 from acquisition.camera.sight import Sight
 from acquisition.errors import UnreachableError
-from acquisition.motion.rigid import inverse, transform
+from acquisition.motion.kinematics import inverse, transform
 from acquisition.recording.rig import Rig, load_rig, plain_rig, rig_text
 from acquisition.sample import Sample
 from calibeam.learner import FittedLearner

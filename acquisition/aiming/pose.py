@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.believed import BelievedArm, FixtureOptics
-from acquisition.motion.inverse.kinematics import flange
+from acquisition.motion.kinematics import flange
 
 Floats = NDArray[np.float64]
 

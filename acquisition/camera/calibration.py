@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from acquisition.camera.board import Seen
 from acquisition.camera.model import CameraFit, CameraModel
 from acquisition.camera.sight import board_poses
-from acquisition.motion.rigid import inverse, rotation_vector
+from acquisition.motion.kinematics import inverse, rotation_vector
 
 Floats = NDArray[np.float64]
 

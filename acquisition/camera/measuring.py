@@ -27,8 +27,7 @@ from acquisition.camera.tour import stops
 from acquisition.errors import SpotLostError, UnreachableError
 from acquisition.journal import Journal
 from acquisition.learner import Learner
-from acquisition.motion.inverse.kinematics import flange
-from acquisition.motion.rigid import transform
+from acquisition.motion.kinematics import flange, transform
 from acquisition.navigator import Navigator
 from acquisition.recording.rig import Camera
 

@@ -13,7 +13,7 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from acquisition.errors import AcquisitionError
-from acquisition.motion.rigid import rotation_vector, transform
+from acquisition.motion.kinematics import rotation_vector, transform
 from acquisition.recording.files import JsonKind, read_json, shown
 from acquisition.recording.files.bounds import Correction, Count, Label, Pixels, Statistic, Vector
 from acquisition.recording.rig import Camera, Pose

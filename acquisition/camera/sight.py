@@ -12,8 +12,7 @@ from acquisition.believed import BelievedArm
 from acquisition.camera.board import Board, Seen
 from acquisition.camera.eye import Eye
 from acquisition.camera.model import CameraModel
-from acquisition.motion.inverse.kinematics import flange
-from acquisition.motion.rigid import apart, inverse
+from acquisition.motion.kinematics import apart, flange, inverse
 
 Floats = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from acquisition.aiming.reach import reach
 from acquisition.believed import BelievedArm
 from acquisition.camera.model import CameraModel
 from acquisition.errors import UnreachableError
-from acquisition.motion.rigid import inverse, transform
+from acquisition.motion.kinematics import inverse, transform
 
 Floats = NDArray[np.float64]
 

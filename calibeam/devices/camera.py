@@ -26,7 +26,7 @@ def camera_sight(rig: Rig, clock: Clock, emulated: Mapping[str, Any] | None = No
     from acquisition.camera.board import Board
     from acquisition.camera.model import read_model
     from acquisition.camera.sight import Sight
-    from acquisition.motion.rigid import transform
+    from acquisition.motion.kinematics import transform
 
     if rig.camera.calibration is None:
         raise RigFileError(

@@ -17,14 +17,13 @@ from numpy.typing import NDArray
 
 from acquisition.motion.following import Followed
 from acquisition.motion.gate import Gate
-from acquisition.motion.inverse.solver import Solver
+from acquisition.motion.inverse.solve import Solver
+from acquisition.motion.kinematics import apart, transform
 from acquisition.motion.paths.path import BeltState
-from acquisition.motion.paths.segments import By, Segment
+from acquisition.motion.paths.segments import By, Place, Segment
 from acquisition.motion.plan import Plan
-from acquisition.motion.rigid import apart, transform
 from acquisition.motion.run_task import Around, run_task, teach
 from acquisition.motion.task.graph import TaskGraph
-from acquisition.motion.task.place import Place
 from acquisition.motion.task.task_file import Task, read_task
 from calibeam.motion.robot import StreamedArm, StreamedRobot
 from drivers.clock import Clock

@@ -10,7 +10,7 @@ from acquisition.motion.following import SetPoints, SetPointStream
 from acquisition.motion.gate import Gate
 from acquisition.motion.gated_arm import GatedArm
 from acquisition.motion.inverse.closed_form import closed_form
-from acquisition.motion.inverse.solver import Solver
+from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.paths.segments import Pace
 from acquisition.motion.setpoints import solve_rate_hz
 from acquisition.recording.rig import ArmModel, Rig

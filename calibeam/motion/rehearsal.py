@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from acquisition.aiming.pose import BeamTarget, flange_for
 from acquisition.aiming.reach import reach
-from acquisition.errors import UnreachableError
-from acquisition.motion.errors import RefusedMotionError
+from acquisition.errors import RefusedMotionError, UnreachableError
 from acquisition.motion.gated_arm import GatedArm
 from acquisition.navigator import FINDING_STAND_OFF_M
 from acquisition.plan import PlanOptions, blocks

@@ -11,8 +11,8 @@ from acquisition.camera.board import Board
 from acquisition.camera.eye import Grey
 from acquisition.camera.model import drawn
 from acquisition.camera.sight import Sight, board_poses
-from acquisition.motion.errors import RefusedMotionError
-from acquisition.motion.rigid import apart, transform
+from acquisition.errors import RefusedMotionError
+from acquisition.motion.kinematics import apart, transform
 from acquisition.navigator import Navigator
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
 from benchmarks import coarse_aim

@@ -11,7 +11,7 @@ from acquisition.camera.board import Board
 from acquisition.camera.calibration import CameraStatus, calibrate_camera
 from acquisition.camera.model import CameraFit, drawn, read_model, write_model
 from acquisition.errors import AcquisitionError
-from acquisition.motion.rigid import apart, transform
+from acquisition.motion.kinematics import apart, transform
 from benchmarks.coarse_aim import measured_world
 from tests.support.direct_bench import DirectEye
 
