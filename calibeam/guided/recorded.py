@@ -15,7 +15,7 @@ from acquisition.guided.guide import Guide
 from acquisition.guided.plan import GuidedVisit
 from acquisition.guided.reading import Reading
 from acquisition.guided.session import GuidedSession, GuidedSummary
-from acquisition.guided.wired import WiredEncoderWatch
+from acquisition.guided.stillness import WiredEncoderWatch
 from acquisition.motion.inverse.solve import AtPoint, refine, within
 from acquisition.recording import Channel, Event, RecordingError, RecordingWriter, RigFileError
 from acquisition.recording.rig import Rig
@@ -34,7 +34,7 @@ ARRIVED_M = 1e-6  # far below what a person can do
 
 
 class BelievedGuidedArm(RigArm):
-    """Implements acquisition.guided.arm.GuidedArm."""
+    """Implements acquisition.guided.stillness.GuidedArm."""
 
     def postures(self, start_rad: Floats, point_m: Floats) -> Floats:
         found = refine(self, AtPoint(self.point_m, point_m), start_rad, close=ARRIVED_M).q_rad

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.guided.coverage import Coverage
+from acquisition.guided.guide import Coverage
 from acquisition.progress import Progress
 from acquisition.sample import Sample
 from acquisition.session_states import RunState
@@ -71,7 +71,7 @@ class Quality:
     spots_m: Floats  # (4,) of the last sample
     sums_v: tuple[float, float]  # light on both faces
     spans_rad: Floats  # (joint,) widest way between two samples
-    marks: tuple[str, ...]  # a joint's range step by step: acquisition/guided/coverage.py
+    marks: tuple[str, ...]  # a joint's range step by step: acquisition/guided/guide.py
 
 
 class QualityKeeper:
