@@ -5,7 +5,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.believed import BelievedArm, FixtureOptics
+from acquisition.centring.believed import BelievedArm, FixtureOptics
 from acquisition.sample import Sample
 
 Floats = NDArray[np.float64]

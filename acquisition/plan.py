@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.aiming.pose import BeamTarget
+from acquisition.centring.aim import BeamTarget
 
 Floats = NDArray[np.float64]
 

@@ -5,13 +5,13 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.aiming.reach import clear_of_table
 from acquisition.bench import Bench
-from acquisition.camera.sight import Sight
+from acquisition.centring.aim import clear_of_table
+from acquisition.centring.camera.board import Sight
+from acquisition.centring.navigator import GLANCE_S, Navigator
 from acquisition.errors import AcquisitionError, NoLightError, SpotLostError, UnreachableError
 from acquisition.journal import Journal, key_detail
 from acquisition.learner import Learner
-from acquisition.navigator import GLANCE_S, Navigator
 from acquisition.plan import PlanOptions, PoseKey
 from acquisition.progress import Phase, Progress, Tell, silent
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan

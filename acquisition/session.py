@@ -12,18 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.bench import Bench, Look
-from acquisition.camera.sight import Sight
+from acquisition.centring.camera.board import Sight
+from acquisition.centring.loop import CentringStatus, Limits
+from acquisition.centring.navigator import Navigator
 from acquisition.errors import SpotLostError, UnreachableError
 from acquisition.journal import Journal, key_detail
 from acquisition.learner import Learner
-from acquisition.navigator import Navigator
 from acquisition.plan import Block, PlanOptions, PoseKey, Visit, blocks
 from acquisition.progress import Phase, Progress, Tell, silent
 from acquisition.reined_bench import ReinedBench
 from acquisition.reins import EndedEarlyError, Reins
 from acquisition.sample import Sample
-from acquisition.servo.centring import Limits
-from acquisition.servo.status import CentringStatus
 from acquisition.session_states import RunEvent
 from acquisition.stepping import Stepping
 

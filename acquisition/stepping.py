@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from acquisition.bench import Bench
-from acquisition.navigator import GLANCE_S, Navigator
+from acquisition.centring.navigator import GLANCE_S, Navigator
 from acquisition.reins import BrokenOffError, Reins
 
 Result = TypeVar("Result")

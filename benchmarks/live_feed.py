@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.aiming.pose import BeamTarget, flange_for
-from acquisition.aiming.reach import reach
+from acquisition.centring.aim import BeamTarget, flange_for, reach
 from acquisition.psd_view import PsdView
 from acquisition.recording.rig import Rig
 from calibeam.live.feed import Feed

@@ -15,7 +15,8 @@ import numpy as np
 from rich.progress import Progress as Bar
 
 from acquisition.bench import Bench
-from acquisition.camera.sight import Sight
+from acquisition.centring.camera.board import Sight
+from acquisition.centring.loop import Limits
 from acquisition.errors import AcquisitionError
 from acquisition.plan import PlanOptions
 from acquisition.planned_session import PlannedSession
@@ -24,7 +25,6 @@ from acquisition.recording import Event, RecordingError, RecordingWriter, read
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig import Rig
 from acquisition.sample import Sample
-from acquisition.servo.centring import Limits
 from acquisition.session import Session, Summary
 from calibeam.emulation import EmulationError
 from calibeam.interrupts import ENDING

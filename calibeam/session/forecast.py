@@ -17,8 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.aiming.pose import flange_for
-from acquisition.aiming.reach import reach
+from acquisition.centring.aim import flange_for, reach
 from acquisition.errors import UnreachableError
 from acquisition.plan import Block, PoseKey
 from acquisition.recording import Samples

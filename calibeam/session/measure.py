@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.camera.sight import Sight
+from acquisition.centring.camera.board import Sight
+from acquisition.centring.loop import Limits
 from acquisition.plan import Block
 from acquisition.planned_session import PlannedSession
 from acquisition.recording import Event, RecordingWriter
 from acquisition.reins import Reins
 from acquisition.sample import Sample
-from acquisition.servo.centring import Limits
 from acquisition.session import Session, Summary
 from acquisition.wired import WiredBench
 from calibeam.devices.camera import camera_sight

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from acquisition.bench import Look
+from acquisition.centring.navigator import GLANCE_S
 from acquisition.errors import NoLightError
-from acquisition.navigator import GLANCE_S
 from acquisition.plan import PlanOptions, blocks
 from acquisition.sample import Sample
 from acquisition.session import Session, Summary

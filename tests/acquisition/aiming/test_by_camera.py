@@ -5,15 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.aiming.by_camera import Aim, Aimed
-from acquisition.aiming.pose import BeamTarget
-from acquisition.camera.board import Board
-from acquisition.camera.eye import Grey
-from acquisition.camera.model import drawn
-from acquisition.camera.sight import Sight, board_poses
+from acquisition.centring.aim import BeamTarget
+from acquisition.centring.by_camera import Aim, Aimed
+from acquisition.centring.camera.board import Board, Grey, Sight, board_poses
+from acquisition.centring.camera.model import drawn
+from acquisition.centring.navigator import Navigator
 from acquisition.errors import RefusedMotionError
 from acquisition.motion.kinematics import apart, transform
-from acquisition.navigator import Navigator
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
 from benchmarks import coarse_aim
 from calibeam.learner import FittedLearner

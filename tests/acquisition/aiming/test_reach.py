@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from acquisition.aiming.pose import BeamTarget, between, flange_for
-from acquisition.aiming.reach import reach
-from acquisition.believed import spots_at
+from acquisition.centring.aim import BeamTarget, between, flange_for, reach
+from acquisition.centring.believed import spots_at
 from acquisition.errors import UnreachableError
 from calibeam.learner import FittedLearner
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from acquisition.aiming.search import Found, Search
+from acquisition.centring.search import Found, Search
 from benchmarks.centring import run_search
 
 

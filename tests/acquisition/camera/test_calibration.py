@@ -6,10 +6,10 @@ import msgspec
 import numpy as np
 import pytest
 
-from acquisition.camera import measuring
-from acquisition.camera.board import Board
-from acquisition.camera.calibration import CameraStatus, calibrate_camera
-from acquisition.camera.model import CameraFit, drawn, read_model, write_model
+from acquisition.centring.camera import measuring
+from acquisition.centring.camera.board import Board
+from acquisition.centring.camera.calibration import CameraStatus, calibrate_camera
+from acquisition.centring.camera.model import CameraFit, drawn, read_model, write_model
 from acquisition.errors import AcquisitionError
 from acquisition.motion.kinematics import apart, transform
 from benchmarks.coarse_aim import measured_world

@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 
 from acquisition.bench import Look, Spot
-from acquisition.servo.centring import Limits, centre
-from acquisition.servo.measured import MeasuredStrategy
-from acquisition.servo.registered import FixedGuess, Registered
-from acquisition.servo.status import CentringStatus
-from acquisition.servo.strategy import Proposal
+from acquisition.centring.loop import CentringStatus, Limits, Proposal, centre
+from acquisition.centring.measured import MeasuredStrategy
+from acquisition.centring.registered import FixedGuess, Registered
 from benchmarks.centring import random_start
 from benchmarks.centring import run as benchmark
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from acquisition.servo.grip import LEAST_GRIP, grip, rolled
-from acquisition.servo.measured import MeasuredStrategy
+from acquisition.centring.measured import MeasuredStrategy
+from acquisition.centring.registered import LEAST_GRIP, grip, rolled
 from benchmarks.centring import random_start
 from calibeam.learner import FittedLearner
 

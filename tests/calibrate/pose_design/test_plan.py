@@ -74,7 +74,7 @@ def test_expected_spots_are_those_of_the_rig_as_drawn(rig, candidates, made):
 
 
 def test_candidates_are_within_limits_above_the_table_and_lit(rig, candidates):
-    from acquisition.aiming.reach import clear_of_table
+    from acquisition.centring.aim import clear_of_table
     from calibrate.believed import BelievedRig
     from calibrate.believed_fixture import Light
 

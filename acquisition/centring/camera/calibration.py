@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.camera.board import Seen
-from acquisition.camera.model import CameraFit, CameraModel
-from acquisition.camera.sight import board_poses
+from acquisition.centring.camera.board import Seen, board_poses
+from acquisition.centring.camera.model import CameraFit, CameraModel
 from acquisition.motion.kinematics import inverse, rotation_vector
 
 Floats = NDArray[np.float64]

@@ -10,18 +10,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.aiming.by_camera import OTHER_ROLLS_RAD, Aim, Aimed
-from acquisition.aiming.pose import BeamTarget, between, flange_for
-from acquisition.aiming.reach import reach
-from acquisition.aiming.search import Found, Search
 from acquisition.bench import Bench
-from acquisition.camera.sight import Sight
+from acquisition.centring.aim import BeamTarget, between, flange_for, reach
+from acquisition.centring.by_camera import OTHER_ROLLS_RAD, Aim, Aimed
+from acquisition.centring.camera.board import Sight
+from acquisition.centring.loop import Centring, Limits, centre
+from acquisition.centring.registered import FIRST_GAIN, Registered
+from acquisition.centring.search import Found, Search
 from acquisition.errors import NoLightError, SpotLostError, UnreachableError
 from acquisition.journal import Journal
 from acquisition.learner import Learner
-from acquisition.servo.centring import Limits, centre
-from acquisition.servo.registered import FIRST_GAIN, Registered
-from acquisition.servo.status import Centring
 
 Floats = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.believed import BelievedArm, FixtureOptics, spots_by_joints
 from acquisition.bench import Bench, Look
+from acquisition.centring.believed import BelievedArm, FixtureOptics, spots_by_joints
 from acquisition.errors import UnreachableError
 
 Floats = NDArray[np.float64]

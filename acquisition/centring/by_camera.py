@@ -10,11 +10,10 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.aiming.pose import BeamTarget, flange_for
-from acquisition.aiming.reach import reach
-from acquisition.believed import BelievedArm, FixtureOptics
 from acquisition.bench import Bench
-from acquisition.camera.sight import Sight
+from acquisition.centring.aim import BeamTarget, flange_for, reach
+from acquisition.centring.believed import BelievedArm, FixtureOptics
+from acquisition.centring.camera.board import Sight
 from acquisition.errors import UnreachableError
 
 Floats = NDArray[np.float64]

@@ -8,8 +8,8 @@ Source of the update: C. G. Broyden, Math. Comp. 19 (1965) 577, "good" form.
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.believed import BelievedArm, FixtureOptics, spots_by_joints
-from acquisition.servo.strategy import Proposal
+from acquisition.centring.believed import BelievedArm, FixtureOptics, spots_by_joints
+from acquisition.centring.loop import Proposal
 
 Floats = NDArray[np.float64]
 
