@@ -24,7 +24,7 @@ from acquisition.centring.search import Found, Search
 from acquisition.errors import UnreachableError
 from acquisition.motion.kinematics import inverse, transform
 from acquisition.recording.rig import Rig, load_rig, plain_rig, rig_text
-from acquisition.sample import Sample
+from acquisition.session.records import Sample
 from calibeam.learner import FittedLearner
 from tests.support.direct_bench import DirectBench, DirectEye, direct_bench
 

@@ -18,8 +18,7 @@ from acquisition.centring.loop import Centring, Limits, centre
 from acquisition.centring.registered import FIRST_GAIN, Registered
 from acquisition.centring.search import Found, Search
 from acquisition.errors import NoLightError, SpotLostError, UnreachableError
-from acquisition.journal import Journal
-from acquisition.learner import Learner
+from acquisition.session.records import Journal, Learner
 
 Floats = NDArray[np.float64]
 

@@ -12,11 +12,11 @@ from rich.console import Console
 
 from acquisition.errors import AcquisitionError
 from acquisition.guided.plan import GuidedOptions, planned_visits
-from acquisition.plan import PlanOptions
 from acquisition.recording import RecordingError
 from acquisition.recording.mcap import parts
 from acquisition.recording.pose_plan import read_pose_plan
 from acquisition.recording.rig import Rig, load_rig, rig_text
+from acquisition.session.plan import PlanOptions
 from calibeam.asking import at_terminal
 from calibeam.devices.site import addresses_of, check_session
 from calibeam.emulation import ask_emulators, moves_nothing_real

@@ -18,14 +18,13 @@ from acquisition.bench import Bench
 from acquisition.centring.camera.board import Sight
 from acquisition.centring.loop import Limits
 from acquisition.errors import AcquisitionError
-from acquisition.plan import PlanOptions
-from acquisition.planned_session import PlannedSession
-from acquisition.progress import Progress
 from acquisition.recording import Event, RecordingError, RecordingWriter, read
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig import Rig
-from acquisition.sample import Sample
-from acquisition.session import Session, Summary
+from acquisition.session.plan import PlanOptions
+from acquisition.session.planned import PlannedSession
+from acquisition.session.records import Progress, Sample
+from acquisition.session.session import Session, Summary
 from calibeam.emulation import EmulationError
 from calibeam.interrupts import ENDING
 from calibeam.learner import FittedLearner
@@ -36,7 +35,7 @@ from drivers.errors import DeviceError
 
 
 class RecordingJournal:
-    """Implements acquisition.journal.Journal."""
+    """Implements acquisition.session.records.Journal."""
 
     def __init__(self, writer: RecordingWriter, clock: Clock) -> None:
         self._writer, self._clock = writer, clock

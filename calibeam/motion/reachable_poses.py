@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from acquisition.centring.aim import BeamTarget, clear_of_table, flange_for
 from acquisition.motion.cell import body_points
 from acquisition.motion.inverse.solve import all_solutions
-from acquisition.plan import PlanOptions
 from acquisition.recording.rig import Placement, Pose, Rig
+from acquisition.session.plan import PlanOptions
 from calibeam.motion.gate_of_rig import cell_of, solver_of
 from calibrate.arms.convert import pose_of
 from calibrate.believed import BelievedRig

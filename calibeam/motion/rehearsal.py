@@ -14,9 +14,9 @@ from acquisition.centring.aim import BeamTarget, flange_for, reach
 from acquisition.centring.navigator import FINDING_STAND_OFF_M
 from acquisition.errors import RefusedMotionError, UnreachableError
 from acquisition.motion.gated_arm import GatedArm
-from acquisition.plan import PlanOptions, blocks
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig import Rig
+from acquisition.session.plan import PlanOptions, blocks
 from calibeam.learner import FittedLearner
 from calibeam.motion.gate_of_rig import cell_of
 from calibrate.arms.rig_arm import RigArm

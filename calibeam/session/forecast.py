@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 
 from acquisition.centring.aim import flange_for, reach
 from acquisition.errors import UnreachableError
-from acquisition.plan import Block, PoseKey
 from acquisition.recording import Samples
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import SPOTS, per_joint
-from acquisition.sample import Sample
+from acquisition.session.plan import Block, PoseKey
+from acquisition.session.records import Sample
 from calibrate.arms.catalogue import arm_of
 from calibrate.believed import BelievedRig
 from calibrate.fit import Status

@@ -12,13 +12,13 @@ from pathlib import Path
 import msgspec
 
 from acquisition.errors import AcquisitionError
-from acquisition.plan import Block, PlanOptions, PoseKey, blocks
 from acquisition.recording import Recording, RecordingError, RigFileError, read
 from acquisition.recording.files import shown
 from acquisition.recording.mcap import differs, parts
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig import Placement, Pose, Rig, parse_rig
-from acquisition.sample import Sample, sample_of
+from acquisition.session.plan import Block, PlanOptions, PoseKey, blocks
+from acquisition.session.records import Sample, sample_of
 from calibeam.devices.site import Addresses
 
 PLACE_EVENT, STANDS_IN = "placement", "place added"

@@ -26,8 +26,7 @@ from types import FrameType
 from typing import Self
 
 from acquisition.errors import StoppedError
-from acquisition.reins import Reins
-from acquisition.session_states import BROKEN, OVER, RunState
+from acquisition.session.control import BROKEN, OVER, Reins, RunState
 from acquisition.supervisor import FROZEN_S
 from calibeam.asking import in_foreground
 from calibeam.interrupts import INTERRUPTS

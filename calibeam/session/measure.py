@@ -9,12 +9,12 @@ import numpy as np
 
 from acquisition.centring.camera.board import Sight
 from acquisition.centring.loop import Limits
-from acquisition.plan import Block
-from acquisition.planned_session import PlannedSession
 from acquisition.recording import Event, RecordingWriter
-from acquisition.reins import Reins
-from acquisition.sample import Sample
-from acquisition.session import Session, Summary
+from acquisition.session.control import Reins
+from acquisition.session.plan import Block
+from acquisition.session.planned import PlannedSession
+from acquisition.session.records import Sample
+from acquisition.session.session import Session, Summary
 from acquisition.wired import WiredBench
 from calibeam.devices.camera import camera_sight
 from calibeam.devices.recorder import RecordingJournal, end_event, kept, new_recording

@@ -8,11 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.journal import Journal
-from acquisition.progress import Phase, Progress
 from acquisition.recording.rig import Rig
-from acquisition.sample import Sample
-from acquisition.session_states import RunState
+from acquisition.session.control import RunState
+from acquisition.session.records import Journal, Phase, Progress, Sample
 from calibeam.outcome import PartialResult
 from calibeam.session.forecast import Forecast
 from calibeam.session.status import UNDELIVERED, Listener, Pace, QualityKeeper, SessionStatus
@@ -48,7 +46,7 @@ class StatusReporter:
                     listener.report(text, on_screen)
 
     def progress(self, progress: Progress) -> None:
-        """From the session, as acquisition.progress.Tell."""
+        """From the session, as acquisition.session.records.Tell."""
         with self._turn:
             before = self.shown.progress
             if before is None or (before.placement, before.first) != (progress.placement, progress.first):
@@ -122,7 +120,7 @@ class StatusReporter:
 
 
 class ReportingJournal:
-    """Implements acquisition.journal.Journal: what goes into the recording is told as well."""
+    """Implements acquisition.session.records.Journal: what goes into the recording is told as well."""
 
     def __init__(self, journal: Journal, reporter: StatusReporter, took: Callable[[list[Sample]], None]) -> None:
         """`took`: all samples so far, after each."""

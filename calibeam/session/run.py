@@ -11,10 +11,10 @@ from dataclasses import replace
 from rich.console import Console
 
 from acquisition.errors import AcquisitionError
-from acquisition.planned_session import check_planned
 from acquisition.recording.mcap import next_part, parts
 from acquisition.recording.rig import Placement
-from acquisition.session import Summary
+from acquisition.session.planned import check_planned
+from acquisition.session.session import Summary
 from calibeam.asking import Asking
 from calibeam.devices.check import DeviceCheck, check_devices
 from calibeam.interrupts import INTERRUPTS

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.guided.guide import Coverage
-from acquisition.progress import Progress
-from acquisition.sample import Sample
-from acquisition.session_states import RunState
+from acquisition.session.control import RunState
+from acquisition.session.records import Progress, Sample
 from calibeam.session.forecast import Forecast
 from drivers.clock import Clock
 

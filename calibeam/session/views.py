@@ -16,8 +16,8 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from acquisition.progress import Progress
-from acquisition.session_states import RunState
+from acquisition.session.control import RunState
+from acquisition.session.records import Progress
 from calibeam.live.feed import Feed
 from calibeam.live.feed import Progress as PageProgress
 from calibeam.session.status import Quality, SessionStatus, clock_words

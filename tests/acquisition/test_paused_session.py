@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from acquisition.errors import StoppedError
-from acquisition.plan import PlanOptions, PoseKey, blocks
-from acquisition.reins import Reins
-from acquisition.session import Session
-from acquisition.session_states import RunState
+from acquisition.session.control import Reins, RunState
+from acquisition.session.plan import PlanOptions, PoseKey, blocks
+from acquisition.session.session import Session
 from calibeam.learner import FittedLearner
 from drivers.errors import DeviceRefused
 from tests.support.direct_bench import DirectBench

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from acquisition.errors import AcquisitionError
-from acquisition.plan import PlanOptions
-from acquisition.planned_session import PlannedSession, check_planned
 from acquisition.recording import RigFileError
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan, read_pose_plan, write_pose_plan
-from acquisition.session import Session
+from acquisition.session.plan import PlanOptions
+from acquisition.session.planned import PlannedSession, check_planned
+from acquisition.session.session import Session
 from calibeam.learner import FittedLearner
 
 from .test_session import Kept

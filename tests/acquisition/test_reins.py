@@ -5,9 +5,16 @@ import threading
 import pytest
 
 from acquisition.errors import StoppedError
-from acquisition.reined_bench import ReinedBench
-from acquisition.reins import BrokenOffError, EndedEarlyError, Reins
-from acquisition.session_states import PAUSE_AGAIN_S, REST_S, RunEvent, RunState
+from acquisition.session.control import (
+    PAUSE_AGAIN_S,
+    REST_S,
+    BrokenOffError,
+    EndedEarlyError,
+    Reins,
+    RunEvent,
+    RunState,
+)
+from acquisition.session.stepping import ReinedBench
 from drivers.errors import DeviceError, DeviceLost, DeviceRefused
 
 

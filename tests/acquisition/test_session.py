@@ -10,9 +10,9 @@ import pytest
 from acquisition.bench import Look
 from acquisition.centring.navigator import GLANCE_S
 from acquisition.errors import NoLightError
-from acquisition.plan import PlanOptions, blocks
-from acquisition.sample import Sample
-from acquisition.session import Session, Summary
+from acquisition.session.plan import PlanOptions, blocks
+from acquisition.session.records import Sample
+from acquisition.session.session import Session, Summary
 from calibeam.learner import FittedLearner
 from drivers.errors import DeviceRefused
 from tests.support.direct_bench import DirectBench

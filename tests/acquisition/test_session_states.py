@@ -2,8 +2,7 @@
 
 import pytest
 
-from acquisition.reins import BrokenOffError, Reins
-from acquisition.session_states import BROKEN, OVER, RunEvent, RunState, after
+from acquisition.session.control import BROKEN, OVER, BrokenOffError, Reins, RunEvent, RunState, after
 
 IDLE, RUNNING, PAUSING, BREAKING, PAUSED, ENDING, ABORTING, DONE, ABORTED, HALTED = RunState
 # START PAUSE BREAK RESUME STOP ABORT HALT CHECKPOINT FINISHED FAULT

@@ -26,10 +26,9 @@ from acquisition.centring.camera.calibration import Calibration, CameraStatus, V
 from acquisition.centring.camera.model import CameraFit, CameraModel, drawn
 from acquisition.centring.navigator import Navigator
 from acquisition.errors import SpotLostError, UnreachableError
-from acquisition.journal import Journal
-from acquisition.learner import Learner
 from acquisition.motion.kinematics import flange, inverse, transform
 from acquisition.recording.rig import Camera
+from acquisition.session.records import Journal, Learner
 
 Floats = NDArray[np.float64]
 

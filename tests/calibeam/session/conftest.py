@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from acquisition.bench import Look, Spot
-from acquisition.plan import PlanOptions, blocks
 from acquisition.recording.rig import Rig, load_rig
-from acquisition.sample import Sample
+from acquisition.session.plan import PlanOptions, blocks
+from acquisition.session.records import Sample
 from calibeam.session.forecast import Ahead, ahead_of_blocks
 from calibrate.believed import BelievedRig
 

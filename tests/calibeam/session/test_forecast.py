@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from acquisition.plan import PlanOptions, blocks
+from acquisition.session.plan import PlanOptions, blocks
 from calibeam.session.forecast import ahead_of_blocks, forecast
 from calibrate.pose_design.information import information_of
 

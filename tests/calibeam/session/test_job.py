@@ -6,10 +6,10 @@ from datetime import UTC, datetime
 import pytest
 
 from acquisition.errors import AcquisitionError
-from acquisition.plan import PlanOptions, PoseKey
 from acquisition.recording import Event, RecordingError, RecordingWriter, RigFileError
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
 from acquisition.recording.rig import parse_rig
+from acquisition.session.plan import PlanOptions, PoseKey
 from calibeam.devices.site import addresses_of
 from calibeam.session.job import (
     MORE,

@@ -12,8 +12,7 @@ from collections.abc import Callable
 import pytest
 
 from acquisition.errors import StoppedError
-from acquisition.reins import Reins
-from acquisition.session_states import RunEvent, RunState
+from acquisition.session.control import Reins, RunEvent, RunState
 from calibeam.session.keys import ENTER, Keys
 from drivers.errors import DeviceLost
 

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import pytest
 from rich.console import Console
 
-from acquisition.plan import PlanOptions
-from acquisition.session import Summary
+from acquisition.session.plan import PlanOptions
+from acquisition.session.session import Summary
 from calibeam.asking import Asking
 from calibeam.devices.check import DeviceCheck
 from calibeam.devices.site import addresses_of

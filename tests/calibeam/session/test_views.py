@@ -10,9 +10,8 @@ import pytest
 from rich.console import Console
 
 from acquisition.errors import AcquisitionError
-from acquisition.progress import Phase, Progress
-from acquisition.reins import Reins
-from acquisition.session_states import RunEvent, RunState
+from acquisition.session.control import Reins, RunEvent, RunState
+from acquisition.session.records import Phase, Progress
 from calibeam.asking import Asking
 from calibeam.live.feed import SILENT
 from calibeam.live.feed import Progress as PageProgress

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.plan import PlanOptions, blocks
 from acquisition.recording import read
 from acquisition.recording.mcap import parts
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan, write_pose_plan
 from acquisition.recording.rig import load_rig
-from acquisition.sample import Sample
-from acquisition.session_states import RunState
+from acquisition.session.control import RunState
+from acquisition.session.plan import PlanOptions, blocks
+from acquisition.session.records import Sample
 from benchmarks.stops import emulated_rig, without_encoders
 from calibeam.cli import run
 from calibeam.emulation import Emulation

@@ -10,17 +10,12 @@ from acquisition.centring.aim import clear_of_table
 from acquisition.centring.camera.board import Sight
 from acquisition.centring.navigator import GLANCE_S, Navigator
 from acquisition.errors import AcquisitionError, NoLightError, SpotLostError, UnreachableError
-from acquisition.journal import Journal, key_detail
-from acquisition.learner import Learner
-from acquisition.plan import PlanOptions, PoseKey
-from acquisition.progress import Phase, Progress, Tell, silent
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
-from acquisition.reined_bench import ReinedBench
-from acquisition.reins import EndedEarlyError, Reins
-from acquisition.sample import Sample
-from acquisition.session import NOTHING, Summary, Taken, usable
-from acquisition.session_states import RunEvent
-from acquisition.stepping import Stepping
+from acquisition.session.control import EndedEarlyError, Reins, RunEvent
+from acquisition.session.plan import PlanOptions, PoseKey
+from acquisition.session.records import Journal, Learner, Phase, Progress, Sample, Tell, key_detail, silent
+from acquisition.session.session import NOTHING, Summary, Taken, usable
+from acquisition.session.stepping import ReinedBench, Stepping
 
 Floats = NDArray[np.float64]
 

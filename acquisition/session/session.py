@@ -16,15 +16,10 @@ from acquisition.centring.camera.board import Sight
 from acquisition.centring.loop import CentringStatus, Limits
 from acquisition.centring.navigator import Navigator
 from acquisition.errors import SpotLostError, UnreachableError
-from acquisition.journal import Journal, key_detail
-from acquisition.learner import Learner
-from acquisition.plan import Block, PlanOptions, PoseKey, Visit, blocks
-from acquisition.progress import Phase, Progress, Tell, silent
-from acquisition.reined_bench import ReinedBench
-from acquisition.reins import EndedEarlyError, Reins
-from acquisition.sample import Sample
-from acquisition.session_states import RunEvent
-from acquisition.stepping import Stepping
+from acquisition.session.control import EndedEarlyError, Reins, RunEvent
+from acquisition.session.plan import Block, PlanOptions, PoseKey, Visit, blocks
+from acquisition.session.records import Journal, Learner, Phase, Progress, Sample, Tell, key_detail, silent
+from acquisition.session.stepping import ReinedBench, Stepping
 
 Floats = NDArray[np.float64]
 Taken = Mapping[PoseKey, Sample]

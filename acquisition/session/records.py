@@ -1,12 +1,23 @@
-"""A settled sample as one row of the session-folder format."""
+"""How far a session is, told to whoever shows it.
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+A settled sample as one row of the session-folder format.
+
+The believed rig during a session, and how samples better it: passed in, because it rests on the kinematic models.
+
+Where a session's samples and events go.
+"""
+
+import enum
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.bench import Look, Spot
+from acquisition.centring.believed import BelievedArm, FixtureOptics
+from acquisition.session.plan import PoseKey
 
 Floats = NDArray[np.float64]
 Cell = float | int | str | None
@@ -88,3 +99,69 @@ def _spot(face: str, spot: Spot) -> dict[str, Cell]:
         f"{face}_x_sigma_m": spot.sigma_x_m,
         f"{face}_y_sigma_m": spot.sigma_y_m,
     }
+
+
+class Learner(Protocol):
+    """What is believed now."""
+
+    @property
+    def arm(self) -> BelievedArm: ...
+
+    @property
+    def optics(self) -> FixtureOptics: ...
+
+    def T_base_fixture(self, placement: int) -> Floats: ...
+
+    def learn(self, samples: list[Sample]) -> None:
+        """Refit arm, laser mount and places to all samples so far."""
+        ...
+
+
+class Journal(Protocol):
+    """The recording, or a test's list."""
+
+    def sample(self, sample: Sample) -> None: ...
+
+    def event(self, kind: str, detail: Mapping[str, Any]) -> None: ...
+
+
+def key_detail(key: PoseKey, look: Look) -> dict[str, Any]:
+    """Of the event "sample": which pose it is, and when it was read, so that the streams tell what happened about."""
+    detail: dict[str, Any] = {"pose": asdict(key)}
+    if look.window_s is not None:
+        detail |= {"psd_from_s": look.window_s[0], "psd_to_s": look.window_s[1]}
+    return detail
+
+
+class Phase(enum.Enum):
+    """What the arm is doing, in a word for a person."""
+
+    PLACE = "fixture"
+    AIM = "aim"
+    CENTRE = "centre"
+    COLLECT = "collect"
+    REPEAT = "repeat"
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Poses of the plan, those of earlier parts of the session among them."""
+
+    phase: Phase
+    done: int
+    total: int
+    skipped: int
+    placement: int
+    first: int  # face that the beam strikes first
+
+    @property
+    def left(self) -> int:
+        """Poses still to be taken."""
+        return max(0, self.total - self.done - self.skipped)
+
+
+Tell = Callable[[Progress], None]
+
+
+def silent(progress: Progress) -> None:
+    """For a session that nobody looks at."""
