@@ -19,11 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.guarded import Guarded
 from acquisition.recording.rig import Rig, load_rig, plain_rig, rig_text
 from acquisition.recording.rig.devices import PsdDriver, RobotDriver
-from acquisition.streams import Pump
-from acquisition.supervisor import Supervisor
+from acquisition.wires.attaching import Guarded
+from acquisition.wires.streams import Pump, Supervisor
 from calibeam.devices.encoders import emulated_encoders, encoder_driver
 from calibeam.devices.psd import emulated_psd, psd_driver
 from calibeam.devices.robot import emulated_robot, robot_of

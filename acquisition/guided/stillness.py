@@ -18,8 +18,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.streams import Pump
-from acquisition.supervisor import Supervisor
+from acquisition.wires.streams import Pump, Supervisor
 from drivers.device import Block
 
 Floats = NDArray[np.float64]

@@ -20,8 +20,7 @@ from acquisition.motion.inverse.solve import AtPoint, refine, within
 from acquisition.recording import Channel, Event, RecordingError, RecordingWriter, RigFileError
 from acquisition.recording.rig import Rig
 from acquisition.recording.rig.devices import EncodersDevice
-from acquisition.streams import Pump
-from acquisition.supervisor import Supervisor
+from acquisition.wires.streams import Pump, Supervisor
 from calibeam.devices.encoders import VIEWED, emulated_encoders, encoder_driver, identities_of
 from calibeam.devices.recorder import Interrupted, uninterrupted
 from calibeam.guided.judge import FittedJudge

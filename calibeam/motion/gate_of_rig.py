@@ -14,7 +14,7 @@ from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.paths.segments import Pace
 from acquisition.motion.setpoints import solve_rate_hz
 from acquisition.recording.rig import ArmModel, Rig
-from acquisition.streams import Pump
+from acquisition.wires.streams import Pump
 from calibeam.geometry_only import read_geometry
 from calibrate.arms.rig_arm import RigArm
 from calibrate.errors import DataError

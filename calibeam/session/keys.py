@@ -27,7 +27,7 @@ from typing import Self
 
 from acquisition.errors import StoppedError
 from acquisition.session.control import BROKEN, OVER, Reins, RunState
-from acquisition.supervisor import FROZEN_S
+from acquisition.wires.streams import FROZEN_S
 from calibeam.asking import in_foreground
 from calibeam.interrupts import INTERRUPTS
 from drivers.clock import Clock, SystemClock

@@ -15,7 +15,7 @@ from acquisition.session.plan import Block
 from acquisition.session.planned import PlannedSession
 from acquisition.session.records import Sample
 from acquisition.session.session import Session, Summary
-from acquisition.wired import WiredBench
+from acquisition.wires.bench import WiredBench
 from calibeam.devices.camera import camera_sight
 from calibeam.devices.recorder import RecordingJournal, end_event, kept, new_recording
 from calibeam.devices.site import connected

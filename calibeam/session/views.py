@@ -99,7 +99,7 @@ class LogFile:
 
 REFRESH_HZ = 4.0
 BAR = 30  # characters
-SOON_S = 0.01  # half a window of acquisition/settling.py: nearer it does not look
+SOON_S = 0.01  # half a window of acquisition/wires/bench.py: nearer it does not look
 MOVES, WAITS, STOPS, ASKS = "bold white on green", "bold black on yellow", "bold white on red", "bold black on cyan"
 STYLES = {
     RunState.PAUSING: WAITS,

@@ -6,9 +6,9 @@ import can
 import numpy as np
 import pytest
 
-from acquisition.frame_log import BLOCK_S, FrameLog
 from acquisition.recording import RecordingError
 from acquisition.recording.can_frames import FrameFlag
+from acquisition.wires.frame_log import BLOCK_S, FrameLog
 
 
 class Clock:

@@ -5,7 +5,7 @@ import threading
 import numpy as np
 import pytest
 
-from acquisition.reopening import Reopening
+from acquisition.wires.attaching import Reopening
 from drivers.clock import SystemClock
 from drivers.device import Block, Channel
 from drivers.errors import DeviceError, DeviceLost, DeviceRefused, DeviceStale

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from acquisition.settling import SettleRule, settled_from, stretch_to_average
+from acquisition.wires.bench import SettleRule, settled_from, stretch_to_average
 
 RULE = SettleRule()
 TIME_S = np.arange(400) * 1e-3

@@ -5,8 +5,7 @@ import threading
 import numpy as np
 import pytest
 
-from acquisition.streams import Pump
-from acquisition.supervisor import Supervisor
+from acquisition.wires.streams import Pump, Supervisor
 from drivers.clock import SystemClock
 from drivers.device import Block
 from drivers.errors import DeviceLost, DeviceStale

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from acquisition.errors import StoppedError
-from acquisition.guarded import Guarded
-from acquisition.supervisor import FROZEN_S, Supervisor
+from acquisition.wires.attaching import Guarded
+from acquisition.wires.streams import FROZEN_S, Supervisor
 from drivers.errors import DeviceError, DeviceLost, DeviceRefused, DeviceStale, WireError
 
 

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from acquisition.bench import Look
 from acquisition.centring.camera.board import Grey
-from acquisition.psd_view import NO_LIGHT, PsdView, PsdWindow
 from acquisition.recording.rig import Rig
-from acquisition.settling import SettleRule, stretch_to_average
+from acquisition.wires.bench import SettleRule, stretch_to_average
+from acquisition.wires.psd_view import NO_LIGHT, PsdView, PsdWindow
 from drivers.psd_faces import Face, FaceKind
 from simulators.camera.emulator import Eye
 from simulators.camera.true_camera import TrueCamera
