@@ -1,7 +1,4 @@
-"""What can go wrong in a session that is not the fault of one device.
-
-Why a motion is not made: the task does not say where, the arm cannot, or the cell does not allow it.
-"""
+"""What can go wrong that is no fault of one device: in a session, and when a motion is not made."""
 
 
 class AcquisitionError(Exception):

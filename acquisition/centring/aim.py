@@ -1,9 +1,9 @@
-"""Joint readings that bring the flange of a believed arm to a pose, near where it stands and clear of the table.
-
-Where the flange must be so that the beam lights both faces at given spots, at a stand-off and a roll about the beam.
+"""Where the flange must be so that the beam lights both faces at given spots, and the joint readings that bring it
+there.
 
 Four spot coordinates fix the line; stand-off (along the beam) and roll (about it) are the two freedoms left
-(Deng, Ding, Zhang 2019: "slide along the beam, roll about it").
+(Deng, Ding, Zhang 2019: "slide along the beam, roll about it"). Joint readings are those of a believed arm, near where
+it stands and clear of the table.
 """
 
 import math

@@ -1,8 +1,6 @@
 """The centring loop: look, ask the strategy, limit the step, move, recover a lost spot, end with a named status.
 
-How a centring run ended, and the record of each of its steps.
-
-What a centring strategy is: it proposes joint steps and learns from what was seen.
+A strategy proposes joint steps and learns from what was seen; the run keeps a record of each step.
 """
 
 from collections.abc import Sequence

@@ -1,6 +1,5 @@
-"""Who moves the probe: a person who is told, or an emulated hand; and what either is told.
-
-How much of the joints' ranges the readings so far have been at, and which posture fills the emptiest of it.
+"""Who moves the probe, a person or an emulated hand; what either is asked for; and how much of the joints' ranges the
+readings so far have been at, since the posture that fills the emptiest of it is asked for next.
 """
 
 from collections.abc import Sequence

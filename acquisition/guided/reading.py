@@ -1,8 +1,8 @@
-"""One accepted reading: where the probe was, and the mean of the encoders while it was held there.
+"""What a person puts the probe on (a cone, one end of a bar, a spot of a sphere), the reading taken there, and its
+judge.
 
-What a person is asked to put the probe on: a cone, one end of a bar, a spot of a sphere.
-
-Whether a reading can be: what the arm as known so far says of it. Given in from outside, for fits are not here.
+A reading is the mean of the encoders while the probe was held. Whether it can be is said by the arm as known so far,
+which is passed in, for fits are not made here.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,6 +1,7 @@
-"""Homogeneous transforms (..., 4, 4) as tasks write them: from origin and rotation vector, inverse, difference.
+"""Homogeneous transforms (..., 4, 4) as tasks write them, and what motion has to know of an arm: passed in, not
+imported.
 
-What motion needs to know of an arm: passed in, never imported. Joint i + 1 turns about z of frame i.
+Joint i + 1 turns about z of frame i.
 """
 
 from typing import Protocol

@@ -1,6 +1,6 @@
 """Teaches a task and runs its program through the gate: a sweep of the arm, a reading of the camera, the next sweep.
 
-From a program to what the arm does in one go: the segments of a path, up to the next reading of a camera.
+A sweep is what the arm does in one go: the segments of a path up to the next reading of a camera.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,10 +1,8 @@
-"""Set-points between solutions: each is solved a period ahead and interpolated to over the next one.
+"""Set-points of a path: solved a period ahead where a belt may move, or all beforehand where none does.
 
 At t_k the belt is read and the solution for t_k + 2/f begun; it is ready at t_k + 1/f, and interpolated to from there.
 So a belt that stops dead is overshot by 2 Vc / f, and between solutions y apart the joints leave a straight track at
 distance R by y^2 / (8 R). Source: R. Paul, Robot Manipulators, 1981, ch. 5 (rates); lecture chapter 8, "Rates".
-
-A path that needs no belt, solved beforehand: its stream costs nothing and never waits for a solution.
 """
 
 from collections.abc import Callable

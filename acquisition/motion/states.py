@@ -6,9 +6,8 @@ abort: brake, clean up, end as aborted. stop: brake, clean up, end as a success.
 Source of the words and keys: bluesky, "Interrupting" (first Ctrl-C: pause at the next checkpoint; second within 10 s:
 pause now).
 
-An action of a program beside the stream: a hand takes its time, and the arm goes on being told where to stand.
-
-On a belt it has to: an arm whose set-points stop stands, and the belt takes the part away from the hand.
+An action of a program runs beside the stream: a hand takes its time, and the arm goes on being sent where to stand. On
+a belt it has to: an arm whose set-points stop stands, and the belt takes the part away from the hand.
 """
 
 import enum

@@ -1,10 +1,9 @@
-"""Who holds a session: pause, resume, stop, abort, halt, said from any thread; the session asks at every checkpoint.
+"""Run control of a session: pause, resume, stop, abort, halt from any thread; the session asks at every checkpoint.
 
-The arm is stopped by whoever says so, not by the session, which may be waiting for that very motion. A stop can fall
-between the session's last look at the reins and its next motion: so it is said again until the session has taken note.
+The arm is stopped by whoever calls, not by the session, which may be waiting for that very motion. A stop can fall
+between the session's last look and its next motion: so it is repeated until the session has taken note.
 
-What a session can be doing, what can happen to it, and what it then does: one table, words as in bluesky.
-
+One table says what a session can be doing, what can happen to it, and what it then does, in the words of bluesky:
 pause: the arm rests within REST_S, at the end of the motion under way or braked softly, and no further motion begins;
 the pose is taken again later. Again within PAUSE_AGAIN_S: at once, the arm is stopped. resume goes on from the last
 checkpoint. stop: ends at the next checkpoint, as a success; a pause takes precedence over it. abort: the arm is stopped
@@ -108,7 +107,7 @@ class EndedEarlyError(Exception):
     """A person has enough samples: the session ends here, as a success."""
 
 
-class Reins:
+class RunControl:
     """Owner of a session's state. `stop_arm` works from any thread; DeviceError where it cannot be delivered.
 
     `failure`: what has gone wrong with a device, so that a pause does not outlast it. `hold_arm`: stops for good, after

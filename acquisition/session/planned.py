@@ -11,11 +11,11 @@ from acquisition.centring.camera.board import Sight
 from acquisition.centring.navigator import GLANCE_S, Navigator
 from acquisition.errors import AcquisitionError, NoLightError, SpotLostError, UnreachableError
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
-from acquisition.session.control import EndedEarlyError, Reins, RunEvent
+from acquisition.session.control import EndedEarlyError, RunControl, RunEvent
 from acquisition.session.plan import PlanOptions, PoseKey
 from acquisition.session.records import Journal, Learner, Phase, Progress, Sample, Tell, key_detail, silent
 from acquisition.session.session import NOTHING, Summary, Taken, usable
-from acquisition.session.stepping import ReinedBench, Stepping
+from acquisition.session.stepping import InterruptibleBench, Stepping
 
 Floats = NDArray[np.float64]
 
@@ -51,14 +51,14 @@ class PlannedSession:
         *,
         tell: Tell = silent,
         sight: Sight | None = None,
-        reins: Reins | None = None,
+        control: RunControl | None = None,
         earlier: Taken = NOTHING,
     ) -> None:
-        self._reins = reins or Reins(bench.stop)
-        self._bench = ReinedBench(bench, self._reins)
+        self._control = control or RunControl(bench.stop)
+        self._bench = InterruptibleBench(bench, self._control)
         self._learner, self._journal, self._options = learner, journal, options
         self._navigator = Navigator(self._bench, learner, journal, home_rad, options.seed, sight)
-        self._stepping = Stepping(self._reins, self._bench, self._navigator, lambda: None)
+        self._stepping = Stepping(self._control, self._bench, self._navigator, lambda: None)
         self._tell, self._earlier = tell, {key.index: sample for key, sample in earlier.items()}
         self._samples: list[Sample] = []
         self._skipped = 0
@@ -74,7 +74,7 @@ class PlannedSession:
         `standing`: the place where the fixture is already.
         """
         check_planned(plan)
-        self._reins.tell(RunEvent.START)
+        self._control.tell(RunEvent.START)
         try:
             self._stepping.step(lambda: self._navigator.move(self._navigator.q_rad))
             index = 0
@@ -89,7 +89,7 @@ class PlannedSession:
                     self._stepping.step(partial(self._take, block, pose, number))
         except EndedEarlyError:
             self._journal.event("ended by a person", {"samples": self.taken})
-        self._reins.finish()
+        self._control.finish()
         return Summary(tuple(self._samples), (), self._skipped)
 
     def _place(self, plan: PosePlan, block: PlannedBlock) -> int:

@@ -1,10 +1,6 @@
-"""How far a session is, told to whoever shows it.
+"""What a session leaves and shows: samples (one row each), events, progress; and who learns the arm from them.
 
-A settled sample as one row of the session-folder format.
-
-The believed rig during a session, and how samples better it: passed in, because it rests on the kinematic models.
-
-Where a session's samples and events go.
+The learner betters the believed rig during a session. It is passed in, because it rests on the kinematic models.
 """
 
 import enum

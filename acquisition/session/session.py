@@ -16,10 +16,10 @@ from acquisition.centring.camera.board import Sight
 from acquisition.centring.loop import CentringStatus, Limits
 from acquisition.centring.navigator import Navigator
 from acquisition.errors import SpotLostError, UnreachableError
-from acquisition.session.control import EndedEarlyError, Reins, RunEvent
+from acquisition.session.control import EndedEarlyError, RunControl, RunEvent
 from acquisition.session.plan import Block, PlanOptions, PoseKey, Visit, blocks
 from acquisition.session.records import Journal, Learner, Phase, Progress, Sample, Tell, key_detail, silent
-from acquisition.session.stepping import ReinedBench, Stepping
+from acquisition.session.stepping import InterruptibleBench, Stepping
 
 Floats = NDArray[np.float64]
 Taken = Mapping[PoseKey, Sample]
@@ -55,14 +55,14 @@ class Session:
         limits: Limits | None = None,
         tell: Tell = silent,
         sight: Sight | None = None,
-        reins: Reins | None = None,
+        control: RunControl | None = None,
         earlier: Taken = NOTHING,
     ) -> None:
-        self._reins = reins or Reins(bench.stop)
-        self._bench = ReinedBench(bench, self._reins)
+        self._control = control or RunControl(bench.stop)
+        self._bench = InterruptibleBench(bench, self._control)
         self._learner, self._journal, self._options = learner, journal, options
         self._navigator = Navigator(self._bench, learner, journal, home_rad, options.seed, sight)
-        self._stepping = Stepping(self._reins, self._bench, self._navigator, self._astray)
+        self._stepping = Stepping(self._control, self._bench, self._navigator, self._astray)
         self._limits, self._tell, self._earlier = limits or Limits(), tell, earlier
         self._samples: list[Sample] = []
         self._keys: dict[PoseKey, Sample] = {}
@@ -86,7 +86,7 @@ class Session:
         keys = [key for block in plan for key in block.pose_keys()]
         self._total += len(keys)
         self._before += sum(key in self._earlier for key in keys)
-        self._reins.tell(RunEvent.START)
+        self._control.tell(RunEvent.START)
         try:
             self._stepping.step(lambda: self._navigator.move(self._navigator.q_rad))
             if self._earlier and not self._samples:
@@ -95,7 +95,7 @@ class Session:
                 self._take(block)
         except EndedEarlyError:
             self._journal.event("ended by a person", {"samples": self.taken})
-        self._reins.finish()
+        self._control.finish()
         return Summary(tuple(self._samples), tuple(self._steps), self._skipped)
 
     def _take(self, block: Block) -> None:

@@ -1,8 +1,7 @@
-"""A device that is attached again by itself: for logs of days, in which a cable may be pulled and put back.
+"""Devices whose failures are all DeviceErrors, whatever library is below; and one that is attached again by itself.
 
-A session does not use it: there a lost device stops the arm, and a person decides.
-
-A device whose failures are all DeviceErrors, whatever library is below it.
+The latter is for logs of days, in which a cable may be pulled and put back. A session does not use it: there a lost
+device stops the arm, and a person decides.
 """
 
 import threading

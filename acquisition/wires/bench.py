@@ -1,8 +1,7 @@
 """The bench on real wires: PSD box, encoders and controller read by pumps, the arm moved by its control process.
 
-When the readings have settled: two neighbouring short windows of the spots agree within their noise.
-
-Judged by the PSD box's own sample times, so the rule is the same whether the world runs in real time or faster.
+Readings have settled when two neighbouring short windows of the spots agree within their noise, judged by the PSD
+box's own sample times, so that the rule is the same whether the world runs in real time or faster.
 """
 
 from collections.abc import Callable

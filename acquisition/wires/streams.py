@@ -1,8 +1,7 @@
 """One reader thread per device: every block goes to the recording and into a short memory that the servo looks at.
 
-A thread ends in one of two ways: it is told to, or the device failed; then the failure is kept and told at once.
-
-Stops the arm when any device fails or falls silent, and lets the session know at its next step.
+A thread ends in one of two ways: it is asked to, or the device failed; then the failure is kept and passed on at once.
+The supervisor stops the arm when any device fails or falls silent, and lets the session know at its next step.
 """
 
 import threading

@@ -26,7 +26,7 @@ from types import FrameType
 from typing import Self
 
 from acquisition.errors import StoppedError
-from acquisition.session.control import BROKEN, OVER, Reins, RunState
+from acquisition.session.control import BROKEN, OVER, RunControl, RunState
 from acquisition.wires.streams import FROZEN_S
 from calibeam.asking import in_foreground
 from calibeam.interrupts import INTERRUPTS
@@ -66,11 +66,11 @@ class _Question:
 
 
 class Keys:
-    """What was pressed, told to the reins; or to who asks, while somebody does."""
+    """What was pressed, told to the run control; or to who asks, while somebody does."""
 
-    def __init__(self, reins: Reins, terminal: int | None, clock: Clock | None = None) -> None:
+    def __init__(self, control: RunControl, terminal: int | None, clock: Clock | None = None) -> None:
         """`terminal`: file descriptor that keys are read from."""
-        self._reins, self._terminal = reins, terminal
+        self._control, self._terminal = control, terminal
         self._clock: Clock = clock or SystemClock()
         self._turned_s = self._clock.now_s()
         self._ended_by = ""  # a signal that ends the session, whatever it is doing
@@ -89,18 +89,18 @@ class Keys:
         """One key."""
         key, question = ENTER if key == "\r" else key.lower(), self._question
         if key == "a":
-            self._reins.abort()
+            self._control.abort()
         elif key == "h":
-            self._reins.halt()
+            self._control.halt()
         elif question is not None:
             if key in question.allowed:
                 question.answers.put(key)
         elif key in " p":
-            self._reins.pause()
+            self._control.pause()
         elif key == "r":
-            self._reins.resume()
+            self._control.resume()
         elif key == "s":
-            self._reins.stop()
+            self._control.stop()
 
     def signalled(self, number: int) -> None:
         """A signal, as if the system had delivered it now."""
@@ -114,8 +114,8 @@ class Keys:
             self._question = question
         try:
             while True:
-                self._reins.check_devices()
-                if self._reins.state in BROKEN or self._reins.state in OVER:
+                self._control.check_devices()
+                if self._control.state in BROKEN or self._control.state in OVER:
                     raise StoppedError("the session was given up while a person was asked")
                 with suppress(queue.Empty):
                     return question.answers.get(timeout=LISTEN_S)
@@ -123,7 +123,7 @@ class Keys:
             self._question = None
 
     def __enter__(self) -> Self:
-        """From now on keys and signals go to the reins; at the end terminal and signals are as they were."""
+        """From now on keys and signals go to the run control; at the end terminal and signals are as they were."""
         with ExitStack() as opened:
             self._woken, self._wake = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
             self._turned_s = self._clock.now_s()
@@ -140,7 +140,7 @@ class Keys:
     def __exit__(self, *error: object) -> None:
         """KeyboardInterrupt where a signal that ends the session came when nothing was under way any more."""
         self._opened.close()
-        if self._ended_by and error[0] is None and self._reins.state in (RunState.IDLE, RunState.DONE):
+        if self._ended_by and error[0] is None and self._control.state in (RunState.IDLE, RunState.DONE):
             raise KeyboardInterrupt(self._ended_by)
 
     def _close(self) -> None:
@@ -168,8 +168,8 @@ class Keys:
     def insist(self) -> None:
         """What the session has not taken note of is repeated; to be called a few times a second."""
         if self._ended_by:
-            self._reins.abort(self._ended_by)  # it may have come before the session began
-        self._reins.insist()
+            self._control.abort(self._ended_by)  # it may have come before the session began
+        self._control.insist()
 
     def _was_frozen(self) -> bool:
         """Whether this program did nothing since the last turn; what the terminal holds then is discarded."""
@@ -203,15 +203,15 @@ class Keys:
             if number == signal.SIGHUP:
                 INTERRUPTS.leave_terminal()
             self._ended_by = self._ended_by or ENDED_BY[signal.Signals(number)]
-            self._reins.abort(self._ended_by)
+            self._control.abort(self._ended_by)
         elif number == signal.SIGCONT:
-            self._reins.resume()
+            self._control.resume()
         elif self._question is not None:
-            self._reins.abort()
+            self._control.abort()
         elif number == signal.SIGTSTP:
-            self._reins.pause()
+            self._control.pause()
         elif number == signal.SIGINT:
-            self._reins.interrupt()
+            self._control.interrupt()
 
 
 def _read(fd: int) -> str:

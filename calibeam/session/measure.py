@@ -1,4 +1,4 @@
-"""One part of a session measured: devices connected and recorded, the plan taken under the reins, forecasts beside."""
+"""One part of a session measured: devices connected and recorded, the plan taken under run control, with forecasts."""
 
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
@@ -10,7 +10,7 @@ import numpy as np
 from acquisition.centring.camera.board import Sight
 from acquisition.centring.loop import Limits
 from acquisition.recording import Event, RecordingWriter
-from acquisition.session.control import Reins
+from acquisition.session.control import RunControl
 from acquisition.session.plan import Block
 from acquisition.session.planned import PlannedSession
 from acquisition.session.records import Sample
@@ -52,7 +52,7 @@ class Measuring:
         self._reporter, self._person = told
         self._samples: list[Sample] = []
         self._forecaster = Forecaster(self._forecast, self._no_forecast)
-        self._reins = Reins(
+        self._control = RunControl(
             bench.stop,
             clock,
             lambda: bench.supervisor.failure,
@@ -67,7 +67,7 @@ class Measuring:
 
     def take(self, more: Sequence[Block] = ()) -> Summary:
         """All that was taken in this part so far. PartialResult when it ended early: the arm stands."""
-        with Keys(self._reins, self._person.keyboard) as keys, self._person.at(keys), self._forecaster.running():
+        with Keys(self._control, self._person.keyboard) as keys, self._person.at(keys), self._forecaster.running():
             try:
                 summary = kept(self._bench, self._writer, self._clock, self._session, self._run(more))
             except PartialResult as early:
@@ -90,14 +90,22 @@ class Measuring:
         rig, options, earlier = self._part.rig, self._job.options, self._part.earlier.taken
         journal = ReportingJournal(RecordingJournal(self._writer, self._clock), self._reporter, self._took)
         learner, home_rad = FittedLearner(rig), np.array(rig.motion.home_rad)
-        tell, limits, reins = self._reporter.progress, Limits(step_rad=rig.motion.step_limit_rad), self._reins
+        tell, limits, control = self._reporter.progress, Limits(step_rad=rig.motion.step_limit_rad), self._control
         if self._part.plan is not None:
             return PlannedSession(
-                self._bench, learner, journal, options, home_rad, tell=tell, sight=sight, reins=reins, earlier=earlier
+                self._bench,
+                learner,
+                journal,
+                options,
+                home_rad,
+                tell=tell,
+                sight=sight,
+                control=control,
+                earlier=earlier,
             )
         return Session(
             self._bench, learner, journal, options, home_rad,
-            limits=limits, tell=tell, sight=sight, reins=reins, earlier=earlier,
+            limits=limits, tell=tell, sight=sight, control=control, earlier=earlier,
         )  # fmt: skip
 
     def _run(self, more: Sequence[Block]) -> Callable[[], Summary]:

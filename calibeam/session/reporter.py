@@ -55,7 +55,7 @@ class StatusReporter:
             self._now(progress=progress, left_s=self._pace.left_s(progress.left))
 
     def state(self, state: RunState) -> None:
-        """From the reins, from several threads: the same one may come twice."""
+        """From the run control, from several threads: the same one may come twice."""
         with self._turn:
             if state is self.shown.state:
                 return
@@ -70,14 +70,14 @@ class StatusReporter:
         )
 
     def undelivered(self, trouble: DeviceError | None) -> None:
-        """From the reins: the arm could not be told to stop; None: now it was, or it need not be."""
+        """From the run control: the arm could not be told to stop; None: now it was, or it need not be."""
         with self._turn:
             self._now(undelivered="" if trouble is None else str(trouble))
             told = "no stop is outstanding any more" if trouble is None else f"{UNDELIVERED.upper()}: {trouble}"
             self.report(told)
 
     def pausing(self, rests_in_s: float, eased_s: float | None) -> None:
-        """From the reins: when the arm rests (s, at most); `eased_s`: it is braked softly for that, in this time."""
+        """From the run control: when the arm rests (s, at most); `eased_s`: braked softly for that, in this time."""
         if eased_s is not None:
             what = f"pause: the arm brakes on its way and stands within {_up(eased_s)} s"
         elif rests_in_s > 0.0:

@@ -1,11 +1,7 @@
-"""From a picture to where the fixture is: the board's pose before the camera, carried into the base by the arm.
+"""The printed board on the fixture as a camera sees it: its markers in a picture, and from these where the fixture is.
 
 The arm's zeros are wrong by degrees, so this is where the fixture must be believed to be *for the arm as it stands*:
 right for what is near, and taken anew after every longer way.
-
-What coarse aim wants of a camera: a picture of now.
-
-The printed board on the fixture: its markers in a picture, each with the points that belong to its corners.
 """
 
 from dataclasses import dataclass

@@ -1,14 +1,12 @@
 """How a camera is measured: a tour round the board for lens and mount, then a few poses with light for the beam.
 
-The camera measured against the beam: where the laser's line runs before the camera.
-Hand-eye calibration tells the mount in the flange as the arm's readings have it, whose last zero may be wrong by
+The tour looks at the board from all round, near and far, turned, and not only in the middle: rotations about two axes
+across each other fix the mount; tilts of the board against the picture fix the focal length.
+
+Hand-eye calibration gives the mount in the flange as the arm's readings have it, whose last zero may be wrong by
 degrees; the laser is drawn in the flange as built. What an aim wants is neither, but the laser's line before the
-camera. A pose with light on both faces tells it: the spots fix the beam in the fixture (FixtureOptics.line), the
+camera. A pose with light on both faces gives it: the spots fix the beam in the fixture (FixtureOptics.line), the
 picture the fixture before the camera. The arm takes no part in it.
-
-From where the board is looked at to measure the camera: all round, near and far, turned, and not only in the middle.
-
-Rotations about two axes across each other fix the mount; tilts of the board against the picture fix the focal length.
 """
 
 from collections.abc import Iterator, Sequence

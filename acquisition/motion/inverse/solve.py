@@ -1,9 +1,8 @@
 """Joint readings for wanted flange poses, or places of a point, on any arm, many at a time: damped Newton steps.
 
+`Solver` is an arm with all that this needs: the nearest posture for a pose, and one branch kept on a way.
 Source of the damping: T. Sugihara, Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method, IEEE
 Trans. Robotics 27 (2011) 984: the damping is the squared error itself, so the last steps are Newton's.
-
-An arm with all that its inverse kinematics need: the nearest posture for a pose, and one branch kept on a way.
 """
 
 from dataclasses import dataclass

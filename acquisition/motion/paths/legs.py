@@ -3,9 +3,8 @@
 A leg is a curve of points over time that knows nothing of the belt; the belt enters where a point becomes joints. So
 a leg goes on along a belt that is faster, slower or stands still, without being planned again.
 
-The drive transform D(r) = T(r) Ra(r) Ro(r): straight from one pose to another, turning about two axes at once.
-
-The approach vector turns by r theta about k = (-sin psi, cos psi, 0), and the tool by r phi about the approach vector.
+The drive transform D(r) = T(r) Ra(r) Ro(r) goes straight from one pose to another, turning about two axes at once: the
+approach vector turns by r theta about k = (-sin psi, cos psi, 0), and the tool by r phi about the approach vector.
 Source: R. Paul, Robot Manipulators, 1981, ch. 5.7; lecture chapter 8, "Cartesian motion".
 """
 

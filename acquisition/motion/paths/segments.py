@@ -1,7 +1,4 @@
-"""What a path is made of before it is planned: where to, how, and how fast at most.
-
-Where a motion goes: the general form T6 TOOL = COORD(s) POS.
-"""
+"""What a path is made of before it is planned: where to (T6 TOOL = COORD(s) POS), how, and how fast at most."""
 
 import enum
 from collections.abc import Callable

@@ -1,6 +1,5 @@
-"""What a named transform of a task can be: known, still to be taught, read by a camera, or carried by a belt.
-
-Equations of transforms, `T6 TOOL = COORD POS`: as text, as a closed loop, and solved for one term.
+"""What a named transform of a task can be (known, still to be taught, read by a camera, carried by a belt), and
+equations between transforms, `T6 TOOL = COORD POS`: as text, as a closed loop, and solved for one term.
 
 An equation a b = c d is the loop a b d^-1 c^-1 = 1. Turned about until one term stands first, the inverse of the rest
 is that term. Source: R. Paul, Robot Manipulators, 1981, ch. 1.11 and 5.2 (transform graphs).

@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 from acquisition.errors import AcquisitionError
-from acquisition.session.control import Reins, RunEvent, RunState
+from acquisition.session.control import RunControl, RunEvent, RunState
 from acquisition.session.records import Phase, Progress
 from calibeam.asking import Asking
 from calibeam.live.feed import SILENT
@@ -261,12 +261,12 @@ def test_a_script_gets_what_is_safe_and_nobody_puts_a_fixture_for_it(reporter) -
 
 def test_the_question_for_the_fixture_is_on_the_screen_before_an_enter_counts(reporter, heard, typist) -> None:
     """Typed ahead, and typed while the question is being drawn: neither is an answer."""
-    reins = Reins(lambda: None, changed=reporter.state)
-    reins.tell(RunEvent.START)
+    control = RunControl(lambda: None, changed=reporter.state)
+    control.tell(RunEvent.START)
     asked = person(reporter, Asking(typist.terminal), agrees=False)
     typist.ahead("\n")
     typist.answers("then press ENTER", "\n")
-    with Keys(reins, typist.terminal) as keys, asked.at(keys):
+    with Keys(control, typist.terminal) as keys, asked.at(keys):
         asker = threading.Thread(target=asked.place, args=("put the fixture at place 2",))
         asker.start()
         assert typist.shows("put the fixture at place 2, then press ENTER")

@@ -7,7 +7,7 @@ import pytest
 
 from acquisition.recording.rig import Rig, load_rig, plain_rig, rig_text
 
-RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd-camera.toml"
+RIG = Path(__file__).parents[4] / "rigs" / "ur5e-dual-psd-camera.toml"
 
 
 @pytest.fixture(scope="session")

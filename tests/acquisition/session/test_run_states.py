@@ -2,7 +2,7 @@
 
 import pytest
 
-from acquisition.session.control import BROKEN, OVER, BrokenOffError, Reins, RunEvent, RunState, after
+from acquisition.session.control import BROKEN, OVER, BrokenOffError, RunControl, RunEvent, RunState, after
 
 IDLE, RUNNING, PAUSING, BREAKING, PAUSED, ENDING, ABORTING, DONE, ABORTED, HALTED = RunState
 # START PAUSE BREAK RESUME STOP ABORT HALT CHECKPOINT FINISHED FAULT
@@ -41,13 +41,13 @@ PAIRS = [
 def test_every_pair(state: RunState, event: RunEvent, then: RunState) -> None:
     assert after(state, event) is then
     stops: list[int] = []
-    reins = Reins(lambda: stops.append(1))
+    control = RunControl(lambda: stops.append(1))
     for before in WAYS[state]:
-        reins.tell(before)
-    assert reins.state is state
+        control.tell(before)
+    assert control.state is state
     stops.clear()
-    reins.tell(event)
-    assert reins.state is then
+    control.tell(event)
+    assert control.state is then
     # A halt always stops the arm; else it is stopped on the way into a state in which nothing may move.
     assert bool(stops) is (event is RunEvent.HALT or (then in BROKEN and then is not state))
 
@@ -59,34 +59,34 @@ def test_what_is_over_lets_no_motion_go_on_by_itself() -> None:
 
 @pytest.mark.parametrize("state", RunState)
 def test_however_often_ctrl_c_comes_no_motion_begins_by_it_and_three_end_a_session(state: RunState) -> None:
-    reins = Reins(lambda: None)
+    control = RunControl(lambda: None)
     for before in WAYS[state]:
-        reins.tell(before)
+        control.tell(before)
     for _ in range(3):
-        now = reins.state
-        reins.interrupt()
-        assert reins.state is not RUNNING
-        assert not (now in BROKEN and reins.state not in BROKEN)
-    assert reins.state in (OVER if state in OVER else (ABORTING, ABORTED, HALTED))
+        now = control.state
+        control.interrupt()
+        assert control.state is not RUNNING
+        assert not (now in BROKEN and control.state not in BROKEN)
+    assert control.state in (OVER if state in OVER else (ABORTING, ABORTED, HALTED))
 
 
 @pytest.mark.parametrize("state", [IDLE, DONE])
 @pytest.mark.parametrize("times", [1, 2, 3])
 def test_ctrl_c_before_measuring_begins_holds_it_before_its_first_motion(state: RunState, times: int) -> None:
-    reins = Reins(lambda: None)
+    control = RunControl(lambda: None)
     for before in WAYS[state]:
-        reins.tell(before)
+        control.tell(before)
     for _ in range(times):
-        reins.interrupt()
-    reins.tell(RunEvent.START)
-    assert reins.state is (PAUSING if times < 3 else ABORTING)
+        control.interrupt()
+    control.tell(RunEvent.START)
+    assert control.state is (PAUSING if times < 3 else ABORTING)
     with pytest.raises(BrokenOffError):
-        reins.check(begins=True)
+        control.check(begins=True)
 
 
 def test_a_pause_that_was_taken_back_before_measuring_begins_holds_nothing() -> None:
-    reins = Reins(lambda: None)
-    reins.pause()
-    reins.resume()
-    reins.tell(RunEvent.START)
-    assert reins.state is RUNNING
+    control = RunControl(lambda: None)
+    control.pause()
+    control.resume()
+    control.tell(RunEvent.START)
+    assert control.state is RUNNING

@@ -10,11 +10,11 @@ from acquisition.session.control import (
     REST_S,
     BrokenOffError,
     EndedEarlyError,
-    Reins,
+    RunControl,
     RunEvent,
     RunState,
 )
-from acquisition.session.stepping import ReinedBench
+from acquisition.session.stepping import InterruptibleBench
 from drivers.errors import DeviceError, DeviceLost, DeviceRefused
 
 
@@ -56,10 +56,10 @@ def clock() -> Clock:
     return Clock()
 
 
-def running(stop=lambda: None, clock=None, **more) -> Reins:
-    reins = Reins(stop, clock, **more)
-    reins.tell(RunEvent.START)
-    return reins
+def running(stop=lambda: None, clock=None, **more) -> RunControl:
+    control = RunControl(stop, clock, **more)
+    control.tell(RunEvent.START)
+    return control
 
 
 def in_thread(act) -> tuple[threading.Thread, list]:
@@ -78,13 +78,13 @@ def in_thread(act) -> tuple[threading.Thread, list]:
 
 def test_a_pause_waits_at_the_checkpoint_until_it_is_resumed(clock) -> None:
     paused = threading.Event()
-    reins = running(clock=clock, changed=lambda state: paused.set() if state is RunState.PAUSED else None)
-    assert reins.checkpoint() is False
-    reins.pause()
-    thread, out = in_thread(reins.checkpoint)
+    control = running(clock=clock, changed=lambda state: paused.set() if state is RunState.PAUSED else None)
+    assert control.checkpoint() is False
+    control.pause()
+    thread, out = in_thread(control.checkpoint)
     assert paused.wait(10.0)
     assert thread.is_alive()
-    reins.resume()
+    control.resume()
     thread.join(10.0)
     assert out == [True]
 
@@ -93,101 +93,101 @@ def test_a_pause_waits_at_the_checkpoint_until_it_is_resumed(clock) -> None:
     ("after_s", "state"), [(PAUSE_AGAIN_S, RunState.BREAKING), (PAUSE_AGAIN_S + 0.1, RunState.PAUSING)]
 )
 def test_a_second_pause_within_ten_seconds_is_at_once(clock, after_s, state) -> None:
-    reins = running(clock=clock)
-    reins.interrupt()
+    control = running(clock=clock)
+    control.interrupt()
     clock.time_s += after_s
-    reins.interrupt()
-    assert reins.state is state
+    control.interrupt()
+    assert control.state is state
 
 
 def test_a_pause_after_a_resume_is_a_first_one(clock) -> None:
-    reins = running(clock=clock)
-    reins.pause()
-    reins.resume()
-    reins.pause()
-    assert reins.state is RunState.PAUSING
+    control = running(clock=clock)
+    control.pause()
+    control.resume()
+    control.pause()
+    assert control.state is RunState.PAUSING
 
 
 def test_ctrl_c_while_paused_aborts(clock) -> None:
-    reins = running(clock=clock)
-    reins.pause()
-    reins.tell(RunEvent.CHECKPOINT)
+    control = running(clock=clock)
+    control.pause()
+    control.tell(RunEvent.CHECKPOINT)
     clock.time_s += PAUSE_AGAIN_S + 0.1
-    reins.interrupt()
+    control.interrupt()
     with pytest.raises(StoppedError, match="aborted"):
-        reins.checkpoint()
+        control.checkpoint()
 
 
 def test_stop_ends_at_the_checkpoint_and_not_before() -> None:
-    reins = running()
-    reins.stop()
-    reins.check()
+    control = running()
+    control.stop()
+    control.check()
     with pytest.raises(EndedEarlyError):
-        reins.checkpoint()
+        control.checkpoint()
 
 
 def test_a_device_that_fails_ends_the_pause() -> None:
     failed: list[Exception] = []
     paused = threading.Event()
-    reins = running(
+    control = running(
         failure=lambda: failed[0] if failed else None,
         changed=lambda state: paused.set() if state is RunState.PAUSED else None,
     )
-    reins.pause()
-    thread, out = in_thread(reins.checkpoint)
+    control.pause()
+    thread, out = in_thread(control.checkpoint)
     assert paused.wait(10.0)
     failed.append(DeviceLost("psd: gone"))
     thread.join(10.0)
     assert isinstance(out[0], DeviceLost)
-    assert reins.state is RunState.ABORTED
+    assert control.state is RunState.ABORTED
 
 
 def test_a_motion_under_way_is_broken_off_by_the_second_pause_and_is_no_failure_of_the_arm() -> None:
     arm = Arm()
-    reins = running(arm.stop)
-    thread, out = in_thread(lambda: ReinedBench(arm, reins).move(None))
+    control = running(arm.stop)
+    thread, out = in_thread(lambda: InterruptibleBench(arm, control).move(None))
     assert arm.moving.wait(10.0)
-    reins.pause()
+    control.pause()
     assert not arm.stopped.is_set()
-    reins.pause()
+    control.pause()
     thread.join(10.0)
     assert isinstance(out[0], BrokenOffError)
-    assert reins.state is RunState.BREAKING
+    assert control.state is RunState.BREAKING
 
 
 def test_no_motion_begins_while_the_arm_is_being_stopped() -> None:
     arm = Arm()
-    reins = running(arm.stop)
-    reins.tell(RunEvent.BREAK)
+    control = running(arm.stop)
+    control.tell(RunEvent.BREAK)
     with pytest.raises(BrokenOffError):
-        ReinedBench(arm, reins).move(None)
+        InterruptibleBench(arm, control).move(None)
     assert arm.begun == 0
 
 
 def test_a_stop_that_fell_before_the_motion_is_said_again() -> None:
-    """The session had looked at the reins, and its motion was not sent yet when the arm was stopped."""
+    """The session had looked at the run control, and its motion was not sent yet when the arm was stopped."""
     arm = Arm()
-    reins = running(arm.stop)
+    control = running(arm.stop)
 
     class Slips(Arm):
         def move(self, q_rad: object) -> None:
-            reins.tell(RunEvent.BREAK)
+            control.tell(RunEvent.BREAK)
             arm.stopped.clear()  # nothing moved yet, so this stop ended nothing
             arm.move(q_rad)
 
-    thread, out = in_thread(lambda: ReinedBench(Slips(), reins).move(None))
+    thread, out = in_thread(lambda: InterruptibleBench(Slips(), control).move(None))
     assert arm.moving.wait(10.0)
-    reins.insist()
+    control.insist()
     thread.join(10.0)
     assert isinstance(out[0], BrokenOffError)
 
 
 def test_a_motion_that_arrived_as_it_was_broken_off_counts_as_broken_off() -> None:
     arm = Arm()
-    reins = running()
-    thread, out = in_thread(lambda: ReinedBench(arm, reins).move(None))
+    control = running()
+    thread, out = in_thread(lambda: InterruptibleBench(arm, control).move(None))
     assert arm.moving.wait(10.0)
-    reins.tell(RunEvent.BREAK)
+    control.tell(RunEvent.BREAK)
     arm.arrive.set()
     thread.join(10.0)
     assert isinstance(out[0], BrokenOffError)
@@ -199,18 +199,18 @@ def test_a_failure_of_the_arm_stays_one() -> None:
             raise DeviceRefused("robot: protective stop")
 
     with pytest.raises(DeviceRefused, match="protective"):
-        ReinedBench(Fails(), running()).move(None)
+        InterruptibleBench(Fails(), running()).move(None)
 
 
 def test_a_stop_that_cannot_be_delivered_is_kept_and_the_session_ends_all_the_same() -> None:
     def no_way() -> None:
         raise DeviceLost("robot: no way to the controller")
 
-    reins = running(no_way)
-    reins.abort()
-    assert isinstance(reins.trouble, DeviceLost)
+    control = running(no_way)
+    control.abort()
+    assert isinstance(control.trouble, DeviceLost)
     with pytest.raises(StoppedError):
-        reins.checkpoint()
+        control.checkpoint()
 
 
 def test_a_stop_that_cannot_be_delivered_is_told_once_and_so_is_the_one_that_is() -> None:
@@ -220,105 +220,106 @@ def test_a_stop_that_cannot_be_delivered_is_told_once_and_so_is_the_one_that_is(
         if ways:
             raise ways.pop()
 
-    reins = running(stop, undelivered=told.append)
-    reins.tell(RunEvent.BREAK)
+    control = running(stop, undelivered=told.append)
+    control.tell(RunEvent.BREAK)
     for _ in range(3):
-        reins.insist()
+        control.insist()
     assert [str(trouble) for trouble in told] == ["robot: gone", "None"]
 
 
 @pytest.mark.parametrize(
-    ("say", "how"), [(Reins.abort, "hold"), (Reins.halt, "hold"), (lambda reins: reins.tell(RunEvent.BREAK), "stop")]
+    ("say", "how"),
+    [(RunControl.abort, "hold"), (RunControl.halt, "hold"), (lambda control: control.tell(RunEvent.BREAK), "stop")],
 )
 def test_only_a_pause_lets_the_arm_move_again(say, how) -> None:
     done: list[str] = []
-    reins = running(lambda: done.append("stop"), hold_arm=lambda: done.append("hold"))
-    say(reins)
-    reins.insist()
+    control = running(lambda: done.append("stop"), hold_arm=lambda: done.append("hold"))
+    say(control)
+    control.insist()
     assert done == [how, how]
 
 
 def test_a_stop_said_while_the_arm_is_being_stopped_does_not_take_that_back() -> None:
     stops: list[int] = []
-    reins = running(lambda: stops.append(1))
-    reins.tell(RunEvent.BREAK)
-    reins.stop()
-    reins.insist()
+    control = running(lambda: stops.append(1))
+    control.tell(RunEvent.BREAK)
+    control.stop()
+    control.insist()
     assert len(stops) == 2
     with pytest.raises(BrokenOffError):
-        reins.check()
+        control.check()
 
 
 def test_an_abort_in_the_last_moment_is_no_success() -> None:
-    reins = running()
-    reins.abort()
+    control = running()
+    control.abort()
     with pytest.raises(StoppedError):
-        reins.finish()
+        control.finish()
 
 
 @pytest.mark.parametrize(("left_s", "eases"), [(0.0, False), (0.9 * REST_S, False), (1.1 * REST_S, True), (10.0, True)])
 def test_a_pause_lets_a_short_motion_arrive_and_brakes_a_long_one_softly(clock, left_s, eases) -> None:
     eased, told = threading.Event(), list[tuple[float, bool]]()
-    reins = running(
+    control = running(
         lambda: pytest.fail("a first pause is soft"),
         clock,
         rests_in_s=lambda: left_s,
         ease_arm=eased.set,
         pausing=lambda rests_in_s, eased: told.append((rests_in_s, eased)),
     )
-    reins.interrupt()
+    control.interrupt()
     assert told == [(left_s, eases)]
     assert eased.wait(10.0 if eases else 0.0) is eases
     if eases:
         with pytest.raises(BrokenOffError):
-            reins.check()
+            control.check()
     else:
-        reins.check()
+        control.check()
 
 
 def test_a_pause_while_the_session_ends_rests_the_arm_as_any_other(clock) -> None:
     eased = threading.Event()
-    reins = running(clock=clock, rests_in_s=lambda: 8.0, ease_arm=eased.set)
-    reins.stop()
-    reins.interrupt()
-    assert reins.state is RunState.PAUSING
+    control = running(clock=clock, rests_in_s=lambda: 8.0, ease_arm=eased.set)
+    control.stop()
+    control.interrupt()
+    assert control.state is RunState.PAUSING
     assert eased.wait(10.0)
     with pytest.raises(BrokenOffError):
-        reins.check(begins=True)
+        control.check(begins=True)
 
 
 def test_a_motion_that_outlasts_its_pause_is_braked(clock) -> None:
     """An operator has slowed the arm down, or the motion had not begun yet when the pause was said."""
     eased, left_s = threading.Event(), [0.5]
-    reins = running(clock=clock, rests_in_s=lambda: left_s[0], ease_arm=eased.set)
-    reins.pause()
-    reins.insist()
+    control = running(clock=clock, rests_in_s=lambda: left_s[0], ease_arm=eased.set)
+    control.pause()
+    control.insist()
     assert not eased.is_set()
     clock.time_s += REST_S + 0.1
-    reins.insist()
+    control.insist()
     assert eased.wait(10.0)
 
 
 def test_no_motion_begins_in_a_pause() -> None:
     arm = Arm()
-    reins = running(arm.stop)
-    reins.pause()
+    control = running(arm.stop)
+    control.pause()
     with pytest.raises(BrokenOffError):
-        ReinedBench(arm, reins).move(None)
+        InterruptibleBench(arm, control).move(None)
     assert arm.begun == 0
 
 
 def test_a_motion_braked_by_a_pause_is_broken_off_also_after_a_resume(clock) -> None:
     arm = Arm()
-    reins = running(arm.stop, clock, rests_in_s=lambda: 5.0)
-    thread, out = in_thread(lambda: ReinedBench(arm, reins).move(None))
+    control = running(arm.stop, clock, rests_in_s=lambda: 5.0)
+    thread, out = in_thread(lambda: InterruptibleBench(arm, control).move(None))
     assert arm.moving.wait(10.0)
-    reins.pause()
-    reins.resume()
+    control.pause()
+    control.resume()
     thread.join(10.0)
     assert isinstance(out[0], BrokenOffError)
-    assert reins.checkpoint() is False
-    reins.check(begins=True)
+    assert control.checkpoint() is False
+    control.check(begins=True)
 
 
 @pytest.mark.parametrize(
@@ -330,9 +331,9 @@ def test_a_motion_braked_by_a_pause_is_broken_off_also_after_a_resume(clock) -> 
 )
 def test_ctrl_c_again_and_again(clock, moves, states) -> None:
     """The second one finds an arm that stands already, or brakes it now; the third gives up."""
-    reins = running(clock=clock)
+    control = running(clock=clock)
     for state in states:
-        reins.interrupt()
+        control.interrupt()
         if not moves:
-            reins.tell(RunEvent.CHECKPOINT)
-        assert reins.state is state
+            control.tell(RunEvent.CHECKPOINT)
+        assert control.state is state

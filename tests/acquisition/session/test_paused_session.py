@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.errors import StoppedError
-from acquisition.session.control import Reins, RunState
+from acquisition.session.control import RunControl, RunState
 from acquisition.session.plan import PlanOptions, PoseKey, blocks
 from acquisition.session.session import Session
 from calibeam.learner import FittedLearner
@@ -38,8 +38,8 @@ def bench(bench_of) -> Disturbed:
     return Disturbed(plain.world, plain.half_size_m)
 
 
-def session_on(rig, bench, kept: Kept, reins: Reins, **more) -> Session:
-    return Session(bench, FittedLearner(rig), kept, TINY, np.array(rig.motion.home_rad), reins=reins, **more)
+def session_on(rig, bench, kept: Kept, control: RunControl, **more) -> Session:
+    return Session(bench, FittedLearner(rig), kept, TINY, np.array(rig.motion.home_rad), control=control, **more)
 
 
 def keys_of(kept: Kept) -> list[PoseKey]:
@@ -54,36 +54,36 @@ def test_a_motion_broken_off_is_made_again_and_no_pose_is_lost(rig, bench, at) -
     def changed(state: RunState) -> None:
         states.append(state.name)
         if state is RunState.PAUSED:
-            reins.resume()
+            control.resume()
 
-    reins = Reins(bench.stop, changed=changed)
+    control = RunControl(bench.stop, changed=changed)
 
     def trouble(move: int) -> None:
         if move == at and "PAUSED" not in states:
-            reins.pause()
-            reins.pause()
-            reins.resume()  # comes too early, and means nothing while the arm is being stopped
+            control.pause()
+            control.pause()
+            control.resume()  # comes too early, and means nothing while the arm is being stopped
             raise DeviceRefused("robot: the motion was ended by stop()")
 
     bench.trouble = trouble
-    summary = session_on(rig, bench, kept, reins).take(PLAN)
+    summary = session_on(rig, bench, kept, control).take(PLAN)
     assert states[:4] == ["RUNNING", "PAUSING", "BREAKING", "PAUSED"]
     assert sorted(map(repr, keys_of(kept))) == sorted(map(repr, ALL))
     assert summary.skipped == 0
 
 
 def test_after_a_pause_every_joint_still_comes_from_the_side_that_is_told(rig, bench) -> None:
-    reins = Reins(bench.stop, changed=lambda state: reins.resume() if state is RunState.PAUSED else None)
+    control = RunControl(bench.stop, changed=lambda state: control.resume() if state is RunState.PAUSED else None)
 
     class Watched(Kept):
         def sample(self, sample) -> None:
             super().sample(sample)
             if len(self.samples) == 2:  # a person pushes the arm away while it is paused
-                reins.pause()
+                control.pause()
                 bench.move(bench.standing_rad + 0.02)
 
     kept = Watched()
-    session_on(rig, bench, kept, reins).take(PLAN)
+    session_on(rig, bench, kept, control).take(PLAN)
     plain, again, other = [sample for sample in kept.samples if sample.repeat is not None]
     moved = plain.approach != 0
     assert np.array_equal(again.approach[moved], plain.approach[moved])
@@ -91,33 +91,33 @@ def test_after_a_pause_every_joint_still_comes_from_the_side_that_is_told(rig, b
 
 
 def test_what_was_taken_is_not_taken_again(rig, bench) -> None:
-    kept, reins = Kept(), Reins(bench.stop)
+    kept, control = Kept(), RunControl(bench.stop)
 
     class Enough(Kept):
         def sample(self, sample) -> None:
             super().sample(sample)
             if len(self.samples) == 3:
-                reins.stop()
+                control.stop()
 
     first = Enough()
-    assert len(session_on(rig, bench, first, reins).take(PLAN).samples) == 3
+    assert len(session_on(rig, bench, first, control).take(PLAN).samples) == 3
     earlier = dict(zip(keys_of(first), first.samples, strict=True))
-    session_on(rig, bench, kept, Reins(bench.stop), earlier=earlier).take(PLAN)
+    session_on(rig, bench, kept, RunControl(bench.stop), earlier=earlier).take(PLAN)
     assert sorted(map(repr, [*keys_of(first), *keys_of(kept)])) == sorted(map(repr, ALL))
 
 
 def test_an_abort_stops_the_arm_and_keeps_what_was_taken(rig, bench) -> None:
-    reins = Reins(bench.stop)
+    control = RunControl(bench.stop)
 
     class Given(Kept):
         def sample(self, sample) -> None:
             super().sample(sample)
             if len(self.samples) == 2:
-                reins.abort()
+                control.abort()
                 moves.append(bench.moves)
 
     moves: list[int] = []
-    session = session_on(rig, bench, Given(), reins)
+    session = session_on(rig, bench, Given(), control)
     with pytest.raises(StoppedError, match="aborted, the arm stands"):
         session.take(PLAN)
     assert session.taken == 2
