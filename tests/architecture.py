@@ -148,7 +148,7 @@ def figures() -> tuple[Figure, ...]:
 
 TODAY = {
     "files": 836,
-    "lines": 92_000,
+    "lines": 92_200,
     "longest_function": 54,
     "one_importer": 49,
     "classes": 38,

@@ -22,6 +22,7 @@ WIRED = (
     "calibeam/session/test_wired_pause.py",
     "calibeam/session/test_wired_stops.py",
     "calibeam/test_camera_cli.py",
+    "calibeam/test_centre_cli.py",
     "calibeam/test_check_cli.py",
     "calibeam/test_cli.py",
     "calibeam/test_device_faults.py",

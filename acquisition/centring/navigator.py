@@ -15,8 +15,8 @@ from acquisition.centring.aim import BeamTarget, between, flange_for, reach
 from acquisition.centring.by_camera import OTHER_ROLLS_RAD, Aim, Aimed
 from acquisition.centring.camera.board import Sight
 from acquisition.centring.loop import Centring, Limits, centre
-from acquisition.centring.registered import FIRST_GAIN, Registered
 from acquisition.centring.search import Found, Search
+from acquisition.centring.strategies import REGISTERED, CentringChoice, fixture_after
 from acquisition.errors import NoLightError, SpotLostError, UnreachableError
 from acquisition.session.records import Journal, Learner
 
@@ -25,7 +25,6 @@ Floats = NDArray[np.float64]
 LANDING_TRIES = 12  # on the way to a pose: halvings of the jump and stops to learn, together
 GLANCE_S = 0.01  # enough to tell light from dark: 10 samples at 1 kHz
 FINDING_STAND_OFF_M = 0.2
-KNOWN_GAIN = 1.0
 NEAR = Limits(tolerance_m=1.5e-3, max_steps=8)  # anywhere near the asked-for spots will do
 
 
@@ -49,8 +48,10 @@ class Navigator:
         home_rad: Floats,
         seed: int,
         sight: Sight | None = None,
+        centring: CentringChoice = REGISTERED,
     ) -> None:
         """`sight`: a camera that sees the fixture; without one, light is searched around the nominal rig's aim."""
+        self._centring = centring
         self._bench, self._learner, self._journal, self._sight = bench, learner, journal, sight
         self._rng = np.random.default_rng(seed)
         self._lit: list[LitPose] = []
@@ -87,6 +88,17 @@ class Navigator:
             self._search(first, T)
         self._stand_in_light(target, T)
         return self.q_rad
+
+    def centre_here(self, placement: int, target: BeamTarget, limits: Limits) -> Centring:
+        """From where the arm stands: search the light if it is dark, then bring the spots to the target's.
+
+        NoLightError where there is none; SpotLostError where it was lost and going back did not find it.
+        """
+        self._placement = placement
+        T = self._lit[-1].T_base_fixture if self._lit else self._learner.T_base_fixture(placement)
+        if self._dark(target.first):
+            self._search(target.first, T)
+        return self._centre(target, T, limits)
 
     def visit(self, target: BeamTarget, limits: Limits | None) -> Centring:
         """Land on the target and bring the spots there: within `limits`, or only near it.
@@ -157,15 +169,16 @@ class Navigator:
         raise SpotLostError(f"no light on the way to roll {target.roll_rad:.2f} rad in {LANDING_TRIES} tries")
 
     def _centre(self, target: BeamTarget, T: Floats, limits: Limits) -> Centring:
-        first_gain = KNOWN_GAIN if self._lit else FIRST_GAIN  # after a lit pose of this block T is known, not guessed
-        strategy = Registered(self._learner.arm, self._learner.optics, T, target.first, first_gain)
-        run = centre(self._bench, self._learner.arm, strategy, self.q_rad, np.array(target.spots_m), limits)
+        arm, optics = self._learner.arm, self._learner.optics
+        strategy = self._centring.strategy(arm, optics, T, target.first, known=bool(self._lit))
+        run = centre(self._bench, arm, strategy, self.q_rad, np.array(target.spots_m), limits)
         for step in run.trace[1:]:
             self._note(step.q_rad)
         self._journal.event("centring", _told(run, self._placement, target, limits))
         if not all(run.look.lit(target.first)):
             raise SpotLostError(f"the light was lost while centring: {run.status.value}")
-        self._lit.append(LitPose(target, self.q_rad, strategy.T_base_fixture))
+        here = fixture_after(run, strategy, arm, optics, T, target.first)
+        self._lit.append(LitPose(target, self.q_rad, here))
         return run
 
     def _dark(self, first: int) -> bool:

@@ -1,4 +1,4 @@
-"""Law (8) with the fixture pose corrected from every reading: the strategy that sessions use.
+"""Law (8) with the fixture pose corrected from every reading: the strategy of sessions unless another is chosen.
 
 Two spots fix the whole incoming beam in the fixture's frame: point on the first face, and direction by mirroring. The
 same beam is known in the base frame from the joints. One reading therefore leaves only two of the fixture's six

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.centring.aim import BeamTarget
+from acquisition.centring.strategies import REGISTERED, CentringChoice
 
 Floats = NDArray[np.float64]
 
@@ -51,6 +52,7 @@ class PlanOptions:
     opposite_rad: float = 0.035  # how far the other side is
     dwell_s: float = 0.2
     seed: int = 1
+    centring: CentringChoice = REGISTERED
 
 
 @dataclass(frozen=True)

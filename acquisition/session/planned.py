@@ -57,7 +57,7 @@ class PlannedSession:
         self._control = control or RunControl(bench.stop)
         self._bench = InterruptibleBench(bench, self._control)
         self._learner, self._journal, self._options = learner, journal, options
-        self._navigator = Navigator(self._bench, learner, journal, home_rad, options.seed, sight)
+        self._navigator = Navigator(self._bench, learner, journal, home_rad, options.seed, sight, options.centring)
         self._stepping = Stepping(self._control, self._bench, self._navigator, lambda: None)
         self._tell, self._earlier = tell, {key.index: sample for key, sample in earlier.items()}
         self._samples: list[Sample] = []

@@ -61,7 +61,7 @@ class Session:
         self._control = control or RunControl(bench.stop)
         self._bench = InterruptibleBench(bench, self._control)
         self._learner, self._journal, self._options = learner, journal, options
-        self._navigator = Navigator(self._bench, learner, journal, home_rad, options.seed, sight)
+        self._navigator = Navigator(self._bench, learner, journal, home_rad, options.seed, sight, options.centring)
         self._stepping = Stepping(self._control, self._bench, self._navigator, self._astray)
         self._limits, self._tell, self._earlier = limits or Limits(), tell, earlier
         self._samples: list[Sample] = []

@@ -9,13 +9,14 @@ import pytest
 
 from acquisition.bench import Look
 from acquisition.centring.navigator import GLANCE_S
+from acquisition.centring.strategies import CentringBy, CentringChoice
 from acquisition.errors import NoLightError
 from acquisition.session.plan import PlanOptions, blocks
 from acquisition.session.records import Sample
 from acquisition.session.session import Session, Summary
 from calibeam.learner import FittedLearner
 from drivers.errors import DeviceRefused
-from tests.support.direct_bench import DirectBench
+from tests.support.direct_bench import DirectBench, direct_bench
 
 SMALL = PlanOptions(centred=2, off_centre=4, repeats=1)
 
@@ -42,8 +43,6 @@ def run(rig, bench, options: PlanOptions = SMALL) -> tuple[Summary, Kept]:
 
 @pytest.fixture(scope="module")
 def taken(rig, plain_rig) -> tuple[Summary, Kept]:
-    from tests.support.direct_bench import direct_bench
-
     return run(rig, direct_bench(rig, plain_rig, seed=6))
 
 
@@ -62,6 +61,18 @@ def test_centred_poses_are_within_5_um(taken) -> None:
     centred = [sample.look.spots_m() for sample in taken[0].samples if sample.centred and sample.repeat is None]
     assert len(centred) == 12
     # The reading after the servo is a new one: 0.3 um of noise of the deciding look comes on top of the tolerance.
+    assert np.max(np.abs(centred)) < 6e-6
+
+
+@pytest.mark.parametrize("by", [CentringBy.MEASURED, CentringBy.LAW8])
+def test_another_strategy_centres_as_well_and_the_recording_says_which(rig, plain_rig, by) -> None:
+    few = PlanOptions(centred=2, off_centre=1, repeats=0, roll_rad=(-0.5, 0.5), centring=CentringChoice(by))
+    kept = Kept()
+    bench = direct_bench(rig, plain_rig, seed=6)
+    summary = Session(bench, FittedLearner(rig), kept, few, np.array(rig.motion.home_rad)).run((1,))
+    assert {detail["strategy"] for kind, detail in kept.events if kind == "centring"} == {by.value}
+    centred = [sample.look.spots_m() for sample in summary.samples if sample.centred]
+    assert len(centred) == 4
     assert np.max(np.abs(centred)) < 6e-6
 
 
