@@ -24,8 +24,8 @@ from calibeam.emulation import ask_emulators, moves_nothing_real
 from calibeam.guided.recorded import encoder_address, is_guided
 from calibeam.guided.run import plan_of, run_guided
 from calibeam.live.feed import SILENT, Feed
-from calibeam.session.job import EarlierParts, Job, new_place, read_earlier_parts, with_place, with_places
-from calibeam.session.run import run_session
+from calibeam.sessions.job import EarlierParts, Job, new_place, read_earlier_parts, with_place, with_places
+from calibeam.sessions.run import run_session
 from drivers.clock import SystemClock
 
 ACCURACY_UM = 20.0  # as Job.goal_m

@@ -91,7 +91,7 @@ def record_session(
     """Take every place of the rig, or the poses of a plan, told by `bar`; with a camera the light is aimed at by it.
 
     PartialResult when it ended early: the arm stands, samples are kept. Nobody is asked, and nothing can be paused:
-    calibeam/session/run.py.
+    calibeam/sessions/run.py.
     """
     home_rad = np.array(rig.motion.home_rad)  # there is one: check_session
     with bar:

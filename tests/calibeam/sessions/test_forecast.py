@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.session.plan import PlanOptions, blocks
-from calibeam.session.forecast import ahead_of_blocks, forecast
+from calibeam.sessions.forecast import ahead_of_blocks, forecast
 from calibrate.pose_design.information import information_of
 
 GOAL_M = 10e-6

@@ -11,7 +11,7 @@ from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
 from acquisition.recording.rig import parse_rig
 from acquisition.session.plan import PlanOptions, PoseKey
 from calibeam.devices.site import addresses_of
-from calibeam.session.job import (
+from calibeam.sessions.job import (
     MORE,
     EarlierParts,
     Job,

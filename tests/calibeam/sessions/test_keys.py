@@ -13,7 +13,7 @@ import pytest
 
 from acquisition.errors import StoppedError
 from acquisition.session.control import RunControl, RunEvent, RunState
-from calibeam.session.keys import ENTER, Keys
+from calibeam.sessions.keys import ENTER, Keys
 from drivers.errors import DeviceLost
 
 PATIENCE_S = 10.0

@@ -2,7 +2,7 @@
 
 import pytest
 
-from calibeam.session.keys import KeyStream
+from calibeam.sessions.keys import KeyStream
 
 SEQUENCES = {
     "up": "\x1b[A",

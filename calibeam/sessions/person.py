@@ -7,8 +7,8 @@ from rich.console import Console
 
 from acquisition.errors import AcquisitionError
 from calibeam.asking import YES, Asking, someone
-from calibeam.session.keys import ENTER, Keys
-from calibeam.session.reporter import StatusReporter
+from calibeam.sessions.keys import ENTER, Keys
+from calibeam.sessions.reporter import StatusReporter
 
 
 class Person:

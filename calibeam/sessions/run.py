@@ -21,8 +21,8 @@ from calibeam.interrupts import INTERRUPTS
 from calibeam.learner import FittedLearner
 from calibeam.live.feed import SILENT, Feed
 from calibeam.outcome import PartialResult, interruption
-from calibeam.session.forecast import ahead_of_blocks, ahead_of_plan
-from calibeam.session.job import (
+from calibeam.sessions.forecast import ahead_of_blocks, ahead_of_plan
+from calibeam.sessions.job import (
     EarlierParts,
     Job,
     Part,
@@ -35,11 +35,11 @@ from calibeam.session.job import (
     with_fixture_moved,
     with_place,
 )
-from calibeam.session.measure import Measuring, measuring
-from calibeam.session.person import Person
-from calibeam.session.reporter import StatusReporter
-from calibeam.session.status import Listener, clock_words
-from calibeam.session.views import NAME, LogFile, PageView, PlainView, TerminalView
+from calibeam.sessions.measure import Measuring, measuring
+from calibeam.sessions.person import Person
+from calibeam.sessions.reporter import StatusReporter
+from calibeam.sessions.status import Listener, clock_words
+from calibeam.sessions.views import NAME, LogFile, PageView, PlainView, TerminalView
 from calibrate.pose_design.candidates import POSE_S
 from drivers.clock import Clock, SystemClock
 from drivers.errors import DeviceError, DeviceRefused

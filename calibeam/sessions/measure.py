@@ -23,11 +23,11 @@ from calibeam.interrupts import INTERRUPTS
 from calibeam.learner import FittedLearner
 from calibeam.live.feed import Feed
 from calibeam.outcome import PartialResult
-from calibeam.session.forecast import Ahead, Asked, Forecast, Forecaster, forecast
-from calibeam.session.job import STANDS_IN, Job, Part, notes_of
-from calibeam.session.keys import Keys
-from calibeam.session.person import Person
-from calibeam.session.reporter import ReportingJournal, StatusReporter
+from calibeam.sessions.forecast import Ahead, Asked, Forecast, Forecaster, forecast
+from calibeam.sessions.job import STANDS_IN, Job, Part, notes_of
+from calibeam.sessions.keys import Keys
+from calibeam.sessions.person import Person
+from calibeam.sessions.reporter import ReportingJournal, StatusReporter
 from drivers.clock import Clock
 
 FORECAST_EVERY = 5  # poses; one takes a tenth of a second, in a thread of its own

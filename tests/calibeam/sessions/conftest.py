@@ -9,7 +9,7 @@ from acquisition.bench import Look, Spot
 from acquisition.recording.rig import Rig, load_rig
 from acquisition.session.plan import PlanOptions, blocks
 from acquisition.session.records import Sample
-from calibeam.session.forecast import Ahead, ahead_of_blocks
+from calibeam.sessions.forecast import Ahead, ahead_of_blocks
 from calibrate.believed import BelievedRig
 
 RIG_FILE = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"

@@ -15,12 +15,12 @@ from acquisition.session.records import Phase, Progress
 from calibeam.asking import Asking
 from calibeam.live.feed import SILENT
 from calibeam.live.feed import Progress as PageProgress
-from calibeam.session.forecast import Forecast
-from calibeam.session.keys import Keys
-from calibeam.session.person import Person
-from calibeam.session.reporter import ReportingJournal, StatusReporter
-from calibeam.session.status import Pace, SessionStatus, clock_words
-from calibeam.session.views import KEYS, LogFile, PageView, PlainView, TerminalView, drawn
+from calibeam.sessions.forecast import Forecast
+from calibeam.sessions.keys import Keys
+from calibeam.sessions.person import Person
+from calibeam.sessions.reporter import ReportingJournal, StatusReporter
+from calibeam.sessions.status import Pace, SessionStatus, clock_words
+from calibeam.sessions.views import KEYS, LogFile, PageView, PlainView, TerminalView, drawn
 from drivers.errors import DeviceLost
 
 PATIENCE_S = 30.0

@@ -19,8 +19,8 @@ from acquisition.session.records import Sample
 from benchmarks.stops import emulated_rig, without_encoders
 from calibeam.cli import run
 from calibeam.emulation import Emulation
-from calibeam.session.forecast import ahead_of_blocks
-from calibeam.session.reporter import StatusReporter
+from calibeam.sessions.forecast import ahead_of_blocks
+from calibeam.sessions.reporter import StatusReporter
 from drivers.ur.reader import UrReader
 
 from .conftest import RIG_FILE

@@ -11,8 +11,8 @@ from calibeam.asking import Asking
 from calibeam.devices.check import DeviceCheck
 from calibeam.devices.site import addresses_of
 from calibeam.live.feed import SILENT
-from calibeam.session.job import EarlierParts, Job, part_of
-from calibeam.session.run import OnSite
+from calibeam.sessions.job import EarlierParts, Job, part_of
+from calibeam.sessions.run import OnSite
 from drivers.clock import SystemClock
 from drivers.errors import DeviceRefused
 

@@ -20,13 +20,13 @@ from acquisition.session.control import RunState
 from acquisition.session.records import Progress
 from calibeam.live.feed import Feed
 from calibeam.live.feed import Progress as PageProgress
-from calibeam.session.status import Quality, SessionStatus, clock_words
+from calibeam.sessions.status import Quality, SessionStatus, clock_words
 
 EVERY = 10  # poses
 
 
 class PlainView:
-    """Implements calibeam.session.status.Listener."""
+    """Implements calibeam.sessions.status.Listener."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -50,7 +50,7 @@ class PlainView:
 
 
 class PageView:
-    """Implements calibeam.session.status.Listener."""
+    """Implements calibeam.sessions.status.Listener."""
 
     def __init__(self, feed: Feed) -> None:
         self._feed = feed
@@ -122,7 +122,7 @@ KEYS = {
 
 
 class TerminalView:
-    """Implements calibeam.session.status.Listener; `opened` while the keys are listened to."""
+    """Implements calibeam.sessions.status.Listener; `opened` while the keys are listened to."""
 
     def __init__(self, console: Console) -> None:
         self._console = console

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from acquisition.guided.guide import Coverage
 from acquisition.session.control import RunState
 from acquisition.session.records import Progress, Sample
-from calibeam.session.forecast import Forecast
+from calibeam.sessions.forecast import Forecast
 from drivers.clock import Clock
 
 ENOUGH = 3  # poses: before, the first search for the light would be taken for the usual
