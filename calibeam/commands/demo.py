@@ -20,6 +20,7 @@ from calibeam.devices.recorder import new_recording, record_session
 from calibeam.devices.site import addresses_of, check_session, connected
 from calibeam.emulation import Emulation
 from calibeam.printing.progress import progress_bar
+from calibeam.rig_files import RIGS
 from calibrate.identification.estimates import JointZero
 from drivers.clock import SystemClock
 from simulators.world.truth import read_truth
@@ -72,7 +73,7 @@ def print_against_truth(console: Console, revealed: tuple[ZeroAgainstTruth, ...]
     console.print(table)
 
 
-RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
+RIG = RIGS / "ur5e-dual-psd.toml"
 RECORDING, TRUTH = "recording.mcap", "truth.json"
 RESULTS = (RECORDING, "model.json", "diagnosis.json", "report.html", TRUTH)
 

@@ -10,7 +10,6 @@ term of Taylor's series, good while the lag is short against the blends.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +25,7 @@ from acquisition.motion.run_task import Around, run_task, teach
 from acquisition.motion.task.graph import TaskGraph
 from acquisition.motion.task.task_file import Task, read_task
 from calibeam.motion.robot import StreamedArm, StreamedRobot
+from calibeam.rig_files import RIGS
 from drivers.clock import Clock
 
 Floats = NDArray[np.float64]
@@ -75,7 +75,7 @@ def lag_s(sent_s: Floats, sent_rad: Floats, heard_s: Floats, heard_rad: Floats) 
     return float(behind @ speed[moves] / (speed[moves] @ speed[moves]))
 
 
-TASKS = Path(__file__).parents[2] / "rigs" / "tasks"
+TASKS = RIGS / "tasks"
 START_RAD = np.radians([0.0, -90.0, 90.0, -90.0, -90.0, 0.0])  # the hand points down in front of the arm
 TOOL = transform((0.0, 0.0, 0.15))
 BELT_M_S = 0.05

@@ -1,39 +1,25 @@
-"""For notebooks and scripts: a recording opened, identified, diagnosed, drawn and reported in a few lines.
-
-    import calibeam
-
-    session = calibeam.open("recording.mcap")
-    model = session.identify()
-
-The same functions stand behind the command line; docs/python.md has all of it as examples.
-"""
+"""An identified arm in a notebook: its numbers with their doubt, as tables and as an arm that computes."""
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording import Recording, Samples, read
-from calibrate.errors import DataError
+from acquisition.recording import Samples
+from calibeam.notebook.tables import SCREEN, pandas_if_installed
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from calibeam.results.identification import JudgedModel, ReadingErrors
-    from calibrate.diagnose.schema import DiagnosisFile
+    from calibeam.results.identification import JudgedModel
     from calibrate.model_file import ModelFile, ModelParameter
     from calibrate.physics.predicting import Placed
 
 Floats = NDArray[np.float64]
 Frame = Literal["robot", "world"]  # of sigmas: the robot's own base frame, or that of the device or fixture
-
-BEFORE, AFTER = "#d55e00", "#0072b2"  # Okabe and Ito, Color Universal Design, 2008
-MICRO = 1e6
 
 
 @dataclass(frozen=True)
@@ -50,6 +36,17 @@ class Model:
         found = {p.name: p for p in self.file.parameters}
         names = [name for name in found if name.startswith("joint") and name.endswith(".zero")]
         return {int(n[5:-5]): (found[n].value, found[n].sigma) for n in names}
+
+    @property
+    def parameters(self) -> Any:
+        """One row a parameter: name, unit, value, sigma, low, high, undetermined; SI units.
+
+        A pandas.DataFrame with the names as its index where pandas is installed, else a list of dictionaries.
+        """
+        keys = ("name", "unit", "value", "sigma", "low", "high", "undetermined")
+        rows = [{key: getattr(p, key) for key in keys} for p in self.file.parameters]
+        pandas = pandas_if_installed()
+        return rows if pandas is None else pandas.DataFrame(rows, columns=list(keys)).set_index("name")
 
     def __getitem__(self, name: str) -> "ModelParameter":
         """One parameter by its name in model.json, SI units. KeyError for a name that the model does not have."""
@@ -147,6 +144,30 @@ class Model:
         write_model(Path(path), self.file)
         return Path(path)
 
+    def export(self, form: str, path: Path | str) -> tuple[str, ...]:
+        """Write the arm for another program, by a word of `calibeam identify --export-…` such as "urdf" or "dh-csv".
+
+        Returns sentences on what the file cannot carry; they stand in it, too. DataError for an arm that the form
+        cannot hold, ValueError for a form that there is not, OSError where it cannot be written.
+        """
+        from acquisition.recording.rig import parse_rig
+        from calibrate.export.export import ExportForm, export_model
+
+        rig = parse_rig(self.file.rig.text or "", "rig.toml in the model")
+        return export_model(Path(path), rig, self.file, ExportForm(form))
+
+    def __repr__(self) -> str:
+        return f"<calibeam.Model of {self.file.rig.name}: {self.says}>"
+
+    def _repr_html_(self) -> str:
+        """One screen in a notebook: the verdict, what speaks against it, the parameters with one sigma."""
+        rows = "".join(f"<tr><td>{escape(p.name)}</td>{_cells(p)}</tr>" for p in self.file.parameters[:SCREEN])
+        more = len(self.file.parameters) - SCREEN
+        rest = f"<p>and {more} more: <code>model.parameters</code></p>" if more > 0 else ""
+        reasons = "".join(f"<li>{escape(reason)}</li>" for reason in self.reasons)
+        head = "<tr><th>parameter</th><th>value</th><th>one sigma</th><th>unit</th></tr>"
+        return f"<p><b>{escape(self.says)}</b></p><ul>{reasons}</ul><table>{head}{rows}</table>{rest}"
+
     def __str__(self) -> str:
         lines = [self.says, *(f"  {reason}" for reason in self.reasons)]
         for joint, (zero, sigma) in self.zeros().items():
@@ -155,106 +176,11 @@ class Model:
         return "\n".join(lines)
 
 
-@dataclass(frozen=True)
-class Session:
-    """A recording that is open. Nothing of it is ever changed; what was computed once is kept."""
-
-    recording: Recording
-
-    @property
-    def samples(self) -> dict[str, NDArray[np.generic]]:
-        """Settled samples, column -> (row,), SI units in the names; `pandas.DataFrame(session.samples)` takes it."""
-        return dict(self.recording.samples.columns)
-
-    def identify(self, plan: Path | str | None = None) -> Model:
-        """The arm by all instruments of the recording, as `calibeam identify` does; `plan`: a fit.toml.
-
-        DataError where nothing can be identified, with the reason.
-        """
-        if plan is None:
-            return _model(self._modelled)
-        from calibeam.results.identification import Planned, identify_and_judge
-
-        return _model(identify_and_judge(self.recording, Planned.read(Path(plan))))
-
-    fit = identify  # what other libraries call it
-
-    def diagnose(self) -> "DiagnosisFile":
-        """What the model lacks: `verdict`, `findings` with size and doubt, `next`; fields are those of diagnosis.json.
-
-        DataError where the recording holds too little.
-        """
-        return self._diagnosis
-
-    def plot(self) -> "Figure":
-        """Error of every reading before and after the fit, along the session, as a matplotlib Figure.
-
-        Lengths of the misfit in µm on a logarithmic axis, one panel an instrument and quantity.
-        """
-        return _errors_along_session(self._modelled.errors)
-
-    def report(self, path: Path | str, *, diagnosis: bool = False) -> Path:
-        """Write the report, one HTML file that needs no other; returns its path. With `diagnosis` also its pages.
-
-        DataError where it cannot be written, or the recording holds nothing to fit.
-        """
-        from calibeam.results.session_results import write_recording_report
-
-        write_recording_report(self.recording, self._modelled.model, Path(path), self.diagnose() if diagnosis else None)
-        return Path(path)
-
-    def __str__(self) -> str:
-        r = self.recording
-        whole = "" if r.complete else ", cut short or damaged"
-        return f"{r.path.name}: rig {r.rig.name}, {r.rig.n_joints} joints, {len(r.samples)} samples{whole}"
-
-    @cached_property
-    def _modelled(self) -> "JudgedModel":
-        from calibeam.results.identification import identify_and_judge
-
-        return identify_and_judge(self.recording)
-
-    @cached_property
-    def _diagnosis(self) -> "DiagnosisFile":
-        from calibeam.results.diagnosis import diagnose_recording
-
-        found, file = diagnose_recording(self.recording)
-        if found.physics is None:
-            raise DataError("; besides, ".join(blunder.says for blunder in found.blunders))
-        return file
-
-
-def open_recording(path: Path | str) -> Session:
-    """A recording (.mcap) or session folder. RecordingError where it is neither, with the reason."""
-    return Session(read(Path(path)))
-
-
-def _model(found: "JudgedModel") -> Model:
+def model_of(found: "JudgedModel") -> Model:
     return Model(found.model, found.verdict.trust.value, found.verdict.sentence, found.verdict.reasons)
 
 
-def _errors_along_session(found: "Sequence[ReadingErrors]") -> "Figure":
-    """One panel a quantity; µm, of orientations µrad, on a logarithmic axis."""
-    from matplotlib.figure import Figure  # takes a second to load
-
-    figure = Figure(figsize=(8.0, 1.0 + 2.4 * len(found)), layout="constrained")
-    for axes, one in zip(figure.subplots(len(found), 1, squeeze=False).ravel(), found, strict=True):
-        number = np.arange(len(one.after)) + 1
-        for values, colour, mark, label in (
-            (one.before, BEFORE, "x", "arm as drawn"),
-            (one.after, AFTER, "o", "identified"),
-        ):
-            axes.plot(number, MICRO * _positive(values), mark, ms=4, color=colour, label=f"{label}: {_rms(values)} rms")
-        unit = "µm" if one.unit == "m" else "µrad"
-        axes.set(yscale="log", xlabel="reading", ylabel=f"error ({unit})", title=one.title)
-        axes.legend(loc="best", fontsize=9)
-    return figure
-
-
-def _positive(values: Floats) -> Floats:
-    """What a logarithmic axis can show; NaN draws nothing."""
-    return np.where(values > 0.0, values, np.nan)
-
-
-def _rms(values: Floats) -> str:
-    return f"{MICRO * float(np.sqrt(np.mean(values**2))):.3g}"
+def _cells(parameter: "ModelParameter") -> str:
+    if parameter.value is None or parameter.sigma is None:
+        return f'<td colspan="3">not determined: {escape(parameter.undetermined or "")}</td>'
+    return f"<td>{parameter.value:.6g}</td><td>{parameter.sigma:.2g}</td><td>{escape(parameter.unit)}</td>"
