@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.arm.rigid import turned
-from simulators.arm.statics import Load, Weight, loaded_by
+from simulators.arm.statics import Load, Weight, carried_by, loaded_by
 from simulators.defects.defect import ANY_INSTRUMENT, ROBOT, Defect
 from simulators.defects.displacement import Bump, Carried, Settling
 from simulators.defects.scene import Scene, Site
@@ -95,9 +95,13 @@ class UnevenPedestal(Defect):
 
 @dataclass(frozen=True)
 class PedestalUnderWeights(Defect):
-    """A soft pedestal under weights that are none of the stated masses, each times its compliance (see `Weight`)."""
+    """A soft pedestal under weights that are none of the stated masses, each times its compliance (see `Weight`).
+
+    To the payload, whose mass is known, it yields `payload_rad_nm`.
+    """
 
     weights: tuple[Weight, ...]
+    payload_rad_nm: float = 0.0
     share: float = 1.0
 
     KIND = "pedestal-under-weights"
@@ -109,7 +113,9 @@ class PedestalUnderWeights(Defect):
     INSTRUMENTS = ROBOT
 
     def base_motion(self, scene: Scene, load: Load) -> Floats:
-        return turned(self.share * loaded_by(load, self.weights, 0)[0] * np.array([1.0, 1.0, 0.0]))
+        own, _ = loaded_by(load, self.weights, 0)
+        payload, _ = carried_by(load, self.payload_rad_nm * scene.payload_kg, scene.payload_com_m, 0)
+        return turned(self.share * (own + payload) * np.array([1.0, 1.0, 0.0]))
 
 
 @dataclass(frozen=True)

@@ -134,6 +134,8 @@ def _driver(name: str, scene: Scene, load: Load | None, own: Floats | None) -> F
         return scene.qd_rad_s[:, joint]
     if stem == "last_move":
         return scene.last_move_rad[:, joint]
+    if stem == "cmd_minus_q" and scene.asked_rad is not None:
+        return scene.asked_rad[:, joint]
     if stem == "approach":
         return np.sign(scene.goal_rad - scene.via_rad)[:, joint]
     if stem == "spot" and own is not None:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.arm.rigid import Vector
-from simulators.arm.statics import Load, Weight, loaded_by
+from simulators.arm.statics import Load, Weight, carried_by, loaded_by
 from simulators.defects.defect import ROBOT, Defect, phase
 from simulators.defects.scene import Scene, Site, UnsuitedError
 
@@ -329,9 +329,13 @@ class HardeningSpring(DriveDefect):
 
 @dataclass(frozen=True)
 class SpringUnderWeights(DriveDefect):
-    """A soft joint whose load is none of the stated masses: each weight is a mass times the spring's compliance."""
+    """A soft joint whose load is none of the stated masses: each weight is a mass times the spring's compliance.
+
+    To the payload, whose mass is known, it yields `payload_rad_nm`.
+    """
 
     weights: tuple[Weight, ...]
+    payload_rad_nm: float = 0.0
     share: float = 1.0
 
     KIND = "spring-under-weights"
@@ -341,7 +345,9 @@ class SpringUnderWeights(DriveDefect):
     TYPICAL = 1.0
 
     def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
-        return self.share * loaded_by(load, self.weights, self.joint)[0][:, 2]
+        own, _ = loaded_by(load, self.weights, self.joint)
+        payload, _ = carried_by(load, self.payload_rad_nm * scene.payload_kg, scene.payload_com_m, self.joint)
+        return self.share * (own + payload)[:, 2]
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.arm.rigid import Vector, shifted, turned, turned_about
-from simulators.arm.statics import Load, Weight, loaded_by
+from simulators.arm.statics import Load, Weight, carried_by, loaded_by
 from simulators.defects.defect import ANY_INSTRUMENT, ROBOT, Defect, phase
 from simulators.defects.scene import Scene, Site
 
@@ -20,11 +20,12 @@ class BendingLink(Defect):
 
     End load F across it and moment M at the end: deflection F L^3 / 3EI + M L^2 / 2EI, slope F L^2 / 2EI + M L / EI
     (clamped beam of constant section, alike about all axes across it; any text on strength of materials). The link's
-    own weight counts as hung at its end.
+    own weight counts as hung at its end; a `light` link has none.
     """
 
     link: int
     bending_per_nm2: float
+    light: bool = False
 
     KIND = "bending-link"
     PHYSICS = "link-bending"
@@ -47,7 +48,8 @@ class BendingLink(Defect):
         return (self.link,)
 
     def link_motion(self, link: int, end_m: Floats, angle_rad: Floats, scene: Scene, load: Load) -> Floats:
-        sag_m, slope_rad = cantilever(end_m, load.moment_nm[:, link], load.force_n[:, link])
+        moment_nm, force_n = (load.beyond_nm, load.beyond_n) if self.light else (load.moment_nm, load.force_n)
+        sag_m, slope_rad = cantilever(end_m, moment_nm[:, link], force_n[:, link])
         bend = self.bending_per_nm2
         return shifted(bend * sag_m) @ turned_about(end_m, bend * slope_rad)
 
@@ -72,7 +74,7 @@ class FlatLink(Defect):
     """A link of a flat section: a clamped beam that is softer about one axis across it than about the other.
 
     1 / (E I) is `about_u_per_nm2` for bending about `axis_u`, a direction across the link in the frame at its start,
-    and `about_v_per_nm2` for bending about the third direction (principal axes of a section).
+    and `about_v_per_nm2` for bending about the third direction (principal axes of a section). It weighs nothing itself.
     """
 
     link: int
@@ -97,7 +99,7 @@ class FlatLink(Defect):
         return (self.link,)
 
     def link_motion(self, link: int, end_m: Floats, angle_rad: Floats, scene: Scene, load: Load) -> Floats:
-        sag_m, slope_rad = cantilever(end_m, load.moment_nm[:, link], load.force_n[:, link])
+        sag_m, slope_rad = cantilever(end_m, load.beyond_nm[:, link], load.beyond_n[:, link])
         u, along = np.asarray(self.axis_u), end_m / np.linalg.norm(end_m)
         v = np.cross(along, u)
         gives = self.about_u_per_nm2 * np.outer(u, u) + self.about_v_per_nm2 * np.outer(v, v)
@@ -107,10 +109,14 @@ class FlatLink(Defect):
 
 @dataclass(frozen=True)
 class BeamUnderWeights(Defect):
-    """A clamped beam under weights that are none of the stated masses, each times L / (E I) (see `Weight`)."""
+    """A clamped beam under weights that are none of the stated masses, each times L / (E I) (see `Weight`).
+
+    To the payload, whose mass is known, it yields with the slope `payload_rad_nm` for a moment at its end.
+    """
 
     link: int
     weights: tuple[Weight, ...]
+    payload_rad_nm: float = 0.0
     share: float = 1.0
 
     KIND = "beam-under-weights"
@@ -130,7 +136,9 @@ class BeamUnderWeights(Defect):
 
     def link_motion(self, link: int, end_m: Floats, angle_rad: Floats, scene: Scene, load: Load) -> Floats:
         beyond = tuple(weight for weight in self.weights if weight.body > link)
-        sag_m, slope_rad = cantilever(end_m, *loaded_by(load, beyond, link))
+        own = loaded_by(load, beyond, link)
+        payload = carried_by(load, self.payload_rad_nm * scene.payload_kg, scene.payload_com_m, link)
+        sag_m, slope_rad = cantilever(end_m, own[0] + payload[0], own[1] + payload[1])
         share = self.share / float(np.linalg.norm(end_m))
         return shifted(share * sag_m) @ turned_about(end_m, share * slope_rad)
 

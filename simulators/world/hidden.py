@@ -99,6 +99,8 @@ class Hidden:
             every(now.payload_torque_nm),
             every(now.moment_nm),
             every(now.force_n),
+            every(now.beyond_nm),
+            every(now.beyond_n),
             every(now.down_flange),
             Frames(every(now.frames.turning), every(now.frames.flange)),
             now.gravity_m_s2,

@@ -1,0 +1,73 @@
+"""The noise of a simulated recording: what the rig of the recording states, else what the model found."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import ORIENTATION, POSITION, SPOTS, WIRE, per_joint
+from calibrate.model_file import ModelFile
+from calibrate.sensors.camera import PLACE, TURN
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """One sigma by column, of the joints' repeatability, and of a probe in its cone; zero: nobody knows of any."""
+
+    sigma: Mapping[str, float]
+    joint_rad: float
+    seat_m: float
+    found: tuple[str, ...]  # columns whose sigma nobody states: it is what the model found
+    silent: tuple[str, ...]  # columns without either
+
+    def of(self, column: str, samples: Samples) -> Floats:
+        """(row,) of a column; a sigma that stands beside a reading goes before all others."""
+        stated = _beside(column)
+        usual = np.full(len(samples), self.sigma.get(column, 0.0))
+        if stated not in samples:
+            return usual
+        own = samples.column(stated)
+        return np.where(np.isfinite(own), own, usual)
+
+    def drawn(self, samples: Samples, rng: np.random.Generator) -> Samples:
+        """With normal noise on every reading, independent of each other."""
+        columns = dict(samples.columns)
+        for name in self.sigma:
+            if name in samples:
+                columns[name] = samples.column(name) + self.of(name, samples) * rng.standard_normal(len(samples))
+        return Samples(columns, samples.n_joints)
+
+
+def noise_of(rig: Rig, model: ModelFile, samples: Samples) -> Noise:
+    """For the columns that the samples have."""
+    stated = rig.noise
+    by_column: dict[str, float | None] = dict.fromkeys(SPOTS, stated.psd_m)
+    by_column |= dict.fromkeys(POSITION, stated.position_m) | {WIRE: stated.wire_m}
+    by_column |= dict.fromkeys(ORIENTATION) | dict.fromkeys(per_joint("enc", "_rad", samples.n_joints))
+    by_column |= dict(zip(PLACE, stated.camera_m or (None,) * 3, strict=True))
+    by_column |= dict(zip(TURN, stated.camera_rad or (None,) * 3, strict=True))
+    sigma: dict[str, float] = {}
+    found: list[str] = []
+    silent: list[str] = []
+    for name, value in by_column.items():
+        if name not in samples or not np.isfinite(samples.column(name)).any():
+            continue
+        its = model.noise.get(name)
+        if value is not None:
+            sigma[name] = value
+        elif isinstance(its, float | int) and not isinstance(its, bool):
+            sigma[name] = float(its)
+            found.append(name)
+        else:
+            sigma[name] = 0.0
+            silent.append(name)
+    return Noise(sigma, stated.joint_rad or 0.0, stated.seat_m or 0.0, tuple(found), tuple(silent))
+
+
+def _beside(column: str) -> str:
+    return column.removesuffix("_m") + "_sigma_m"

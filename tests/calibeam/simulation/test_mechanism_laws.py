@@ -1,0 +1,136 @@
+"""Every effect of the catalogue against the mechanism that it becomes: both change the readings alike.
+
+The exceptions and their reasons are those of the table itself (calibeam/simulation/mechanisms.py, `Line.within`).
+"""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from calibeam.simulation.conditions import Clock, scene_of
+from calibeam.simulation.found import Found, Session
+from calibeam.simulation.geometry import rigged
+from calibeam.simulation.mechanisms import TABLE, line_of, mechanism_of
+from calibrate.diagnose.curve import curve
+from calibrate.diagnose.ported import perturbed_frames
+from calibrate.effects.catalogue import EFFECTS, terms_of
+from calibrate.effects.ports import Perturbation, Place
+from calibrate.effects.term import Term
+from calibrate.identification.session import about_of
+from calibrate.physics.acting import arm_in, moved_columns
+from calibrate.predict import Predictor, readings
+from simulators.conceal.wanted import FAMILIES, Family
+from simulators.replayed import Readings, Rigged, Sited, replayed
+from simulators.defects import Scene
+from tests.calibrate.effects.conftest import full_session
+
+SIZE = 5e-5  # rad or m at a port: what a machine shows
+SPOTS = ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")
+POSITION = ("x_m", "y_m", "z_m")
+
+
+class Bench:
+    """One session of a family, as both sides see it."""
+
+    def __init__(self, family: Family) -> None:
+        fit = full_session(family)
+        self.drivers, self.samples = fit.drivers, fit.session.samples
+        values = {p.name: float(v) for p, v in zip(fit.session.parameters, fit.geometry, strict=True)}
+        names = tuple(m.name for m in fit.session.measured)
+        self.predictor = Predictor(fit.session.rig, values, about_of(fit.session.weighting), names)
+        self.session = Session.of(self.predictor, self.drivers)
+        rest = {place: float(degC.mean()) for place, degC in self.drivers.temperatures_degC.items()}
+        clock = Clock(float(self.drivers.t_s.min()), float(self.drivers.t_s.max()), rest)
+        self.scene: Scene = scene_of(self.samples, clock, same_recording=True)
+        self.rig: Rigged = rigged(self.predictor, self.samples)
+        self.plain = self.simulated(())
+        self.expected = self.modelled(self.samples.joints(), Perturbation.none(len(self.samples), 6))
+
+    def simulated(self, mechanisms: tuple[Sited, ...]) -> Readings:
+        return replayed(self.rig, self.scene, mechanisms, self.samples.joints())
+
+    def modelled(self, q_rad: np.ndarray, by: Perturbation) -> np.ndarray:
+        """(row, k)"""
+        frames = perturbed_frames(arm_in(self.predictor), self.theta, q_rad, by)
+        if self.rig.seat_m is not None:
+            return self.predictor.tip_at(frames[:, -1])
+        read = readings(self.predictor, frames[:, -1], self.samples, self.predictor.instruments)
+        added = moved_columns(by)
+        return np.stack([read[c] + added.get(c, 0.0) for c in read], axis=1)
+
+    @property
+    def theta(self) -> np.ndarray:
+        return self.predictor.values_of(arm_in(self.predictor).parameters)
+
+    def observed(self, read: Readings) -> np.ndarray:
+        """(row, k) in the order of `modelled`."""
+        found = {"dual-psd": read.spots_m, "position": read.position_m, "wire": read.length_m}
+        values = found[self.predictor.instruments[0]]
+        return values if values.ndim == 2 else values[:, None]
+
+    def apart(self, found: Found) -> tuple[float, float]:
+        """Rms of what mechanism and effect differ by, and of the effect."""
+        by = Perturbation.none(len(self.samples), 6).plus(found.port, found.amount)
+        simulated = self.simulated((mechanism_of(found),))
+        if self.rig.seat_m is not None:  # the probe stays in its cone, and the encoders read something else
+            seated = np.isfinite(self.rig.seat_m).all(axis=1)
+            left = (self.modelled(simulated.reading_rad, by) - self.rig.seat_m)[seated]
+            whole = (self.modelled(self.plain.reading_rad, by) - self.rig.seat_m)[seated]
+            return rms(left), rms(whole)
+        change = self.modelled(self.samples.joints(), by) - self.expected
+        seen = np.isfinite(change).all(axis=1)
+        return rms((self.observed(simulated) - self.observed(self.plain) - change)[seen]), rms(change[seen])
+
+
+def rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+@cache
+def bench(family: Family) -> Bench:
+    return Bench(family)
+
+
+def found_of(term: Term, place: Bench) -> Found:
+    """With values of a machine: coefficients of either sign where it has several, springs that give way."""
+    inner = np.array([spec.grid[len(spec.grid) // 2] for spec in term.inner])
+    basis = term.basis(place.drivers, inner)
+    coefficients = np.linspace(1.0, 0.4, basis.shape[2]) / np.maximum(np.abs(basis).max(axis=(0, 1)), 1e-12)
+    size = np.abs(basis @ coefficients).max()
+    return Found(term.physics, term, SIZE / size * coefficients, inner, place.session)
+
+
+def slow_terms(terms: tuple[Term, ...]) -> tuple[Term, ...]:
+    """Of every line of the table, and of every port, one: the same line at six joints is one law."""
+    kept: dict[tuple[object, ...], list[Term]] = {}
+    for term in terms:
+        drivers = tuple(name.rstrip("0123456789") for name in term.depends_on)
+        key = (term.physics, term.variant.rstrip("0123456789"), term.shape, term.port.where.strip("0123456789")[:4])
+        kept.setdefault((*key, drivers if len(drivers) < 3 else ()), []).append(term)
+    return tuple(alike[k % len(alike)] for k, alike in enumerate(kept.values()))
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_model_and_simulation_read_the_same_without_physics(family: Family) -> None:
+    place = bench(family)
+    if place.rig.seat_m is not None:
+        seated = np.isfinite(place.rig.seat_m).all(axis=1)
+        tips = place.modelled(place.plain.reading_rad, Perturbation.none(len(place.samples), 6))
+        assert np.abs(tips - place.rig.seat_m)[seated].max() < 1e-10
+        return
+    seen = np.isfinite(place.expected).all(axis=1)
+    assert seen.all()
+    assert np.abs(place.observed(place.plain) - place.expected)[seen].max() < 1e-10
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_every_effect_is_what_its_mechanism_does(family: Family) -> None:
+    place = bench(family)
+    wrong = []
+    for term in slow_terms(terms_of(place.drivers)):
+        found = found_of(term, place)
+        off, whole = place.apart(found)
+        if off > line_of(found).within * whole + 1e-11:
+            wrong.append(f"{term.key}: {off:.2e} of {whole:.2e}")
+    assert not wrong, "\n".join(wrong)
