@@ -71,10 +71,8 @@ def replay_command(
     for what, (rms, sigma, ratio) in apart.items():
         says = angle if what.endswith("orientations") else length
         print(f"{what}: measured less simulated {says(rms)} rms, {ratio:.2f} of the noise ({says(sigma)})")
-    for columns, words in (
-        (found.noise.found, "as the model found it"),
-        (found.noise.silent, "none: nobody states it"),
-    ):
-        if noise and columns:
-            print(f"noise of {', '.join(columns)}: {words}")
+    if noise and found.noise.found:
+        print(f"noise of {', '.join(found.noise.found)}: as the model found it")
+    if noise and found.noise.silent:
+        print(f"noise of {', '.join(found.noise.silent)}: none, for neither the rig nor the model states it")
     print(f"simulated: {out}")

@@ -1,4 +1,8 @@
-"""The noise of a simulated recording: what the rig of the recording states, else what the model found."""
+"""The noise of a simulated recording: what the rig of the recording states, else what the model found.
+
+What the model found is all that scatters, the joints' repeatability with it. So it stands in for a stated noise that
+leaves the joints out and is smaller.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -29,7 +33,7 @@ class Noise:
         """(row,) of a column; a sigma that stands beside a reading goes before all others."""
         stated = _beside(column)
         usual = np.full(len(samples), self.sigma.get(column, 0.0))
-        if stated not in samples:
+        if stated not in samples or column in self.found:
             return usual
         own = samples.column(stated)
         return np.where(np.isfinite(own), own, usual)
@@ -57,16 +61,29 @@ def noise_of(rig: Rig, model: ModelFile, samples: Samples) -> Noise:
     for name, value in by_column.items():
         if name not in samples or not np.isfinite(samples.column(name)).any():
             continue
-        its = model.noise.get(name)
-        if value is not None:
-            sigma[name] = value
-        elif isinstance(its, float | int) and not isinstance(its, bool):
-            sigma[name] = float(its)
+        its = _number(model.noise.get(name))
+        drawn = _typical(name, value, samples)
+        if drawn is not None and (its is None or stated.joint_rad is not None or its <= drawn):
+            sigma[name] = drawn
+        elif its is not None:
+            sigma[name] = its
             found.append(name)
         else:
             sigma[name] = 0.0
             silent.append(name)
     return Noise(sigma, stated.joint_rad or 0.0, stated.seat_m or 0.0, tuple(found), tuple(silent))
+
+
+def _typical(column: str, stated: float | None, samples: Samples) -> float | None:
+    """As it stands beside the readings, in the middle; else as the rig states it."""
+    beside = _beside(column)
+    if beside in samples and np.isfinite(samples.column(beside)).any():
+        return float(np.nanmedian(samples.column(beside)))
+    return stated
+
+
+def _number(value: object) -> float | None:
+    return float(value) if isinstance(value, float | int) and not isinstance(value, bool) else None
 
 
 def _beside(column: str) -> str:
