@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from simulators.arm.kinematics import Arm
 from simulators.arm.rigid import inverse
+from simulators.arm.statics import weigh
 from simulators.conceal.chain import Stance, stand, true_shaft_rad
 from simulators.conceal.readings import length_m, position_m, spots
 from simulators.conceal.rig import Device, DualPsd, TrueRig
@@ -139,12 +140,14 @@ def _between_rad(arm: Arm, scene: Scene, mechanisms: Sequence[Sited], reading_ra
     usual = [one.defect for one in mechanisms if one.where in ("", "past")]
     stance = stand(TrueRig(arm, np.zeros(3), Device(np.eye(4))), scene, usual, reading_rad)
     shaft_rad = true_shaft_rad(usual, scene, reading_rad)
+    foot = np.broadcast_to(np.eye(4), (len(scene), 4, 4))
+    load = stance.load or weigh(arm, stance.frames, foot, scene.payload_kg, scene.payload_com_m)
     between_rad = shaft_rad - reading_rad
     for one in mechanisms:
         sign = {"": 1.0, "second": 1.0, "motor": -1.0, "past": 0.0, "camera": 0.0}[one.where]
         defect = one.defect
-        if isinstance(defect, TurnsJoint) and stance.load is not None:
-            between_rad = between_rad + sign * defect.extra_turn_rad(shaft_rad, scene, stance.load)
+        if isinstance(defect, TurnsJoint):
+            between_rad = between_rad + sign * defect.extra_turn_rad(shaft_rad, scene, load)
         elif isinstance(defect, ReadsAngle) and one.where == "second":
             between_rad = between_rad - defect.reading_error_rad(shaft_rad, scene)
     return between_rad

@@ -60,7 +60,7 @@ def replay_command(
     write_replayed(out, found, source, about | ({"without": ", ".join(without)} if without else {}))
     apart = over_noise(found, source.samples)
     if json:
-        sizes = {what: {"rms": rms, "sigma": sigma, "over_noise": ratio} for what, (rms, sigma, ratio) in apart.items()}
+        sizes = {what: {"rms": rms, "noise": drawn} for what, (rms, drawn) in apart.items()}
         effects = [name for name, _ in found.physics.named]
         print(as_json.dumps({"effects": effects, "notes": found.notes, "measured_less_simulated": sizes}))
         return
@@ -68,9 +68,10 @@ def replay_command(
     print("physics: " + (", ".join(acting) if acting else "none" + ("" if names_of(known) else "; the model has none")))
     for note in found.notes:
         print(note)
-    for what, (rms, sigma, ratio) in apart.items():
+    for what, (rms, drawn) in apart.items():
         says = angle if what.endswith("orientations") else length
-        print(f"{what}: measured less simulated {says(rms)} rms, {ratio:.2f} of the noise ({says(sigma)})")
+        share = f", {rms / drawn:.2f} of the noise that was drawn ({says(drawn)})" if drawn > 0.0 else ""
+        print(f"{what}: measured less simulated {says(rms)} rms{share}")
     if noise and found.noise.found:
         print(f"noise of {', '.join(found.noise.found)}: as the model found it")
     if noise and found.noise.silent:

@@ -12,8 +12,8 @@ from calibrate.diagnose.causes import cause
 from calibrate.diagnose.linearised import Accepted
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.gravity import likely_torque_nm
-from calibrate.effects.ports import Port
-from calibrate.effects.second_encoders import PLACES
+from calibrate.effects.ports import Place, Port
+from calibrate.effects.second_encoders import AGAINST, PLACES
 from calibrate.effects.term import Term
 from calibrate.errors import DataError
 from calibrate.physics.records import Effect
@@ -112,7 +112,8 @@ class Found:
     @property
     def place(self) -> str:
         """Where it sits of a joint with two encoders, as in second_encoders.py; "" else."""
-        return next((place for place in PLACES if self.term.variant.endswith(place)), "")
+        ends = [place for place in PLACES if self.term.variant.endswith(place)]
+        return max(ends, key=len, default="")  # one of them ends as another does
 
     @property
     def variant(self) -> str:
@@ -140,6 +141,13 @@ class Found:
     def amount(self) -> Floats:
         """(row, width) what it adds at its port over the session."""
         return self.term.amount(self.session.drivers, self.coefficients, self.inner)
+
+    def turn_rad(self) -> Floats:
+        """(row,) by which it turns its joint; of a drive on the other side of a second encoder, the drive itself."""
+        if self.port.place is Place.JOINTS:
+            return self.amount[:, self.number - 1]
+        joints = self.session.drivers.readouts[self.port.instrument].joints
+        return (-1.0 if self.place == AGAINST else 1.0) * self.amount[:, joints.index(self.number)]
 
     def size(self, *names: str) -> float:
         """The parameter of the first of these names that it has."""

@@ -87,20 +87,26 @@ def write_replayed(path: Path, found: Replayed, source: Recording, notes: Mappin
             writer.sample(row)
 
 
-def over_noise(found: Replayed, measured: Samples) -> dict[str, tuple[float, float, float]]:
-    """By quantity: rms of measured less simulated without noise, one sigma as drawn, and their ratio."""
-    out: dict[str, tuple[float, float, float]] = {}
+def over_noise(found: Replayed, measured: Samples) -> dict[str, tuple[float, float]]:
+    """By quantity: rms of measured less simulated without noise, and rms of the noise that was drawn (0: none was)."""
+    out: dict[str, tuple[float, float]] = {}
     for what, columns in QUANTITIES.items():
         here = [name for name in columns if name in measured]
         if not here:
             continue
-        apart = np.stack([measured.column(name) - found.exact.column(name) for name in here], axis=1)
-        apart = apart[np.isfinite(apart).all(axis=1)]
-        if len(apart):
-            rms = float(np.sqrt(np.mean(apart**2)))
-            sigma = float(np.sqrt(np.mean([np.nanmean(found.noise.of(name, measured) ** 2) for name in here])))
-            out[what] = rms, sigma, rms / sigma if sigma > 0.0 else float("nan")
+        exact, read, noisy = (_stacked(samples, here) for samples in (found.exact, measured, found.samples))
+        known = np.isfinite(exact - read).all(axis=1)
+        if known.any():
+            out[what] = _rms((read - exact)[known]), _rms((noisy - exact)[known])
     return out
+
+
+def _stacked(samples: Samples, names: Sequence[str]) -> Floats:
+    return np.stack([samples.column(name) for name in names], axis=1)
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 QUANTITIES: Mapping[str, tuple[str, ...]] = {

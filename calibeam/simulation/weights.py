@@ -23,7 +23,7 @@ WEAKEST = 1e-8  # of the strongest: a combination of weights that shows less is 
 def spring_weights(found: Found) -> Weights:
     """Of a soft joint."""
     joint = found.number
-    return _fitted(found, joint, joint, lambda at: at[0][:, 2:], found.amount[:, joint - 1 : joint])
+    return _fitted(found, joint, joint, lambda at: at[0][:, 2:], found.turn_rad()[:, np.newaxis])
 
 
 def beam_weights(found: Found) -> Weights:
