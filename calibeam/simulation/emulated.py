@@ -41,7 +41,8 @@ def emulated(model: ModelFile, rig: Rig) -> tuple[Given, tuple[Defect, ...], tup
     for made in physics.mechanisms:
         why = _unfit(made, n)
         if why:
-            notes.append(f"left out: {names.get(id(made), made.defect.KIND)}: {why}")
+            name = names.get(id(made), made.defect.KIND)
+            notes.append(f"left out: {name}, {physics.sizes.get(name, 'geometry')}: {why}")
         else:
             mechanisms.append(made.defect)
     return _given(model, predictor), tuple(mechanisms), tuple(notes)

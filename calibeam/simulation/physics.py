@@ -1,6 +1,6 @@
 """The physics of a model as mechanisms: which effects act, which were left out on purpose, which have none."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +8,6 @@ import numpy as np
 from calibeam.simulation.found import Found, Session
 from calibeam.simulation.geometry import light_of
 from calibeam.simulation.mechanisms import NoMechanismError, at_the_end, mechanism_of
-from calibrate.diagnose.linearised import Accepted
 from calibrate.effects.ports import Perturbation, Place
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
@@ -16,11 +15,13 @@ from calibrate.physics.acting import drivers_under, listed
 from calibrate.physics.applied import recorded_samples
 from calibrate.physics.records import Effect
 from calibrate.predict import Predictor
+from calibrate.sensors.catalogue import kind_of
 from simulators.defects.detector import StrainedFace
 from simulators.defects.encoder import RADIUS_M, EccentricDisc
 from simulators.replayed import Sited
 
 EXACT = 1e-12  # of a scale that is held at one
+FIRST_TURN = 3  # of the six of a frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +31,7 @@ class Physics:
     mechanisms: tuple[Sited, ...]
     every: tuple[Sited, ...]
     named: tuple[tuple[str, Sited], ...]  # of each effect that acts
+    sizes: Mapping[str, str]  # of each effect, rms over the session at its port, with its unit
     notes: tuple[str, ...]
 
 
@@ -46,24 +48,29 @@ def physics_of(
     kept = _geometry(predictor)
     acting, notes = _acting(model, same_recording)
     if model.session is None or not acting:
-        return Physics(kept, kept, (), notes)
+        return Physics(kept, kept, (), {}, notes)
     recorded = recorded_samples(model, n_joints)
     drivers = drivers_under(predictor, recorded, Perturbation.none(len(recorded), n_joints))
     session = Session.of(predictor, drivers)
     every: list[Sited] = []
     named: list[tuple[str, Sited]] = []
+    sizes: dict[str, str] = {}
     for (effect, ended), carried in zip(acting, listed([effect for effect, _ in acting], drivers), strict=True):
-        made = _made(effect, carried.accepted, session)
-        if isinstance(made, str):
-            notes = (*notes, made)
+        found = Found.of(effect, carried.accepted, session)
+        sizes[effect.name] = _size(found)
+        try:
+            made = mechanism_of(found)
+        except NoMechanismError as why:
+            at = f"{effect.physics} at {effect.where}"
+            notes = (*notes, f"left out: {effect.name} ({at}), {sizes[effect.name]}: {why}")
             continue
         made = Sited(at_the_end(made.defect), made.where) if ended else made
         every.append(made)
         if effect.name in without:
-            notes = (*notes, f"left out as asked: {effect.name}")
+            notes = (*notes, f"left out as asked: {effect.name}, {sizes[effect.name]}")
         else:
             named.append((effect.name, made))
-    return Physics((*kept, *(made for _, made in named)), (*kept, *every), tuple(named), notes)
+    return Physics((*kept, *(made for _, made in named)), (*kept, *every), tuple(named), sizes, notes)
 
 
 def _refuse_unknown(model: ModelFile, without: Sequence[str]) -> None:
@@ -90,15 +97,15 @@ def _acting(model: ModelFile, same_recording: bool) -> tuple[list[tuple[Effect, 
     )
 
 
-def _made(effect: Effect, accepted: Accepted, session: Session) -> Sited | str:
-    """The mechanism; or, where there is none, what is left out and how large it is."""
-    found = Found.of(effect, accepted, session)
-    try:
-        return mechanism_of(found)
-    except NoMechanismError as why:
-        size = float(np.sqrt(np.mean(np.max(np.abs(found.amount), axis=1) ** 2)))
-        unit = "rad" if found.port.place is Place.JOINTS else "m or rad"
-        return f"left out: {effect.name} ({effect.physics} at {effect.where}), {size:.2g} {unit} rms: {why}"
+def _size(found: Found) -> str:
+    """Of the component that it moves most."""
+    rms = np.sqrt(np.mean(found.amount**2, axis=0))
+    most = int(np.argmax(rms))
+    if found.port.place is Place.READING:
+        unit = kind_of(found.port.instrument).quantities[0].unit
+    else:
+        unit = "rad" if found.port.place is Place.JOINTS or most >= FIRST_TURN else "m"
+    return f"{rms[most]:.2g} {unit} rms"
 
 
 def _geometry(predictor: Predictor) -> tuple[Sited, ...]:
