@@ -9,7 +9,7 @@ from mkdocs.structure.pages import Page
 
 from calibeam.cli import app
 from calibeam.command_list import COMMANDS
-from calibeam.simulation.mechanisms import TABLE
+from calibeam.simulation.mechanism_table import TABLE
 from calibrate.effects.catalogue import EFFECTS
 
 OPEN = "unknown"

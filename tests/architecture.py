@@ -147,8 +147,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 862,
-    "lines": 92_100,
+    "files": 877,
+    "lines": 95_600,
     "longest_function": 54,
     "one_importer": 49,
     "classes": 38,

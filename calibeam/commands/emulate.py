@@ -103,8 +103,10 @@ def _simulated(
     """Geometry and mechanisms of a model, and those put in by hand. What is left out goes to standard error."""
     if model is None and not hide:
         return None, ()
-    from calibeam.simulation.by_hand import by_hand  # the physics of a model loads the whole catalogue: only here
     from calibeam.simulation.emulated import emulated
+    from calibeam.simulation.mechanism_by_hand import (
+        by_hand,  # the physics of a model loads the whole catalogue: only here
+    )
     from calibrate.model_file import read_model
 
     given, found, notes = (None, (), ()) if model is None else emulated(read_model(model), load_rig(rig))

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 from acquisition.recording import read
 from calibeam.results.identification import naming_source
 from calibeam.simulation.physics import names_of
-from calibeam.simulation.replay import over_noise, replay, write_replayed
+from calibeam.simulation.replayed_recording import over_noise, replay, write_replayed
 from calibrate.model_file import read_model
 from calibrate.report.quantities import angle, length
 

@@ -7,16 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.rig import Rig
-from calibeam.simulation.conditions import rest_degC
-from calibeam.simulation.geometry import arm_in_numbers, light_of
 from calibeam.simulation.physics import physics_of
+from calibeam.simulation.rig_in_numbers import arm_in_numbers, light_of
+from calibeam.simulation.scene_of_samples import rest_degC
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
 from calibrate.predict import Predictor
 from simulators.arm.drawing import origin_and_rotation
 from simulators.defects import Defect
-from simulators.defects.curve import FoundCurve
 from simulators.defects.defect import as_vector
+from simulators.defects.found_curve import FoundCurve
 from simulators.replayed import Sited
 from simulators.world.exposure import temperatures
 from simulators.world.rig import Pose

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from calibeam.simulation.geometry import arm_in_numbers, beyond_m, light_of
+from calibeam.simulation.rig_in_numbers import arm_in_numbers, beyond_m, light_of
 from calibrate.diagnose.causes import cause
 from calibrate.diagnose.linearised import Accepted
 from calibrate.effects.drivers import Drivers
@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Session:
+class FoundIn:
     """The session that effects are stated about, in the model's own geometry."""
 
     predictor: Predictor
@@ -35,7 +35,7 @@ class Session:
     payload_com_m: Floats  # (3,) or (row, 3)
 
     @classmethod
-    def of(cls, predictor: Predictor, drivers: Drivers) -> "Session":
+    def of(cls, predictor: Predictor, drivers: Drivers) -> "FoundIn":
         """The geometry of `predictor`; conditions and readings as `drivers` has them."""
         com = drivers.payload_com_m
         return cls(predictor, drivers, np.zeros(3) if com is None else com)
@@ -55,7 +55,7 @@ class Session:
 
     @cached_property
     def beyond_m(self) -> Floats:
-        """(n + 1,) see geometry.py."""
+        """(n + 1,) see rig_in_numbers.py."""
         return beyond_m(self.predictor.rig)
 
     @cached_property
@@ -91,17 +91,17 @@ class Session:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class FoundEffect:
     """One effect with its values at the session."""
 
     name: str  # as in model.json
     term: Term
     coefficients: Floats
     inner: Floats
-    session: Session
+    session: FoundIn
 
     @classmethod
-    def of(cls, effect: Effect, accepted: Accepted, session: Session) -> "Found":
+    def of(cls, effect: Effect, accepted: Accepted, session: FoundIn) -> "FoundEffect":
         """As model.json holds it."""
         return cls(effect.name, accepted.term, accepted.coefficients, accepted.inner, session)
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from calibeam.simulation.found import Found
+from calibeam.simulation.found import FoundEffect
 from calibeam.simulation.of_arm import course_of
 from calibrate.effects.laser_pointing import beam_axes
 from calibrate.effects.ports import Place
@@ -16,7 +16,6 @@ from calibrate.sensors.kind import Trait
 from simulators.arm.drawing import origin_and_rotation
 from simulators.arm.rigid import Vector
 from simulators.defects import Defect
-from simulators.defects.curve import CurveAtBase, CurveAtJoints, CurveAtLink, CurveInReading
 from simulators.defects.defect import as_vector
 from simulators.defects.detector import (
     StrainedFace,
@@ -24,6 +23,7 @@ from simulators.defects.detector import (
     UnevenLayer,
     WavesOnFace,
 )
+from simulators.defects.found_curve import CurveAtBase, CurveAtJoints, CurveAtLink, CurveInReading
 from simulators.defects.tool import CarriedLaser, ElasticMount, LaserWarmUp, SaggingMount, WarmLaser
 from simulators.defects.tracker import (
     CircleOffCentre,
@@ -40,7 +40,7 @@ NOWHERE: Vector = (0.0, 0.0, 0.0)
 # --- tool and laser
 
 
-def make_bracket(f: Found) -> Defect:
+def make_bracket(f: FoundEffect) -> Defect:
     tool = f.session.predictor.rig.tool
     tip = tool.laser_origin_m if f.port.where.startswith("laser") else tool.point_m
     overhang = np.array(tool.com_m if f.variant.endswith("centre of mass") else tip)
@@ -48,7 +48,7 @@ def make_bracket(f: Found) -> Defect:
     return SaggingMount(f.size("sag_rad"), as_vector(overhang / np.linalg.norm(overhang)), at_laser)
 
 
-def make_leaning(f: Found) -> Defect:
+def make_leaning(f: FoundEffect) -> Defect:
     direction = np.array(f.session.predictor.rig.tool.laser_direction)
     foot = f.session.predictor.rig.tool.laser_origin_m or NOWHERE
     return SaggingMount(f.size("sag_rad"), as_vector(direction / np.linalg.norm(direction)), True, foot)
@@ -58,25 +58,25 @@ def matrix(values: Floats) -> tuple[Vector, Vector, Vector]:
     return as_vector(values[0]), as_vector(values[1]), as_vector(values[2])
 
 
-def make_mount(f: Found) -> Defect:
+def make_mount(f: FoundEffect) -> Defect:
     origin, u, v = beam_axes(f.session.drivers)
     by = f.coefficients.reshape(2, 3)
     turn = np.asarray(np.outer(u, by[0]) + np.outer(v, by[1]), dtype=np.float64)
     return ElasticMount(matrix(np.zeros((3, 3))), matrix(turn), as_vector(origin), True)
 
 
-def make_hanging(f: Found) -> Defect:
+def make_hanging(f: FoundEffect) -> Defect:
     return ElasticMount(matrix(f.size("sag_m") * np.eye(3)), matrix(np.zeros((3, 3))), NOWHERE, False)
 
 
-def make_spring_mount(f: Found) -> Defect:
+def make_spring_mount(f: FoundEffect) -> Defect:
     shift = np.zeros((3, 3))
     for (i, j), value in zip(PAIRS, f.coefficients, strict=True):
         shift[i, j] = shift[j, i] = value
     return ElasticMount(matrix(shift), matrix(np.zeros((3, 3))), NOWHERE, False)
 
 
-def across(f: Found) -> tuple[float, Vector, Vector]:
+def across(f: FoundEffect) -> tuple[float, Vector, Vector]:
     """Size, direction and origin of what happens along two axes across the beam."""
     origin, u, v = beam_axes(f.session.drivers)
     both = f.coefficients[0] * u + f.coefficients[1] * v
@@ -84,14 +84,14 @@ def across(f: Found) -> tuple[float, Vector, Vector]:
     return size, as_vector(both / size), as_vector(origin)
 
 
-def make_pointing(f: Found) -> Defect:
+def make_pointing(f: FoundEffect) -> Defect:
     size, axis, at_m = across(f)
     if f.thermometer:
         return WarmLaser(size, axis, at_m, f.thermometer)
     return LaserWarmUp(size, f.size("time_constant_s"), axis, at_m)
 
 
-def make_walking(f: Found) -> Defect:
+def make_walking(f: FoundEffect) -> Defect:
     size, along, _ = across(f)
     course, at_s, over_s = course_of(f)
     shift = as_vector(size * np.array(along))
@@ -101,16 +101,16 @@ def make_walking(f: Found) -> Defect:
 # --- detectors
 
 
-def half_m(f: Found) -> float:
+def half_m(f: FoundEffect) -> float:
     return f.session.light.half_size_m
 
 
-def make_strained(f: Found) -> Defect:
+def make_strained(f: FoundEffect) -> Defect:
     x, y = (f.sizes.get(f"gain_{axis}_error_share", 0.0) for axis in "xy")
     return StrainedFace(f.number, x, y, f.sizes.get("cross_share", 0.0))
 
 
-def layer(f: Found, powers: Sequence[tuple[int, int, int]]) -> Defect:
+def layer(f: FoundEffect, powers: Sequence[tuple[int, int, int]]) -> Defect:
     """`powers`: axis, i, j of each coefficient, in order."""
     sizes = tuple((a, i, j, float(c)) for (a, i, j), c in zip(powers, f.coefficients, strict=True))
     return UnevenLayer(f.number, sizes, half_m(f))
@@ -120,14 +120,14 @@ SQUARES = ((2, 0), (1, 1), (0, 2))
 CUBES = ((3, 0), (2, 1), (1, 2), (0, 3))
 
 
-def make_waves(f: Found) -> Defect:
+def make_waves(f: FoundEffect) -> Defect:
     sx, cx, sy, cy = f.coefficients
     waves = (f.size("waves_x_per_m"), f.size("waves_y_per_m"))
     amplitudes = (math.hypot(sx, cx), math.hypot(sy, cy))
     return WavesOnFace(f.number, amplitudes, (math.atan2(cx, sx), math.atan2(cy, sy)), waves)
 
 
-def make_stray(f: Found) -> Defect:
+def make_stray(f: FoundEffect) -> Defect:
     pull_x_m, pull_y_m, share = f.coefficients
     share = share if abs(share) > LEAST else LEAST
     total = f.session.drivers.psd_sum_v
@@ -138,21 +138,21 @@ def make_stray(f: Found) -> Defect:
 # --- devices
 
 
-def is_drum(f: Found) -> bool:
+def is_drum(f: FoundEffect) -> bool:
     return Trait.DRUM in kind_of(f.port.instrument).traits
 
 
-def make_scale(f: Found) -> Defect:
+def make_scale(f: FoundEffect) -> Defect:
     return (WireScale if is_drum(f) else TrackerScale)(f.size("scale_error_share"))
 
 
-def make_drum(f: Found) -> Defect:
+def make_drum(f: FoundEffect) -> Defect:
     radius_m = f.size("period_m") / (2.0 * math.pi)
     bearing_rad = f.size("phase_rad") + math.pi
     return DrumOutOfRound(f.size("amplitude_m"), radius_m, bearing_rad, -bearing_rad * radius_m)
 
 
-def make_circle(f: Found) -> Defect:
+def make_circle(f: FoundEffect) -> Defect:
     which = "azimuth" if f.variant == "azimuth" else "elevation"
     return CircleOffCentre(which, f.term.order or 1, f.size("amplitude_rad"), f.size("phase_rad"))
 
@@ -164,7 +164,7 @@ def rows(values: Floats) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(row) for row in values.tolist())
 
 
-def make_curve(f: Found) -> Defect:
+def make_curve(f: FoundEffect) -> Defect:
     by, knots, amounts = tuple(",".join(f.term.depends_on).split(",")), rows(f.knots()), rows(f.amount)
     match f.port.place:
         case Place.JOINTS:
@@ -178,7 +178,7 @@ def make_curve(f: Found) -> Defect:
 
 
 def at_frame(
-    f: Found, by: tuple[str, ...], knots: tuple[tuple[float, ...], ...], amounts: tuple[tuple[float, ...], ...]
+    f: FoundEffect, by: tuple[str, ...], knots: tuple[tuple[float, ...], ...], amounts: tuple[tuple[float, ...], ...]
 ) -> Defect:
     end = f.session.arm.fixed[f.port.index].copy()
     end[:3, 3] += f.session.beyond_m[f.port.index] * end[:3, 2]
@@ -187,7 +187,7 @@ def at_frame(
 
 
 def in_reading(
-    f: Found, by: tuple[str, ...], knots: tuple[tuple[float, ...], ...], amounts: tuple[tuple[float, ...], ...]
+    f: FoundEffect, by: tuple[str, ...], knots: tuple[tuple[float, ...], ...], amounts: tuple[tuple[float, ...], ...]
 ) -> Defect:
     if f.place:
         joints = f.session.drivers.readouts[f.port.instrument].joints

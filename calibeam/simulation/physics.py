@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibeam.simulation.found import Found, Session
-from calibeam.simulation.geometry import light_of
-from calibeam.simulation.mechanisms import NoMechanismError, at_the_end, mechanism_of
+from calibeam.simulation.found import FoundEffect, FoundIn
+from calibeam.simulation.mechanism_table import NoMechanismError, at_the_end, mechanism_of
+from calibeam.simulation.rig_in_numbers import light_of
 from calibrate.effects.ports import Perturbation, Place
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
@@ -51,12 +51,12 @@ def physics_of(
         return Physics(kept, kept, (), {}, notes)
     recorded = recorded_samples(model, n_joints)
     drivers = drivers_under(predictor, recorded, Perturbation.none(len(recorded), n_joints))
-    session = Session.of(predictor, drivers)
+    session = FoundIn.of(predictor, drivers)
     every: list[Sited] = []
     named: list[tuple[str, Sited]] = []
     sizes: dict[str, str] = {}
     for (effect, ended), carried in zip(acting, listed([effect for effect, _ in acting], drivers), strict=True):
-        found = Found.of(effect, carried.accepted, session)
+        found = FoundEffect.of(effect, carried.accepted, session)
         sizes[effect.name] = _size(found)
         try:
             made = mechanism_of(found)
@@ -97,7 +97,7 @@ def _acting(model: ModelFile, same_recording: bool) -> tuple[list[tuple[Effect, 
     )
 
 
-def _size(found: Found) -> str:
+def _size(found: FoundEffect) -> str:
     """Of the component that it moves most."""
     rms = np.sqrt(np.mean(found.amount**2, axis=0))
     most = int(np.argmax(rms))

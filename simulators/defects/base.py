@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from simulators.arm.rigid import turned
 from simulators.arm.statics import Load, Weight, carried_by, loaded_by
 from simulators.defects.defect import ANY_INSTRUMENT, ROBOT, Defect
-from simulators.defects.displacement import Bump, Carried, Settling
+from simulators.defects.displacement import Bump, CarriedPart, Settling
 from simulators.defects.scene import Scene, Site
 
 Floats = NDArray[np.float64]
@@ -119,7 +119,7 @@ class PedestalUnderWeights(Defect):
 
 
 @dataclass(frozen=True)
-class CarriedBase(Carried):
+class CarriedBase(CarriedPart):
     """The arm's foot, in the base frame."""
 
     KIND = "carried-base"

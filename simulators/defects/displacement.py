@@ -76,7 +76,7 @@ Course = Literal["step", "settling", "steady", "warmth"]
 
 
 @dataclass(frozen=True)
-class Carried(Defect):
+class CarriedPart(Defect):
     """A part that is carried away: by `shift_m`, and turned by `turn_rad` about `about_m`, in its own frame.
 
     `course` says when: all of it from `at_s` on ("step"); slowly to that end with the time constant `over_s`, from

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from simulators.arm.rigid import Vector, moved
 from simulators.defects.defect import SPOTS, Defect, direction
-from simulators.defects.displacement import Carried
+from simulators.defects.displacement import CarriedPart
 from simulators.defects.scene import Scene, Site
 
 Floats = NDArray[np.float64]
@@ -86,7 +86,7 @@ class MovedCone(Defect):
 
 
 @dataclass(frozen=True)
-class CarriedFixture(Carried):
+class CarriedFixture(CarriedPart):
     """The fixture while it stands at a place, in the frame of PSD 1."""
 
     place: int = 1

@@ -20,7 +20,6 @@ from simulators.defects.base import (
     SoftPedestal,
     UnevenPedestal,
 )
-from simulators.defects.curve import CurveAtBase, CurveAtJoints, CurveAtLink, CurveInReading
 from simulators.defects.defect import Defect
 from simulators.defects.detector import (
     BowedScale,
@@ -50,6 +49,7 @@ from simulators.defects.drive import (
 )
 from simulators.defects.encoder import EccentricDisc, EncoderSlip, OvalRing, SlowFilter, StaleReading
 from simulators.defects.fixture import BumpedFixture, CarriedFixture, MovedCone
+from simulators.defects.found_curve import CurveAtBase, CurveAtJoints, CurveAtLink, CurveInReading
 from simulators.defects.link import BeamUnderWeights, BendingLink, FlatLink, HeatedLink, WarmArm, WarmingUp, WornBearing
 from simulators.defects.outside import (
     BentRay,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from simulators.arm.rigid import Vector, shifted, turned_about
 from simulators.arm.statics import Load
 from simulators.defects.defect import ROBOT, SPOTS, Defect, as_vector, direction
-from simulators.defects.displacement import Carried
+from simulators.defects.displacement import CarriedPart
 from simulators.defects.scene import Scene, Site
 
 Floats = NDArray[np.float64]
@@ -146,7 +146,7 @@ class WarmLaser(Defect):
 
 
 @dataclass(frozen=True)
-class CarriedLaser(Carried):
+class CarriedLaser(CarriedPart):
     """The laser in its mount, in the flange frame."""
 
     KIND = "carried-laser"

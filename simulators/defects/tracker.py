@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from simulators.arm.rigid import turned
 from simulators.defects.defect import Defect, phase
-from simulators.defects.displacement import Bump, Carried, Settling
+from simulators.defects.displacement import Bump, CarriedPart, Settling
 from simulators.defects.scene import Scene, Site
 
 Floats = NDArray[np.float64]
@@ -125,7 +125,7 @@ class DrumOutOfRound(Defect):
 
 
 @dataclass(frozen=True)
-class CarriedDevice(Carried):
+class CarriedDevice(CarriedPart):
     """A tripod, in the device's frame."""
 
     KIND = "carried-device"

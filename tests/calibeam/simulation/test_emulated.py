@@ -8,8 +8,8 @@ import pytest
 from msgspec import structs
 
 from acquisition.recording.rig import parse_rig
-from calibeam.simulation.by_hand import BY_HAND, by_hand, form, unit_of
 from calibeam.simulation.emulated import emulated
+from calibeam.simulation.mechanism_by_hand import BY_HAND, by_hand, form, unit_of
 from calibrate.errors import DataError
 from calibrate.model_file import RigIdentity
 from calibrate.predict import Predictor

@@ -1,6 +1,6 @@
 """Every effect of the catalogue against the mechanism that it becomes: both change the readings alike.
 
-The exceptions and their reasons are those of the table itself (calibeam/simulation/mechanisms.py, `Line.within`).
+The exceptions and their reasons are those of the table itself (calibeam/simulation/mechanism_table.py, `Line.within`).
 """
 
 from dataclasses import replace
@@ -9,10 +9,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from calibeam.simulation.conditions import Clock, scene_of
-from calibeam.simulation.found import Found, Session
-from calibeam.simulation.geometry import rigged
-from calibeam.simulation.mechanisms import TABLE, line_of, mechanism_of
+from calibeam.simulation.found import FoundEffect, FoundIn
+from calibeam.simulation.mechanism_table import TABLE, line_of, mechanism_of
+from calibeam.simulation.rig_in_numbers import rigged
+from calibeam.simulation.scene_of_samples import Clock, scene_of
 from calibrate.diagnose.ported import perturbed_frames
 from calibrate.effects.catalogue import terms_of
 from calibrate.effects.drivers import Readout
@@ -52,7 +52,7 @@ class Bench:
         values = {p.name: float(v) for p, v in zip(fit.session.parameters, fit.geometry, strict=True)}
         names = tuple(m.name for m in fit.session.measured)
         self.predictor = Predictor(fit.session.rig, values, about_of(fit.session.weighting), names)
-        self.session = Session.of(self.predictor, self.drivers)
+        self.session = FoundIn.of(self.predictor, self.drivers)
         rest = {place: float(degC.mean()) for place, degC in self.drivers.temperatures_degC.items()}
         clock = Clock(float(self.drivers.t_s.min()), float(self.drivers.t_s.max()), rest)
         self.scene: Scene = scene_of(self.samples, clock, same_recording=True)
@@ -82,7 +82,7 @@ class Bench:
         values = found[self.predictor.instruments[0]]
         return values if values.ndim == 2 else values[:, None]
 
-    def apart(self, found: Found) -> tuple[float, float]:
+    def apart(self, found: FoundEffect) -> tuple[float, float]:
         """Rms of what mechanism and effect differ by, and of the effect."""
         by = Perturbation.none(len(self.samples), 6).plus(found.port, found.amount)
         simulated = self.simulated((mechanism_of(found),))
@@ -117,13 +117,13 @@ def acting(place: Bench) -> tuple[Term, ...]:
     return tuple(term for term in terms_of(place.drivers) if acts(term, place))
 
 
-def found_of(term: Term, place: Bench) -> Found:
+def found_of(term: Term, place: Bench) -> FoundEffect:
     """With values of a machine: coefficients of either sign where it has several, springs that give way."""
     inner = np.array([spec.grid[len(spec.grid) // 2] for spec in term.inner])
     basis = term.basis(place.drivers, inner)
     coefficients = np.linspace(1.0, 0.4, basis.shape[2]) / np.maximum(np.abs(basis).max(axis=(0, 1)), 1e-12)
     size = np.abs(basis @ coefficients).max()
-    return Found(term.physics, term, SIZE / size * coefficients, inner, place.session)
+    return FoundEffect(term.physics, term, SIZE / size * coefficients, inner, place.session)
 
 
 def one_of_each(terms: tuple[Term, ...]) -> tuple[Term, ...]:
@@ -173,7 +173,7 @@ def test_two_encoders_see_the_drive_from_where_they_sit() -> None:
     rows, joints = len(place.samples), (1, 2, 3, 4, 5, 6)
     readout = Readout(ENCODER_DIFFERENCE, np.zeros((rows, 6)), np.ones(rows, dtype=bool), joints=joints)
     drivers = replace(place.drivers, readouts={**place.drivers.readouts, ENCODER_DIFFERENCE: readout})
-    session = Session.of(place.predictor, drivers)
+    session = FoundIn.of(place.predictor, drivers)
     sites = [t for t in terms_of(drivers) if t.port.where == "joint2.angle" and (not t.open or t.shape is Shape.SMOOTH)]
     for term in sites:
         found = replace(found_of(term, place), session=session)
@@ -185,7 +185,7 @@ def test_two_encoders_see_the_drive_from_where_they_sit() -> None:
         change = place.modelled(place.samples.joints(), by) - place.expected
         apart = place.observed(read) - place.observed(place.plain) - change
         assert rms(apart) <= within * rms(change) + 1e-9, term.key
-    assert {Found(term.physics, term, np.zeros(0), np.zeros(0), session).place for term in sites} == {"", *PLACES}
+    assert {FoundEffect(term.physics, term, np.zeros(0), np.zeros(0), session).place for term in sites} == {"", *PLACES}
 
 
 @pytest.mark.endure

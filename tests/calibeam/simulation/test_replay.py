@@ -10,7 +10,7 @@ from msgspec import structs
 from acquisition.recording import Recording, Samples, read, readings_sha256
 from calibeam.commands.replay import replay_command
 from calibeam.simulation.physics import names_of
-from calibeam.simulation.replay import replay, write_replayed
+from calibeam.simulation.replayed_recording import replay, write_replayed
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile, RigIdentity, write_model
 from calibrate.physics.predicting import predict_with_physics

@@ -13,10 +13,10 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording import Recording, RecordingWriter, Samples, readings_sha256
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION, SPOTS, WIRE, per_joint
-from calibeam.simulation.conditions import Clock, scene_of
-from calibeam.simulation.geometry import rigged
 from calibeam.simulation.noise import Noise, noise_of
 from calibeam.simulation.physics import Physics, physics_of
+from calibeam.simulation.rig_in_numbers import rigged
+from calibeam.simulation.scene_of_samples import Clock, scene_of
 from calibeam.software import SOFTWARE
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from calibeam.simulation.found import Found
+from calibeam.simulation.found import FoundEffect
 from calibeam.simulation.of_arm import (
+    beam_weights,
     carried,
     length_m,
     make_cone,
@@ -33,6 +34,8 @@ from calibeam.simulation.of_arm import (
     make_under_weight,
     make_warming,
     make_wobble,
+    pedestal_weights,
+    spring_weights,
 )
 from calibeam.simulation.of_instruments import (
     CUBES,
@@ -54,7 +57,6 @@ from calibeam.simulation.of_instruments import (
     make_walking,
     make_waves,
 )
-from calibeam.simulation.weights import beam_weights, pedestal_weights, spring_weights
 from calibrate.effects.ports import Place
 from calibrate.effects.psd_cover_glass import INDEX
 from calibrate.effects.second_encoders import AGAINST, PAST, SECOND
@@ -63,7 +65,6 @@ from calibrate.sensors.catalogue import kind_of
 from calibrate.sensors.kind import Trait
 from simulators.defects import Defect
 from simulators.defects.base import CarriedBase, PedestalUnderWeights, SoftPedestal, UnevenPedestal
-from simulators.defects.curve import CurveAtJoints
 from simulators.defects.detector import (
     CoverGlass,
     Pincushion,
@@ -90,6 +91,7 @@ from simulators.defects.drive import (
 )
 from simulators.defects.encoder import EccentricDisc, EncoderSlip, OvalRing, SlowFilter, StaleReading
 from simulators.defects.fixture import CarriedFixture, MovedCone
+from simulators.defects.found_curve import CurveAtJoints
 from simulators.defects.link import (
     BeamUnderWeights,
     BendingLink,
@@ -122,15 +124,15 @@ class Line:
 
     physics: str
     form: str  # which of the effect's forms, for a person
-    takes: Callable[[Found], bool]
+    takes: Callable[[FoundEffect], bool]
     mechanism: type[Defect]
     crosses: str  # what crosses over, with its unit
-    make: Callable[[Found], Defect]
+    make: Callable[[FoundEffect], Defect]
     within: float = 0.02
     differs: str = ""  # why, where it is more than two per cent, or what else a reader should know
 
 
-def mechanism_of(found: Found) -> Sited:
+def mechanism_of(found: FoundEffect) -> Sited:
     """NoMechanismError where no line takes it, or its drivers are none that the simulators follow."""
     line = line_of(found)
     try:
@@ -139,7 +141,7 @@ def mechanism_of(found: Found) -> Sited:
         raise NoMechanismError(f"its driver {missing.args[0]} is unknown to the simulation") from missing
 
 
-def line_of(found: Found) -> Line:
+def line_of(found: FoundEffect) -> Line:
     """NoMechanismError where no line takes it."""
     for line in TABLE:
         if line.physics == found.term.physics and line.takes(found):
@@ -153,7 +155,7 @@ def at_the_end(mechanism: Defect) -> Defect:
     return replace(changed, at_s=-math.inf) if hasattr(changed, "at_s") else mechanism
 
 
-def _site(found: Found) -> Where:
+def _site(found: FoundEffect) -> Where:
     if found.port.instrument and found.port.place is Place.READING and not found.place:
         kind = kind_of(found.port.instrument)
         return "camera" if Trait.DEVICE in kind.traits and "camera" in kind.reads[0] else ""
@@ -163,19 +165,19 @@ def _site(found: Found) -> Where:
 # --- the table
 
 
-def _any(f: Found) -> bool:
+def _any(f: FoundEffect) -> bool:
     return True
 
 
-def _has(*names: str) -> Callable[[Found], bool]:
+def _has(*names: str) -> Callable[[FoundEffect], bool]:
     return lambda f: all(name in f.sizes for name in names)
 
 
-def _named(*variants: str) -> Callable[[Found], bool]:
+def _named(*variants: str) -> Callable[[FoundEffect], bool]:
     return lambda f: f.variant in variants
 
 
-def _shaped(shape: Shape, variant: str | None = None) -> Callable[[Found], bool]:
+def _shaped(shape: Shape, variant: str | None = None) -> Callable[[FoundEffect], bool]:
     return lambda f: f.term.shape is shape and (variant is None or f.variant == variant)
 
 
