@@ -22,6 +22,7 @@ def replay_command(
     without: Annotated[tuple[str, ...], Parameter(negative=())] = (),
     seed: int = 0,
     noise: bool = True,
+    noise_found: Annotated[bool, Parameter(negative=())] = False,
     json: bool = False,
 ) -> None:
     """Move a simulated rig through a recording's motion, with a model's physics.
@@ -48,6 +49,8 @@ def replay_command(
         Of the noise.
     noise
         Draw noise as the recording's rig states it, or as the model found it where the rig states none.
+    noise_found
+        Draw the noise that the model found, instead of what the rig states.
     json
         Print what was done as one line of JSON.
 
@@ -55,7 +58,7 @@ def replay_command(
     known = read_model(model)
     with naming_source(recording):
         source = read(recording)
-        found = replay(source, known, without=without, seed=seed, noisy=noise)
+        found = replay(source, known, without=without, seed=seed, noisy=noise, noise_found=noise_found)
     about = {"replayed": recording.name, "model": model.name, "seed": str(seed), "noise": "drawn" if noise else "none"}
     write_replayed(out, found, source, about | ({"without": ", ".join(without)} if without else {}))
     apart = over_noise(found, source.samples)

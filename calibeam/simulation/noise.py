@@ -47,8 +47,8 @@ class Noise:
         return Samples(columns, samples.n_joints)
 
 
-def noise_of(rig: Rig, model: ModelFile, samples: Samples) -> Noise:
-    """For the columns that the samples have."""
+def noise_of(rig: Rig, model: ModelFile, samples: Samples, *, as_found: bool = False) -> Noise:
+    """For the columns that the samples have; `as_found`: what the model found goes before what is stated."""
     stated = rig.noise
     by_column: dict[str, float | None] = dict.fromkeys(SPOTS, stated.psd_m)
     by_column |= dict.fromkeys(POSITION, stated.position_m) | {WIRE: stated.wire_m}
@@ -63,7 +63,8 @@ def noise_of(rig: Rig, model: ModelFile, samples: Samples) -> Noise:
             continue
         its = _number(model.noise.get(name))
         drawn = _typical(name, value, samples)
-        if drawn is not None and (its is None or stated.joint_rad is not None or its <= drawn):
+        enough = stated.joint_rad is not None or its is None or drawn is None or its <= drawn
+        if drawn is not None and (its is None or (enough and not as_found)):
             sigma[name] = drawn
         elif its is not None:
             sigma[name] = its
@@ -71,7 +72,8 @@ def noise_of(rig: Rig, model: ModelFile, samples: Samples) -> Noise:
         else:
             sigma[name] = 0.0
             silent.append(name)
-    return Noise(sigma, stated.joint_rad or 0.0, stated.seat_m or 0.0, tuple(found), tuple(silent))
+    shaken = not as_found or not found  # what was found holds the joints, too
+    return Noise(sigma, (stated.joint_rad or 0.0) if shaken else 0.0, stated.seat_m or 0.0, tuple(found), tuple(silent))
 
 
 def _typical(column: str, stated: float | None, samples: Samples) -> float | None:

@@ -48,9 +48,18 @@ class Replayed:
 
 
 def replay(
-    recording: Recording, model: ModelFile, *, without: Sequence[str] = (), seed: int = 0, noisy: bool = True
+    recording: Recording,
+    model: ModelFile,
+    *,
+    without: Sequence[str] = (),
+    seed: int = 0,
+    noisy: bool = True,
+    noise_found: bool = False,
 ) -> Replayed:
-    """DataError for a model of another arm, for names that it does not list, or where nothing was measured."""
+    """`noise_found`: noise as the model found it, instead of as the rig states it.
+
+    DataError for a model of another arm, for names that it does not list, or where nothing was measured.
+    """
     samples = recording.samples
     predictor = _predictor(recording.rig, model)
     same = model.readings_sha256 == readings_sha256(samples)
@@ -58,7 +67,7 @@ def replay(
     scene = _lit(scene_of(samples, Clock.of(model, samples.column("t_s")), same_recording=same), physics)
     rig = rigged(predictor, samples)
     exact_samples = _read(rig, scene, physics, samples, np.zeros_like(samples.joints()))
-    noise = noise_of(recording.rig, model, samples)
+    noise = noise_of(recording.rig, model, samples, as_found=noise_found)
     shaken = exact_samples
     if noisy:
         rng = np.random.default_rng(seed)

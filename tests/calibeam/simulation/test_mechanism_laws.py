@@ -8,7 +8,9 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from acquisition.recording.samples import ORIENTATION, POSITION
 from calibeam.simulation.found import FoundEffect, FoundIn
 from calibeam.simulation.mechanism_table import TABLE, line_of, mechanism_of
 from calibeam.simulation.rig_in_numbers import rigged
@@ -22,6 +24,7 @@ from calibrate.effects.term import Shape, Term
 from calibrate.identification.session import about_of
 from calibrate.physics.acting import arm_in, moved_columns
 from calibrate.predict import Predictor, readings
+from calibrate.sensors.camera import PLACE, TURN
 from calibrate.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 from simulators.conceal.belief import rig_document
 from simulators.conceal.case import conceal
@@ -32,8 +35,6 @@ from simulators.replayed import Readings, Rigged, Sited, replayed
 from tests.calibrate.effects.conftest import SAMPLES, SEED, full_session
 
 SIZE = 5e-5  # rad or m at a port: what a machine shows
-SPOTS = ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")
-POSITION = ("x_m", "y_m", "z_m")
 
 
 def rig_text_of(family: Family) -> str:
@@ -159,6 +160,26 @@ def test_every_effect_is_what_its_mechanism_does(family: Family) -> None:
         if off > line_of(found).within * whole + 1e-11:
             wrong.append(f"{term.key}: {off:.2e} of {whole:.2e}")
     assert not wrong, "\n".join(wrong)
+
+
+def test_a_six_d_target_and_a_camera_are_where_the_model_has_them() -> None:
+    place = bench("tracker")
+    about = {
+        **place.predictor.about,
+        "tool": (*place.predictor.about["tool"][:3], 0.1, -0.2, 0.3),
+        "camera": (1.0, 2.0, 0.5, 0.1, 0.2, 0.3),
+        "marker": (0.01, 0.02, 0.03, 0.3, 0.1, -0.2),
+    }
+    moved = {"tool.roll": 1e-3, "camera.x": 1e-3, "camera.yaw": 2e-3, "marker.y": 1e-3, "marker.pitch": -2e-3}
+    predictor = replace(place.predictor, about=about, values={**place.predictor.values, **moved})
+    read = replayed(rigged(predictor, place.samples), place.scene, (), place.samples.joints())
+    wanted = readings(predictor, predictor.flange(place.samples.joints()), place.samples, ["full-pose", "camera-pose"])
+    for names, values in ((POSITION, read.position_m), (PLACE, read.camera_m)):
+        np.testing.assert_allclose(values, np.stack([wanted[c] for c in names], axis=1), rtol=0.0, atol=1e-10)
+    for names, values in ((ORIENTATION, read.turn_rad), (TURN, read.camera_rad)):
+        assert values is not None
+        turned = Rotation.from_rotvec(values).inv() * Rotation.from_rotvec(np.stack([wanted[c] for c in names], axis=1))
+        assert turned.magnitude().max() < 1e-9
 
 
 def test_every_line_of_the_table_is_met_by_the_catalogue() -> None:

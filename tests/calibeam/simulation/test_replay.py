@@ -190,6 +190,14 @@ def test_noise_is_as_stated_and_repeats_with_its_seed() -> None:
     assert np.abs(one.samples.column("x_m") - other.samples.column("x_m")).max() > 0.0
 
 
+def test_noise_as_found_goes_before_what_is_stated() -> None:
+    place = bench("tracker")
+    model = structs.replace(model_of(place), noise=dict.fromkeys(("x_m", "y_m", "z_m"), 3e-6))
+    found = replay(recording_of(place), model, noise_found=True)
+    drawn = np.stack([found.samples.column(c) - found.exact.column(c) for c in ("x_m", "y_m", "z_m")])
+    assert drawn.std() == pytest.approx(3e-6, rel=0.15)
+
+
 def test_what_is_written_reads_as_a_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     place = bench("tracker")
     write_replayed(tmp_path / "source.mcap", replay(recording_of(place), model_of(place)), recording_of(place), {})
