@@ -107,12 +107,17 @@ def _simulated(
     from calibeam.simulation.mechanism_by_hand import (
         by_hand,  # the physics of a model loads the whole catalogue: only here
     )
+    from calibrate.errors import DataError
     from calibrate.model_file import read_model
+    from simulators.defects import WrittenError
 
     given, found, notes = (None, (), ()) if model is None else emulated(read_model(model), load_rig(rig))
     for note in notes:
         print(note, file=sys.stderr, flush=True)
-    return given, (*found, *(by_hand(text, plain) for text in hide))
+    try:
+        return given, (*found, *(by_hand(text, plain) for text in hide))
+    except WrittenError as wrong:
+        raise DataError(str(wrong)) from wrong
 
 
 def _print_json(where: dict[str, dict[str, Any]]) -> None:
