@@ -49,6 +49,11 @@ GROUPS: dict[str, tuple[ListedCommand, ...]] = {
     ),
     "Simulation": (
         ListedCommand("emulate", "emulate:emulate", "Emulate every device of a rig on real wires until Ctrl-C."),
+        ListedCommand(
+            "replay",
+            "replay:replay_command",
+            "Move a simulated rig through a recording's motion, with a model's physics.",
+        ),
         ListedCommand("compare", "compare:compare_command", "Find where a simulation and a measurement disagree."),
         ListedCommand("motion", "motion:motion_command", "Run the motion examples on an emulated controller."),
         ListedCommand(

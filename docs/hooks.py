@@ -9,6 +9,7 @@ from mkdocs.structure.pages import Page
 
 from calibeam.cli import app
 from calibeam.command_list import COMMANDS
+from calibeam.simulation.mechanism_table import TABLE
 from calibrate.effects.catalogue import EFFECTS
 
 OPEN = "unknown"
@@ -22,6 +23,17 @@ def effects() -> str:
         f"| `{e.physics}` | {e.explains} | {', '.join(f'`{name}`' for name in e.mistaken_for)} | {e.source} |"
         for e in EFFECTS
         if e.physics != OPEN
+    ]
+    return "\n".join(rows)
+
+
+def mechanisms() -> str:
+    """One row for each line of the table from effects to mechanisms."""
+    rows = ["| effect | form | mechanism | what crosses over, and its unit | may differ by |", "|---|---|---|---|---|"]
+    rows += [
+        f"| `{line.physics}` | {line.form} | `{line.mechanism.KIND}` | {line.crosses} | "
+        f"{100.0 * line.within:.0f} %{': ' + line.differs if line.differs else ''} |"
+        for line in TABLE
     ]
     return "\n".join(rows)
 
@@ -40,7 +52,12 @@ def _title(note: Path) -> str:
     return note.read_text(encoding="utf-8").splitlines()[0].removeprefix("# ")
 
 
-TABLES: dict[str, Callable[[], str]] = {"effects": effects, "commands": commands, "decisions": decisions}
+TABLES: dict[str, Callable[[], str]] = {
+    "effects": effects,
+    "mechanisms": mechanisms,
+    "commands": commands,
+    "decisions": decisions,
+}
 
 
 def on_page_content(html: str, page: Page, **_: object) -> str:

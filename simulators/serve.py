@@ -15,7 +15,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from simulators.defects import defects_of
+from simulators.defects import Defect, defects_of
 from simulators.devices import (
     EmulatedDevices,
     addresses,
@@ -30,6 +30,7 @@ from simulators.host.errors import HostError, PortBusy
 from simulators.host.loop import Host
 from simulators.host.side_channel import Control, side_channel
 from simulators.wire import Bench
+from simulators.world.truth import Given
 from simulators.world_of_rig import EmulatedWorld, world_of
 
 AUTO = "auto"
@@ -51,6 +52,8 @@ class ServeOptions:
     links: bool = True  # make the symbolic links that the rig names as serial ports
     end_with_stdin: bool = False  # stop when stdin closes, so that a parent that dies leaves no emulators behind
     hidden: Sequence[Mapping[str, Any]] = ()  # mechanisms at work in the world, see simulators/defects/mechanisms.py
+    mechanisms: Sequence[Defect] = ()  # further ones, as records
+    given: Given | None = None  # the rig's geometry in numbers, instead of a drawn one
 
 
 class _Stop:
@@ -69,7 +72,8 @@ def serve(rig: Mapping[str, Any], options: ServeOptions, announce: Callable[[Ann
     Must run in the main thread, for only that takes signals. Raises WorldError for a rig that cannot be emulated,
     WrittenError for mechanisms that cannot be read, PortBusy and HostError for ports that cannot be opened.
     """
-    world = world_of(rig, options.seed, defects_of(options.hidden))
+    hidden = (*defects_of(options.hidden), *options.mechanisms)
+    world = world_of(rig, options.seed, hidden, options.given)
     time_scale = _time_scale(world, options)
     auto = options.robot_host == AUTO
     devices = build_devices(world.physics, rig, AUTO_HOSTS[0] if auto else options.robot_host)

@@ -12,7 +12,7 @@ from simulators.hand.truth import write_hand_truth
 from simulators.hand.world import HandWorld
 from simulators.world.errors import WorldError
 from simulators.world.rig import read_rig
-from simulators.world.truth import write_truth
+from simulators.world.truth import Given, write_truth
 from simulators.world.world import World
 
 
@@ -26,13 +26,23 @@ class EmulatedWorld:
     write_truth: Callable[[Path], None]
 
 
-def world_of(rig: Mapping[str, Any], seed: int | None, hidden: Sequence[Defect]) -> EmulatedWorld:
-    """The world of a rig as `tomllib` gives it. WorldError for one that cannot be emulated."""
-    return _hand_held(rig, seed, hidden) if is_hand_held(rig) else _driven(rig, seed, hidden)
+def world_of(
+    rig: Mapping[str, Any], seed: int | None, hidden: Sequence[Defect], given: Given | None = None
+) -> EmulatedWorld:
+    """The world of a rig as `tomllib` gives it. WorldError for one that cannot be emulated.
+
+    `given`: its geometry in numbers, instead of one that the seed draws.
+    """
+    if not is_hand_held(rig):
+        return _driven(rig, seed, hidden, given)
+    if given is not None:
+        raise WorldError("a hand-held arm has its geometry in [emulation]; leave the model out")
+    return _hand_held(rig, seed, hidden)
 
 
-def _driven(rig: Mapping[str, Any], seed: int | None, hidden: Sequence[Defect]) -> EmulatedWorld:
-    world = World.from_rig(rig, seed=seed, q_rad=rig.get("motion", {}).get("home_rad"), hidden=hidden)
+def _driven(rig: Mapping[str, Any], seed: int | None, hidden: Sequence[Defect], given: Given | None) -> EmulatedWorld:
+    home_rad = rig.get("motion", {}).get("home_rad")
+    world = World.from_rig(rig, seed=seed, q_rad=home_rad, hidden=hidden, given=given)
 
     def place(id: int) -> None:  # noqa: A002 - the verb's argument is called id
         world.place_fixture(id)

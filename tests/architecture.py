@@ -147,8 +147,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 839,
-    "lines": 92_400,
+    "files": 999,
+    "lines": 199_000,
     "longest_function": 54,
     "one_importer": 49,
     "classes": 38,

@@ -18,6 +18,7 @@ TURNED_PARTS = {
     "calibrate/arms": "the arm models themselves",
     "calibrate/diagnose/ported.py": "effects at every port of the chain",
     "calibrate/physics/predicting.py": "the same, for the derivative by values",
+    "calibeam/simulation/rig_in_numbers.py": "no kinematics: zeros go over to the simulators, which have their own",
 }
 
 

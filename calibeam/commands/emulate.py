@@ -1,13 +1,19 @@
 """`calibeam emulate`: the rig's devices as emulators on real wires, until stopped."""
 
 import json
+import sys
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
+
+if TYPE_CHECKING:
+    from simulators.defects import Defect
+    from simulators.world.truth import Given
 
 
 def emulate(
@@ -21,6 +27,8 @@ def emulate(
     links: bool = True,
     expose: bool = False,
     control_host: str = "127.0.0.1",
+    model: Path | None = None,
+    hide: Annotated[tuple[str, ...], Parameter(negative=())] = (),
     end_with_stdin: Annotated[bool, Parameter(show=False)] = False,
 ) -> None:
     """Emulate every device of a rig on real wires until Ctrl-C.
@@ -31,6 +39,12 @@ def emulate(
     "control", for example by nc 127.0.0.1 PORT; the kinds stand in docs/protocols/faults.md:
 
     {"do": "fault.inject", "with": {"device": "psd", "kind": "silence", "count": 100}}
+
+    A rig with the geometry and the physics of a model, and one that mechanisms were put into by hand:
+
+    Example: calibeam emulate rigs/ur5e-dual-psd.toml --model model.json
+
+    Example: calibeam emulate rigs/ur5e-dual-psd.toml --hide "soft-joint joint2 8e-6" --hide "slack-drive joint5 1e-4"
 
     Parameters
     ----------
@@ -54,12 +68,22 @@ def emulate(
         Let devices listen on addresses that other machines reach. Device protocols know no password.
     control_host
         Address of the side channel. Anywhere but on loopback it wants the token that is announced with it.
+    model
+        A model.json: the emulated rig has its geometry, and a mechanism for each effect that holds on any day.
+    hide
+        A mechanism to put in: its name, its place (joint2, link3, psd1) and its size in SI units (rad/Nm, m, rad,
+        1/K); further quantities as key=value. A wrong name lists all of them with their units. May be given several
+        times.
 
     """
     from simulators.serve import ServeOptions, serve  # the physics takes a second to load: only here
 
     stated = load_rig(rig).devices.robot  # tells what is wrong with the file in its own words
+    plain = plain_rig(rig_text(rig), str(rig))
+    given, mechanisms = _simulated(rig, plain, model, hide)
     options = ServeOptions(
+        mechanisms=mechanisms,
+        given=given,
         robot_host=robot_host,
         truth_path=truth,
         seed=seed,
@@ -70,7 +94,30 @@ def emulate(
         end_with_stdin=end_with_stdin,
     )
     show = _print_json if json_ else partial(_print_table, None if stated is None else stated.host)
-    serve(plain_rig(rig_text(rig), str(rig)), options, show)
+    serve(plain, options, show)
+
+
+def _simulated(
+    rig: Path, plain: Mapping[str, Any], model: Path | None, hide: tuple[str, ...]
+) -> tuple["Given | None", "tuple[Defect, ...]"]:
+    """Geometry and mechanisms of a model, and those put in by hand. What is left out goes to standard error."""
+    if model is None and not hide:
+        return None, ()
+    from calibeam.simulation.emulated import emulated
+    from calibeam.simulation.mechanism_by_hand import (
+        by_hand,  # the physics of a model loads the whole catalogue: only here
+    )
+    from calibrate.errors import DataError
+    from calibrate.model_file import read_model
+    from simulators.defects import WrittenError
+
+    given, found, notes = (None, (), ()) if model is None else emulated(read_model(model), load_rig(rig))
+    for note in notes:
+        print(note, file=sys.stderr, flush=True)
+    try:
+        return given, (*found, *(by_hand(text, plain) for text in hide))
+    except WrittenError as wrong:
+        raise DataError(str(wrong)) from wrong
 
 
 def _print_json(where: dict[str, dict[str, Any]]) -> None:

@@ -8,7 +8,7 @@ d_z about (law of reflection). The cosines and the power share of each face foll
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,6 +87,8 @@ def spots(rig: TrueRig, fixture: DualPsd, scene: Scene, defects: Sequence[Defect
         if isinstance(defect, MovesFixture):
             psd1 = psd1 @ defect.fixture_motion(scene)
     light = shine(laser, fixture.laser_direction, psd1, fixture.psd2_in_psd1, scene.first_psd, scene.laser_power)
+    if scene.laser_sum_v is not None:
+        light = replace(light, sum_v=scene.laser_sum_v)
     seen_m, sum_v = light.spot_m, light.sum_v
     for defect in defects:
         if isinstance(defect, DistortsSpots):

@@ -22,7 +22,11 @@ def seated_readings(
     rig: TrueRig, artefacts: Artefacts, scene: Scene, defects: Sequence[Defect], posture_rad: Floats
 ) -> Floats:
     """Encoder readings (row, n) with the probe truly in its cone, in the posture nearest to `posture_rad` (row, n)."""
-    wanted_m = artefacts.seat_m[scene.seat - 1]
+    return readings_at(rig, artefacts.seat_m[scene.seat - 1], scene, defects, posture_rad)
+
+
+def readings_at(rig: TrueRig, wanted_m: Floats, scene: Scene, defects: Sequence[Defect], posture_rad: Floats) -> Floats:
+    """The same with cones at `wanted_m` (row, 3) in the base, before anything moves them."""
     for defect in defects:
         if isinstance(defect, MovesSeat):
             wanted_m = wanted_m + defect.seat_shift_m(scene)

@@ -2,15 +2,17 @@
 
 A file holds the mechanisms of one place in the chain: encoder, drive, link, base, tool, fixture, detector, tracker, and
 `outside` for what no catalogue lists. A new mechanism is one class there, with the method of its place (`defect.py`
-lists the places), and one line in `mechanisms.MECHANISMS`. Other folders import from here.
+lists the places), and one line in `mechanisms.MECHANISMS`, or in
+`mechanisms.GIVEN` where it has its numbers from a model only. Other folders import from here.
 """
 
 from simulators.arm.statics import Load
 from simulators.defects.defect import Defect, size_of, with_size
-from simulators.defects.mechanisms import MECHANISMS, WrittenError, defects_of, written
+from simulators.defects.mechanisms import GIVEN, MECHANISMS, WrittenError, defects_of, written
 from simulators.defects.scene import Light, Scene, Site, UnsuitedError
 
 __all__ = [
+    "GIVEN",
     "MECHANISMS",
     "Defect",
     "Light",

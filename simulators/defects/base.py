@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.arm.rigid import turned
-from simulators.arm.statics import Load
-from simulators.defects.defect import ROBOT, Defect
-from simulators.defects.displacement import Bump, Settling
+from simulators.arm.statics import Load, Weight, carried_by, loaded_by
+from simulators.defects.defect import ANY_INSTRUMENT, ROBOT, Defect
+from simulators.defects.displacement import Bump, CarriedPart, Settling
 from simulators.defects.scene import Scene, Site
 
 Floats = NDArray[np.float64]
@@ -70,3 +70,62 @@ class SoftPedestal(Defect):
 
     def base_motion(self, scene: Scene, load: Load) -> Floats:
         return turned(self.compliance_rad_nm * load.moment_nm[:, 0] * np.array([1.0, 1.0, 0.0]))
+
+
+@dataclass(frozen=True)
+class UnevenPedestal(Defect):
+    """A pedestal that leans more about one level axis than about the other: a spring for each."""
+
+    about_x_rad_nm: float
+    about_y_rad_nm: float
+    share: float = 1.0
+
+    KIND = "uneven-pedestal"
+    PHYSICS = "base-compliance"
+    PORT = "base.pose"
+    DRIVERS = ("overturning_moment",)
+    SIZE = "share"
+    TYPICAL = 1.0
+    INSTRUMENTS = ROBOT
+
+    def base_motion(self, scene: Scene, load: Load) -> Floats:
+        gives = np.array([self.about_x_rad_nm, self.about_y_rad_nm, 0.0])
+        return turned(self.share * load.moment_nm[:, 0] * gives)
+
+
+@dataclass(frozen=True)
+class PedestalUnderWeights(Defect):
+    """A soft pedestal under weights that are none of the stated masses, each times its compliance (see `Weight`).
+
+    To the payload, whose mass is known, it yields `payload_rad_nm`.
+    """
+
+    weights: tuple[Weight, ...]
+    payload_rad_nm: float = 0.0
+    share: float = 1.0
+
+    KIND = "pedestal-under-weights"
+    PHYSICS = "base-compliance"
+    PORT = "base.pose"
+    DRIVERS = ("overturning_moment",)
+    SIZE = "share"
+    TYPICAL = 1.0
+    INSTRUMENTS = ROBOT
+
+    def base_motion(self, scene: Scene, load: Load) -> Floats:
+        own, _ = loaded_by(load, self.weights, 0)
+        payload, _ = carried_by(load, self.payload_rad_nm * scene.payload_kg, scene.payload_com_m, 0)
+        return turned(self.share * (own + payload) * np.array([1.0, 1.0, 0.0]))
+
+
+@dataclass(frozen=True)
+class CarriedBase(CarriedPart):
+    """The arm's foot, in the base frame."""
+
+    KIND = "carried-base"
+    PHYSICS = "base-moved"
+    PORT = "base.pose"
+    INSTRUMENTS = ANY_INSTRUMENT
+
+    def base_motion(self, scene: Scene, load: Load) -> Floats:
+        return self.carried(scene)

@@ -1,12 +1,13 @@
 """Mechanisms between the light on a PSD and the position that it gives."""
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.defects.defect import SPOTS, Defect, phase
+from simulators.defects.defect import SPOTS, UNKNOWN, Defect, phase
 from simulators.defects.scene import Light, Scene, Site
 
 Floats = NDArray[np.float64]
@@ -157,7 +158,7 @@ class StrayLight(PsdDefect):
 
     stray_v: float
     centre_m: tuple[float, float]
-    hour_s: float
+    hour_s: float = math.inf  # in which it waxes and wanes; infinite: a lamp
 
     KIND = "psd-stray-light"
     PHYSICS = "psd-ambient-light"
@@ -214,3 +215,71 @@ class CoverGlass(PsdDefect):
         inside = sine / self.index
         shift_m = self.thickness_m * (sine / np.sqrt(1.0 - sine**2) - inside / np.sqrt(1.0 - inside**2))
         return own_m - shift_m[:, np.newaxis] * beam[:, :2] / np.maximum(sine, 1e-12)[:, np.newaxis]
+
+
+@dataclass(frozen=True)
+class StrainedFace(PsdDefect):
+    """A face whose picture is strained like a sheet of rubber: `x` and `y` too long, and sheared by `shear` (no unit).
+
+    Plane strain: x' = (1 + x) x + (shear / 2) y, y' = (1 + y) y + (shear / 2) x. Electrodes that are not square to each
+    other shear it; what is left is a turn of the whole detector.
+    """
+
+    x: float
+    y: float
+    shear: float
+    share: float = 1.0
+
+    KIND = "psd-strained"
+    PHYSICS = "psd-gain"
+    SIZE = "share"
+    TYPICAL = 1.0
+
+    def seen_m(self, own_m: Floats, light: Light, scene: Scene) -> Floats:
+        half = 0.5 * self.shear
+        return own_m + self.share * own_m @ np.array([[self.x, half], [half, self.y]])
+
+
+@dataclass(frozen=True)
+class UnevenLayer(PsdDefect):
+    """A resistive layer of uneven thickness, expanded in powers of the place on the face.
+
+    Each of `powers` is (0 for x or 1 for y, i, j, share): the reading there is off by share H (x / H)^i (y / H)^j with
+    H half the face, so `share` is the error at the edge over half the face.
+    """
+
+    powers: tuple[tuple[int, int, int, float], ...]
+    half_size_m: float
+    share: float = 1.0
+
+    KIND = "psd-uneven-layer"
+    PHYSICS = "psd-nonlinearity"
+    SIZE = "share"
+    TYPICAL = 1.0
+
+    def seen_m(self, own_m: Floats, light: Light, scene: Scene) -> Floats:
+        x, y = (own_m / self.half_size_m).T
+        seen_m = own_m.copy()
+        for axis, i, j, size in self.powers:
+            seen_m[:, axis] += self.share * size * self.half_size_m * x**i * y**j
+        return seen_m
+
+
+@dataclass(frozen=True)
+class WavesOnFace(PsdDefect):
+    """Waves across a face, as a window or strips of a worn layer make them: x and y each with amplitude and phase."""
+
+    amplitude_m: tuple[float, float]
+    phase_rad: tuple[float, float]
+    waves_per_m: tuple[float, float]
+    share: float = 1.0
+
+    KIND = "psd-waves"
+    PHYSICS = UNKNOWN
+    SIZE = "share"
+    TYPICAL = 1.0
+
+    def seen_m(self, own_m: Floats, light: Light, scene: Scene) -> Floats:
+        turn_rad = 2.0 * np.pi * (own_m @ np.asarray(self.waves_per_m))
+        waves = np.sin(turn_rad[:, np.newaxis] + np.asarray(self.phase_rad))
+        return own_m + self.share * np.asarray(self.amplitude_m) * waves

@@ -1,12 +1,12 @@
-"""Parts of the set-up that move as a whole while a session lasts: at once, or slowly to an end."""
+"""Parts of the set-up that move as a whole while a session lasts: at once, slowly to an end, or with temperature."""
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.rigid import Vector, moved
+from simulators.arm.rigid import Vector, moved, shifted, turned_about
 from simulators.defects.defect import Defect, direction
 from simulators.defects.scene import Scene, Site
 
@@ -70,3 +70,48 @@ class Settling(Displacement):
     def motion(self, scene: Scene) -> Floats:
         """(row, 4, 4) of the part in its own frame."""
         return self.displaced(self.shift_m * (1.0 - np.exp(-scene.t_s / self.time_constant_s)))
+
+
+Course = Literal["step", "settling", "steady", "warmth"]
+
+
+@dataclass(frozen=True)
+class CarriedPart(Defect):
+    """A part that is carried away: by `shift_m`, and turned by `turn_rad` about `about_m`, in its own frame.
+
+    `course` says when: all of it from `at_s` on ("step"); slowly to that end with the time constant `over_s`, from
+    `at_s` on ("settling"); by that much in every `over_s`, steadily ("steady"); by that much for each kelvin at
+    `where` ("warmth").
+    """
+
+    shift_m: Vector
+    turn_rad: Vector
+    about_m: Vector
+    course: Course
+    at_s: float = 0.0
+    over_s: float = 1.0
+    where: str = ""
+    share: float = 1.0
+
+    DRIVERS = ("t",)
+    SIZE = "share"
+    TYPICAL = 1.0
+
+    def carried(self, scene: Scene) -> Floats:
+        """Motion (row, 4, 4) of the part in its own frame."""
+        gone = self.share * self._gone(scene)[:, np.newaxis]
+        turned = turned_about(np.asarray(self.about_m), gone * np.asarray(self.turn_rad))
+        return shifted(gone * np.asarray(self.shift_m)) @ turned
+
+    def _gone(self, scene: Scene) -> Floats:
+        """(row,) how much of the way."""
+        since_s = scene.t_s - self.at_s
+        match self.course:
+            case "step":
+                return (since_s >= 0.0).astype(np.float64)
+            case "settling":
+                return -np.expm1(-since_s / self.over_s)
+            case "steady":
+                return since_s / self.over_s
+            case "warmth":
+                return scene.warmed_k(self.where)

@@ -6,7 +6,8 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.statics import Load
+from simulators.arm.rigid import Vector
+from simulators.arm.statics import Load, Weight, carried_by, loaded_by
 from simulators.defects.defect import ROBOT, Defect, phase
 from simulators.defects.scene import Scene, Site, UnsuitedError
 
@@ -276,6 +277,7 @@ class PayloadOnSoftJoint(DriveDefect):
     """
 
     compliance_rad_nm: float
+    centre_m: Vector | None = None  # the payload's centre of mass in the flange frame; None: as the session has it
 
     KIND = "payload-on-soft-joint"
     PHYSICS = "payload-compliance"
@@ -291,7 +293,84 @@ class PayloadOnSoftJoint(DriveDefect):
         return cls(site.loaded_joint(rng), cls.draw_size(rng))
 
     def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
-        return self.compliance_rad_nm * load.payload_torque_nm[:, self.joint - 1]
+        if self.centre_m is None:
+            return self.compliance_rad_nm * load.payload_torque_nm[:, self.joint - 1]
+        weight_n = scene.payload_kg[:, np.newaxis] * load.gravity_m_s2
+        return self.compliance_rad_nm * torque_at_nm(load, self.joint, self.centre_m, weight_n)
+
+
+def torque_at_nm(load: Load, joint: int, point_m: Vector, force_n: Floats) -> Floats:
+    """(row,) about the axis of a joint, of forces (row, 3) in the base frame at a point of the flange."""
+    flange, axis = load.frames.flange, load.frames.turning[:, joint - 1]
+    lever_m = flange[:, :3, :3] @ np.asarray(point_m) + flange[:, :3, 3] - axis[:, :3, 3]
+    return np.einsum("rj,rj->r", np.cross(lever_m, force_n), axis[:, :3, 2])
+
+
+@dataclass(frozen=True)
+class HardeningSpring(DriveDefect):
+    """A drive whose stiffness changes smoothly with its load: c T + h T^3 for a torque T.
+
+    A rubber coupling or a strain-wave gear without a marked knee: the first two uneven terms of its characteristic.
+    """
+
+    compliance_rad_nm: float
+    hardening_rad_nm3: float
+
+    KIND = "hardening-spring"
+    PHYSICS = "joint-compliance"
+    DRIVERS = ("gravity_torque{joint}",)
+    SIZE = "compliance_rad_nm"
+    TYPICAL = 5e-6
+
+    def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
+        torque_nm = load.torque_nm[:, self.joint - 1]
+        return self.compliance_rad_nm * torque_nm + self.hardening_rad_nm3 * torque_nm**3
+
+
+@dataclass(frozen=True)
+class SpringUnderWeights(DriveDefect):
+    """A soft joint whose load is none of the stated masses: each weight is a mass times the spring's compliance.
+
+    To the payload, whose mass is known, it yields `payload_rad_nm`.
+    """
+
+    weights: tuple[Weight, ...]
+    payload_rad_nm: float = 0.0
+    share: float = 1.0
+
+    KIND = "spring-under-weights"
+    PHYSICS = "joint-compliance"
+    DRIVERS = ("gravity_torque{joint}",)
+    SIZE = "share"
+    TYPICAL = 1.0
+
+    def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
+        own, _ = loaded_by(load, self.weights, self.joint)
+        payload, _ = carried_by(load, self.payload_rad_nm * scene.payload_kg, scene.payload_com_m, self.joint)
+        return self.share * (own + payload)[:, 2]
+
+
+@dataclass(frozen=True)
+class PressedJoint(DriveDefect):
+    """A joint of a measuring arm that gives way to the hand, which presses the probe along steady axes of the tool.
+
+    Torsion spring of `compliance_rad_nm` under the torque of `force_n`, a force in the flange frame at `point_m`.
+    """
+
+    compliance_rad_nm: float
+    force_n: Vector
+    point_m: Vector
+
+    KIND = "pressed-joint"
+    PHYSICS = "joint-compliance"
+    DRIVERS = ("q{joint}",)
+    SIZE = "compliance_rad_nm"
+    TYPICAL = 5e-6
+    INSTRUMENTS = ("seat",)
+
+    def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
+        force_n = load.frames.flange[:, :3, :3] @ np.asarray(self.force_n)
+        return self.compliance_rad_nm * torque_at_nm(load, self.joint, self.point_m, force_n)
 
 
 # --- all drives still on their way

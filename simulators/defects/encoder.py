@@ -94,11 +94,13 @@ class OvalRing(EncoderDefect):
 
     Radius r (1 + k cos 2(q - b)); marks keep their distance along the rim, so the angle per mark grows where the rim
     stands far out. The rim of a slightly oval ring is, to second order in k, marked at angle q + (k/2) sin 2(q - b);
-    the reading here is the exact ratio of arc lengths, s(q)/s(2 pi), integrated on a fine grid.
+    the reading here is the exact ratio of arc lengths, s(q)/s(2 pi), integrated on a fine grid. A ring that is held by
+    three or four screws has as many `lobes` instead of two.
     """
 
     ovality: float
     bearing_rad: float
+    lobes: int = 2
 
     KIND = "oval-ring"
     PHYSICS = "encoder-harmonic"
@@ -107,7 +109,7 @@ class OvalRing(EncoderDefect):
 
     @property
     def figures(self) -> dict[str, float]:
-        return {"amplitude_rad": 0.5 * abs(self.ovality), "order": 2.0}
+        return {"amplitude_rad": abs(self.ovality) / self.lobes, "order": float(self.lobes)}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:
@@ -123,8 +125,8 @@ class OvalRing(EncoderDefect):
     def _marked_rad(self, turn_rad: Floats) -> Floats:
         """Angle that the marks give at true angle `turn_rad` (row,), continued beyond a turn."""
         place_rad = np.linspace(-np.pi, np.pi, GRID)
-        radius = 1.0 + self.ovality * np.cos(2.0 * place_rad)
-        slope = -2.0 * self.ovality * np.sin(2.0 * place_rad)
+        radius = 1.0 + self.ovality * np.cos(self.lobes * place_rad)
+        slope = -self.lobes * self.ovality * np.sin(self.lobes * place_rad)
         speed = np.hypot(radius, slope)
         arc = np.concatenate(([0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))))
         marked_rad = 2.0 * np.pi * arc / arc[-1] - np.pi
@@ -215,3 +217,28 @@ class SlowFilter(EncoderDefect):
 
     def error_rad(self, shaft_rad: Floats, scene: Scene) -> Floats:
         return -self.missing * scene.last_move_rad[:, self.joint - 1]
+
+
+@dataclass(frozen=True)
+class StaleReading(EncoderDefect):
+    """A controller that reports an older angle than the one it has: `missing` of what it still asks for (no unit).
+
+    A first-order lag in a position loop at constant speed reads behind by a share of the following error.
+    """
+
+    missing: float
+
+    KIND = "stale-reading"
+    PHYSICS = "reading-lag"
+    DRIVERS = ("cmd_minus_q{joint}",)
+    SIZE = "missing"
+    TYPICAL = 0.1
+    INSTRUMENTS = ROBOT
+
+    def reading_error_rad(self, shaft_rad: Floats, scene: Scene) -> Floats:
+        return self.in_column_rad(shaft_rad, scene)
+
+    def error_rad(self, shaft_rad: Floats, scene: Scene) -> Floats:
+        if scene.asked_rad is None:
+            return np.zeros(len(shaft_rad))
+        return -self.missing * scene.asked_rad[:, self.joint - 1]

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from simulators.arm.rigid import Vector, moved
 from simulators.defects.defect import SPOTS, Defect, direction
+from simulators.defects.displacement import CarriedPart
 from simulators.defects.scene import Scene, Site
 
 Floats = NDArray[np.float64]
@@ -82,3 +83,19 @@ class MovedCone(Defect):
     def seat_shift_m(self, scene: Scene) -> Floats:
         pushed = (scene.seat == self.cone) & (scene.t_s >= self.at_s)
         return np.where(pushed, self.shift_m, 0.0)[:, np.newaxis] * np.asarray(self.along)
+
+
+@dataclass(frozen=True)
+class CarriedFixture(CarriedPart):
+    """The fixture while it stands at a place, in the frame of PSD 1."""
+
+    place: int = 1
+
+    KIND = "carried-fixture"
+    PHYSICS = "fixture-moved"
+    PORT = "fixture.pose"
+    INSTRUMENTS = SPOTS
+
+    def fixture_motion(self, scene: Scene) -> Floats:
+        here = (scene.placement == self.place)[:, np.newaxis, np.newaxis]
+        return np.where(here, self.carried(scene), np.eye(4))

@@ -6,8 +6,8 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.rigid import shifted, turned, turned_about
-from simulators.arm.statics import Load
+from simulators.arm.rigid import Vector, shifted, turned, turned_about
+from simulators.arm.statics import Load, Weight, carried_by, loaded_by
 from simulators.defects.defect import ANY_INSTRUMENT, ROBOT, Defect, phase
 from simulators.defects.scene import Scene, Site
 
@@ -20,11 +20,12 @@ class BendingLink(Defect):
 
     End load F across it and moment M at the end: deflection F L^3 / 3EI + M L^2 / 2EI, slope F L^2 / 2EI + M L / EI
     (clamped beam of constant section, alike about all axes across it; any text on strength of materials). The link's
-    own weight counts as hung at its end.
+    own weight counts as hung at its end; a `light` link has none.
     """
 
     link: int
     bending_per_nm2: float
+    light: bool = False
 
     KIND = "bending-link"
     PHYSICS = "link-bending"
@@ -47,16 +48,99 @@ class BendingLink(Defect):
         return (self.link,)
 
     def link_motion(self, link: int, end_m: Floats, angle_rad: Floats, scene: Scene, load: Load) -> Floats:
-        length_m = float(np.linalg.norm(end_m))
-        along = end_m / length_m
-        force_n, moment_nm = load.force_n[:, link], load.moment_nm[:, link]
-        across_n = force_n - (force_n @ along)[:, np.newaxis] * along
-        end_nm = moment_nm - np.cross(end_m, force_n)
-        end_nm = end_nm - (end_nm @ along)[:, np.newaxis] * along
-        sag_m = across_n * length_m**3 / 3.0 + np.cross(end_nm, along) * length_m**2 / 2.0
-        slope_rad = np.cross(along, across_n) * length_m**2 / 2.0 + end_nm * length_m
+        moment_nm, force_n = (load.beyond_nm, load.beyond_n) if self.light else (load.moment_nm, load.force_n)
+        sag_m, slope_rad = cantilever(end_m, moment_nm[:, link], force_n[:, link])
         bend = self.bending_per_nm2
         return shifted(bend * sag_m) @ turned_about(end_m, bend * slope_rad)
+
+
+def cantilever(end_m: Floats, moment_nm: Floats, force_n: Floats) -> tuple[Floats, Floats]:
+    """Sag and slope of the end of a clamped beam, each (row, 3), for 1 / (E I) = 1.
+
+    Moment about its start and force (row, 3), all in the frame at its start.
+    """
+    length_m = float(np.linalg.norm(end_m))
+    along = end_m / length_m
+    across_n = force_n - (force_n @ along)[:, np.newaxis] * along
+    end_nm = moment_nm - np.cross(end_m, force_n)
+    end_nm = end_nm - (end_nm @ along)[:, np.newaxis] * along
+    sag_m = across_n * length_m**3 / 3.0 + np.cross(end_nm, along) * length_m**2 / 2.0
+    slope_rad = np.cross(along, across_n) * length_m**2 / 2.0 + end_nm * length_m
+    return sag_m, slope_rad
+
+
+@dataclass(frozen=True)
+class FlatLink(Defect):
+    """A link of a flat section: a clamped beam that is softer about one axis across it than about the other.
+
+    1 / (E I) is `about_u_per_nm2` for bending about `axis_u`, a direction across the link in the frame at its start,
+    and `about_v_per_nm2` for bending about the third direction (principal axes of a section). It weighs nothing itself.
+    """
+
+    link: int
+    about_u_per_nm2: float
+    about_v_per_nm2: float
+    axis_u: Vector
+    share: float = 1.0
+
+    KIND = "flat-link"
+    PHYSICS = "link-bending"
+    PORT = "link{link}.tilt"
+    SIZE = "share"
+    TYPICAL = 1.0
+    INSTRUMENTS = ROBOT
+
+    @property
+    def drivers(self) -> tuple[str, ...]:
+        return (f"gravity_torque{self.link}", f"gravity_torque{self.link + 1}")
+
+    @property
+    def links(self) -> tuple[int, ...]:
+        return (self.link,)
+
+    def link_motion(self, link: int, end_m: Floats, angle_rad: Floats, scene: Scene, load: Load) -> Floats:
+        sag_m, slope_rad = cantilever(end_m, load.beyond_nm[:, link], load.beyond_n[:, link])
+        u, along = np.asarray(self.axis_u), end_m / np.linalg.norm(end_m)
+        v = np.cross(along, u)
+        gives = self.about_u_per_nm2 * np.outer(u, u) + self.about_v_per_nm2 * np.outer(v, v)
+        sags = self.about_u_per_nm2 * np.outer(v, v) + self.about_v_per_nm2 * np.outer(u, u)  # about u it sags along v
+        return shifted(self.share * sag_m @ sags) @ turned_about(end_m, self.share * slope_rad @ gives)
+
+
+@dataclass(frozen=True)
+class BeamUnderWeights(Defect):
+    """A clamped beam under weights that are none of the stated masses, each times L / (E I) (see `Weight`).
+
+    To the payload, whose mass is known, it yields with the slope `payload_rad_nm` for a moment at its end.
+    """
+
+    link: int
+    weights: tuple[Weight, ...]
+    payload_rad_nm: float = 0.0
+    share: float = 1.0
+
+    KIND = "beam-under-weights"
+    PHYSICS = "link-bending"
+    PORT = "link{link}.tilt"
+    SIZE = "share"
+    TYPICAL = 1.0
+    INSTRUMENTS = ROBOT
+
+    @property
+    def drivers(self) -> tuple[str, ...]:
+        return (f"gravity_torque{self.link}", f"gravity_torque{self.link + 1}")
+
+    @property
+    def links(self) -> tuple[int, ...]:
+        return (self.link,)
+
+    def link_motion(self, link: int, end_m: Floats, angle_rad: Floats, scene: Scene, load: Load) -> Floats:
+        beyond = tuple(weight for weight in self.weights if weight.body > link)
+        own = loaded_by(load, beyond, link)
+        payload = carried_by(load, self.payload_rad_nm * scene.payload_kg, scene.payload_com_m, link)
+        sag_m, slope_rad = cantilever(end_m, own[0] + payload[0], own[1] + payload[1])
+        share = self.share / float(np.linalg.norm(end_m))
+        return shifted(share * sag_m) @ turned_about(end_m, share * slope_rad)
 
 
 @dataclass(frozen=True)
@@ -124,6 +208,7 @@ class HeatedLink(Growth):
 
     link: int
     expansion_per_k: float
+    where: str = ""  # the thermometer that says how warm it is; "": its own
 
     KIND = "heated-link"
     PORT = "link{link}.length"
@@ -139,7 +224,8 @@ class HeatedLink(Growth):
         return (self.link,)
 
     def link_motion(self, link: int, end_m: Floats, angle_rad: Floats, scene: Scene, load: Load) -> Floats:
-        return shifted(self.expansion_per_k * scene.warmed_k(f"link{link}")[:, np.newaxis] * end_m)
+        warmed_k = scene.warmed_k(self.where or f"link{link}")
+        return shifted(self.expansion_per_k * warmed_k[:, np.newaxis] * end_m)
 
 
 @dataclass(frozen=True)
@@ -148,6 +234,8 @@ class WarmArm(Growth):
 
     expansion_per_k: float
     joints: int
+    where: str = "room"  # the thermometer that says how warm it is
+    first: int = 0  # the first link that grows
 
     KIND = "warm-arm"
     PORT = "link*.length"
@@ -160,7 +248,37 @@ class WarmArm(Growth):
 
     @property
     def links(self) -> tuple[int, ...]:
-        return tuple(range(self.joints + 1))
+        return tuple(range(self.first, self.joints + 1))
 
     def link_motion(self, link: int, end_m: Floats, angle_rad: Floats, scene: Scene, load: Load) -> Floats:
-        return shifted(self.expansion_per_k * scene.warmed_k("room")[:, np.newaxis] * end_m)
+        return shifted(self.expansion_per_k * scene.warmed_k(self.where)[:, np.newaxis] * end_m)
+
+
+@dataclass(frozen=True)
+class WarmingUp(Defect):
+    """Links that grow while the machine warms up: by `growth` (no unit) in the end, with one time constant.
+
+    A body of one thermal mass under a steady source of heat: 1 - exp(-t / time constant), counted from `start_s`.
+    """
+
+    first: int
+    last: int
+    growth: float
+    time_constant_s: float
+    start_s: float = 0.0
+
+    KIND = "warming-up"
+    PHYSICS = "link-thermal-growth"
+    PORT = "link{first}.length"
+    DRIVERS = ("t",)
+    SIZE = "growth"
+    TYPICAL = 1e-4
+    INSTRUMENTS = ANY_INSTRUMENT
+
+    @property
+    def links(self) -> tuple[int, ...]:
+        return tuple(range(self.first, self.last + 1))
+
+    def link_motion(self, link: int, end_m: Floats, angle_rad: Floats, scene: Scene, load: Load) -> Floats:
+        warm = 1.0 - np.exp(-(scene.t_s - self.start_s) / self.time_constant_s)
+        return shifted(self.growth * warm[:, np.newaxis] * end_m)

@@ -1,31 +1,56 @@
-"""Every mechanism that can be hidden, and mechanisms as plain values. A new one is a class and a line here.
+"""Every mechanism, and mechanisms as plain values. A new one is a class and a line here.
+
+`MECHANISMS` are what a concealed session draws from; `GIVEN` are those that have their numbers from a model or from a
+person, and that no session draws.
 
 As plain values: [{"mechanism": "soft-joint", "fields": {...}}, ...], as a revealed truth lists them.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import asdict
+from typing import Any, cast
 
 import msgspec
 
-from simulators.defects.base import BumpedBase, DriftingBase, SoftPedestal
+from simulators.defects.base import (
+    BumpedBase,
+    CarriedBase,
+    DriftingBase,
+    PedestalUnderWeights,
+    SoftPedestal,
+    UnevenPedestal,
+)
 from simulators.defects.defect import Defect
-from simulators.defects.detector import BowedScale, CoverGlass, Pincushion, SkewedElectrodes, StrayLight, WrongGain
+from simulators.defects.detector import (
+    BowedScale,
+    CoverGlass,
+    Pincushion,
+    SkewedElectrodes,
+    StrainedFace,
+    StrayLight,
+    UnevenLayer,
+    WavesOnFace,
+    WrongGain,
+)
 from simulators.defects.drive import (
     CoupledWrist,
     GearRunout,
+    HardeningSpring,
     LateClock,
     PayloadOnSoftJoint,
+    PressedJoint,
     SlackDrive,
     SlackUnderWeight,
     SoftJoint,
+    SpringUnderWeights,
     TwoSlopeFlexspline,
     Unsettled,
     WrongRatio,
 )
-from simulators.defects.encoder import EccentricDisc, EncoderSlip, OvalRing, SlowFilter
-from simulators.defects.fixture import BumpedFixture, MovedCone
-from simulators.defects.link import BendingLink, HeatedLink, WarmArm, WornBearing
+from simulators.defects.encoder import EccentricDisc, EncoderSlip, OvalRing, SlowFilter, StaleReading
+from simulators.defects.fixture import BumpedFixture, CarriedFixture, MovedCone
+from simulators.defects.found_curve import CurveAtBase, CurveAtJoints, CurveAtLink, CurveInReading
+from simulators.defects.link import BeamUnderWeights, BendingLink, FlatLink, HeatedLink, WarmArm, WarmingUp, WornBearing
 from simulators.defects.outside import (
     BentRay,
     CableBundle,
@@ -38,8 +63,17 @@ from simulators.defects.outside import (
     StickingPad,
     UnevenSpring,
 )
-from simulators.defects.tool import LaserWarmUp, SaggingMount, WarmLaser
-from simulators.defects.tracker import BumpedDevice, DriftingDevice, DrumOutOfRound, TrackerScale, WireScale
+from simulators.defects.tool import CarriedLaser, ElasticMount, LaserWarmUp, SaggingMount, WarmLaser
+from simulators.defects.tracker import (
+    BumpedDevice,
+    CarriedDevice,
+    ChangingScale,
+    CircleOffCentre,
+    DriftingDevice,
+    DrumOutOfRound,
+    TrackerScale,
+    WireScale,
+)
 
 MECHANISMS: tuple[type[Defect], ...] = (
     EccentricDisc,
@@ -90,6 +124,31 @@ MECHANISMS: tuple[type[Defect], ...] = (
     BentRay,
     DragChain,
 )
+GIVEN: tuple[type[Defect], ...] = (
+    StaleReading,
+    HardeningSpring,
+    SpringUnderWeights,
+    PressedJoint,
+    FlatLink,
+    BeamUnderWeights,
+    WarmingUp,
+    UnevenPedestal,
+    PedestalUnderWeights,
+    CarriedBase,
+    ElasticMount,
+    CarriedLaser,
+    CarriedFixture,
+    StrainedFace,
+    UnevenLayer,
+    WavesOnFace,
+    CarriedDevice,
+    ChangingScale,
+    CircleOffCentre,
+    CurveAtJoints,
+    CurveAtLink,
+    CurveAtBase,
+    CurveInReading,
+)
 
 
 class WrittenError(ValueError):
@@ -98,7 +157,7 @@ class WrittenError(ValueError):
 
 def written(defects: Sequence[Defect]) -> list[dict[str, Any]]:
     """Ready for JSON."""
-    return [{"mechanism": defect.KIND, "fields": dict(vars(defect))} for defect in defects]
+    return [{"mechanism": defect.KIND, "fields": asdict(cast("Any", defect))} for defect in defects]
 
 
 def defects_of(listed: Sequence[Mapping[str, Any]]) -> tuple[Defect, ...]:
@@ -107,9 +166,9 @@ def defects_of(listed: Sequence[Mapping[str, Any]]) -> tuple[Defect, ...]:
 
 
 def _made(one: Mapping[str, Any]) -> Defect:
-    kind: Any = next((kind for kind in MECHANISMS if one.get("mechanism") == kind.KIND), None)
+    kind: Any = next((kind for kind in (*MECHANISMS, *GIVEN) if one.get("mechanism") == kind.KIND), None)
     if kind is None:
-        names = ", ".join(kind.KIND for kind in MECHANISMS)
+        names = ", ".join(kind.KIND for kind in (*MECHANISMS, *GIVEN))
         raise WrittenError(f"no mechanism {one.get('mechanism')!r}; there are {names}")
     try:
         return msgspec.convert(one.get("fields", {}), type=kind)

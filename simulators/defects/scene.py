@@ -4,7 +4,7 @@ A row is one sample. Everything here is true; what a column of the recording sho
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,13 +23,17 @@ class Scene:
     qd_rad_s: Floats  # (row, n) speed while the instrument read
     wait_s: Floats  # (row,) from the end of the last move to the reading of the instrument
     payload_kg: Floats  # (row,) carried beyond the tool
-    payload_com_m: Floats  # (3,) its centre of mass in the flange frame
+    payload_com_m: Floats  # (3,) or (row, 3) its centre of mass in the flange frame
     placement: Whole  # (row,) fixture place, 0 without a fixture
     first_psd: Whole  # (row,) 1 or 2, 0 without a fixture
     seat: Whole  # (row,) cone, 0 when the probe is in none
     temperature_degC: Mapping[str, Floats]  # by place: "room", "joint2", "link2", "laser"
     laser_power: Floats  # (row,) against the start
     extra: Mapping[str, Floats]  # other things that are measured: "fan_rpm", "supply_bar"
+    rest_degC: Mapping[str, float] = field(default_factory=dict[str, float])  # see `warmed_k`
+    moved_rad: Floats | None = None  # (row, n) last move where it is known by itself; None: from via to goal
+    asked_rad: Floats | None = None  # (row, n) what the controller still asks for: command less reading
+    laser_sum_v: Floats | None = None  # (row, 2) sum signal of the laser alone where it was recorded
 
     def __len__(self) -> int:
         return int(self.t_s.size)
@@ -37,11 +41,12 @@ class Scene:
     @property
     def last_move_rad(self) -> Floats:
         """(row, n) the last straight move of each joint."""
-        return self.goal_rad - self.via_rad
+        return self.goal_rad - self.via_rad if self.moved_rad is None else self.moved_rad
 
     def warmed_k(self, where: str) -> Floats:
-        """(row,) temperature against the start of the session."""
-        return self.temperature_degC[where] - self.temperature_degC[where][0]
+        """(row,) temperature against the one at which the rig is as drawn; where none is stated, against the start."""
+        degC = self.temperature_degC[where]
+        return degC - self.rest_degC.get(where, float(degC[0]))
 
 
 @dataclass(frozen=True, eq=False)

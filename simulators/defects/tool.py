@@ -6,12 +6,14 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.rigid import Vector, turned
+from simulators.arm.rigid import Vector, shifted, turned_about
 from simulators.arm.statics import Load
 from simulators.defects.defect import ROBOT, SPOTS, Defect, as_vector, direction
+from simulators.defects.displacement import CarriedPart
 from simulators.defects.scene import Scene, Site
 
 Floats = NDArray[np.float64]
+ORIGIN: Vector = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -19,12 +21,13 @@ class SaggingMount(Defect):
     """A mount at the flange that gives way: it leans by `lean_rad` towards where gravity pulls when its axis is level.
 
     Cantilever with its mass on the axis of the flange: the lean is across axis and gravity, in proportion to the part
-    of gravity across the axis, about the foot of the mount.
+    of gravity across the axis, about the foot of the mount, which stands at `foot_m` in the flange frame.
     """
 
     lean_rad: float
     axis: Vector
     at_laser: bool
+    foot_m: Vector = ORIGIN
 
     KIND = "sagging-mount"
     PHYSICS = "tool-sag"
@@ -44,19 +47,54 @@ class SaggingMount(Defect):
         return cls(cls.draw_size(rng), as_vector(axis / np.linalg.norm(axis)), site.instrument == "dual-psd")
 
     def tool_motion(self, scene: Scene, load: Load) -> Floats:
-        return turned(self.lean_rad * np.cross(np.asarray(self.axis), load.down_flange))
+        lean_rad = self.lean_rad * np.cross(np.asarray(self.axis), load.down_flange)
+        return turned_about(np.asarray(self.foot_m), lean_rad)
+
+
+@dataclass(frozen=True)
+class ElasticMount(Defect):
+    """A mount of any shape: it shifts and turns by a matrix times the direction of gravity in the flange frame.
+
+    Hooke for a body on a spring: rows of `shift_m` and `turn_rad` are x, y, z of what one weight along x, y, z of the
+    flange does, at the point `at_m`.
+    """
+
+    shift_m: tuple[Vector, Vector, Vector]
+    turn_rad: tuple[Vector, Vector, Vector]
+    at_m: Vector
+    at_laser: bool
+    share: float = 1.0
+
+    KIND = "elastic-mount"
+    PHYSICS = "tool-sag"
+    DRIVERS = ("gravity_tool",)
+    SIZE = "share"
+    TYPICAL = 1.0
+    INSTRUMENTS = ROBOT
+
+    @property
+    def port(self) -> str:
+        return "laser.direction" if self.at_laser else "tool.point"
+
+    def tool_motion(self, scene: Scene, load: Load) -> Floats:
+        down = self.share * load.down_flange
+        turned = turned_about(np.asarray(self.at_m), down @ np.asarray(self.turn_rad).T)
+        return shifted(down @ np.asarray(self.shift_m).T) @ turned
 
 
 @dataclass(frozen=True)
 class LaserWarmUp(Defect):
     """A laser diode that has just been switched on: its beam turns by `turn_rad` until it is warm.
 
-    Body of one thermal mass: the turn is `turn_rad` (1 - exp(-t / time_constant)) about a fixed axis of the housing.
+    Body of one thermal mass: the turn is `turn_rad` (1 - exp(-t / time_constant)) about a fixed axis of the housing,
+    which passes through `at_m` of the flange frame.
     """
 
     turn_rad: float
     time_constant_s: float
     axis: Vector
+    at_m: Vector = ORIGIN
+    start_s: float = 0.0
 
     KIND = "laser-warm-up"
     PHYSICS = "laser-warm-up"
@@ -72,8 +110,8 @@ class LaserWarmUp(Defect):
         return cls(cls.draw_size(rng), float(rng.uniform(0.05, 0.25) * site.duration_s), direction(rng))
 
     def tool_motion(self, scene: Scene, load: Load) -> Floats:
-        warm = 1.0 - np.exp(-scene.t_s / self.time_constant_s)
-        return turned(self.turn_rad * warm[:, np.newaxis] * np.asarray(self.axis))
+        warm = 1.0 - np.exp(-(scene.t_s - self.start_s) / self.time_constant_s)
+        return turned_about(np.asarray(self.at_m), self.turn_rad * warm[:, np.newaxis] * np.asarray(self.axis))
 
 
 @dataclass(frozen=True)
@@ -82,6 +120,8 @@ class WarmLaser(Defect):
 
     turn_rad_k: float
     axis: Vector
+    at_m: Vector = ORIGIN  # a point of that axis in the flange frame
+    where: str = "laser"  # the thermometer
 
     KIND = "warm-laser"
     PHYSICS = "laser-thermal-drift"
@@ -101,4 +141,18 @@ class WarmLaser(Defect):
         return cls(cls.draw_size(rng), direction(rng))
 
     def tool_motion(self, scene: Scene, load: Load) -> Floats:
-        return turned(self.turn_rad_k * scene.warmed_k("laser")[:, np.newaxis] * np.asarray(self.axis))
+        turn_rad = self.turn_rad_k * scene.warmed_k(self.where)[:, np.newaxis] * np.asarray(self.axis)
+        return turned_about(np.asarray(self.at_m), turn_rad)
+
+
+@dataclass(frozen=True)
+class CarriedLaser(CarriedPart):
+    """The laser in its mount, in the flange frame."""
+
+    KIND = "carried-laser"
+    PHYSICS = "laser-warm-up"
+    PORT = "laser.origin"
+    INSTRUMENTS = SPOTS
+
+    def tool_motion(self, scene: Scene, load: Load) -> Floats:
+        return self.carried(scene)

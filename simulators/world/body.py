@@ -19,6 +19,7 @@ What it does not imitate: dependence on direction, load or distance (that is bac
 """
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,10 +124,16 @@ class ArmBody:
     """Owns the physics state. Joint vectors are (n,), in joint order."""
 
     def __init__(
-        self, rig: WorldRig, truth: Truth, q_rad: Floats, rng: np.random.Generator, hidden: Hidden | None = None
+        self,
+        rig: WorldRig,
+        truth: Truth,
+        q_rad: Floats,
+        rng: np.random.Generator,
+        hidden: Hidden | None = None,
+        rest_degC: Mapping[str, float] | None = None,
     ) -> None:
         n = len(truth.links)
-        self._hidden, self._exposure = hidden, Exposure(q_rad)
+        self._hidden, self._exposure = hidden, Exposure(q_rad, rest_degC)
         self._engine = Engine(build_mjcf(rig, truth))
         self._at, self._driven = self._engine.joint_addresses([f"joint{number}" for number in range(1, n + 1)])
         self._laser_origin, self._laser_axes = self._engine.site("laser")

@@ -53,7 +53,9 @@ NO_LOAD_KG = 0.0
 class Exposure:
     """Follows the set-point. Joint vectors (n,) are the controller's own readings."""
 
-    def __init__(self, q_rad: Floats) -> None:
+    def __init__(self, q_rad: Floats, rest_degC: Mapping[str, float] | None = None) -> None:
+        """`rest_degC`: by place, the temperature at which the rig is as drawn; none: that at power-on."""
+        self._rest_degC = rest_degC or {}
         self._start_rad = q_rad.copy()
         self._via_rad, self._goal_rad = q_rad.copy(), q_rad.copy()
         self._changed_s = -STOOD_S
@@ -92,6 +94,7 @@ class Exposure:
             temperature_degC=temperatures(np.array([0.0] * (rows - 1) + [time_s]), len(qd_rad_s)),
             laser_power=np.ones(rows),
             extra={},
+            rest_degC=self._rest_degC,
         )
 
 

@@ -90,11 +90,20 @@ class Hidden:
     def _load(self, turning: Floats, flange: Floats, rows: int) -> Load:
         """The load of the moment in every row."""
         now = weigh(self._arm, Frames(turning[np.newaxis], flange[np.newaxis]), GROUND, np.zeros(1), np.zeros(3))
+
+        def every(values: Floats) -> Floats:
+            return np.repeat(values, rows, axis=0)
+
         return Load(
-            *(
-                np.repeat(values, rows, axis=0)
-                for values in (now.torque_nm, now.payload_torque_nm, now.moment_nm, now.force_n, now.down_flange)
-            )
+            every(now.torque_nm),
+            every(now.payload_torque_nm),
+            every(now.moment_nm),
+            every(now.force_n),
+            every(now.beyond_nm),
+            every(now.beyond_n),
+            every(now.down_flange),
+            Frames(every(now.frames.turning), every(now.frames.flange)),
+            now.gravity_m_s2,
         )
 
     def _bent(self, scene: Scene, load: Load, joint_rad: Floats, turning: Floats, flange: Floats) -> Floats:

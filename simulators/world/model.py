@@ -10,8 +10,10 @@ What it does not imitate: contact (the arm passes through the fixture), friction
 import math
 from xml.etree import ElementTree
 
+import msgspec
+
 from simulators.world.rig import Arm, Joint, Pose, Tool, Vector, WorldRig
-from simulators.world.truth import TrueLink, Truth
+from simulators.world.truth import TrueLink, Truth, arm_of
 
 STEP_S = 0.001  # physics step; an e-Series joint controller closes its position loop at about this rate
 ARMATURE_KG_M2 = 0.1  # rotor behind the gear; MuJoCo Menagerie, universal_robots_ur5e/ur5e.xml
@@ -34,10 +36,26 @@ def build_mjcf(rig: WorldRig, truth: Truth) -> str:
     )
     ElementTree.SubElement(option, "flag", contact="disable", constraint="disable")
     parent = ElementTree.SubElement(root, "worldbody")
+    if truth.parts:
+        _add_parts(parent, rig, truth)
+        return ElementTree.tostring(root, encoding="unicode")
     for number, (joint, link) in enumerate(zip(rig.arm.joint, truth.links, strict=True), start=1):
         parent = _add_link(parent, number, joint, link)
     _add_flange(parent, rig.tool, truth)
     return ElementTree.tostring(root, encoding="unicode")
+
+
+def _add_parts(parent: ElementTree.Element, rig: WorldRig, truth: Truth) -> None:
+    """An arm that is given by its fixed parts; each mass turns with its joint, where the drawing has it."""
+    com_m = arm_of(rig, truth).com_m
+    for number, (joint, part) in enumerate(zip(rig.arm.joint, truth.parts[:-1], strict=True), start=1):
+        parent = _add_frame(parent, f"axis{number}", part)
+        ElementTree.SubElement(
+            parent, "joint", name=f"joint{number}", type="hinge", axis="0 0 1", armature=repr(ARMATURE_KG_M2)
+        )
+        x, y, z = com_m[number - 1].tolist()
+        _add_inertia(parent, joint.mass_kg, (x, y, z), reach_m=math.hypot(joint.a_m, joint.d_m))
+    _add_flange(parent, rig.tool, msgspec.structs.replace(truth, flange=truth.parts[-1]))
 
 
 def _add_link(parent: ElementTree.Element, number: int, joint: Joint, link: TrueLink) -> ElementTree.Element:

@@ -59,6 +59,42 @@ class Truth(msgspec.Struct, frozen=True):
     laser_direction: Vector
     placements: tuple[TruePlacement, ...]
     schema: int = SCHEMA
+    parts: tuple[Pose, ...] = ()  # of an arm that is given: n + 1 fixed parts between turns about z, in place of links
+    psd2_in_psd1: Pose | None = None  # of a fixture that is given
+
+
+class Given(msgspec.Struct, frozen=True):
+    """A rig that is given in numbers, instead of drawn: what a calibration found.
+
+    T_base_flange(q) = F0 Rz(q1 + zero1) F1 ... Rz(qn + zeron) Fn with the `parts` F.
+    """
+
+    parts: tuple[Pose, ...]
+    joint_zero_rad: tuple[float, ...]
+    laser_origin_m: Vector
+    laser_direction: Vector
+    placements: tuple[TruePlacement, ...]
+    psd2_in_psd1: Pose
+    rest_degC: dict[str, float] = {}  # by place: the temperature at which it is so
+
+
+def given_truth(rig: WorldRig, seed: int, given: Given) -> Truth:
+    """The truth of a given rig; the seed draws only what no calibration finds. WorldError for another arm or places."""
+    drawn = draw_truth(rig, seed)
+    if len(given.parts) != len(drawn.links) + 1:
+        raise WorldError(f"an arm of {len(given.parts) - 1} joints is given; the rig file has {len(drawn.links)}")
+    missing = {place.id for place in drawn.placements} - {place.id for place in given.placements}
+    if missing:
+        raise WorldError(f"place {min(missing)} of the rig file is not among the given ones; give all of them")
+    return msgspec.structs.replace(
+        drawn,
+        joint_zero_rad=given.joint_zero_rad,
+        laser_origin_m=given.laser_origin_m,
+        laser_direction=given.laser_direction,
+        placements=given.placements,
+        parts=given.parts,
+        psd2_in_psd1=given.psd2_in_psd1,
+    )
 
 
 def draw_truth(rig: WorldRig, seed: int) -> Truth:
@@ -160,8 +196,9 @@ def arm_of(rig: WorldRig, truth: Truth) -> Arm:
     flange = moved(truth.flange.origin_m, truth.flange.rotation_rad)
     between = [end @ offset for end, offset in zip(ends[:-1], offsets[1:], strict=True)]
     com_m = [end[:3, :3] @ joint.com_m + end[:3, 3] for end, joint in zip(ends, rig.arm.joint, strict=True)]
+    fixed = [moved(part.origin_m, part.rotation_rad) for part in truth.parts]
     return Arm(
-        fixed=np.stack([offsets[0], *between, ends[-1] @ flange]),
+        fixed=np.stack(fixed or [offsets[0], *between, ends[-1] @ flange]),
         zero_rad=np.array(truth.joint_zero_rad),
         lower_rad=np.full(n, -NO_LIMIT_RAD),
         upper_rad=np.full(n, NO_LIMIT_RAD),

@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -26,7 +27,7 @@ from simulators.world.model import STEP_S
 from simulators.world.optics import DARK, Face, Ray, Spots, place_faces, trace
 from simulators.world.photocurrent import EDGE_S, ELECTRODES, NOISE_RATE_HZ, Knot, Photodetectors, interpolate, sample_a
 from simulators.world.rig import Pose, WorldRig, read_rig
-from simulators.world.truth import Truth, arm_of, draw_truth
+from simulators.world.truth import Given, Truth, arm_of, draw_truth, given_truth
 
 Floats = NDArray[np.float64]
 NO_FIXTURE = 0
@@ -48,15 +49,23 @@ class World:
     """Arm, laser and fixture. Starts standing at `q_rad`, with the fixture at the rig's first place."""
 
     def __init__(
-        self, rig: WorldRig, truth: Truth, q_rad: ArrayLike | None = None, hidden: Sequence[Defect] = ()
+        self,
+        rig: WorldRig,
+        truth: Truth,
+        q_rad: ArrayLike | None = None,
+        hidden: Sequence[Defect] = (),
+        rest_degC: Mapping[str, float] | None = None,
     ) -> None:
         """`q_rad`: (n,) readings at power-on, zero when not given. WorldError when their number is wrong."""
+        if truth.psd2_in_psd1 is not None:
+            fixture = msgspec.structs.replace(rig.fixture, psd2_in_psd1=truth.psd2_in_psd1)
+            rig = msgspec.structs.replace(rig, fixture=fixture)
         repeat_seed, noise_seed = np.random.SeedSequence([truth.seed, 2]).spawn(2)
         self.truth = truth
         self.n_joints = len(truth.links)
         start_rad = self._checked(np.zeros(self.n_joints) if q_rad is None else q_rad)
         self._hidden = Hidden(hidden, arm_of(rig, truth)) if hidden else None
-        self._body = ArmBody(rig, truth, start_rad, np.random.default_rng(repeat_seed), self._hidden)
+        self._body = ArmBody(rig, truth, start_rad, np.random.default_rng(repeat_seed), self._hidden, rest_degC)
         self._detectors = Photodetectors(
             rig.fixture.half_size_m, rig.emulation.laser_power_w, rig.emulation.psd_noise_m
         )
@@ -81,10 +90,17 @@ class World:
         seed: int | None = None,
         q_rad: ArrayLike | None = None,
         hidden: Sequence[Defect] = (),
+        given: Given | None = None,
     ) -> "World":
-        """The world of a rig as `tomllib` gives it; `seed` goes before the one in [emulation]. WorldError if bad."""
+        """The world of a rig as `tomllib` gives it; `seed` goes before the one in [emulation]. WorldError if bad.
+
+        `given`: its geometry in numbers, instead of a drawn one.
+        """
         checked = read_rig(rig)
-        return cls(checked, draw_truth(checked, checked.emulation.seed if seed is None else seed), q_rad, hidden)
+        of = checked.emulation.seed if seed is None else seed
+        if given is None:
+            return cls(checked, draw_truth(checked, of), q_rad, hidden)
+        return cls(checked, given_truth(checked, of, given), q_rad, hidden, given.rest_degC)
 
     # --- time and action
 

@@ -1,0 +1,219 @@
+"""Every effect of the catalogue against the mechanism that it becomes: both change the readings alike.
+
+The exceptions and their reasons are those of the table itself (calibeam/simulation/mechanism_table.py, `Line.within`).
+"""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from acquisition.recording.samples import ORIENTATION, POSITION
+from calibeam.simulation.found import FoundEffect, FoundIn
+from calibeam.simulation.mechanism_table import TABLE, line_of, mechanism_of
+from calibeam.simulation.rig_in_numbers import rigged
+from calibeam.simulation.scene_of_samples import Clock, scene_of
+from calibrate.diagnose.ported import perturbed_frames
+from calibrate.effects.catalogue import terms_of
+from calibrate.effects.drivers import Readout
+from calibrate.effects.ports import Perturbation
+from calibrate.effects.second_encoders import PLACES
+from calibrate.effects.term import Shape, Term
+from calibrate.identification.session import about_of
+from calibrate.physics.acting import arm_in, moved_columns
+from calibrate.predict import Predictor, readings
+from calibrate.sensors.camera import PLACE, TURN
+from calibrate.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
+from simulators.conceal.belief import rig_document
+from simulators.conceal.case import conceal
+from simulators.conceal.toml_text import toml_text
+from simulators.conceal.wanted import FAMILIES, Family, Wanted
+from simulators.defects import Scene
+from simulators.replayed import Readings, Rigged, Sited, replayed
+from tests.calibrate.effects.conftest import SAMPLES, SEED, full_session
+
+SIZE = 5e-5  # rad or m at a port: what a machine shows
+
+
+def rig_text_of(family: Family) -> str:
+    """The rig file of that session."""
+    places = 4 if family == "cones" else 3
+    return toml_text(rig_document(conceal(Wanted(family, SEED, samples=SAMPLES, places=places)).belief))
+
+
+class Bench:
+    """One session of a family, as both sides see it."""
+
+    def __init__(self, family: Family) -> None:
+        fit = full_session(family)
+        self.rig_text = rig_text_of(family)
+        self.drivers, self.samples = fit.drivers, fit.session.samples
+        values = {p.name: float(v) for p, v in zip(fit.session.parameters, fit.geometry, strict=True)}
+        names = tuple(m.name for m in fit.session.measured)
+        self.predictor = Predictor(fit.session.rig, values, about_of(fit.session.weighting), names)
+        self.session = FoundIn.of(self.predictor, self.drivers)
+        rest = {place: float(degC.mean()) for place, degC in self.drivers.temperatures_degC.items()}
+        clock = Clock(float(self.drivers.t_s.min()), float(self.drivers.t_s.max()), rest)
+        self.scene: Scene = scene_of(self.samples, clock, same_recording=True)
+        self.rig: Rigged = rigged(self.predictor, self.samples)
+        self.plain = self.simulated(())
+        self.expected = self.modelled(self.samples.joints(), Perturbation.none(len(self.samples), 6))
+
+    def simulated(self, mechanisms: tuple[Sited, ...]) -> Readings:
+        return replayed(self.rig, self.scene, mechanisms, self.samples.joints())
+
+    def modelled(self, q_rad: np.ndarray, by: Perturbation) -> np.ndarray:
+        """(row, k)"""
+        frames = perturbed_frames(arm_in(self.predictor), self.theta, q_rad, by)
+        if self.rig.seat_m is not None:
+            return self.predictor.tip_at(frames[:, -1])
+        read = readings(self.predictor, frames[:, -1], self.samples, self.predictor.instruments)
+        added = moved_columns(by)
+        return np.stack([read[c] + added.get(c, 0.0) for c in read], axis=1)
+
+    @property
+    def theta(self) -> np.ndarray:
+        return self.predictor.values_of(arm_in(self.predictor).parameters)
+
+    def observed(self, read: Readings) -> np.ndarray:
+        """(row, k) in the order of `modelled`."""
+        found = {"dual-psd": read.spots_m, "position": read.position_m, "wire": read.length_m}
+        values = found[self.predictor.instruments[0]]
+        return values if values.ndim == 2 else values[:, None]
+
+    def apart(self, found: FoundEffect) -> tuple[float, float]:
+        """Rms of what mechanism and effect differ by, and of the effect."""
+        by = Perturbation.none(len(self.samples), 6).plus(found.port, found.amount)
+        simulated = self.simulated((mechanism_of(found),))
+        if self.rig.seat_m is not None:  # the probe stays in its cone, and the encoders read something else
+            seated = np.isfinite(self.rig.seat_m).all(axis=1)
+            left = (self.modelled(simulated.reading_rad, by) - self.rig.seat_m)[seated]
+            whole = (self.modelled(self.plain.reading_rad, by) - self.rig.seat_m)[seated]
+            return rms(left), rms(whole)
+        change = self.modelled(self.samples.joints(), by) - self.expected
+        seen = np.isfinite(change).all(axis=1)
+        return rms((self.observed(simulated) - self.observed(self.plain) - change)[seen]), rms(change[seen])
+
+
+def rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+@cache
+def bench(family: Family) -> Bench:
+    return Bench(family)
+
+
+def acts(term: Term, place: Bench) -> bool:
+    """Whether it does anything in this session: an upright axis carries no weight."""
+    basis = term.basis(place.drivers, np.array([spec.grid[len(spec.grid) // 2] for spec in term.inner]))
+    upright = term.depends_on == ("gravity_torque1",) and term.physics == "backlash"
+    return bool(np.abs(basis).max() > 0.0) and not upright
+
+
+def acting(place: Bench) -> tuple[Term, ...]:
+    """Of the whole catalogue."""
+    return tuple(term for term in terms_of(place.drivers) if acts(term, place))
+
+
+def found_of(term: Term, place: Bench) -> FoundEffect:
+    """With values of a machine: coefficients of either sign where it has several, springs that give way."""
+    inner = np.array([spec.grid[len(spec.grid) // 2] for spec in term.inner])
+    basis = term.basis(place.drivers, inner)
+    coefficients = np.linspace(1.0, 0.4, basis.shape[2]) / np.maximum(np.abs(basis).max(axis=(0, 1)), 1e-12)
+    size = np.abs(basis @ coefficients).max()
+    return FoundEffect(term.physics, term, SIZE / size * coefficients, inner, place.session)
+
+
+def one_of_each(terms: tuple[Term, ...]) -> tuple[Term, ...]:
+    """Of every line of the table, and of every port, one: the same line at six joints is one law."""
+    kept: dict[tuple[object, ...], list[Term]] = {}
+    for term in terms:
+        drivers = tuple(name.rstrip("0123456789") for name in term.depends_on)
+        key = (term.physics, term.variant.rstrip("0123456789"), term.shape, term.port.where.strip("0123456789")[:4])
+        kept.setdefault((*key, drivers if len(drivers) < 3 else ()), []).append(term)
+    return tuple(alike[k % len(alike)] for k, alike in enumerate(kept.values()))
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_model_and_simulation_read_the_same_without_physics(family: Family) -> None:
+    place = bench(family)
+    if place.rig.seat_m is not None:
+        seated = np.isfinite(place.rig.seat_m).all(axis=1)
+        tips = place.modelled(place.plain.reading_rad, Perturbation.none(len(place.samples), 6))
+        assert np.abs(tips - place.rig.seat_m)[seated].max() < 1e-10
+        return
+    seen = np.isfinite(place.expected).all(axis=1)
+    assert seen.all()
+    assert np.abs(place.observed(place.plain) - place.expected)[seen].max() < 1e-10
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_every_effect_is_what_its_mechanism_does(family: Family) -> None:
+    place = bench(family)
+    wrong = []
+    for term in one_of_each(acting(place)):
+        found = found_of(term, place)
+        off, whole = place.apart(found)
+        if off > line_of(found).within * whole + 1e-11:
+            wrong.append(f"{term.key}: {off:.2e} of {whole:.2e}")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_a_six_d_target_and_a_camera_are_where_the_model_has_them() -> None:
+    place = bench("tracker")
+    about = {
+        **place.predictor.about,
+        "tool": (*place.predictor.about["tool"][:3], 0.1, -0.2, 0.3),
+        "camera": (1.0, 2.0, 0.5, 0.1, 0.2, 0.3),
+        "marker": (0.01, 0.02, 0.03, 0.3, 0.1, -0.2),
+    }
+    moved = {"tool.roll": 1e-3, "camera.x": 1e-3, "camera.yaw": 2e-3, "marker.y": 1e-3, "marker.pitch": -2e-3}
+    predictor = replace(place.predictor, about=about, values={**place.predictor.values, **moved})
+    read = replayed(rigged(predictor, place.samples), place.scene, (), place.samples.joints())
+    wanted = readings(predictor, predictor.flange(place.samples.joints()), place.samples, ["full-pose", "camera-pose"])
+    for names, values in ((POSITION, read.position_m), (PLACE, read.camera_m)):
+        np.testing.assert_allclose(values, np.stack([wanted[c] for c in names], axis=1), rtol=0.0, atol=1e-10)
+    for names, values in ((ORIENTATION, read.turn_rad), (TURN, read.camera_rad)):
+        assert values is not None
+        turned = Rotation.from_rotvec(values).inv() * Rotation.from_rotvec(np.stack([wanted[c] for c in names], axis=1))
+        assert turned.magnitude().max() < 1e-9
+
+
+def test_every_line_of_the_table_is_met_by_the_catalogue() -> None:
+    met = {id(line_of(found_of(term, place))) for place in map(bench, FAMILIES) for term in acting(place)}
+    never = [f"{line.physics}: {line.form}" for line in TABLE if id(line) not in met]
+    assert never == []
+
+
+def test_two_encoders_see_the_drive_from_where_they_sit() -> None:
+    """In the difference of both encoders, what the effect adds there; at the flange, what it adds to the chain."""
+    place = bench("tracker")
+    rows, joints = len(place.samples), (1, 2, 3, 4, 5, 6)
+    readout = Readout(ENCODER_DIFFERENCE, np.zeros((rows, 6)), np.ones(rows, dtype=bool), joints=joints)
+    drivers = replace(place.drivers, readouts={**place.drivers.readouts, ENCODER_DIFFERENCE: readout})
+    session = FoundIn.of(place.predictor, drivers)
+    sites = [t for t in terms_of(drivers) if t.port.where == "joint2.angle" and (not t.open or t.shape is Shape.SMOOTH)]
+    for term in sites:
+        found = replace(found_of(term, place), session=session)
+        by = Perturbation.none(rows, 6).plus(term.port, found.amount)
+        read = place.simulated((mechanism_of(found),))
+        within = line_of(found).within
+        wanted = by.between_rad + by.readings.get(ENCODER_DIFFERENCE, 0.0)
+        assert rms(read.between_rad - wanted) <= within * rms(wanted) + 1e-9, term.key
+        change = place.modelled(place.samples.joints(), by) - place.expected
+        apart = place.observed(read) - place.observed(place.plain) - change
+        assert rms(apart) <= within * rms(change) + 1e-9, term.key
+    assert {FoundEffect(term.physics, term, np.zeros(0), np.zeros(0), session).place for term in sites} == {"", *PLACES}
+
+
+@pytest.mark.endure
+@pytest.mark.parametrize("family", FAMILIES)
+def test_every_effect_is_what_its_mechanism_does_at_every_place(family: Family) -> None:
+    place = bench(family)
+    for term in acting(place):
+        found = found_of(term, place)
+        off, whole = place.apart(found)
+        assert off <= line_of(found).within * whole + 1e-11, term.key
