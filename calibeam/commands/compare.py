@@ -9,7 +9,7 @@ from acquisition.recording import Recording, read
 from calibeam.printing.comparison import print_comparison
 from calibeam.results.comparison import compare, write_comparison
 from calibeam.results.identification import naming_source
-from calibeam.results.simulator import TIMEOUT_S, Simulator, simulated_by, simulated_by_model
+from calibeam.results.simulator import TIMEOUT_S, Simulator, simulated_by
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile, read_model
 
@@ -74,7 +74,7 @@ def compare_command(
 
 def _simulation(
     measured: Recording, recording: Path | None, program: str | None, structure: ModelFile | None, timeout_s: float
-) -> Recording:
+) -> Recording | ModelFile:
     """The simulated side. DataError where none is given, or two are."""
     if recording is not None and program is not None:
         raise DataError("give the simulation either as a recording or as --simulator, not both")
@@ -84,4 +84,4 @@ def _simulation(
         return simulated_by(Simulator(program, timeout_s), measured)
     if structure is None:
         raise DataError("no simulation: give a recording of it, --simulator COMMAND or --simulated-model MODEL")
-    return simulated_by_model(structure, measured)
+    return structure

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Recording, Samples
 from calibeam.results.diagnosis import SEED
+from calibeam.results.simulator import simulated_by_model
 from calibeam.software import SOFTWARE
-from calibrate.diagnose.compare.beside import Beside, begin, beside, set_alike
+from calibrate.diagnose.compare.beside import Beside, begin, beside, beside_structure, set_alike
 from calibrate.diagnose.compare.chain import READINGS, Difference, Pair, columns_of, differences, of_rig
 from calibrate.diagnose.compare.corrected import Simulated, compared_session, corrected_samples, simulated_of
 from calibrate.diagnose.compare.matched import Key, Matched, match, zeros_between
@@ -183,20 +184,27 @@ class _Asked:
 
 
 def compare(
-    measured: Recording, simulated: Recording, *, diagnosed: bool = True, structure: ModelFile | None = None
+    measured: Recording,
+    simulation: Recording | ModelFile,
+    *,
+    diagnosed: bool = True,
+    structure: ModelFile | None = None,
 ) -> ComparisonFile:
-    """DataError where the two are not of one arm and one plan.
+    """DataError where the two are not of one arm and one plan, or where the model cannot predict the recording.
 
-    `diagnosed`: explain what differs. `structure`: the model that the simulation is made of, where it is known: its
-    own values then stand beside the differences.
+    `simulation`: its recording of the same plan, or a model, whose own uncertainty then counts as no difference.
+    `diagnosed`: explain what differs. `structure`: the model that a recorded simulation is made of: its values stand
+    beside the differences.
     """
+    made_of = simulation if isinstance(simulation, ModelFile) else None
+    simulated = simulated_by_model(simulation, measured) if isinstance(simulation, ModelFile) else simulation
     for recording in (measured, simulated):
         _refuse_wrong(recording)
     rows = match(measured.samples, simulated.samples, _plans(measured, simulated))
     pair = measured.samples.take(rows.measured), simulated.samples.take(rows.simulated)
     zeros_rad = zeros_between(*pair)
     pair = _without_zeros(pair, zeros_rad), pair[1]
-    asked, model, alike = _asked(measured, simulated, pair, zeros_rad, diagnosed=diagnosed)
+    asked, model, alike = _asked(measured, simulated, pair, zeros_rad, made_of, diagnosed=diagnosed)
     links = differences(model, alike)
     parted = judged(links, model, alike)
     rig = rig_differences(measured.rig, simulated.rig)
@@ -221,7 +229,7 @@ def compare(
         verdict.value,
         _says(verdict, found, asked),
         tuple(_rig_record(one) for one in rig),
-        tuple(_record(one, structure) for one in found),
+        tuple(_record(one, structure or made_of) for one in found),
         asked.readings,
         next((one.link for one in parted if one.parts), None),
         tuple(_link(one, pair[0]) for one in parted),
@@ -264,7 +272,13 @@ def _without_zeros(pair: Pair, zeros_rad: Floats) -> Samples:
 
 
 def _asked(
-    measured: Recording, simulated: Recording, pair: Pair, zeros_rad: Floats, *, diagnosed: bool
+    measured: Recording,
+    simulated: Recording,
+    pair: Pair,
+    zeros_rad: Floats,
+    made_of: ModelFile | None,
+    *,
+    diagnosed: bool,
 ) -> tuple[_Asked, Predictor, Pair]:
     """What a search gives, the simulation's geometry, and the pair as if set up alike."""
     try:
@@ -280,7 +294,11 @@ def _asked(
         return _Asked(None, (), None, (), why), here, alike
     differing = [f"joint{j + 1}.zero" for j in np.flatnonzero(zeros_rad)]
     try:
-        found = beside(simulation, pair, np.random.default_rng(SEED), differing)
+        rng = np.random.default_rng(SEED)
+        if made_of is None or made_of.covariance is None or differing:
+            found = beside(simulation, pair, rng, differing)
+        else:
+            found = beside_structure(simulation, pair, rng, made_of)
         samples = corrected_samples(simulation, pair, found.T_simulated_measured)
         before = begin(simulation, compared_session(simulated.rig, samples))
     except (DataError, np.linalg.LinAlgError) as why:

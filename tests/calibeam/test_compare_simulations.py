@@ -99,11 +99,14 @@ def test_nominal_geometry_against_an_arm_that_is_off_names_both_constants(off, t
 
 
 def test_a_program_of_thirty_lines_is_a_simulation(off, tmp_path):
-    said = compared(tmp_path, off, "--simulator", f"{sys.executable} {EXAMPLES / 'numpy_arm.py'}")
-    names_both(said)
-    device = [one for one in said["differences"] if one["where"] == "device.pose"]
-    assert len(device) == 1  # the program answers in the base, the tracker stands before it
-    assert not device[0]["decides"]
+    command = f"{sys.executable} {EXAMPLES / 'numpy_arm.py'}"
+    answer = Simulator(command).readings(read(off).samples)
+    expected = np.array([arm().reflector_m(q) for q in poses()])
+    assert np.array_equal(np.stack([answer[name] for name in ("x_m", "y_m", "z_m")], axis=1), expected)
+    said = compared(tmp_path, off, "--simulator", command, "--no-diagnose")
+    assert said["matched"] == SAMPLES
+    assert said["first_link"] == "position"
+    assert said["verdict"] == "mismatch"
 
 
 def test_a_mjcf_is_a_simulation_and_is_asked_by_file(off):
@@ -162,6 +165,7 @@ def test_servo_corrections_and_zeros_of_second_encoders_are_no_mismatch(tmp_path
     assert said["first_link"] is None
 
 
+@pytest.mark.endure
 def test_another_zero_of_degrees_does_not_break_a_match_and_is_sized(tmp_path):
     measured = session(
         tmp_path / "measured", poses() + np.array([0.0, 2.6, 0.0, 0.0, 0.0, 0.0]), poses(), arm(), seed=1
@@ -199,6 +203,16 @@ def test_a_program_that_answers_wrongly_is_one_message(program, off, tmp_path, c
     assert says in error
     assert "Traceback" not in error
     assert not (tmp_path / "c.json").exists()
+
+
+def test_a_model_is_a_simulation_whose_own_uncertainty_is_no_difference(tmp_path):
+    """The example of `compare --help`."""
+    measured = session(tmp_path / "measured", poses(), poses(), arm(A_M=[0.0, 4e-4, 0.0, 0.0, 0.0, 0.0]))
+    model = tmp_path / "model.json"
+    assert run(["identify", str(measured), "--out", str(model)]) == 0
+    said = compared(tmp_path, measured, "--simulated-model", model)
+    assert said["verdict"] == "consistent"
+    assert said["differences"] == []
 
 
 def test_a_simulation_has_to_be_given_once(off, capsys):

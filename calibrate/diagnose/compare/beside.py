@@ -38,8 +38,9 @@ from calibrate.effects.since_model import RECORDING
 from calibrate.effects.term import Size, Term
 from calibrate.errors import DataError
 from calibrate.identification.session import about_of
+from calibrate.model_file import ModelFile
 from calibrate.parameters import Parameter, plausible_sizes, start_values
-from calibrate.physics.known import ANEW
+from calibrate.physics.known import ANEW, Known
 from calibrate.predict import Predictor, predict
 from calibrate.rigid import inverse
 from calibrate.sensors import seat, wire
@@ -109,6 +110,24 @@ def beside(simulated: Simulated, pair: Pair, rng: Generator, differing: Sequence
     if at is None or here is None:
         return Beside(simulated, found, constants, None, T)
     return Beside(simulated, found, constants, _device(here, at, model, covariance), inverse(here) @ at)
+
+
+def beside_structure(simulated: Simulated, pair: Pair, rng: Generator, structure: ModelFile) -> Beside:
+    """The same where the simulation is made of a model: its geometry and effects enter with their covariance.
+
+    What the model itself does not know is no difference; changes beyond it are findings of the search. DataError for a
+    model without a covariance, and where an effect of it cannot be evaluated here.
+    """
+    known = Known(structure, same_recording=False)
+    found = diagnose_samples(simulated.rig, pair[0], rng, known.begin)
+    T = device_between(simulated, pair)
+    at, here = None, device_of(simulated.model)
+    if found.physics is not None:
+        at = device_of(predictor_of(found.physics.model.session, found.physics.model.geometry))
+    if found.physics is None or at is None or here is None:
+        return Beside(simulated, found, (), None, T)
+    model = found.physics.model
+    return Beside(simulated, found, (), _device(here, at, model, _covariance(model)), inverse(here) @ at)
 
 
 def _asked(simulated: Simulated, samples: Samples, rng: Generator, freed: Sequence[Part]) -> Diagnosed:
@@ -192,6 +211,8 @@ def _device(here: Floats, there: Floats, model: Fitted, covariance: Floats) -> C
     turn = Rotation.from_matrix(there[:3, :3] @ here[:3, :3].T).as_rotvec()
     apart = np.concatenate([there[:3, 3] - here[:3, 3], turn])[: len(at)]
     axes = np.kron(np.eye(2), there[:3, :3])[: len(at), : len(at)]  # corrections are about the device's own axes
+    if not np.all(np.isfinite(covariance[np.ix_(at, at)])):
+        return None  # the model leaves open what the device stands against
     own = axes @ covariance[np.ix_(at, at)] @ axes.T
     p = _chance(apart, own)
     return Constant("device.pose", "device-moved", SIX[: len(at)], _sizes(apart, own), p, ()) if p < SET_UP else None
