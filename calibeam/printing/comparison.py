@@ -7,7 +7,6 @@ from rich.table import Table
 
 from calibeam.printing.results import print_diagnosis
 from calibeam.results.comparison import (
-    CLEAR,
     SAYS,
     ComparisonFile,
     DifferenceRecord,
@@ -28,9 +27,6 @@ def print_comparison(console: Console, file: ComparisonFile, *, verbose: bool = 
         console.print(line, highlight=False, markup=False)
     if file.readings:
         console.print(_readings(file.readings))
-    for one in file.streams:
-        if (line := _late(one)) is not None:
-            console.print(line, highlight=False, markup=False)
     for note in file.notes:
         console.print(note, highlight=False, markup=False)
     if verbose:
@@ -43,7 +39,7 @@ def _print_details(console: Console, file: ComparisonFile) -> None:
         console.print(_streams(file.streams))
     if file.diagnosis is not None:
         console.print(
-            "\nwhat was sought beside the simulation's geometry, its differing constants refitted:", highlight=False
+            "\nphysics sought beside the simulation's geometry, the constants above refitted:", highlight=False
         )
         print_diagnosis(console, file.diagnosis)
 
@@ -115,16 +111,9 @@ def _streams(streams: tuple[StreamRecord, ...]) -> Table:
             continue
         drift = "-" if one.drift is None else f"{1e6 * one.drift:+.2f} ± {1e6 * (one.drift_sigma or 0.0):.2g}"
         offset = f"{one.offset_s:+.6f} ± {one.offset_sigma_s:.2g}"
-        parts = "yes" if one.parts else "no"
+        parts = "other motion" if one.parts is None else "yes" if one.parts else "no"
         table.add_row(one.stream, offset, drift, _size(one.rms, one.unit), _size(one.noise, one.unit), parts)
     return table
-
-
-def _late(one: StreamRecord) -> str | None:
-    late, sigma = one.later_than_joints_s, one.later_than_joints_sigma_s
-    if late is None or sigma is None or abs(late) < max(CLEAR * sigma, 1e-4):
-        return None
-    return f"{one.stream}: {1e3 * late:+.3f} ± {1e3 * sigma:.2g} ms later after the joints than in the simulation"
 
 
 def _size(value: float, unit: str) -> str:

@@ -4,6 +4,7 @@
 in docs/formats.md.
 """
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,7 +19,7 @@ from calibeam.results.simulator import simulated_by_model
 from calibeam.software import SOFTWARE
 from calibrate.diagnose.compare.beside import Beside, begin, beside, beside_structure, set_alike
 from calibrate.diagnose.compare.chain import READINGS, Difference, Pair, columns_of, differences, of_rig
-from calibrate.diagnose.compare.corrected import Simulated, compared_session, corrected_samples, simulated_of
+from calibrate.diagnose.compare.corrected import compared_session, corrected_samples, simulated_of
 from calibrate.diagnose.compare.matched import Key, Matched, match, zeros_between
 from calibrate.diagnose.compare.mismatches import Level, Mismatch, Side, mismatches
 from calibrate.diagnose.compare.own_noise import chance_of_structure
@@ -169,6 +170,9 @@ FEWEST = 20  # samples of a search; fewer hold no more than the geometry
 READING = tuple(reading.link for reading in READINGS)
 EXPLAINED = (*READING, "encoders")  # links whose differences are asked of the model
 CLEAR = 5.0  # sigmas of a time that is told
+LENGTH_OR_ANGLE = re.compile(r"_(m|rad)(?: [0-9]+)?$")
+LATENCY = "latency"
+SHORTEST_S = 1e-4  # of a device that comes later: below, the motion does not show it
 SAYS = {"rad": angle, "m": length}  # how a person reads a size
 
 
@@ -211,12 +215,13 @@ def compare(
     found = [*_rig(rig), *_joints(parted, links)]
     if asked.beside is not None:
         found += mismatches(asked.beside, zeros_rad)
-    found += [*_zeros_alone(asked, zeros_rad), *asked.left, *_streams_apart(measured, simulated, asked)]
+    found += [*_zeros_alone(asked, zeros_rad), *asked.left]
+    streams = stream_pairs(devices_of(measured), devices_of(simulated))
+    found += _streams_apart(measured, simulated, asked, streams)
     order = list(Level)
     found.sort(key=lambda one: order.index(one.level))
     explained = any(one.decides and one.level not in (Level.RIG, Level.STREAMS) for one in found)
     parted = tuple(_as_explained(one, asked, explained) for one in parted)
-    streams = stream_pairs(devices_of(measured), devices_of(simulated))
     verdict = _verdict(found, parted, asked)
     return ComparisonFile(
         1,
@@ -234,7 +239,7 @@ def compare(
         next((one.link for one in parted if one.parts), None),
         tuple(_link(one, pair[0]) for one in parted),
         _streams(streams),
-        (asked.why,) if asked.why is not None else (),
+        tuple(_notes(asked)),
         asked.diagnosis,
     )
 
@@ -312,6 +317,15 @@ def _asked(
     return _Asked(found, tuple(_readings(before, after, file)), file, tuple(_left(after)), None), here, alike
 
 
+def _notes(asked: _Asked) -> Iterator[str]:
+    """What was not compared, and why."""
+    if asked.why is not None:
+        yield asked.why
+    if asked.beside is not None:
+        for name in asked.beside.simulated.uncorrected:
+            yield f"{kind_of(name).noun}: what the simulation's own readings miss its geometry by is not taken out"
+
+
 def _readings(before: Fitted, after: Fitted, file: DiagnosisFile) -> Iterator[ReadingRecord]:
     """Of every quantity of an instrument, a 6-D target's position and turn apart."""
     one = {m.name: m.problem.observed - e for m, e in zip(before.session.measured, before.around.expected, strict=True)}
@@ -354,8 +368,11 @@ def _rig(keys: tuple[RigKey, ...]) -> Iterator[Mismatch]:
 
 
 def _by(one: RigKey) -> str:
-    unit = next((u for u in ("rad", "m") if f"_{u}" in one.key.split(" ")[-2 if one.key[-1].isdigit() else -1]), None)
-    return f"{one.difference:+.6g}" if unit is None or one.difference is None else _signed(one.difference, unit)
+    """The difference in the unit that the key's name ends with."""
+    if one.difference is None:
+        return ""
+    unit = LENGTH_OR_ANGLE.search(one.key)
+    return f"{one.difference:+.6g}" if unit is None else _signed(one.difference, unit[1])
 
 
 def _signed(value: float, unit: str) -> str:
@@ -390,15 +407,40 @@ def _zeros_alone(asked: _Asked, zeros_rad: Floats) -> Iterator[Mismatch]:
         yield Mismatch(Level.JOINT_ZEROS, f"joint{j + 1}.angle", "joint-zero-moved", size, says)
 
 
-def _streams_apart(measured: Recording, simulated: Recording, asked: _Asked) -> Iterator[Mismatch]:
-    """Of streams that both have: what each recording shows by itself, side by side."""
+def _streams_apart(
+    measured: Recording, simulated: Recording, asked: _Asked, pairs: tuple[StreamPair, ...]
+) -> list[Mismatch]:
+    """Of streams that both have: what each recording shows by itself, side by side, and what one motion shows."""
     if not measured.streams or not simulated.streams:
-        return
-    fitted: Simulated | None = None if asked.beside is None else asked.beside.simulated
-    model = None if fitted is None else fitted.fitted
-    reports = [streams_of(one, model) for one in (measured, simulated)]
-    yield from (_of_stream(one) for one in stream_differences(*reports))
-    yield from (_of_noise(one) for one in noise_differences(devices_of(measured), devices_of(simulated)))
+        return []
+    models: tuple[Fitted | None, Fitted | None] = (None, None)
+    if asked.beside is not None and asked.beside.diagnosed.physics is not None:
+        models = asked.beside.diagnosed.physics.model, asked.beside.simulated.fitted
+    reports = [streams_of(one, model) for one, model in zip((measured, simulated), models, strict=True)]
+    apart = stream_differences(reports[0], reports[1])
+    out = [_of_stream(one) for one in apart]
+    late = {one.stream for one in apart if one.name.physics == LATENCY}
+    out += [_of_lateness(name, *by) for name, by in late_against_joints(pairs).items() if name not in late and _is(*by)]
+    out += [_of_motion(one) for one in pairs if one.parts]
+    return out + [_of_noise(one) for one in noise_differences(devices_of(measured), devices_of(simulated))]
+
+
+def _is(late_s: float, sigma_s: float) -> bool:
+    return abs(late_s) >= max(CLEAR * sigma_s, SHORTEST_S)
+
+
+def _of_lateness(stream: str, late_s: float, sigma_s: float) -> Mismatch:
+    size = Size(late_s, sigma_s)
+    words = plain("latency_s", size)
+    says = f"Readings of the {stream} stream come later after the joints than in the simulation, by {words}"
+    return Mismatch(Level.STREAMS, stream, LATENCY, {"latency_s": size}, says)
+
+
+def _of_motion(one: StreamPair) -> Mismatch:
+    size = "" if one.rms is None or one.noise is None else f" by {SAYS[one.unit](one.rms)} rms"
+    noise = "" if one.noise is None else f", where noise makes {SAYS[one.unit](one.noise)}"
+    says = f"The {one.stream} streams of one motion differ{size}{noise}"
+    return Mismatch(Level.STREAMS, one.stream, "unlike-motion", {}, says)
 
 
 def _of_stream(one: StreamDifference) -> Mismatch:
@@ -446,7 +488,7 @@ def _says(verdict: Verdict, found: list[Mismatch], asked: _Asked) -> str:
     if verdict is Verdict.CONSISTENT:
         return f"Measured and simulated agree to within the noise at every level{anew}."
     if verdict is Verdict.UNDECIDABLE:
-        return f"Undecidable: {deciding[0].says if deciding else asked.why}."
+        return f"{deciding[0].says if deciding else asked.why}."
     named = [one for one in deciding if one.level is not Level.UNEXPLAINED]
     if not named:
         return "Measured and simulated differ; the links below say where."

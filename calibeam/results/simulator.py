@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Recording, Samples
 from acquisition.recording.samples import BAR_END, cells_of, per_joint
+from calibrate.diagnose.compare.seated import is_seated
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
 from calibrate.physics.predicting import predict_with_physics
@@ -47,6 +48,7 @@ class Simulator:
 
         DataError in one sentence where the program cannot be started, fails, hangs, or answers with another table.
         """
+        _refuse_seated(samples)
         text = table_text(samples, inputs_of(samples))
         return _checked(self.command, self._answer(text), samples)
 
@@ -100,6 +102,7 @@ def simulated_by(simulator: Simulator, measured: Recording) -> Recording:
 def simulated_by_model(model: ModelFile, measured: Recording) -> Recording:
     """The recording as the model predicts it, physics included. DataError where it cannot predict these samples."""
     samples = measured.samples
+    _refuse_seated(samples)
     predicted = predict_with_physics(model, samples).columns
     wanted = [name for name in reading_columns(samples) if name in predicted]
     if not wanted:
@@ -111,6 +114,17 @@ def simulated_by_model(model: ModelFile, measured: Recording) -> Recording:
         measured, path=Path(f"model of {model.rig.name}"), rig=Predictor.of(model).rig, rig_text=text, samples=table,
         streams={},
     )  # fmt: skip
+
+
+def _refuse_seated(samples: Samples) -> None:
+    """DataError where a probe was seated: there the joints are the reading, and nobody can be asked for them."""
+    if np.any(is_seated(samples)):
+        raise DataError(
+            "rows with a probe in a cone or at a bar: the joint angles are the reading, and no simulation can be asked "
+            "for it at these poses; compare with a recording of the simulation instead"
+        )
+    if not any(np.any(np.isfinite(samples.column(name))) for name in reading_columns(samples)):
+        raise DataError("the measured samples hold no reading to ask a simulation for")
 
 
 def reading_columns(samples: Samples) -> tuple[str, ...]:

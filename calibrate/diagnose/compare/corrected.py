@@ -59,6 +59,12 @@ class Simulated:
         return predictor_of(self.fitted.session, self.fitted.geometry)
 
     @property
+    def uncorrected(self) -> tuple[str, ...]:
+        """Instruments whose readings `corrected_samples` leaves as they are."""
+        taken = {*COLUMNS, *SEATED, encoder_difference.NAME}
+        return tuple(m.name for m in self.fitted.session.measured if m.name not in taken)
+
+    @property
     def values(self) -> Mapping[str, float]:
         """Parameter -> correction."""
         session = self.fitted.session

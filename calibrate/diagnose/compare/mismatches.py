@@ -74,7 +74,6 @@ PARTS = {
     "laser-moved": "The laser on the flange",
     "fixture-moved": "The fixture",
     "seat-moved": "Seat",
-    "base-moved": "The base of the arm",
     "device-moved": "The measuring device",
 }
 

@@ -5,7 +5,7 @@ error or a ringing is a property of the machine, and each recording shows its ow
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,9 @@ from calibrate.effects.term import Size
 
 Floats = NDArray[np.float64]
 
-ORDER = ("command", "joints", "encoders", "spots")
+SENT = "command"
+ZEROLESS = "encoders"  # their zeros are arbitrary
+ORDER = (SENT, "joints", "encoders", "spots")
 BEYOND = 5.0  # sigmas of a sample's noise, of the median of what differs: more than noise can do
 CLEAR = 5.0  # sigmas of a difference of two sizes
 ALIKE = 0.05  # of the larger size: two estimates of one law differ by their models, too
@@ -42,14 +44,19 @@ class StreamPair:
     noise: float | None  # of one difference, by both streams' own
     largest: float | None
     largest_s: float | None  # on the measured clock
-    parts: bool | None
+    parts: bool | None  # None: not the same motion, or not known to be
 
 
 def stream_pairs(measured: Mapping[str, Device], simulated: Mapping[str, Device]) -> tuple[StreamPair, ...]:
-    """Of every device that both recordings have, in the order of the chain."""
-    return tuple(
-        _pair(name, measured[name], simulated[name]) for name in ORDER if name in measured and name in simulated
-    )
+    """Of every device that both recordings have, in the order of the chain.
+
+    Where the arms were sent otherwise (a servo corrects what it sees), the others do not part: nothing is expected.
+    """
+    pairs = [_pair(name, measured[name], simulated[name]) for name in ORDER if name in measured and name in simulated]
+    sent = next((pair for pair in pairs if pair.stream == SENT), None)
+    if sent is not None and sent.parts is False:
+        return tuple(pairs)
+    return tuple(replace(pair, parts=None) for pair in pairs)
 
 
 def _pair(name: str, measured: Device, simulated: Device) -> StreamPair:
@@ -77,7 +84,7 @@ def _pair(name: str, measured: Device, simulated: Device) -> StreamPair:
         float(np.median(floor)),
         float(np.abs(about[row, channel])),
         float(time_s[row]),
-        bool(np.any(usual > BEYOND * floor) or np.any(np.abs(level) > BEYOND * floor)),
+        bool(np.any(usual > BEYOND * floor) or (name != ZEROLESS and np.any(np.abs(level) > BEYOND * floor))),
     )
 
 
