@@ -20,7 +20,7 @@ from acquisition.recording.samples import ORIENTATION, POSITION
 from calibrate.diagnose.assumed import Assumed
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.compare.chain import Pair, columns_of
-from calibrate.diagnose.compare.constants import AXES, TURNS, Part, Quadratic, alternatives, fewest, parts_of
+from calibrate.diagnose.compare.constants import AXES, TURNS, Part, Quadratic, alternatives, fewest, outermost, parts_of
 from calibrate.diagnose.compare.corrected import (
     Simulated,
     compared_session,
@@ -90,7 +90,7 @@ def beside(simulated: Simulated, pair: Pair, rng: Generator, differing: Sequence
     whole = begin(simulated, session, frozenset(name for part in every for name in part.names))
     quadratic = Quadratic.of(whole, _values(simulated, session), every)
     sure = tuple(part for part in every if set(part.names) & set(differing))
-    freed = _worth(simulated, session, tuple(dict.fromkeys((*sure, *fewest(quadratic)))), sure)
+    freed = _worth(simulated, session, tuple(dict.fromkeys((*sure, *outermost(quadratic, fewest(quadratic))))), sure)
     found = _asked(simulated, samples, rng, freed)
     for _ in range(ROUNDS):
         if found.physics is None:

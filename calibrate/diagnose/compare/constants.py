@@ -33,6 +33,7 @@ FRAMES = {
     "placement": ("fixture.pose", "fixture-moved"),
     seat.POINTS: ("seat.position", "seat-moved"),
 }
+TIED = 2.0  # of BIC: no more than a bare mention (Kass, Raftery 1995)
 RIVAL = 6.0  # of BIC: strong evidence against what is farther off (Kass, Raftery 1995)
 
 
@@ -124,6 +125,24 @@ def fewest(whole: Quadratic) -> tuple[Part, ...]:
             break
         left = left.without(part)
     return tuple(p for p, _ in left.parts)
+
+
+def outermost(whole: Quadratic, chosen: tuple[Part, ...]) -> tuple[Part, ...]:
+    """A number of a link gives way to a joint's zero that explains as much: what hardly differs is named outside in."""
+    for part in chosen:
+        if part.physics != LINK:
+            continue
+        kept = _reduced(whole, chosen)
+        zeros = [other for other, _ in whole.parts if other.physics == ZERO and other not in chosen]
+        costs = [(_reduced(whole, _exchanged(chosen, part, zero)) - kept, zero) for zero in zeros]
+        worse, zero = min(costs, key=lambda one: one[0], default=(np.inf, part))
+        if worse < TIED:
+            chosen = _exchanged(chosen, part, zero)
+    return chosen
+
+
+def _exchanged(chosen: tuple[Part, ...], part: Part, other: Part) -> tuple[Part, ...]:
+    return tuple(other if one == part else one for one in chosen)
 
 
 def alternatives(whole: Quadratic, chosen: Sequence[Part]) -> dict[Part, tuple[Named, ...]]:
