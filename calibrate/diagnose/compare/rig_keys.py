@@ -8,15 +8,15 @@ from typing import Any
 import msgspec
 
 from acquisition.recording.rig import Rig
+from acquisition.recording.samples import BAR
 
 SAME = 1e-12  # m, rad or a share of a number: one number written twice
 # What places a reading: where two recordings' rigs differ in it, one at most states the arm that both are about.
-PLACES = ("arm", "tool", "fixture", "placement", "known_distance", "bar")
+PLACES = ("arm", "tool", "fixture", "placement", "known_distance", BAR)
 NUMBERS = (
     "model", "a_m", "alpha_rad", "d_m", "theta_offset_rad", "origin_m", "rotation_rad", "point_m", "laser_origin_m",
     "laser_direction", "length_m",
 )  # fmt: skip
-LISTED = ("placement", "known_distance", "bar", "target")  # by their own number, where they have one
 
 Value = str | float | bool | None
 
