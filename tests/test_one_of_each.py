@@ -12,7 +12,7 @@ JOINT_STEPS = {
     "calibrate/observation_model.py": "to readings of any instrument, which calibrate may not ask of acquisition",
     "acquisition/centring/search.py": "two linear steps of a beam, and moves of the arm between looks at its spots",
     "acquisition/centring/registered.py": "uphill in the grip of the servo, while the beam is held",
-    "calibrate/diagnose/compare/observed.py": "one linear step for each pose of a pair",
+    "calibrate/diagnose/compare/corrected.py": "one linear step for each pose of a pair",
 }
 TURNED_PARTS = {
     "calibrate/arms": "the arm models themselves",

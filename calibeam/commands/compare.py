@@ -1,52 +1,87 @@
-"""`calibeam compare`: two recordings of one motion, measured and simulated: where in the chain they part, and why."""
+"""`calibeam compare`: what a measured recording and a simulation of it differ by, from the rig file to the streams."""
 
 from pathlib import Path
 
 import msgspec
 from rich.console import Console
 
-from acquisition.recording import read
-from calibeam.printing.results import print_comparison
+from acquisition.recording import Recording, read
+from calibeam.printing.comparison import print_comparison
 from calibeam.results.comparison import compare, write_comparison
 from calibeam.results.identification import naming_source
+from calibeam.results.simulator import TIMEOUT_S, Simulator, simulated_by
+from calibrate.errors import DataError
+from calibrate.model_file import ModelFile, read_model
 
 
 def compare_command(
     measured: Path,
-    simulated: Path,
+    simulated: Path | None = None,
     *,
+    simulator: str | None = None,
+    simulated_model: Path | None = None,
+    timeout_s: float = TIMEOUT_S,
     out: Path = Path("compare.json"),
     diagnose: bool = True,
     json: bool = False,
+    verbose: bool = False,
 ) -> None:
     """Find where a simulation and a measurement disagree.
 
-    Which link of the chain differs first, by how much and since when; then the physics of readings that differ.
+    From the outside in: rig files, frames, zeros, links, effects, streams; each difference with its size and sigma.
 
-    Samples are matched by pose and order, streams by their motion: clocks may differ and drift, rows may be missing.
+    Samples are matched by plan, order, repeat and station, and by joint angles only where these are missing.
 
-    Example: calibeam compare out/site/recording.mcap out/demo/recording.mcap --out compare.json
+    Example: calibeam compare out/demo/recording.mcap --simulated-model out/demo/model.json --out compare.json
 
     Parameters
     ----------
     measured
         A recording, or a session folder with rig.toml and samples.csv.
     simulated
-        The same motion as simulated. Its rig is the model.
+        The same plan as simulated: a recording, or a session folder. Its rig is the model.
+    simulator
+        Instead of a recording a program, as "python my_sim.py": it gets the inputs of the samples as CSV on its
+        standard input, or in a file where the command holds {samples}, and writes the readings it expects as CSV.
+    simulated_model
+        The model that the simulation is made of: its values stand beside the differences. Without a recording and
+        without a program it is the simulation.
+    timeout_s
+        How long the program may take.
     out
         Where to write the comparison.
     diagnose
-        Also diagnose what differs: which physics the simulation lacks.
+        Explain what differs; without it the links of the chain are compared only.
     json
         Print the comparison as it stands in the file, on one line, and nothing else.
+    verbose
+        Print also the links of the chain, the streams and what the diagnosis says.
 
     """
+    source = read(measured)
+    structure = None if simulated_model is None else read_model(simulated_model)
     with naming_source(measured):
-        file = compare(read(measured), read(simulated), diagnosed=diagnose)
+        other = _simulation(source, simulated, simulator, structure, timeout_s)
+        file = compare(source, other, diagnosed=diagnose, structure=structure)
     write_comparison(out, file)
     if json:
         print(msgspec.json.encode(file).decode())
         return
     console = Console()
-    print_comparison(console, file)
+    print_comparison(console, file, verbose=verbose)
     console.print(f"comparison: {out}", markup=False)
+
+
+def _simulation(
+    measured: Recording, recording: Path | None, program: str | None, structure: ModelFile | None, timeout_s: float
+) -> Recording | ModelFile:
+    """The simulated side. DataError where none is given, or two are."""
+    if recording is not None and program is not None:
+        raise DataError("give the simulation either as a recording or as --simulator, not both")
+    if recording is not None:
+        return read(recording)
+    if program is not None:
+        return simulated_by(Simulator(program, timeout_s), measured)
+    if structure is None:
+        raise DataError("no simulation: give a recording of it, --simulator COMMAND or --simulated-model MODEL")
+    return structure

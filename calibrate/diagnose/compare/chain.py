@@ -25,8 +25,8 @@ from calibrate.sensors import bar, position, seat, wire
 
 Floats = NDArray[np.float64]
 Pair = tuple[Samples, Samples]  # measured, simulated; row by row the same pose
-OfPair = Callable[[Rig, Pair], Floats | None]  # (row, channel), NaN where either has no reading
-Explained = Callable[[Rig, Pair], Floats]
+OfPair = Callable[[Predictor, Pair], Floats | None]  # (row, channel), NaN where either has no reading
+Explained = Callable[[Predictor, Pair], Floats]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +52,8 @@ class Reading:
     by_joints: Explained
 
 
-def differences(rig: Rig, pair: Pair) -> tuple[Difference, ...]:
-    """In the order of the chain, of the links whose columns both tables have."""
+def differences(model: Predictor, pair: Pair) -> tuple[Difference, ...]:
+    """In the order of the chain, of the links whose columns both tables have. `model`: the simulation's geometry."""
     n = pair[0].n_joints
     upstream, seated = np.zeros((len(pair[0]), n)), is_seated(pair[0])[:, None]
     out: list[Difference] = []
@@ -63,6 +63,8 @@ def differences(rig: Rig, pair: Pair) -> tuple[Difference, ...]:
         if apart is None:
             continue
         raw, own = apart, apart - upstream if link != "command" else apart
+        if link == "encoders":  # their zeros are arbitrary
+            own = _about_zero(own)
         if link == "joints":  # where the probe is seated they are the reading
             raw, own = np.where(seated, np.nan, raw), np.where(seated, np.nan, own)
         if np.any(np.isfinite(own)):
@@ -70,9 +72,9 @@ def differences(rig: Rig, pair: Pair) -> tuple[Difference, ...]:
         if link != "encoders":
             upstream = np.nan_to_num(apart)
     for reading in READINGS:
-        raw = reading.raw(rig, pair)
+        raw = reading.raw(model, pair)
         if raw is not None and np.any(np.isfinite(raw)):
-            out.append(Difference(reading.link, reading.names, reading.unit, raw, raw - reading.explained(rig, pair)))
+            out.append(Difference(reading.link, reading.names, reading.unit, raw, raw - reading.explained(model, pair)))
     return tuple(out)
 
 
@@ -84,8 +86,15 @@ def _columns_apart(pair: Pair, names: tuple[str, ...]) -> Floats | None:
     return raw if np.any(np.isfinite(raw)) else None
 
 
+def _about_zero(apart_rad: Floats) -> Floats:
+    """(row, joint) without each joint's constant, and without whole turns."""
+    middle = np.angle(np.nanmean(np.exp(1j * apart_rad), axis=0))
+    wrapped = (apart_rad - middle + np.pi) % (2.0 * np.pi) - np.pi
+    return wrapped - np.nanmedian(wrapped, axis=0)
+
+
 def _of_columns(names: tuple[str, ...]) -> OfPair:
-    return lambda rig, pair: _columns_apart(pair, names)
+    return lambda model, pair: _columns_apart(pair, names)
 
 
 def of_rig(rig: Rig) -> Predictor:
@@ -93,29 +102,27 @@ def of_rig(rig: Rig) -> Predictor:
     return Predictor(rig, {}, {}, ())
 
 
-def _spots(rig: Rig, pair: Pair) -> Floats:
-    return _predicted(rig, pair, SPOTS)
+def _spots(model: Predictor, pair: Pair) -> Floats:
+    return _predicted(model, pair, SPOTS)
 
 
-def _wire(rig: Rig, pair: Pair) -> Floats:
-    if rig.device is None:
+def _wire(model: Predictor, pair: Pair) -> Floats:
+    if model.rig.device is None and "device" not in model.about:
         return np.zeros((len(pair[0]), 1))
-    return _predicted(rig, pair, wire.KIND.columns)
+    return _predicted(model, pair, wire.KIND.columns)
 
 
-def _predicted(rig: Rig, pair: Pair, names: tuple[str, ...]) -> Floats:
-    model = of_rig(rig)
+def _predicted(model: Predictor, pair: Pair, names: tuple[str, ...]) -> Floats:
     said = [predict(model, one) for one in pair]
     return np.stack([said[0][name] - said[1][name] for name in names], axis=1)
 
 
-def _position(rig: Rig, pair: Pair) -> Floats:
-    model = of_rig(rig)
+def _position(model: Predictor, pair: Pair) -> Floats:
     tips = [model.tip_m(one.joints()) for one in pair]
-    return (tips[0] - tips[1]) @ device_of(rig, pair[1])[:3, :3]
+    return (tips[0] - tips[1]) @ device_of(model, pair[1])[:3, :3]
 
 
-def _turned(rig: Rig, pair: Pair) -> Floats | None:
+def _turned(model: Predictor, pair: Pair) -> Floats | None:
     """(row, 3) rotation vector from simulated to measured: a difference of two vectors would break at half a turn."""
     if not all(name in one for one in pair for name in ORIENTATION):
         return None
@@ -128,17 +135,17 @@ def _turned(rig: Rig, pair: Pair) -> Floats | None:
     return out
 
 
-def _turned_by_joints(rig: Rig, pair: Pair) -> Floats:
+def _turned_by_joints(model: Predictor, pair: Pair) -> Floats:
     """However the target is screwed on: its mounting cancels."""
-    model, R_base_device = of_rig(rig), device_of(rig, pair[1])[:3, :3]
+    R_base_device = device_of(model, pair[1])[:3, :3]
     measured, simulated = (model.flange(one.joints())[:, :3, :3] for one in pair)
     return Rotation.from_matrix(measured @ np.swapaxes(simulated, 1, 2)).as_rotvec() @ R_base_device
 
 
-def device_of(rig: Rig, simulated: Samples) -> Floats:
-    """T_base_device (4, 4): the rig's, else where the simulated positions say that it stands."""
-    model = of_rig(rig)
-    if rig.device is not None:
+def device_of(model: Predictor, simulated: Samples) -> Floats:
+    """T_base_device (4, 4): the model's, else where the simulated positions place it."""
+    rig = model.rig
+    if rig.device is not None or "device" in model.about:
         return model.T_base_device
     seen = np.stack([simulated.column(name) for name in POSITION], axis=1)
     good = np.all(np.isfinite(seen), axis=1)
@@ -151,21 +158,21 @@ def device_of(rig: Rig, simulated: Samples) -> Floats:
     return align(tips[good], seen[good]).T_a_b
 
 
-def _seats(rig: Rig, pair: Pair) -> Floats | None:
-    return tip_differences(of_rig(rig), *pair)
+def _seats(model: Predictor, pair: Pair) -> Floats | None:
+    return tip_differences(model, *pair)
 
 
-def _bars(rig: Rig, pair: Pair) -> Floats | None:
-    return bar_differences(of_rig(rig), *pair)
+def _bars(model: Predictor, pair: Pair) -> Floats | None:
+    return bar_differences(model, *pair)
 
 
 def _nothing(channels: int) -> Explained:
-    return lambda rig, pair: np.zeros((len(pair[0]), channels))
+    return lambda model, pair: np.zeros((len(pair[0]), channels))
 
 
 def _known(raw: OfPair, channels: int) -> Explained:
-    def of(rig: Rig, pair: Pair) -> Floats:
-        found = raw(rig, pair)
+    def of(model: Predictor, pair: Pair) -> Floats:
+        found = raw(model, pair)
         return np.zeros((len(pair[0]), channels)) if found is None else found
 
     return of

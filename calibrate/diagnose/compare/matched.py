@@ -1,9 +1,16 @@
-"""Which row of one table is which of another: the same motion, in the same order, rows missing on either side.
+"""Which row of one table is which of another: rows of one plan, missing on either side.
+
+What a session says of each sample, its station, beam order, number in the plan and repeat, decides where both say it.
+Tables without it that have the same stations and repeats in the same order are rows of one plan as they stand. Only
+where rows are missing do joint angles decide, to within what a servo may have moved the arm. Angles that differ by a
+constant in all rows, zeros of degrees, make no difference.
 
 Longest common subsequence (Wagner and Fischer, J. ACM 21, 1974) with a small reward for being near; a row of the inner
 loop is one vector operation, since the best so far along a row is a running maximum.
 """
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,9 +24,17 @@ from calibrate.errors import DataError
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
-# Of every joint: a servo that centres goes to a slightly other place; poses of a plan lie farther apart.
-SAME_RAD = 0.02
-WHAT = ("placement", "first_psd", SEAT, BAR, BAR_END)  # where both say it, it must be the same
+SAME_RAD = 0.02  # of every joint, at least: a servo that centres goes to a slightly other place
+FAR_RAD = 0.15  # at most: no servo moves the arm so far
+NEAREST = 0.4  # of the distance between neighbouring poses of the plan
+SPREAD = 0.1  # rad: joints of one plan, but for a constant of each joint, keep to within so much in most rows
+MOST = 0.9
+# A constant of a joint beyond any servo, that hardly varies: another zero of degrees.
+CONSTANT_RAD, VARIES = 0.05, 0.2
+WHAT = ("placement", "first_psd", SEAT, BAR, BAR_END, "target")  # where both say it, it must be the same
+ORDERED = (*WHAT, "repeat")
+
+Key = tuple[object, ...]  # of a sample: its place in the plan
 
 
 @dataclass(frozen=True)
@@ -32,8 +47,11 @@ class Matched:
     only_simulated: Ints
 
 
-def match(measured: Samples, simulated: Samples) -> Matched:
-    """DataError for arms of different joints, and where no row of one is a row of the other."""
+def match(measured: Samples, simulated: Samples, plans: tuple[Sequence[Key], Sequence[Key]] | None = None) -> Matched:
+    """`plans`: of each row of both tables its place in the plan, where the recordings say it.
+
+    DataError for arms of different joints, and where no row of one is a row of the other.
+    """
     if measured.n_joints != simulated.n_joints:
         raise DataError(
             f"measured: {measured.n_joints} joints, simulated: {simulated.n_joints} joints; "
@@ -42,26 +60,87 @@ def match(measured: Samples, simulated: Samples) -> Matched:
     for name, samples in (("measured", measured), ("simulated", simulated)):
         if len(samples) == 0:
             raise DataError(f"{name}: no sample; give a recording that holds some")
-    near = _nearness(measured, simulated)
-    rows, columns = _whole_bars(measured, *_longest(near))
+    by_plan = None if plans is None else _by_plan(*plans)
+    if by_plan is None and _same_rows(measured, simulated):
+        by_plan = np.arange(len(measured)), np.arange(len(measured))
+    if by_plan is None:
+        by_plan = _longest(_nearness(measured, simulated))
+    rows, columns = _whole_bars(measured, *by_plan)
     if not len(rows):
         raise DataError(
-            f"no sample of the one recording was taken at a pose of the other (within {SAME_RAD} rad of each joint); "
+            "no sample of the one recording is a sample of the other, neither by plan and order nor by joint angles; "
             "compare recordings of the same motion"
         )
     others = [np.setdiff1d(np.arange(n), used) for n, used in ((len(measured), rows), (len(simulated), columns))]
     return Matched(rows, columns, *others)
 
 
+def zeros_between(measured: Samples, simulated: Samples) -> Floats:
+    """(joint,) rad by which measured angles are larger in all matched rows, far beyond any servo; else 0.
+
+    Whole turns are none.
+    """
+    apart = measured.joints() - simulated.joints()
+    middle = np.median(apart, axis=0)
+    spread = np.median(np.abs(apart - middle), axis=0)
+    return np.where((np.abs(middle) > CONSTANT_RAD) & (spread < VARIES * np.abs(middle)), middle, 0.0)
+
+
+def _by_plan(measured: Sequence[Key], simulated: Sequence[Key]) -> tuple[Ints, Ints] | None:
+    """Rows of one place in the plan, one by one where a sample was taken again. None where the plans are others."""
+    there = {key: row for row, key in enumerate(_numbered(simulated))}
+    pairs = [(row, there[key]) for row, key in enumerate(_numbered(measured)) if key in there]
+    if len(pairs) < MOST / 2.0 * min(len(measured), len(simulated)):
+        return None
+    rows = np.array(pairs, dtype=np.intp)
+    return rows[:, 0], rows[:, 1]
+
+
+def _numbered(keys: Sequence[Key]) -> list[Key]:
+    """With how often the key came before."""
+    seen: Counter[Key] = Counter()
+    out: list[Key] = []
+    for key in keys:
+        out.append((key, seen[key]))
+        seen[key] += 1
+    return out
+
+
+def _same_rows(measured: Samples, simulated: Samples) -> bool:
+    """Whether both hold the same stations, beam orders and repeats in one order, and joints that keep to each other."""
+    if len(measured) != len(simulated):
+        return False
+    for name in ORDERED:
+        if name in measured and name in simulated:
+            one, two = _labels(measured, name), _labels(simulated, name)
+            if not np.array_equal(one, two, equal_nan=True):
+                return False
+    apart = measured.joints() - simulated.joints()
+    near = np.all(np.abs(apart - np.median(apart, axis=0)) < SPREAD, axis=1)
+    return bool(np.mean(near) >= MOST)
+
+
 def _nearness(measured: Samples, simulated: Samples) -> Floats:
     """(row, row) 1 to 2 where they may be one pose, 0 elsewhere."""
-    apart = np.abs(_poses(measured, simulated)[:, None] - _poses(simulated, measured)[None]).max(axis=2)
-    may = apart < SAME_RAD
+    one, two = _poses(measured, simulated), _poses(simulated, measured)
+    same_rad = _reach(two)
+    apart = np.abs(one[:, None] - two[None]).max(axis=2)
+    may = apart < same_rad
     for name in WHAT:
         if name in measured and name in simulated:
-            one, two = _labels(measured, name)[:, None], _labels(simulated, name)[None]
-            may &= (one == two) | np.isnan(one) | np.isnan(two)
-    return np.where(may, 2.0 - apart / SAME_RAD, 0.0)
+            mine, theirs = _labels(measured, name)[:, None], _labels(simulated, name)[None]
+            may &= (mine == theirs) | np.isnan(mine) | np.isnan(theirs)
+    return np.where(may, 2.0 - apart / same_rad, 0.0)
+
+
+def _reach(poses: Floats) -> float:
+    """Rad of every joint within which a pose is the same: less than half the way to the poses around it."""
+    apart = np.abs(poses[:, None] - poses[None]).max(axis=2)
+    nearest = np.where(apart > SAME_RAD, apart, np.inf).min(axis=1)  # repeats are the same pose
+    nearest = nearest[np.isfinite(nearest)]
+    if not len(nearest):
+        return SAME_RAD
+    return float(np.clip(NEAREST * np.quantile(nearest, 1.0 - MOST), SAME_RAD, FAR_RAD))
 
 
 def _labels(samples: Samples, name: str) -> Floats:

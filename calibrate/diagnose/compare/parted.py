@@ -1,6 +1,6 @@
 """Whether a link of the chain parts: its own difference against the noise that both sessions may have."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from acquisition.recording.rig import Rig
 from acquisition.recording.samples import SPOTS
 from calibrate.diagnose.compare.chain import READINGS, Difference, Pair, columns_of
 from calibrate.diagnose.compare.own_noise import chance_of_structure, scatter_of
+from calibrate.predict import Predictor
 from calibrate.sensors import bar
 from calibrate.sensors.catalogue import SENSORS
 
@@ -46,20 +47,26 @@ class Parted:
     scatter: float  # of the own difference from row to row: the noise that was found
 
 
-def judged(differences: tuple[Difference, ...], rig: Rig, pair: Pair) -> tuple[Parted, ...]:
+def judged(differences: tuple[Difference, ...], model: Predictor, pair: Pair) -> tuple[Parted, ...]:
     """In the order of the chain."""
-    return tuple(_judged(one, rig, pair, len(differences)) for one in differences)
+    sent = any(one.link == COMMAND for one in differences)
+    each = (_judged(one, model, pair, len(differences)) for one in differences)
+    return tuple(_as_input(one) if one.link == "joints" and not sent else one for one in each)
 
 
-def _judged(one: Difference, rig: Rig, pair: Pair, links: int) -> Parted:
+def _as_input(one: Parted) -> Parted:
+    """Without set-points the joints are where each arm stood, which the links behind them take into account."""
+    return replace(one, parts=False, first_row=None)
+
+
+def _judged(one: Difference, model: Predictor, pair: Pair, links: int) -> Parted:
     own, good = one.own, np.isfinite(one.own)
-    sigma, where = _noise(one, rig, pair)
+    sigma, where = _noise(one, model, pair)
     at_row, at_channel = np.unravel_index(int(np.nanargmax(np.abs(own))), own.shape)
     largest = float(np.abs(own[at_row, at_channel]))
     p, first = None, None
-    if sigma is None and one.link == COMMAND:
-        beyond = np.abs(own) > ROUNDING
-        parts = bool(np.any(beyond & good))
+    if one.link == COMMAND:  # where each was sent, a servo's corrections included: what follows is asked of the links
+        beyond, parts = np.zeros(own.shape, dtype=bool), False
     elif sigma is None:
         p = max(min(1.0, links * chance_of_structure(own)), SMALLEST)
         beyond, parts = np.abs(own) > 4.0 * scatter_of(own), p < ALARM and largest > ROUNDING
@@ -100,17 +107,17 @@ def _in_means(own: Floats, sigma: Floats, good: NDArray[np.bool_]) -> float:
     return float(chi2.sf(float(np.sum((mean / of_mean) ** 2)), int(seen.sum())))
 
 
-def _noise(one: Difference, rig: Rig, pair: Pair) -> tuple[Floats | None, str]:
+def _noise(one: Difference, model: Predictor, pair: Pair) -> tuple[Floats | None, str]:
     """(row, channel) sigma of a difference, and where it is from."""
     repeats = _from_repeats(one, pair)
     if repeats is not None:
         return np.broadcast_to(repeats, one.own.shape), "repeated poses"
-    joint = _joint_noise(rig, pair[0].n_joints)
+    joint = _joint_noise(model.rig, pair[0].n_joints)
     if one.link in JOINTS:
         if one.link == COMMAND:
             return None, "a set-point has none"
         return np.broadcast_to(np.sqrt(2.0) * joint, one.own.shape), "believed, and one count of the encoders"
-    noise = rig.noise
+    noise = model.rig.noise
     told = {"spots": noise.psd_m, **{k.name: getattr(noise, k.noise[0].key, None) for k in SENSORS}}
     ends_m = None if noise.seat_m is None else np.sqrt(2.0) * noise.seat_m
     believed = ends_m if one.link == bar.KIND.name else told.get(one.link)
@@ -120,18 +127,18 @@ def _noise(one: Difference, rig: Rig, pair: Pair) -> tuple[Floats | None, str]:
             return stated, "scatter within the samples"
     if believed is None:
         return None, "unknown"
-    return np.sqrt(2.0) * np.hypot(believed, _through_joints(one, rig, pair)), "believed, of reading and joints"
+    return np.sqrt(2.0) * np.hypot(believed, _through_joints(one, model, pair)), "believed, of reading and joints"
 
 
-def _through_joints(one: Difference, rig: Rig, pair: Pair) -> Floats:
+def _through_joints(one: Difference, model: Predictor, pair: Pair) -> Floats:
     """(row, channel) what the joints' believed noise does to a reading, by differences of the model."""
-    joint = _joint_noise(rig, pair[0].n_joints)
+    joint = _joint_noise(model.rig, pair[0].n_joints)
     explained = next(reading.by_joints for reading in READINGS if reading.link == one.link)
     total = np.zeros(one.own.shape)
     for j, sigma in enumerate(joint):
         name = f"q{j + 1}_rad"
         nudged = columns_of(pair[1], {name: pair[1].column(name) + NUDGE_RAD})
-        total += (sigma * explained(rig, (nudged, pair[1])) / NUDGE_RAD) ** 2
+        total += (sigma * explained(model, (nudged, pair[1])) / NUDGE_RAD) ** 2
     return np.sqrt(np.nan_to_num(total))
 
 

@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from calibeam.results.comparison import compare
-from calibrate.diagnose.compare.chain import differences
-from calibrate.diagnose.compare.observed import difference_samples
+from calibrate.diagnose.compare.chain import differences, of_rig
+from calibrate.diagnose.compare.corrected import corrected_samples, simulated_of
 from calibrate.diagnose.compare.seated import lengths_of
 from calibrate.diagnose.fitted import fit_geometry
 from calibrate.diagnose.session import session_of
@@ -21,7 +21,7 @@ TURN = [f"r{axis}_rad" for axis in "xyz"]
 
 
 def apart(rig, measured, simulated):
-    return {one.link: one for one in differences(rig, (measured, simulated))}
+    return {one.link: one for one in differences(of_rig(rig), (measured, simulated))}
 
 
 def shifted(recording, columns):
@@ -78,14 +78,13 @@ def test_a_simulation_that_is_its_own_measurement_leaves_what_its_geometry_says(
     """What the simulation holds already cancels: noise, too."""
     _, simulated, _ = tracked
     samples = simulated.samples
-    links = differences(simulated.rig, (samples, samples))
-    made = difference_samples(simulated.rig, (samples, samples), links)
-    fitted = fit_geometry(session_of(simulated.rig, samples))
-    expected = fitted.around.expected[0]
+    fitted = simulated_of(simulated.rig, samples)
+    made = corrected_samples(fitted, (samples, samples), np.eye(4))
+    expected = fitted.fitted.around.expected[0]
     assert np.stack([made.column(f"{a}_m") for a in "xyz"], axis=1) == pytest.approx(expected[:, :3], abs=1e-12)
     seen = Rotation.from_rotvec(np.stack([samples.column(name) for name in TURN], axis=1))
     now = Rotation.from_rotvec(np.stack([made.column(name) for name in TURN], axis=1))
-    assert (now * seen.inv()).as_rotvec() == pytest.approx(expected[:, 3:], abs=1e-12)
+    assert (now * seen.inv()).as_rotvec() == pytest.approx(expected[:, 3:], abs=1e-8)
 
 
 def test_joints_of_seated_rows_are_a_reading_and_no_link_of_their_own(probed):
@@ -106,8 +105,7 @@ def test_a_probe_that_reads_off_in_the_cone_parts_at_the_seat(probed):
 
 def test_what_the_simulation_misses_its_own_cones_by_does_not_count(probed):
     samples = probed.samples
-    links = differences(probed.rig, (samples, samples))
-    made = difference_samples(probed.rig, (samples, samples), links)
+    made = corrected_samples(simulated_of(probed.rig, samples), (samples, samples), np.eye(4))
     before, after = (fit_geometry(session_of(probed.rig, one)) for one in (samples, made))
     for i, m in enumerate(before.session.measured):
         missed = [np.std(state.around.expected[i] - m.problem.observed) for state in (before, after)]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording import Samples
-from calibrate.diagnose.compare.matched import SAME_RAD, match
+from calibrate.diagnose.compare.matched import SAME_RAD, match, zeros_between
 from calibrate.errors import DataError
 
 
@@ -48,3 +48,27 @@ def test_a_servo_that_stopped_a_little_elsewhere_is_the_same_pose(poses):
 def test_arms_of_other_joints_are_refused(poses):
     with pytest.raises(DataError, match="2 joints"):
         match(session(poses), session(poses[:, :2]))
+
+
+def test_the_place_in_the_plan_decides_whatever_the_joints_read(poses):
+    """Taken in another order, one twice, one not at all, and every joint from another zero."""
+    order = [3, 1, 2, 2, 0]
+    plan = [("pose", i) for i in range(5)]
+    found = match(session(poses[:5]), session(poses[order] + 2.6), (plan, [plan[i] for i in order]))
+    assert found.measured.tolist() == [0, 1, 2, 3]
+    assert found.simulated.tolist() == [4, 1, 2, 0]
+    assert found.only_measured.tolist() == [4]
+    assert found.only_simulated.tolist() == [3]
+
+
+def test_other_zeros_of_degrees_do_not_break_a_match_of_rows(poses):
+    zero_rad = np.array([0.0, -2.6, 0.0])
+    measured, simulated = session(poses + zero_rad), session(poses + 1e-3 * np.sin(np.arange(40.0))[:, None])
+    found = match(measured, simulated)
+    assert found.measured.tolist() == found.simulated.tolist() == list(range(40))
+    assert zeros_between(measured, simulated) == pytest.approx(zero_rad, abs=2e-3)
+
+
+def test_a_servo_moves_no_zero(poses):
+    moved = session(poses + 4e-3)
+    assert np.array_equal(zeros_between(moved, session(poses)), np.zeros(3))
