@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.motion.inverse.closed_form import Starts
-from acquisition.motion.inverse.kinematics import Kinematics, jacobian
+from acquisition.motion.inverse.kinematics import Kinematics, by_readings, jacobian
 from acquisition.motion.rigid import rotation_vector
 
 Floats = NDArray[np.float64]
@@ -94,7 +94,7 @@ def refine(arm: Kinematics, goal: Goal, start_rad: Floats, max_steps: int = MAX_
         active, error, frames = active[going], error[going], frames[going]
         if active.size == 0:
             break
-        step = _step(goal.by_joint(frames), error)
+        step = _step(by_readings(arm, goal.by_joint(frames)), error)
         q_rad[active] += step * np.minimum(1.0, STEP_RAD / np.max(np.abs(step), axis=1, keepdims=True))
     return Solved(np.where(found[:, None], q_rad, np.nan), found)
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from acquisition.errors import UnreachableError
 from acquisition.motion.inverse.closed_form import Starts
-from acquisition.motion.inverse.kinematics import Kinematics, flange, jacobian
+from acquisition.motion.inverse.kinematics import Kinematics, by_readings, flange, jacobian
 from acquisition.motion.inverse.solve import AtPose, all_solutions, refine, within
 
 Floats = NDArray[np.float64]
@@ -61,7 +61,7 @@ class Solver:
 
         Rows of the Jacobian are m by LEVER_M, and rad.
         """
-        J = jacobian(self.arm.frames(q_rad[None]))[0]
+        J = by_readings(self.arm, jacobian(self.arm.frames(q_rad[None])))[0]
         _, sizes, rows = np.linalg.svd(J / np.repeat([LEVER_M, 1.0], 3)[:, None])
         return int(np.argmax(np.abs(rows[len(sizes) - 1]))) + 1, float(sizes[-1])
 
