@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.rig import Rig
-from calibrate.arms.coupling import by_readings
+from calibrate.arms.coupled_readings import by_readings
 from calibrate.arms.rig_arm import RigArm
 from calibrate.dual_psd_rig import laser_of
 from calibrate.parameters import values_by_name

@@ -147,8 +147,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 862,
-    "lines": 92_100,
+    "files": 870,
+    "lines": 93_150,
     "longest_function": 54,
     "one_importer": 49,
     "classes": 38,

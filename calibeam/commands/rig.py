@@ -3,17 +3,19 @@
 import importlib
 import importlib.util
 import re
+from collections.abc import Mapping
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from acquisition.recording.errors import shown
-from acquisition.recording.rig import Rig, parse_rig
-from calibeam.new_rig.dh_table import dh_table_text
-from calibeam.new_rig.shipped import first_comment, shipped_rigs, shipped_text
+from acquisition.recording.files import shown
+from acquisition.recording.rig import Rig, parse_rig, rig_text
+from calibeam.new_rig.from_dh import dh_table_text
 from calibrate.errors import DataError
 
+SHIPPED = Path(__file__).parents[1] / "shipped_rigs"  # geometry and limits with their source, for a tracker
 DESCRIPTIONS = "robot_descriptions"  # a package of others; it loads what it does not have from their repositories
 
 
@@ -80,10 +82,10 @@ def _of_model(from_urdf: str | None, from_mjcf: str | None, base_link: str | Non
     from calibeam.new_rig.drawn import poe_text
 
     if from_urdf is not None:
-        from calibeam.new_rig.urdf import urdf_arm
+        from calibeam.new_rig.from_urdf import urdf_arm
 
         return poe_text(urdf_arm(_file(from_urdf, "URDF_PATH"), base_link, tip_link))
-    from calibeam.new_rig.mjcf import mjcf_arm
+    from calibeam.new_rig.from_mjcf import mjcf_arm
 
     return poe_text(mjcf_arm(_file(from_mjcf or "", "MJCF_PATH"), base_link, tip_link))
 
@@ -102,3 +104,22 @@ def _file(name: str, kind: str) -> Path:
 def _in_words(rig: Rig) -> str:
     masses = sum(joint.mass_kg is not None for joint in rig.arm.joints)
     return f"{rig.n_joints} joints, {rig.arm.model.value}, {masses} with a mass"
+
+
+def shipped_rigs() -> Mapping[str, Path]:
+    """Files by name, in the order of the alphabet."""
+    return {path.stem: path for path in sorted(SHIPPED.glob("*.toml"))}
+
+
+def shipped_text(name: str) -> str:
+    """The text of a shipped rig. DataError for an unknown name."""
+    rigs = shipped_rigs()
+    if name not in rigs:
+        near = get_close_matches(name, rigs, 3, 0.4) or list(rigs)
+        raise DataError(f"no shipped rig {shown(name)}; there is {', '.join(near)}: calibeam rig list shows all")
+    return rig_text(rigs[name])
+
+
+def first_comment(text: str) -> str:
+    """What the first line of a rig file says of it."""
+    return text.splitlines()[0].removeprefix("#").strip()

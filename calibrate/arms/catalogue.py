@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.rig import Arm, ArmModel, Rig
 from calibrate.arms.belief import HELD_AS_DRAWN, LinkBelief
-from calibrate.arms.coupling import by_reading
+from calibrate.arms.coupled_readings import by_reading
 from calibrate.arms.dh import DhArm, DhLink
 from calibrate.arms.local_poe import LocalPoeArm
 from calibrate.arms.mdh import MdhArm

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.arms.coupling import uncoupled
+from calibrate.arms.coupled_readings import uncoupled
 
 if TYPE_CHECKING:  # the arms use this file in turn
     from calibrate.arms.serial import SerialArm

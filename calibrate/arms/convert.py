@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording.rig import Arm, ArmModel, Joint, Pose
 from calibrate.arms.belief import HELD_AS_DRAWN
 from calibrate.arms.catalogue import ARMS
-from calibrate.arms.coupling import by_reading, uncoupled
+from calibrate.arms.coupled_readings import by_reading, uncoupled
 from calibrate.arms.dh import DhLink
 from calibrate.arms.serial import chain_frames, rotation_x, rotation_z, shift
 from calibrate.arms.table import NearParallel, Table, dh_table

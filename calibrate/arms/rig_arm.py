@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.rig import Rig
 from calibrate.arms.catalogue import arm_of
-from calibrate.arms.coupling import uncoupled
+from calibrate.arms.coupled_readings import uncoupled
 from calibrate.arms.serial import SerialArm, chain_frames
 from calibrate.parameters import values_by_name
 

@@ -1,7 +1,7 @@
 """What all serial arms of turning joints have in common: fixed parts and turns about z in alternation.
 
 T_base_flange = F_0 Rz(a_1) F_1 Rz(a_2) ... Rz(a_n) F_n,  a_i = q_i + offset_i; where joint i follows joint k of the
-controller, a_i = q_i + by q_k + offset_i (arms/coupling.py).
+controller, a_i = q_i + by q_k + offset_i (arms/coupled_readings.py).
 Every parameter moves one frame B_i = F_0 Rz(a_1) ... F_i, and moves it by a twist that is constant in that frame;
 the base sees it through the adjoint of B_i. Source: Murray, Li, Sastry, A Mathematical Introduction to Robotic
 Manipulation, 1994, ch. 3.4 (body and spatial manipulator Jacobian).
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from calibrate.arms import compiled
-from calibrate.arms.coupling import by_readings, uncoupled
+from calibrate.arms.coupled_readings import by_readings, uncoupled
 from calibrate.arms.model import KinematicModel
 from calibrate.parameters import Parameter
 from calibrate.rigid import cross, cross_matrix, turn_twist
@@ -48,7 +48,7 @@ class SerialArm(ABC):
         """(param, 6) twist [v; w] by each parameter, written in the frame it moves."""
 
     def coupled(self, by_reading: Floats | None) -> Self:
-        """The same arm, whose readings are coupled: angle = by_reading @ reading + offset (arms/coupling.py)."""
+        """The same arm, with coupled readings: angle = by_reading @ reading + offset (arms/coupled_readings.py)."""
         out = copy(self)
         out.by_reading = by_reading
         return out

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.arms.coupling import by_readings, recoupled
+from calibrate.arms.coupled_readings import by_readings, recoupled
 from calibrate.diagnose.assumed import Assumed
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.ported import Look, flange_twists, joint_turns, look, perturbed_frames, through

@@ -10,7 +10,7 @@ from scipy.ndimage import gaussian_filter1d
 from acquisition.recording import Samples
 from acquisition.recording.rig import Arm
 from acquisition.recording.samples import joint_of, per_joint
-from calibrate.arms.coupling import by_reading, uncoupled
+from calibrate.arms.coupled_readings import by_reading, uncoupled
 from calibrate.sensors.catalogue import SENSORS
 
 Floats = NDArray[np.float64]

@@ -8,7 +8,7 @@ import pytest
 
 from acquisition.recording.rig import load_rig
 from calibeam.cli import run
-from calibeam.new_rig.shipped import shipped_rigs
+from calibeam.commands.rig import shipped_rigs
 from calibrate.arms.rig_arm import RigArm
 
 URDF = """<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="revolute"><parent link="a"/>

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig import ArmModel, parse_rig
-from calibeam.new_rig.dh_table import dh_table_text
+from calibeam.new_rig.from_dh import dh_table_text
 from calibrate.errors import DataError
 
 GERMAN = """# iiwa

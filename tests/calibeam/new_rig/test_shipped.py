@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig import load_rig
-from calibeam.new_rig.shipped import shipped_rigs, shipped_text
+from calibeam.commands.rig import shipped_rigs, shipped_text
 from calibrate.arms.rig_arm import RigArm
 from calibrate.errors import DataError
 

@@ -8,7 +8,7 @@ import pytest
 
 from acquisition.recording.rig import parse_rig
 from calibeam.new_rig.drawn import poe_text
-from calibeam.new_rig.urdf import urdf_arm
+from calibeam.new_rig.from_urdf import urdf_arm
 from calibrate.arms.rig_arm import RigArm
 from calibrate.errors import DataError
 

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.errors import shown
-from acquisition.recording.files.toml_file import read_text
+from acquisition.recording.files import read_text, shown
 from calibeam.new_rig.drawn import ANY_TURN_RAD, DrawnArm, DrawnJoint, onto_axis
 from calibrate.errors import DataError
 from calibrate.rigid import inverse

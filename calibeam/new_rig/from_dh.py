@@ -15,8 +15,7 @@ from pathlib import Path
 
 import msgspec
 
-from acquisition.recording.errors import shown
-from acquisition.recording.files.toml_file import read_text
+from acquisition.recording.files import read_text, shown
 from acquisition.recording.rig import Joint, Pose
 from calibeam.new_rig.drawn import ANY_TURN_RAD, rig_file_text
 from calibrate.errors import DataError
