@@ -147,8 +147,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 870,
-    "lines": 93_150,
+    "files": 847,
+    "lines": 93_400,
     "longest_function": 54,
     "one_importer": 49,
     "classes": 38,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.motion.inverse.closed_form import closed_form
-from acquisition.motion.inverse.solver import Solver
+from acquisition.motion.inverse.solve import Solver
 from acquisition.recording import Samples
 from acquisition.recording.rig import ArmModel, load_rig, parse_rig
 from calibrate.arms.belief import FREE
