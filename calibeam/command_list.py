@@ -18,6 +18,7 @@ class ListedCommand:
 
 GROUPS: dict[str, tuple[ListedCommand, ...]] = {
     "Start here": (
+        ListedCommand("rig", "rig:rig_command", "Write the rig file of a robot, or list the robots that are shipped."),
         ListedCommand("demo", "demo:demo", "Run a whole session on emulated devices and show the truth."),
         ListedCommand("session", "session:session", "Run a session: check, plan, align, centre, measure, report."),
         ListedCommand("check", "check:check_command", "Check every device of a rig, or check a recording; no motion."),

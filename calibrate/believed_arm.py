@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.rig import Rig
+from calibrate.arms.coupled_readings import by_readings
 from calibrate.arms.rig_arm import RigArm
 from calibrate.dual_psd_rig import laser_of
 from calibrate.parameters import values_by_name
@@ -27,10 +28,11 @@ class BelievedArm(RigArm):
         return self.beam_from(self.flange(q_rad))
 
     def beam_jacobian(self, q_rad: Floats) -> Floats:
-        """(6, joint) d(origin, direction)/dq: z x (origin - o), z x direction."""
+        """(6, joint) d(origin, direction)/dq: z x (origin - o), z x direction by the turn of a joint."""
         T = self.frames(q_rad[None])[0]
         (origin, direction), axes = self.beam_from(T[-1]), T[:-1, :3, 2]
-        return np.concatenate([cross(axes, origin - T[:-1, :3, 3]), cross(axes, direction)], axis=1).T
+        by_angle = np.concatenate([cross(axes, origin - T[:-1, :3, 3]), cross(axes, direction)], axis=1).T
+        return by_readings(self.by_reading, by_angle)
 
     def beam_from(self, T_base_flange: Floats) -> tuple[Floats, Floats]:
         """The beam at a flange pose (4, 4)."""

@@ -24,6 +24,11 @@ class Kinematics(Protocol):
     @property
     def upper_rad(self) -> Floats: ...
 
+    @property
+    def by_reading(self) -> Floats | None:
+        """(joint, joint) turns of the joints by readings, where a controller couples them; None: one to one."""
+        ...
+
     def frames(self, q_rad: Floats) -> Floats:
         """T_base_frame (pose, joint + 1, 4, 4) at joint readings (pose, joint); the last is the flange."""
         ...
@@ -35,8 +40,13 @@ def flange(arm: Kinematics, q_rad: Floats) -> Floats:
     return out
 
 
+def by_readings(arm: Kinematics, by_angle: Floats) -> Floats:
+    """A derivative (..., joint) by the turns of the joints as one by the readings."""
+    return by_angle if arm.by_reading is None else by_angle @ arm.by_reading
+
+
 def jacobian(frames: Floats, point_m: Floats | None = None) -> Floats:
-    """(pose, 6, joint): velocity of a point of the flange (m) and turn (rad) in the base by each joint, of `frames`.
+    """(pose, 6, joint): velocity of a point of the flange (m) and turn (rad) in the base by the turn of each joint.
 
     `point_m` (pose, 3) in the base; None: the flange's origin.
     """

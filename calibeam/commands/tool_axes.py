@@ -105,6 +105,7 @@ def errors_of(rig: Rig, zero: str | None, length: str | None, angle: str | None)
 def tool_of(recording: Recording, errors: ArmErrors, model: Path | None = None) -> ToolFile:
     """The record of tool.json. DataError without positions, or without the rotations that are needed."""
     targets = targets_of(recording)
+    _refuse_coupled(recording.rig)
     calibrated = None if model is None else read_model(model)
     rig = recording.rig if calibrated is None else _rig_of(calibrated, recording)
     arm = with_discs(arm_of(rig, errors.links), rig)
@@ -114,6 +115,15 @@ def tool_of(recording: Recording, errors: ArmErrors, model: Path | None = None) 
     found = calibrate_tool(arm, targets, prior)
     identity = RigIdentity(recording.rig.name, rig_sha256(recording.rig_text), recording.rig_text)
     return tool_record(found, errors, None if model is None else model.name, identity, SOFTWARE)
+
+
+def _refuse_coupled(rig: Rig) -> None:
+    for number, joint in enumerate(rig.arm.joints, start=1):
+        if joint.follows is not None:
+            raise DataError(
+                f"rig {rig.name}: joint {number} follows joint {joint.follows.joint}, which then turns two axes at "
+                "once; find the target together with the arm: calibeam identify"
+            )
 
 
 def targets_of(recording: Recording) -> tuple[TargetRows, ...]:

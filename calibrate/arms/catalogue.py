@@ -3,14 +3,18 @@
 from collections.abc import Callable, Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition.recording.rig import Arm, ArmModel, Rig
 from calibrate.arms.belief import HELD_AS_DRAWN, LinkBelief
+from calibrate.arms.coupled_readings import by_reading
 from calibrate.arms.dh import DhArm, DhLink
 from calibrate.arms.local_poe import LocalPoeArm
 from calibrate.arms.mdh import MdhArm
 from calibrate.arms.serial import SerialArm
 from calibrate.rigid import transform
+
+Floats = NDArray[np.float64]
 
 
 def dh_rows(arm: Arm) -> tuple[DhLink, ...]:
@@ -18,12 +22,16 @@ def dh_rows(arm: Arm) -> tuple[DhLink, ...]:
     return tuple(DhLink(j.theta_offset_rad or 0.0, j.d_m or 0.0, j.a_m or 0.0, j.alpha_rad or 0.0) for j in arm.joints)
 
 
+def _base(arm: Arm) -> Floats:
+    return transform(arm.base.origin_m, arm.base.rotation_rad)
+
+
 def _dh(arm: Arm, belief: LinkBelief) -> SerialArm:
-    return DhArm(dh_rows(arm), belief, transform(arm.flange.origin_m, arm.flange.rotation_rad))
+    return DhArm(dh_rows(arm), belief, transform(arm.flange.origin_m, arm.flange.rotation_rad), _base(arm))
 
 
 def _mdh(arm: Arm, belief: LinkBelief) -> SerialArm:
-    return MdhArm(dh_rows(arm), belief, transform(arm.flange.origin_m, arm.flange.rotation_rad))
+    return MdhArm(dh_rows(arm), belief, transform(arm.flange.origin_m, arm.flange.rotation_rad), _base(arm))
 
 
 def _local_poe(arm: Arm, belief: LinkBelief) -> SerialArm:
@@ -38,9 +46,14 @@ ARMS: Mapping[ArmModel, Callable[[Arm, LinkBelief], SerialArm]] = {
 }
 
 
+def serial_arm(arm: Arm, belief: LinkBelief) -> SerialArm:
+    """The arm of any model, its links believed as given, its readings coupled as declared."""
+    return ARMS[arm.model](arm, belief).coupled(by_reading(arm))
+
+
 def arm_of(rig: Rig, belief: LinkBelief | None = None) -> SerialArm:
     """The rig's arm, its links as `belief` says, else as the [tolerance] says, else held as drawn."""
-    return ARMS[rig.arm.model](rig.arm, drawn_belief(rig) if belief is None else belief)
+    return serial_arm(rig.arm, drawn_belief(rig) if belief is None else belief)
 
 
 def drawn_belief(rig: Rig) -> LinkBelief:

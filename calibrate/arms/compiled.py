@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.arms.coupled_readings import uncoupled
+
 if TYPE_CHECKING:  # the arms use this file in turn
     from calibrate.arms.serial import SerialArm
 
@@ -36,6 +38,7 @@ class ArmConstants:
     offset_rad: Floats  # (joint,) added to a reading
     moves_frame: Indices  # (param,) frame that a parameter moves
     body_twists: Floats  # (param, 6) [v; w] by a parameter in the frame that it moves
+    by_reading: Floats | None = None  # (joint, joint) as SerialArm.by_reading
 
     @classmethod
     def of(cls, arm: "SerialArm", theta: Floats) -> Self:
@@ -45,15 +48,17 @@ class ArmConstants:
             np.ascontiguousarray(arm.angle_offset_rad(theta)),
             np.array(arm.moves_frame, dtype=np.intp),
             np.ascontiguousarray(arm.body_twists(theta)),
+            arm.by_reading,
         )
 
     def of_columns(self, columns: Indices) -> Self:
         """The same arm, where only these parameters are asked for, in this order."""
-        return type(self)(self.fixed, self.offset_rad, self.moves_frame[columns], self.body_twists[columns])
+        moves, twists = self.moves_frame[columns], self.body_twists[columns]
+        return type(self)(self.fixed, self.offset_rad, moves, twists, self.by_reading)
 
     def half_tangents(self, q_rad: Floats) -> Floats:
         """(pose, joint) tangent of half of every joint angle, what fast.py makes sine and cosine of."""
-        half = np.add(q_rad, self.offset_rad, order="C")
+        half = np.add(uncoupled(self.by_reading, q_rad), self.offset_rad, order="C")
         half *= 0.5
         return np.tan(half, out=half)
 

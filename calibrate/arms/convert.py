@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording.rig import Arm, ArmModel, Joint, Pose
 from calibrate.arms.belief import HELD_AS_DRAWN
 from calibrate.arms.catalogue import ARMS
+from calibrate.arms.coupled_readings import by_reading, uncoupled
 from calibrate.arms.dh import DhLink
 from calibrate.arms.serial import chain_frames, rotation_x, rotation_z, shift
 from calibrate.arms.table import NearParallel, Table, dh_table
@@ -90,7 +91,7 @@ def _offsets_behind(arm: Arm, corrections: Mapping[str, float], parts: Floats) -
 
 
 def flange_of_parts(parts: Floats, q_rad: Floats) -> Floats:
-    """(pose, 4, 4) of F_0 Rz(q_1) F_1 ... F_n at joint readings (pose, joint)."""
+    """(pose, 4, 4) of F_0 Rz(q_1) F_1 ... F_n at turns of the joints (pose, joint)."""
     return chain_frames(parts[0], parts[1:], q_rad)[:, -1]
 
 
@@ -143,6 +144,7 @@ def _bare(joint: Joint) -> Joint:
         gear_ratio=joint.gear_ratio,
         encoder_counts=joint.encoder_counts,
         mass_kg=joint.mass_kg,
+        follows=joint.follows,
     )
 
 
@@ -157,7 +159,7 @@ def _vector(values: Floats) -> tuple[float, float, float]:
 
 
 def _error_left(arm: Arm, old: Floats, new: Floats, T_base_new: Floats) -> ErrorLeft:
-    q = sampled_readings(arm)
+    q = uncoupled(by_reading(arm), sampled_readings(arm))
     T_old, T_new = flange_of_parts(old, q), T_base_new @ flange_of_parts(new, q)
     position = np.linalg.norm(T_new[:, :3, 3] - T_old[:, :3, 3], axis=1)
     angle = Rotation.from_matrix((inverse(T_old) @ T_new)[:, :3, :3]).magnitude()

@@ -1,7 +1,7 @@
 """Standard Denavit-Hartenberg arm with Hayati's extra tilt on every link.
 
 T_i = Rz(q_i + theta_offset_i + zero_i) Tz(d_i + offset_i) Tx(a_i + length_i) Rx(alpha_i + twist_i) Ry(tilt_i),
-T_base_flange = T_1 ... T_n T_n_flange.
+T_base_flange = T_base_first T_1 ... T_n T_n_flange.
 Sources: Denavit, Hartenberg, J. Appl. Mech. 22, 1955; Hayati, Mirmirani, J. Robotic Systems 2(4), 1985 (tilt, there
 for near-parallel axes only). On a link with alpha = +-90 deg the tilt turns about an axis parallel to the link's own
 joint: zero and tilt then only add up. So there the tilt is held, and `joint.zero` is by definition the whole turn.
@@ -37,10 +37,17 @@ class DhLink:
 class DhArm(SerialArm):
     """KinematicModel of a D-H table; all parameters are corrections to it, zero, offset, length, twist, tilt a link."""
 
-    def __init__(self, links: tuple[DhLink, ...], belief: LinkBelief, T_last_flange: Floats | None = None) -> None:
+    def __init__(
+        self,
+        links: tuple[DhLink, ...],
+        belief: LinkBelief,
+        T_last_flange: Floats | None = None,
+        T_base_first: Floats | None = None,
+    ) -> None:
         n = len(links)
         self._nominal = nominal_rows(links)
         self._T_last_flange = np.eye(4) if T_last_flange is None else T_last_flange
+        self._T_base_first = np.eye(4) if T_base_first is None else T_base_first
         self._twist_flange_last = adjoint(inverse(self._T_last_flange))
         parameters = tuple(p for i, k in enumerate(links, start=1) for p in _link_parameters(i, k, belief))
         super().__init__(n, parameters, tuple(frame for i in range(n) for frame in (i, i, i + 1, i + 1, i + 1)))
@@ -58,7 +65,7 @@ class DhArm(SerialArm):
         return out
 
     def fixed_parts(self, theta: Floats) -> Floats:
-        return np.concatenate([np.eye(4)[None], self.link_tail(theta)])
+        return np.concatenate([self._T_base_first[None], self.link_tail(theta)])
 
     def angle_offset_rad(self, theta: Floats) -> Floats:
         return self._nominal[:, 0] + theta[::PER_LINK]

@@ -3,7 +3,7 @@
 Row i of the rig holds alpha_(i-1), a_(i-1), d_i, theta_offset_i:
 T_(i-1,i) = Rx(alpha_(i-1) + twist_(i-1)) Tx(a_(i-1) + length_(i-1)) Ry(tilt_(i-1))
             Rz(q_i + theta_offset_i + zero_i) Tz(d_i + offset_i),
-T_base_flange = T_(0,1) ... T_(n-1,n) T_n_flange.
+T_base_flange = T_base_first T_(0,1) ... T_(n-1,n) T_n_flange.
 Parameters carry Craig's indices: alpha and a of row i are twist and length of link i-1, the body in front of joint i.
 So link<i>.length, twist, tilt and offset mean the same as in a standard table of the same arm (arms/dh.py).
 Sources: Craig, Introduction to Robotics, 3rd ed. 2005, ch. 3.4, eq. 3.6; tilt as in Hayati, Mirmirani, J. Robotic
@@ -28,9 +28,16 @@ PER_ROW = 5  # zero, offset of link i; length, twist, tilt of link i-1
 class MdhArm(SerialArm):
     """KinematicModel of a modified D-H table; all parameters are corrections to it."""
 
-    def __init__(self, rows: tuple[DhLink, ...], belief: LinkBelief, T_last_flange: Floats | None = None) -> None:
+    def __init__(
+        self,
+        rows: tuple[DhLink, ...],
+        belief: LinkBelief,
+        T_last_flange: Floats | None = None,
+        T_base_first: Floats | None = None,
+    ) -> None:
         self._nominal = nominal_rows(rows)
         self._T_last_flange = np.eye(4) if T_last_flange is None else T_last_flange
+        self._T_base_first = np.eye(4) if T_base_first is None else T_base_first
         parameters = tuple(p for i, row in enumerate(rows, start=1) for p in _row_parameters(i, row, belief))
         super().__init__(len(rows), parameters, tuple(np.repeat(np.arange(len(rows)), PER_ROW).tolist()))
 
@@ -39,7 +46,9 @@ class MdhArm(SerialArm):
         _, d, a, alpha, tilt = self._rows(theta)
         along_x = rotation_x(alpha) @ shift(a, np.zeros_like(a))
         along_z = rotation_y(tilt) @ shift(np.zeros_like(d), d)
-        return np.concatenate([along_x @ along_z, self._T_last_flange[None]])
+        parts = np.concatenate([along_x @ along_z, self._T_last_flange[None]])
+        parts[0] = self._T_base_first @ parts[0]
+        return parts
 
     def angle_offset_rad(self, theta: Floats) -> Floats:
         return self._nominal[:, 0] + theta[::PER_ROW]

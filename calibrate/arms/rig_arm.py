@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.rig import Rig
 from calibrate.arms.catalogue import arm_of
+from calibrate.arms.coupled_readings import uncoupled
 from calibrate.arms.serial import SerialArm, chain_frames
 from calibrate.parameters import values_by_name
 
@@ -27,11 +28,13 @@ class RigArm:
     lower_rad: Floats  # (joint,) of the readings
     upper_rad: Floats
     point_m: Floats = field(default_factory=lambda: np.zeros(3))  # (3,) of the tool in the flange; its origin: none
+    by_reading: Floats | None = None  # (joint, joint) of coupled readings, as SerialArm.by_reading
 
     @classmethod
     def of(cls, arm: SerialArm, theta: Floats, lower_rad: Floats, upper_rad: Floats) -> Self:
         """`theta` (param,): values of the arm's own parameters."""
-        return cls(arm.fixed_parts(theta), arm.angle_offset_rad(theta), lower_rad, upper_rad)
+        parts, offset_rad = arm.fixed_parts(theta), arm.angle_offset_rad(theta)
+        return cls(parts, offset_rad, lower_rad, upper_rad, by_reading=arm.by_reading)
 
     @classmethod
     def of_rig(cls, rig: Rig, corrections: Mapping[str, float] | None = None) -> Self:
@@ -48,7 +51,11 @@ class RigArm:
 
     def frames(self, q_rad: Floats) -> Floats:
         """(pose, joint + 1, 4, 4) as SerialArm.frames: joint i + 1 turns about z of frame i, the last is the flange."""
-        return chain_frames(self.fixed[0], self.fixed[1:], q_rad + self.offset_rad)
+        return chain_frames(self.fixed[0], self.fixed[1:], self.angles_rad(q_rad))
+
+    def angles_rad(self, q_rad: Floats) -> Floats:
+        """(pose, joint) turns of the joints at readings (pose, joint)."""
+        return uncoupled(self.by_reading, q_rad) + self.offset_rad
 
     def flange(self, q_rad: Floats) -> Floats:
         """T_base_flange (4, 4) at joint readings (joint,)."""

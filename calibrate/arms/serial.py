@@ -1,6 +1,7 @@
 """What all serial arms of turning joints have in common: fixed parts and turns about z in alternation.
 
-T_base_flange = F_0 Rz(a_1) F_1 Rz(a_2) ... Rz(a_n) F_n,  a_i = q_i + offset_i.
+T_base_flange = F_0 Rz(a_1) F_1 Rz(a_2) ... Rz(a_n) F_n,  a_i = q_i + offset_i; where joint i follows joint k of the
+controller, a_i = q_i + by q_k + offset_i (arms/coupled_readings.py).
 Every parameter moves one frame B_i = F_0 Rz(a_1) ... F_i, and moves it by a twist that is constant in that frame;
 the base sees it through the adjoint of B_i. Source: Murray, Li, Sastry, A Mathematical Introduction to Robotic
 Manipulation, 1994, ch. 3.4 (body and spatial manipulator Jacobian).
@@ -8,11 +9,14 @@ Manipulation, 1994, ch. 3.4 (body and spatial manipulator Jacobian).
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from copy import copy
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from calibrate.arms import compiled
+from calibrate.arms.coupled_readings import by_readings, uncoupled
 from calibrate.arms.model import KinematicModel
 from calibrate.parameters import Parameter
 from calibrate.rigid import cross, cross_matrix, turn_twist
@@ -28,6 +32,7 @@ class SerialArm(ABC):
         self.n_joints = n_joints
         self.parameters = parameters
         self.moves_frame = moves_frame
+        self.by_reading: Floats | None = None  # (joint, joint) of coupled readings; None: angles from the links
         self._columns_of = [np.flatnonzero(np.array(moves_frame) == i) for i in range(n_joints + 1)]
 
     @abstractmethod
@@ -42,10 +47,20 @@ class SerialArm(ABC):
     def body_twists(self, theta: Floats) -> Floats:
         """(param, 6) twist [v; w] by each parameter, written in the frame it moves."""
 
+    def coupled(self, by_reading: Floats | None) -> Self:
+        """The same arm, with coupled readings: angle = by_reading @ reading + offset (arms/coupled_readings.py)."""
+        out = copy(self)
+        out.by_reading = by_reading
+        return out
+
+    def angles_rad(self, theta: Floats, q_rad: Floats, more_rad: Floats | float = 0.0) -> Floats:
+        """(pose, joint) turns of the joints at readings (pose, joint); `more_rad` is added behind the coupling."""
+        return uncoupled(self.by_reading, q_rad) + more_rad + self.angle_offset_rad(theta)
+
     def frames(self, theta: Floats, q_rad: Floats) -> Floats:
         """(pose, joint + 1, 4, 4) B_0 ... B_n: joint i turns about z of B_(i-1), B_n is the flange."""
         fixed = self.fixed_parts(theta)
-        return chain_frames(fixed[0], fixed[1:], q_rad + self.angle_offset_rad(theta))
+        return chain_frames(fixed[0], fixed[1:], self.angles_rad(theta, q_rad))
 
     def flange(self, theta: Floats, q_rad: Floats) -> Floats:
         if compiled.worth(len(q_rad)):
@@ -54,7 +69,8 @@ class SerialArm(ABC):
 
     def joint_twists(self, theta: Floats, q_rad: Floats) -> Floats:
         before = self.frames(theta, q_rad)[:, :-1]
-        return np.swapaxes(turn_twist(before[..., :3, 2], before[..., :3, 3]), 1, 2)
+        turns = np.swapaxes(turn_twist(before[..., :3, 2], before[..., :3, 3]), 1, 2)
+        return by_readings(self.by_reading, turns)
 
     def twists(self, theta: Floats, q_rad: Floats) -> Floats:
         if compiled.worth(len(q_rad)):

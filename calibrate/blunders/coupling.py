@@ -14,17 +14,20 @@ from calibrate.blunders.hypothesis import Hypothesis
 
 Floats = NDArray[np.float64]
 
+MAKES = {(2, 3): ", as for FANUC"}  # who counts so: docs/robots.md, with sources
+
 
 def hypotheses(n_joints: int) -> Iterator[Hypothesis]:
     """Each joint alone, with the angle of its neighbour in front added or taken away."""
     for j in range(1, n_joints):
-        for sign, word in ((-1.0, "subtract"), (1.0, "add")):
+        for sign in (-1.0, 1.0):
             mixing = np.eye(n_joints)
             mixing[j, j - 1] = sign
             yield Hypothesis(
                 BlunderKind.JOINT_COUPLING,
                 f"column q{j + 1}_rad",
                 f"joint {j + 1} is coupled with joint {j}: its angle is not counted from link {j}",
-                f"{word} q{j}_rad {'from' if sign < 0 else 'to'} the column",
+                f"in the rig file, write follows = {{ joint = {j}, by = {sign} }} for joint {j + 1}"
+                f"{MAKES.get((j, j + 1), '')}, or remove it there",
                 lambda q, m=mixing: q @ m.T,
             )

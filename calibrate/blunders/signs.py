@@ -4,7 +4,7 @@ Controllers choose the senses of their joints freely; KUKA counts A1, A4 and A6 
 tables. Where links 2 and 3 move in one plane, these three signs together mirror the arm at that plane.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import combinations
 
 import numpy as np
@@ -13,6 +13,8 @@ from calibrate.blunders.finding import BlunderKind
 from calibrate.blunders.hypothesis import Hypothesis
 
 EVERY_SET = 8  # joints up to which all sets are tried: 247 of them, in a second
+# Against the table with every axis drawn as the one before it turns: docs/robots.md, with sources
+MAKES: Mapping[tuple[int, ...], str] = {(1, 4, 6): "KUKA"}
 LARGEST_SET = 3  # of longer arms; no controller is known that turns more
 
 
@@ -41,6 +43,11 @@ def in_words(joints: tuple[int, ...]) -> str:
     return f"joints {', '.join(str(j) for j in joints[:-1])} and {joints[-1]}"
 
 
+def _makes(joints: tuple[int, ...]) -> str:
+    """Who counts these joints so."""
+    return f", as for {MAKES[joints]}" if joints in MAKES else ""
+
+
 def _turned(joints: tuple[int, ...], n_joints: int) -> Hypothesis:
     sign = np.where(np.isin(np.arange(1, n_joints + 1), joints), -1.0, 1.0)
     columns, one = ", ".join(f"q{j}_rad" for j in joints), len(joints) == 1
@@ -48,8 +55,7 @@ def _turned(joints: tuple[int, ...], n_joints: int) -> Hypothesis:
         BlunderKind.JOINT_SIGN,
         f"{'column' if one else 'columns'} {columns}",
         f"{in_words(joints)} {'turns' if one else 'turn'} against the rig's sense",
-        f"change the sign of {'the column' if one else 'these columns'} or turn "
-        f"{'this axis' if one else 'these axes'} (docs/formats.md, Joint signs)",
+        f"in the rig file, write sign = -1 for {in_words(joints)}{_makes(joints)}, or remove it there",
         lambda q: q * sign,
         joints,
     )

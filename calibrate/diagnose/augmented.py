@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.arms.coupled_readings import by_readings, recoupled
 from calibrate.diagnose.assumed import Assumed
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.ported import Look, flange_twists, joint_turns, look, perturbed_frames, through
@@ -161,7 +162,7 @@ class Augmented:
         if key not in self.slopes:
             self.slopes.clear()
             at, (geometry, terms) = self.around(theta), self.split(theta)
-            moved = self.session.samples.joints() + at.by.joints_rad
+            moved = self.session.samples.joints() + recoupled(self.session.arm.by_reading, at.by.joints_rad)
             arm = self.session.arm.twists(geometry[: len(self.session.arm.parameters)], moved)
             joint = self.session.weighting.unweighted
             added = [self._term_columns(accepted, at) for accepted in terms]
@@ -177,7 +178,7 @@ class Augmented:
 
     def by_joint(self, at: Around, i: int) -> Floats:
         """(row, k, readings) derivative of instrument i's readings by the joint readings of the row's poses."""
-        turns, m = joint_turns(at.frames), self.session.measured[i]
+        turns, m = by_readings(self.session.arm.by_reading, joint_turns(at.frames)), self.session.measured[i]
         each = [by @ turns[rows] for by, rows in zip(at.looks[i].by_twists, m.sample_rows.T, strict=True)]
         return np.concatenate(each, axis=-1)
 

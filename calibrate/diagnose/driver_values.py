@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from calibrate.diagnose.session import Session
-from calibrate.effects.conditions import conditions_of, temperatures_of
+from calibrate.effects.conditions import conditions_of, temperatures_of, uncoupled_samples
 from calibrate.effects.drivers import Drivers, Readout
 from calibrate.sensors.model import Standing, Used
 from calibrate.weighting import Measured
@@ -29,7 +29,7 @@ def drivers_at(
     rig: Rig, samples: Samples, frames: Floats, readouts: Mapping[str, Readout], temperatures_degC: Mapping[str, Floats]
 ) -> Drivers:
     """Of any table of samples, with what the model predicts at them; temperatures (sample,) by place."""
-    taken = conditions_of(samples, temperatures_degC)
+    taken = conditions_of(uncoupled_samples(rig.arm, samples), temperatures_degC)
     return Drivers(**vars(taken), rig=rig, frames=frames, readouts=readouts)
 
 

@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 def perturbed_frames(arm: SerialArm, theta: Floats, q_rad: Floats, by: Perturbation) -> Floats:
     """(pose, joint + 1, 4, 4) B_0 ... B_n as the surroundings see them, for readings (pose, joint)."""
     fixed = arm.fixed_parts(theta)
-    angle_rad = q_rad + by.joints_rad + arm.angle_offset_rad(theta)
+    angle_rad = arm.angles_rad(theta, q_rad, by.joints_rad)
     perturbed = {i: offsets(by.frames[:, i]) for i in range(arm.n_joints + 1) if np.any(by.frames[:, i])}
     return chain_frames(inverse(offsets(by.surroundings)) @ fixed[0], fixed[1:], angle_rad, perturbed)
 
@@ -103,6 +103,6 @@ def through(seen: Look, measured: Measured, twists: Floats) -> Floats:
 
 
 def joint_turns(frames: Floats) -> Floats:
-    """(pose, 6, joint) base twist of the flange by each joint angle."""
+    """(pose, 6, joint) base twist of the flange by the turn of each joint."""
     before = frames[:, :-1]
     return np.swapaxes(turn_twist(before[..., :3, 2], before[..., :3, 3]), 1, 2)

@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from acquisition.recording import Samples
+from acquisition.recording.rig import Arm
 from acquisition.recording.samples import joint_of, per_joint
+from calibrate.arms.coupled_readings import by_reading, uncoupled
 from calibrate.sensors.catalogue import SENSORS
 
 Floats = NDArray[np.float64]
@@ -27,7 +29,7 @@ NAMED = {
 class Conditions:
     """In the order of the samples. None: not recorded."""
 
-    q_rad: Floats  # (pose, joint) as reported
+    q_rad: Floats  # (pose, joint) as reported; of a coupled joint from the link in front (uncoupled_samples)
     t_s: Floats  # (pose,)
     approach: Floats | None  # (pose, joint) -1, 0, 1
     approach_derived: bool  # from the order of the samples, not recorded
@@ -67,6 +69,30 @@ def conditions_of(samples: Samples, temperatures_degC: Mapping[str, Floats]) -> 
         extra=_extra(samples, n),
         repeat=samples.integers("repeat", -1) if "repeat" in samples else None,
     )
+
+
+def uncoupled_samples(arm: Arm, samples: Samples) -> Samples:
+    """The samples with all that they hold of joints counted from the link in front, as drives and bearings see it.
+
+    A joint that follows another one has moved where the sum of both has: its `approach` is then the sign of its last
+    move. Second encoders sit on a joint and stay as they are.
+    """
+    matrix = by_reading(arm)
+    if matrix is None:
+        return samples
+    n, columns = samples.n_joints, dict(samples.columns)
+    for stem, unit in (("q", "_rad"), ("cmd", "_rad"), ("qd", "_rad_s"), ("last_move", "_rad")):
+        names = per_joint(stem, unit, n)
+        if all(name in samples for name in names):
+            read = np.stack([samples.column(name) for name in names], axis=1)
+            columns |= dict(zip(names, uncoupled(matrix, read).T, strict=True))
+    out = Samples(columns, n)
+    _, direction = moves_of(out)
+    for i in np.flatnonzero(np.any(matrix != np.eye(n), axis=1)):
+        if (name := f"approach{i + 1}") in columns:
+            last = f"last_move{i + 1}_rad"
+            columns[name] = np.sign(columns[last]) if last in columns else direction[:, i]
+    return Samples(columns, n)
 
 
 def _per_joint(samples: Samples, stem: str, unit: str, n: int) -> Floats | None:

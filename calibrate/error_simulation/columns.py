@@ -96,7 +96,7 @@ def arm_at(machine: Machine, sources: Sequence[Source], columns: Columns, q_rad:
                     weights.append(weight)
     return ArmAtPoses(
         machine.fixed,
-        q_rad + machine.offset_rad,
+        machine.angles_rad(q_rad),
         machine.point_m,
         np.array(slots, dtype=np.int64),
         np.array(index, dtype=np.int64),

@@ -40,6 +40,12 @@ def identified_arm(
     """Takes what belongs to arm and tool point; `tool_about_m` is what a model's corrections of the tool are about,
     else the rig's point. DataError for a joint or link that this arm does not have.
     """
+    followers = [i for i, joint in enumerate(rig.arm.joints, start=1) if joint.follows is not None]
+    if followers:
+        raise DataError(
+            f"rig {rig.name}: joint {followers[0]} follows another joint, and this form has no coupled joints; give the"
+            " program that needs the arm angles from the links in front, and a rig without 'follows'"
+        )
     known = {p.name for p in arm_of(rig).parameters}
     discs = [name for name, value in corrections.items() if name.endswith((SINE, COSINE)) and value != 0.0]
     if discs:

@@ -31,6 +31,8 @@ class Joint(Part, frozen=True, kw_only=True):
 
     lower_rad: float
     upper_rad: float
+    sign: int = 1
+    follows: Mapping[str, float] | None = None
 
 
 class Arm(msgspec.Struct, frozen=True):
@@ -126,6 +128,8 @@ def read_hand_rig(rig: Mapping[str, Any]) -> HandRig:
         checked = msgspec.convert(dict(rig), type=HandRig)
     except msgspec.ValidationError as error:
         raise WorldError(f"rig file: {error}; an emulated measuring arm needs [arm] with joints in its form") from error
+    if any(joint.sign != 1 or joint.follows for joint in checked.arm.joint):
+        raise WorldError("rig file: an emulated arm counts joints as drawn; emulate a rig without sign and follows")
     if checked.arm.model != LOCAL_POE:
         raise WorldError(
             f'rig file: arm.model = "{checked.arm.model}": a hand-held arm is emulated as "{LOCAL_POE}" only'

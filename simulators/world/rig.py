@@ -34,6 +34,8 @@ class Joint(msgspec.Struct, frozen=True):
     encoder_counts: Annotated[int, msgspec.Meta(ge=1)] | None = None
     mass_kg: Sigma = 0.0
     com_m: Vector = ZERO
+    sign: int = 1
+    follows: Mapping[str, float] | None = None
 
 
 class Arm(msgspec.Struct, frozen=True):
@@ -43,6 +45,7 @@ class Arm(msgspec.Struct, frozen=True):
     model: str = "dh"
     gravity_m_s2: Vector = (0.0, 0.0, -9.81)
     flange: Pose = Pose()
+    base: Pose = Pose()
 
 
 class Tool(msgspec.Struct, frozen=True):
@@ -110,6 +113,11 @@ def read_rig(rig: Mapping[str, Any]) -> WorldRig:
 def _refuse_what_cannot_be_built(rig: WorldRig) -> None:
     if rig.arm.model != "dh":
         raise WorldError(f'rig file: arm.model = "{rig.arm.model}" cannot be emulated; write the arm as "dh"')
+    if any(joint.sign != 1 or joint.follows for joint in rig.arm.joint) or rig.arm.base != Pose():
+        raise WorldError(
+            "rig file: the emulated controller counts every joint as the table draws it; emulate a rig without sign, "
+            "follows and [arm.base]"
+        )
     if not any(rig.tool.laser_direction):
         raise WorldError(
             "rig file: tool.laser_direction = [0, 0, 0] points nowhere; give a direction in the flange frame"

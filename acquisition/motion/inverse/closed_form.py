@@ -47,10 +47,15 @@ def closed_form(nominal: Kinematics) -> Starts | None:
     if wrist_m is None:
         return None
     if _parallel(axes, 2, 3):
-        return lambda T: _branches(axes, T, wrist_m, _three_parallel)
+        return lambda T: _as_read(nominal, _branches(axes, T, wrist_m, _three_parallel))
     if _off_axis_m(axes, 3, wrist_m) < SAME_M:
-        return lambda T: _branches(axes, T, wrist_m, _spherical_wrist)
+        return lambda T: _as_read(nominal, _branches(axes, T, wrist_m, _spherical_wrist))
     return None
+
+
+def _as_read(nominal: Kinematics, angle_rad: Floats) -> Floats:
+    """Readings (..., joint) of turns of the joints."""
+    return angle_rad if nominal.by_reading is None else angle_rad @ np.linalg.inv(nominal.by_reading).T
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from acquisition.errors import UnreachableError
 from acquisition.motion.inverse.closed_form import Starts
-from acquisition.motion.kinematics import Kinematics, flange, jacobian, rotation_vector
+from acquisition.motion.kinematics import Kinematics, by_readings, flange, jacobian, rotation_vector
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -95,7 +95,7 @@ def refine(arm: Kinematics, goal: Goal, start_rad: Floats, max_steps: int = MAX_
         active, error, frames = active[going], error[going], frames[going]
         if active.size == 0:
             break
-        step = _step(goal.by_joint(frames), error)
+        step = _step(by_readings(arm, goal.by_joint(frames)), error)
         q_rad[active] += step * np.minimum(1.0, STEP_RAD / np.max(np.abs(step), axis=1, keepdims=True))
     return Solved(np.where(found[:, None], q_rad, np.nan), found)
 
@@ -272,7 +272,7 @@ class Solver:
 
         Rows of the Jacobian are m by LEVER_M, and rad.
         """
-        J = jacobian(self.arm.frames(q_rad[None]))[0]
+        J = by_readings(self.arm, jacobian(self.arm.frames(q_rad[None])))[0]
         _, sizes, rows = np.linalg.svd(J / np.repeat([LEVER_M, 1.0], 3)[:, None])
         return int(np.argmax(np.abs(rows[len(sizes) - 1]))) + 1, float(sizes[-1])
 

@@ -15,6 +15,7 @@ from acquisition.recording.files.quantity import si_value, suffix_of
 from acquisition.recording.files.toml_file import TomlFile, parse_toml, read_text
 from acquisition.recording.rig.rules import faults
 from acquisition.recording.rig.schema import EMULATION_KEYS, ArmModel, Rig
+from acquisition.recording.rig.senses import arm_as_counted
 
 
 def load_rig(path: Path | str) -> Rig:
@@ -102,11 +103,14 @@ def _emulation_faults(section: Any) -> Iterator[tuple[KeyPath, str]]:
 
 
 def _completed(rig: Rig) -> Rig:
-    """What the rest of the program may rely on: theta offsets filled in, the beam's direction of length 1."""
+    """What the rest of the program may rely on: theta offsets filled in, joints counted as the controller counts them,
+    the beam's direction of length 1.
+    """
     replace = msgspec.structs.replace
     if rig.arm.model is not ArmModel.LOCAL_POE:
         joints = tuple(replace(joint, theta_offset_rad=joint.theta_offset_rad or 0.0) for joint in rig.arm.joints)
         rig = replace(rig, arm=replace(rig.arm, joints=joints))
+    rig = replace(rig, arm=arm_as_counted(rig.arm))
     if (beam := rig.tool.laser_direction) is not None:
         length = math.hypot(*beam)
         unit = beam if length == 1.0 else tuple(component / length for component in beam)

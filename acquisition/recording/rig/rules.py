@@ -26,6 +26,7 @@ Fault = tuple[KeyPath, str]
 # Frames of what an arm or a fixture carries; those of what stands in the room may be farther away.
 _CARRIED: tuple[KeyPath, ...] = (
     ("arm", "flange"),
+    ("arm", "base"),
     ("fixture", "psd2_in_psd1"),
     ("camera", "in_flange"),
     ("camera", "board", "in_psd1"),
@@ -49,6 +50,7 @@ def faults(rig: Rig) -> Iterator[Fault]:
     """All that contradicts itself in a rig whose types are right, in the order of the file's sections."""
     for index, joint in enumerate(rig.arm.joints):
         yield from _joint_faults(("arm", "joint", index), joint, rig.arm.model)
+    yield from _sense_faults(rig)
     yield from _carried_faults(rig)
     yield from _laser_faults(rig)
     yield from _placement_faults(rig)
@@ -57,6 +59,27 @@ def faults(rig: Rig) -> Iterator[Fault]:
     yield from _instrument_faults(rig)
     yield from _robot_faults(rig)
     yield from _motion_faults(rig)
+
+
+def _sense_faults(rig: Rig) -> Iterator[Fault]:
+    """A joint may follow one in front of it, one to one: then every set of reported angles is one posture."""
+    for index, joint in enumerate(rig.arm.joints):
+        path: KeyPath = ("arm", "joint", index, "follows")
+        if joint.follows is None:
+            continue
+        if not joint.follows.joint <= index:
+            yield (
+                (*path, "joint"),
+                f"joint {index + 1} cannot follow joint {joint.follows.joint}: give the number of a joint nearer to "
+                "the base",
+            )
+        if abs(joint.follows.by) != 1.0:
+            yield (
+                (*path, "by"),
+                f"by = {joint.follows.by!r}: controllers couple joints one to one; give 1.0 or -1.0",
+            )
+    if rig.arm.model is ArmModel.LOCAL_POE and rig.arm.base != Pose():
+        yield ("arm", "base"), "'base' belongs to a D-H table; write it into origin_m and rotation_rad of joint 1"
 
 
 def _joint_faults(path: KeyPath, joint: Joint, model: ArmModel) -> Iterator[Fault]:

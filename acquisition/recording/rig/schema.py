@@ -72,6 +72,13 @@ class EncoderSide(enum.Enum):
     MOTOR = "motor"
 
 
+class Follows(Struct, frozen=True, forbid_unknown_fields=True):
+    """A joint whose reported angle is not counted from the link in front of it: see `Joint.follows`."""
+
+    joint: Identity  # another joint, nearer to the base, from 1
+    by: Number = 1.0  # 1 or -1
+
+
 class Joint(Struct, frozen=True, forbid_unknown_fields=True):
     """One axis and the link after it. Either a, alpha, d (and theta offset), or origin and rotation, by `arm.model`."""
 
@@ -88,6 +95,8 @@ class Joint(Struct, frozen=True, forbid_unknown_fields=True):
     encoder_side: EncoderSide | None = None  # of the second encoder; None: not known
     mass_kg: Kilograms | None = None
     com_m: ArmVector | None = None
+    sign: Literal[-1, 1] = 1  # -1: the controller counts against the axis as drawn; taken into the numbers (senses.py)
+    follows: Follows | None = None  # angle from the link in front = reported angle + by * reported angle of that joint
 
 
 class Arm(Struct, frozen=True, forbid_unknown_fields=True):
@@ -97,6 +106,8 @@ class Arm(Struct, frozen=True, forbid_unknown_fields=True):
     joints: Annotated[tuple[Joint, ...], Meta(min_length=1, max_length=JOINTS)] = field(name="joint")
     gravity_m_s2: Gravity = (0.0, 0.0, -9.81)  # an arm that stands on its feet
     flange: Pose = Pose()
+    base: Pose = Pose()  # of a D-H table: fixed transform in front of the first joint
+    make: Name | None = None  # who built it: "KUKA"
     serial_number: Name | None = None  # of the maker's plate: tells two arms of one kind apart
 
 

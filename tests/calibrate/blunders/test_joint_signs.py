@@ -52,7 +52,7 @@ def test_a_kuka_is_named_by_its_joints_and_not_by_a_left_handed_tracker(point):
     found = judged(counted(q, 1, 4, 6), position_m, point)
     assert (found.kind, found.column) == (BlunderKind.JOINT_SIGN, "columns q1_rad, q4_rad, q6_rad")
     assert "joints 1, 4 and 6 turn against the rig's sense" in found.says
-    assert found.remedy.startswith("change the sign of these columns")
+    assert found.remedy == "in the rig file, write sign = -1 for joints 1, 4 and 6, as for KUKA, or remove it there"
     assert found.says.endswith(found.remedy)  # a terminal cuts long messages in the middle
     assert "less likely: one of x_m, y_m, z_m is negated in the device's file, or two exchanged" in found.what
 
@@ -109,4 +109,4 @@ def test_a_terminal_shows_joints_and_remedy_of_a_message_that_it_cuts():
     assert len(found.says) <= MESSAGE_LENGTH
     shown = brief(f"{'folder/' * 20}session: {found.says}")
     assert "joints 1, 4 and 6" in brief(f"recordings/kuka/session: {found.says}")
-    assert "change the sign of these columns or turn these axes" in shown
+    assert "write sign = -1 for joints 1, 4 and 6, as for KUKA" in shown

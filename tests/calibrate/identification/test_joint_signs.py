@@ -60,7 +60,7 @@ def test_a_kuka_is_refused_by_its_joints_and_good_once_these_are_mended(planar_r
     samples = session(planar_rig, joints=(1, 4, 6))
     with pytest.raises(DataError, match="joints 1, 4 and 6 turn against the rig's sense") as refused:
         run(planar_rig, samples)
-    assert "change the sign of these columns" in str(refused.value)
+    assert "write sign = -1 for joints 1, 4 and 6, as for KUKA" in str(refused.value)
     assert "left-handed" not in str(refused.value)
     mended = run(planar_rig, negated(samples, "q1_rad", "q4_rad", "q6_rad"))
     assert mended.instruments[0].rms_distance_after_m < 2.0 * NOISE_M

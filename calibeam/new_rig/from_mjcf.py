@@ -1,0 +1,139 @@
+"""MJCF to an arm, through MuJoCo's own loader: the hinges between the world and a body or site.
+
+Source of the form: MuJoCo documentation, XML reference, body and joint: position and orientation of a body in its
+parent, then its joints in order, each about `axis` through `pos`, with angle zero at `ref`.
+"""
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from acquisition.recording.files import shown
+from calibeam.new_rig.drawn import ANY_TURN_RAD, DrawnArm, DrawnJoint, onto_axis
+from calibrate.errors import DataError
+from calibrate.rigid import inverse, transform
+
+Floats = NDArray[np.float64]
+
+WORLD = 0
+
+
+def mjcf_arm(path: Path, base_body: str | None = None, tip: str | None = None) -> DrawnArm:
+    """The arm of an MJCF file. DataError naming file and remedy."""
+    mujoco: Any = importlib.import_module("mujoco")  # its stubs lack most names
+
+    if not path.is_file():
+        raise DataError(f"{path}: no such file; give an MJCF file")
+    try:
+        model = mujoco.MjModel.from_xml_path(str(path))
+    except (ValueError, mujoco.FatalError) as error:
+        raise DataError(f"{path}: MuJoCo cannot load it: {' '.join(str(error).split())}; correct the file") from error
+    base = WORLD if base_body is None else _body(mujoco, model, path, base_body)
+    end, T_end = _end(mujoco, model, path, tip)
+    bodies = _way(model, path, base, end)
+    drawn: list[DrawnJoint] = []
+    behind = np.eye(4)  # what stands behind the last turn
+    free: list[str] = []
+    for body in bodies:
+        behind = behind @ _frame(model.body_pos[body], model.body_quat[body])
+        first = model.body_jntadr[body]
+        for joint in range(first, first + model.body_jntnum[body]):
+            name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, joint) or f"number {joint + 1}"
+            if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE:
+                raise DataError(
+                    f"{path}: joint {shown(name)} is no hinge, and a rig file has turning joints only; name the part "
+                    "of the arm that turns with --base-link and --tip-link"
+                )
+            turn = onto_axis(model.jnt_axis[joint])
+            turn[:3, 3] = model.jnt_pos[joint]
+            ref_rad = float(model.qpos0[model.jnt_qposadr[joint]])
+            behind = behind @ turn @ transform((0.0, 0.0, 0.0), (0.0, 0.0, -ref_rad))
+            lower, upper = (-ANY_TURN_RAD, ANY_TURN_RAD)
+            if model.jnt_limited[joint]:
+                lower, upper = model.jnt_range[joint].tolist()
+            else:
+                free.append(name)
+            drawn.append(DrawnJoint(behind, lower, upper))
+            behind = inverse(turn)
+        if drawn:
+            drawn[-1] = _laden(model, drawn[-1], behind, body, bodies)
+    if not drawn:
+        raise DataError(f"{path}: no hinge on the way to the tip; name other ends with --base-link and --tip-link")
+    notes = [f"From {path.name} (MJCF)."]
+    if free:
+        notes.append(f"Joints without limits there, taken as one turn either way: {', '.join(free)}.")
+    return DrawnArm(path.stem, tuple(drawn), behind @ T_end, tuple(notes))
+
+
+def _laden(model: Any, joint: DrawnJoint, T: Floats, body: int, bodies: list[int]) -> DrawnJoint:
+    """The joint with the mass of a body, and of those that are fixed to it; T is the body behind the turn."""
+    mass_kg, moment = _carried(model, body, T, bodies)
+    before = np.zeros(3) if joint.com_m is None else joint.mass_kg * joint.com_m
+    whole = joint.mass_kg + mass_kg
+    com_m = (before + moment) / whole if whole > 0.0 else None
+    return DrawnJoint(joint.T, joint.lower_rad, joint.upper_rad, whole, com_m)
+
+
+def _carried(model: Any, body: int, T: Floats, bodies: list[int]) -> tuple[float, Floats]:
+    mass_kg = float(model.body_mass[body])
+    moment = mass_kg * (T[:3, :3] @ model.body_ipos[body] + T[:3, 3])
+    for child in range(1, model.nbody):
+        if model.body_parentid[child] == body and model.body_jntnum[child] == 0 and child not in bodies:
+            more_kg, more = _carried(model, child, T @ _frame(model.body_pos[child], model.body_quat[child]), bodies)
+            mass_kg, moment = mass_kg + more_kg, moment + more
+    return mass_kg, moment
+
+
+def _end(mujoco: Any, model: Any, path: Path, tip: str | None) -> tuple[int, Floats]:
+    """The last body, and the tip in it; without a name the body with the most hinges in front."""
+    if tip is None:
+        counts = {body: _hinges(model, body) for body in range(1, model.nbody)}
+        if not counts:
+            raise DataError(f"{path}: there is no body in it; give an arm")
+        most = max(counts.values())
+        parents = set(model.body_parentid.tolist())
+        ends = [body for body, count in counts.items() if count == most and body not in parents]
+        if len(ends) != 1:
+            names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, body) or str(body) for body in ends]
+            raise DataError(f"{path}: the arm ends in {shown(', '.join(names))}; name one with --tip-link")
+        return ends[0], np.eye(4)
+    site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, tip)
+    if site >= 0:
+        return int(model.site_bodyid[site]), _frame(model.site_pos[site], model.site_quat[site])
+    return _body(mujoco, model, path, tip), np.eye(4)
+
+
+def _hinges(model: Any, body: int) -> int:
+    count = 0
+    while body != WORLD:
+        count += int(model.body_jntnum[body])
+        body = int(model.body_parentid[body])
+    return count
+
+
+def _body(mujoco: Any, model: Any, path: Path, name: str) -> int:
+    found = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
+    if found < 0:
+        raise DataError(f"{path}: no body or site {shown(name)}; name one of the file")
+    return int(found)
+
+
+def _way(model: Any, path: Path, base: int, end: int) -> list[int]:
+    out: list[int] = []
+    while end != base:
+        if end == WORLD:
+            raise DataError(f"{path}: the tip does not hang on the base; exchange --base-link and --tip-link")
+        out.append(end)
+        end = int(model.body_parentid[end])
+    return out[::-1]
+
+
+def _frame(position_m: Floats, quaternion: Floats) -> Floats:
+    out = np.eye(4)
+    out[:3, :3] = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+    out[:3, 3] = position_m
+    return out
