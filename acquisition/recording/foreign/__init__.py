@@ -1,0 +1,35 @@
+"""Tables and logs of other programs: read as they stand, understood, brought to SI, and made a session or streams.
+
+`read_sheet` reads xlsx, CSV and Parquet; `understand` finds what the columns mean for a rig; `questions` are the units
+that nobody has stated; `samples_of` and `write_session` make a session folder. A new name of a column is a word in
+`column_meanings`, a new way to write an orientation a function in `rotations`, a new unit a line in `heading_units`.
+"""
+
+from acquisition.recording.foreign.conversion import (
+    ColumnRecord,
+    ColumnsFile,
+    Question,
+    Understanding,
+    columns_file,
+    questions,
+    refusal,
+    samples_of,
+    understand,
+    write_session,
+)
+from acquisition.recording.foreign.sheet import SUFFIXES, read_sheet
+
+__all__ = [
+    "SUFFIXES",
+    "ColumnRecord",
+    "ColumnsFile",
+    "Question",
+    "Understanding",
+    "columns_file",
+    "questions",
+    "read_sheet",
+    "refusal",
+    "samples_of",
+    "understand",
+    "write_session",
+]
