@@ -1,55 +1,69 @@
 """`calibeam import`: session folders, tables, logs of other programs and CAN logs become sessions and recordings."""
 
 import math
-from collections.abc import Iterator
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from acquisition.recording import RecordingError, read
+from acquisition.can_signals import STREAM as ENCODERS
+from acquisition.can_signals import described_by_dbc, encoder_rows, encoder_sheet, encoder_stream
+from acquisition.recording import Recording, RecordingError, read
 from acquisition.recording.can_log import SUFFIXES as CAN_SUFFIXES
-from acquisition.recording.can_log import import_can
+from acquisition.recording.can_log import CanImport, import_can
 from acquisition.recording.foreign import (
+    BAG_SUFFIXES,
     SUFFIXES,
     ColumnRecord,
     ColumnsFile,
     Question,
+    Sheet,
     Understanding,
     columns_file,
     questions,
+    read_log,
     read_sheet,
+    recording_of,
     refusal,
     samples_of,
     understand,
+    understand_logs,
+    write_columns,
     write_session,
 )
-from acquisition.recording.rig import rig_text
+from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.session_folder import CSV, PARQUET, RIG
-from acquisition.recording.session_folder.folder_import import import_folder
+from acquisition.recording.session_folder.folder_import import import_folder, write_recording
 from calibeam.asking import NotAgreedError, at_terminal, someone
 from calibeam.outcome import PartialResult
 from calibeam.software import SOFTWARE
 from calibrate.report.quantities import significant
 
+BAG = "metadata.yaml"  # in the folder of a ROS 2 bag
+WORKBOOKS = (".xlsx", ".xlsm")
 CAN_CSV = "timestamp,arbitration_id"  # how python-can's CSV begins
 HUMAN = {"rad": (math.degrees(1.0), "°"), "m": (1e3, "mm")}
 
 
 def import_command(
     source: Path,
-    *,
+    *others: Path,
     out: Path,
     rig: Path | None = None,
     columns: str = "",
     sheet: str | None = None,
+    streams: bool = False,
     yes: bool = False,
 ) -> None:
     """Make a session of a table, a log or a session folder.
 
     Of a table of poses (xlsx, CSV, Parquet) a session folder, of everything else a recording. What the columns of a
-    table are understood to mean is shown and asked for once, and written beside the folder.
+    table are understood to mean is shown and asked for once, and written beside what is made.
 
     Example: calibeam import lab.xlsx --rig rig.toml --out session
 
@@ -59,11 +73,15 @@ def import_command(
 
     Example: calibeam import bus.blf --rig rigs/ur5e-dual-psd.toml --out bus.mcap
 
+    Example: calibeam import robot.csv encoders.csv --streams --rig rig.toml --out streams.mcap
+
     Parameters
     ----------
     source
-        A table; a session folder, with its folder "streams" if it has one; or a CAN log: .blf, .asc, .csv or .log
-        (candump).
+        A table; a session folder, with its folder "streams" if it has one; a ROS 2 bag; or a CAN log: .blf, .asc, .csv
+        or .log (candump).
+    others
+        Further logs of the same time, with --streams.
     out
         The session folder or recording to make.
     rig
@@ -71,60 +89,144 @@ def import_command(
     columns
         What columns mean, where their headings do not show it: "HEADINGS [unit] = meaning, ...". Meanings are q, cmd,
         enc, position, abc, wpr, quaternion, rotvec, matrix, pose-matrix, wire, time, ..., a name of your own, unused.
+        Of several logs "LOG: HEADINGS [unit] = meaning".
     sheet
         The sheet of a workbook with several tables.
+    streams
+        A row of a table is a moment, not a pose: make a recording of streams.
     yes
         Take the columns as they are understood, without asking. An open unit is an error then.
 
     """
     if source.name in (CSV, PARQUET) and rig is None and (source.parent / RIG).is_file():
         source = source.parent
-    if source.is_dir():
-        _refuse(source, "a session folder has its own rig.toml", rig=rig, columns=columns, sheet=sheet)
+    if source.is_dir() and not (source / BAG).is_file():
+        given = {"rig": rig, "columns": columns, "sheet": sheet, "streams": streams}
+        _refuse(source, "a session folder has its own rig.toml", **given)
         import_folder(source, out, software=SOFTWARE)
         print(f"{out}: {len(read(out).samples)} samples")
         return
-    suffix = source.suffix.lower()
-    if suffix not in (*SUFFIXES, *CAN_SUFFIXES):
-        known = ", ".join(dict.fromkeys((*SUFFIXES, *CAN_SUFFIXES)))
-        raise RecordingError(f"{source}: neither a session folder nor one of {known}; give one of these")
+    for path in (source, *others):
+        _check_known(path)
     if rig is None:
         raise RecordingError(f"{source}: a table or a log does not say of which rig it is; give --rig RIG.toml")
-    if suffix in CAN_SUFFIXES and (suffix != ".csv" or _is_can_csv(source)):
-        _refuse(source, "a CAN log has no columns", columns=columns, sheet=sheet)
+    if _is_can(source) and not others:
+        _refuse(source, "a CAN log has no columns", columns=columns, sheet=sheet, streams=streams)
         _can(source, out, rig)
-        return
-    _table(understand(read_sheet(source, sheet), rig_text(rig), str(rig), columns), out, yes=yes)
+    elif streams or source.is_dir() or source.suffix.lower() in BAG_SUFFIXES:
+        sheets = [table for path in (source, *others) for table in _log_tables(path, sheet, rig, out)]
+        _logs(understand_logs(sheets, rig_text(rig), str(rig), columns), out, yes=yes)
+    elif others:
+        raise RecordingError(f"{others[0]}: one table becomes one session; give --streams for several logs of one time")
+    else:
+        _table(understand(read_sheet(source, sheet), rig_text(rig), str(rig), columns), out, yes=yes)
+
+
+def _check_known(path: Path) -> None:
+    known = tuple(dict.fromkeys((*SUFFIXES, *CAN_SUFFIXES, *BAG_SUFFIXES)))
+    if not path.is_dir() and path.suffix.lower() not in known:
+        raise RecordingError(f"{path}: neither a session folder nor one of {', '.join(known)}; give one of these")
+
+
+def _is_can(path: Path) -> bool:
+    suffix = path.suffix.lower()
+    return suffix in CAN_SUFFIXES and (suffix != ".csv" or _is_can_csv(path))
 
 
 def _can(source: Path, out: Path, rig: Path) -> None:
-    done = import_can(source, out, rig_text=rig_text(rig), software=SOFTWARE)
-    print(f"{out}: {done.frames} CAN frames in {', '.join(done.streams)}")
+    """Every frame, and where the rig names a DBC file what the encoders sent."""
+    encoders = load_rig(rig).devices.encoders
+    if encoders is None or not described_by_dbc(encoders):
+        done = import_can(source, out, rig_text=rig_text(rig), software=SOFTWARE)
+        print(f"{out}: {done.frames} CAN frames in {', '.join(done.streams)}")
+    else:
+        done, frames = _frames(source, rig, out)
+        rows = encoder_rows(frames, encoders)
+        whole = replace(frames, streams={**frames.streams, ENCODERS: encoder_stream(rows)})
+        started_utc = datetime.fromisoformat(frames.started_utc)
+        write_recording(whole, out, software=SOFTWARE, imported_from=source.name, started_utc=started_utc)
+        print(f"{out}: {done.frames} CAN frames in {', '.join(done.streams)}, {len(rows)} rows of {ENCODERS}")
     if done.damage is not None:
         raise PartialResult(f"{source}: {done.damage}; everything before it is in {out}")
+
+
+def _frames(source: Path, rig: Path, out: Path) -> tuple[CanImport, Recording]:
+    """The frames of a CAN log as a recording in memory."""
+    with tempfile.TemporaryDirectory(dir=_existing(out)) as folder:
+        path = Path(folder) / "frames.mcap"
+        done = import_can(source, path, rig_text=rig_text(rig), software=SOFTWARE)
+        return done, replace(read(path), path=source)
+
+
+def _existing(out: Path) -> Path:
+    """The folder in which `out` will be. RecordingError where there is none."""
+    if not out.parent.is_dir():
+        raise RecordingError(f"--out {out}: there is no folder {out.parent}; make it, or choose another place")
+    return out.parent
+
+
+def _log_tables(path: Path, sheet: str | None, rig: Path, out: Path) -> tuple[Sheet, ...]:
+    if not _is_can(path):
+        return read_log(path, sheet if path.suffix.lower() in WORKBOOKS else None)
+    encoders = load_rig(rig).devices.encoders
+    if encoders is None or not described_by_dbc(encoders):
+        raise RecordingError(
+            f"{path}: beside other logs a CAN log is read by a DBC file; name it in [devices.encoders] of {rig}"
+        )
+    done, frames = _frames(path, rig, out)
+    if done.damage is not None:
+        raise RecordingError(f"{path}: {done.damage}; export the log again, or import it by itself")
+    return (encoder_sheet(encoder_rows(frames, encoders), frames, path),)
+
+
+def _logs(tables: Sequence[Understanding], out: Path, *, yes: bool) -> None:
+    """A recording of streams, after a person has agreed to what the columns mean."""
+    if out.suffix.lower() != ".mcap":
+        raise RecordingError(f"--out {out}: logs become a recording; give a name that ends with .mcap")
+    console = Console()
+    tables = [with_units(table, yes=yes, settled=False) for table in tables]
+    recording, started_utc = recording_of(tables, out)
+    about = [columns_file(table, None, SOFTWARE) for table in tables]
+    for one in about:
+        print_columns(console, one)
+    _agreed(yes=yes)
+    names = ", ".join(str(table.sheet.path.name) for table in tables)
+    write_recording(recording, out, software=SOFTWARE, imported_from=names, started_utc=started_utc)
+    beside = write_columns(about, out)
+    for name, stream in recording.streams.items():
+        console.print(f"{out}: {name}, {len(stream.host_s)} rows", markup=False, highlight=False)
+    console.print(f"columns: {beside}", markup=False, highlight=False)
+
+
+def _agreed(*, yes: bool) -> None:
+    """Returns when a person has agreed to the columns that are shown. NotAgreedError."""
+    if yes:
+        return
+    asking = someone(at_terminal(), "whether the columns are meant so", "give --yes when they are")
+    if not asking.enter("Are the columns meant so?"):
+        raise NotAgreedError("nothing was written: the columns are meant otherwise; state them with --columns")
 
 
 def _table(table: Understanding, out: Path, *, yes: bool) -> None:
     """A session folder of a table of poses, after a person has agreed to what its columns mean."""
     if out.suffix.lower() == ".mcap":
-        raise RecordingError(f"--out {out}: a table becomes a session folder; give the name of a folder")
+        raise RecordingError(
+            f"--out {out}: a table of poses becomes a session folder; give the name of a folder, or --streams for a log"
+        )
     console = Console()
     table = with_units(table, yes=yes)
     samples = samples_of(table)
     about = columns_file(table, samples, SOFTWARE)
     print_columns(console, about)
-    if not yes:
-        asking = someone(at_terminal(), "whether the columns are meant so", "give --yes when they are")
-        if not asking.enter("Are the columns meant so?"):
-            raise NotAgreedError("nothing was written: the columns are meant otherwise; state them with --columns")
+    _agreed(yes=yes)
     beside = write_session(table, samples, about, out)
     for line in (f"{out}: {RIG} and {CSV} with {len(samples)} samples", f"columns: {beside}"):
         console.print(line, markup=False, highlight=False)
 
 
-def with_units(table: Understanding, *, yes: bool) -> Understanding:
+def with_units(table: Understanding, *, yes: bool, settled: bool = True) -> Understanding:
     """With every open unit answered by a person. SamplesError where nobody is to be asked."""
-    while (question := next(iter(questions(table)), None)) is not None:
+    while (question := next(iter(questions(table, settled=settled)), None)) is not None:
         asking = None if yes else at_terminal()
         if asking is None:
             raise refusal(table, question)
@@ -185,5 +287,5 @@ def _is_can_csv(source: Path) -> bool:
 
 def _refuse(source: Path, why: str, **given: object) -> None:
     for name, value in given.items():
-        if value not in (None, ""):
+        if value not in (None, "", False):
             raise RecordingError(f"{source}: --{name} {value}: {why}; leave --{name} out")

@@ -67,7 +67,7 @@ class Group:
             return "rad" if CONVENTIONS[bare][1] == 3 else ""
         if self.meaning in SINGLE:
             return SINGLE[self.meaning][1]
-        if _TEMPERATURE.fullmatch(self.meaning):
+        if _TEMPERATURE.fullmatch(self.meaning) or self.meaning.endswith("_degC"):
             return "degC"
         return "" if self.meaning == UNUSED else suffix_of(self.meaning) or ""
 
@@ -273,7 +273,58 @@ _CLAUSE = re.compile(
     r"""\s*(?P<left>(?:'[^']*'|"[^"]*"|\[[^\]]*\]|[^=,'"\[\]])+)=\s*(?P<right>[A-Za-z][A-Za-z0-9_\-]*)\s*(?:,|$)"""
 )
 _TOKEN = re.compile(r"""(?P<dots>\.\.)|'(?P<one>[^']*)'|"(?P<two>[^"]*)"|(?P<bare>(?:(?!\.\.)[^\s'"])+)|\s+""")
+_OF = re.compile(r"(?P<of>[^\s:'\"\[\]]+):\s+(?P<rest>.+)")
 _NUMBER_AT_END = re.compile(r"(.*?)(\d+)")
+
+
+@dataclass(frozen=True)
+class Clause:
+    """One statement of `--columns`; `of`: the name of the log that it is about, "" for any."""
+
+    of: str
+    text: str
+
+    def is_of(self, sheet: Sheet, name: str) -> bool:
+        """Whether the table, a log of that name, has all headings of the statement."""
+        if self.of:
+            return self.of in (name, sheet.name, sheet.path.name, sheet.path.stem)
+        try:
+            return bool(tuple(_found(sheet, _list_and_unit(self.text.rpartition("=")[0])[0])))
+        except SamplesError:
+            return False
+
+
+def clauses(columns: str) -> tuple[Clause, ...]:
+    """The statements of a `--columns` text for several logs: `encoders: A1..A6 [deg] = enc` is about one of them.
+
+    SamplesError for a text that cannot be read.
+    """
+    out: list[Clause] = []
+    at = 0
+    while columns[at:].strip():
+        match = _matched(columns, at)
+        at = match.end()
+        named = _OF.fullmatch(match["left"].strip())
+        left = named["rest"] if named else match["left"].strip()
+        out.append(Clause(named["of"] if named else "", f"{left} = {match['right']}"))
+    return tuple(out)
+
+
+def _matched(columns: str, at: int) -> re.Match[str]:
+    match = _CLAUSE.match(columns, at)
+    if match is None:
+        rest = shown(columns[at:].strip(), 60)
+        raise SamplesError(f"--columns: '{rest}' is no `HEADINGS [unit] = meaning`; {REMEDY}")
+    return match
+
+
+def _list_and_unit(left: str) -> tuple[str, str]:
+    """`A1..A6 [deg]` as the list of headings and the unit."""
+    left = left.strip()
+    if not left.endswith("]"):
+        return left, ""
+    names, _, unit = left[:-1].rpartition("[")
+    return names, unit.strip()
 
 
 def _stated(sheet: Sheet, n_joints: int, columns: str) -> Iterator[Group]:
@@ -281,16 +332,10 @@ def _stated(sheet: Sheet, n_joints: int, columns: str) -> Iterator[Group]:
     at, taken = 0, set[int]()
     meant: set[str] = set()
     while columns[at:].strip():
-        match = _CLAUSE.match(columns, at)
-        if match is None:
-            raise SamplesError(
-                f"--columns: '{shown(columns[at:].strip(), 60)}' is no `HEADINGS [unit] = meaning`; {REMEDY}"
-            )
+        match = _matched(columns, at)
         at = match.end()
-        left, unit = match["left"].strip(), ""
-        if left.endswith("]") and not _quoted(left):
-            left, _, unit = left[:-1].rpartition("[")
-        group = _group(sheet, match["right"], tuple(_found(sheet, left)), unit.strip())
+        left, unit = _list_and_unit(match["left"])
+        group = _group(sheet, match["right"], tuple(_found(sheet, left)), unit)
         if again := taken & set(group.columns):
             raise SamplesError(
                 f"--columns: '{shown(sheet.headings[min(again)], 40)}' stands twice; give it one meaning"
@@ -402,8 +447,3 @@ def _column(sheet: Sheet, name: str) -> int:
             return found[0]
     there = ", ".join(filter(None, sheet.headings))
     raise SamplesError(f"--columns: {sheet.place()} has no column '{shown(name, 40)}'; there are {shown(there)}")
-
-
-def _quoted(left: str) -> bool:
-    """Whether the bracket at the end is inside quotes."""
-    return left.count("'") % 2 == 1 or left.count('"') % 2 == 1

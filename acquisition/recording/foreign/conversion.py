@@ -26,6 +26,7 @@ from acquisition.recording.foreign.column_meanings import (
     UNUSED,
     Group,
     understood,
+    unit_in,
 )
 from acquisition.recording.foreign.heading_units import Unit, symbols, unit_of
 from acquisition.recording.foreign.rotations import CONVENTIONS, bad_matrix, bad_quaternion, of_matrices
@@ -96,23 +97,33 @@ class Understanding:
     def headings(self, group: Group) -> tuple[str, ...]:
         return tuple(self.sheet.headings[column] for column in group.columns)
 
+    def unit_in(self, column: int) -> str:
+        """The unit that stands with a column."""
+        return unit_in(self.sheet, column)
+
     def unused(self) -> tuple[str, ...]:
         """Headings of the columns that nothing becomes of."""
         used = {column for group in self.groups if group.meaning != UNUSED for column in group.columns}
         return tuple(h for column, h in enumerate(self.sheet.headings) if column not in used and h)
 
 
-def understand(sheet: Sheet, rig_text: str, rig_name: str, columns: str = "") -> Understanding:
-    """What a table means for this rig. SamplesError, RigFileError naming the place, the value and the remedy."""
+def understand(
+    sheet: Sheet, rig_text: str, rig_name: str, columns: str = "", *, whole_rows: bool = True
+) -> Understanding:
+    """What a table means for this rig. `whole_rows`: what belongs together is there or missing together in a row.
+
+    SamplesError, RigFileError naming the place, the value and the remedy.
+    """
     rig = parse_rig(rig_text, rig_name)
-    groups = tuple(group for group in understood(sheet, rig.n_joints, columns))
+    groups = understood(sheet, rig.n_joints, columns)
     numbers: dict[int, Floats] = {}
     for group in groups:
         if group.meaning == UNUSED or group.meaning == TIME or group.meaning in TEXT:
             continue
         for column in group.columns:
             numbers[column] = np.array(sheet.numbers(column), dtype=np.float64)
-        _check_whole_rows(sheet, group, numbers)
+        if whole_rows:
+            _check_whole_rows(sheet, group, numbers)
     return Understanding(sheet, rig_text, rig, groups, numbers)
 
 
@@ -247,8 +258,8 @@ class ColumnsFile(msgspec.Struct, frozen=True):
     stated: str  # as `--columns` takes it: reads the table again in the same way
 
 
-def columns_file(table: Understanding, samples: Samples, software: str) -> ColumnsFile:
-    """What was understood, as it is printed and written."""
+def columns_file(table: Understanding, samples: Samples | None, software: str) -> ColumnsFile:
+    """What was understood, as it is printed and written; without `samples` it is a log, converted here."""
     sheet = table.sheet
     used = [group for group in table.groups if group.meaning != UNUSED]
     return ColumnsFile(
@@ -256,7 +267,7 @@ def columns_file(table: Understanding, samples: Samples, software: str) -> Colum
         "calibeam-columns",
         software,
         sheet.path.name,
-        hashlib.sha256(sheet.path.read_bytes()).hexdigest(),
+        hashlib.sha256(sheet.path.read_bytes()).hexdigest() if sheet.path.is_file() else "",
         sheet.name,
         len(sheet.rows),
         tuple(_record(table, group, samples) for group in used),
@@ -272,19 +283,31 @@ def write_session(table: Understanding, samples: Samples, about: ColumnsFile, fo
     RecordingError where the folder is not empty, or the disk refuses.
     """
     recording = Recording(folder, table.rig_text, table.rig, samples, complete=True)
-    beside = folder.with_name(f"{folder.name}.columns.json")
     export(recording, folder)
+    return write_columns((about,), folder)
+
+
+def write_columns(about: Sequence[ColumnsFile], out: Path) -> Path:
+    """The file of columns beside what was made of one table, or a list of them; its path.
+
+    RecordingError where the disk refuses.
+    """
+    beside = out.with_name(f"{out.name}.columns.json")
+    content = about[0] if len(about) == 1 else about
     try:
-        beside.write_bytes(msgspec.json.format(msgspec.json.encode(about), indent=2) + b"\n")
+        beside.write_bytes(msgspec.json.format(msgspec.json.encode(content), indent=2) + b"\n")
     except OSError as error:
         raise RecordingError(f"{beside}: cannot be written ({error.strerror}); choose another place") from error
     return beside
 
 
-def _record(table: Understanding, group: Group, samples: Samples) -> ColumnRecord:
+def _record(table: Understanding, group: Group, samples: Samples | None) -> ColumnRecord:
     targets = group.targets(table.rig.n_joints)
-    alike = [t for t in targets if t not in TEXT and suffix_of(t) == suffix_of(targets[0])]
-    values = np.concatenate([np.empty(0), *(samples.columns[t] for t in alike)])
+    alike = [k for k, t in enumerate(targets) if t not in TEXT and suffix_of(t) == suffix_of(targets[0])]
+    if samples is None:
+        values = converted(table, group)[:, alike].ravel()
+    else:
+        values = np.concatenate([np.empty(0), *(samples.columns[targets[k]] for k in alike)])
     there = values[np.isfinite(values)]
     low, high = (float(there.min()), float(there.max())) if there.size else (None, None)
     si_unit = "°C" if group.suffix == "degC" else spelt(group.suffix) if group.suffix else ""
