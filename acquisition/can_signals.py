@@ -11,10 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.recording import Recording, RecordingError, Stream
+from acquisition.recording import Channel, Recording, RecordingError, Stream
 from acquisition.recording.can_frames import Frame, FrameFlag, frames_of, is_frames
 from acquisition.recording.foreign import Sheet
-from acquisition.recording.recording import Channel
 from acquisition.recording.rig.devices import EncoderDriver, EncodersDevice
 from drivers.can_dbc.description import JointSignal, joint_signals
 from drivers.cia406.angle import SPEED_LIMIT_RAD_S, ContinuousAngle

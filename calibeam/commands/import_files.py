@@ -13,15 +13,13 @@ from rich.text import Text
 
 from acquisition.can_signals import STREAM as ENCODERS
 from acquisition.can_signals import described_by_dbc, encoder_rows, encoder_sheet, encoder_stream
-from acquisition.recording import Recording, RecordingError, read
+from acquisition.recording import Recording, RecordingError, SamplesError, read
 from acquisition.recording.can_log import SUFFIXES as CAN_SUFFIXES
 from acquisition.recording.can_log import CanImport, import_can
 from acquisition.recording.foreign import (
     BAG_SUFFIXES,
     SUFFIXES,
-    ColumnRecord,
     ColumnsFile,
-    Question,
     Sheet,
     Understanding,
     columns_file,
@@ -29,7 +27,6 @@ from acquisition.recording.foreign import (
     read_log,
     read_sheet,
     recording_of,
-    refusal,
     samples_of,
     understand,
     understand_logs,
@@ -229,20 +226,14 @@ def with_units(table: Understanding, *, yes: bool, settled: bool = True) -> Unde
     while (question := next(iter(questions(table, settled=settled)), None)) is not None:
         asking = None if yes else at_terminal()
         if asking is None:
-            raise refusal(table, question)
+            raise SamplesError(question.refusal)
         numbered = {str(number): unit for number, unit in enumerate(question.choices, start=1)}
         proposed = next((n for n, unit in numbered.items() if unit == question.proposal), "q")
-        choice = asking.choice(_asked(table, question), {**numbered, "q": "none of these: stop"}, proposed)
+        choice = asking.choice(question.asks, {**numbered, "q": "none of these: stop"}, proposed)
         if choice is None or choice == "q":
-            raise refusal(table, question)
+            raise SamplesError(question.refusal)
         table = table.answered(question, numbered[choice])
     return table
-
-
-def _asked(table: Understanding, question: Question) -> str:
-    names = table.headings(question.group)
-    shown = names[0] if len(names) == 1 else f"{names[0]} … {names[-1]}"
-    return f"{shown} ({question.group.meaning}): {question.why}. Unit?"
 
 
 def print_columns(console: Console, about: ColumnsFile) -> None:
@@ -251,7 +242,8 @@ def print_columns(console: Console, about: ColumnsFile) -> None:
     console.print(f"{about.source}{sheet}: {about.rows} rows", style="bold", markup=False, highlight=False)
     lines = Table("column", "meaning", "unit read", "becomes", "range")
     for record in about.columns:
-        cells = _several(record.headings), record.meaning, record.unit or "—", _several(record.becomes), _range(record)
+        span = _range(record.si_unit, record.lowest, record.highest)
+        cells = _several(record.headings), record.meaning, record.unit or "—", _several(record.becomes), span
         lines.add_row(*map(Text, cells))  # no markup: a heading may hold [deg]
     console.print(lines)
     for line in _remarks(about):
@@ -264,12 +256,12 @@ def _remarks(about: ColumnsFile) -> Iterator[str]:
         yield f"not used: {', '.join(about.unused)} (keep one with --columns \"'{about.unused[0]}' = its_name\")"
 
 
-def _range(record: ColumnRecord) -> str:
+def _range(si_unit: str, lowest: float | None, highest: float | None) -> str:
     """After conversion; of angles and lengths as a laboratory reads them."""
-    if record.lowest is None or record.highest is None:
+    if lowest is None or highest is None:
         return "—"
-    factor, unit = HUMAN.get(record.si_unit, (1.0, record.si_unit))
-    low, high = (significant(factor * end, 5) for end in (record.lowest, record.highest))
+    factor, unit = HUMAN.get(si_unit, (1.0, si_unit))
+    low, high = (significant(factor * end, 5) for end in (lowest, highest))
     return f"{low} … {high} {unit}".rstrip()
 
 

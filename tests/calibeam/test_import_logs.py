@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording import read
 from calibeam.cli import run
 from calibrate.diagnose.compare.streams import late_against_joints, stream_pairs
+from calibrate.diagnose.file import read_diagnosis
 from calibrate.diagnose.streams.examine import examine
 from calibrate.diagnose.streams.recorded import devices_of
 from simulators.streams.course import course
@@ -78,6 +79,16 @@ def test_a_delay_and_a_drift_are_findings_and_a_common_clock_is_none(tmp_path, w
     )
     prompt = examine(devices_of(imported(tmp_path / "prompt.mcap", *logs(tmp_path, way, 0.0, drift=0.0))))
     assert [f for f in prompt.findings if f.name.physics == "latency"] == []
+
+
+def test_diagnose_judges_streams_without_samples(tmp_path, way, capsys):
+    imported(tmp_path / "log.mcap", *logs(tmp_path, way, 0.02))
+    out = tmp_path / "diagnosis.json"
+    assert run(["diagnose", str(tmp_path / "log.mcap"), "--out", str(out)]) == 0
+    shown = capsys.readouterr().out
+    assert "Streams only: 1 cause found" in shown
+    assert "clock of encoders: joints' clock -2" in shown
+    assert read_diagnosis(out).findings[0].physics == "latency"
 
 
 def test_compare_finds_by_how_much_later_the_second_encoders_are(tmp_path, way):

@@ -7,13 +7,10 @@ that nobody has stated; `samples_of` and `write_session` make a session folder. 
 """
 
 from acquisition.recording.foreign.conversion import (
-    ColumnRecord,
     ColumnsFile,
-    Question,
     Understanding,
     columns_file,
     questions,
-    refusal,
     samples_of,
     understand,
     write_columns,
@@ -25,9 +22,7 @@ from acquisition.recording.foreign.sheet import SUFFIXES, Sheet, read_sheet
 __all__ = [
     "BAG_SUFFIXES",
     "SUFFIXES",
-    "ColumnRecord",
     "ColumnsFile",
-    "Question",
     "Sheet",
     "Understanding",
     "columns_file",
@@ -35,7 +30,6 @@ __all__ = [
     "read_log",
     "read_sheet",
     "recording_of",
-    "refusal",
     "samples_of",
     "understand",
     "understand_logs",

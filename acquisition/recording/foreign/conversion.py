@@ -74,9 +74,29 @@ class Question:
     """A unit that is open: why, what it may be, and what the values suggest ("" for nothing)."""
 
     group: Group
+    headings: tuple[str, ...]
+    place: str
     why: str
     choices: tuple[str, ...]
     proposal: str
+
+    @property
+    def asks(self) -> str:
+        """The question for a person."""
+        ends = self.headings[0] if len(self.headings) == 1 else f"{self.headings[0]} … {self.headings[-1]}"
+        return f"{ends} ({self.group.meaning}): {self.why}. Unit?"
+
+    @property
+    def refusal(self) -> str:
+        """The error where nobody can be asked: place, columns, reason, remedy."""
+        names = self.headings
+        quoted = " ".join(f"'{name}'" if any(c in name for c in " ,=[].'") else name for name in names)
+        unit = self.proposal or "|".join(self.choices)
+        column = f"column '{shown(names[0], 40)}'" if len(names) == 1 else f"columns '{shown(names[0], 30)}' …"
+        return (
+            f'{self.place}, {column}: {self.why}; state the unit: --columns "{shown(quoted, 80)} [{unit}] = '
+            f'{self.group.meaning}"'
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,20 +169,8 @@ def questions(table: Understanding, *, settled: bool = True) -> Iterator[Questio
         else:
             why = fault
         fitting = [s for s in choices if (u := unit_of(s)) and _fault(table, group, u, settled=settled) is None]
-        yield Question(group, why, choices, fitting[0] if len(fitting) == 1 else "")
-
-
-def refusal(table: Understanding, question: Question) -> SamplesError:
-    """The error where nobody can be asked."""
-    names = table.headings(question.group)
-    quoted = " ".join(f"'{name}'" if any(c in name for c in " ,=[].'") else name for name in names)
-    unit = question.proposal or "|".join(question.choices)
-    where = table.sheet.place()
-    column = f"column '{shown(names[0], 40)}'" if len(names) == 1 else f"columns '{shown(names[0], 30)}' …"
-    return SamplesError(
-        f'{where}, {column}: {question.why}; state the unit: --columns "{shown(quoted, 80)} [{unit}] = '
-        f'{question.group.meaning}"'
-    )
+        proposal = fitting[0] if len(fitting) == 1 else ""
+        yield Question(group, table.headings(group), table.sheet.place(), why, choices, proposal)
 
 
 def samples_of(table: Understanding) -> Samples:

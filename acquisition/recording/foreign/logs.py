@@ -162,8 +162,8 @@ def _start(tables: Sequence[Understanding]) -> LogStart:
     if latest > earliest:
         one, two = (next(t for t, e in zip(tables, ends, strict=True) if at in e) for at in (earliest, latest))
         raise SamplesError(
-            f"{stream_name(one.sheet)} ends at {earliest:.12g} s, {stream_name(two.sheet)} begins at {latest:.12g} s: logs of "
-            "one session count from one moment, to some seconds; correct the column of time, or import them one by one"
+            f"{stream_name(one.sheet)} ends at {earliest:.12g} s, {stream_name(two.sheet)} begins at {latest:.12g} s: "
+            "logs of one session count from one moment; correct the column of time, or import them one by one"
         )
     begin_s = math.floor(min(begin for begin, _ in ends))
     if begin_s <= EPOCH_S:

@@ -200,7 +200,7 @@ def _read_mcap(path: Path) -> Recording:
         if isinstance(record, Header) and record.profile != PROFILE:
             raise RecordingError(
                 f"{path}: an MCAP file of another program (profile '{record.profile}', library '{record.library}'); "
-                "give a recording of calibeam"
+                "give a recording of calibeam, or make one of a ROS 2 bag: calibeam import"
             )
         content.take(record)
     about = _metadata(content, RECORDING_METADATA, path, scan)

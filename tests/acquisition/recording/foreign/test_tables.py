@@ -16,7 +16,6 @@ from acquisition.recording.foreign import (
     columns_file,
     questions,
     read_sheet,
-    refusal,
     samples_of,
     understand,
     write_session,
@@ -39,7 +38,7 @@ def imported(path, rig_source, columns="", sheet=None):
     """As `import --yes`: SamplesError where a unit is open."""
     table = understood(path, rig_source, columns, sheet)
     for question in questions(table):
-        raise refusal(table, question)
+        raise SamplesError(question.refusal)
     return table, samples_of(table)
 
 
