@@ -30,10 +30,18 @@ def described_by_dbc(encoders: EncodersDevice | None) -> bool:
 def encoder_rows(recording: Recording, encoders: EncodersDevice) -> list[Row]:
     """Host time and angle of every joint, NaN where an encoder sent nothing for that row.
 
-    RecordingError where no frame is of these encoders; DeviceRefused for a DBC file that does not fit.
+    RecordingError where no frame is of these encoders, or several buses have them; DeviceRefused for a DBC file that
+    does not fit.
     """
     joints = joint_signals(Path(encoders.dbc or ""), encoders.signals, encoders.units_per_turn)
-    frames = [frame for stream in recording.streams.values() if is_frames(stream) for frame in frames_of(stream)]
+    ours = {joint.frame for joint in joints}
+    buses = [list(frames_of(stream)) for stream in recording.streams.values() if is_frames(stream)]
+    theirs = [bus for bus in buses if any((f.can_id, bool(f.flags & FrameFlag.EXTENDED)) in ours for f in bus)]
+    if len(theirs) > 1:
+        raise RecordingError(
+            f"{recording.path}: frames of these encoders are on {len(theirs)} channels of the log; export one of them"
+        )
+    frames = [frame for bus in buses for frame in bus] if not theirs else theirs[0]
     limit = encoders.acceleration_limit_rad_s2
     rows = list(_rows(sorted(frames, key=lambda f: f.host_s), joints, math.inf if limit is None else limit))
     if not rows:

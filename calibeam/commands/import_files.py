@@ -98,6 +98,8 @@ def import_command(
     if source.name in (CSV, PARQUET) and rig is None and (source.parent / RIG).is_file():
         source = source.parent
     if source.is_dir() and not (source / BAG).is_file():
+        if others:
+            raise RecordingError(f"{others[0]}: a session folder is imported by itself; leave the others out")
         given = {"rig": rig, "columns": columns, "sheet": sheet, "streams": streams}
         _refuse(source, "a session folder has its own rig.toml", **given)
         import_folder(source, out, software=SOFTWARE)
@@ -105,6 +107,8 @@ def import_command(
         return
     for path in (source, *others):
         _check_known(path)
+    if sheet is not None and not any(path.suffix.lower() in WORKBOOKS for path in (source, *others)):
+        raise RecordingError(f"{source}: --sheet {sheet}: only a workbook has sheets; leave --sheet out")
     if rig is None:
         raise RecordingError(f"{source}: a table or a log does not say of which rig it is; give --rig RIG.toml")
     if _is_can(source) and not others:

@@ -109,6 +109,12 @@ def test_the_table_of_a_session_folder_means_the_folder(lab, capsys):
         (["lab.pdf", "--rig", str(RIG), "--out", "s"], "neither a session folder nor one of"),
         (["missing.xlsx", "--rig", str(RIG), "--out", "s"], "cannot read the workbook"),
         (["missing.csv", "--rig", str(RIG), "--out", "s"], "cannot read it"),
+        ([".", "lab.xlsx", "--out", "s.mcap"], "a session folder is imported by itself"),
+        (["lab.xlsx", "lab.xlsx", "--rig", str(RIG), "--out", "s"], "give --streams for several logs"),
+        (
+            ["lab.csv", "--streams", "--rig", str(RIG), "--out", "s.mcap", "--sheet", "Two"],
+            "only a workbook has sheets",
+        ),
         (["lab.xlsx", "--rig", str(RIG), "--out", "s", "--sheet", "Two"], "no sheet 'Two'; there are Sheet"),
     ],
 )

@@ -150,7 +150,7 @@ def understand(
 def questions(table: Understanding, *, settled: bool = True) -> Iterator[Question]:
     """The units that are open. `settled`: rows are poses of a session, whose spread is that of an arm's work."""
     for group in table.groups:
-        if not group.suffix or (group.meaning == TIME and _is_dated(table.sheet, group.columns[0])):
+        if not group.suffix or (group.meaning == TIME and is_dated(table.sheet, group.columns[0])):
             continue
         unit = unit_of(group.unit)
         choices = symbols(group.suffix)
@@ -438,7 +438,8 @@ def _time(sheet: Sheet, row: int, column: int, cell: Raw) -> Exact:
         return cell
     if isinstance(cell, str):
         try:
-            return Decimal(cell.replace(",", "."))
+            if (value := Decimal(cell.replace(",", "."))).is_finite():
+                return value
         except ArithmeticError:
             pass
         try:
@@ -457,7 +458,8 @@ def _naive(moment: datetime) -> Decimal:
     return Decimal(since.days * 86400 + since.seconds) + Decimal(since.microseconds).scaleb(-6)
 
 
-def _is_dated(sheet: Sheet, column: int) -> bool:
+def is_dated(sheet: Sheet, column: int) -> bool:
+    """Whether the times are those of a calendar or a day, which need no unit."""
     cells = sheet.cells(column)
     return bool(cells) and all(isinstance(c, datetime | time) or (isinstance(c, str) and ":" in c) for c in cells)
 

@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from acquisition.recording.foreign.conversion import (
     Exact,
     Understanding,
     converted,
+    is_dated,
     seconds_since,
     times_of,
     understand,
@@ -168,8 +170,14 @@ def _start(tables: Sequence[Understanding]) -> LogStart:
     begin_s = math.floor(min(begin for begin, _ in ends))
     if begin_s <= EPOCH_S:
         return LogStart((0,) * len(tables), None)
-    bases = tuple(round(begin_s / unit) for unit in units)
-    return LogStart(bases, datetime.fromtimestamp(begin_s, UTC))
+    bases = tuple(Decimal(begin_s) / Decimal(repr(unit)) for unit in units)
+    dated = any(is_dated(table.sheet, _time_group(table).columns[0]) for table in tables)  # whose zone nobody states
+    return LogStart(tuple(map(_whole, bases)), None if dated else datetime.fromtimestamp(begin_s, UTC))
+
+
+def _whole(value: Decimal) -> Exact:
+    """As int where it is one: differences of ints are exact, too, and faster."""
+    return int(value) if value == value.to_integral_value() else value
 
 
 def _stream(table: Understanding, base: Exact) -> Stream:
@@ -186,9 +194,11 @@ def _stream(table: Understanding, base: Exact) -> Stream:
             values[channel.name] = array
     device_s = host_s
     if DEVICE_S in values:
-        device_s = values.pop(DEVICE_S)
+        stamps_s = values.pop(DEVICE_S)
         channels = [channel for channel in channels if channel.name != DEVICE_S]
-        device_s = device_s - (float(base) * _factor(time_group) if np.nanmax(np.abs(device_s)) > EPOCH_S else 0.0)
+        if not np.all(np.isnan(stamps_s)):  # else it was never set
+            from_1970 = np.nanmax(np.abs(stamps_s)) > EPOCH_S
+            device_s = stamps_s - (float(base) * _factor(time_group) if from_1970 else 0.0)
     name = stream_name(sheet)
     try:
         check_declaration(name, tuple(channels))
