@@ -1,4 +1,4 @@
-"""What can go wrong in a session that is not the fault of one device."""
+"""What can go wrong that is no fault of one device: in a session, and when a motion is not made."""
 
 
 class AcquisitionError(Exception):
@@ -19,3 +19,18 @@ class UnreachableError(AcquisitionError):
 
 class StoppedError(AcquisitionError):
     """A person said stop; the arm is held, and what was recorded is kept."""
+
+
+class TaskError(AcquisitionError):
+    """The task's transforms do not determine a position, or contradict each other."""
+
+
+class RefusedMotionError(UnreachableError):
+    """The gate does not let a motion begin; the message names the segment and the joint or box.
+
+    To a session it is a pose that cannot be had: it goes on with the next one.
+    """
+
+
+class InterruptedMotionError(AcquisitionError):
+    """A motion under way was aborted, or could not be streamed in time; the arm was told to stop."""

@@ -14,10 +14,10 @@ from pathlib import Path
 import can
 import numpy as np
 
-from acquisition.frame_log import FrameLog
 from acquisition.recording import RecordingWriter, read
 from acquisition.recording.can_frames import DATA, STREAM
 from acquisition.recording.rig import rig_text
+from acquisition.wires.frame_log import FrameLog
 from drivers.clock import SystemClock
 from drivers.transports.can_interfaces import bus_opener
 from drivers.transports.can_tap import tapped

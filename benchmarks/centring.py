@@ -13,17 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.aiming.pose import BeamTarget, flange_for
-from acquisition.aiming.reach import reach
-from acquisition.aiming.search import Found, Search
-from acquisition.believed import BelievedArm, FixtureOptics
+from acquisition.centring.aim import BeamTarget, flange_for, reach
+from acquisition.centring.believed import BelievedArm, FixtureOptics
+from acquisition.centring.loop import Centring, CentringStatus, Limits, Strategy, centre
+from acquisition.centring.measured import MeasuredStrategy
+from acquisition.centring.registered import FixedGuess, Registered
+from acquisition.centring.search import Found, Search
 from acquisition.errors import UnreachableError
 from acquisition.recording.rig import Rig
-from acquisition.servo.centring import Limits, centre
-from acquisition.servo.measured import MeasuredStrategy
-from acquisition.servo.registered import FixedGuess, Registered
-from acquisition.servo.status import Centring, CentringStatus
-from acquisition.servo.strategy import Strategy
 from calibeam.learner import FittedLearner
 from tests.support.direct_bench import DirectBench, direct_bench
 

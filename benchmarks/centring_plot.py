@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from acquisition.servo.status import Centring, CentringStatus
+from acquisition.centring.loop import Centring, CentringStatus
 from calibeam.motion.figures import PRINTED, write_figure
 
 LONGEST = 40  # steps that are drawn

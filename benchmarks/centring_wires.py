@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.bench import Bench, Look
-from acquisition.plan import PlanOptions
+from acquisition.centring.loop import CentringStatus, Limits
 from acquisition.recording import RecordingWriter
 from acquisition.recording.rig import load_rig, rig_text
-from acquisition.sample import Sample
-from acquisition.servo.centring import Limits
-from acquisition.servo.status import CentringStatus
-from acquisition.session import Session
+from acquisition.session.plan import PlanOptions
+from acquisition.session.records import Sample
+from acquisition.session.session import Session
 from calibeam.devices.site import addresses_of, connected
 from calibeam.emulation import Emulation
 from calibeam.learner import FittedLearner

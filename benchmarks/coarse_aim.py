@@ -15,18 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.aiming.by_camera import Aim, Aimed, CameraAim
-from acquisition.aiming.pose import BeamTarget
-from acquisition.aiming.reach import reach
-from acquisition.aiming.search import Found, Search
-from acquisition.camera.board import Board
-from acquisition.camera.measuring import CameraMeasuring, MeasuredCamera
-from acquisition.camera.model import CameraFit, CameraModel
-from acquisition.camera.sight import Sight
+from acquisition.centring.aim import BeamTarget, reach
+from acquisition.centring.by_camera import Aim, Aimed, CameraAim
+from acquisition.centring.camera.board import Board, Sight
+from acquisition.centring.camera.measuring import CameraMeasuring, MeasuredCamera
+from acquisition.centring.camera.model import CameraFit, CameraModel
+from acquisition.centring.search import Found, Search
 from acquisition.errors import UnreachableError
-from acquisition.motion.rigid import inverse, transform
+from acquisition.motion.kinematics import inverse, transform
 from acquisition.recording.rig import Rig, load_rig, plain_rig, rig_text
-from acquisition.sample import Sample
+from acquisition.session.records import Sample
 from calibeam.learner import FittedLearner
 from tests.support.direct_bench import DirectBench, DirectEye, direct_bench
 

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.plan import PlanOptions
-from acquisition.planned_session import PlannedSession
 from acquisition.recording import Recording, RecordingWriter, read
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig import Rig, load_rig, plain_rig, rig_sha256, rig_text
+from acquisition.session.plan import PlanOptions
+from acquisition.session.planned import PlannedSession
 from benchmarks.slices import Slices
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.learner import FittedLearner

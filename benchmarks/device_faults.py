@@ -11,7 +11,7 @@ import tempfile
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,11 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.guarded import Guarded
 from acquisition.recording.rig import Rig, load_rig, plain_rig, rig_text
 from acquisition.recording.rig.devices import PsdDriver, RobotDriver
-from acquisition.streams import Pump
-from acquisition.supervisor import Supervisor
+from acquisition.wires.attaching import Guarded
+from acquisition.wires.streams import Pump, Supervisor
 from calibeam.devices.encoders import emulated_encoders, encoder_driver
 from calibeam.devices.psd import emulated_psd, psd_driver
 from calibeam.devices.robot import emulated_robot, robot_of
@@ -154,7 +153,7 @@ def _arm(rig: Rig, where: Mapping[str, Any], clock: Clock) -> Callable[[], Movab
 
 def _case(subject: Subject, kind: str, phase: str, count: int | None) -> Outcome:
     device = Guarded(subject.make())
-    threads = threading.active_count()
+    before = set(threading.enumerate())
     times_s: list[float] = []  # when the fault came, and, where cleaning up takes its time, when the case had ended
 
     def inject() -> None:
@@ -177,10 +176,18 @@ def _case(subject: Subject, kind: str, phase: str, count: int | None) -> Outcome
     device.close()
     if phase == "move" and took_s > 0.0 and not _stands(subject.emulators):
         ended = f"UNDEFINED: the arm moves ({ended})"
-    if threading.active_count() > threads:
+    if _left(before):
         ended = f"UNDEFINED: a thread is left ({ended})"
     _well_again(subject)
     return Outcome(subject.name, kind, phase, ended, took_s)
+
+
+def _left(before: Collection[threading.Thread]) -> list[threading.Thread]:
+    """Threads of the case that do not end although the device is closed; one that is on its way out may arrive."""
+    mine = [thread for thread in threading.enumerate() if thread not in before]
+    for thread in mine:
+        thread.join(READY_S)
+    return [thread for thread in mine if thread.is_alive()]
 
 
 def _well_again(subject: Subject) -> None:

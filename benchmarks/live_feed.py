@@ -8,10 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.aiming.pose import BeamTarget, flange_for
-from acquisition.aiming.reach import reach
-from acquisition.psd_view import PsdView
+from acquisition.centring.aim import BeamTarget, flange_for, reach
 from acquisition.recording.rig import Rig
+from acquisition.wires.psd_view import PsdView
 from calibeam.live.feed import Feed
 from calibrate.believed import BelievedRig
 from drivers.clock import Clock

@@ -17,11 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from acquisition.guided.arm import GuidedArm
 from acquisition.guided.plan import GuidedOptions, calibration_plan
 from acquisition.guided.reading import Reading
 from acquisition.guided.session import GuidedSession
-from acquisition.guided.stillness import ArmMotion, StillRule
+from acquisition.guided.stillness import ArmMotion, GuidedArm, StillRule
 from acquisition.recording.rig import Rig, load_rig, plain_rig, rig_sha256, rig_text
 from benchmarks.slices import Slices
 from calibeam.guided.hand import COUNTS, DirectHand

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.plan import PlanOptions
-from acquisition.planned_session import PlannedSession
 from acquisition.recording import Recording, RecordingWriter, Samples, read
 from acquisition.recording.pose_plan import read_pose_plan
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from acquisition.session import Session
+from acquisition.session.plan import PlanOptions
+from acquisition.session.planned import PlannedSession
+from acquisition.session.session import Session
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibeam.results.diagnosis import diagnose_recording, plan_next

@@ -14,7 +14,7 @@ import numpy as np
 
 from acquisition.recording import Channel, RecordingWriter, read
 from acquisition.recording.rig import plain_rig, rig_text
-from acquisition.streams import Pump
+from acquisition.wires.streams import Pump
 from drivers.clock import SystemClock
 from drivers.ur.reader import UrReader
 from simulators.process import Emulators

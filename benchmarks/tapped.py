@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.bench import Look
-from acquisition.plan import PlanOptions
 from acquisition.recording import Channel, Recording, RecordingWriter, read
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from acquisition.session import Session
+from acquisition.session.plan import PlanOptions
+from acquisition.session.session import Session
 from benchmarks.disturbed import DisturbedWorld, Trouble
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.learner import FittedLearner

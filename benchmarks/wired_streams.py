@@ -10,9 +10,9 @@ from pathlib import Path
 import msgspec
 from rich.console import Console
 
-from acquisition.plan import PlanOptions
 from acquisition.recording import Recording, RecordingWriter, read
 from acquisition.recording.rig import load_rig, rig_text
+from acquisition.session.plan import PlanOptions
 from benchmarks.disturbed import Trouble
 from calibeam.devices.recorder import record_session
 from calibeam.devices.site import addresses_of, connected

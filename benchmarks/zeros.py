@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.plan import PlanOptions
 from acquisition.recording import RecordingWriter, read
 from acquisition.recording.rig import Rig
-from acquisition.session import Session
+from acquisition.session.plan import PlanOptions
+from acquisition.session.session import Session
 from calibeam.commands.demo import ZeroAgainstTruth, compare_with_truth
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.learner import FittedLearner

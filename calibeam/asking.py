@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 from rich.console import Console
 
 from acquisition.errors import AcquisitionError
-from acquisition.supervisor import FROZEN_S
+from acquisition.wires.streams import FROZEN_S
 from drivers.clock import Clock, SystemClock
 
 GO, REFUSALS = "go", ("n", "no", "q")

@@ -2,7 +2,7 @@
 
 The first one raises KeyboardInterrupt in the main thread. Those that follow while the command cleans up are not heard:
 a recording has to be closed, and a traceback on the way out helps nobody. While the arm of a session moves, its keys
-hear them instead (calibeam/session/keys.py).
+hear them instead (calibeam/sessions/keys.py).
 """
 
 import os

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.rig import Rig
-from acquisition.sample import Sample
+from acquisition.session.records import Sample
 from calibrate.believed import BelievedRig
 from calibrate.believed_arm import BelievedArm
 from calibrate.believed_fixture import BelievedFixture
@@ -46,7 +46,7 @@ class Beliefs:
 
 
 class FittedLearner:
-    """Implements acquisition.learner.Learner on the models of `calibrate`."""
+    """Implements acquisition.session.records.Learner on the models of `calibrate`."""
 
     def __init__(self, rig: Rig, beliefs: Beliefs | None = None) -> None:
         self._rig, self._beliefs = rig, beliefs or Beliefs()

@@ -103,6 +103,7 @@ class UnseenRows(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     rms_distance_before_m: Statistic
     rms_distance_after_m: Statistic
     chi_after: Statistic
+    chi_predicted: Statistic | None = None  # over noise and doubt of the fit together; absent in earlier files
 
 
 class ObservabilityRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -147,8 +147,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 862,
-    "lines": 92_100,
+    "files": 839,
+    "lines": 92_400,
     "longest_function": 54,
     "one_importer": 49,
     "classes": 38,

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 from msgspec.structs import fields
 
-from acquisition.camera import model as camera
+from acquisition.centring.camera import model as camera
 from acquisition.motion.task.task_file import TaskEntries
 from acquisition.recording.mcap import read
 from acquisition.recording.pose_plan import PosePlan

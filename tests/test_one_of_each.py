@@ -10,8 +10,8 @@ SOLVED = {"solve", "lstsq", "pinv", "inv"}
 JOINT_STEPS = {
     "acquisition/motion/inverse/solve.py": "to flange poses, and to places of a point: the inverse kinematics",
     "calibrate/observation_model.py": "to readings of any instrument, which calibrate may not ask of acquisition",
-    "acquisition/aiming/search.py": "two linear steps of a beam, and moves of the real arm between looks at its spots",
-    "acquisition/servo/grip.py": "uphill in the grip of the servo, while the beam is held",
+    "acquisition/centring/search.py": "two linear steps of a beam, and moves of the arm between looks at its spots",
+    "acquisition/centring/registered.py": "uphill in the grip of the servo, while the beam is held",
     "calibrate/diagnose/compare/observed.py": "one linear step for each pose of a pair",
 }
 TURNED_PARTS = {

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.errors import AcquisitionError
-from acquisition.guided.target import BarEnd, Cone, SphereSpot, Target, Vector
+from acquisition.guided.reading import BarEnd, Cone, SphereSpot, Target, Vector
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig import Rig, Sphere
 from acquisition.recording.rig.schema import BarPosition

@@ -10,15 +10,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.guided.arm import GuidedArm
-from acquisition.guided.coverage import Coverage
-from acquisition.guided.guide import Guide, GuidedProgress, Request
-from acquisition.guided.judge import Judge
+from acquisition.guided.guide import Coverage, Guide, GuidedProgress, Request
 from acquisition.guided.plan import GuidedVisit, readings_of
-from acquisition.guided.reading import Reading
-from acquisition.guided.stillness import ArmMotion, StillRule
-from acquisition.guided.target import Cone, SphereSpot, Target
-from acquisition.guided.window import EncoderWatch, Window
+from acquisition.guided.reading import Cone, Judge, Reading, SphereSpot, Target
+from acquisition.guided.stillness import ArmMotion, EncoderWatch, GuidedArm, StillRule, Window
 
 Floats = NDArray[np.float64]
 ATTEMPTS = 4  # at one reading; then it is left out, or taken where only its place is in doubt

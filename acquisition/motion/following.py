@@ -10,13 +10,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.motion.acting import Acting, Action
-from acquisition.motion.errors import InterruptedMotionError, RefusedMotionError
+from acquisition.errors import InterruptedMotionError, RefusedMotionError
 from acquisition.motion.paths.path import STANDING
 from acquisition.motion.paths.segments import Pace
-from acquisition.motion.paths.solved import SolvedPath
-from acquisition.motion.setpoints import Followable, LookAhead, OnPath
-from acquisition.motion.states import OVER, MotionEvent, MotionState
+from acquisition.motion.setpoints import Followable, LookAhead, OnPath, SolvedPath
+from acquisition.motion.states import OVER, Acting, Action, MotionEvent, MotionState
 from acquisition.motion.under_way import UnderWay
 from drivers.clock import Clock
 

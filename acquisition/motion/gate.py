@@ -14,17 +14,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.motion.acting import Acting
+from acquisition.errors import InterruptedMotionError, RefusedMotionError
 from acquisition.motion.cell import Cell
-from acquisition.motion.errors import InterruptedMotionError, RefusedMotionError
 from acquisition.motion.following import Followed, Following, Said, SetPoints, SetPointStream
-from acquisition.motion.inverse.solver import Solver
+from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.paths.path import STANDING
 from acquisition.motion.paths.segments import By, Pace, Segment
-from acquisition.motion.paths.solved import SolvedPath
 from acquisition.motion.plan import BeltAt, Plan, plan
-from acquisition.motion.setpoints import BeltNow, LookAhead
-from acquisition.motion.states import OVER, PAUSE_AGAIN_S, REST_S, MotionEvent, MotionState, after
+from acquisition.motion.setpoints import BeltNow, LookAhead, SolvedPath
+from acquisition.motion.states import OVER, PAUSE_AGAIN_S, REST_S, Acting, MotionEvent, MotionState, after
 from acquisition.motion.under_way import UnderWay
 from drivers.clock import Clock
 from drivers.errors import DeviceRefused

@@ -9,9 +9,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.errors import RefusedMotionError
 from acquisition.motion.cell import Cell, body_points, entered
-from acquisition.motion.errors import RefusedMotionError
-from acquisition.motion.inverse.kinematics import Kinematics
+from acquisition.motion.kinematics import Kinematics
 from drivers.device import Movable
 
 Floats = NDArray[np.float64]

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.errors import RefusedMotionError
 from acquisition.motion.cell import Cell, body_points, entered
-from acquisition.motion.errors import RefusedMotionError
-from acquisition.motion.inverse.solver import Solver
+from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.paths.path import STANDING, BeltState, Path
 from acquisition.motion.paths.segments import By, Pace, Segment
 

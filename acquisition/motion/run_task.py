@@ -1,4 +1,7 @@
-"""Teaches a task and runs its program through the gate: a sweep of the arm, a reading of the camera, the next sweep."""
+"""Teaches a task and runs its program through the gate: a sweep of the arm, a reading of the camera, the next sweep.
+
+A sweep is what the arm does in one go: the segments of a path up to the next reading of a camera.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -7,17 +10,41 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.motion.errors import TaskError
+from acquisition.errors import TaskError
 from acquisition.motion.following import Followed
 from acquisition.motion.gate import Gate
-from acquisition.motion.inverse.solver import Solver
+from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.paths.path import STANDING, BeltState
+from acquisition.motion.paths.segments import By, Place, Segment
 from acquisition.motion.plan import Plan
 from acquisition.motion.setpoints import BeltNow
 from acquisition.motion.task.graph import TaskGraph
-from acquisition.motion.task.program import Step, unrolled
-from acquisition.motion.task.sweeps import next_sweep
+from acquisition.motion.task.program import Grasp, Move, Plain, Read, Release, Step, unrolled
 from acquisition.motion.task.task_file import Task, Teach
+
+GRASP, RELEASE = "GRASP", "RELEASE"
+
+
+def next_sweep(graph: TaskGraph, steps: Sequence[Plain]) -> tuple[tuple[Segment, ...], int]:
+    """The segments before the next READ, and how many steps they are. TaskError where a position is not determined."""
+    segments: list[Segment] = []
+    place: Place | None = None
+    for count, step in enumerate(steps):
+        match step:
+            case Read():
+                return tuple(segments), count
+            case Move(to, by, time_s, stop):
+                place = graph.place(to)
+                segments.append(Segment(to, By.LINE if by == "line" else By.JOINTS, place, time_s))
+                if stop:
+                    segments.append(Segment(f"stop at {to}", By.STAND, place))
+            case Grasp(wait_s) | Release(wait_s):
+                if place is None:
+                    raise TaskError("GRASP or RELEASE before the first MOVE of a sweep: move somewhere first")
+                action = GRASP if isinstance(step, Grasp) else RELEASE
+                segments.append(Segment(f"{action} at {place.name}", By.STAND, place, wait_s, action=action))
+    return tuple(segments), len(steps)
+
 
 Floats = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""Set-points between solutions: each is solved a period ahead and interpolated to over the next one.
+"""Set-points of a path: solved a period ahead where a belt may move, or all beforehand where none does.
 
 At t_k the belt is read and the solution for t_k + 2/f begun; it is ready at t_k + 1/f, and interpolated to from there.
 So a belt that stops dead is overshot by 2 Vc / f, and between solutions y apart the joints leave a straight track at
@@ -12,9 +12,32 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.motion.paths.path import BeltState
+from acquisition.motion.paths.path import STANDING, BeltState, Path
 
 Floats = NDArray[np.float64]
+
+
+class SolvedPath:
+    """The solutions of a path at every period; between them, as in a hold, it is interpolated."""
+
+    def __init__(self, path: Path, period_s: float) -> None:
+        """RefusedMotionError where the path cannot be solved."""
+        self._period_s = period_s
+        solved: list[Floats] = []
+        while len(solved) * period_s < path.ends_s + period_s:
+            solved.append(path.at(len(solved) * period_s))
+        self._q_rad = np.array(solved)
+        self.ends_s, self.rests = path.ends_s, path.rests
+
+    def at(self, t_s: float, belt: BeltState = STANDING) -> Floats:
+        """Joint readings (joint,) at time t; at the end it stays."""
+        place = min(t_s / self._period_s, len(self._q_rad) - 1.0)
+        before = min(int(place + 1e-9), len(self._q_rad) - 2)
+        share = place - before
+        out: Floats = self._q_rad[before] + (self._q_rad[before + 1] - self._q_rad[before]) * share
+        return out
+
+
 BeltNow = Callable[[], BeltState]
 
 

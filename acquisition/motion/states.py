@@ -5,9 +5,41 @@ within PAUSE_AGAIN_S. resume goes on.
 abort: brake, clean up, end as aborted. stop: brake, clean up, end as a success. halt: stop the arm, no clean-up.
 Source of the words and keys: bluesky, "Interrupting" (first Ctrl-C: pause at the next checkpoint; second within 10 s:
 pause now).
+
+An action of a program runs beside the stream: a hand takes its time, and the arm goes on being sent where to stand. On
+a belt it has to: an arm whose set-points stop stands, and the belt takes the part away from the hand.
 """
 
 import enum
+import threading
+from collections.abc import Callable
+
+Acting = Callable[[str], None]
+
+
+class Action:
+    """One GRASP or RELEASE under way. A motion that is ended meanwhile does not wait for it."""
+
+    def __init__(self, act: Acting, name: str) -> None:
+        self._act, self._name = act, name
+        self._failure: BaseException | None = None
+        self._thread = threading.Thread(target=self._run, name=f"action {name}", daemon=True)
+        self._thread.start()
+
+    def over(self) -> bool:
+        """Whether it is done. Raises what went wrong in it."""
+        if self._thread.is_alive():
+            return False
+        if self._failure is not None:
+            raise self._failure
+        return True
+
+    def _run(self) -> None:
+        try:
+            self._act(self._name)
+        except BaseException as failure:  # told to the stream, which stops the arm
+            self._failure = failure
+
 
 PAUSE_AGAIN_S = 10.0
 REST_S = 1.0

@@ -8,9 +8,9 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.errors import InterruptedMotionError
 from acquisition.motion.cell import Cell, body_of, nearest_m
-from acquisition.motion.errors import InterruptedMotionError
-from acquisition.motion.inverse.kinematics import Kinematics
+from acquisition.motion.kinematics import Kinematics
 from acquisition.motion.paths.segments import Pace
 from acquisition.motion.plan import SAMPLE_S
 

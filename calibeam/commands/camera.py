@@ -45,8 +45,8 @@ def camera_command(
         raise RigFileError(f"rig {loaded.name}: no [camera]; say how it is reached, and what board is on the fixture")
     if not yes:
         someone(at_terminal(), "whether the arm may move", YES).may_move()
-    from acquisition.camera.measuring import CameraMeasuring
-    from acquisition.camera.model import write_model
+    from acquisition.centring.camera.measuring import CameraMeasuring
+    from acquisition.centring.camera.model import write_model
     from calibeam.devices.camera import open_camera
     from calibeam.devices.recorder import RecordingJournal
     from calibeam.learner import FittedLearner

@@ -13,13 +13,14 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from acquisition.plan import PlanOptions
 from acquisition.recording import RecordingError
 from acquisition.recording.rig import load_rig, rig_text
+from acquisition.session.plan import PlanOptions
 from calibeam.devices.recorder import new_recording, record_session
 from calibeam.devices.site import addresses_of, check_session, connected
 from calibeam.emulation import Emulation
 from calibeam.printing.progress import progress_bar
+from calibeam.rig_files import RIGS
 from calibrate.identification.estimates import JointZero
 from drivers.clock import SystemClock
 from simulators.world.truth import read_truth
@@ -72,7 +73,7 @@ def print_against_truth(console: Console, revealed: tuple[ZeroAgainstTruth, ...]
     console.print(table)
 
 
-RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
+RIG = RIGS / "ur5e-dual-psd.toml"
 RECORDING, TRUTH = "recording.mcap", "truth.json"
 RESULTS = (RECORDING, "model.json", "diagnosis.json", "report.html", TRUTH)
 

@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
-from acquisition.motion.errors import TaskError
-from acquisition.motion.inverse.solver import Solver
-from acquisition.motion.paths.segments import By, Segment
-from acquisition.motion.rigid import transform
-from acquisition.motion.task.place import Place
+from acquisition.errors import TaskError
+from acquisition.motion.inverse.solve import Solver
+from acquisition.motion.kinematics import transform
+from acquisition.motion.paths.segments import By, Place, Segment
 from acquisition.recording.rig import load_rig
 
 Floats = NDArray[np.float64]

@@ -8,7 +8,7 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
-from acquisition.motion.errors import TaskError
+from acquisition.errors import TaskError
 from acquisition.motion.plan import Plan
 from acquisition.recording.rig import load_rig
 from calibeam.commands.demo import RIG

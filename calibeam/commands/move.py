@@ -8,10 +8,9 @@ from cyclopts import Parameter
 from numpy.typing import NDArray
 from rich.console import Console
 
-from acquisition.motion.errors import TaskError
-from acquisition.motion.inverse.solver import Solver
-from acquisition.motion.paths.segments import By, Segment
-from acquisition.motion.task.place import Place
+from acquisition.errors import TaskError
+from acquisition.motion.inverse.solve import Solver
+from acquisition.motion.paths.segments import By, Place, Segment
 from acquisition.motion.task.task_file import read_task
 from acquisition.recording.rig import Rig, load_rig
 

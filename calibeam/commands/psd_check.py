@@ -9,11 +9,11 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from acquisition.psd_view import psd_window
 from acquisition.recording import SamplesError
 from acquisition.recording.files import shown
 from acquisition.recording.rig import load_rig
 from acquisition.recording.rig.devices import PsdDevice
+from acquisition.wires.psd_view import psd_window
 from calibeam.asking import Asking, NotAgreedError, at_terminal, someone
 from calibeam.devices.psd import PsdInstrument, psd_driver
 from drivers.clock import SystemClock

@@ -10,21 +10,22 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 from rich.console import Console
 
+from acquisition.centring.strategies import CentringBy, CentringChoice
 from acquisition.errors import AcquisitionError
 from acquisition.guided.plan import GuidedOptions, planned_visits
-from acquisition.plan import PlanOptions
 from acquisition.recording import RecordingError
 from acquisition.recording.mcap import parts
 from acquisition.recording.pose_plan import read_pose_plan
 from acquisition.recording.rig import Rig, load_rig, rig_text
+from acquisition.session.plan import PlanOptions
 from calibeam.asking import at_terminal
 from calibeam.devices.site import addresses_of, check_session
 from calibeam.emulation import ask_emulators, moves_nothing_real
 from calibeam.guided.recorded import encoder_address, is_guided
 from calibeam.guided.run import plan_of, run_guided
 from calibeam.live.feed import SILENT, Feed
-from calibeam.session.job import EarlierParts, Job, new_place, read_earlier_parts, with_place, with_places
-from calibeam.session.run import run_session
+from calibeam.sessions.job import EarlierParts, Job, new_place, read_earlier_parts, with_place, with_places
+from calibeam.sessions.run import run_session
 from drivers.clock import SystemClock
 
 ACCURACY_UM = 20.0  # as Job.goal_m
@@ -46,6 +47,11 @@ class RobotOptions:
         Predicted error of the beam in free space that is good enough: how many more poses it takes is told.
     yes
         Ask nothing: the cell is clear, the arm may move.
+    centring
+        How the beam is centred: law (8) with the fixture pose corrected from every reading, the Jacobian measured by
+        four probing moves, or law (8) of the source with the fixture pose as guessed.
+    gain
+        Of law8: the share of the correction that each step takes, above 0 and up to 1.
 
     """
 
@@ -54,6 +60,8 @@ class RobotOptions:
     place: Annotated[tuple[float, float, float, float] | None, Parameter(negative="")] = None
     accuracy_um: float = ACCURACY_UM
     yes: bool = False
+    centring: CentringBy = CentringBy.REGISTERED
+    gain: float = CentringChoice.gain
 
     @property
     def given(self) -> dict[str, bool]:
@@ -64,6 +72,8 @@ class RobotOptions:
             "--place": self.place is not None,
             "--accuracy-um": self.accuracy_um != ACCURACY_UM,
             "--yes": self.yes,
+            "--centring": self.centring is not CentringBy.REGISTERED,
+            "--gain": self.gain != CentringChoice.gain,
         }
 
 
@@ -216,7 +226,7 @@ def _session_of_robot(wanted: Wanted, robot: RobotOptions, page: PageOptions, co
         wanted.text,
         wanted.out,
         addresses,
-        PlanOptions(seed=wanted.seed),
+        PlanOptions(seed=wanted.seed, centring=CentringChoice.asked(robot.centring, robot.gain)),
         poses,
         pose_text,
         robot.accuracy_um * 1e-6,

@@ -10,7 +10,7 @@ from acquisition.recording.rig import Camera, Rig
 from drivers.clock import Clock
 
 if TYPE_CHECKING:
-    from acquisition.camera.sight import Sight
+    from acquisition.centring.camera.board import Sight
     from drivers.camera.device import Camera as CameraDevice
 
 
@@ -23,10 +23,9 @@ def camera_sight(rig: Rig, clock: Clock, emulated: Mapping[str, Any] | None = No
     if rig.camera is None:
         yield None
         return
-    from acquisition.camera.board import Board
-    from acquisition.camera.model import read_model
-    from acquisition.camera.sight import Sight
-    from acquisition.motion.rigid import transform
+    from acquisition.centring.camera.board import Board, Sight
+    from acquisition.centring.camera.model import read_model
+    from acquisition.motion.kinematics import transform
 
     if rig.camera.calibration is None:
         raise RigFileError(

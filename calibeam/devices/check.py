@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.errors import AcquisitionError
-from acquisition.guarded import one_error_tree
-from acquisition.psd_view import psd_window
 from acquisition.recording import RigFileError
 from acquisition.recording.files import brief
 from acquisition.recording.rig import Camera, Rig
 from acquisition.recording.rig.devices import EncoderDriver, RobotDriver
+from acquisition.wires.attaching import one_error_tree
+from acquisition.wires.psd_view import psd_window
 from calibeam.devices.camera import camera_sight
 from calibeam.devices.encoders import (
     bus_trouble,

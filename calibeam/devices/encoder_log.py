@@ -12,13 +12,12 @@ from types import FrameType
 
 import can
 
-from acquisition.frame_log import FrameLog
-from acquisition.guarded import Guarded
 from acquisition.recording import Channel, Gap, RecordingWriter
 from acquisition.recording.mcap import Rotation, SegmentedRecording, SegmentStream
 from acquisition.recording.rig.devices import EncodersDevice
-from acquisition.reopening import Reopening
-from acquisition.streams import Pump
+from acquisition.wires.attaching import Guarded, Reopening
+from acquisition.wires.frame_log import FrameLog
+from acquisition.wires.streams import Pump
 from calibeam.devices.encoders import VIEWED, encoder_driver, identities_of, names_of
 from calibeam.devices.recorder import uninterrupted
 from calibeam.interrupts import ENDING

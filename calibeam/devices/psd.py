@@ -6,9 +6,9 @@ from typing import Any, Protocol
 
 from msgspec import structs
 
-from acquisition.psd_view import PsdView
 from acquisition.recording.rig import Rig
 from acquisition.recording.rig.devices import PsdDevice, PsdDriver
+from acquisition.wires.psd_view import PsdView
 from drivers.clock import Clock
 from drivers.device import Device
 from drivers.errors import DeviceRefused

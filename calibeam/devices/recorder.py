@@ -15,17 +15,16 @@ import numpy as np
 from rich.progress import Progress as Bar
 
 from acquisition.bench import Bench
-from acquisition.camera.sight import Sight
+from acquisition.centring.camera.board import Sight
+from acquisition.centring.loop import Limits
 from acquisition.errors import AcquisitionError
-from acquisition.plan import PlanOptions
-from acquisition.planned_session import PlannedSession
-from acquisition.progress import Progress
 from acquisition.recording import Event, RecordingError, RecordingWriter, read
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig import Rig
-from acquisition.sample import Sample
-from acquisition.servo.centring import Limits
-from acquisition.session import Session, Summary
+from acquisition.session.plan import PlanOptions
+from acquisition.session.planned import PlannedSession
+from acquisition.session.records import Progress, Sample
+from acquisition.session.session import Session, Summary
 from calibeam.emulation import EmulationError
 from calibeam.interrupts import ENDING
 from calibeam.learner import FittedLearner
@@ -36,7 +35,7 @@ from drivers.errors import DeviceError
 
 
 class RecordingJournal:
-    """Implements acquisition.journal.Journal."""
+    """Implements acquisition.session.records.Journal."""
 
     def __init__(self, writer: RecordingWriter, clock: Clock) -> None:
         self._writer, self._clock = writer, clock
@@ -92,7 +91,7 @@ def record_session(
     """Take every place of the rig, or the poses of a plan, told by `bar`; with a camera the light is aimed at by it.
 
     PartialResult when it ended early: the arm stands, samples are kept. Nobody is asked, and nothing can be paused:
-    calibeam/session/run.py.
+    calibeam/sessions/run.py.
     """
     home_rad = np.array(rig.motion.home_rad)  # there is one: check_session
     with bar:

@@ -8,14 +8,13 @@ from functools import partial
 from typing import Any
 
 from acquisition.errors import StoppedError
-from acquisition.guarded import Guarded
-from acquisition.psd_view import PsdView, psd_window
 from acquisition.recording import Channel, Event, RecordingError, RecordingWriter, RigFileError
 from acquisition.recording.rig import Rig
 from acquisition.recording.rig.devices import EncodersDevice, PsdDevice, RobotDevice
-from acquisition.streams import Pump
-from acquisition.supervisor import Supervisor
-from acquisition.wired import Pumps, Speeds, WiredBench
+from acquisition.wires.attaching import Guarded
+from acquisition.wires.bench import Pumps, Speeds, WiredBench
+from acquisition.wires.psd_view import PsdView, psd_window
+from acquisition.wires.streams import Pump, Supervisor
 from calibeam.devices.encoders import emulated_encoders, encoder_driver
 from calibeam.devices.psd import PsdInstrument, emulated_psd, psd_driver, psd_view
 from calibeam.devices.recorder import uninterrupted

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.guided.guide import GuidedProgress, Request
-from acquisition.guided.target import BarEnd, Cone, Target
-from acquisition.guided.window import Window
+from acquisition.guided.reading import BarEnd, Cone, Target
+from acquisition.guided.stillness import Window
 from calibeam.emulation import EmulationError
 from simulators.hand.hand import CannotReachError
 from simulators.hand.world import HandWorld
@@ -21,7 +21,7 @@ COUNTS = 1 << 20  # of simulators/encoders/encoder.py
 
 
 class DirectHand:
-    """Implements acquisition.guided.window.EncoderWatch and acquisition.guided.guide.Guide."""
+    """Implements acquisition.guided.stillness.EncoderWatch and acquisition.guided.guide.Guide."""
 
     def __init__(self, world: HandWorld, period_s: float = 0.025) -> None:
         self.world, self._period_s = world, period_s

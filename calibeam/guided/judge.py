@@ -9,9 +9,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.guided.judge import Doubt
-from acquisition.guided.reading import Reading
-from acquisition.guided.target import BarEnd, Cone
+from acquisition.guided.reading import BarEnd, Cone, Doubt, Reading
 from acquisition.recording.rig import Rig, Tolerance
 from calibeam.guided.refit import LIMIT_SIGMAS, Refit, assumed_prior, refit_arm, visits_of
 from calibrate.arms.catalogue import arm_of
@@ -27,7 +25,7 @@ Floats = NDArray[np.float64]
 
 
 class FittedJudge:
-    """Implements acquisition.guided.judge.Judge."""
+    """Implements acquisition.guided.reading.Judge."""
 
     def __init__(self, rig: Rig) -> None:
         stated = rig.tolerance or Tolerance(length_m=SCALELESS.length_sigma_m, angle_rad=SCALELESS.angle_sigma_rad)

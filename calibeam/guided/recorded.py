@@ -15,13 +15,12 @@ from acquisition.guided.guide import Guide
 from acquisition.guided.plan import GuidedVisit
 from acquisition.guided.reading import Reading
 from acquisition.guided.session import GuidedSession, GuidedSummary
-from acquisition.guided.wired import WiredEncoderWatch
+from acquisition.guided.stillness import WiredEncoderWatch
 from acquisition.motion.inverse.solve import AtPoint, refine, within
 from acquisition.recording import Channel, Event, RecordingError, RecordingWriter, RigFileError
 from acquisition.recording.rig import Rig
 from acquisition.recording.rig.devices import EncodersDevice
-from acquisition.streams import Pump
-from acquisition.supervisor import Supervisor
+from acquisition.wires.streams import Pump, Supervisor
 from calibeam.devices.encoders import VIEWED, emulated_encoders, encoder_driver, identities_of
 from calibeam.devices.recorder import Interrupted, uninterrupted
 from calibeam.guided.judge import FittedJudge
@@ -34,7 +33,7 @@ ARRIVED_M = 1e-6  # far below what a person can do
 
 
 class BelievedGuidedArm(RigArm):
-    """Implements acquisition.guided.arm.GuidedArm."""
+    """Implements acquisition.guided.stillness.GuidedArm."""
 
     def postures(self, start_rad: Floats, point_m: Floats) -> Floats:
         found = refine(self, AtPoint(self.point_m, point_m), start_rad, close=ARRIVED_M).q_rad

@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.guided.reading import Reading
-from acquisition.guided.target import Cone
+from acquisition.guided.reading import Cone, Reading
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import BAR

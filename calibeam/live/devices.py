@@ -5,10 +5,10 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
-from acquisition.guarded import Guarded, one_error_tree
 from acquisition.recording import RigFileError
 from acquisition.recording.rig import Rig
 from acquisition.recording.rig.schema import Devices
+from acquisition.wires.attaching import Guarded, one_error_tree
 from calibeam.devices.encoders import encoder_driver
 from calibeam.devices.psd import psd_driver, psd_view
 from calibeam.devices.robot import robot_of

@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from acquisition.psd_view import PsdView
 from acquisition.recording.rig import Rig
+from acquisition.wires.psd_view import PsdView
 from drivers.device import Block
 
 PAGE_STOP = "STOP was pressed on the live page; see why, then go on with a new session"

@@ -4,8 +4,8 @@ import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from acquisition.psd_view import PsdView
 from acquisition.recording.rig import Rig
+from acquisition.wires.psd_view import PsdView
 from calibeam.live.feed import Progress
 from calibeam.live.stopping import Stop
 from drivers.clock import Clock

@@ -11,7 +11,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from acquisition.psd_view import NO_LIGHT, SATURATED, PsdView
+from acquisition.wires.psd_view import NO_LIGHT, SATURATED, PsdView
 from calibeam.live.feed import Progress
 from calibeam.live.health import Health
 from calibeam.live.scene import Points, SceneBeam, SceneFixture

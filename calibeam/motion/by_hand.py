@@ -21,7 +21,7 @@ from rich.console import Console
 
 from acquisition.motion.cell import Cell
 from acquisition.motion.gate import Gate
-from acquisition.motion.inverse.solver import Solver
+from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.paths.segments import Segment
 from acquisition.motion.plan import Plan
 from acquisition.motion.states import MotionState

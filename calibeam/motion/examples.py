@@ -10,23 +10,22 @@ term of Taylor's series, good while the lag is short against the blends.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.motion.following import Followed
 from acquisition.motion.gate import Gate
-from acquisition.motion.inverse.solver import Solver
+from acquisition.motion.inverse.solve import Solver
+from acquisition.motion.kinematics import apart, transform
 from acquisition.motion.paths.path import BeltState
-from acquisition.motion.paths.segments import By, Segment
+from acquisition.motion.paths.segments import By, Place, Segment
 from acquisition.motion.plan import Plan
-from acquisition.motion.rigid import apart, transform
 from acquisition.motion.run_task import Around, run_task, teach
 from acquisition.motion.task.graph import TaskGraph
-from acquisition.motion.task.place import Place
 from acquisition.motion.task.task_file import Task, read_task
 from calibeam.motion.robot import StreamedArm, StreamedRobot
+from calibeam.rig_files import RIGS
 from drivers.clock import Clock
 
 Floats = NDArray[np.float64]
@@ -76,7 +75,7 @@ def lag_s(sent_s: Floats, sent_rad: Floats, heard_s: Floats, heard_rad: Floats) 
     return float(behind @ speed[moves] / (speed[moves] @ speed[moves]))
 
 
-TASKS = Path(__file__).parents[2] / "rigs" / "tasks"
+TASKS = RIGS / "tasks"
 START_RAD = np.radians([0.0, -90.0, 90.0, -90.0, -90.0, 0.0])  # the hand points down in front of the arm
 TOOL = transform((0.0, 0.0, 0.15))
 BELT_M_S = 0.05

@@ -10,9 +10,9 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from acquisition.motion.cell import Box, Cell
-from acquisition.motion.inverse.solver import Solver
-from acquisition.motion.paths.solved import SolvedPath
+from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.plan import Plan
+from acquisition.motion.setpoints import SolvedPath
 from calibeam.motion.examples import TOOL, ExampleResult
 from calibrate.report.svg import house_style
 from calibrate.report.tones import Tone

@@ -10,11 +10,11 @@ from acquisition.motion.following import SetPoints, SetPointStream
 from acquisition.motion.gate import Gate
 from acquisition.motion.gated_arm import GatedArm
 from acquisition.motion.inverse.closed_form import closed_form
-from acquisition.motion.inverse.solver import Solver
+from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.paths.segments import Pace
 from acquisition.motion.setpoints import solve_rate_hz
 from acquisition.recording.rig import ArmModel, Rig
-from acquisition.streams import Pump
+from acquisition.wires.streams import Pump
 from calibeam.geometry_only import read_geometry
 from calibrate.arms.rig_arm import RigArm
 from calibrate.errors import DataError

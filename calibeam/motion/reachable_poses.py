@@ -2,7 +2,7 @@
 
 Before two detectors: random spots, stand-offs and rolls, by every branch of the inverse kinematics. For a device that
 measures positions: joint angles drawn evenly. Collisions are those of calibeam's motion (acquisition/motion/cell.py)
-and the table of a session (acquisition/aiming/reach.py); a cell of boxes knows no collision between the arm's links.
+and the table of a session (acquisition/centring/aim.py); a cell of boxes knows no collision between the arm's links.
 
 The fixture may also stand at further stations: on rings about the base, at some heights, turned towards the arm.
 """
@@ -14,12 +14,11 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from acquisition.aiming.pose import BeamTarget, flange_for
-from acquisition.aiming.reach import clear_of_table
+from acquisition.centring.aim import BeamTarget, clear_of_table, flange_for
 from acquisition.motion.cell import body_points
 from acquisition.motion.inverse.solve import all_solutions
-from acquisition.plan import PlanOptions
 from acquisition.recording.rig import Placement, Pose, Rig
+from acquisition.session.plan import PlanOptions
 from calibeam.motion.gate_of_rig import cell_of, solver_of
 from calibrate.arms.convert import pose_of
 from calibrate.believed import BelievedRig

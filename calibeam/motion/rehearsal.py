@@ -10,15 +10,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.aiming.pose import BeamTarget, flange_for
-from acquisition.aiming.reach import reach
-from acquisition.errors import UnreachableError
-from acquisition.motion.errors import RefusedMotionError
+from acquisition.centring.aim import BeamTarget, flange_for, reach
+from acquisition.centring.navigator import FINDING_STAND_OFF_M
+from acquisition.errors import RefusedMotionError, UnreachableError
 from acquisition.motion.gated_arm import GatedArm
-from acquisition.navigator import FINDING_STAND_OFF_M
-from acquisition.plan import PlanOptions, blocks
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig import Rig
+from acquisition.session.plan import PlanOptions, blocks
 from calibeam.learner import FittedLearner
 from calibeam.motion.gate_of_rig import cell_of
 from calibrate.arms.rig_arm import RigArm

@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from acquisition.plan import PlanOptions
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig import Rig
+from acquisition.session.plan import PlanOptions
 from calibeam.motion.figures import draw_cell, write_figure
 from calibeam.motion.gate_of_rig import cell_of
 from calibeam.motion.rehearsal import Rehearsal, rehearse

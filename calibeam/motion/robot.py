@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from acquisition.motion.following import SetPoints
 from acquisition.recording import RigFileError
 from acquisition.recording.rig import Rig
-from acquisition.streams import Pump
-from acquisition.supervisor import Supervisor
+from acquisition.wires.streams import Pump, Supervisor
 from calibeam.devices.recorder import uninterrupted
 from calibeam.devices.robot import emulated_robot, robot_of
 from drivers.clock import Clock

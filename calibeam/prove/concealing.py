@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from acquisition.plan import PlanOptions
 from acquisition.recording import Channel, Event, Recording, RecordingWriter, read
 from acquisition.recording.rig import parse_rig, plain_rig, rig_text
+from acquisition.session.plan import PlanOptions
 from calibeam.devices.recorder import new_recording, record_session
 from calibeam.devices.site import addresses_of, connected
 from calibeam.emulation import EmulationError
@@ -25,6 +25,7 @@ from calibeam.printing.progress import progress_bar
 from calibeam.prove.scenario import DRAWS, WIRED_DRAWS, Mix, Scenario, scenario, wired_scenario
 from calibeam.prove.seal import Layout, fingerprint, new_key, seal_truth
 from calibeam.prove.unseen import write_asked
+from calibeam.rig_files import RIGS
 from calibeam.software import SOFTWARE
 from calibeam.worker_processes import in_workers
 from calibrate.diagnose.streams.sample_times import sample_windows
@@ -102,7 +103,7 @@ def _rows(case: Case, session: StreamedSession) -> list[Mapping[str, Any]]:
     return [dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True)]
 
 
-RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
+RIG = RIGS / "ur5e-dual-psd.toml"
 PACE = 8.0  # emulated seconds in one of ours, as in `calibeam demo`
 CENTRED, REPEATS = 2, 2  # a place and order
 ORDERS = 2

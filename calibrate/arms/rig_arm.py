@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class RigArm:
-    """Implements acquisition.motion.inverse.kinematics.Kinematics and acquisition.guided.arm.GuidedArm."""
+    """Implements acquisition.motion.kinematics.Kinematics and acquisition.guided.stillness.GuidedArm."""
 
     fixed: Floats  # (joint + 1, 4, 4) parts between the turns
     offset_rad: Floats  # (joint,) added to a reading

@@ -29,7 +29,15 @@ def evidence_fields(evidence: Evidence) -> EvidenceFields:
     """All of it, as written."""
     drawn, shown, room = evidence.bootstrap, evidence.observability, evidence.free_space
     proofs = tuple(
-        UnseenRows(u.split, u.name, u.observations, u.rms_distance_before_m, u.rms_distance_after_m, u.chi_after)
+        UnseenRows(
+            u.split,
+            u.name,
+            u.observations,
+            u.rms_distance_before_m,
+            u.rms_distance_after_m,
+            u.chi_after,
+            u.chi_predicted,
+        )
         for u in evidence.proven.held_out
     )
     return EvidenceFields(

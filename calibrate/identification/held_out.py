@@ -113,7 +113,7 @@ def _by_instrument(fitted: Fitted, split: Split, old: HeldOut, new: HeldOut) -> 
     out: list[Unseen] = []
     for measured, first in zip(fitted.weighting.measured, fitted.problem.first_rows, strict=False):
         own = (rows >= first) & (rows < first + measured.problem.rows)
-        if own.any() and new.chi is not None:
+        if own.any() and new.chi is not None and new.chi_predicted is not None:
             rms = [float(np.sqrt(np.mean(errors[own] ** 2))) for errors in (before, after)]
-            out.append(Unseen(measured.name, split.says, int(own.sum()), rms[0], rms[1], new.chi))
+            out.append(Unseen(measured.name, split.says, int(own.sum()), rms[0], rms[1], new.chi, new.chi_predicted))
     return out

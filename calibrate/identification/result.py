@@ -76,7 +76,8 @@ class Unseen:
     observations: int
     rms_distance_before_m: float
     rms_distance_after_m: float
-    chi_after: float  # rms of the whitened prediction error of all instruments together, near 1
+    chi_after: float  # rms of the prediction error over the noise, all instruments together
+    chi_predicted: float  # the same over noise and doubt of the fit together: near 1, however far the rows lie off
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from calibrate.model_file import UnseenRows
 from calibrate.report.elements import Html, table, tag
-from calibrate.report.quantities import angle, fixed, length
+from calibrate.report.quantities import DASH, angle, fixed, length
 from calibrate.sensors.catalogue import kind_of
 
 
@@ -13,9 +13,17 @@ def unseen_rows(found: Sequence[UnseenRows], unproven: Sequence[str]) -> list[Ht
     reasons = [tag("p", f"No proof by {why}.") for why in unproven]
     if not found:
         return [tag("p", "No rows were kept out of the fit: too few, or it was not asked for."), *reasons]
-    head = ("Left out", "reading", "count", "as drawn, rms distance", "identified, rms distance", "over the noise")
+    head = (
+        "Left out",
+        "reading",
+        "count",
+        "as drawn, rms distance",
+        "identified, rms distance",
+        "over the noise",
+        "over noise and sigmas",
+    )
     caption = "Rows that the fit has not seen, predicted from the others"
-    return [table(head, (_proof(p) for p in found), numeric=(2, 3, 4, 5), caption=caption), *reasons]
+    return [table(head, (_proof(p) for p in found), numeric=(2, 3, 4, 5, 6), caption=caption), *reasons]
 
 
 def _proof(proof: UnseenRows) -> tuple[str, ...]:
@@ -28,4 +36,5 @@ def _proof(proof: UnseenRows) -> tuple[str, ...]:
         says(proof.rms_distance_before_m),
         says(proof.rms_distance_after_m),
         fixed(proof.chi_after, 2),
+        DASH if proof.chi_predicted is None else fixed(proof.chi_predicted, 2),
     )

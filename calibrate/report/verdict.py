@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 UNLIKELY = 0.01  # lack of fit: the usual level (Draper, Smith, Applied Regression Analysis, 1998, ch. 2.1)
-WORSE_UNSEEN = 1.5  # whitened error on unseen poses; the doubt of a healthy fit adds 5 to 20 % to 1
+WORSE_UNSEEN = 1.5  # error on unseen poses over its own uncertainty; of a healthy fit near 1
 NOISIER = 3.0  # found over believed; believed noise is often wrong by this much, beyond it something is broken
 AGAIN = "Measure again, with more and more different poses."
 

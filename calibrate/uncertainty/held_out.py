@@ -25,6 +25,8 @@ Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
 P = TypeVar("P", bound=Cuttable)
 
+SEEN = 1e-9  # of the largest singular value of scaled columns: rounding is at 1e-16, what rows see at 1e-3 and above
+
 USABLE = (Status.CONVERGED, Status.RANK_DEFICIENT)  # unseen combinations do not spoil a prediction of like rows
 
 
@@ -44,6 +46,7 @@ class HeldOut:
     proof: Proof
     rows: int  # predicted
     chi: float | None  # rms of the whitened error: 1 = the noise, above it what the fit does not know
+    chi_predicted: float | None  # the same, whitened with what the other rows leave open besides: near 1 unless wrong
     rms: float | None  # rms of `measure`, in its unit; None without one
     refitted: tuple[str, ...]  # what only unseen rows know
     errors: tuple[Floats, ...] = ()  # of each fold, what `measure` gave
@@ -52,6 +55,7 @@ class HeldOut:
 @dataclass(frozen=True)
 class _Fold:
     squares: float
+    predicted_squares: float
     dof: int
     measured: Floats
     refitted: tuple[str, ...]
@@ -73,17 +77,18 @@ def held_out(
         used = np.setdiff1d(np.arange(problem.rows), unseen)
         fold = _fold(problem, used, unseen, theta, measure, by) if len(used) else Proof.TOO_FEW
         if isinstance(fold, Proof):
-            return HeldOut(split.says, fold, 0, None, None, ())
+            return HeldOut(split.says, fold, 0, None, None, None, ())
         folds.append(fold)
     dof = sum(fold.dof for fold in folds)
     if dof <= 0:
-        return HeldOut(split.says, Proof.TOO_FEW, 0, None, None, ())
+        return HeldOut(split.says, Proof.TOO_FEW, 0, None, None, None, ())
     errors = np.concatenate([fold.measured for fold in folds])
     return HeldOut(
         split.says,
         Proof.DONE,
         sum(len(unseen) for unseen in split.unseen),
         float(np.sqrt(sum(fold.squares for fold in folds) / dof)),
+        float(np.sqrt(sum(fold.predicted_squares for fold in folds) / dof)),
         float(np.sqrt(np.mean(errors**2))) if len(errors) else None,
         tuple(dict.fromkeys(name for fold in folds for name in fold.refitted)),
         tuple(fold.measured for fold in folds),
@@ -114,7 +119,32 @@ def _fold(
     residual = test.residual(after)
     measured = np.zeros(0) if measure is None else np.ravel(measure(test, after))
     refitted = tuple(problem.parameters[i].name for i in own)
-    return _Fold(float(residual @ residual), len(residual) - len(own), measured, refitted)
+    predicted = _predicted_squares(residual, train.jacobian(after), test.jacobian(after), kept, own)
+    return _Fold(float(residual @ residual), predicted, len(residual) - len(own), measured, refitted)
+
+
+def _predicted_squares(
+    residual: Floats, train: Floats, test: Floats, parameters: tuple[Parameter, ...], own: list[int]
+) -> float:
+    """Squares r' (I + T C T')^-1 r of the error over its own covariance, noise and doubt of the fit together.
+
+    `train`, `test`: whitened derivatives (value, param); C is the covariance of what the training rows see, and what
+    only the unseen rows know (`own`) is projected out of both. Rows elsewhere than the others are missed by more than
+    the noise although nothing is wrong; this is what tells the two apart.
+    """
+    free = [i for i, p in enumerate(parameters) if p.free]
+    scale = np.linalg.norm(train[:, free], axis=0)
+    scale[scale == 0.0] = 1.0
+    _, sizes, directions = np.linalg.svd(train[:, free] / scale, full_matrices=False)
+    seen = sizes > sizes[0] * SEEN if len(sizes) else np.zeros(0, dtype=bool)
+    spread = test[:, free] / scale @ (directions[seen].T / sizes[seen])
+    if own:
+        onto, _ = np.linalg.qr(test[:, own])
+        spread = spread - onto @ (onto.T @ spread)
+        residual = residual - onto @ (onto.T @ residual)
+    inner = np.eye(spread.shape[1]) + spread.T @ spread  # Woodbury: small where parameters are fewer than values
+    along = spread.T @ residual
+    return float(residual @ residual - along @ np.linalg.solve(inner, along))
 
 
 def _idle(jacobian: Floats, parameters: tuple[Parameter, ...]) -> tuple[int, ...]:

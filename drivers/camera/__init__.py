@@ -1,0 +1,1 @@
+"""A camera on this machine's video interface, by OpenCV: pictures with their time (`device`)."""

@@ -5,9 +5,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from acquisition.streams import Pump
-from acquisition.supervisor import Supervisor
-from acquisition.wired import LATENESS_S, Pumps, Speeds, WiredBench
+from acquisition.wires.bench import LATENESS_S, Pumps, Speeds, WiredBench
+from acquisition.wires.streams import Pump, Supervisor
 from drivers.clock import SystemClock
 from drivers.device import Block
 

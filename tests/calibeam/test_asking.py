@@ -17,7 +17,7 @@ from calibeam.asking import Asking, NotAgreedError
 from calibeam.cli import run
 from calibeam.commands import psd_check
 from calibeam.motion import by_hand
-from calibeam.session.run import OnSite
+from calibeam.sessions.run import OnSite
 
 ROOT = Path(__file__).parents[2]
 RIG, CAMERA_RIG = ROOT / "rigs" / "ur5e-dual-psd.toml", ROOT / "rigs" / "ur5e-dual-psd-camera.toml"
@@ -30,9 +30,9 @@ ASKS = {
     "calibeam/commands/psd_check.py",
     "calibeam/commands/session.py",
     "calibeam/motion/by_hand.py",
-    "calibeam/session/keys.py",
-    "calibeam/session/person.py",
-    "calibeam/session/run.py",
+    "calibeam/sessions/keys.py",
+    "calibeam/sessions/person.py",
+    "calibeam/sessions/run.py",
 }
 PROMPTERS = {"input", "rich.prompt", "readline", "getpass", "click"}
 # Processes whose standard input is a pipe of the program that started them.

@@ -9,9 +9,9 @@ import msgspec
 import pytest
 from rich.console import Console
 
-from acquisition.plan import PlanOptions
 from acquisition.recording import RecordingWriter, RigFileError, read
 from acquisition.recording.rig import load_rig, rig_text
+from acquisition.session.plan import PlanOptions
 from calibeam.cli import run
 from calibeam.devices.camera import camera_sight
 from calibeam.devices.recorder import record_session

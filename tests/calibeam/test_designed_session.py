@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from acquisition.plan import PlanOptions
 from acquisition.recording import RecordingWriter, Samples, read
 from acquisition.recording.pose_plan import PosePlan, read_pose_plan, write_pose_plan
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
+from acquisition.session.plan import PlanOptions
 from calibeam.devices.recorder import record_session
 from calibeam.motion.reachable_poses import candidates_of
 from calibeam.printing.progress import progress_bar

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from acquisition.plan import PlanOptions
 from acquisition.recording import RecordingWriter, read
 from acquisition.recording.rig import load_rig, rig_text
+from acquisition.session.plan import PlanOptions
 from calibeam.devices.recorder import record_session
 from calibeam.devices.site import addresses_of, check_session, connected
 from calibeam.emulation import Emulation

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from acquisition.plan import PlanOptions
 from acquisition.recording import RecordingWriter
 from acquisition.recording.rig import load_rig, rig_text
-from acquisition.sample import Sample
-from acquisition.session import Session
+from acquisition.session.plan import PlanOptions
+from acquisition.session.records import Sample
+from acquisition.session.session import Session
 from calibeam.devices.recorder import RecordingJournal, record_session
 from calibeam.devices.site import addresses_of, connected
 from calibeam.emulation import Emulation

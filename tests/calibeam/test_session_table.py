@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from acquisition.plan import PlanOptions
 from acquisition.recording import RecordingWriter, Samples, read
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from acquisition.session import Session
+from acquisition.session.plan import PlanOptions
+from acquisition.session.session import Session
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibeam.printing.identification import print_identification

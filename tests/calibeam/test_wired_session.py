@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from acquisition.plan import PlanOptions
 from acquisition.recording import Recording, RecordingWriter, read
 from acquisition.recording.rig import Rig, rig_text
-from acquisition.session import Summary
+from acquisition.session.plan import PlanOptions
+from acquisition.session.session import Summary
 from calibeam.devices.recorder import record_session
 from calibeam.devices.site import addresses_of, connected
 from calibeam.emulation import Emulation
@@ -122,7 +122,7 @@ def test_a_controller_that_goes_quiet_ends_the_session(takes: Takes) -> None:
     assert len(takes.recording().samples) >= 2
 
 
-@pytest.mark.endure  # half a minute of searching; in process: tests/acquisition/test_session.py
+@pytest.mark.endure  # half a minute of searching; in process: tests/acquisition/session/test_session.py
 def test_a_light_that_is_gone_for_good_ends_the_session(takes: Takes) -> None:
     takes.emulation.place_fixture = lambda placement: takes.emulation.ask("fixture.place", id=0)
     with pytest.raises(PartialResult, match="check that the laser is on"):

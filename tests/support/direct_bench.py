@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.bench import Look
-from acquisition.camera.eye import Grey
-from acquisition.psd_view import NO_LIGHT, PsdView, PsdWindow
+from acquisition.centring.camera.board import Grey
 from acquisition.recording.rig import Rig
-from acquisition.settling import SettleRule, stretch_to_average
+from acquisition.wires.bench import SettleRule, stretch_to_average
+from acquisition.wires.psd_view import NO_LIGHT, PsdView, PsdWindow
 from drivers.psd_faces import Face, FaceKind
 from simulators.camera.emulator import Eye
 from simulators.camera.true_camera import TrueCamera
@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 
 
 class DirectEye:
-    """Implements acquisition.camera.eye.Eye over a world in this process."""
+    """Implements acquisition.centring.camera.board.Eye over a world in this process."""
 
     def __init__(self, world: World, plain_rig: Mapping[str, Any]) -> None:
         self._eye = Eye(world, plain_rig, world.truth.seed)

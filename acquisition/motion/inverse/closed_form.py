@@ -17,8 +17,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.motion.inverse.kinematics import Kinematics
-from acquisition.motion.rigid import inverse
+from acquisition.motion.kinematics import Kinematics, inverse
 
 Floats = NDArray[np.float64]
 Starts = Callable[[Floats], Floats]  # T_base_flange (pose, 4, 4) -> joint readings (pose, branch, joint), NaN for none

@@ -14,15 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.errors import UnreachableError
-from acquisition.motion.errors import RefusedMotionError
-from acquisition.motion.inverse.solver import Solver
+from acquisition.errors import RefusedMotionError, UnreachableError
+from acquisition.motion.inverse.solve import Solver
+from acquisition.motion.kinematics import apart
 from acquisition.motion.paths.blend import Blend, blend, state_of
-from acquisition.motion.paths.drive import drive_between
-from acquisition.motion.paths.legs import JointLeg, Leg, LineLeg
-from acquisition.motion.paths.segments import By, Pace, Segment
-from acquisition.motion.rigid import apart
-from acquisition.motion.task.place import Place
+from acquisition.motion.paths.legs import JointLeg, Leg, LineLeg, drive_between
+from acquisition.motion.paths.segments import By, Pace, Place, Segment
 
 Floats = NDArray[np.float64]
 

@@ -1,14 +1,35 @@
-"""What a path is made of before it is planned: where to, how, and how fast at most."""
+"""What a path is made of before it is planned: where to (T6 TOOL = COORD(s) POS), how, and how fast at most."""
 
 import enum
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.motion.task.place import Place
+from acquisition.motion.kinematics import inverse
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """`coord` None: fixed in the base. `carried_by` names the moving coordinates: places that share it share COORD."""
+
+    name: str
+    pos: Floats  # (4, 4) of the tool in its coordinates
+    tool: Floats  # (4, 4) of the tool on the flange
+    coord: Callable[[float], Floats] | None = None
+    carried_by: str = ""
+
+    def coord_at(self, s_m: float) -> Floats:
+        """COORD(s), (4, 4)."""
+        return np.eye(4) if self.coord is None else self.coord(s_m)
+
+    def flange_at(self, s_m: float) -> Floats:
+        """T6 (4, 4) with the belt at s."""
+        return self.coord_at(s_m) @ self.pos @ inverse(self.tool)
+
 
 LARGEST_CHANGE = 2.0  # of speed at a corner: from full speed one way to full speed back
 QUARTIC_PEAK = 0.75  # q'' = K (1 - h) 3h / tacc^2 is largest in the middle, with K = change of speed times tacc

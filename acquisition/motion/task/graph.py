@@ -9,11 +9,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.motion.errors import TaskError
-from acquisition.motion.rigid import apart
-from acquisition.motion.task.equation import ARM, Equation, Term, product
-from acquisition.motion.task.place import Place
-from acquisition.motion.task.transforms import Constant, Source
+from acquisition.errors import TaskError
+from acquisition.motion.kinematics import apart
+from acquisition.motion.paths.segments import Place
+from acquisition.motion.task.transforms import ARM, Constant, Equation, Source, Term, product
 
 Floats = NDArray[np.float64]
 

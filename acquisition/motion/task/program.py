@@ -11,7 +11,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from acquisition.motion.errors import TaskError
+from acquisition.errors import TaskError
 from acquisition.recording.files.bounds import Few, Name, Seconds, Whole
 
 

@@ -16,12 +16,11 @@ from pathlib import Path
 import numpy as np
 from msgspec import Struct
 
-from acquisition.motion.errors import TaskError
-from acquisition.motion.rigid import transform
-from acquisition.motion.task.equation import Equation, parse_equation
+from acquisition.errors import TaskError
+from acquisition.motion.kinematics import transform
 from acquisition.motion.task.graph import TaskGraph
 from acquisition.motion.task.program import Step, filled, loops
-from acquisition.motion.task.transforms import Belt, Constant, Source, Unread, Untaught
+from acquisition.motion.task.transforms import Belt, Constant, Equation, Source, Unread, Untaught, parse_equation
 from acquisition.recording.files import parse_toml, read_text
 from acquisition.recording.files.bounds import ZERO, Direction, Few, Line, Name, Rotation, Vector
 

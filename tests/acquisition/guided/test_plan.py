@@ -16,7 +16,7 @@ from acquisition.guided.plan import (
     readings_of,
     verification_plan,
 )
-from acquisition.guided.target import BarEnd, Cone, SphereSpot
+from acquisition.guided.reading import BarEnd, Cone, SphereSpot
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
 from acquisition.recording.rig import load_rig
 

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from acquisition.guided.judge import Doubt
 from acquisition.guided.plan import GuidedVisit
+from acquisition.guided.reading import BarEnd, Cone, Doubt, SphereSpot
 from acquisition.guided.session import GuidedSession
-from acquisition.guided.target import BarEnd, Cone, SphereSpot
-from acquisition.guided.window import Window
+from acquisition.guided.stillness import Window
 from drivers.errors import DeviceLost
 
 CONE, A, B = Cone(1, (0.5, 0.0, 0.1)), BarEnd(1, 1, "a", (0.0, 0.5, 0.1)), BarEnd(1, 1, "b", (0.0, -0.5, 0.1))

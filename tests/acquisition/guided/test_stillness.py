@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from acquisition.guided.stillness import ArmMotion, StillRule
-from acquisition.guided.window import Window
+from acquisition.guided.stillness import ArmMotion, StillRule, Window
 
 T_S = np.arange(0.0, 0.6, 0.01)
 

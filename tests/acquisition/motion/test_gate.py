@@ -5,17 +5,16 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from acquisition.errors import InterruptedMotionError, RefusedMotionError
 from acquisition.motion.cell import Box, Cell, body_points
-from acquisition.motion.errors import InterruptedMotionError, RefusedMotionError
 from acquisition.motion.following import SetPointStream
 from acquisition.motion.gate import Gate
 from acquisition.motion.inverse.closed_form import closed_form
-from acquisition.motion.inverse.solver import Solver
+from acquisition.motion.inverse.solve import Solver
+from acquisition.motion.kinematics import transform
 from acquisition.motion.paths.path import BeltState
-from acquisition.motion.paths.segments import By, Pace, Segment
-from acquisition.motion.rigid import transform
+from acquisition.motion.paths.segments import By, Pace, Place, Segment
 from acquisition.motion.states import REST_S, MotionState
-from acquisition.motion.task.place import Place
 from drivers.errors import DeviceRefused
 from tests.acquisition.motion.conftest import ur5e
 

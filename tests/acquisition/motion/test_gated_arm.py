@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from acquisition.errors import RefusedMotionError
 from acquisition.motion.cell import Box, Cell, SlowArea
-from acquisition.motion.errors import RefusedMotionError
 from acquisition.motion.gated_arm import GatedArm
 from tests.acquisition.motion.conftest import ur5e
 

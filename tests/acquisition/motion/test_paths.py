@@ -7,15 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acquisition.motion.errors import RefusedMotionError
+from acquisition.errors import RefusedMotionError
 from acquisition.motion.inverse.closed_form import closed_form
-from acquisition.motion.inverse.solver import Solver
+from acquisition.motion.inverse.solve import Solver
+from acquisition.motion.kinematics import apart, inverse, transform
 from acquisition.motion.paths.blend import BlendState, blend
-from acquisition.motion.paths.drive import drive_between
+from acquisition.motion.paths.legs import drive_between
 from acquisition.motion.paths.path import BeltState, Path
-from acquisition.motion.paths.segments import By, Pace, Segment
-from acquisition.motion.rigid import apart, inverse, transform
-from acquisition.motion.task.place import Place
+from acquisition.motion.paths.segments import By, Pace, Place, Segment
 from tests.acquisition.motion.conftest import ur5e
 from tests.acquisition.motion.continuity import jumps
 

@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
+from acquisition.errors import RefusedMotionError
 from acquisition.motion.cell import Box, Cell, SlowArea, body_points
-from acquisition.motion.errors import RefusedMotionError
 from acquisition.motion.inverse.closed_form import closed_form
-from acquisition.motion.inverse.solver import Solver
-from acquisition.motion.paths.segments import By, Pace, Segment
+from acquisition.motion.inverse.solve import Solver
+from acquisition.motion.kinematics import transform
+from acquisition.motion.paths.segments import By, Pace, Place, Segment
 from acquisition.motion.plan import OVER, plan
-from acquisition.motion.rigid import transform
-from acquisition.motion.task.place import Place
 from acquisition.recording.rig import load_rig
 from calibeam.motion.gate_of_rig import cell_of, pace_of
 from tests.acquisition.motion.conftest import RIG, ur5e

@@ -5,15 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from acquisition.errors import TaskError
 from acquisition.motion.cell import Cell
-from acquisition.motion.errors import TaskError
 from acquisition.motion.following import SetPointStream
 from acquisition.motion.gate import Gate
 from acquisition.motion.inverse.closed_form import closed_form
-from acquisition.motion.inverse.solver import Solver
+from acquisition.motion.inverse.solve import Solver
+from acquisition.motion.kinematics import apart, transform
 from acquisition.motion.paths.path import BeltState
 from acquisition.motion.paths.segments import Pace
-from acquisition.motion.rigid import apart, transform
 from acquisition.motion.run_task import Around, run_task, teach
 from acquisition.motion.task.graph import TaskGraph
 from acquisition.motion.task.program import Grasp, Move, Read, Release, unrolled

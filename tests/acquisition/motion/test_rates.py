@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 
 from acquisition.motion.inverse.closed_form import closed_form
-from acquisition.motion.inverse.solver import Solver
+from acquisition.motion.inverse.solve import Solver
+from acquisition.motion.kinematics import inverse, transform
 from acquisition.motion.paths.path import BeltState, Path
-from acquisition.motion.paths.segments import By, Pace, Segment
-from acquisition.motion.rigid import inverse, transform
+from acquisition.motion.paths.segments import By, Pace, Place, Segment
 from acquisition.motion.setpoints import LookAhead, solve_rate_hz
-from acquisition.motion.task.place import Place
 from tests.acquisition.motion.conftest import ur5e
 
 SOLVER = Solver(ur5e(), closed_form(ur5e()))

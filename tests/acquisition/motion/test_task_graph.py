@@ -5,11 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acquisition.motion.errors import TaskError
-from acquisition.motion.rigid import apart, inverse, transform
-from acquisition.motion.task.equation import parse_equation
+from acquisition.errors import TaskError
+from acquisition.motion.kinematics import apart, inverse, transform
 from acquisition.motion.task.graph import TaskGraph
-from acquisition.motion.task.transforms import Belt, Constant, Unread, Untaught
+from acquisition.motion.task.transforms import Belt, Constant, Unread, Untaught, parse_equation
 
 vectors = st.tuples(*[st.floats(-1.0, 1.0)] * 3)
 poses = st.builds(transform, vectors, vectors)

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from acquisition.guided.plan import GuidedOptions, calibration_plan
-from acquisition.guided.reading import Reading
+from acquisition.guided.reading import BarEnd, Cone, Reading
 from acquisition.guided.session import GuidedSession, GuidedSummary
-from acquisition.guided.target import BarEnd, Cone
 from acquisition.recording.rig import load_rig, plain_rig, rig_sha256, rig_text
 from calibeam.guided.hand import DirectHand
 from calibeam.guided.judge import FittedJudge

@@ -5,9 +5,8 @@ import io
 import numpy as np
 from rich.console import Console
 
-from acquisition.guided.coverage import Coverage
-from acquisition.guided.guide import GuidedProgress, Request
-from acquisition.guided.target import BarEnd, Cone
+from acquisition.guided.guide import Coverage, GuidedProgress, Request
+from acquisition.guided.reading import BarEnd, Cone
 from calibeam.guided.run import PersonGuide, drawn
 
 CONE = Cone(2, (0.5, 0.1, 0.0))

@@ -10,8 +10,8 @@ import pytest
 from rich.console import Console
 
 from acquisition.guided.plan import GuidedOptions, GuidedVisit, calibration_plan
+from acquisition.guided.reading import BarEnd, Cone
 from acquisition.guided.session import GuidedSummary
-from acquisition.guided.target import BarEnd, Cone
 from acquisition.recording import RecordingWriter, read
 from acquisition.recording.rig import load_rig, rig_text
 from calibeam.emulation import Emulation

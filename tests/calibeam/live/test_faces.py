@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from acquisition.psd_view import PsdView, psd_window
+from acquisition.wires.psd_view import PsdView, psd_window
 from calibeam.live.messages import faces_now, measured_m
 from drivers.device import Block
 from drivers.psd_daq.messages import Flag

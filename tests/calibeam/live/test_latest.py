@@ -2,7 +2,7 @@
 
 import threading
 
-from acquisition.supervisor import Supervisor
+from acquisition.wires.streams import Supervisor
 from calibeam.live.feed import SILENT, Progress
 from calibeam.live.latest import LINES, Latest
 from drivers.errors import DeviceLost

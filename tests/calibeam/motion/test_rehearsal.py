@@ -6,10 +6,10 @@ import msgspec
 import numpy as np
 import pytest
 
-from acquisition.plan import PlanOptions
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
 from acquisition.recording.rig import Rig, load_rig
 from acquisition.recording.rig.schema import MotionBox
+from acquisition.session.plan import PlanOptions
 from calibeam.motion.rehearsal import rehearse
 from calibeam.motion.rehearsal_figure import draw_session
 

@@ -44,7 +44,7 @@ LAZY = (  # loaded by commands when they need them; here once for all
     "calibrate.error_simulation.simulate",
     "calibrate.pose_design.design",
     "calibrate.report.pose_design.page",
-    "acquisition.camera.measuring",
+    "acquisition.centring.camera.measuring",
     "simulators.serve",
 )
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.plan import PlanOptions
 from acquisition.recording import RecordingWriter, read
 from acquisition.recording.rig import load_rig, rig_text
-from acquisition.session import Session
+from acquisition.session.plan import PlanOptions
+from acquisition.session.session import Session
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibrate.diagnose.from_recording import diagnose_samples

@@ -6,9 +6,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from acquisition.planned_session import check_planned
 from acquisition.recording.pose_plan import read_pose_plan, write_pose_plan
 from acquisition.recording.rig import load_rig
+from acquisition.session.planned import check_planned
 from calibeam.motion.reachable_poses import candidates_of, with_grid
 from calibrate.errors import DataError
 from calibrate.pose_design.design import Asked, design, enough_of
@@ -74,7 +74,7 @@ def test_expected_spots_are_those_of_the_rig_as_drawn(rig, candidates, made):
 
 
 def test_candidates_are_within_limits_above_the_table_and_lit(rig, candidates):
-    from acquisition.aiming.reach import clear_of_table
+    from acquisition.centring.aim import clear_of_table
     from calibrate.believed import BelievedRig
     from calibrate.believed_fixture import Light
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acquisition.plan import PlanOptions
 from acquisition.recording import Recording, RecordingWriter, Samples, read
 from acquisition.recording.rig import load_rig, parse_rig, plain_rig, rig_sha256, rig_text
-from acquisition.session import Session
+from acquisition.session.plan import PlanOptions
+from acquisition.session.session import Session
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibeam.results.identification import identify_session, session_model

@@ -54,10 +54,18 @@ def test_noise_below_the_stated_is_advice_and_no_doubt(healthy):
 
 
 def test_unseen_rows_far_beyond_the_noise_call_for_care(healthy):
-    far = tuple(msgspec.structs.replace(p, chi_after=4.0) for p in healthy.model.proofs)
+    far = tuple(msgspec.structs.replace(p, chi_after=4.0, chi_predicted=3.0) for p in healthy.model.proofs)
     judged = session_verdict(changed(healthy, proofs=far))
     assert judged.trust is Trust.CARE
-    assert "4.00 times the noise" in judged.reasons[0]
+    assert "3.00 times what noise and sigmas say" in judged.reasons[0]
+
+
+def test_unseen_rows_that_lie_elsewhere_are_judged_by_what_the_others_leave_open(healthy):
+    """Such as the last block of a session, in postures of its own: missed by four times the noise, as predicted."""
+    far = tuple(msgspec.structs.replace(p, chi_after=4.0, chi_predicted=1.0) for p in healthy.model.proofs)
+    assert session_verdict(changed(healthy, proofs=far)).trust is Trust.GOOD
+    of_an_earlier_file = tuple(msgspec.structs.replace(p, chi_predicted=None) for p in far)
+    assert session_verdict(changed(healthy, proofs=of_an_earlier_file)).trust is Trust.CARE
 
 
 def test_an_arm_no_better_than_its_drawing_is_not_to_be_used(healthy):

@@ -40,6 +40,18 @@ def test_held_out_error_is_above_what_the_fit_says_of_itself(fitted):
     assert np.mean(ratios) > 1.2
 
 
+def test_over_its_own_uncertainty_the_error_is_one_wherever_the_rows_lie(fitted):
+    """Places left out in turn, of few poses each: missed by more than the noise, and by what was to be expected."""
+    over_noise, over_all = [], []
+    for seed in range(6):
+        one = fitted(20 + seed, poses=30)
+        found = held_out(one.problem, by_place(np.arange(30) % 5), one.fit.theta)
+        over_noise.append(found.chi)
+        over_all.append(found.chi_predicted)
+    assert np.sqrt(np.mean(np.square(over_all))) == pytest.approx(1.0, abs=0.12)  # 6 x 90 values: 0.03 one sigma
+    assert np.mean(over_noise) > np.mean(over_all) + 0.1
+
+
 def test_a_drift_at_the_end_shows_in_the_last_block_only(fitted):
     one = fitted(3, poses=80)
     t_s = np.random.default_rng(1).permutation(80).astype(float)
@@ -48,6 +60,7 @@ def test_a_drift_at_the_end_shows_in_the_last_block_only(fitted):
     still = held_out(one.problem, last_block(t_s), one.fit.theta)
     found = held_out(drifted, last_block(t_s), solve(drifted).theta)
     assert still.chi < 2.0 < 5.0 < found.chi
+    assert still.chi_predicted < 1.5 < 4.0 < found.chi_predicted
 
 
 def test_a_joint_problem_is_cut_the_same_way(fitted):

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from acquisition.camera.board import Board
+from acquisition.centring.camera.board import Board
 from acquisition.recording.rig import load_rig
 from calibeam.emulation import Emulation
 from drivers.camera.device import Camera
@@ -34,8 +34,7 @@ def emulation(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Emulation]:
 
 
 def before_the_board(rig) -> list[float]:
-    from acquisition.aiming.pose import BeamTarget, flange_for
-    from acquisition.aiming.reach import reach
+    from acquisition.centring.aim import BeamTarget, flange_for, reach
     from calibeam.learner import FittedLearner
 
     learner = FittedLearner(rig)

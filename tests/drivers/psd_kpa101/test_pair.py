@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from acquisition.psd_view import PsdView, psd_window
+from acquisition.wires.psd_view import PsdView, psd_window
 from drivers.clock import SystemClock
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale, WireError
 from drivers.psd_daq.messages import Flag

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition.reopening import Reopening
+from acquisition.wires.attaching import Reopening
 from drivers.cia406.device import Cia406Encoders
 from drivers.clock import SystemClock
 from drivers.device import Device

@@ -1,0 +1,186 @@
+"""An identified arm in a notebook: its numbers with their doubt, as tables and as an arm that computes."""
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.recording import Samples
+from calibeam.notebook.tables import SCREEN, pandas_if_installed
+
+if TYPE_CHECKING:
+    from calibeam.results.identification import JudgedModel
+    from calibrate.model_file import ModelFile, ModelParameter
+    from calibrate.physics.predicting import Placed
+
+Floats = NDArray[np.float64]
+Frame = Literal["robot", "world"]  # of sigmas: the robot's own base frame, or that of the device or fixture
+
+
+@dataclass(frozen=True)
+class Model:
+    """An identified arm: numbers with their doubt. `file` holds everything that model.json does."""
+
+    file: "ModelFile"
+    trust: str  # "good", "care" or "bad"
+    says: str  # the verdict in one sentence
+    reasons: tuple[str, ...]  # what speaks against trusting it
+
+    def zeros(self) -> dict[int, tuple[float | None, float | None]]:
+        """Joint (from 1) -> (zero, one sigma) in rad; true angle = reading + zero. (None, None): not determined."""
+        found = {p.name: p for p in self.file.parameters}
+        names = [name for name in found if name.startswith("joint") and name.endswith(".zero")]
+        return {int(n[5:-5]): (found[n].value, found[n].sigma) for n in names}
+
+    @property
+    def parameters(self) -> Any:
+        """One row a parameter: name, unit, value, sigma, low, high, undetermined; SI units.
+
+        A pandas.DataFrame with the names as its index where pandas is installed, else a list of dictionaries.
+        """
+        keys = ("name", "unit", "value", "sigma", "low", "high", "undetermined")
+        rows = [{key: getattr(p, key) for key in keys} for p in self.file.parameters]
+        pandas = pandas_if_installed()
+        return rows if pandas is None else pandas.DataFrame(rows, columns=list(keys)).set_index("name")
+
+    def __getitem__(self, name: str) -> "ModelParameter":
+        """One parameter by its name in model.json, SI units. KeyError for a name that the model does not have."""
+        for parameter in self.file.parameters:
+            if parameter.name == name:
+                return parameter
+        raise KeyError(f"'{name}': no parameter of the model; it has {', '.join(p.name for p in self.file.parameters)}")
+
+    def flange(
+        self, q_rad: Floats, conditions: "Mapping[str, Floats | float] | None" = None, *, same_session: bool = False
+    ) -> Floats:
+        """T_base_flange (pose, 4, 4), m, at joint readings (pose, joint) or (joint,), rad, with the model's effects.
+
+        `conditions`: columns of samples.csv by name, (pose,) or one value for all poses: payload_kg, approach2,
+        temp_arm_degC, ... (`file.needs` lists those that the effects need). A missing one is named in a UserWarning,
+        taken as the mean of the model's session, and widens `flange_sigma`. `same_session`: as of `predict`. DataError
+        where an effect cannot be evaluated.
+        """
+        return self._placed(q_rad, conditions, same_session).T_base_flange
+
+    def flange_sigma(
+        self,
+        q_rad: Floats,
+        conditions: "Mapping[str, Floats | float] | None" = None,
+        *,
+        same_session: bool = False,
+        frame: Frame = "robot",
+    ) -> Floats:
+        """(pose, 6) one sigma of `flange`: m along x, y, z of the base, rad about them. NaN without a covariance.
+
+        In the frame "robot": doubt of geometry and physics, as seen from the base frame that lies best on the arm over
+        its joint limits; where the base stands and how it is turned is no part of it. In the frame "world" that counts,
+        too: where only a device of unknown place has seen the arm, it is most of it. Without noise of any instrument.
+        """
+        return self._placed(q_rad, conditions, same_session, frame).flange_sigma
+
+    def tip(
+        self, q_rad: Floats, conditions: "Mapping[str, Floats | float] | None" = None, *, same_session: bool = False
+    ) -> Floats:
+        """(pose, 3) target or probe tip in the base, m; arguments, warnings and errors as of `flange`.
+
+        Where neither rig nor model knows a tip, the centre of the flange.
+        """
+        return self._placed(q_rad, conditions, same_session).tip_m
+
+    def tip_sigma(
+        self,
+        q_rad: Floats,
+        conditions: "Mapping[str, Floats | float] | None" = None,
+        *,
+        same_session: bool = False,
+        frame: Frame = "robot",
+    ) -> Floats:
+        """(pose, 3) one sigma of `tip`, m; what it contains in either frame: as of `flange_sigma`, and of the tool."""
+        return self._placed(q_rad, conditions, same_session, frame).tip_sigma_m
+
+    def predict(self, samples: Mapping[str, NDArray[np.generic]], *, same_session: bool = False) -> dict[str, Floats]:
+        """Columns of predicted.csv, name -> (row,), for columns of samples.csv; effects of the model are applied.
+
+        `same_session`: the samples are of the recording that the model was found in. DataError where an effect cannot
+        be evaluated, SamplesError where joint angles or t_s are missing.
+        """
+        from acquisition.recording.rig import parse_rig
+        from calibrate.physics.predicting import predict_with_physics
+
+        joints = parse_rig(self.file.rig.text or "", "rig.toml in the model").n_joints
+        table = Samples({name: np.asarray(values) for name, values in samples.items()}, joints)
+        return predict_with_physics(self.file, table, same_session).columns
+
+    def _placed(
+        self,
+        q_rad: Floats,
+        conditions: "Mapping[str, Floats | float] | None",
+        same_session: bool,
+        frame: Frame = "robot",
+    ) -> "Placed":
+        """ValueError for a frame of another name."""
+        from calibrate.physics.predicting import placed
+
+        if frame not in get_args(Frame):
+            raise ValueError(f"frame '{frame}': give one of {', '.join(get_args(Frame))}")
+        q = np.atleast_2d(np.asarray(q_rad, dtype=np.float64))
+        columns = {name: np.broadcast_to(value, len(q)) for name, value in (conditions or {}).items()}
+        joints = {f"q{i + 1}_rad": column for i, column in enumerate(q.T)}
+        samples = Samples({"t_s": np.zeros(len(q))} | columns | joints, q.shape[1])
+        found = placed(self.file, samples, same_session, in_world=frame == "world")
+        for note in found.notes:
+            warnings.warn(note, stacklevel=3)
+        return found
+
+    def save(self, path: Path | str) -> Path:
+        """Write model.json; returns the path. OSError where it cannot be written."""
+        from calibrate.model_file import write_model
+
+        write_model(Path(path), self.file)
+        return Path(path)
+
+    def export(self, form: str, path: Path | str) -> tuple[str, ...]:
+        """Write the arm for another program, by a word of `calibeam identify --export-…` such as "urdf" or "dh-csv".
+
+        Returns sentences on what the file cannot carry; they stand in it, too. DataError for an arm that the form
+        cannot hold, ValueError for a form that there is not, OSError where it cannot be written.
+        """
+        from acquisition.recording.rig import parse_rig
+        from calibrate.export.export import ExportForm, export_model
+
+        rig = parse_rig(self.file.rig.text or "", "rig.toml in the model")
+        return export_model(Path(path), rig, self.file, ExportForm(form))
+
+    def __repr__(self) -> str:
+        return f"<calibeam.Model of {self.file.rig.name}: {self.says}>"
+
+    def _repr_html_(self) -> str:
+        """One screen in a notebook: the verdict, what speaks against it, the parameters with one sigma."""
+        rows = "".join(f"<tr><td>{escape(p.name)}</td>{_cells(p)}</tr>" for p in self.file.parameters[:SCREEN])
+        more = len(self.file.parameters) - SCREEN
+        rest = f"<p>and {more} more: <code>model.parameters</code></p>" if more > 0 else ""
+        reasons = "".join(f"<li>{escape(reason)}</li>" for reason in self.reasons)
+        head = "<tr><th>parameter</th><th>value</th><th>one sigma</th><th>unit</th></tr>"
+        return f"<p><b>{escape(self.says)}</b></p><ul>{reasons}</ul><table>{head}{rows}</table>{rest}"
+
+    def __str__(self) -> str:
+        lines = [self.says, *(f"  {reason}" for reason in self.reasons)]
+        for joint, (zero, sigma) in self.zeros().items():
+            told = "not determined" if zero is None or sigma is None else f"{zero:+.6f} ± {sigma:.6f} rad"
+            lines.append(f"joint {joint} zero: {told}")
+        return "\n".join(lines)
+
+
+def model_of(found: "JudgedModel") -> Model:
+    return Model(found.model, found.verdict.trust.value, found.verdict.sentence, found.verdict.reasons)
+
+
+def _cells(parameter: "ModelParameter") -> str:
+    if parameter.value is None or parameter.sigma is None:
+        return f'<td colspan="3">not determined: {escape(parameter.undetermined or "")}</td>'
+    return f"<td>{parameter.value:.6g}</td><td>{parameter.sigma:.2g}</td><td>{escape(parameter.unit)}</td>"

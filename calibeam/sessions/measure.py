@@ -1,0 +1,167 @@
+"""One part of a session measured: devices connected and recorded, the plan taken under run control, with forecasts."""
+
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.centring.camera.board import Sight
+from acquisition.centring.loop import Limits
+from acquisition.recording import Event, RecordingWriter
+from acquisition.session.control import RunControl
+from acquisition.session.plan import Block
+from acquisition.session.planned import PlannedSession
+from acquisition.session.records import Sample
+from acquisition.session.session import Session, Summary
+from acquisition.wires.bench import WiredBench
+from calibeam.devices.camera import camera_sight
+from calibeam.devices.recorder import RecordingJournal, end_event, kept, new_recording
+from calibeam.devices.site import connected
+from calibeam.interrupts import INTERRUPTS
+from calibeam.learner import FittedLearner
+from calibeam.live.feed import Feed
+from calibeam.outcome import PartialResult
+from calibeam.sessions.forecast import Ahead, Asked, Forecast, Forecaster, forecast
+from calibeam.sessions.job import STANDS_IN, Job, Part, notes_of
+from calibeam.sessions.keys import Keys
+from calibeam.sessions.person import Person
+from calibeam.sessions.reporter import ReportingJournal, StatusReporter
+from drivers.clock import Clock
+
+FORECAST_EVERY = 5  # poses; one takes a tenth of a second, in a thread of its own
+
+
+class Measuring:
+    """A part under way: `take` its plan, then more where that is wanted. Owns the samples of the part."""
+
+    def __init__(
+        self,
+        job: Job,
+        part: Part,
+        ahead: Ahead,
+        bench: WiredBench,
+        writer: RecordingWriter,
+        clock: Clock,
+        told: tuple[StatusReporter, Person],
+        sight: Sight | None = None,
+    ) -> None:
+        self._job, self._part, self._ahead = job, part, ahead
+        self._bench, self._writer, self._clock = bench, writer, clock
+        self._reporter, self._person = told
+        self._samples: list[Sample] = []
+        self._forecaster = Forecaster(self._forecast, self._no_forecast)
+        self._control = RunControl(
+            bench.stop,
+            clock,
+            lambda: bench.supervisor.failure,
+            self._reporter.state,
+            hold_arm=bench.hold,
+            undelivered=self._reporter.undelivered,
+            rests_in_s=bench.rests_in_s,
+            ease_arm=bench.ease,
+            pausing=lambda rests_in_s, eased: self._reporter.pausing(rests_in_s, bench.ease_s if eased else None),
+        )
+        self._session = self._session_of(sight)
+
+    def take(self, more: Sequence[Block] = ()) -> Summary:
+        """All that was taken in this part so far. PartialResult when it ended early: the arm stands."""
+        with Keys(self._control, self._person.keyboard) as keys, self._person.at(keys), self._forecaster.running():
+            try:
+                summary = kept(self._bench, self._writer, self._clock, self._session, self._run(more))
+            except PartialResult as early:
+                INTERRUPTS.close()  # a recording is being closed
+                self._reporter.ended_early(early)
+                raise
+        end_event(self._writer, self._clock, summary)
+        return summary
+
+    def forecast_now(self) -> Forecast:
+        """With all samples; ahead is what was not taken."""
+        return self._made(Asked(list(self._samples), self._behind()))
+
+    @property
+    def placement(self) -> int | None:
+        """Where the fixture stands."""
+        return self._samples[-1].placement if self._samples else self._part.earlier.standing
+
+    def _session_of(self, sight: Sight | None) -> Session | PlannedSession:
+        rig, options, earlier = self._part.rig, self._job.options, self._part.earlier.taken
+        journal = ReportingJournal(RecordingJournal(self._writer, self._clock), self._reporter, self._took)
+        learner, home_rad = FittedLearner(rig), np.array(rig.motion.home_rad)
+        tell, limits, control = self._reporter.progress, Limits(step_rad=rig.motion.step_limit_rad), self._control
+        if self._part.plan is not None:
+            return PlannedSession(
+                self._bench,
+                learner,
+                journal,
+                options,
+                home_rad,
+                tell=tell,
+                sight=sight,
+                control=control,
+                earlier=earlier,
+            )
+        return Session(
+            self._bench, learner, journal, options, home_rad,
+            limits=limits, tell=tell, sight=sight, control=control, earlier=earlier,
+        )  # fmt: skip
+
+    def _run(self, more: Sequence[Block]) -> Callable[[], Summary]:
+        standing = None if self._samples else self._part.earlier.standing
+        if isinstance(self._session, Session):
+            return partial(self._session.take, more or self._part.blocks, standing)
+        assert self._part.plan is not None  # noqa: S101 - it is why the session is one of a plan
+        return partial(self._session.run, self._part.plan, standing)
+
+    def _took(self, samples: list[Sample]) -> None:
+        self._samples = samples
+        if len(samples) % FORECAST_EVERY == 0:
+            self._forecaster.ask(Asked(list(samples), self._behind()))
+
+    def _behind(self) -> int:
+        progress = self._reporter.shown.progress
+        return 0 if progress is None else progress.done + progress.skipped
+
+    def _forecast(self, asked: Asked) -> None:
+        self._reporter.forecast(self._made(asked))
+
+    def _made(self, asked: Asked) -> Forecast:
+        taken = [*self._part.earlier.taken.values(), *asked.samples]
+        return forecast(self._part.rig, taken, self._ahead.after(asked.taken_of_plan), self._job.goal_m)
+
+    def _no_forecast(self, why: Exception) -> None:
+        self._reporter.report(f"no more forecasts in this session: {type(why).__name__}: {why}", on_screen=False)
+
+
+@contextmanager
+def measuring(
+    job: Job, part: Part, ahead: Ahead, path: Path, clock: Clock, told: tuple[StatusReporter, Person], feed: Feed
+) -> Generator[Measuring]:
+    """Devices connected, the recording begun. DeviceError, RecordingError, and what `camera_sight` raises."""
+    mover = partial(_asked_for, part, told[1]) if job.place is None else partial(_emulated, part, job.place)
+    with (
+        new_recording(path, part.text, clock, notes_of(job, part.seed)) as writer,
+        camera_sight(part.rig, clock) as sight,
+        connected(part.rig, job.addresses, writer, clock, mover, feed) as bench,
+    ):
+        feed.measures(part.rig)
+        for place in part.earlier.added:
+            instead_of = next((k for k, v in part.earlier.stands_in.items() if v == place.id), None)
+            writer.event(Event(clock.now_s(), STANDS_IN, {"id": place.id, "instead_of": instead_of}))
+        yield Measuring(job, part, ahead, bench, writer, clock, told, sight)
+
+
+def _emulated(part: Part, place: Callable[[int], None], placement: int) -> None:
+    """An emulated fixture knows the places of the rig file only: one that was measured anew is where it was."""
+    origin = {new: old for old, new in part.earlier.stands_in.items()}
+    while placement in origin:
+        placement = origin[placement]
+    place(placement)
+
+
+def _asked_for(part: Part, person: Person, placement: int) -> None:
+    """Has a person place the fixture."""
+    where = ", ".join(f"{value:.3f}" for value in part.rig.placements[placement].psd1_in_base.origin_m)
+    person.place(f"put the fixture at place {placement} (PSD 1 near {where} m in the base)")

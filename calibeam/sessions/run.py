@@ -1,0 +1,274 @@
+"""A whole session on site, step by step: devices, plan, arm, measure, look, result.
+
+What a person decides is asked where there is one; a script gets what is safe: no motion without --yes unless the
+devices are emulated, and a fixture that nobody vouches for counts as moved.
+"""
+
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager, nullcontext
+from dataclasses import replace
+
+from rich.console import Console
+
+from acquisition.errors import AcquisitionError
+from acquisition.recording.mcap import next_part, parts
+from acquisition.recording.rig import Placement
+from acquisition.session.planned import check_planned
+from acquisition.session.session import Summary
+from calibeam.asking import Asking
+from calibeam.devices.check import DeviceCheck, check_devices
+from calibeam.interrupts import INTERRUPTS
+from calibeam.learner import FittedLearner
+from calibeam.live.feed import SILENT, Feed
+from calibeam.outcome import PartialResult, interruption
+from calibeam.sessions.forecast import ahead_of_blocks, ahead_of_plan
+from calibeam.sessions.job import (
+    EarlierParts,
+    Job,
+    Part,
+    more_at,
+    new_place,
+    part_of,
+    placement_text,
+    read_earlier_parts,
+    same_place,
+    with_fixture_moved,
+    with_place,
+)
+from calibeam.sessions.measure import Measuring, measuring
+from calibeam.sessions.person import Person
+from calibeam.sessions.reporter import StatusReporter
+from calibeam.sessions.status import Listener, clock_words
+from calibeam.sessions.views import NAME, LogFile, PageView, PlainView, TerminalView
+from calibrate.pose_design.candidates import POSE_S
+from drivers.clock import Clock, SystemClock
+from drivers.errors import DeviceError, DeviceRefused
+
+GO_ON = "to go on, give the same command with --continue"
+FINISH, MORE, PLACE = "f", "m", "n"
+
+
+class OnSite:
+    """The steps; owns which part of the session comes next."""
+
+    def __init__(
+        self, job: Job, console: Console, clock: Clock, feed: Feed, asking: Asking | None, *, agrees: bool
+    ) -> None:
+        self._job, self._console, self._clock, self._feed = job, console, clock, feed
+        terminal = TerminalView(console) if asking is not None and console.is_terminal else None
+        view: Listener = PlainView(console) if terminal is None else terminal
+        self.reporter = StatusReporter(job.rig, clock, (LogFile(job.out / NAME), view, PageView(feed)))
+        opened = {} if terminal is None else {"view": terminal.opened}
+        self._person = Person(console, self.reporter, asking, agrees=agrees, **opened)
+        self._half_size_m = FittedLearner(job.rig).optics.half_size_m
+
+    def run(self, earlier: EarlierParts, *, stands: bool) -> None:
+        """Everything, until there is nothing more to be measured. PartialResult, and what its steps raise.
+
+        `stands`: the fixture has not been touched since the earlier parts.
+        """
+        self._devices()
+        earlier, agreed, broken = self._since(earlier, stands=stands), False, False
+        while True:
+            with self._kept() if broken else nullcontext():
+                part = part_of(self._job, earlier, self._half_size_m)
+                if part.left == 0:
+                    self.reporter.report("everything that was planned is taken")
+                    break
+                self._plan(part)
+                if not agreed:
+                    self.reporter.step("arm")
+                    self._person.arm()
+                    agreed = True
+            try:
+                place = self._measure(part)
+            except PartialResult as early:
+                if not self._goes_on(early):
+                    raise
+                with self._kept():
+                    agreed, broken, earlier = False, True, self._again()
+                continue
+            if place is None:
+                break
+            earlier = with_place(read_earlier_parts(self._job.out, self._job.rig), place)
+        self.reporter.step("result")
+        files = parts(self._job.out)
+        from calibeam.results.session_results import (
+            write_session_results,  # a second of libraries that no device waits for
+        )
+
+        write_session_results(files[0] if len(files) == 1 else self._job.out, self._console)
+
+    @contextmanager
+    def _kept(self) -> Generator[None]:
+        """After a first part there is something to keep: what ends the session ends it in part."""
+        try:
+            yield
+        except (AcquisitionError, DeviceError, KeyboardInterrupt) as why:
+            INTERRUPTS.close()
+            reason = interruption(why) if isinstance(why, KeyboardInterrupt) else str(why)
+            raise PartialResult(f"{reason}; what was taken is kept in {self._job.out}; {GO_ON}") from why
+
+    def _devices(self) -> None:
+        """One line each; goes on when all are good, or a person says so. DeviceRefused where one cannot be had."""
+        self.reporter.step("devices")
+        if self._job.addresses.hurry != 1.0:
+            self.reporter.report("emulators at another pace than real time: their devices are not judged")
+            return
+        while True:
+            checks = list(self._told())
+            missing = [check.line for check in checks if check.wrong and not check.what]
+            if not any(check.wrong for check in checks):
+                return
+            answer = self._person.choose(
+                "something is wrong:",
+                {"r": "it is mended: try again", "g": "go on all the same", "e": "end"},
+                default="e" if missing else "g",
+                at_end="e",
+            )
+            if answer == "e":
+                raise DeviceRefused("; ".join(check.line for check in checks if check.wrong))
+            if answer == "g":
+                return
+
+    def _goes_on(self, early: PartialResult) -> bool:
+        """A device failed, and the arm was stopped: whether to go on is a person's decision, never the program's."""
+        if not isinstance(early.__cause__, DeviceError):
+            return False
+        INTERRUPTS.heed()
+        self.reporter.asked("the arm was stopped; answer at the terminal whether the session goes on")
+        try:
+            answer = self._person.choose(
+                "the arm was stopped, and the recording is closed:",
+                {
+                    "g": "go on: check the devices, then ask before the arm moves",
+                    "e": "end here; --continue goes on later",
+                },
+                default="e",
+                at_end="e",
+            )
+        except KeyboardInterrupt:
+            return False
+        finally:
+            self.reporter.asked("")
+        if answer != "g":
+            INTERRUPTS.close()  # the exit code is decided
+        return answer == "g"
+
+    def _again(self) -> EarlierParts:
+        """After a failure every device is connected anew, and asked for, into a further recording."""
+        self._devices()
+        return self._since(read_earlier_parts(self._job.out, self._job.rig), stands=False)
+
+    def _told(self) -> Iterator[DeviceCheck]:
+        for check in check_devices(self._job.rig, self._clock):
+            self.reporter.report(check.line)
+            yield check
+
+    def _since(self, earlier: EarlierParts, *, stands: bool) -> EarlierParts:
+        """Where the fixture stands now, as far as it matters: a place that was left half done."""
+        standing = earlier.standing
+        if standing is None:
+            return earlier
+        part = part_of(self._job, earlier, self._half_size_m)
+        if not part.open_at(standing):
+            return replace(earlier, standing=None)
+        question = f"does the fixture still stand at place {standing}?"
+        told = {"y": "yes, nobody has touched it", "n": "no, or nobody knows: it is measured anew, as a new place"}
+        if stands or self._person.choose(question, told, "n", "n") == "y":
+            return earlier
+        place = same_place(part.rig, standing)
+        self.reporter.report(
+            f"place {standing} is measured anew as place {place.id}; what was taken there still counts"
+        )
+        return with_fixture_moved(earlier, place, standing)
+
+    def _plan(self, part: Part) -> None:
+        """Gone through and drawn before anything moves."""
+        from calibeam.motion.rehearsal_figure import draw_session  # matplotlib takes a second to load
+
+        self.reporter.step("plan")
+        drawing = next_part(self._job.out).with_suffix(".plan.svg")
+        self.reporter.report(draw_session(part.rig, drawing, part.options, part.plan))
+        before = f", {len(part.earlier.taken)} taken before" if part.earlier.begun else ""
+        about = clock_words(POSE_S * part.left / self._job.addresses.hurry)
+        self.reporter.report(f"{part.left} readings to take, repeats among them{before}; about {about}")
+
+    def _measure(self, part: Part) -> Placement | None:
+        """A part; a further place that a person wants, None: it is enough."""
+        self.reporter.step("measure")
+        ahead = ahead_of_blocks(part.rig, part.blocks) if part.plan is None else ahead_of_plan(part.rig, part.plan)
+        path = next_part(self._job.out)
+        try:
+            with measuring(
+                self._job, part, ahead, path, self._clock, (self.reporter, self._person), self._feed
+            ) as session:
+                summary, rounds = session.take(), 0
+                while True:
+                    self._look(session, summary, part)
+                    answer = self._decide(part)
+                    if answer != MORE or session.placement is None:
+                        break
+                    rounds += 1
+                    self.reporter.step("measure")
+                    summary = session.take(more_at(part, session.placement, self._half_size_m, part.options, rounds))
+        except KeyboardInterrupt as why:  # at a question, while the arm stands
+            INTERRUPTS.close()
+            raise PartialResult(f"{interruption(why)}; what was taken is kept in {path}; {GO_ON}") from why
+        except PartialResult as early:
+            raise PartialResult(f"{early}; {GO_ON}") from early.__cause__
+        self.reporter.report(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {path}")
+        return self._new_place(part) if answer == PLACE else None
+
+    def _look(self, session: Measuring, summary: Summary, part: Part) -> None:
+        """How good it is."""
+        self.reporter.step("look")
+        quality = self.reporter.shown.quality
+        settled = "" if quality is None or not quality.unsettled else f", {quality.unsettled} of them did not settle"
+        self.reporter.report(
+            f"{len(part.earlier.taken) + len(summary.samples)} poses{settled}; {summary.skipped} left out"
+        )
+        try:
+            forecast = session.forecast_now()
+        except Exception as why:  # as in forecast.py: what was measured is worth more than a forecast of it
+            self.reporter.report(f"no forecast: {type(why).__name__}: {why}")
+            return
+        self.reporter.forecast(forecast)
+        self.reporter.report(f"predicted error of the beam in free space: {forecast.says}")
+
+    def _decide(self, part: Part) -> str:
+        choices = {FINISH: "finish: identify, diagnose, report"}
+        if part.plan is None:
+            choices |= {MORE: "more poses, the fixture stays", PLACE: "a further place of the fixture"}
+        return self._person.choose("what next?", choices, FINISH, FINISH)
+
+    def _new_place(self, part: Part) -> Placement | None:
+        """None: the terminal went instead of an answer, and it is enough."""
+        numbers = self._person.numbers("PSD 1 in the base: x y z in m, and the turn about z in degrees", 4)
+        if numbers is None:
+            return None
+        place = new_place(part.rig, numbers)
+        self.reporter.report(f"place {place.id}; to keep it, add to the rig file:{placement_text(place)}")
+        return place
+
+
+def run_session(
+    job: Job,
+    console: Console,
+    earlier: EarlierParts,
+    feed: Feed = SILENT,
+    *,
+    asking: Asking | None,
+    agrees: bool,
+    stands: bool,
+) -> None:
+    """The whole session. `earlier`: what it goes on with; `stands`: the fixture has not been touched since.
+
+    `asking`: the terminal at which a person sits; `agrees`: who needs not be asked whether the arm may move.
+    """
+    if job.plan is not None:
+        check_planned(job.plan)
+    clock = SystemClock()
+    job.out.mkdir(parents=True, exist_ok=True)
+    site = OnSite(job, console, clock, feed, asking, agrees=agrees)
+    site.run(earlier, stands=stands)

@@ -1,0 +1,53 @@
+"""Steps of a session on site, one at a time, without devices."""
+
+from types import SimpleNamespace
+
+import pytest
+from rich.console import Console
+
+from acquisition.session.plan import PlanOptions
+from acquisition.session.session import Summary
+from calibeam.asking import Asking
+from calibeam.devices.check import DeviceCheck
+from calibeam.devices.site import addresses_of
+from calibeam.live.feed import SILENT
+from calibeam.sessions.job import EarlierParts, Job, part_of
+from calibeam.sessions.run import OnSite
+from drivers.clock import SystemClock
+from drivers.errors import DeviceRefused
+
+from .conftest import RIG_FILE
+
+
+@pytest.fixture
+def site(rig, tmp_path) -> OnSite:
+    job = Job(rig, RIG_FILE.read_text(), tmp_path, addresses_of(rig), PlanOptions())
+    return OnSite(job, Console(quiet=True), SystemClock(), SILENT, None, agrees=True)
+
+
+def test_a_forecast_that_cannot_be_made_is_said_and_ends_nothing(site, tmp_path) -> None:
+    def fails() -> None:
+        raise ZeroDivisionError("no pose ahead")
+
+    part = part_of(site._job, EarlierParts(), 0.01)
+    site._look(SimpleNamespace(forecast_now=fails), Summary((), (), 2), part)
+    log = (tmp_path / "session.log").read_text()
+    assert "0 poses; 2 left out" in log
+    assert "no forecast: ZeroDivisionError: no pose ahead" in log
+
+
+def test_a_terminal_that_goes_instead_of_the_numbers_of_a_place_finishes(rig, tmp_path, typist) -> None:
+    job = Job(rig, RIG_FILE.read_text(), tmp_path, addresses_of(rig), PlanOptions())
+    site = OnSite(job, Console(quiet=True), SystemClock(), SILENT, Asking(typist.terminal), agrees=False)
+    typist.answers("> ", "\x04")
+    assert site._new_place(part_of(job, EarlierParts(), 0.01)) is None
+
+
+def test_devices_that_are_wrong_end_the_session_where_the_input_ends(rig, tmp_path, typist, monkeypatch) -> None:
+    job = Job(rig, RIG_FILE.read_text(), tmp_path, addresses_of(rig), PlanOptions())
+    site = OnSite(job, Console(quiet=True), SystemClock(), SILENT, Asking(typist.terminal), agrees=False)
+    monkeypatch.setattr(OnSite, "_told", lambda _: [DeviceCheck("psd", "PSD2001-E", wrong="too few samples")])
+    typist.ahead("g\n")
+    typist.answers("something is wrong: [r/g/e, ENTER: g] ", "\x04")
+    with pytest.raises(DeviceRefused, match="too few samples"):
+        site._devices()
