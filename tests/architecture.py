@@ -147,8 +147,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 839,
-    "lines": 92_400,
+    "files": 848,
+    "lines": 94_700,
     "longest_function": 54,
     "one_importer": 49,
     "classes": 38,
