@@ -63,7 +63,7 @@ GROUPS: dict[str, tuple[ListedCommand, ...]] = {
         ListedCommand("prove", "prove:prove_command", "Test the diagnosis on sessions with hidden physics."),
     ),
     "Files": (
-        ListedCommand("import", "export:import_command", "Make a recording of a session folder or of a CAN log."),
+        ListedCommand("import", "import_files:import_command", "Make a session of a table, a log or a session folder."),
         ListedCommand(
             "export", "export:export_command", "Write a recording as tables, or its CAN frames as a CAN log."
         ),

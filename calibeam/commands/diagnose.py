@@ -5,9 +5,9 @@ from pathlib import Path
 import msgspec
 from rich.console import Console
 
-from acquisition.recording import read
-from calibeam.printing.results import print_diagnosis
-from calibeam.results.diagnosis import diagnose_recording, plan_next, refuse_wrong_file
+from acquisition.recording import Recording, read
+from calibeam.printing.results import print_diagnosis, print_streams
+from calibeam.results.diagnosis import diagnose_recording, diagnose_streams, plan_next, refuse_wrong_file
 from calibeam.results.identification import naming_source
 from calibrate.diagnose.file import write_diagnosis
 from calibrate.model_file import read_model, write_model
@@ -36,7 +36,7 @@ def diagnose_command(
     Parameters
     ----------
     recording
-        A recording, or a session folder with rig.toml and samples.csv.
+        A recording, or a session folder with rig.toml and samples.csv. Of one without samples its streams are judged.
     model
         A model of the same rig, with or without physics: only what is new beside it is asked. On a later recording
         its values enter with their covariance, and what has changed is named.
@@ -54,6 +54,9 @@ def diagnose_command(
     """
     known = None if model is None else read_model(model)
     source, console = read(recording), Console()
+    if len(source.samples) == 0 and source.streams:
+        _streams_only(console, source, out, json=json)
+        return
     with naming_source(recording):
         found, file = diagnose_recording(source, known)
         write_diagnosis(out, file)
@@ -71,3 +74,13 @@ def diagnose_command(
     if not json:
         for line in filter(None, (planned, f"diagnosis: {out}", modelled, f"report: {page}")):
             console.print(line, markup=False, highlight=False)
+
+
+def _streams_only(console: Console, source: Recording, out: Path, *, json: bool) -> None:
+    file = diagnose_streams(source)
+    write_diagnosis(out, file)
+    if json:
+        print(msgspec.json.encode(file).decode())
+        return
+    print_streams(console, file)
+    console.print(f"diagnosis: {out}", markup=False, highlight=False)

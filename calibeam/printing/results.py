@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from rich.console import Console
 from rich.table import Table
 
-from calibrate.diagnose.schema import DiagnosisFile, FindingRecord
+from calibrate.diagnose.schema import ClockRecord, DiagnosisFile, FindingRecord
 from calibrate.report.diagnosis.words import (
     before_after,
     free_space_words,
@@ -35,6 +35,31 @@ def print_diagnosis(console: Console, file: DiagnosisFile) -> None:
         console.print(_proof(file))
     for line in file.next:
         console.print(f"next: {line}", highlight=False, markup=False)
+
+
+def print_streams(console: Console, file: DiagnosisFile) -> None:
+    """Of a recording without samples: each clock with its uncertainty, findings, and what the streams do not show."""
+    count = len(file.findings)
+    found = f"{count} cause{'s' if count > 1 else ''} found" if count else "no fault found"
+    console.print(f"\n[bold]Streams only: {found}. The recording has no samples.[/bold]", highlight=False)
+    lines = [line for number, finding in enumerate(file.findings, start=1) for line in _finding(number, finding)]
+    if file.streams is not None:
+        lines += [line for clock in file.streams.clocks for line in _clock(clock)]
+        lines += [f"usual: {one.says}" for one in file.streams.usual]
+        lines += [f"not tested: {says}" for says in file.streams.unseen]
+    for line in (*lines, *(f"next: {says}" for says in file.next)):
+        console.print(line, highlight=False, markup=False)
+
+
+def _clock(clock: ClockRecord) -> Iterator[str]:
+    """Joints' clock less that of the stream."""
+    if clock.offset_s is None or clock.offset_sigma_s is None:
+        yield f"clock of {clock.stream}: {clock.status}"
+        return
+    line = f"clock of {clock.stream}: joints' clock {1e3 * clock.offset_s:+.3f} ± {1e3 * clock.offset_sigma_s:.3f} ms"
+    if clock.drift is not None and clock.drift_sigma is not None:
+        line += f", drift {1e6 * clock.drift:+.1f} ± {1e6 * clock.drift_sigma:.1f} µs/s"
+    yield f"{line}, at {clock.middle_s:.1f} s"
 
 
 def _finding(number: int, finding: FindingRecord) -> Iterator[str]:

@@ -8,11 +8,13 @@ import numpy as np
 from acquisition.recording import Recording
 from acquisition.recording.pose_plan import write_pose_plan
 from acquisition.recording.rig import rig_sha256
+from calibeam.software import SOFTWARE
 from calibrate.diagnose.contests import separating
+from calibrate.diagnose.diagnosis import Verdict
 from calibrate.diagnose.file import write_diagnosis
 from calibrate.diagnose.from_recording import Diagnosed, diagnose_samples
 from calibrate.diagnose.plan_of import plan_of
-from calibrate.diagnose.schema import DiagnosisFile
+from calibrate.diagnose.schema import SCHEMA, DiagnosisFile, RigRecord
 from calibrate.diagnose.streams.from_recording import streams_of
 from calibrate.diagnose.streams.to_file import with_streams
 from calibrate.diagnose.to_file import file_of
@@ -37,6 +39,35 @@ def diagnose_recording(recording: Recording, model: ModelFile | None = None) -> 
         )
     found, file = _diagnosed(recording, model)
     return found, msgspec.structs.replace(file, next=(*file.next, *unused_columns(recording.samples)))
+
+
+def diagnose_streams(recording: Recording) -> DiagnosisFile:
+    """What the streams of a recording without samples show: their clocks, lags and faults; nothing of the arm.
+
+    DataError where the streams are none that a finder knows.
+    """
+    report = streams_of(recording, None)
+    if report is None:
+        known = "joints, commands, a second set of encoders or spots"
+        raise DataError(
+            f"{recording.path}: no samples, and no stream of {known}; import the log with its columns stated: "
+            '--columns "A1..A6 [deg] = q"'
+        )
+    nothing = DiagnosisFile(
+        schema=SCHEMA,
+        verdict=Verdict.CONSISTENT.value,
+        noise_floor_m=None,
+        rms_before_m=None,
+        rms_after_m=None,
+        findings=(),
+        unexplained=None,
+        next=("record settled samples: streams alone show clocks, lags and faults, nothing of the geometry",),
+        software=SOFTWARE,
+        rig=RigRecord(recording.rig.name, rig_sha256(recording.rig_text)),
+    )
+    file = with_streams(nothing, report)
+    agree = file.verdict == Verdict.CONSISTENT.value
+    return msgspec.structs.replace(file, verdict=Verdict.UNDECIDABLE.value) if agree else file
 
 
 def _diagnosed(recording: Recording, model: ModelFile | None) -> tuple[Diagnosed, DiagnosisFile]:

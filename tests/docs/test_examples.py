@@ -2,11 +2,11 @@
 
 import importlib.util
 import os
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import openpyxl
 import pytest
 from scipy.spatial.transform import Rotation
 
@@ -147,10 +147,13 @@ def test_a_laboratory_s_table_is_identified(tmp_path):
         point = Rotation.from_euler("z", q_deg[:, j : j + 1], degrees=True).apply(point)
     seen_mm = Rotation.from_rotvec([0.2, 0.1, 2.0]).apply(point) + np.array([1000.0, 2000.0, 500.0])
     seen_mm += rng.normal(0.0, 0.02, seen_mm.shape)
-    lab, folder = tmp_path / "lab.csv", tmp_path / "session"
-    np.savetxt(lab, np.hstack([q_deg, seen_mm]), delimiter=",", header="J1,J2,J3,J4,J5,J6,X,Y,Z", comments="")
-    shutil.copytree(EXAMPLES / "lab", folder)
-    assert example("lab_table").convert(lab, folder / "samples.csv") == 120
+    lab, folder = tmp_path / "lab.xlsx", tmp_path / "session"
+    book = openpyxl.Workbook()
+    headings = [*(f"A{joint} [deg]" for joint in range(1, 7)), "X/mm", "Y/mm", "Z/mm"]
+    for row in (headings, *np.hstack([q_deg, seen_mm]).tolist()):
+        book.active.append(row)
+    book.save(lab)
+    assert run(["import", str(lab), "--rig", str(EXAMPLES / "lab" / "rig.toml"), "--out", str(folder), "--yes"]) == 0
     assert run(["identify", str(folder), "--out", str(tmp_path / "model.json")]) == 0
     model = read_model(tmp_path / "model.json")
     length = next(p for p in model.parameters if p.name == "link2.length")

@@ -40,8 +40,14 @@ from acquisition.recording.recording import Channel, Event, Gap, Recording, Stre
 from acquisition.recording.rig import Rig, parse_rig, rig_sha256
 from acquisition.recording.sample_rules import checked_samples, no_samples
 from acquisition.recording.samples import Cell, Samples
-from acquisition.recording.session_folder import RIG, read_folder
+from acquisition.recording.session_folder import CSV, PARQUET, RIG, read_folder
 
+# Suffixes of what another program wrote, which `calibeam import` takes
+FOREIGN = {
+    **dict.fromkeys((".xlsx", ".xlsm", ".csv", ".tsv", ".txt", ".parquet"), "table"),
+    **dict.fromkeys((".blf", ".asc", ".log"), "CAN log"),
+    ".db3": "ROS 2 bag",
+}
 _CLOCKS = ("host_s", "device_s", "sequence")
 
 
@@ -161,15 +167,31 @@ class Content:
 def read(path: Path | str) -> Recording:
     """A recording or a session folder. Of a torn or damaged file every complete batch, with `complete` False.
 
+    A path to samples.csv or samples.parquet means its folder.
+
     A folder with recording.mcap and no rig.toml is all parts of that session together (session_parts.py).
 
     RecordingError when it is neither, or torn before the rig; RigFileError and SamplesError for what a folder holds.
     """
     path = Path(path)
+    if path.name in (CSV, PARQUET):
+        return read_folder(path.parent)
     if not path.is_dir():
+        _refuse_foreign(path)
         return _read_mcap(path)
     files = [] if (path / RIG).is_file() else parts(path)
     return joined([_read_mcap(file) for file in files], path) if files else read_folder(path)
+
+
+def _refuse_foreign(path: Path) -> None:
+    """RecordingError naming the command that makes a session of what another program wrote."""
+    kind = FOREIGN.get(path.suffix.lower())
+    if kind is not None and path.is_file():
+        out = path.with_suffix("" if kind == "table" else ".mcap")
+        raise RecordingError(
+            f"{path}: a {kind}, no recording; make a session of it first: calibeam import {path} --rig RIG.toml "
+            f"--out {out}"
+        )
 
 
 def _read_mcap(path: Path) -> Recording:
@@ -178,7 +200,7 @@ def _read_mcap(path: Path) -> Recording:
         if isinstance(record, Header) and record.profile != PROFILE:
             raise RecordingError(
                 f"{path}: an MCAP file of another program (profile '{record.profile}', library '{record.library}'); "
-                "give a recording of calibeam"
+                "give a recording of calibeam, or make one of a ROS 2 bag: calibeam import"
             )
         content.take(record)
     about = _metadata(content, RECORDING_METADATA, path, scan)

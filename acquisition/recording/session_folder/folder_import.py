@@ -24,14 +24,25 @@ def import_folder(folder: Path | str, path: Path | str, *, software: str, starte
     folder, RigFileError, SamplesError.
     """
     source = read_folder(Path(folder))
+    started_utc = _started(source, Path(folder)) or started_utc
+    write_recording(source, path, software=software, imported_from=Path(folder).name, started_utc=started_utc)
+
+
+def write_recording(
+    source: Recording, path: Path | str, *, software: str, imported_from: str, started_utc: datetime | None
+) -> None:
+    """One file of a recording in memory: rig, samples, streams, events and gaps. RecordingError if `path` exists.
+
+    `started_utc`: now, where it is not known.
+    """
     with RecordingWriter(
         path,
         rig_text=source.rig_text,
         software=source.software or software,
         clock=_SessionStart(),
-        notes={"imported_from": Path(folder).name, **source.notes},
+        notes={"imported_from": imported_from, **source.notes},
         host_s0=source.host_s0,
-        started_utc=_started(source, Path(folder)) or started_utc or datetime.now(UTC),
+        started_utc=started_utc or datetime.now(UTC),
         host=source.host or None,
     ) as writer:
         for row in source.samples.rows():

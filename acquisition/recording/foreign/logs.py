@@ -1,0 +1,306 @@
+"""Logs of other programs as streams: one table a device, each row a moment; ROS 2 bags are tables, too, one a topic.
+
+Joints become channels that the diagnosis of streams reads (`actual_q_rad`, `target_q_rad`, `position_rad`); what has no
+meaning of its own is kept under its heading, in SI where its unit is known. `host_s` is the time of the table, from the
+first row of all tables where it counts from 1970; `device_s` is a column of that name, or the same.
+"""
+
+import importlib
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.recording.errors import RecordingError, SamplesError, shown
+from acquisition.recording.files.quantity import spelt
+from acquisition.recording.foreign.column_meanings import CAMERA, POSE_MATRIX, TIME, UNUSED, Group, clauses, name_of
+from acquisition.recording.foreign.conversion import (
+    EPOCH_S,
+    Exact,
+    Understanding,
+    converted,
+    is_dated,
+    seconds_since,
+    times_of,
+    understand,
+)
+from acquisition.recording.foreign.heading_units import unit_of
+from acquisition.recording.foreign.sheet import Raw, Sheet, read_sheet
+from acquisition.recording.recording import Channel, Recording, Stream, check_declaration
+from acquisition.recording.sample_rules import no_samples
+
+BAG_SUFFIXES = (".db3", ".mcap")
+JOINT_STATE, POSE_STAMPED = "sensor_msgs/msg/JointState", "geometry_msgs/msg/PoseStamped"
+# Universal Robots' own names, which their driver does not send in this order: ur_description, urdf/ur_macro.xacro
+UR_JOINTS = (
+    "shoulder_pan_joint",
+    "shoulder_lift_joint",
+    "elbow_joint",
+    "wrist_1_joint",
+    "wrist_2_joint",
+    "wrist_3_joint",
+)
+_JOINT_CHANNELS: Mapping[str, str] = {
+    "q": "actual_q_rad",
+    "cmd": "target_q_rad",
+    "enc": "position_rad",
+    "qd": "actual_qd_rad_s",
+}
+_NUMBERED = re.compile(r".*?(\d+)\D*")
+DEVICE_S = "device_s"
+
+
+@dataclass(frozen=True)
+class LogStart:
+    """What the times of all logs count from: `base` in each one's own unit, and the date that is, if it is one."""
+
+    bases: tuple[Exact, ...]
+    started_utc: datetime | None
+
+
+def read_log(path: Path, sheet: str | None = None) -> tuple[Sheet, ...]:
+    """The table of a file, or of each topic of a bag. SamplesError, RecordingError naming what cannot be read."""
+    is_bag = path.is_dir() or path.suffix.lower() in BAG_SUFFIXES
+    return tuple(_bag(path)) if is_bag else (read_sheet(path, sheet),)
+
+
+def understand_logs(sheets: Sequence[Sheet], rig_text: str, rig_name: str, columns: str) -> tuple[Understanding, ...]:
+    """What each table means. A clause of `columns` holds for the tables that have its headings.
+
+    SamplesError for a clause of no table, a table without a time, and two tables of one meaning.
+    """
+    names = [stream_name(sheet) for sheet in sheets]
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise SamplesError(f"two logs are named '{shown(twice, 40)}'; rename one of the files")
+    stated = clauses(columns)
+    used: set[int] = set()
+    tables: list[Understanding] = []
+    for sheet in sheets:
+        own = {k: clause.text for k, clause in enumerate(stated) if clause.is_of(sheet, stream_name(sheet))}
+        used |= set(own)
+        table = understand(sheet, rig_text, rig_name, ", ".join(own.values()), whole_rows=False)
+        tables.append(_with_own_channels(table))
+    if lost := next((clause for k, clause in enumerate(stated) if k not in used), None):
+        raise SamplesError(f"--columns: no log has the headings of '{shown(lost.text, 60)}'; correct them")
+    for meaning in _JOINT_CHANNELS:
+        both = [t for t in tables if any(group.meaning == meaning for group in t.groups)]
+        if len(both) > 1:
+            first, second = (stream_name(t.sheet) for t in both[:2])
+            raise SamplesError(
+                f"'{shown(first, 40)}' and '{shown(second, 40)}' both hold joint angles understood as {meaning}; state "
+                f'what one of them is: --columns "{shown(second, 40)}: A1..A6 [deg] = enc"'
+            )
+    return tuple(tables)
+
+
+def stream_name(sheet: Sheet) -> str:
+    """Of a file its name without suffix, of a bag's topic the topic, in letters that a stream may have."""
+    name = re.sub(r"[^A-Za-z0-9_]+", "-", (sheet.name if sheet.name.startswith("/") else sheet.path.stem)).strip("-")
+    return name if name[:1].isalpha() else f"log-{name}".rstrip("-")
+
+
+def recording_of(tables: Sequence[Understanding], path: Path) -> tuple[Recording, datetime | None]:
+    """The streams of all logs as one recording without samples, and when it began, where a calendar says so.
+
+    SamplesError where their times have nothing in common.
+    """
+    start = _start(tables)
+    streams = [_stream(table, base) for table, base in zip(tables, start.bases, strict=True)]
+    first = tables[0]
+    recording = Recording(
+        path=path,
+        rig_text=first.rig_text,
+        rig=first.rig,
+        samples=no_samples(first.rig),
+        complete=True,
+        streams={stream.name: stream for stream in streams},
+    )
+    return recording, start.started_utc
+
+
+def _with_own_channels(table: Understanding) -> Understanding:
+    """With every column of numbers that has no meaning yet, under its own name."""
+    sheet = table.sheet
+    if not any(group.meaning == TIME for group in table.groups):
+        raise SamplesError(
+            f"{sheet.place()}: no column is understood as the time of each row; state which it is: "
+            '--columns "Time [ms] = time"'
+        )
+    taken = {column for group in table.groups for column in group.columns}
+    groups, numbers = list(table.groups), dict(table.numbers)
+    for column, numeric in enumerate(sheet.numeric):
+        if column in taken or not numeric or not sheet.headings[column]:
+            continue
+        name = re.sub(r"[^A-Za-z0-9]+", "_", name_of(sheet, column)).strip("_")
+        unit = table.unit_in(column)
+        known = unit_of(unit)
+        ending = f"_{known.suffix}" if known is not None else ""
+        name = f"{name if name[:1].isalpha() else f'column_{name}'}".rstrip("_") + ending
+        groups.append(Group(name, (column,), unit, stated=True))
+        numbers[column] = np.array(sheet.numbers(column), dtype=np.float64)
+    return replace(table, groups=tuple(groups), numbers=numbers)
+
+
+def _start(tables: Sequence[Understanding]) -> LogStart:
+    """One moment for all clocks that count from 1970, else 0. SamplesError for tables of times apart."""
+    ends: list[tuple[float, float]] = []
+    units: list[float] = []
+    for table in tables:
+        group = _time_group(table)
+        times = times_of(table.sheet, group.columns[0])
+        if not times:
+            raise SamplesError(f"{table.sheet.place()}: the table has no row; leave it out")
+        unit = unit_of(group.unit)
+        units.append(1.0 if unit is None else unit.factor)
+        ends.append((float(min(times)) * units[-1], float(max(times)) * units[-1]))
+    latest, earliest = max(begin for begin, _ in ends), min(end for _, end in ends)
+    if latest > earliest:
+        one, two = (next(t for t, e in zip(tables, ends, strict=True) if at in e) for at in (earliest, latest))
+        raise SamplesError(
+            f"{stream_name(one.sheet)} ends at {earliest:.12g} s, {stream_name(two.sheet)} begins at {latest:.12g} s: "
+            "logs of one session count from one moment; correct the column of time, or import them one by one"
+        )
+    begin_s = math.floor(min(begin for begin, _ in ends))
+    if begin_s <= EPOCH_S:
+        return LogStart((0,) * len(tables), None)
+    bases = tuple(Decimal(begin_s) / Decimal(repr(unit)) for unit in units)
+    dated = any(is_dated(table.sheet, _time_group(table).columns[0]) for table in tables)  # whose zone nobody states
+    return LogStart(tuple(map(_whole, bases)), None if dated else datetime.fromtimestamp(begin_s, UTC))
+
+
+def _whole(value: Decimal) -> Exact:
+    """As int where it is one: differences of ints are exact, too, and faster."""
+    return int(value) if value == value.to_integral_value() else value
+
+
+def _stream(table: Understanding, base: Exact) -> Stream:
+    sheet = table.sheet
+    time_group = _time_group(table)
+    host_s = seconds_since(times_of(sheet, time_group.columns[0]), base, time_group)
+    channels: list[Channel] = []
+    values: dict[str, NDArray[Any]] = {}
+    for group in table.groups:
+        if group.meaning in (TIME, UNUSED):
+            continue
+        for channel, array in _channels(table, group):
+            channels.append(channel)
+            values[channel.name] = array
+    device_s = host_s
+    if DEVICE_S in values:
+        stamps_s = values.pop(DEVICE_S)
+        channels = [channel for channel in channels if channel.name != DEVICE_S]
+        if not np.all(np.isnan(stamps_s)):  # else it was never set
+            from_1970 = np.nanmax(np.abs(stamps_s)) > EPOCH_S
+            device_s = stamps_s - (float(base) * _factor(time_group) if from_1970 else 0.0)
+    name = stream_name(sheet)
+    try:
+        check_declaration(name, tuple(channels))
+    except ValueError as error:
+        raise SamplesError(f"{sheet.place()}: {shown(str(error), 160)}; rename a column") from error
+    return Stream(name, tuple(channels), host_s, device_s, np.arange(len(host_s), dtype=np.int64), values)
+
+
+def _channels(table: Understanding, group: Group) -> Iterator[tuple[Channel, NDArray[Any]]]:
+    values = converted(table, group)
+    prefix = "camera_" if group.meaning.startswith(CAMERA) else ""
+    if group.meaning in _JOINT_CHANNELS:
+        unit = "rad/s" if group.meaning == "qd" else "rad"
+        yield Channel(_JOINT_CHANNELS[group.meaning], unit, values.shape[1:]), values
+    elif group.meaning.endswith(("position", POSE_MATRIX)):
+        yield Channel(f"{prefix}position_m", "m", (3,)), values[:, :3]
+        if values.shape[1] == 6:
+            yield Channel(f"{prefix}rotation_rad", "rad", (3,)), values[:, 3:]
+    elif values.shape[1] == 3:
+        yield Channel(f"{prefix}rotation_rad", "rad", (3,)), values
+    else:
+        unit = "°C" if group.suffix == "degC" else spelt(group.suffix) if group.suffix else group.unit
+        for name, column in zip(group.targets(table.rig.n_joints), values.T, strict=True):
+            yield Channel(name, unit), column
+
+
+def _time_group(table: Understanding) -> Group:
+    return next(group for group in table.groups if group.meaning == TIME)
+
+
+def _factor(group: Group) -> float:
+    unit = unit_of(group.unit)
+    return 1.0 if unit is None else unit.factor
+
+
+def _bag(path: Path) -> list[Sheet]:
+    """Each topic of joint states and stamped poses of a ROS 2 bag as a table."""
+    reader = importlib.import_module("rosbags.rosbag2")
+    types = importlib.import_module("rosbags.typesys")
+    if not path.exists():
+        raise RecordingError(f"{path}: no such bag; check the path")
+    try:
+        store = types.get_typestore(types.Stores.ROS2_HUMBLE)
+        with reader.Reader(path) as bag:
+            there = sorted({f"{c.topic} ({c.msgtype})" for c in bag.connections})
+            wanted = [c for c in bag.connections if c.msgtype in (JOINT_STATE, POSE_STAMPED)]
+            rows: dict[str, list[tuple[int, Any]]] = {c.topic: [] for c in wanted}
+            for connection, received_ns, raw in bag.messages(connections=wanted):
+                rows[connection.topic].append((received_ns, store.deserialize_cdr(raw, connection.msgtype)))
+    except reader.ReaderError as error:
+        raise RecordingError(
+            f"{path}: no ROS 2 bag that can be read ({shown(str(error), 80)}); check the path"
+        ) from error
+    if not wanted:
+        raise RecordingError(
+            f"{path}: no topic of {JOINT_STATE} or {POSE_STAMPED}; there are {shown(', '.join(there)) or 'none'}"
+        )
+    kinds = {c.topic: c.msgtype for c in wanted}
+    made = [(_joint_table if kinds[topic] == JOINT_STATE else _pose_table)(path, topic, r) for topic, r in rows.items()]
+    return [sheet for sheet in made if sheet.rows]
+
+
+def _joint_table(path: Path, topic: str, messages: Sequence[tuple[int, Any]]) -> Sheet:
+    names = list(messages[0][1].name) if messages else []
+    headings = [f"{heading} [rad]" for heading in _joint_headings(names)]
+    rows: list[tuple[Raw, ...]] = []
+    for row, (received_ns, message) in enumerate(messages, start=1):
+        if list(message.name) != names or len(message.position) != len(names):
+            raise RecordingError(
+                f"{path} topic '{topic}' message {row}: joints {shown(', '.join(message.name))} with "
+                f"{len(message.position)} positions, before {shown(', '.join(names))}; record one set of joints a topic"
+            )
+        rows.append((received_ns, _stamp_s(message), *map(float, message.position)))
+    return _topic(path, topic, headings, rows)
+
+
+def _joint_headings(names: list[str]) -> list[str]:
+    """q1, q2, ... where the names show the order: numbers, or the maker's; else the names, for a person to order."""
+    if set(names) == set(UR_JOINTS):
+        return [f"q{UR_JOINTS.index(name) + 1}" for name in names]
+    found = [match for name in names if (match := _NUMBERED.fullmatch(name))]
+    numbers = [int(match[1]) for match in found]
+    if sorted(numbers) == list(range(1, len(names) + 1)):
+        return [f"q{number}" for number in numbers]
+    return names
+
+
+def _pose_table(path: Path, topic: str, messages: Sequence[tuple[int, Any]]) -> Sheet:
+    headings = ["x [m]", "y [m]", "z [m]", "qx", "qy", "qz", "qw"]
+    rows: list[tuple[Raw, ...]] = []
+    for received_ns, message in messages:
+        p, q = message.pose.position, message.pose.orientation
+        rows.append((received_ns, _stamp_s(message), p.x, p.y, p.z, q.x, q.y, q.z, q.w))
+    return _topic(path, topic, headings, rows)
+
+
+def _topic(path: Path, topic: str, headings: Sequence[str], rows: Sequence[tuple[Raw, ...]]) -> Sheet:
+    names = ("host [ns]", "device [s]", *headings)
+    return Sheet(path, topic, names, ("",) * len(names), tuple(rows), tuple(range(1, len(rows) + 1)))
+
+
+def _stamp_s(message: Any) -> float:
+    """The stamp of the header; NaN where it was never set."""
+    stamp = message.header.stamp
+    return stamp.sec + 1e-9 * stamp.nanosec if stamp.sec or stamp.nanosec else math.nan

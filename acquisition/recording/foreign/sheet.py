@@ -1,0 +1,307 @@
+"""A table of another program as it stands in its file: xlsx, CSV of any dialect, or Parquet; nothing is converted yet.
+
+The heading row is the first one with several texts and no number; rows above it are a title. A row of units may follow.
+Decimals are a point or a comma, decided once for the whole file and refused where both occur.
+"""
+
+import csv
+import importlib
+import io
+import math
+import re
+import zipfile
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from datetime import date, datetime, time
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from acquisition.recording.errors import SamplesError, shown
+from acquisition.recording.foreign.heading_units import unit_of
+
+SUFFIXES = (".xlsx", ".xlsm", ".csv", ".tsv", ".txt", ".parquet")
+SEPARATORS = (";", "\t", ",")  # in this order: a table with decimal commas has them inside its cells
+TITLE_ROWS = 50  # above the headings, at most
+NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+COMMA_NUMBER = re.compile(r"[+-]?(?:\d+,\d*|,\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+ERRORS = re.compile(r"#[A-Z/0!?]+")  # of a spreadsheet: #REF!, #DIV/0!, #N/A
+NOT_THERE = ("", "nan", "na", "n/a", "null", "none", "-", "--")  # texts for a reading that is missing
+
+Raw = float | int | str | datetime | date | time | bool | None
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """Headings and cells as they stand; `lines`: the number of each row in the file, from 1."""
+
+    path: Path
+    name: str  # of the sheet in a workbook, "" elsewhere
+    headings: tuple[str, ...]
+    unit_row: tuple[str, ...]  # "" where none stands
+    rows: tuple[tuple[Raw, ...], ...]
+    lines: tuple[int, ...]
+    title: tuple[str, ...] = ()  # what stands above the headings
+    decimal: str = "."  # or ",": of numbers that are text
+
+    def place(self, row: int | None = None, column: int | None = None) -> str:
+        """Where a cell is, for a person: file, sheet, row, column."""
+        sheet = f" sheet '{shown(self.name, 40)}'" if self.name else ""
+        line = "" if row is None else f" row {self.lines[row]}"
+        heading = "" if column is None else f", column '{shown(self.headings[column], 40)}'"
+        return f"{self.path}{sheet}{line}{heading}"
+
+    def cells(self, column: int) -> list[Raw]:
+        """One column, from the first row on."""
+        return [row[column] for row in self.rows]
+
+    def numbers(self, column: int) -> list[float]:
+        """One column as numbers, NaN where a cell is empty. SamplesError for any other cell."""
+        return [self._number(row, column, cell) for row, cell in enumerate(self.cells(column))]
+
+    def _number(self, row: int, column: int, cell: Raw) -> float:
+        if cell is None:
+            return math.nan
+        if isinstance(cell, int | float) and not isinstance(cell, bool):
+            if math.isfinite(cell) or math.isnan(cell):
+                return float(cell)
+        elif isinstance(cell, str):
+            if cell.casefold() in NOT_THERE:
+                return math.nan
+            form = NUMBER if self.decimal == "." else COMMA_NUMBER
+            if form.fullmatch(cell) or NUMBER.fullmatch(cell):
+                return float(cell.replace(",", "."))
+        raise SamplesError(
+            f"{self.place(row, column)}: '{shown(str(cell), 40)}' is not a number; {self._remedy(cell)}, or empty the "
+            "cell if the reading is missing"
+        )
+
+    def _remedy(self, cell: Raw) -> str:
+        text = str(cell)
+        if ERRORS.fullmatch(text):
+            return "correct the formula in the spreadsheet"
+        if "." in text and "," in text:
+            return "write it without a separator of thousands"
+        return "correct the cell"
+
+    @cached_property
+    def numeric(self) -> tuple[bool, ...]:
+        """Of each column: whether every cell that is not empty is a number, and one is there."""
+
+        def number(cell: Raw) -> bool:
+            return _is_number(cell) or (isinstance(cell, str) and COMMA_NUMBER.fullmatch(cell) is not None)
+
+        filled = [[c for c in self.cells(i) if c is not None and not _is_missing(c)] for i in range(len(self.headings))]
+        return tuple(bool(cells) and all(map(number, cells)) for cells in filled)
+
+
+def read_sheet(path: Path, sheet: str | None = None) -> Sheet:
+    """The table of a file; `sheet` names one of a workbook with several.
+
+    SamplesError naming file and place where it cannot be read or holds no table.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise SamplesError(f"{path}: no table that this program reads; save it as one of {', '.join(SUFFIXES)}")
+    if suffix in (".xlsx", ".xlsm"):
+        return _workbook(path, sheet)
+    if sheet is not None:
+        raise SamplesError(f"{path}: --sheet {shown(sheet, 40)}: only a workbook has sheets; leave it out")
+    return _parquet(path) if suffix == ".parquet" else _text(path)
+
+
+def _text(path: Path) -> Sheet:
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise SamplesError(f"{path}: cannot read the table ({error.strerror}); check the path") from error
+    if b"\0" in content[:4096] and not content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise SamplesError(f"{path}: not a text file; save the table as CSV or xlsx")
+    text = _decoded(content, path)
+    separator = _separator(text)
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True)
+    rows: list[tuple[int, list[Raw]]] = []
+    try:
+        rows.extend((reader.line_num, [cell.strip() or None for cell in cells]) for cells in reader)
+    except csv.Error as error:
+        raise SamplesError(f"{path} line {reader.line_num}: not CSV: {error}; correct the line") from error
+    return _tabled(path, "", rows)
+
+
+def _decoded(content: bytes, path: Path) -> str:
+    """UTF-8 with or without a mark, UTF-16 with one; else the code page of Western Windows, which Excel writes."""
+    try:
+        return content.decode("utf-16" if content.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig")
+    except UnicodeDecodeError:
+        pass
+    try:
+        return content.decode("cp1252")
+    except UnicodeDecodeError as error:
+        raise SamplesError(f"{path}: byte {error.start} is of no known text; save the file as CSV UTF-8") from error
+
+
+def _separator(text: str) -> str:
+    """The first of `;`, tab and comma that parts the most filled of the first rows alike."""
+    lines = [line for line in text.splitlines()[:200] if line.strip()]
+    counts = {mark: [line.count(mark) for line in lines] for mark in SEPARATORS}
+    return max(SEPARATORS, key=lambda mark: (sum(1 for n in counts[mark] if n), mark != ","))
+
+
+def _workbook(path: Path, wanted: str | None) -> Sheet:
+    books = _openpyxl(path)
+    try:
+        book = books.load_workbook(path, read_only=True, data_only=True)
+    except OSError as error:
+        raise SamplesError(f"{path}: cannot read the workbook ({error.strerror or error}); check the path") from error
+    except (zipfile.BadZipFile, KeyError, ValueError, books.utils.exceptions.InvalidFileException) as error:
+        raise SamplesError(f"{path}: no workbook ({shown(str(error), 80)}); save it again as xlsx") from error
+    try:
+        sheets = {str(one.title): _sheet_rows(path, one) for one in book.worksheets}
+    finally:
+        book.close()
+    if wanted is not None and wanted not in sheets:
+        raise SamplesError(f"{path}: no sheet '{shown(wanted, 40)}'; there are {shown(', '.join(sheets))}")
+    tables = {n: rows for n, rows in sheets.items() if (n == wanted if wanted else _heading_row(rows) is not None)}
+    if len(tables) > 1:
+        raise SamplesError(f"{path}: several sheets hold tables ({shown(', '.join(tables))}); name one with --sheet")
+    if not tables:
+        raise SamplesError(f"{path}: no table in the workbook: no row of headings with numbers below; add headings")
+    ((name, rows),) = tables.items()
+    return _without_formulas(_tabled(path, name, rows), books)
+
+
+def _sheet_rows(path: Path, sheet: Any) -> list[tuple[int, list[Raw]]]:
+    try:
+        cells = [
+            [c.strip() or None if isinstance(c, str) else c for c in row] for row in sheet.iter_rows(values_only=1)
+        ]
+    except (KeyError, ValueError, TypeError, SyntaxError, zipfile.BadZipFile) as error:
+        raise SamplesError(
+            f"{path}: sheet '{sheet.title}' is damaged ({shown(str(error), 80)}); save it again"
+        ) from error
+    return list(enumerate(cells, start=1))
+
+
+def _without_formulas(sheet: Sheet, books: Any) -> Sheet:
+    """The same; SamplesError where an empty cell is a formula whose result no program has stored."""
+    if not any(cell is None for row in sheet.rows for cell in row):
+        return sheet
+    book = books.load_workbook(sheet.path, read_only=True, data_only=False)
+    try:
+        written = dict(enumerate(book[sheet.name].iter_rows(values_only=True), start=1))
+    finally:
+        book.close()
+    for row, (line, cells) in enumerate(zip(sheet.lines, sheet.rows, strict=True)):
+        for column, cell in enumerate(cells):
+            formula = written[line][column] if cell is None and column < len(written[line]) else None
+            if isinstance(formula, str) and formula.startswith("="):
+                raise SamplesError(
+                    f"{sheet.place(row, column)}: the formula '{shown(formula, 40)}' has no stored result; open the "
+                    "workbook in the spreadsheet program and save it"
+                )
+    return sheet
+
+
+def _parquet(path: Path) -> Sheet:
+    try:
+        table = importlib.import_module("pyarrow.parquet").read_table(path)
+        columns = [table[i].to_pylist() for i in range(table.num_columns)]
+    except (OSError, ValueError, NotImplementedError) as error:  # pyarrow.ArrowInvalid is a ValueError
+        raise SamplesError(f"{path}: cannot read the Parquet file ({shown(str(error))}); write it again") from error
+    units = [(field.metadata or {}).get(b"unit", b"").decode(errors="replace") for field in table.schema]
+    rows = tuple(zip(*columns, strict=True))
+    return Sheet(path, "", tuple(table.column_names), tuple(units), rows, tuple(range(1, len(rows) + 1)))
+
+
+def _tabled(path: Path, name: str, rows: Sequence[tuple[int, Sequence[Raw]]]) -> Sheet:
+    """Headings, a row of units if there is one, and rows of as many cells; rows without any content are left out."""
+    at = _heading_row(rows)
+    where = f"{path} sheet '{shown(name, 40)}'" if name else str(path)
+    if at is None:
+        raise SamplesError(
+            f"{where}: no row of headings with numbers below; write the columns' names above the numbers"
+        )
+    wide = max(i for i, cell in enumerate(rows[at][1]) if cell is not None) + 1
+    headings = tuple("" if cell is None else str(cell) for cell in _padded(rows[at][1], wide))
+    below = [(line, tuple(_padded(cells, wide)), cells[wide:]) for line, cells in rows[at + 1 :] if any(_filled(cells))]
+    units = [""] * wide
+    if below and _is_unit_row(below[0][1]):
+        units = ["" if cell is None else str(cell).strip("[]()") for cell in below[0][1]]
+        below = below[1:]
+    for line, _, beyond in below:
+        if any(_filled(beyond)):
+            raise SamplesError(f"{where} row {line}: more cells than the {wide} headings; give every column a heading")
+    table = tuple(cells for _, cells, _ in below)
+    title = tuple(str(c) for _, cells in rows[:at] for c in cells if c is not None)
+    lines = tuple(line for line, _, _ in below)
+    return Sheet(path, name, headings, tuple(units), table, lines, title, _decimal(where, lines, table))
+
+
+def _heading_row(rows: Sequence[tuple[int, Sequence[Raw]]]) -> int | None:
+    """The first row with at least two texts and no number, if numbers stand in one of the two rows below it."""
+    for at, (_, cells) in enumerate(rows[:TITLE_ROWS]):
+        texts = [cell for cell in cells if isinstance(cell, str)]
+        if len(texts) < 2 or any(map(_is_number, cells)) or _comma_numbers(cells):
+            continue
+        below = [c for _, c in rows[at + 1 :] if any(_filled(c))][:2]
+        if any(sum(map(_is_number, c)) + _comma_numbers(c) >= 2 for c in below):
+            return at
+    return None
+
+
+def _is_unit_row(cells: Sequence[Raw]) -> bool:
+    """Whether a row below the headings holds texts alone, most of them units: no row of missing readings."""
+    texts = [cell.strip("[]()") for cell in cells if isinstance(cell, str)]
+    if len(texts) < sum(_filled(cells)) or any(map(_is_number, cells)) or _comma_numbers(cells):
+        return False
+    return 2 * sum(1 for text in texts if unit_of(text)) > len(texts)
+
+
+def _decimal(where: str, lines: Sequence[int], rows: Iterable[tuple[Raw, ...]]) -> str:
+    """What parts whole numbers from fractions in cells of text. SamplesError where it is now a point, now a comma."""
+    comma: tuple[int, str] | None = None
+    point: tuple[int, str] | None = None
+    for line, cells in zip(lines, rows, strict=True):
+        for cell in cells:
+            if not isinstance(cell, str):
+                continue
+            if COMMA_NUMBER.fullmatch(cell):
+                comma = comma or (line, cell)
+            elif "." in cell and NUMBER.fullmatch(cell):
+                point = point or (line, cell)
+    if comma is not None and point is not None:
+        raise SamplesError(
+            f"{where}: '{comma[1]}' in row {comma[0]} has a decimal comma, '{point[1]}' in row {point[0]} a decimal "
+            "point; write all numbers in one way, without separators of thousands"
+        )
+    return "," if comma is not None else "."
+
+
+def _padded(cells: Sequence[Raw], wide: int) -> Iterator[Raw]:
+    yield from cells[:wide]
+    yield from [None] * (wide - len(cells))
+
+
+def _filled(cells: Sequence[Raw]) -> Iterator[bool]:
+    return (cell is not None for cell in cells)
+
+
+def _is_number(cell: Raw) -> bool:
+    if isinstance(cell, str):
+        return NUMBER.fullmatch(cell) is not None
+    return isinstance(cell, int | float) and not isinstance(cell, bool)
+
+
+def _comma_numbers(cells: Sequence[Raw]) -> int:
+    return sum(1 for cell in cells if isinstance(cell, str) and COMMA_NUMBER.fullmatch(cell))
+
+
+def _is_missing(cell: Raw) -> bool:
+    return (isinstance(cell, str) and cell.casefold() in NOT_THERE) or (isinstance(cell, float) and math.isnan(cell))
+
+
+def _openpyxl(path: Path) -> Any:
+    try:
+        return importlib.import_module("openpyxl")
+    except ImportError as error:
+        raise SamplesError(f"{path}: reading a workbook needs openpyxl; pip install openpyxl, or save CSV") from error

@@ -1,0 +1,287 @@
+"""`calibeam import`: session folders, tables, logs of other programs and CAN logs become sessions and recordings."""
+
+import math
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from acquisition.can_signals import STREAM as ENCODERS
+from acquisition.can_signals import described_by_dbc, encoder_rows, encoder_sheet, encoder_stream
+from acquisition.recording import Recording, RecordingError, SamplesError, read
+from acquisition.recording.can_log import SUFFIXES as CAN_SUFFIXES
+from acquisition.recording.can_log import CanImport, import_can
+from acquisition.recording.foreign import (
+    BAG_SUFFIXES,
+    SUFFIXES,
+    ColumnsFile,
+    Sheet,
+    Understanding,
+    columns_file,
+    questions,
+    read_log,
+    read_sheet,
+    recording_of,
+    samples_of,
+    understand,
+    understand_logs,
+    write_columns,
+    write_session,
+)
+from acquisition.recording.rig import load_rig, rig_text
+from acquisition.recording.session_folder import CSV, PARQUET, RIG
+from acquisition.recording.session_folder.folder_import import import_folder, write_recording
+from calibeam.asking import NotAgreedError, at_terminal, someone
+from calibeam.outcome import PartialResult
+from calibeam.software import SOFTWARE
+from calibrate.report.quantities import significant
+
+BAG = "metadata.yaml"  # in the folder of a ROS 2 bag
+WORKBOOKS = (".xlsx", ".xlsm")
+CAN_CSV = "timestamp,arbitration_id"  # how python-can's CSV begins
+HUMAN = {"rad": (math.degrees(1.0), "°"), "m": (1e3, "mm")}
+
+
+def import_command(
+    source: Path,
+    *others: Path,
+    out: Path,
+    rig: Path | None = None,
+    columns: str = "",
+    sheet: str | None = None,
+    streams: bool = False,
+    yes: bool = False,
+) -> None:
+    """Make a session of a table, a log or a session folder.
+
+    Of a table of poses (xlsx, CSV, Parquet) a session folder, of everything else a recording. What the columns of a
+    table are understood to mean is shown and asked for once, and written beside what is made.
+
+    Example: calibeam import lab.xlsx --rig rig.toml --out session
+
+    Example: calibeam import lab.csv --rig rig.toml --columns "A1..A6 [deg] = q, X Y Z [mm] = position" --out session
+
+    Example: calibeam import session --out session.mcap
+
+    Example: calibeam import bus.blf --rig rigs/ur5e-dual-psd.toml --out bus.mcap
+
+    Example: calibeam import robot.csv encoders.csv --streams --rig rig.toml --out streams.mcap
+
+    Parameters
+    ----------
+    source
+        A table; a session folder, with its folder "streams" if it has one; a ROS 2 bag; or a CAN log: .blf, .asc, .csv
+        or .log (candump).
+    others
+        Further logs of the same time, with --streams.
+    out
+        The session folder or recording to make.
+    rig
+        The rig file of the arm; a session folder has its own.
+    columns
+        What columns mean, where their headings do not show it: "HEADINGS [unit] = meaning, ...". Meanings are q, cmd,
+        enc, position, abc, wpr, quaternion, rotvec, matrix, pose-matrix, wire, time, ..., a name of your own, unused.
+        Of several logs "LOG: HEADINGS [unit] = meaning".
+    sheet
+        The sheet of a workbook with several tables.
+    streams
+        A row of a table is a moment, not a pose: make a recording of streams.
+    yes
+        Take the columns as they are understood, without asking. An open unit is an error then.
+
+    """
+    if source.name in (CSV, PARQUET) and rig is None and (source.parent / RIG).is_file():
+        source = source.parent
+    if source.is_dir() and not (source / BAG).is_file():
+        if others:
+            raise RecordingError(f"{others[0]}: a session folder is imported by itself; leave the others out")
+        given = {"rig": rig, "columns": columns, "sheet": sheet, "streams": streams}
+        _refuse(source, "a session folder has its own rig.toml", **given)
+        import_folder(source, out, software=SOFTWARE)
+        print(f"{out}: {len(read(out).samples)} samples")
+        return
+    for path in (source, *others):
+        _check_known(path)
+    if sheet is not None and not any(path.suffix.lower() in WORKBOOKS for path in (source, *others)):
+        raise RecordingError(f"{source}: --sheet {sheet}: only a workbook has sheets; leave --sheet out")
+    if rig is None:
+        raise RecordingError(f"{source}: a table or a log does not say of which rig it is; give --rig RIG.toml")
+    if _is_can(source) and not others:
+        _refuse(source, "a CAN log has no columns", columns=columns, sheet=sheet, streams=streams)
+        _can(source, out, rig)
+    elif streams or source.is_dir() or source.suffix.lower() in BAG_SUFFIXES:
+        sheets = [table for path in (source, *others) for table in _log_tables(path, sheet, rig, out)]
+        _logs(understand_logs(sheets, rig_text(rig), str(rig), columns), out, yes=yes)
+    elif others:
+        raise RecordingError(f"{others[0]}: one table becomes one session; give --streams for several logs of one time")
+    else:
+        _table(understand(read_sheet(source, sheet), rig_text(rig), str(rig), columns), out, yes=yes)
+
+
+def _check_known(path: Path) -> None:
+    known = tuple(dict.fromkeys((*SUFFIXES, *CAN_SUFFIXES, *BAG_SUFFIXES)))
+    if not path.is_dir() and path.suffix.lower() not in known:
+        raise RecordingError(f"{path}: neither a session folder nor one of {', '.join(known)}; give one of these")
+
+
+def _is_can(path: Path) -> bool:
+    suffix = path.suffix.lower()
+    return suffix in CAN_SUFFIXES and (suffix != ".csv" or _is_can_csv(path))
+
+
+def _can(source: Path, out: Path, rig: Path) -> None:
+    """Every frame, and where the rig names a DBC file what the encoders sent."""
+    encoders = load_rig(rig).devices.encoders
+    if encoders is None or not described_by_dbc(encoders):
+        done = import_can(source, out, rig_text=rig_text(rig), software=SOFTWARE)
+        print(f"{out}: {done.frames} CAN frames in {', '.join(done.streams)}")
+    else:
+        done, frames = _frames(source, rig, out)
+        rows = encoder_rows(frames, encoders)
+        whole = replace(frames, streams={**frames.streams, ENCODERS: encoder_stream(rows)})
+        started_utc = datetime.fromisoformat(frames.started_utc)
+        write_recording(whole, out, software=SOFTWARE, imported_from=source.name, started_utc=started_utc)
+        print(f"{out}: {done.frames} CAN frames in {', '.join(done.streams)}, {len(rows)} rows of {ENCODERS}")
+    if done.damage is not None:
+        raise PartialResult(f"{source}: {done.damage}; everything before it is in {out}")
+
+
+def _frames(source: Path, rig: Path, out: Path) -> tuple[CanImport, Recording]:
+    """The frames of a CAN log as a recording in memory."""
+    with tempfile.TemporaryDirectory(dir=_existing(out)) as folder:
+        path = Path(folder) / "frames.mcap"
+        done = import_can(source, path, rig_text=rig_text(rig), software=SOFTWARE)
+        return done, replace(read(path), path=source)
+
+
+def _existing(out: Path) -> Path:
+    """The folder in which `out` will be. RecordingError where there is none."""
+    if not out.parent.is_dir():
+        raise RecordingError(f"--out {out}: there is no folder {out.parent}; make it, or choose another place")
+    return out.parent
+
+
+def _log_tables(path: Path, sheet: str | None, rig: Path, out: Path) -> tuple[Sheet, ...]:
+    if not _is_can(path):
+        return read_log(path, sheet if path.suffix.lower() in WORKBOOKS else None)
+    encoders = load_rig(rig).devices.encoders
+    if encoders is None or not described_by_dbc(encoders):
+        raise RecordingError(
+            f"{path}: beside other logs a CAN log is read by a DBC file; name it in [devices.encoders] of {rig}"
+        )
+    done, frames = _frames(path, rig, out)
+    if done.damage is not None:
+        raise RecordingError(f"{path}: {done.damage}; export the log again, or import it by itself")
+    return (encoder_sheet(encoder_rows(frames, encoders), frames, path),)
+
+
+def _logs(tables: Sequence[Understanding], out: Path, *, yes: bool) -> None:
+    """A recording of streams, after a person has agreed to what the columns mean."""
+    if out.suffix.lower() != ".mcap":
+        raise RecordingError(f"--out {out}: logs become a recording; give a name that ends with .mcap")
+    console = Console()
+    tables = [with_units(table, yes=yes, settled=False) for table in tables]
+    recording, started_utc = recording_of(tables, out)
+    about = [columns_file(table, None, SOFTWARE) for table in tables]
+    for one in about:
+        print_columns(console, one)
+    _agreed(yes=yes)
+    names = ", ".join(str(table.sheet.path.name) for table in tables)
+    write_recording(recording, out, software=SOFTWARE, imported_from=names, started_utc=started_utc)
+    beside = write_columns(about, out)
+    for name, stream in recording.streams.items():
+        console.print(f"{out}: {name}, {len(stream.host_s)} rows", markup=False, highlight=False)
+    console.print(f"columns: {beside}", markup=False, highlight=False)
+
+
+def _agreed(*, yes: bool) -> None:
+    """Returns when a person has agreed to the columns that are shown. NotAgreedError."""
+    if yes:
+        return
+    asking = someone(at_terminal(), "whether the columns are meant so", "give --yes when they are")
+    if not asking.enter("Are the columns meant so?"):
+        raise NotAgreedError("nothing was written: the columns are meant otherwise; state them with --columns")
+
+
+def _table(table: Understanding, out: Path, *, yes: bool) -> None:
+    """A session folder of a table of poses, after a person has agreed to what its columns mean."""
+    if out.suffix.lower() == ".mcap":
+        raise RecordingError(
+            f"--out {out}: a table of poses becomes a session folder; give the name of a folder, or --streams for a log"
+        )
+    console = Console()
+    table = with_units(table, yes=yes)
+    samples = samples_of(table)
+    about = columns_file(table, samples, SOFTWARE)
+    print_columns(console, about)
+    _agreed(yes=yes)
+    beside = write_session(table, samples, about, out)
+    for line in (f"{out}: {RIG} and {CSV} with {len(samples)} samples", f"columns: {beside}"):
+        console.print(line, markup=False, highlight=False)
+
+
+def with_units(table: Understanding, *, yes: bool, settled: bool = True) -> Understanding:
+    """With every open unit answered by a person. SamplesError where nobody is to be asked."""
+    while (question := next(iter(questions(table, settled=settled)), None)) is not None:
+        asking = None if yes else at_terminal()
+        if asking is None:
+            raise SamplesError(question.refusal)
+        numbered = {str(number): unit for number, unit in enumerate(question.choices, start=1)}
+        proposed = next((n for n, unit in numbered.items() if unit == question.proposal), "q")
+        choice = asking.choice(question.asks, {**numbered, "q": "none of these: stop"}, proposed)
+        if choice is None or choice == "q":
+            raise SamplesError(question.refusal)
+        table = table.answered(question, numbered[choice])
+    return table
+
+
+def print_columns(console: Console, about: ColumnsFile) -> None:
+    """What the columns of a table were understood to mean, one line each, and what is not used."""
+    sheet = f", sheet {about.sheet}" if about.sheet else ""
+    console.print(f"{about.source}{sheet}: {about.rows} rows", style="bold", markup=False, highlight=False)
+    lines = Table("column", "meaning", "unit read", "becomes", "range")
+    for record in about.columns:
+        span = _range(record.si_unit, record.lowest, record.highest)
+        cells = _several(record.headings), record.meaning, record.unit or "—", _several(record.becomes), span
+        lines.add_row(*map(Text, cells))  # no markup: a heading may hold [deg]
+    console.print(lines)
+    for line in _remarks(about):
+        console.print(line, markup=False, highlight=False)
+
+
+def _remarks(about: ColumnsFile) -> Iterator[str]:
+    yield from about.notes
+    if about.unused:
+        yield f"not used: {', '.join(about.unused)} (keep one with --columns \"'{about.unused[0]}' = its_name\")"
+
+
+def _range(si_unit: str, lowest: float | None, highest: float | None) -> str:
+    """After conversion; of angles and lengths as a laboratory reads them."""
+    if lowest is None or highest is None:
+        return "—"
+    factor, unit = HUMAN.get(si_unit, (1.0, si_unit))
+    low, high = (significant(factor * end, 5) for end in (lowest, highest))
+    return f"{low} … {high} {unit}".rstrip()
+
+
+def _several(names: tuple[str, ...]) -> str:
+    return ", ".join(names) if len(names) <= 3 else f"{names[0]} … {names[-1]}"
+
+
+def _is_can_csv(source: Path) -> bool:
+    try:
+        with source.open("rb") as file:
+            return file.read(len(CAN_CSV)) == CAN_CSV.encode()
+    except OSError as error:
+        raise RecordingError(f"{source}: cannot read it ({error.strerror}); check the path") from error
+
+
+def _refuse(source: Path, why: str, **given: object) -> None:
+    for name, value in given.items():
+        if value not in (None, "", False):
+            raise RecordingError(f"{source}: --{name} {value}: {why}; leave --{name} out")
