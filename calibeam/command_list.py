@@ -38,6 +38,9 @@ GROUPS: dict[str, tuple[ListedCommand, ...]] = {
             "predict", "predict:predict_command", "Predict readings with a model, each with its uncertainty."
         ),
         ListedCommand(
+            "correct", "correct:correct_command", "Correct poses or a program, so that the real tool reaches them."
+        ),
+        ListedCommand(
             "report", "report:report_command", "Write the report of a recording: one self-contained HTML file."
         ),
         ListedCommand(

@@ -14,7 +14,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 TOPS = ("drivers", "acquisition", "calibrate", "simulators", "calibeam")
-CATALOGUES = ("effects", "sensors", "defects", "commands", "arms")  # one file an entry is their purpose
+CATALOGUES = ("effects", "sensors", "defects", "commands", "arms", "programs")  # one file an entry is their purpose
 SMALL = 80  # lines: a module with one importer and fewer lives in its importer
 
 
@@ -147,8 +147,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 862,
-    "lines": 92_100,
+    "files": 874,
+    "lines": 93_700,
     "longest_function": 54,
     "one_importer": 49,
     "classes": 38,
