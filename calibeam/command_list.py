@@ -63,6 +63,11 @@ GROUPS: dict[str, tuple[ListedCommand, ...]] = {
         ListedCommand(
             "export", "export:export_command", "Write a recording as tables, or its CAN frames as a CAN log."
         ),
+        ListedCommand(
+            "export-model",
+            "export_model:export_model_command",
+            "Export a model to another program, or to its controller.",
+        ),
         ListedCommand("recover", "recover:recover_command", "Save what is readable of a damaged recording."),
         ListedCommand("layouts", "layouts:layouts_command", "Write Foxglove and PlotJuggler layouts for a recording."),
     ),

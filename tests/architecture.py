@@ -147,8 +147,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 874,
-    "lines": 93_700,
+    "files": 877,
+    "lines": 94_000,
     "longest_function": 54,
     "one_importer": 49,
     "classes": 38,

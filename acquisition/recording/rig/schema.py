@@ -65,6 +65,18 @@ class Pose(Struct, frozen=True, forbid_unknown_fields=True):
     rotation_rad: Rotation = ZERO
 
 
+class Make(enum.Enum):
+    """Whose controller moves the arm: what a model can be exported to, and what its numbers are called there."""
+
+    ABB = "abb"
+    FANUC = "fanuc"
+    KUKA = "kuka"
+    MOTOMAN = "motoman"
+    STAUBLI = "staubli"
+    UR = "ur"
+    OTHER = "other"
+
+
 class EncoderSide(enum.Enum):
     """On which side of the gear a second encoder sits."""
 
@@ -98,6 +110,7 @@ class Arm(Struct, frozen=True, forbid_unknown_fields=True):
     gravity_m_s2: Gravity = (0.0, 0.0, -9.81)  # an arm that stands on its feet
     flange: Pose = Pose()
     serial_number: Name | None = None  # of the maker's plate: tells two arms of one kind apart
+    make: Make | None = None  # None: not stated
 
 
 class Tool(Struct, frozen=True, forbid_unknown_fields=True):
