@@ -54,7 +54,7 @@ def correct_command(
     margin_deg: Annotated[float, Parameter(validator=validators.Number(gte=0.0))] = 1.0,
     tool: tuple[float, float, float, float, float, float] | None = None,
     frame: tuple[float, float, float, float, float, float] | None = None,
-    start: tuple[float, ...] = (),
+    start: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (),
     condition: tuple[str, ...] = (),
     verbose: bool = False,
 ) -> None:

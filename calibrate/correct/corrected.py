@@ -31,7 +31,6 @@ Branch = Callable[[Floats], Bools]  # joint readings (solution, joint) -> which 
 ROUNDS = 12
 CLOSE = 1e-9  # m and rad: far below what any arm repeats
 MOVED_RAD = 1e-4  # a joint that went less far has not moved, as in effects/conditions.py
-BACK = 0.02  # of a straight way: from here to its end the joints turn in the sense in which they arrive
 RANGE_SLACK = 1e-9  # of the recorded range: rounding
 OK, LIMIT, UNREACHABLE, OUTSIDE = "ok", "limit", "unreachable", "outside"
 
@@ -56,7 +55,6 @@ class Wanted:
     joints_rad: Floats  # (pose, joint) of a point that is given as joint angles: its pose is that of the rig's arm
     near_rad: Floats  # (pose, joint) posture whose branch is wanted
     conditions: Mapping[str, Floats]  # column of samples.csv -> (pose,)
-    straight: Bools  # (pose,) reached along a straight line of the tool
     in_order: bool = True  # whether each pose is reached from the one before
     branches: tuple[Branch | None, ...] = ()  # one a pose; empty: none asks for one
 
@@ -118,7 +116,7 @@ def correct(model: ModelFile, wanted: Wanted, inverse_of: Inverse, options: Opti
     nominal_rad, why = _nominal(arms, wanted, inverse_of)
     reached = np.isfinite(nominal_rad).all(axis=1)
     q_rad = nominal_rad.copy()
-    conditions = moves_conditions(wanted, arms, nominal_rad, inverse_of, options)
+    conditions = moves_conditions(wanted, nominal_rad, options)
     if reached.any():
         rows = np.flatnonzero(reached)
         goal = wanted.T_base_tool[rows] @ inverse(arms.real_tool)
@@ -283,9 +281,7 @@ def _samples(q_rad: Floats, conditions: Mapping[str, Floats]) -> Samples:
     return Samples(columns | dict(conditions), joints)
 
 
-def moves_conditions(
-    wanted: Wanted, arms: Arms, q_rad: Floats, inverse_of: Inverse, options: Options
-) -> dict[str, Floats]:
+def moves_conditions(wanted: Wanted, q_rad: Floats, options: Options) -> dict[str, Floats]:
     """Conditions with the side from which each joint comes and its last move, where they are known and not stated."""
     n, joints = q_rad.shape
     moves = np.full((n, joints), np.nan)
@@ -296,8 +292,6 @@ def moves_conditions(
         if wanted.in_order:
             moves[1:] = np.diff(q_rad, axis=0)
         side = _sides(moves)
-        for row in np.flatnonzero(wanted.straight & np.isfinite(moves).all(axis=1)):
-            side[row] = _arriving(wanted, arms, q_rad, int(row), inverse_of, side[row])
     table: dict[str, Floats] = {}
     for j in range(joints):
         if np.isfinite(side[:, j]).any():
@@ -313,20 +307,6 @@ def _sides(moves: Floats) -> Floats:
         still = np.isfinite(moves[row]) & (np.abs(moves[row]) <= MOVED_RAD)
         side[row] = np.where(still, side[row - 1], side[row])
     return side
-
-
-def _arriving(wanted: Wanted, arms: Arms, q_rad: Floats, row: int, inverse_of: Inverse, side: Floats) -> Floats:
-    """(joint,) side at the end of a straight way, which a joint may reach in the other sense than it left."""
-    begin, end = (arms.drawn.frames(q_rad[[r]])[0, -1] for r in (row - 1, row))
-    turn = Rotation.from_matrix(begin[:3, :3].T @ end[:3, :3]).as_rotvec()
-    back = end.copy()
-    back[:3, 3] -= BACK * (end[:3, 3] - begin[:3, 3])
-    back[:3, :3] = end[:3, :3] @ Rotation.from_rotvec(-BACK * turn).as_matrix()
-    before_rad, found = inverse_of.refined(arms.drawn, back[None], q_rad[[row]])
-    if not found[0]:
-        return np.full_like(side, np.nan)
-    last = q_rad[row] - before_rad[0]
-    return np.where(np.abs(last) > BACK * MOVED_RAD, np.sign(last), side)
 
 
 def _refuse_beyond(arms: Arms, q_rad: Floats, via_rad: Floats | None, why: dict[int, tuple[str, str]]) -> None:

@@ -12,7 +12,7 @@ from calibrate.correct.rotations import FANUC
 POSITION = re.compile(r"P\[\s*(?P<number>\d+)[^\]]*\]\s*\{(?P<body>[^}]*)\}")
 FIELD = re.compile(rf"\b(?P<key>X|Y|Z|W|P|R|J[1-9])\s*=\s*(?P<number>{NUMBER})\s*(?P<unit>mm|deg)")
 FRAME = re.compile(r"UF\s*:\s*(?P<frame>\w+)")
-MOVE = re.compile(r"^[ \t]*\d*:\s*(?:J|(?P<straight>L)|(?P<arc>[CA]))\s+(?P<target>P(?:R)?\[\s*\d+)", re.MULTILINE)
+MOVE = re.compile(r"^[ \t]*\d*:\s*(?:J|L|(?P<arc>[CA]))\s+(?P<target>P(?:R)?\[\s*\d+)", re.MULTILINE)
 POSE = ("X", "Y", "Z", "W", "P", "R")
 
 
@@ -30,7 +30,7 @@ def find(text: str, n_joints: int) -> Targets:
             what = "circular moves" if match["arc"] else "position registers"
             skipped.append(f"line {line_of(text, match.end())}: {what} are not corrected")
             continue
-        by_number.setdefault(target[2:], []).append(Move(start, text[start:end], bool(match["straight"])))
+        by_number.setdefault(target[2:], []).append(Move(start, text[start:end]))
     literals: list[Literal] = []
     for match in POSITION.finditer(text, body):
         one = _literal(text, match, tuple(by_number.get(match["number"], ())), n_joints)

@@ -29,12 +29,12 @@ Floats = NDArray[np.float64]
 
 AGGREGATE = r"\{(?:\s*(?:E6POS|E6AXIS|POS|AXIS|FRAME)\s*:)?(?P<fields>[^{}\[\]]*)\}"
 FIELD = re.compile(rf"\b(?P<key>[A-Z]\w*)\s+(?P<number>{NUMBER})", re.IGNORECASE)
-INLINE = re.compile(rf"^[ \t]*S?(?:PTP|(?P<straight>LIN))\s+{AGGREGATE}", re.IGNORECASE | re.MULTILINE)
+INLINE = re.compile(rf"^[ \t]*S?(?:PTP|LIN)\s+{AGGREGATE}", re.IGNORECASE | re.MULTILINE)
 DECLARED = re.compile(
     rf"^[ \t]*(?:DECL\s+)?(?:GLOBAL\s+)?(?:CONST\s+)?(?:E6POS|E6AXIS|POS|AXIS)\s+(?P<name>\w+)\s*=\s*{AGGREGATE}",
     re.IGNORECASE | re.MULTILINE,
 )
-MOVE = re.compile(r"^[ \t]*S?(?:PTP|(?P<straight>LIN)|CIRC)\s+(?P<target>[A-Za-z_]\w*)", re.IGNORECASE | re.MULTILINE)
+MOVE = re.compile(r"^[ \t]*S?(?:PTP|LIN|CIRC)\s+(?P<target>[A-Za-z_]\w*)", re.IGNORECASE | re.MULTILINE)
 OTHER = re.compile(r"^[ \t]*S?(?:CIRC|PTP_REL|LIN_REL|CIRC_REL)\b", re.IGNORECASE | re.MULTILINE)
 POSE = ("X", "Y", "Z", "A", "B", "C")
 
@@ -50,7 +50,7 @@ def find(text: str, n_joints: int) -> Targets:
         if inline:
             start = line_start(text, match.end())
             end = text.find("\n", match.end())
-            moves = (Move(start, text[start : len(text) if end < 0 else end], bool(match["straight"])),)
+            moves = (Move(start, text[start : len(text) if end < 0 else end]),)
             name = f"line {line_of(text, match.start('fields'))}"
         else:
             name = match["name"]

@@ -22,7 +22,6 @@ class Move:
 
     line_start: int
     text: str
-    straight: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,13 +108,11 @@ def blanked(text: str, comment: str) -> str:
 
 
 def moves_of(text: str, code: str, pattern: re.Pattern[str]) -> dict[str, list[Move]]:
-    """By what an instruction moves to. `pattern` has the groups `kind` and `target`; straight moves begin with its
-    `straight` group.
-    """
+    """By what an instruction moves to, the group `target` of the pattern."""
     found: dict[str, list[Move]] = {}
     for match in pattern.finditer(code):
         start = line_start(text, match.start())
         end = text.find("\n", match.start())
         line = text[start : len(text) if end < 0 else end]
-        found.setdefault(match["target"].lower(), []).append(Move(start, line, bool(match["straight"])))
+        found.setdefault(match["target"].lower(), []).append(Move(start, line))
     return found

@@ -37,8 +37,8 @@ ROBTARGET = rf"(?P<pose>\[\s*{_list(3)}\s*,\s*{_list(4)}\s*,\s*{_list(4)}\s*,\s*
 JOINTTARGET = rf"(?P<joints>\[\s*{_list(6)}\s*,\s*{_list(6)}\s*\])"
 TARGET = re.compile(f"{ROBTARGET}|{JOINTTARGET}")
 NAMED = re.compile(r"\b(?:robtarget|jointtarget)\s+(?P<name>\w+)\s*:=\s*$", re.IGNORECASE)
-INLINE = re.compile(r"\bMove(?:J|AbsJ|(?P<straight>L))\s+$", re.IGNORECASE)
-MOVE = re.compile(r"\bMove(?:J|AbsJ|(?P<straight>L)|C|\w+)\s+(?P<target>[A-Za-z_]\w*)", re.IGNORECASE)
+INLINE = re.compile(r"\bMove(?:J|AbsJ|L)\s+$", re.IGNORECASE)
+MOVE = re.compile(r"\bMove(?:J|AbsJ|L|C|\w+)\s+(?P<target>[A-Za-z_]\w*)", re.IGNORECASE)
 CIRCLE = re.compile(r"\bMoveC\b", re.IGNORECASE)
 REST = re.compile(r"\bMove\w+\s+(?:\[.*\]\]|\w+)\s*(?P<rest>(?:\\[^,]*)?,.*;)", re.IGNORECASE)
 QUARTER = np.pi / 2.0
@@ -56,7 +56,7 @@ def find(text: str, n_joints: int) -> Targets:
         before = code[start : match.start()]
         named, inline = NAMED.search(before), INLINE.search(before)
         if inline:
-            moves = (Move(start, text[start : len(text) if end < 0 else end], bool(inline["straight"])),)
+            moves = (Move(start, text[start : len(text) if end < 0 else end]),)
             name = f"line {line_of(text, match.start())}"
         elif named:
             name, moves = named["name"], tuple(by_name.get(named["name"].lower(), ()))

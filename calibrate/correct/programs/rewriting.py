@@ -89,7 +89,7 @@ def correct_program(
             joints = dialect.joint_numbers(found.via_rad[row])
             ending = "\r\n" if "\r\n" in text else "\n"
             pieces += [(m.line_start, m.line_start, dialect.overshoot(m, joints) + ending) for m in one.moves]
-    conditions = moves_conditions(wanted, arms, found.nominal_rad, inverse_of, options)
+    conditions = moves_conditions(wanted, found.nominal_rad, options)
     after, _, _ = predicted_errors(model, wanted, q_rad, conditions, options)
     new = _replaced(text, pieces)
     shown = difflib.unified_diff(text.splitlines(), new.splitlines(), name, "corrected", lineterm="", n=0)
@@ -107,8 +107,17 @@ def _check(targets: Targets, dialect: Dialect, frame: Floats | None, options: Op
             f"{name}: positions are in user frame {', '.join(framed)}, whose place the program does not hold; give its "
             "pose in the base with --frame"
         )
-    if len(framed) > 1:
-        raise DataError(f"{name}: positions are in user frames {', '.join(framed)}; correct one frame at a time")
+    named = sorted({one.frame for one in targets.literals if one.frame})
+    if len(named) > 1:
+        raise DataError(f"{name}: positions are in user frames {', '.join(named)}; correct one frame at a time")
+    if named == ["0"] and frame is not None:
+        raise DataError(f"{name}: positions are in user frame 0, which is the base; leave --frame out")
+    idle = [one.name for one in targets.literals if not one.moves]
+    if options.approach and idle:
+        raise DataError(
+            f"{name}: no move in this file goes to {', '.join(idle[:3])}, before which an overshoot point could stand; "
+            "leave --approach out"
+        )
     if options.approach and dialect.overshoot is None:
         raise DataError(f"{name}: overshoot points cannot be inserted into {dialect.name}; leave --approach out")
 
@@ -134,9 +143,8 @@ def _wanted(
         else:
             position_m, R = dialect.position_and_turn(one.numbers)
             T[row] = base @ pose(position_m[None], R[None])[0]
-    straight = np.zeros(n, dtype=bool)
     branches = tuple(one.branch for one in literals)
-    return Wanted(T, joints, near, {c: np.full(n, v) for c, v in every.items()}, straight, False, branches)
+    return Wanted(T, joints, near, {c: np.full(n, v) for c, v in every.items()}, False, branches)
 
 
 def _commanded(

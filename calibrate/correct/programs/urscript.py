@@ -22,8 +22,8 @@ from calibrate.correct.programs.literal import (
 from calibrate.correct.rotations import VECTOR
 
 LIST = rf"(?P<pose>p?)\[\s*{NUMBER}(?:\s*,\s*{NUMBER})*\s*\]"
-MOVE = re.compile(r"\b(?:movej|(?P<straight>movel|movep)|servoj|movec)\s*\(\s*(?P<target>[A-Za-z_]\w*|p?\[)")
-INLINE = re.compile(rf"\b(?P<move>movej|movel|movep|servoj)\s*\(\s*(?:q\s*=\s*|pose\s*=\s*)?{LIST}")
+MOVE = re.compile(r"\b(?:movej|movel|movep|servoj|movec)\s*\(\s*(?P<target>[A-Za-z_]\w*|p?\[)")
+INLINE = re.compile(rf"\b(?:movej|movel|movep|servoj)\s*\(\s*(?:q\s*=\s*|pose\s*=\s*)?{LIST}")
 ASSIGNED = re.compile(rf"(?P<name>[A-Za-z_]\w*)\s*=\s*{LIST}")
 CIRCLE = re.compile(r"\bmovec\s*\(")
 
@@ -34,8 +34,7 @@ def find(text: str, n_joints: int) -> Targets:
     by_name = moves_of(text, code, MOVE)
     literals: list[Literal] = []
     for match in INLINE.finditer(code):
-        straight = match["move"] in ("movel", "movep")
-        literals.append(_literal(text, match, "", (_move(text, match.start(), straight),), n_joints))
+        literals.append(_literal(text, match, "", (_move(text, match.start()),), n_joints))
     for match in ASSIGNED.finditer(code):
         if match["name"].lower() in by_name:
             moves = tuple(by_name[match["name"].lower()])
@@ -52,10 +51,10 @@ def find(text: str, n_joints: int) -> Targets:
     return Targets(tuple(sorted(good, key=lambda one: one.at)), tuple(dict.fromkeys(skipped)))
 
 
-def _move(text: str, at: int, straight: bool) -> Move:
+def _move(text: str, at: int) -> Move:
     start = line_start(text, at)
     end = text.find("\n", at)
-    return Move(start, text[start : len(text) if end < 0 else end], straight)
+    return Move(start, text[start : len(text) if end < 0 else end])
 
 
 def _literal(text: str, match: re.Match[str], name: str, moves: tuple[Move, ...], n_joints: int) -> Literal:

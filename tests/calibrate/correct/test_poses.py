@@ -23,7 +23,7 @@ T = drawn().frames(Q)[:, -1]
 
 def wanted(T_base_tool, near_rad, **conditions):
     n, joints = near_rad.shape
-    return Wanted(T_base_tool, np.full((n, joints), np.nan), near_rad, conditions, np.zeros(n, dtype=bool))
+    return Wanted(T_base_tool, np.full((n, joints), np.nan), near_rad, conditions)
 
 
 def test_the_real_tool_reaches_every_pose():

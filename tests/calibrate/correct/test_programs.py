@@ -193,6 +193,14 @@ def test_what_cannot_be_done_is_refused():
         corrected(fanuc(), ".ls", Options(tool=TOOL, approach=1))
     with pytest.raises(DataError, match="user frame 3"):
         corrected(fanuc(3), ".ls")
+    with pytest.raises(DataError, match="user frame 0, which is the base"):
+        corrected(fanuc(), ".ls", frame=np.eye(4))
+    two = fanuc(3).replace("/END", fanuc().split("/POS")[1].replace("P[1]", "P[5]").replace("P[2]", "P[6]"))
+    with pytest.raises(DataError, match="user frames 0, 3"):
+        corrected(two, ".ls", frame=np.eye(4))
+    declared = krl().replace("  LIN {E6POS: ", "  DECL E6POS XP1 = {")
+    with pytest.raises(DataError, match="no move in this file goes to XP1"):
+        corrected(declared, ".src", Options(tool=TOOL, approach=1))
     with pytest.raises(DataError, match="no target"):
         corrected("DEF a()\nEND\n", ".src")
 
