@@ -40,6 +40,9 @@ GROUPS: dict[str, tuple[ListedCommand, ...]] = {
             "predict", "predict:predict_command", "Predict readings with a model, each with its uncertainty."
         ),
         ListedCommand(
+            "correct", "correct:correct_command", "Correct poses or a program, so that the real tool reaches them."
+        ),
+        ListedCommand(
             "report", "report:report_command", "Write the report of a recording: one self-contained HTML file."
         ),
         ListedCommand(
@@ -66,6 +69,11 @@ GROUPS: dict[str, tuple[ListedCommand, ...]] = {
         ListedCommand("import", "import_files:import_command", "Make a session of a table, a log or a session folder."),
         ListedCommand(
             "export", "export:export_command", "Write a recording as tables, or its CAN frames as a CAN log."
+        ),
+        ListedCommand(
+            "export-model",
+            "export_model:export_model_command",
+            "Export a model to another program, or to its controller.",
         ),
         ListedCommand("recover", "recover:recover_command", "Save what is readable of a damaged recording."),
         ListedCommand("layouts", "layouts:layouts_command", "Write Foxglove and PlotJuggler layouts for a recording."),

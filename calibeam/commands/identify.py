@@ -19,22 +19,13 @@ from calibeam.results.identification import (
     write_session_model,
 )
 from calibrate.errors import DataError
-from calibrate.export.export import ExportForm, export_model
+from calibrate.export.export import SUFFIX, ExportForm, export_model
 from calibrate.fit import Status
 from calibrate.identification.planned import rig_as_planned
 from calibrate.model_file import ModelFile, read_model, write_model
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_verdict import session_verdict
 from calibrate.sensors.catalogue import unused_columns
-
-SUFFIX = {
-    ExportForm.URDF: ".urdf",
-    ExportForm.DH_CSV: ".dh.csv",
-    ExportForm.UR_KINEMATICS: ".kinematics.yaml",
-    ExportForm.UR_CALIBRATION: ".calibration.conf",
-    ExportForm.JSON: ".arm.json",
-    ExportForm.MATLAB: ".m",
-}
 
 
 def identify_command(
@@ -72,8 +63,7 @@ def identify_command(
     out
         Where to write the model.
     export
-        Also write the arm for another program, beside the model: urdf, dh-csv, ur-kinematics, ur-calibration, json,
-        matlab.
+        Also write the arm for another program, beside the model: the forms of `calibeam export-model`.
     json
         Print the model as it stands in the file, on one line, and nothing else.
 

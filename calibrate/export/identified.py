@@ -1,7 +1,7 @@
 """The arm that is exported: the rig as corrected, ready for every form."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from calibrate.arms.catalogue import arm_of
 from calibrate.arms.convert import corrected_parts
 from calibrate.arms.eccentric import COSINE, SINE
 from calibrate.errors import DataError
+from calibrate.model_file import ModelParameter
 
 Floats = NDArray[np.float64]
 
@@ -21,6 +22,16 @@ SIGN = (
 
 
 @dataclass(frozen=True)
+class AxisOffset:
+    """True angle = reading + value."""
+
+    joint: int  # from 1
+    value_rad: float
+    sigma_rad: float | None  # None: not known
+    undetermined: bool
+
+
+@dataclass(frozen=True)
 class IdentifiedArm:
     """T_base_flange(q) = F_0 Rz(q_1) F_1 ... Rz(q_n) F_n with q the joint readings."""
 
@@ -28,7 +39,9 @@ class IdentifiedArm:
     corrections: Mapping[str, float]  # of the arm only
     parts: Floats  # (joint + 1, 4, 4) F_0 ... F_n
     tool_m: tuple[float, float, float] | None  # target point in the flange frame, where rig or model names one
-    not_carried: tuple[str, ...] = ()  # sentences: what no form can hold (not_carried.py)
+    not_carried: tuple[str, ...] = ()  # sentences: what the form cannot hold (not_carried.py)
+    zeros: tuple[AxisOffset, ...] = ()
+    compliance_rad_nm: Mapping[int, float] = field(default_factory=dict[int, float])  # joint from 1: linear ones
 
 
 def identified_arm(
@@ -36,9 +49,13 @@ def identified_arm(
     corrections: Mapping[str, float],
     tool_about_m: tuple[float, ...] | None = None,
     not_carried: tuple[str, ...] = (),
+    stated: Sequence[ModelParameter] | None = None,
+    compliance_rad_nm: Mapping[int, float] | None = None,
 ) -> IdentifiedArm:
     """Takes what belongs to arm and tool point; `tool_about_m` is what a model's corrections of the tool are about,
-    else the rig's point. DataError for a joint or link that this arm does not have.
+    else the rig's point. `stated`: what the model holds of each correction; None: nothing beside its value.
+
+    DataError for a joint or link that this arm does not have.
     """
     followers = [i for i, joint in enumerate(rig.arm.joints, start=1) if joint.follows is not None]
     if followers:
@@ -61,7 +78,20 @@ def identified_arm(
             )
     own = {k: v for k, v in corrections.items() if k in known}
     tool_m = _tool_m(rig.tool.point_m if tool_about_m is None else tool_about_m[:3], corrections)
-    return IdentifiedArm(rig, own, corrected_parts(rig.arm, own), tool_m, not_carried)
+    zeros = tuple(_zero(i, own, stated) for i in range(1, rig.n_joints + 1))
+    parts, yields = corrected_parts(rig.arm, own), dict(compliance_rad_nm or {})
+    return IdentifiedArm(rig, own, parts, tool_m, not_carried, zeros, yields)
+
+
+def _zero(joint: int, own: Mapping[str, float], stated: Sequence[ModelParameter] | None) -> AxisOffset:
+    """A zero of which the model has no number was held where it is, or is one choice among many."""
+    name = f"joint{joint}.zero"
+    if stated is None:
+        return AxisOffset(joint, own.get(name, 0.0), None, name not in own)
+    found = next((p for p in stated if p.name == name), None)
+    if found is None or found.value is None:
+        return AxisOffset(joint, own.get(name, 0.0), None, True)
+    return AxisOffset(joint, found.value, found.sigma, False)
 
 
 def _tool_m(about_m: tuple[float, ...] | None, corrections: Mapping[str, float]) -> tuple[float, float, float] | None:

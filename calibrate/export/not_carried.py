@@ -6,10 +6,11 @@ joint had, each under the conditions of a recorded sample; beyond, the model say
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Samples
 from calibrate.effects.ports import Perturbation
@@ -49,6 +50,7 @@ class NotCarried:
     whole: Moved
     each: dict[str, Moved]
     session: tuple[str, ...]
+    carried: tuple[str, ...] = ()  # names of those that the form holds
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -65,23 +67,33 @@ class NotCarried:
         for name, moved in self.each.items():
             still = moved.max_m < STILL_M
             yield f"not carried: {name}: {'moves no point of the arm' if still else _length(moved)}"
+        for name in self.carried:
+            yield f"carried: {name}"
         for name in self.session:
             yield f"not carried: {name}: true of its own session only"
 
 
-def not_carried(model: ModelFile) -> NotCarried:
-    """Of a model with effects. DataError for one without its rig, or whose effects cannot be evaluated."""
+def not_carried(model: ModelFile, carried: tuple[str, ...] = ()) -> NotCarried:
+    """Of a model with effects, but for those named `carried`. DataError for one without its rig, or whose effects
+    cannot be evaluated.
+    """
     predictor = Predictor.of(model)
     recorded = recorded_samples(model, len(predictor.rig.arm.joints))
     session = tuple(e.name for e in model.effects if e.holds == "session")
     try:
-        return _over(model, predictor, _drawn(recorded), session, workspace=True)
+        return _over(model, predictor, _drawn(recorded), session, carried, workspace=True)
     except DataError:  # what the poses themselves have chosen has no meaning between them
-        return _over(model, predictor, recorded, session, workspace=False)
+        return _over(model, predictor, recorded, session, carried, workspace=False)
 
 
 def _over(
-    model: ModelFile, predictor: Predictor, samples: Samples, session: tuple[str, ...], *, workspace: bool
+    model: ModelFile,
+    predictor: Predictor,
+    samples: Samples,
+    session: tuple[str, ...],
+    carried: tuple[str, ...],
+    *,
+    workspace: bool,
 ) -> NotCarried:
     applied, q = effects_at(model, predictor, samples, same_session=False), samples.joints()
     nothing = Perturbation.none(len(samples), samples.n_joints)
@@ -94,8 +106,35 @@ def _over(
         moved, plain = (flange_frames(arm_in(predictor), predictor, q, p)[:, -1] for p in (by, nothing))
         return predictor.tip_at(moved) - predictor.tip_at(plain)
 
-    each = {left.get(a.carried.record.name, a.carried.record.name): Moved.of(shift([a])) for a in applied.found}
-    return NotCarried(len(samples), workspace, Moved.of(shift(applied.found)), each, session)
+    found = [a for a in applied.found if a.carried.record.name not in carried]
+    each = {left.get(a.carried.record.name, a.carried.record.name): Moved.of(shift([a])) for a in found}
+    return NotCarried(len(samples), workspace, Moved.of(shift(found)), each, session, carried)
+
+
+def geometry_lost(model: ModelFile) -> str:
+    """What the drawn arm with the identified joint zeros still is off, a motion of the whole arm aside.
+
+    The tip of the model against that of an arm that has its zeros and its tool, at postures between the joint limits.
+    """
+    predictor = Predictor.of(model)
+    joints = predictor.rig.arm.joints
+    low, high = np.array([j.lower_rad for j in joints]), np.array([j.upper_rad for j in joints])
+    q = np.random.default_rng(SEED).uniform(low, high, (POSES, len(joints)))
+    kept = {n: v for n, v in predictor.values.items() if n.endswith(".zero") or not n.startswith(("joint", "link"))}
+    none = {n: v for n, v in kept.items() if not n.startswith("joint")}
+    off, drawn = (
+        Moved.of(_left_over(replace(predictor, values=values).tip_m(q), predictor.tip_m(q))) for values in (kept, none)
+    )
+    return (
+        f"not carried: lengths and axes; with the offsets alone the tip is off by {_length(off)}, over {POSES} poses "
+        f"between the joint limits; without them by {_length(drawn)}"
+    )
+
+
+def _left_over(tip_m: Floats, wanted_m: Floats) -> Floats:
+    """(pose, 3) after the motion that brings the one best onto the other."""
+    a, b = tip_m - tip_m.mean(axis=0), wanted_m - wanted_m.mean(axis=0)
+    return np.asarray(Rotation.align_vectors(b, a)[0].apply(a) - b, dtype=np.float64)
 
 
 def _drawn(recorded: Samples) -> Samples:

@@ -148,7 +148,7 @@ def _felt(at: At, predictor: Predictor, by: Perturbation, port: Port, amount: Fl
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """Where the arm holds flange and tip in its base, each row with one sigma; `notes` as in `Predicted`.
+    """Where the arm holds flange and tip in its base, each row with one sigma; `outside`, `notes` as in `Predicted`.
 
     Sigmas are of the robot's own frame (own_frame.py) or of the world, as asked.
     """
@@ -157,13 +157,30 @@ class Placed:
     flange_sigma: Floats  # (row, 6) m along x, y, z of the base, rad about them; NaN without a covariance
     tip_m: Floats  # (row, 3)
     tip_sigma_m: Floats  # (row, 3)
+    outside: tuple[str, ...]
     notes: tuple[str, ...]
 
 
-def placed(model: ModelFile, samples: Samples, same_session: bool = False, *, in_world: bool = False) -> Placed:
+def flange_with_physics(model: ModelFile, samples: Samples) -> tuple[Floats, Applied]:
+    """(row, 4, 4) with the effects of the model beyond their session, and what these are there. DataError as above."""
+    predictor = Predictor.of(model)
+    applied = effects_at(model, predictor, samples, same_session=False)
+    return _flange(predictor, applied, samples.joints())(predictor, applied.by), applied
+
+
+def placed(
+    model: ModelFile,
+    samples: Samples,
+    same_session: bool = False,
+    *,
+    in_world: bool = False,
+    point_m: Floats | None = None,
+    own_flange: bool = False,
+) -> Placed:
     """Flange and tip with the effects of the model, at joints and conditions of samples. DataError as above.
 
-    `in_world`: sigmas contain how far it is known where the base stands.
+    `in_world`: sigmas contain how far it is known where the base stands. `point_m` (3,): a point of the flange in place
+    of the model's tip; `own_flange`: sigmas of flange and point do not contain where the target is mounted on it.
     """
     predictor = Predictor.of(model)
     own = None if in_world else OwnFrame.of(predictor)
@@ -171,15 +188,21 @@ def placed(model: ModelFile, samples: Samples, same_session: bool = False, *, in
     flange = _flange(predictor, applied, samples.joints())
     T = flange(predictor, applied.by)
 
+    def tip_at(predictor: Predictor, T: Floats) -> Floats:
+        return predictor.tip_at(T) if point_m is None else T[:, :3, :3] @ point_m + T[:, :3, 3]
+
     def at(predictor: Predictor, by: Perturbation) -> Columns:
-        now = flange(predictor, by) if own is None else own.back(predictor) @ flange(predictor, by)
-        turn = Rotation.from_matrix(now[:, :3, :3] @ np.swapaxes(T[:, :3, :3], 1, 2)).as_rotvec()
-        table = np.concatenate([now[:, :3, 3], turn, predictor.tip_at(now)], axis=1)
+        back = np.eye(4) if own is None else own.back(predictor)
+        now = back @ flange(predictor, by)
+        mounted = now @ own.flange_back(predictor, back) if own is not None and own_flange else now
+        turn = Rotation.from_matrix(mounted[:, :3, :3] @ np.swapaxes(T[:, :3, :3], 1, 2)).as_rotvec()
+        tip_m = tip_at(predictor, now if point_m is None else mounted)
+        table = np.concatenate([mounted[:, :3, 3], turn, tip_m], axis=1)
         return dict(zip(PLACED, table.T, strict=True))
 
     variance = _variance(model, predictor, applied, at, PLACED)
     sigma = np.sqrt(np.maximum(np.stack([variance[c] for c in PLACED], axis=1), 0.0))
-    return Placed(T, sigma[:, :6], predictor.tip_at(T), sigma[:, 6:], applied.notes)
+    return Placed(T, sigma[:, :6], tip_at(predictor, T), sigma[:, 6:], applied.outside, applied.notes)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ SLOW = ("scipy.stats", "scipy.optimize", "scipy.interpolate", "scipy.ndimage", "
 # stages before and after the fit, loaded by their command
 LATER = (
     "calibrate.report",
+    "calibrate.correct",
     "calibrate.diagnose",
     "calibrate.effects",
     "calibrate.export.not_carried",  # of a model with effects

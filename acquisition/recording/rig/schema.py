@@ -65,6 +65,19 @@ class Pose(Struct, frozen=True, forbid_unknown_fields=True):
     rotation_rad: Rotation = ZERO
 
 
+class Make(enum.Enum):
+    """Whose controller moves the arm: what a model can be exported to, and what its numbers are called there."""
+
+    ABB = "abb"
+    FANUC = "fanuc"
+    FRANKA = "franka"
+    KUKA = "kuka"
+    MOTOMAN = "motoman"
+    STAUBLI = "staubli"
+    UR = "ur"
+    OTHER = "other"
+
+
 class EncoderSide(enum.Enum):
     """On which side of the gear a second encoder sits."""
 
@@ -107,8 +120,8 @@ class Arm(Struct, frozen=True, forbid_unknown_fields=True):
     gravity_m_s2: Gravity = (0.0, 0.0, -9.81)  # an arm that stands on its feet
     flange: Pose = Pose()
     base: Pose = Pose()  # of a D-H table: fixed transform in front of the first joint
-    make: Name | None = None  # who built it: "KUKA"
     serial_number: Name | None = None  # of the maker's plate: tells two arms of one kind apart
+    make: Make | None = None  # None: not stated
 
 
 class Tool(Struct, frozen=True, forbid_unknown_fields=True):

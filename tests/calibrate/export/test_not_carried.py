@@ -10,7 +10,7 @@ import pytest
 
 from acquisition.recording.rig import parse_rig
 from calibeam.notebook import Model
-from calibrate.export.export import ExportForm, export_model
+from calibrate.export.export import MAKES, ExportForm, export_model
 from calibrate.export.not_carried import not_carried
 from calibrate.model_file import read_model
 from calibrate.predict import Predictor
@@ -18,7 +18,7 @@ from calibrate.predict import Predictor
 from ..physics.two_joints import PLAY_RAD, REACH_M, two_joints
 
 MODELS = Path(__file__).parents[2] / "golden" / "data" / "formats" / "models"
-FORMS = [form for form in ExportForm if not form.value.startswith("ur-")]  # those have six joints
+FORMS = [form for form in ExportForm if form not in MAKES]  # those are for arms of one make
 OFF_UM = 1e6 * REACH_M * PLAY_RAD / 2.0  # half the play either way, at a stretched arm
 SAYS = "not carried: joint1-backlash: 250.0 µm rms, at most 250.0 µm"
 

@@ -1,0 +1,255 @@
+"""`calibeam correct`: joint commands and corrected programs that bring the real tool where it is wanted."""
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from cyclopts import Parameter, validators
+from numpy.typing import NDArray
+from rich.console import Console
+from scipy.spatial.transform import Rotation
+
+from acquisition.motion.inverse.closed_form import closed_form
+from acquisition.motion.inverse.solve import AtPose, all_solutions, refine
+from acquisition.recording.rig import parse_rig
+from calibeam.outcome import PartialResult
+from calibrate.arms.rig_arm import RigArm
+from calibrate.correct.corrected import Corrected, Options, Wanted, correct
+from calibrate.correct.programs.rewriting import correct_program, dialect_of
+from calibrate.correct.tables import corrected_rows, read_poses
+from calibrate.errors import DataError
+from calibrate.model_file import ModelFile, read_model
+
+Floats = NDArray[np.float64]
+
+LISTED = 12  # poses that are not ok, before the rest is counted
+SEED = 1  # of the starts of an arm without a closed form: the same poses always give the same commands
+SIDES = {"positive": 1, "negative": -1}
+UM = 1e6
+
+
+class MotionInverse:
+    """The inverse kinematics of motion, with the closed form of the rig file's arm for its starts."""
+
+    def __init__(self, drawn: RigArm) -> None:
+        self._starts = closed_form(drawn)
+
+    def solutions(self, arm: RigArm, T_base_flange: Floats, near_rad: Floats) -> Floats:
+        return all_solutions(arm, T_base_flange, near_rad, self._starts, np.random.default_rng(SEED))
+
+    def refined(self, arm: RigArm, T_base_flange: Floats, start_rad: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+        solved = refine(arm, AtPose(T_base_flange), start_rad)
+        return solved.q_rad, solved.found
+
+
+def correct_command(
+    model: Path,
+    poses: Path,
+    *,
+    out: Path,
+    approach: Literal["positive", "negative"] | None = None,
+    overshoot_deg: Annotated[float, Parameter(validator=validators.Number(gt=0.0, lte=20.0))] = 2.0,
+    margin_deg: Annotated[float, Parameter(validator=validators.Number(gte=0.0))] = 1.0,
+    tool: tuple[float, float, float, float, float, float] | None = None,
+    frame: tuple[float, float, float, float, float, float] | None = None,
+    start: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (),
+    condition: tuple[str, ...] = (),
+    verbose: bool = False,
+) -> None:
+    """Correct poses or a program, so that the real tool reaches them.
+
+    A table of poses becomes a table of joint commands and corrected poses; in a program of URScript, KRL, RAPID or
+    FANUC LS only the numbers of targets change. The predicted tool error of every pose stands beside it, before and
+    after, with its sigma. Poses that are unreachable, near a limit or beyond the calibrated range are listed.
+
+    Example: calibeam correct model.json poses.csv --out corrected.csv --approach positive --condition payload_kg=2.5
+
+    Example: calibeam correct model.json weld.src --out weld-corrected.src --frame 0.8 0.1 0.2 0 0 0
+
+    Parameters
+    ----------
+    model
+        The model.json of a diagnosis or an identification; its rig file is what the controller computes with.
+    poses
+        poses.csv, or a program (.script, .src, .dat, .mod, .prg, .ls); joint targets of a program are taken as poses of
+        the rig file's arm.
+    out
+        The file to write; never the input itself.
+    approach
+        Let every joint come from one side: overshoot points are inserted before each pose.
+    overshoot_deg
+        How far an overshoot point lies off, in every joint.
+    margin_deg
+        Poses with a joint nearer than this to its limit are listed.
+    tool
+        Tool centre point in the flange as the controller has it: x y z in m, rotation vector in rad; it is taken to be
+        exact. Default: the rig file's point for the controller, the calibrated one for the real tool.
+    frame
+        Frame of the poses in the base, x y z in m, rotation vector in rad: work object, $BASE, user frame.
+    start
+        Joint angles in degrees before the first pose; the nearest posture is taken. Default: middle of the range.
+    condition
+        A condition of all poses, as NAME=VALUE with a column of samples.csv: payload_kg=2.5, temp_arm_degC=24.
+    verbose
+        List every pose that is not ok, and the whole diff.
+
+    """
+    if out.resolve() == poses.resolve():
+        raise DataError(f"{out}: this is the input; give another --out")
+    job = _Job.of(model, start, condition, frame)
+    options = Options(
+        None if tool is None else _pose(tool),
+        0 if approach is None else SIDES[approach],
+        float(np.radians(overshoot_deg)),
+        float(np.radians(margin_deg)),
+    )
+    console = Console(soft_wrap=True, highlight=False)
+    found, names, notes = (
+        _table(job, poses, out, options)
+        if poses.suffix.lower() == ".csv"
+        else _program(console, job, poses, out, options, verbose)
+    )
+    needless = tuple(
+        f"{c} is given; no effect of the model depends on it" for c in job.every if c not in job.known.needs
+    )
+    _print_found(console, job.known, found, names, (*needless, *notes, *found.notes), verbose)
+    console.print(f"corrected: {out}", markup=False)
+    lost = int(np.sum(~np.isfinite(found.q_rad).all(axis=1)))
+    if lost:
+        raise PartialResult(f"{lost} of {len(names)} poses have no command; they are named above and in {out}")
+
+
+@dataclass(frozen=True, eq=False)
+class _Job:
+    """What table and program have in common."""
+
+    known: ModelFile
+    n_joints: int
+    near_rad: Floats | None
+    every: dict[str, float]  # conditions of all poses
+    frame: Floats | None
+    solver: MotionInverse
+
+    @classmethod
+    def of(
+        cls, model: Path, start: tuple[float, ...], condition: tuple[str, ...], frame: tuple[float, ...] | None
+    ) -> "_Job":
+        known = read_model(model)
+        if known.rig.text is None:
+            raise DataError(f"{model}: the rig's text is not in the file; identify again")
+        rig = parse_rig(known.rig.text, f"rig.toml in {model}")
+        if start and len(start) != rig.n_joints:
+            raise DataError(f"--start has {len(start)} angles, the arm {rig.n_joints} joints")
+        near_rad = np.radians(start) if start else None
+        place = None if frame is None else _pose(frame)
+        return cls(known, rig.n_joints, near_rad, _conditions(condition), place, MotionInverse(RigArm.of_rig(rig)))
+
+
+def _table(job: _Job, poses: Path, out: Path, options: Options) -> tuple[Corrected, list[str], tuple[str, ...]]:
+    place = np.eye(4) if job.frame is None else job.frame
+    wanted = _begun(read_poses(_text(poses, "utf-8"), str(poses), job.n_joints, place, job.every), job.near_rad)
+    found = correct(job.known, wanted, job.solver, options)
+    _write_table(out, *corrected_rows(found, place))
+    given = tuple(
+        f"column {c} is no condition that the model depends on"
+        for c in wanted.conditions
+        if c not in job.known.needs and c not in job.every
+    )
+    return found, [f"pose {row + 1}" for row in range(len(wanted))], given
+
+
+def _program(
+    console: Console, job: _Job, poses: Path, out: Path, options: Options, verbose: bool
+) -> tuple[Corrected, list[str], tuple[str, ...]]:
+    dialect = dialect_of(poses.suffix)
+    if dialect is None:
+        raise DataError(f"{poses}: neither a table (.csv) nor a program (.script, .src, .dat, .mod, .prg, .ls)")
+    text = _text(poses, "latin-1")  # every byte has a letter, so that all of them are kept
+    done = correct_program(
+        job.known, text, dialect, job.frame, job.near_rad, job.every, job.solver, options, poses.name
+    )
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_bytes(done.text.encode("latin-1"))
+    names = list(done.names)
+    _print_program(console, done.diff, done.found, names, verbose)
+    return done.found, names, done.skipped
+
+
+def _begun(wanted: Wanted, near_rad: Floats | None) -> Wanted:
+    """With the posture before the first pose, where the table does not state one."""
+    if near_rad is not None and not np.isfinite(wanted.near_rad[0]).all():
+        wanted.near_rad[0] = near_rad
+    return wanted
+
+
+def _print_program(console: Console, diff: tuple[str, ...], found: Corrected, names: list[str], verbose: bool) -> None:
+    for line in diff if verbose else diff[:LISTED]:
+        console.print(line, markup=False)
+    if not verbose and len(diff) > LISTED:
+        console.print(f"... {len(diff) - LISTED} more lines of the diff (--verbose)", markup=False)
+    for row, name in enumerate(names if verbose else names[:LISTED]):
+        before, after = (
+            f"{UM * p.error_m[row]:.0f} ± {UM * p.s_error_m[row]:.0f} µm" for p in (found.before, found.after)
+        )
+        console.print(f"{name}: predicted tool error {before}, corrected {after}", markup=False)
+    if not verbose and len(names) > LISTED:
+        console.print(f"... {len(names) - LISTED} more targets (--verbose)", markup=False)
+
+
+def _print_found(
+    console: Console, model: ModelFile, found: Corrected, names: list[str], notes: tuple[str, ...], verbose: bool
+) -> None:
+    commanded = int(np.sum(np.isfinite(found.q_rad).all(axis=1)))
+
+    def say(text: str) -> None:
+        console.print(text, markup=False)
+
+    say(
+        f"{commanded} of {len(names)} poses corrected; predicted tool error, uncertainty included, rms: "
+        f"{UM * found.before.rms_m:.0f} µm before, {UM * found.after.rms_m:.1f} µm after"
+    )
+    if model.covariance is None:
+        say("the model has no covariance: the predicted errors have no uncertainty")
+    bad = [f"{name}: {status}: {why}" for name, status, why in zip(names, found.status, found.says, strict=True) if why]
+    for line in bad if verbose else bad[:LISTED]:
+        say(line)
+    if not verbose and len(bad) > LISTED:
+        say(f"... {len(bad) - LISTED} more (--verbose, or column says)")
+    for note in notes:
+        say(note)
+
+
+def _write_table(out: Path, header: list[str], rows: list[list[str]]) -> None:
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with out.open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([header, *rows])
+
+
+def _text(path: Path, encoding: str) -> str:
+    try:
+        return path.read_bytes().decode(encoding)
+    except FileNotFoundError as error:
+        raise DataError(f"{path}: there is no such file") from error
+    except UnicodeDecodeError as error:
+        raise DataError(f"{path}: byte {error.start} is not UTF-8; save the file as UTF-8") from error
+
+
+def _pose(six: tuple[float, ...]) -> Floats:
+    T = np.eye(4)
+    T[:3, 3], T[:3, :3] = six[:3], Rotation.from_rotvec(six[3:]).as_matrix()
+    return T
+
+
+def _conditions(given: tuple[str, ...]) -> dict[str, float]:
+    out: dict[str, float] = {}
+    for one in given:
+        name, _, value = one.partition("=")
+        try:
+            out[name] = float(value)
+        except ValueError:
+            raise DataError(f"--condition {one}: NAME=VALUE with a number, as payload_kg=2.5") from None
+        if not np.isfinite(out[name]):
+            raise DataError(f"--condition {one}: the value must be finite")
+    return out

@@ -1,0 +1,360 @@
+"""Joint commands at which the real tool, as a model has it with its physics, stands where it is wanted.
+
+The controller is taken to compute with the rig file's arm: what it is told to reach, it commands the joints of that arm
+to. The model's flange P(q) = G(q) D(q) is its geometry G with what the physics adds, D, which changes slowly; so the
+geometric arm is sent to W D(q)^-1 for a wanted flange W, and D is evaluated anew until nothing changes. Each round
+leaves about a thousandth of what was left before.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from acquisition.recording import Samples
+from acquisition.recording.rig import parse_rig
+from calibrate.arms.rig_arm import RigArm
+from calibrate.model_file import ModelFile
+from calibrate.physics.conditions import BY_JOINT
+from calibrate.physics.own_frame import POSTURES, SEED, mean_motion
+from calibrate.physics.predicting import flange_with_physics, placed
+from calibrate.predict import Predictor
+from calibrate.rigid import inverse
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Branch = Callable[[Floats], Bools]  # joint readings (solution, joint) -> which of them a program asks for
+
+ROUNDS = 12
+CLOSE = 1e-9  # m and rad: far below what any arm repeats
+MOVED_RAD = 1e-4  # a joint that went less far has not moved, as in effects/conditions.py
+RANGE_SLACK = 1e-9  # of the recorded range: rounding
+OK, LIMIT, UNREACHABLE, OUTSIDE = "ok", "limit", "unreachable", "outside"
+
+
+class Inverse(Protocol):
+    """Joint readings for flange poses of an arm."""
+
+    def solutions(self, arm: RigArm, T_base_flange: Floats, near_rad: Floats) -> Floats:
+        """(solution, joint) within the limits of the arm for one pose (4, 4), nearest to `near_rad` (joint,) first."""
+        ...
+
+    def refined(self, arm: RigArm, T_base_flange: Floats, start_rad: Floats) -> tuple[Floats, Bools]:
+        """(pose, joint) on the branch of each start, whether or not within the limits, and (pose,) whether found."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """Poses of the tool in the base, in the order in which they are visited. NaN: not stated."""
+
+    T_base_tool: Floats  # (pose, 4, 4)
+    joints_rad: Floats  # (pose, joint) of a point that is given as joint angles: its pose is that of the rig's arm
+    near_rad: Floats  # (pose, joint) posture whose branch is wanted
+    conditions: Mapping[str, Floats]  # column of samples.csv -> (pose,)
+    in_order: bool = True  # whether each pose is reached from the one before
+    branches: tuple[Branch | None, ...] = ()  # one a pose; empty: none asks for one
+
+    def __len__(self) -> int:
+        return len(self.T_base_tool)
+
+
+@dataclass(frozen=True, eq=False)
+class Options:
+    """`tool`: pose (4, 4) in the flange that the controller and the real tool share; None: the rig file's point for the
+    controller and the model's for the real one. `approach`: side from which every joint comes by an overshoot point,
+    0 for none.
+    """
+
+    tool: Floats | None = None
+    approach: int = 0
+    overshoot_rad: float = np.radians(2.0)
+    margin_rad: float = np.radians(1.0)  # to a limit of a joint: nearer is reported
+
+
+@dataclass(frozen=True, eq=False)
+class ToolErrors:
+    """Distance and turn between real tool and wanted pose, by the model, and one sigma of both; NaN: unknown."""
+
+    error_m: Floats  # (pose,)
+    error_rad: Floats
+    s_error_m: Floats
+    s_error_rad: Floats
+
+    @property
+    def rms_m(self) -> float:
+        """Of the error that is to be expected: the predicted one and its sigma together, over what is reached."""
+        known = self.error_m[np.isfinite(self.error_m)]
+        sigma = np.nan_to_num(self.s_error_m[np.isfinite(self.error_m)])
+        return float(np.sqrt(np.mean(known**2 + sigma**2))) if len(known) else float("nan")
+
+
+@dataclass(frozen=True, eq=False)
+class Corrected:
+    """Rows are those of the wanted poses; NaN where nothing can be commanded."""
+
+    q_rad: Floats  # (pose, joint) to command
+    nominal_rad: Floats  # (pose, joint) that the controller would have commanded
+    via_rad: Floats | None  # (pose, joint) overshoot points, visited before
+    T_base_tool: Floats  # (pose, 4, 4) to tell a controller that computes with the rig file's arm
+    before: ToolErrors
+    after: ToolErrors
+    status: tuple[str, ...]
+    says: tuple[str, ...]  # why, where the status is not ok
+    notes: tuple[str, ...]
+
+
+def correct(model: ModelFile, wanted: Wanted, inverse_of: Inverse, options: Options) -> Corrected:
+    """Commands for every pose that can be reached; what cannot is named, nothing is clipped.
+
+    DataError for a model without its rig, and where an effect of the model cannot be evaluated.
+    """
+    arms = Arms.of(model, options)
+    nominal_rad, why = _nominal(arms, wanted, inverse_of)
+    reached = np.isfinite(nominal_rad).all(axis=1)
+    q_rad = nominal_rad.copy()
+    conditions = moves_conditions(wanted, nominal_rad, options)
+    if reached.any():
+        rows = np.flatnonzero(reached)
+        goal = wanted.T_base_tool[rows] @ inverse(arms.real_tool)
+        some = {name: values[rows] for name, values in conditions.items()}
+        found_rad, solved = _solved(arms, goal, nominal_rad[rows], some, inverse_of)
+        q_rad[rows] = np.where(solved[:, None], found_rad, np.nan)
+        for row in rows[~solved]:
+            why[row] = (UNREACHABLE, "no posture of the calibrated arm puts the tool there")
+    via_rad = q_rad - options.approach * options.overshoot_rad if options.approach else None
+    _refuse_beyond(arms, q_rad, via_rad, why)
+    before, _, _ = predicted_errors(model, wanted, nominal_rad, conditions, options)
+    after, beyond, notes = predicted_errors(model, wanted, q_rad, conditions, options)
+    status, says = _stated(arms, q_rad, why, beyond, options.margin_rad)
+    told = np.full(wanted.T_base_tool.shape, np.nan)
+    good: Bools = np.asarray(np.isfinite(q_rad).all(axis=1))
+    told[good] = arms.drawn.frames(q_rad[good])[:, -1] @ arms.stated_tool
+    if via_rad is not None:
+        via_rad = np.where(good[:, None], via_rad, np.nan)
+    if arms.low_rad is None:
+        notes = (*notes, "the model does not hold its recorded joint range: poses beyond it are not marked")
+    return Corrected(q_rad, nominal_rad, via_rad, told, before, after, status, says, notes)
+
+
+@dataclass(frozen=True, eq=False)
+class Arms:
+    """The arm as the controller and as the model have it, with the tool of each."""
+
+    model: ModelFile
+    drawn: RigArm
+    geometric: RigArm
+    stated_tool: Floats  # (4, 4) in the flange
+    real_tool: Floats
+    low_rad: Floats | None  # (joint,) recorded range; None: the model does not hold it
+    high_rad: Floats | None
+
+    @classmethod
+    def of(cls, model: ModelFile, options: Options) -> "Arms":
+        predictor = Predictor.of(model)
+        rig = parse_rig(model.rig.text or "", f"rig.toml in the model of {model.rig.name}")
+        drawn, geometric = RigArm.of_rig(rig), RigArm.of_rig(predictor.rig, predictor.values)
+        held = {} if model.session is None else model.session.conditions
+        joints = [held.get(f"q{j + 1}_rad") for j in range(rig.n_joints)]
+        table = np.array([j for j in joints if j], dtype=np.float64)
+        whole = len(table) == rig.n_joints
+        # Which frame of the last link is its flange no instrument shows: the one that lies best on the drawn one.
+        postures = np.random.default_rng(SEED).uniform(drawn.lower_rad, drawn.upper_rad, (POSTURES, drawn.n_joints))
+        mounted = mean_motion(geometric.frames(postures)[:, -1], drawn.frames(postures)[:, -1])
+        if options.tool is not None:
+            stated, real = options.tool, mounted @ options.tool
+        else:
+            stated, real = np.eye(4), mounted.copy()
+            stated[:3, 3] = drawn.point_m
+            real[:3, 3] = predictor.tip_at(np.eye(4)[None])[0]
+        low, high = (table.min(axis=1), table.max(axis=1)) if whole else (None, None)
+        return cls(model, drawn, geometric, stated, real, low, high)
+
+    @property
+    def n_joints(self) -> int:
+        return self.drawn.n_joints
+
+
+def predicted_errors(
+    model: ModelFile, wanted: Wanted, q_rad: Floats, conditions: Mapping[str, Floats], options: Options
+) -> tuple[ToolErrors, tuple[str, ...], tuple[str, ...]]:
+    """Of the real tool at commands (pose, joint); names of drivers of each row beyond their recorded range; notes."""
+    n, arms = len(q_rad), Arms.of(model, options)
+    values, beyond = np.full((4, n), np.nan), [""] * n
+    rows = np.flatnonzero(np.isfinite(q_rad).all(axis=1))
+    if rows.size == 0:
+        return ToolErrors(*values), tuple(beyond), ()
+    samples = _samples(q_rad[rows], {name: v[rows] for name, v in conditions.items()})
+    point_m = None if options.tool is None else arms.real_tool[:3, 3]
+    known = placed(model, samples, point_m=point_m, own_flange=True)
+    off = wanted.T_base_tool[rows] @ inverse(known.T_base_flange @ arms.real_tool)
+    turn = Rotation.from_matrix(off[:, :3, :3]).magnitude()
+    there_m = (known.T_base_flange @ arms.real_tool)[:, :3, 3]
+    shift = wanted.T_base_tool[rows, :3, 3] - there_m
+    values[:, rows] = (
+        np.linalg.norm(shift, axis=1),
+        turn,
+        np.linalg.norm(known.tip_sigma_m, axis=1),
+        np.linalg.norm(known.flange_sigma[:, 3:], axis=1),
+    )
+    for row, names in zip(rows.tolist(), known.outside, strict=True):
+        beyond[row] = names
+    return ToolErrors(*values), tuple(beyond), known.notes
+
+
+def _nominal(arms: Arms, wanted: Wanted, inverse_of: Inverse) -> tuple[Floats, dict[int, tuple[str, str]]]:
+    """(pose, joint) that a controller with the rig file's arm commands, NaN for none; row -> status and reason."""
+    q_rad, why = wanted.joints_rad.copy(), dict[int, tuple[str, str]]()
+    last_rad = 0.5 * (arms.drawn.lower_rad + arms.drawn.upper_rad)
+    goal = wanted.T_base_tool @ inverse(arms.stated_tool)
+    for row in range(len(wanted)):
+        stated = wanted.near_rad[row]
+        near_rad = stated if np.isfinite(stated).all() else last_rad
+        if not np.isfinite(q_rad[row]).all():
+            branch = wanted.branches[row] if wanted.branches else None
+            found, why_not = _posture(arms.drawn, goal[row], near_rad, branch, inverse_of)
+            if found is None:
+                why[row] = why_not
+                continue
+            q_rad[row] = found
+        last_rad = q_rad[row]
+    return q_rad, why
+
+
+def _posture(
+    arm: RigArm, goal: Floats, near_rad: Floats, branch: Branch | None, inverse_of: Inverse
+) -> tuple[Floats | None, tuple[str, str]]:
+    """(joint,) nearest to `near_rad` on the wanted branch; or status and reason."""
+    within = inverse_of.solutions(arm, goal, near_rad)
+    good = within if branch is None else within[branch(within)]
+    if len(good):
+        return good[0], (OK, "")
+    if len(within):
+        return None, (UNREACHABLE, "no posture with the configuration that the program states")
+    turn = 2.0 * np.pi * np.ones(arm.n_joints)
+    free = inverse_of.solutions(replace(arm, lower_rad=-turn, upper_rad=turn), goal, near_rad)
+    if not len(free):
+        return None, (UNREACHABLE, "out of reach of the nominal arm")
+    beyond = np.maximum(arm.lower_rad - free, free - arm.upper_rad)
+    best = int(np.argmin(beyond.max(axis=1)))
+    joint = int(np.argmax(beyond[best]))
+    return None, (LIMIT, _beyond_limit(arm, joint, float(free[best, joint])))
+
+
+def _beyond_limit(arm: RigArm, joint: int, q_rad: float) -> str:
+    low, high = np.degrees(arm.lower_rad[joint]), np.degrees(arm.upper_rad[joint])
+    return f"joint {joint + 1} would stand at {np.degrees(q_rad):.2f}°, outside its range {low:.1f}° to {high:.1f}°"
+
+
+def _solved(
+    arms: Arms, goal: Floats, start_rad: Floats, conditions: Mapping[str, Floats], inverse_of: Inverse
+) -> tuple[Floats, Bools]:
+    """(pose, joint) at which the model's flange is nearest to `goal` (pose, 4, 4), and (pose,) whether it was found.
+
+    An effect that jumps (a sign of the torque) may leave a pose between two values: the nearer one is kept, and the
+    predicted error shows what is left.
+    """
+    q_rad, best_rad = start_rad, start_rad.copy()
+    least, found = np.full(len(goal), np.inf), np.zeros(len(goal), dtype=bool)
+    for _ in range(ROUNDS):
+        real = flange_with_physics(arms.model, _samples(q_rad, conditions))[0]
+        off = inverse(real) @ goal
+        left = np.maximum(np.linalg.norm(off[:, :3, 3], axis=1), Rotation.from_matrix(off[:, :3, :3]).magnitude())
+        better = found & (left < least)
+        least[better], best_rad[better] = left[better], q_rad[better]
+        if found.all() and np.all(least < CLOSE):
+            break
+        plain = arms.geometric.frames(q_rad)[:, -1]
+        next_rad, solved = inverse_of.refined(arms.geometric, plain @ inverse(real) @ goal, q_rad)
+        q_rad = np.where(solved[:, None], next_rad, q_rad)
+        found |= solved
+    return best_rad, found & np.isfinite(least)
+
+
+def _samples(q_rad: Floats, conditions: Mapping[str, Floats]) -> Samples:
+    """Rows of joints under conditions. The clock is of no matter: what is true of one session only is left out."""
+    n, joints = q_rad.shape
+    columns = {"t_s": np.arange(n, dtype=np.float64)} | {f"q{j + 1}_rad": q_rad[:, j] for j in range(joints)}
+    return Samples(columns | dict(conditions), joints)
+
+
+def moves_conditions(wanted: Wanted, q_rad: Floats, options: Options) -> dict[str, Floats]:
+    """Conditions with the side from which each joint comes and its last move, where they are known and not stated."""
+    n, joints = q_rad.shape
+    moves = np.full((n, joints), np.nan)
+    if options.approach:
+        moves[:] = options.approach * options.overshoot_rad
+        side = np.full((n, joints), float(options.approach))
+    else:
+        if wanted.in_order:
+            moves[1:] = np.diff(q_rad, axis=0)
+        side = _sides(moves)
+    table: dict[str, Floats] = {}
+    for j in range(joints):
+        if np.isfinite(side[:, j]).any():
+            table[BY_JOINT["approach"].format(j + 1)] = side[:, j]
+            table[BY_JOINT["last_move"].format(j + 1)] = moves[:, j]
+    return table | dict(wanted.conditions)
+
+
+def _sides(moves: Floats) -> Floats:
+    """(pose, joint) sign of the last move that was one; NaN where none is known."""
+    side = np.where(np.abs(moves) > MOVED_RAD, np.sign(moves), np.nan)
+    for row in range(1, len(side)):
+        still = np.isfinite(moves[row]) & (np.abs(moves[row]) <= MOVED_RAD)
+        side[row] = np.where(still, side[row - 1], side[row])
+    return side
+
+
+def _refuse_beyond(arms: Arms, q_rad: Floats, via_rad: Floats | None, why: dict[int, tuple[str, str]]) -> None:
+    """Commands beyond a limit are no commands; in place."""
+    for what, table in (("", q_rad), ("overshoot point: ", via_rad)):
+        if table is None:
+            continue
+        beyond = np.maximum(arms.drawn.lower_rad - table, table - arms.drawn.upper_rad)
+        for row in np.flatnonzero(np.nan_to_num(beyond, nan=-1.0).max(axis=1) > 0.0):
+            joint = int(np.argmax(beyond[row]))
+            why[int(row)] = (LIMIT, what + _beyond_limit(arms.drawn, joint, float(table[row, joint])))
+            q_rad[row] = np.nan
+
+
+def _stated(
+    arms: Arms, q_rad: Floats, why: Mapping[int, tuple[str, str]], beyond: tuple[str, ...], margin_rad: float
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Status and reason of every row."""
+    status: list[str] = []
+    says: list[str] = []
+    for row, q in enumerate(q_rad):
+        if row in why:
+            state, reason = why[row]
+        else:
+            near = _near_limit(arms, q, margin_rad)
+            outside = [name for name in beyond[row].split(",") if name] + _beyond_range(arms, q)
+            state = LIMIT if near else OUTSIDE if outside else OK
+            out = f"beyond the calibrated range: {', '.join(dict.fromkeys(outside))}" if outside else ""
+            reason = "; ".join(part for part in (near, out) if part)
+        status.append(state)
+        says.append(reason)
+    return tuple(status), tuple(says)
+
+
+def _near_limit(arms: Arms, q: Floats, margin_rad: float) -> str:
+    room = np.minimum(q - arms.drawn.lower_rad, arms.drawn.upper_rad - q)
+    joint = int(np.argmin(room))
+    return f"joint {joint + 1} is {np.degrees(room[joint]):.2f}° from its limit" if room[joint] < margin_rad else ""
+
+
+def _beyond_range(arms: Arms, q: Floats) -> list[str]:
+    if arms.low_rad is None or arms.high_rad is None:
+        return []
+    slack = RANGE_SLACK * np.maximum(arms.high_rad - arms.low_rad, 1e-12)
+    out = (q < arms.low_rad - slack) | (q > arms.high_rad + slack)
+    return [f"q{j + 1}" for j in np.flatnonzero(out)]
+
+
+def wanted_joints(arms: Arms, q_rad: Floats) -> Floats:
+    """(pose, 4, 4) where a controller with the rig file's arm has its tool at joints (pose, joint)."""
+    return arms.drawn.frames(q_rad)[:, -1] @ arms.stated_tool

@@ -1,0 +1,61 @@
+"""FANUC programs as text (.ls): positions P[n] behind /POS, X, Y, Z, W, P, R or J1 ... J6 with their units.
+
+W, P, R turn about the fixed x, y, z. Numbers keep three decimals, as a controller writes them. A new position would
+need a number of its own and new line numbers behind it, so overshoot points are not inserted here.
+"""
+
+import re
+
+from calibrate.correct.programs.literal import NUMBER, Dialect, Literal, Move, Span, Targets, line_of, line_start
+from calibrate.correct.rotations import FANUC
+
+POSITION = re.compile(r"P\[\s*(?P<number>\d+)[^\]]*\]\s*\{(?P<body>[^}]*)\}")
+FIELD = re.compile(rf"\b(?P<key>X|Y|Z|W|P|R|J[1-9])\s*=\s*(?P<number>{NUMBER})\s*(?P<unit>mm|deg)")
+FRAME = re.compile(r"UF\s*:\s*(?P<frame>\w+)")
+MOVE = re.compile(r"^[ \t]*\d*:\s*(?:J|L|(?P<arc>[CA]))\s+(?P<target>P(?:R)?\[\s*\d+)", re.MULTILINE)
+POSE = ("X", "Y", "Z", "W", "P", "R")
+
+
+def find(text: str, n_joints: int) -> Targets:
+    """Only positions in the listing; position registers are of the controller."""
+    begin = text.find("\n/POS")
+    body = len(text) if begin < 0 else begin
+    by_number: dict[str, list[Move]] = {}
+    skipped: list[str] = []
+    for match in MOVE.finditer(text, 0, body):
+        start = line_start(text, match.end())
+        end = text.find("\n", match.end())
+        target = re.sub(r"\s", "", match["target"])
+        if target.startswith("PR[") or match["arc"]:
+            what = "circular moves" if match["arc"] else "position registers"
+            skipped.append(f"line {line_of(text, match.end())}: {what} are not corrected")
+            continue
+        by_number.setdefault(target[2:], []).append(Move(start, text[start:end]))
+    literals: list[Literal] = []
+    for match in POSITION.finditer(text, body):
+        one = _literal(text, match, tuple(by_number.get(match["number"], ())), n_joints)
+        if one is None:
+            skipped.append(f"P[{match['number']}]: not a whole position in mm and deg; not corrected")
+        else:
+            literals.append(one)
+    return Targets(tuple(literals), tuple(dict.fromkeys(skipped)))
+
+
+def _literal(text: str, match: re.Match[str], moves: tuple[Move, ...], n_joints: int) -> Literal | None:
+    spans: dict[str, Span] = {}
+    numbers: dict[str, float] = {}
+    for field in FIELD.finditer(text, *match.span("body")):
+        if (field["unit"] == "mm") != (field["key"] in "XYZ"):
+            return None
+        spans[field["key"]], numbers[field["key"]] = field.span("number"), float(field["number"])
+    frame = FRAME.search(match["body"])
+    for keys, joints in ((POSE, False), (tuple(f"J{j + 1}" for j in range(n_joints)), True)):
+        if all(key in numbers for key in keys):
+            values, places = tuple(numbers[k] for k in keys), tuple(spans[k] for k in keys)
+            name = f"P[{match['number']}]"
+            used = "" if frame is None or joints else frame["frame"]
+            return Literal(name, match.start("body"), places, values, joints, moves, None, used)
+    return None
+
+
+FANUC_LS = Dialect("FANUC LS", "FANUC", (".ls",), find, FANUC, True, 3, 3, None)

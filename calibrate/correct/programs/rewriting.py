@@ -1,0 +1,166 @@
+"""A program with corrected targets: literals are replaced where they stand, everything else is kept byte for byte.
+
+The prediction is made of the numbers as they are written, rounding included.
+"""
+
+import difflib
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.correct.corrected import (
+    Arms,
+    Corrected,
+    Inverse,
+    Options,
+    Wanted,
+    correct,
+    moves_conditions,
+    predicted_errors,
+    wanted_joints,
+)
+from calibrate.correct.programs.fanuc_ls import FANUC_LS
+from calibrate.correct.programs.krl import KRL
+from calibrate.correct.programs.literal import Dialect, Literal, Targets
+from calibrate.correct.programs.rapid import RAPID
+from calibrate.correct.programs.urscript import URSCRIPT
+from calibrate.correct.rotations import pose
+from calibrate.errors import DataError
+from calibrate.model_file import ModelFile
+from calibrate.rigid import inverse
+
+Floats = NDArray[np.float64]
+
+DIALECTS = (URSCRIPT, KRL, RAPID, FANUC_LS)
+
+
+@dataclass(frozen=True, eq=False)
+class CorrectedProgram:
+    """`diff` unified, line by line; `names` of the targets, one a row of `found`; `skipped` sentences on the others."""
+
+    text: str
+    diff: tuple[str, ...]
+    names: tuple[str, ...]
+    found: Corrected
+    skipped: tuple[str, ...]
+
+
+def dialect_of(suffix: str) -> Dialect | None:
+    """By the end of a file's name; None: no program."""
+    return next((d for d in DIALECTS if suffix.lower() in d.suffixes), None)
+
+
+def correct_program(
+    model: ModelFile,
+    text: str,
+    dialect: Dialect,
+    frame: Floats | None,
+    near_rad: Floats | None,
+    every: dict[str, float],
+    inverse_of: Inverse,
+    options: Options,
+    name: str,
+) -> CorrectedProgram:
+    """`frame` (4, 4): of the program's coordinates in the base; None: the base itself. `near_rad` (joint,): posture
+    before the first target. `every`: conditions of all targets.
+
+    DataError where there is no target, or the program names a frame that is not stated.
+    """
+    arms = Arms.of(model, options)
+    targets = dialect.find(text, arms.n_joints)
+    _check(targets, dialect, frame, options, name)
+    base = np.eye(4) if frame is None else frame
+    wanted = _wanted(targets.literals, dialect, arms, base, near_rad, every)
+    found = correct(model, wanted, inverse_of, options)
+    pieces, q_rad = list[tuple[int, int, str]](), found.q_rad.copy()
+    told = inverse(base) @ found.T_base_tool
+    for row, one in enumerate(targets.literals):
+        if not np.isfinite(found.q_rad[row]).all():
+            continue
+        if one.joints:
+            written = dialect.joint_numbers(found.q_rad[row])
+            q_rad[row] = dialect.joints_rad([float(v) for v in written])
+        else:
+            written = dialect.pose_numbers(told[row, :3, 3], told[row, :3, :3])
+            q_rad[row] = _commanded(arms, dialect, base, written, found.q_rad[row], inverse_of)
+        pieces += [(*span, number) for span, number in zip(one.spans, written, strict=True)]
+        if found.via_rad is not None and dialect.overshoot is not None:
+            joints = dialect.joint_numbers(found.via_rad[row])
+            ending = "\r\n" if "\r\n" in text else "\n"
+            pieces += [(m.line_start, m.line_start, dialect.overshoot(m, joints) + ending) for m in one.moves]
+    conditions = moves_conditions(wanted, found.nominal_rad, options)
+    after, _, _ = predicted_errors(model, wanted, q_rad, conditions, options)
+    new = _replaced(text, pieces)
+    shown = difflib.unified_diff(text.splitlines(), new.splitlines(), name, "corrected", lineterm="", n=0)
+    names = tuple(one.name for one in targets.literals)
+    return CorrectedProgram(new, tuple(shown), names, replace(found, q_rad=q_rad, after=after), targets.skipped)
+
+
+def _check(targets: Targets, dialect: Dialect, frame: Floats | None, options: Options, name: str) -> None:
+    if not targets.literals:
+        why = f"; {targets.skipped[0]}" if targets.skipped else ""
+        raise DataError(f"{name}: no target of {dialect.name} that could be corrected{why}")
+    framed = sorted({one.frame for one in targets.literals if one.frame not in ("", "0")})
+    if framed and frame is None:
+        raise DataError(
+            f"{name}: positions are in user frame {', '.join(framed)}, whose place the program does not hold; give its "
+            "pose in the base with --frame"
+        )
+    named = sorted({one.frame for one in targets.literals if one.frame})
+    if len(named) > 1:
+        raise DataError(f"{name}: positions are in user frames {', '.join(named)}; correct one frame at a time")
+    if named == ["0"] and frame is not None:
+        raise DataError(f"{name}: positions are in user frame 0, which is the base; leave --frame out")
+    idle = [one.name for one in targets.literals if not one.moves]
+    if options.approach and idle:
+        raise DataError(
+            f"{name}: no move in this file goes to {', '.join(idle[:3])}, before which an overshoot point could stand; "
+            "leave --approach out"
+        )
+    if options.approach and dialect.overshoot is None:
+        raise DataError(f"{name}: overshoot points cannot be inserted into {dialect.name}; leave --approach out")
+
+
+def _wanted(
+    literals: tuple[Literal, ...],
+    dialect: Dialect,
+    arms: Arms,
+    base: Floats,
+    near_rad: Floats | None,
+    every: dict[str, float],
+) -> Wanted:
+    """A program may visit its targets in any order: none is known to be reached from the one before."""
+    n = len(literals)
+    T, joints = np.empty((n, 4, 4)), np.full((n, arms.n_joints), np.nan)
+    near = np.full((n, arms.n_joints), np.nan)
+    if near_rad is not None and n:
+        near[0] = near_rad
+    for row, one in enumerate(literals):
+        if one.joints:
+            joints[row] = dialect.joints_rad(one.numbers)
+            T[row] = wanted_joints(arms, joints[[row]])[0]
+        else:
+            position_m, R = dialect.position_and_turn(one.numbers)
+            T[row] = base @ pose(position_m[None], R[None])[0]
+    branches = tuple(one.branch for one in literals)
+    return Wanted(T, joints, near, {c: np.full(n, v) for c, v in every.items()}, False, branches)
+
+
+def _commanded(
+    arms: Arms, dialect: Dialect, base: Floats, written: list[str], near_rad: Floats, inverse_of: Inverse
+) -> Floats:
+    """(joint,) to which a controller with the rig file's arm goes for a pose as it is written."""
+    position_m, R = dialect.position_and_turn([float(v) for v in written])
+    goal = base @ pose(position_m[None], R[None]) @ inverse(arms.stated_tool)
+    q_rad, found = inverse_of.refined(arms.drawn, goal, near_rad[None])
+    return q_rad[0] if found[0] else np.full_like(near_rad, np.nan)
+
+
+def _replaced(text: str, pieces: list[tuple[int, int, str]]) -> str:
+    """The text with each piece in place of what stood between its two places."""
+    out, last = list[str](), 0
+    for begin, end, new in sorted(pieces, key=lambda piece: (piece[0], piece[1])):
+        out += [text[last:begin], new]
+        last = end
+    return "".join([*out, text[last:]])

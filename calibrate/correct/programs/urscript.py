@@ -1,0 +1,73 @@
+"""URScript: poses p[x, y, z, rx, ry, rz] in m and rad, and joint lists [q1, ... q6], as first arguments of moves.
+
+Source: Universal Robots, The URScript Programming Language, movej, movel, movep, movec: a pose is a rotation vector;
+movej and movel take either form; a comment begins with #.
+"""
+
+import re
+from collections.abc import Sequence
+
+from calibrate.correct.programs.literal import (
+    NUMBER,
+    Dialect,
+    Literal,
+    Move,
+    Targets,
+    blanked,
+    line_of,
+    line_start,
+    moves_of,
+    numbers_in,
+)
+from calibrate.correct.rotations import VECTOR
+
+LIST = rf"(?P<pose>p?)\[\s*{NUMBER}(?:\s*,\s*{NUMBER})*\s*\]"
+MOVE = re.compile(r"\b(?:movej|movel|movep|servoj|movec)\s*\(\s*(?P<target>[A-Za-z_]\w*|p?\[)")
+INLINE = re.compile(rf"\b(?:movej|movel|movep|servoj)\s*\(\s*(?:q\s*=\s*|pose\s*=\s*)?{LIST}")
+ASSIGNED = re.compile(rf"(?P<name>[A-Za-z_]\w*)\s*=\s*{LIST}")
+CIRCLE = re.compile(r"\bmovec\s*\(")
+
+
+def find(text: str, n_joints: int) -> Targets:
+    """Literals of moves, and of variables that moves go to."""
+    code = blanked(text, "#")
+    by_name = moves_of(text, code, MOVE)
+    literals: list[Literal] = []
+    for match in INLINE.finditer(code):
+        literals.append(_literal(text, match, "", (_move(text, match.start()),), n_joints))
+    for match in ASSIGNED.finditer(code):
+        if match["name"].lower() in by_name:
+            moves = tuple(by_name[match["name"].lower()])
+            literals.append(_literal(text, match, match["name"], moves, n_joints))
+    good = [one for one in literals if len(one.numbers) == (n_joints if one.joints else 6)]
+    named = {one.name.lower() for one in good}
+    skipped = [
+        f"{move.text.strip()}: its target is not a literal of {n_joints} joints or a pose"
+        for target, moves in by_name.items()
+        if target not in ("[", "p[") and target not in named
+        for move in moves
+    ]
+    skipped += [f"line {line_of(text, m.start())}: a circular move is not corrected" for m in CIRCLE.finditer(code)]
+    return Targets(tuple(sorted(good, key=lambda one: one.at)), tuple(dict.fromkeys(skipped)))
+
+
+def _move(text: str, at: int) -> Move:
+    start = line_start(text, at)
+    end = text.find("\n", at)
+    return Move(start, text[start : len(text) if end < 0 else end])
+
+
+def _literal(text: str, match: re.Match[str], name: str, moves: tuple[Move, ...], n_joints: int) -> Literal:
+    at = match.start("pose")
+    found = list(numbers_in(text, at, match.end()))
+    label = name or f"line {line_of(text, at)}"
+    return Literal(label, at, tuple(s for s, _ in found), tuple(v for _, v in found), not match["pose"], moves)
+
+
+def overshoot(move: Move, joints: Sequence[str]) -> str:
+    """A slow move with the script's default acceleration."""
+    indent = move.text[: len(move.text) - len(move.text.lstrip())]
+    return f"{indent}movej([{', '.join(joints)}], v=0.25)"
+
+
+URSCRIPT = Dialect("URScript", "UR", (".script", ".urscript"), find, VECTOR, False, 7, 7, overshoot)

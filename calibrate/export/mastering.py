@@ -1,0 +1,70 @@
+"""Joint offsets for the zero positions of industrial controllers: KUKA's mastering, ABB's motor offsets, FANUC's.
+
+One meaning in all of them: the true angle of an axis is its reading plus its offset, in the robot's own signs. When an
+offset has been entered and the arm has not moved, the reading has changed by just that. Sources, where numbers are
+entered and what could not be tried: docs/controllers.
+"""
+
+import math
+from collections.abc import Callable
+
+from calibrate.errors import DataError
+from calibrate.export.identified import AxisOffset, IdentifiedArm
+
+CLEAR = 2.0  # sigmas: an offset that is less than this is no better than none
+EXPLAINED = (
+    "true angle = reading + offset, in the robot's own signs",
+    "entered rightly, the reading of an axis that rests changes by its offset",
+    "offsets that are not to be entered are empty; the last column has the reason",
+    "identified together with lengths and axes: for offsets alone, identify with a plan that holds those",
+)
+KUKA = "KUKA mastering: add offset_deg to $MAMES of the axis, then master it"
+FANUC = "FANUC mastering: a joint that reads r stands at r + offset_deg, which single-axis mastering is to be given"
+ABB = "ABB motor calibration: motor_rad, by which the offset of a motor changes that turns in the sense of its axis"
+
+
+def kuka_mastering_text(arm: IdentifiedArm) -> str:
+    """Degrees of A1 ... An, to be added to $MAMES before the axis is mastered at its mark."""
+    return _table(arm, KUKA, "A", (("offset_deg", _degrees),))
+
+
+def fanuc_mastering_text(arm: IdentifiedArm) -> str:
+    """Degrees of J1 ... Jn; master counts need pulses per degree, which the rig file does not hold."""
+    return _table(arm, FANUC, "J", (("offset_deg", _degrees),))
+
+
+def abb_moc_text(arm: IdentifiedArm) -> str:
+    """Degrees and motor radians. DataError for a rig without gear ratios."""
+    ratios = {i: joint.gear_ratio for i, joint in enumerate(arm.rig.arm.joints, start=1)}
+    missing = [i for i, ratio in ratios.items() if ratio is None]
+    if missing:
+        raise DataError(f"rig {arm.rig.name}: joint {missing[0]} has no gear_ratio; state it in [[arm.joint]]")
+    return _table(
+        arm, ABB, "rob1_", (("offset_deg", _degrees), ("motor_rad", lambda z: z.value_rad * (ratios[z.joint] or 1.0)))
+    )
+
+
+def _table(
+    arm: IdentifiedArm, title: str, axis: str, columns: tuple[tuple[str, Callable[[AxisOffset], float]], ...]
+) -> str:
+    lines = [f"# {says}" for says in (title, *EXPLAINED, *arm.not_carried)]
+    lines.append(",".join(("axis", *(name for name, _ in columns), "sigma_deg", "not_entered_because")))
+    for zero in arm.zeros:
+        why = refused(zero)
+        numbers = [repr(number(zero)) if not why else "" for _, number in columns]
+        sigma = "" if zero.sigma_rad is None else repr(math.degrees(zero.sigma_rad))
+        lines.append(",".join((f"{axis}{zero.joint}", *numbers, sigma, why)))
+    return "\n".join(lines) + "\n"
+
+
+def refused(zero: AxisOffset) -> str:
+    """Why an offset is not to be entered; empty where it is."""
+    if zero.undetermined:
+        return "not determined by the recording"
+    if zero.sigma_rad is not None and abs(zero.value_rad) < CLEAR * zero.sigma_rad:
+        return f"less than {CLEAR:g} sigma"
+    return ""
+
+
+def _degrees(zero: AxisOffset) -> float:
+    return math.degrees(zero.value_rad)
