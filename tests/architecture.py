@@ -147,8 +147,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 999,
-    "lines": 199_000,
+    "files": 920,
+    "lines": 105_000,
     "longest_function": 54,
     "one_importer": 49,
     "classes": 38,
