@@ -67,11 +67,6 @@ class Assumed:
         out[:, self.at] = self.root
         return out
 
-    def holds(self, covariance: Floats) -> float:
-        """Values that it, and not the data, has fixed, of a fit with this covariance (value, value)."""
-        own = self.root @ np.nan_to_num(covariance[np.ix_(self.at, self.at)]) @ self.root.T
-        return float(np.clip(np.trace(own), 0.0, len(self.at)))
-
 
 @dataclass(frozen=True)
 class Stated(Term):

@@ -30,6 +30,7 @@ FEWEST = 40  # observations of an instrument, for a wander to be told
 WANDERS = 6.0
 # Wander is overstated rather than understated: the strongest within this -2 log L of the best.
 CONSERVATIVE = 1.0
+FEWEST_LENGTHS = 10  # observations of an instrument, for a law of their lengths
 LEVERAGE = 0.9  # rows that geometry follows closer than this say nothing about the noise
 
 # Correlation from one sample to the next; the last one is a random walk over any session.
@@ -100,14 +101,19 @@ class NoiseLaw:
         return sum(s.minus_two_log_likelihood(before) - s.minus_two_log_likelihood(after) for s in self.series)
 
     def draw(self, rng: Generator, count: int) -> Floats:
-        """(row, count): sign flips of whole samples where noise is white, Gaussian wander where not.
+        """(row, count): residuals of whole samples with signs and lengths drawn anew where noise is white, Gaussian
+        wander where not.
 
-        All instruments of a sample flip together, since the repeatability of the joints is in each of them.
+        All instruments of a sample flip together, since the repeatability of the joints may be in each of them. Lengths
+        are drawn, too, since those that happened to be found are one draw themselves. With the lengths kept, the first
+        p of 160 drawn quiet sessions (48 shots, second encoders on the links) was below 1.5 % in 1.9 % of them for fast
+        terms and in 4.4 % for slow ones; with lengths drawn, and noise of each instrument by its own degrees of
+        freedom, in 1.3 % and 1.3 %.
         """
         _, groups = np.unique(self.rows.sample, return_inverse=True)
         alone = np.where(self.rows.data, groups, groups.max(initial=0) + 1 + np.arange(len(groups)))
         signs = rng.integers(0, 2, (int(alone.max(initial=0)) + 1, count)) * 2.0 - 1.0
-        out = self.inflated[:, None] * signs[alone]
+        out = self.inflated[:, None] * signs[alone] * self._stretched(rng, count)
         for s in self.series:
             if s.wander.share > 0.0:
                 n, k = s.rows.shape
@@ -116,6 +122,31 @@ class NoiseLaw:
                 drawn = s.wander.draw((n, k, count), rng)
                 out[s.rows] = np.einsum("ij,tjd->tid", L, drawn)
         return out
+
+    def _stretched(self, rng: Generator, count: int) -> Floats:
+        """(row, count) by which each observation's residual is drawn longer or shorter; 1 for what is no data."""
+        data = np.flatnonzero(self.rows.data)
+        _, first, group = np.unique(self.rows.group[data], return_index=True, return_inverse=True)
+        square = np.bincount(group, self.inflated[data] ** 2).astype(np.float64)
+        instrument = self.rows.instrument[data[first]]
+        factor = np.ones((len(square), count))
+        for one in np.unique(instrument):
+            mine = np.flatnonzero((instrument == one) & (square > 0.0))
+            if len(mine) >= FEWEST_LENGTHS:
+                factor[mine] = np.sqrt(_lengths(square[mine], (len(mine), count), rng) / square[mine, None])
+        out = np.ones((len(self.rows.data), count))
+        out[data] = factor[group]
+        return out
+
+
+def _lengths(square: Floats, shape: tuple[int, ...], rng: Generator) -> Floats:
+    """Squares drawn from the gamma law with mean and variance of those found (group,): chi-square for Gaussian noise,
+    whatever the scale, and longer or shorter in the tail as they are.
+    """
+    mean, variance = float(np.mean(square)), float(np.var(square))
+    if mean <= 0.0 or variance <= 0.0:
+        return np.full(shape, mean)
+    return rng.gamma(mean**2 / variance, variance / mean, shape)
 
 
 def curvature_of(rows: Rows) -> float:

@@ -9,7 +9,7 @@ from calibrate.diagnose.augmented import Augmented
 from calibrate.diagnose.scatter import Scatter, likelihood_of, scatter_of
 from calibrate.fit import Fit
 from calibrate.identification.session import believed_sigma
-from calibrate.parameters import priors
+from calibrate.parameters import plausible_sizes
 from calibrate.problem import whitener_of
 from calibrate.shared_scatter import SharedScatter, levers_of, shares_found, witness_of
 
@@ -48,7 +48,7 @@ class Noise:
 
 def noise_of(problem: Augmented, fit: Fit) -> Noise:
     """Noise of every instrument at the values of a fit; what they share with second encoders is found first."""
-    at, larger = problem.around(fit.theta), freedom(problem, fit.covariance)
+    at, larger = problem.around(fit.theta), freedom(problem, fit.theta, fit.covariance)
     measured = problem.session.measured
     residuals = [m.problem.observed - expected for m, expected in zip(measured, at.expected, strict=True)]
     by_joint = [problem.by_joint(at, i) for i in range(len(measured))]
@@ -56,7 +56,7 @@ def noise_of(problem: Augmented, fit: Fit) -> Noise:
     def found(i: int, residual: Floats) -> Scatter:
         rows = problem.rows[i]
         scatter = scatter_of(residual[rows], by_joint[i][rows], believed_sigma(measured[i])[rows])
-        return replace(scatter, covariance=scatter.covariance * larger)
+        return replace(scatter, covariance=scatter.covariance * larger[i])
 
     witness = witness_of([m.problem.chain for m in measured])
     if witness is None or len(measured) == 1 or len(problem.rows[witness]) == 0:
@@ -79,16 +79,25 @@ def _trust(seen: Scatter, residual: Floats, known: Ints) -> Floats:
     return np.clip(weights / GLITCH, 0.0, 1.0)
 
 
-def freedom(problem: Augmented, covariance: Floats) -> float:
-    """Rows over rows less what was fitted to them: residuals of a fit are smaller than the noise."""
-    rows = sum(
-        len(r) * m.problem.observed.shape[1] for m, r in zip(problem.session.measured, problem.rows, strict=True)
-    )
-    free = np.array([p.free for p in problem.parameters])
-    believed = np.diag(covariance)[free] / priors(problem.parameters)[free] ** 2
-    fitted = float(np.sum(1.0 - np.clip(np.nan_to_num(believed), 0.0, 1.0)))
-    fitted -= 0.0 if problem.assumed is None else problem.assumed.holds(covariance)
-    return rows / max(rows - fitted, MOST_FITTED * rows)
+def freedom(problem: Augmented, values: Floats, covariance: Floats) -> Floats:
+    """(instrument,) numbers over numbers less what was fitted to them: residuals of a fit are smaller than the noise.
+
+    What an instrument has given to the fit is the trace of its part of the hat matrix, J C J' of whitened rows: spots
+    pay for nearly all of geometry, second encoders for their zeros alone. Source: Cook, Weisberg, Residuals and
+    Influence in Regression, 1982, section 2.1.
+    """
+    slope, out, first = problem.jacobian(values), np.ones(len(problem.rows)), 0
+    posterior = covariance
+    if not np.isfinite(covariance).all():  # a direction that nothing holds; what the others have fitted counts
+        slope = slope * plausible_sizes(problem.parameters)
+        posterior = np.linalg.pinv(slope.T @ slope, hermitian=True)
+    for i, (measured, rows) in enumerate(zip(problem.session.measured, problem.rows, strict=True)):
+        count = len(rows) * measured.problem.observed.shape[1]
+        mine = slope[first : first + count]
+        fitted = float(np.sum((mine @ posterior) * mine))
+        out[i] = count / max(count - fitted, MOST_FITTED * count) if count else 1.0
+        first += count
+    return out
 
 
 def whiteners_of(scatters: tuple[Scatter, ...]) -> tuple[Floats, ...]:

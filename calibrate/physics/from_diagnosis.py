@@ -335,11 +335,11 @@ def _curve(a: Accepted, drivers: Drivers, covariance: Floats) -> EffectCurve | N
 def _noise(fit: Fitted) -> Fields:
     """One sigma of a reading by column; of joint noise seen through the arm, at the middle row."""
     out: Fields = {}
-    larger = freedom(fit.problem, fit.covariance)
+    larger = freedom(fit.problem, fit.values, fit.covariance)
     for i, (m, scatter) in enumerate(zip(fit.session.measured, fit.noise.whole(fit.problem.rows), strict=True)):
         misfit = m.problem.observed[fit.problem.rows[i]] - fit.around.expected[i][fit.problem.rows[i]]
         white = np.linalg.solve(np.linalg.cholesky(scatter.covariance), misfit[..., None])[..., 0]
-        size = larger * _normal_size(np.sum(white**2, axis=1), misfit.shape[1])
+        size = larger[i] * _normal_size(np.sum(white**2, axis=1), misfit.shape[1])
         sigma = np.sqrt(size * np.median(np.diagonal(scatter.covariance, axis1=1, axis2=2), axis=0))
         names = kind_of(m.name).reads or m.problem.chain.sensor.own_columns() or (m.name,)
         out |= {name: float(s) for name, s in zip(names, sigma, strict=True)}

@@ -9,6 +9,7 @@ from acquisition.recording import Samples
 from acquisition.recording.rig import load_rig
 from calibrate.diagnose.fitted import fit_geometry
 from calibrate.diagnose.linearised import Accepted
+from calibrate.diagnose.noise_of_fit import freedom
 from calibrate.diagnose.session import session_of
 from calibrate.fit_plan import FitPlan
 from calibrate.identification.rounds import settled_fit
@@ -137,6 +138,16 @@ def test_joints_scatter_by_what_encoders_have_taken_out_and_by_what_is_left(rig,
     assert 0.4 < np.sqrt(np.mean(np.square(off))) < 1.6  # the middle 99 % of what eight draws may come to
     taken, sigma = (fit := fitted(rig, drawn(1, OWN_RAD, on_link=False))).weighting.shared_rad(fit.factors)
     assert taken < 3.0 * sigma
+
+
+def test_each_instrument_pays_for_what_was_fitted_to_it(rig, drawn):
+    """Zeros of the second encoders are all that their rows determine; the rest of geometry is the spots'."""
+    fit = fit_geometry(session_of(rig, drawn(1, OWN_RAD)))
+    names = [m.name for m in fit.session.measured]
+    counts = np.array([m.problem.observed.size for m in fit.session.measured])
+    fitted = dict(zip(names, counts * (1.0 - 1.0 / freedom(fit.problem, fit.values, fit.covariance)), strict=True))
+    assert fitted["encoder-difference"] == pytest.approx(6.0, abs=0.6)
+    assert fitted["dual-psd"] > 20.0
 
 
 def test_a_sample_without_an_answer_of_the_encoders_weighs_less(rig, drawn):

@@ -49,12 +49,23 @@ def test_drawn_noise_has_the_size_of_the_session_and_keeps_observations_whole(wo
     bench = Bench(world.session(rng))
     law = noise_law(bench.state.rows, bench.sight, bench.state.drivers.t_s, rng)
     drawn = law.draw(rng, 400)
-    assert np.mean(drawn[bench.state.rows.data] ** 2) == pytest.approx(
-        np.mean(law.inflated[bench.state.rows.data] ** 2)
-    )
+    found = np.mean(law.inflated[bench.state.rows.data] ** 2)
+    assert np.mean(drawn[bench.state.rows.data] ** 2) == pytest.approx(found, rel=0.02)  # five sigmas of such a mean
     first = bench.state.rows.group == 0
     signs = np.sign(drawn[first] / law.inflated[first][:, None])
     assert np.all(signs == signs[0])
+
+
+def test_lengths_of_observations_are_drawn_with_mean_and_variance_of_those_found(world):
+    rng = np.random.default_rng(3)
+    bench = Bench(world.session(rng))
+    rows = bench.state.rows
+    law = noise_law(rows, bench.sight, bench.state.drivers.t_s, rng)
+    found = np.bincount(rows.group[rows.data], law.inflated[rows.data] ** 2)
+    drawn = law.draw(rng, 400)[rows.data]
+    squares = np.stack([np.bincount(rows.group[rows.data], column**2) for column in drawn.T])
+    assert np.mean(squares[:, 0]) == pytest.approx(np.mean(found), rel=0.25)  # of one observation, whatever its own is
+    assert np.var(squares[:, 0]) == pytest.approx(np.var(found), rel=0.6)
 
 
 @pytest.mark.parametrize("value", [2.0, 3.0, 4.0])
