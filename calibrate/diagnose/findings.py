@@ -58,6 +58,30 @@ def findings_of(
     return tuple(sorted(found, key=lambda f: -f.share))
 
 
+def bare_findings(at: Search) -> tuple[Finding, ...]:
+    """What is known as soon as the causes are: names and shares, no sizes, and no name more likely than not."""
+    found = [_bare(at, i) for i in range(len(at.state.accepted))]
+    explained = max(sum(f.share for f in found), 1e-300)
+    return tuple(sorted((replace(f, share=f.share / explained) for f in found), key=lambda f: -f.share))
+
+
+def _bare(at: Search, i: int) -> Finding:
+    a = at.state.accepted[i]
+    name, p = named(a.term), at.p.get(a.term.key, 0.0)
+    return Finding(
+        name=name,
+        parameters={},
+        share=at.bench.gone[i].squares,
+        confidence=NOT_FINAL * (1.0 - p),
+        p=p,
+        gain=gain_of(at.bench.gone[i], at.bench.sight),
+        predicts=float("nan"),
+        says=f"{name.physics} at {name.where}, depends on {' and '.join(name.depends_on)}: size not determined",
+        rivals=(),
+        pulled=None,
+    )
+
+
 def _unnamed(at: Search) -> list[list[int]]:
     """Accepted terms that are no names, by port."""
     accepted, places = at.state.accepted, {term.port.where for term in at.bench.menu.terms}
