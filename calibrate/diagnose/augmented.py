@@ -2,19 +2,21 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.arms.serial import SerialArm
 from calibrate.diagnose.assumed import Assumed
 from calibrate.diagnose.linearised import Accepted
-from calibrate.diagnose.ported import Look, flange_twists, joint_turns, look, perturbed_frames, through
+from calibrate.diagnose.ported import Look, flange_twists, joint_turns, look, offsets, perturbed_frames, through
 from calibrate.diagnose.session import Session
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.ports import Perturbation, Place, Port
 from calibrate.joint_problem import JointProblem
 from calibrate.parameters import Parameter
+from calibrate.rigid import inverse
 from calibrate.shared_scatter import SharedScatter
 from calibrate.weighting import Measured
 
@@ -22,6 +24,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 INNER_STEP = 1e-3  # of the range of an inner parameter, for its difference quotient
+PART_STEP = 1e-3  # m, rad: whether a part of the arm follows a parameter at all
+KEPT = 8  # arms of which that is remembered
 LOOSE = 1e3  # times the size that would be plain to see: belief about a coefficient, so that none is ever singular
 
 
@@ -161,8 +165,7 @@ class Augmented:
         if key not in self.slopes:
             self.slopes.clear()
             at, (geometry, terms) = self.around(theta), self.split(theta)
-            moved = self.session.samples.joints() + at.by.joints_rad
-            arm = self.session.arm.twists(geometry[: len(self.session.arm.parameters)], moved)
+            arm = self._arm_twists(geometry[: len(self.session.arm.parameters)], at)
             joint = self.session.weighting.unweighted
             added = [self._term_columns(accepted, at) for accepted in terms]
             self.slopes[key] = [
@@ -170,6 +173,16 @@ class Augmented:
                 for i, m in enumerate(self.session.measured)
             ]
         return self.slopes[key]
+
+    def _arm_twists(self, theta: Floats, at: Around) -> Floats:
+        """(sample, 6, param) of the frames as terms have moved them, each before or behind what a term adds there."""
+        if not (np.any(at.by.frames) or np.any(at.by.surroundings)):
+            return self.session.arm.twists(theta, self.session.samples.joints() + at.by.joints_rad)
+        B = at.frames.copy()
+        for i in np.flatnonzero(np.any(at.by.frames != 0.0, axis=(0, 2))):
+            B[:, i] = B[:, i] @ inverse(offsets(at.by.frames[:, i]))
+        arm = self.session.arm
+        return np.where(ends_of_links(arm), arm.twists_at(theta, B), arm.twists_at(theta, at.frames))
 
     @staticmethod
     def _own_slope(joint: JointProblem, i: int, m: Measured, at: Around, arm: Floats) -> Floats:
@@ -227,6 +240,17 @@ class Augmented:
     def columns(self, port: Port, basis: Floats, at: Around) -> list[Floats]:
         """Of each instrument (row, k, m) derivative of its readings by what a port adds (sample, width, m)."""
         return columns_of(self.session, port, basis, at)
+
+
+@lru_cache(maxsize=KEPT)
+def ends_of_links(arm: SerialArm) -> NDArray[np.bool_]:
+    """(param,) whether each moves its frame from the link's side, hence before what a term adds at that frame; the
+    others turn or shift what comes behind it.
+    """
+    nominal, n = np.zeros(len(arm.parameters)), len(arm.parameters)
+    parts = arm.fixed_parts(nominal)
+    moved = [np.any(arm.fixed_parts(step) != parts, axis=(1, 2)) for step in PART_STEP * np.eye(n)]
+    return np.array([bool(part[frame]) for part, frame in zip(moved, arm.moves_frame, strict=True)], dtype=bool)
 
 
 def plain_sizes(
