@@ -10,7 +10,16 @@ from numpy.typing import NDArray
 from calibrate.arms.serial import SerialArm
 from calibrate.diagnose.assumed import Assumed
 from calibrate.diagnose.linearised import Accepted
-from calibrate.diagnose.ported import Look, flange_twists, joint_turns, look, offsets, perturbed_frames, through
+from calibrate.diagnose.ported import (
+    Look,
+    adjoints,
+    flange_twists,
+    joint_turns,
+    look,
+    offsets,
+    perturbed_frames,
+    through,
+)
 from calibrate.diagnose.session import Session
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.ports import Perturbation, Place, Port
@@ -37,6 +46,22 @@ class Around:
     frames: Floats  # (sample, joint + 1, 4, 4)
     looks: tuple[Look, ...]
     expected: tuple[Floats, ...]  # (row, k) with reading terms
+    adjoint: dict[int, Floats] = field(default_factory=dict[int, Floats])  # (sample, 6, 6) of the frames asked for
+
+    @cached_property
+    def turns(self) -> Floats:
+        """(sample, 6, joint) base twist of the flange by each joint angle."""
+        return joint_turns(self.frames)
+
+    def twists(self, port: Port, basis: Floats) -> Floats:
+        """(sample, 6, m) as `flange_twists`; a search asks for thousands at the same frames."""
+        if port.place is Place.JOINTS:
+            return self.turns @ basis
+        if port.place is not Place.FRAME:
+            return flange_twists(self.frames, port, basis)
+        if port.index not in self.adjoint:
+            self.adjoint[port.index] = adjoints(self.frames[:, port.index])
+        return self.adjoint[port.index] @ basis
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +215,7 @@ class Augmented:
 
     def by_joint(self, at: Around, i: int) -> Floats:
         """(row, k, readings) derivative of instrument i's readings by the joint readings of the row's poses."""
-        turns, m = joint_turns(at.frames), self.session.measured[i]
+        turns, m = at.turns, self.session.measured[i]
         each = [by @ turns[rows] for by, rows in zip(at.looks[i].by_twists, m.sample_rows.T, strict=True)]
         return np.concatenate(each, axis=-1)
 
@@ -283,7 +308,7 @@ def plain_sizes(
 def columns_of(session: Session, port: Port, basis: Floats, at: Around) -> list[Floats]:
     """Of each instrument (row, k, m) derivative of its readings by what a port adds (sample, width, m)."""
     if port.place is not Place.READING:
-        twists = flange_twists(at.frames, port, basis)
+        twists = at.twists(port, basis)
         return [
             through(seen, m, twists)
             if (channels := encoder_channels(m)) is None

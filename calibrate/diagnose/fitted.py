@@ -166,6 +166,11 @@ class Fitted:
         return np.concatenate([*data, np.zeros((rest, data[0].shape[1]))])
 
     def candidates(self) -> Sequence[Term]:
+        return self._candidates
+
+    @cached_property
+    def _candidates(self) -> tuple[Term, ...]:
+        """Closed and open menus and the ports ask for them in turn."""
         since = () if self.problem.assumed is None else changes(self.drivers)
         return (*terms_of(self.drivers), *since)
 
