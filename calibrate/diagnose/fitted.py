@@ -19,15 +19,15 @@ from calibrate.diagnose.linearised import Accepted, Rows, Unseen
 from calibrate.diagnose.noise_of_fit import Noise, covariance_at, noise_of, whiteners_of
 from calibrate.diagnose.scatter import Scatter, likelihood_of
 from calibrate.diagnose.session import Session
-from calibrate.diagnose.unmet_places import places_found
 from calibrate.effects.catalogue import terms_of
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.since_model import changes
 from calibrate.effects.term import Term
-from calibrate.fit import FAR_START, Loss, Stop
+from calibrate.fit import FAR_START, NEAR_START, Loss, Stop, solve
 from calibrate.identification.session import believed_sigma
-from calibrate.parameters import plausible_sizes, priors, start_values
+from calibrate.parameters import Parameter, plausible_sizes, priors, start_values
 from calibrate.problem import whitener_of
+from calibrate.sensors import point_line, seat
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -42,6 +42,7 @@ WILD = 0.1  # weight of a row that may have bent a plain fit
 SWALLOWED = 0.3  # weight of a row that next to nothing of a model follows: five sigmas off
 SETTLED = 0.1  # of -2 log L: far below any difference that decides
 AT_REST = (Stop.GAIN, Stop.ROUNDING)  # of a solver that found the least squares of its weights
+PLACES = ("placement", seat.POINTS, point_line.POINTS)  # of where something stood; a place may be met unseen
 
 
 @dataclass(frozen=True, eq=False)
@@ -299,3 +300,38 @@ def _cut(state: Fitted, active: Ints) -> Fitted:
 
 def _rows_of(session: Session, active: Ints) -> tuple[Ints, ...]:
     return tuple(np.flatnonzero(np.isin(m.sample_rows, active).all(axis=1)) for m in session.measured)
+
+
+def places_found(
+    problem: Augmented, values: Floats, scatters: tuple[Scatter, ...], rows: tuple[Ints, ...], data_rows: int
+) -> Floats:
+    """Values in which places that the fit has not met are found from these rows of each instrument, all else held.
+
+    `data_rows`: of the problem's own rows, those of readings.
+    """
+    parameters = problem.parameters
+    place = np.array([p.free and p.name.startswith(PLACES) for p in parameters])
+    met = np.any(problem.jacobian(values)[:data_rows] != 0.0, axis=0)
+    unmet = place & ~met
+    if not unmet.any():
+        return values
+    whiteners = tuple(
+        whitener_of(covariance_at(s, old, r)) for s, old, r in zip(scatters, problem.rows, rows, strict=True)
+    )
+    held = tuple(p if u else replace(p, free=False) for p, u in zip(parameters, unmet, strict=True))
+    there = _Held(replace(problem, rows=rows, whiteners=whiteners, last={}, slopes={}), held)
+    return solve(there, start=values, damping=NEAR_START).theta
+
+
+@dataclass(frozen=True, eq=False)
+class _Held:
+    """A problem with other beliefs."""
+
+    problem: Augmented
+    parameters: tuple[Parameter, ...]
+
+    def residual(self, theta: Floats) -> Floats:
+        return self.problem.residual(theta)
+
+    def jacobian(self, theta: Floats) -> Floats:
+        return self.problem.jacobian(theta)
