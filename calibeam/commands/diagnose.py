@@ -1,5 +1,6 @@
 """`calibeam diagnose`: where a recording parts from its model, what physics was left out, and the proof."""
 
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -58,7 +59,7 @@ def diagnose_command(
         _streams_only(console, source, out, json=json)
         return
     with naming_source(recording):
-        found, file = diagnose_recording(source, known)
+        found, file = diagnose_recording(source, known, partial(write_diagnosis, out))
         write_diagnosis(out, file)
         if json:
             print(msgspec.json.encode(file).decode())

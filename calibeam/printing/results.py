@@ -33,6 +33,8 @@ def print_diagnosis(console: Console, file: DiagnosisFile) -> None:
         console.print(line, highlight=False, markup=False)
     if file.splits:
         console.print(_proof(file))
+    for one in file.incomplete:
+        console.print(f"not completed: {one.stage}: {one.reason}", highlight=False, markup=False)
     for line in file.next:
         console.print(f"next: {line}", highlight=False, markup=False)
 

@@ -1,5 +1,7 @@
 """From a recording to diagnosis.json: where it parts from what the model predicts, and why."""
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -14,7 +16,8 @@ from calibrate.diagnose.diagnosis import Verdict
 from calibrate.diagnose.file import write_diagnosis
 from calibrate.diagnose.from_recording import Diagnosed, diagnose_samples
 from calibrate.diagnose.plan_of import plan_of
-from calibrate.diagnose.schema import SCHEMA, DiagnosisFile, RigRecord
+from calibrate.diagnose.schema import SCHEMA, DiagnosisFile, IncompleteRecord, RigRecord
+from calibrate.diagnose.stages import Stage, Stages
 from calibrate.diagnose.streams.from_recording import streams_of
 from calibrate.diagnose.streams.to_file import with_streams
 from calibrate.diagnose.to_file import file_of
@@ -27,9 +30,15 @@ from calibrate.sensors.catalogue import unused_columns
 SEED = 1  # of nulls, splits and bootstraps: the same recording always gives the same diagnosis
 
 
-def diagnose_recording(recording: Recording, model: ModelFile | None = None) -> tuple[Diagnosed, DiagnosisFile]:
+Keep = Callable[[DiagnosisFile], None]
+
+
+def diagnose_recording(
+    recording: Recording, model: ModelFile | None = None, keep: Keep | None = None
+) -> tuple[Diagnosed, DiagnosisFile]:
     """Both as records and as the file says it; with a `model` only what is new to it.
 
+    `keep` is called once with what is known as soon as the causes are: sizes, alternatives and proofs take a while.
     DataError where the recording holds too little, or the model is of another rig.
     """
     if model is not None and model.rig.sha256 != rig_sha256(recording.rig_text):
@@ -37,7 +46,7 @@ def diagnose_recording(recording: Recording, model: ModelFile | None = None) -> 
             f"the model is of rig '{model.rig.name}', whose file is another than that of {recording.path.name}; "
             "give the model that was identified with this rig, or none"
         )
-    found, file = _diagnosed(recording, model)
+    found, file = _diagnosed(recording, model, keep)
     return found, msgspec.structs.replace(file, next=(*file.next, *unused_columns(recording.samples)))
 
 
@@ -70,19 +79,29 @@ def diagnose_streams(recording: Recording) -> DiagnosisFile:
     return msgspec.structs.replace(file, verdict=Verdict.UNDECIDABLE.value) if agree else file
 
 
-def _diagnosed(recording: Recording, model: ModelFile | None) -> tuple[Diagnosed, DiagnosisFile]:
+def _diagnosed(recording: Recording, model: ModelFile | None, keep: Keep | None) -> tuple[Diagnosed, DiagnosisFile]:
     rng = np.random.default_rng(SEED)
     if model is None:
-        found = diagnose_samples(recording.rig, recording.samples, rng)
-        fitted = None if found.physics is None else found.physics.model
-        return found, with_streams(file_of(found, recording), streams_of(recording, fitted))
+
+        def causes(so_far: Diagnosed) -> None:
+            if keep is not None:
+                keep(file_of(so_far, recording))
+
+        found = diagnose_samples(recording.rig, recording.samples, rng, known=causes)
+        return found, _with_streams(file_of(found, recording), recording, found)
     known = known_before(model, recording.samples)
     found = diagnose_samples(recording.rig, recording.samples, rng, known.begin)
     if known.same_recording:
         found = only_new(found)  # what its streams show is no part of a model, and not new either
         return found, beside_known(file_of(found, recording), known)
-    fitted = None if found.physics is None else found.physics.model
-    return found, with_streams(beside_known(file_of(found, recording), known), streams_of(recording, fitted))
+    return found, _with_streams(beside_known(file_of(found, recording), known), recording, found)
+
+
+def _with_streams(file: DiagnosisFile, recording: Recording, found: Diagnosed) -> DiagnosisFile:
+    stages, fitted = Stages(), None if found.physics is None else found.physics.model
+    whole = stages.attempt(Stage.STREAMS, lambda: with_streams(file, streams_of(recording, fitted)), file)
+    failed = tuple(IncompleteRecord(one.stage.value, one.reason) for one in stages.failed)
+    return msgspec.structs.replace(whole, incomplete=(*whole.incomplete, *failed))
 
 
 def plan_next(found: Diagnosed, path: Path) -> str:
@@ -108,7 +127,10 @@ def plan_next(found: Diagnosed, path: Path) -> str:
 
 
 def refuse_wrong_file(found: Diagnosed, path: Path) -> None:
-    """DataError where the whole file is wrong, after that has been written to `path`."""
+    """DataError where the whole file is wrong or cannot be fitted, after that has been written to `path`."""
+    if found.physics is None and found.incomplete:
+        said = "; ".join(f"{one.stage.value}: {one.reason}" for one in found.incomplete)
+        raise DataError(f"no diagnosis, {said} (also in {path})")
     if found.physics is None:
         said = "; besides, ".join(blunder.says for blunder in found.blunders)
         raise DataError(f"{said} (also in {path}); no physics is sought before that is put right")
@@ -116,7 +138,7 @@ def refuse_wrong_file(found: Diagnosed, path: Path) -> None:
 
 def diagnose_to_file(recording: Recording, path: Path) -> tuple[Diagnosed, DiagnosisFile]:
     """diagnosis.json at `path`. DataError as above; OSError where it cannot be written."""
-    found, file = diagnose_recording(recording)
+    found, file = diagnose_recording(recording, keep=partial(write_diagnosis, path))
     write_diagnosis(path, file)
     refuse_wrong_file(found, path)
     return found, file

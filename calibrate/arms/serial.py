@@ -75,12 +75,15 @@ class SerialArm(ABC):
     def twists(self, theta: Floats, q_rad: Floats) -> Floats:
         if compiled.worth(len(q_rad)):
             return compiled.twists(compiled.ArmConstants.of(self, theta), q_rad)
-        B = self.frames(theta, q_rad)
+        return self.twists_at(theta, self.frames(theta, q_rad))
+
+    def twists_at(self, theta: Floats, B: Floats) -> Floats:
+        """(pose, 6, param) as `twists`, of frames (pose, joint + 1, 4, 4) that more than theta may have moved."""
         body = self.body_twists(theta).reshape(-1, 2, 3)
-        out = np.empty((len(q_rad), len(self.parameters), 6))
+        out = np.empty((len(B), len(self.parameters), 6))
         for i, columns in enumerate(self._columns_of):
             to_base = np.swapaxes(B[:, i, :3, :3], 1, 2)
-            seen = (body[columns].reshape(-1, 3) @ to_base).reshape(len(q_rad), len(columns), 6)
+            seen = (body[columns].reshape(-1, 3) @ to_base).reshape(len(B), len(columns), 6)
             seen[..., :3] += cross(B[:, i, None, :3, 3], seen[..., 3:])
             out[:, columns] = seen
         return np.swapaxes(out, 1, 2)

@@ -2,20 +2,31 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.arms.coupled_readings import by_readings, recoupled
+from calibrate.arms.serial import SerialArm
 from calibrate.diagnose.assumed import Assumed
 from calibrate.diagnose.linearised import Accepted
-from calibrate.diagnose.ported import Look, flange_twists, joint_turns, look, perturbed_frames, through
+from calibrate.diagnose.ported import (
+    Look,
+    adjoints,
+    flange_twists,
+    joint_turns,
+    look,
+    offsets,
+    perturbed_frames,
+    through,
+)
 from calibrate.diagnose.session import Session
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.ports import Perturbation, Place, Port
 from calibrate.joint_problem import JointProblem
 from calibrate.parameters import Parameter
+from calibrate.rigid import inverse
 from calibrate.shared_scatter import SharedScatter
 from calibrate.weighting import Measured
 
@@ -23,6 +34,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 INNER_STEP = 1e-3  # of the range of an inner parameter, for its difference quotient
+PART_STEP = 1e-3  # m, rad: whether a part of the arm follows a parameter at all
+KEPT = 8  # arms of which that is remembered
 LOOSE = 1e3  # times the size that would be plain to see: belief about a coefficient, so that none is ever singular
 
 
@@ -34,6 +47,22 @@ class Around:
     frames: Floats  # (sample, joint + 1, 4, 4)
     looks: tuple[Look, ...]
     expected: tuple[Floats, ...]  # (row, k) with reading terms
+    adjoint: dict[int, Floats] = field(default_factory=dict[int, Floats])  # (sample, 6, 6) of the frames asked for
+
+    @cached_property
+    def turns(self) -> Floats:
+        """(sample, 6, joint) base twist of the flange by each joint angle."""
+        return joint_turns(self.frames)
+
+    def twists(self, port: Port, basis: Floats) -> Floats:
+        """(sample, 6, m) as `flange_twists`; a search asks for thousands at the same frames."""
+        if port.place is Place.JOINTS:
+            return self.turns @ basis
+        if port.place is not Place.FRAME:
+            return flange_twists(self.frames, port, basis)
+        if port.index not in self.adjoint:
+            self.adjoint[port.index] = adjoints(self.frames[:, port.index])
+        return self.adjoint[port.index] @ basis
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,8 +191,7 @@ class Augmented:
         if key not in self.slopes:
             self.slopes.clear()
             at, (geometry, terms) = self.around(theta), self.split(theta)
-            moved = self.session.samples.joints() + recoupled(self.session.arm.by_reading, at.by.joints_rad)
-            arm = self.session.arm.twists(geometry[: len(self.session.arm.parameters)], moved)
+            arm = self._arm_twists(geometry[: len(self.session.arm.parameters)], at)
             joint = self.session.weighting.unweighted
             added = [self._term_columns(accepted, at) for accepted in terms]
             self.slopes[key] = [
@@ -172,13 +200,24 @@ class Augmented:
             ]
         return self.slopes[key]
 
+    def _arm_twists(self, theta: Floats, at: Around) -> Floats:
+        """(sample, 6, param) of the frames as terms have moved them, each before or behind what a term adds there."""
+        if not (np.any(at.by.frames) or np.any(at.by.surroundings)):
+            more_rad = recoupled(self.session.arm.by_reading, at.by.joints_rad)
+            return self.session.arm.twists(theta, self.session.samples.joints() + more_rad)
+        B = at.frames.copy()
+        for i in np.flatnonzero(np.any(at.by.frames != 0.0, axis=(0, 2))):
+            B[:, i] = B[:, i] @ inverse(offsets(at.by.frames[:, i]))
+        arm = self.session.arm
+        return np.where(ends_of_links(arm), arm.twists_at(theta, B), arm.twists_at(theta, at.frames))
+
     @staticmethod
     def _own_slope(joint: JointProblem, i: int, m: Measured, at: Around, arm: Floats) -> Floats:
         return joint.spread(i, np.concatenate([through(at.looks[i], m, arm), at.looks[i].by_sensor], axis=-1))
 
     def by_joint(self, at: Around, i: int) -> Floats:
         """(row, k, readings) derivative of instrument i's readings by the joint readings of the row's poses."""
-        turns, m = by_readings(self.session.arm.by_reading, joint_turns(at.frames)), self.session.measured[i]
+        turns, m = by_readings(self.session.arm.by_reading, at.turns), self.session.measured[i]
         each = [by @ turns[rows] for by, rows in zip(at.looks[i].by_twists, m.sample_rows.T, strict=True)]
         return np.concatenate(each, axis=-1)
 
@@ -230,6 +269,17 @@ class Augmented:
         return columns_of(self.session, port, basis, at)
 
 
+@lru_cache(maxsize=KEPT)
+def ends_of_links(arm: SerialArm) -> NDArray[np.bool_]:
+    """(param,) whether each moves its frame from the link's side, hence before what a term adds at that frame; the
+    others turn or shift what comes behind it.
+    """
+    nominal, n = np.zeros(len(arm.parameters)), len(arm.parameters)
+    parts = arm.fixed_parts(nominal)
+    moved = [np.any(arm.fixed_parts(step) != parts, axis=(1, 2)) for step in PART_STEP * np.eye(n)]
+    return np.array([bool(part[frame]) for part, frame in zip(moved, arm.moves_frame, strict=True)], dtype=bool)
+
+
 def plain_sizes(
     session: Session,
     terms: Sequence[Accepted],
@@ -260,7 +310,7 @@ def plain_sizes(
 def columns_of(session: Session, port: Port, basis: Floats, at: Around) -> list[Floats]:
     """Of each instrument (row, k, m) derivative of its readings by what a port adds (sample, width, m)."""
     if port.place is not Place.READING:
-        twists = flange_twists(at.frames, port, basis)
+        twists = at.twists(port, basis)
         return [
             through(seen, m, twists)
             if (channels := encoder_channels(m)) is None

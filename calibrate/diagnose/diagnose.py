@@ -3,20 +3,22 @@
 What to measure next where a cause has rivals: other poses, a change of temperature, or a second instrument.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
 from calibrate.diagnose.diagnosis import Diagnosis, Finding, Named, Rejected, RivalName
-from calibrate.diagnose.doubt import doubted
+from calibrate.diagnose.doubt import Doubted, doubted
 from calibrate.diagnose.drifts import parted_by_time
 from calibrate.diagnose.findings import named
 from calibrate.diagnose.linearised import State
 from calibrate.diagnose.noise_law import noise_law
 from calibrate.diagnose.proof import floors, proofs
 from calibrate.diagnose.searching import Search
+from calibrate.diagnose.stages import Stage, Stages
 from calibrate.effects.term import Missing
 
 Floats = NDArray[np.float64]
@@ -28,26 +30,63 @@ COOLED = "no pose tells them apart; measure on while the arm is cooled and warme
 WITNESS = "alike at every pose to this instrument; watch either with a second one, or measure fixed marks again"
 
 
-def diagnose(state: State, rng: Generator, missing: Sequence[Missing] = ()) -> Diagnosis:
-    """Of a state with geometry fitted and no terms; `missing`: what effects of the catalogue lack in this record."""
-    found = doubted(state, rng, missing)
-    at = found.at
+def diagnose(
+    state: State,
+    rng: Generator,
+    missing: Sequence[Missing] = (),
+    stages: Stages | None = None,
+    known: Callable[[Diagnosis], None] | None = None,
+) -> Diagnosis:
+    """Of a state with geometry fitted and no terms; `missing`: what effects of the catalogue lack in this record.
+
+    `stages` keeps what fails; `known` is called once as soon as the causes are known, with nothing beside them yet.
+    """
+    stages = Stages() if stages is None else stages
+
+    def causes(found: Doubted) -> None:
+        if known is not None:
+            known(replace(_without_proof(found, missing), incomplete=stages.not_yet(Stage.PREDICTION)))
+
+    found = doubted(state, rng, missing, stages, causes)
+    at, attempt = found.at, stages.attempt
     samples = np.unique(at.state.rows.sample[at.state.rows.data])
-    law = noise_law(at.state.rows, at.bench.sight, at.state.drivers.t_s, rng)
+    wanders = attempt(Stage.NOISE, lambda: _wanders(at, rng), otherwise=False)
+    rejected, invisible = attempt(Stage.REJECTED, lambda: _not_there(at), ((), ()))
+    return replace(
+        _without_proof(found, missing),
+        proofs=attempt(Stage.PROOFS, lambda: proofs(state, at.state, samples, rng), ()),
+        floors=attempt(Stage.FLOORS, lambda: floors(at.state, samples, at.state.rows.geometry.shape[1]), ()),
+        noise_wanders=wanders,
+        rejected=rejected,
+        invisible=invisible,
+        incomplete=stages.failed,
+    )
+
+
+def _without_proof(found: Doubted, missing: Sequence[Missing]) -> Diagnosis:
     return Diagnosis(
         verdict=found.verdict,
         findings=found.findings,
         unexplained=found.unexplained,
-        proofs=proofs(state, at.state, samples, rng),
-        floors=floors(at.state, samples, at.state.rows.geometry.shape[1]),
+        proofs=(),
+        floors=(),
         lack_of_fit=found.misfit,
-        noise_wanders=law.wanders,
-        rejected=_rejected(at),
-        invisible=tuple(dict.fromkeys(named(term) for term in at.bench.menu.invisible)),
+        noise_wanders=False,
+        rejected=(),
+        invisible=(),
         missing=tuple(missing),
         next=(*to_measure(found.findings), *found.next),
-        model=at.state,
+        model=found.at.state,
     )
+
+
+def _wanders(at: Search, rng: Generator) -> bool:
+    return noise_law(at.state.rows, at.bench.sight, at.state.drivers.t_s, rng).wanders
+
+
+def _not_there(at: Search) -> tuple[tuple[Rejected, ...], tuple[Named, ...]]:
+    """Rejected causes, and those that these poses do not show."""
+    return _rejected(at), tuple(dict.fromkeys(named(term) for term in at.bench.menu.invisible))
 
 
 def _rejected(at: Search) -> tuple[Rejected, ...]:

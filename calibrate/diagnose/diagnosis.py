@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from calibrate.diagnose.lack_of_fit import LackOfFit
 from calibrate.diagnose.linearised import State
 from calibrate.diagnose.proof import Floor, HeldOut
+from calibrate.diagnose.stages import Incomplete
 from calibrate.effects.term import Missing, Size
 
 Floats = NDArray[np.float64]
@@ -117,3 +118,4 @@ class Diagnosis:
     missing: tuple[Missing, ...]
     next: tuple[str, ...]
     model: State  # geometry, and the terms behind the findings
+    incomplete: tuple[Incomplete, ...] = ()  # stages without a result

@@ -17,7 +17,7 @@ Which samples of a long session the search works on: its cost grows with their n
 The model that is found is fitted to all of them afterwards.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.diagnosis import Finding, Unexplained, Verdict
 from calibrate.diagnose.drifts import doubtful, suspects, untold
-from calibrate.diagnose.findings import findings_of
+from calibrate.diagnose.findings import bare_findings, findings_of
 from calibrate.diagnose.folds import k_folds, units
 from calibrate.diagnose.hidden_levers import TIME
 from calibrate.diagnose.lack_of_fit import LackOfFit, lack_of_fit
@@ -37,6 +37,7 @@ from calibrate.diagnose.rivals import Rival, rivals_of
 from calibrate.diagnose.score import gain_of
 from calibrate.diagnose.search import search
 from calibrate.diagnose.searching import BETTER, Search
+from calibrate.diagnose.stages import Stage, Stages
 from calibrate.diagnose.unknown import with_unknowns
 from calibrate.diagnose.unrecorded import Unrecorded, unrecorded
 from calibrate.effects.term import Missing, Term
@@ -73,34 +74,65 @@ class Doubted:
     unexplained: tuple[Unexplained, ...]
     misfit: LackOfFit | None
     next: tuple[str, ...]  # columns to record
+    undecided: bool = False  # a stage that decides has failed
 
     @property
     def verdict(self) -> Verdict:
         if self.findings:
             return Verdict.MISMATCH
-        return Verdict.UNDECIDABLE if self.unexplained else Verdict.CONSISTENT
+        return Verdict.UNDECIDABLE if self.unexplained or self.undecided else Verdict.CONSISTENT
 
 
-def doubted(state: State, rng: Generator, missing: Sequence[Missing] = ()) -> Doubted:
-    """Of a state with geometry fitted and no terms; `missing`: what effects of the catalogue lack in this record."""
-    at = _predicting(with_unknowns(search(thinned(state, rng), rng)), rng)
-    if at.state.samples < state.samples:
-        at = at.at(Bench(state.refitted(at.state.accepted)))
-    at, rivals = with_best_names(at)
-    if (kept := _predicting(at, rng)) is not at:
-        at, rivals = with_best_names(kept)
-    scatter, misfit = unrecorded(at.bench, rng, missing), lack_of_fit(at.bench)
+def doubted(
+    state: State,
+    rng: Generator,
+    missing: Sequence[Missing] = (),
+    stages: Stages | None = None,
+    known: Callable[[Doubted], None] | None = None,
+) -> Doubted:
+    """Of a state with geometry fitted and no terms; `missing`: what effects of the catalogue lack in this record.
+
+    `stages` keeps what fails; `known` is called once as soon as the causes are known, before alternatives and sizes.
+    """
+    stages = Stages() if stages is None else stages
+    at = _found(state, rng, stages)
+    if known is not None:
+        known(Doubted(at, bare_findings(at), (), None, (), undecided=True))
+    at, rivals = stages.attempt(
+        Stage.ALTERNATIVES, lambda: _named_best(at, rng), (at, tuple(() for _ in at.state.accepted))
+    )
+    scatter = stages.attempt(Stage.SCATTER, lambda: unrecorded(at.bench, rng, missing), None)
+    misfit = stages.attempt(Stage.REPEATS, lambda: lack_of_fit(at.bench), None)
     speed = [m for m in missing if m.driver == SPEED]
     moving = _moving(at, speed)
     left = [*_scattered(scatter), *_repeated(misfit), *moving]
-    findings = findings_of(at, rivals, predicts(at.bench, rng), final=not left)
+    final = not left and not stages.undecided
+    findings = stages.attempt(
+        Stage.SIZES, lambda: findings_of(at, rivals, predicts(at.bench, rng), final), bare_findings(at)
+    )
     drifts = [(f, hidden) for f in findings if (hidden := suspects(f, missing))]
     findings = tuple(doubtful(f) if suspects(f, missing) else f for f in findings)
     lacking = [*(scatter.missing if scatter is not None else ()), *(speed if moving else ())]
     lacking += [m for _, hidden in drifts for m in hidden]
     if left and not lacking:
         lacking = list(missing)
-    return Doubted(at, findings, (*left, *(untold(f, hidden) for f, hidden in drifts)), misfit, _records(lacking))
+    unexplained = (*left, *(untold(f, hidden) for f, hidden in drifts))
+    return Doubted(at, findings, unexplained, misfit, _records(lacking), stages.undecided)
+
+
+def _found(state: State, rng: Generator, stages: Stages) -> Search:
+    """Every cause, in a model fitted to all samples; where a stage fails, what the stages before it have found."""
+    few = stages.attempt(Stage.SEARCH, lambda: thinned(state, rng), state)
+    at = stages.attempt(Stage.SEARCH, lambda: search(few, rng), Search(Bench(few), rng))
+    at = stages.attempt(Stage.UNKNOWN, lambda: with_unknowns(at), at)
+    at = stages.attempt(Stage.PREDICTION, lambda: _predicting(at, rng), at)
+    return at.at(Bench(state.refitted(at.state.accepted))) if at.state.samples < state.samples else at
+
+
+def _named_best(at: Search, rng: Generator) -> tuple[Search, Rivals]:
+    at, rivals = with_best_names(at)
+    kept = _predicting(at, rng)
+    return (at, rivals) if kept is at else with_best_names(kept)
 
 
 def _predicting(at: Search, rng: Generator) -> Search:

@@ -4,6 +4,10 @@ Several names at one place of a machine that is sound elsewhere: pieces of one l
 Sines of a joint's angle and its torque build up any function of the pose, so a few of them that fit prove little.
 Faults that have nothing to do with each other are spread over a machine; three of them at one joint and next to none
 anywhere else are one cause.
+
+Of all open terms at one port a finding gives place, drivers, and how much of it these poses show. A curve's
+coefficients are shared out between it, its neighbours and geometry as priors please; their size is no size of anything.
+What only the curve explains is one: felt at the readings, divided by how they feel the port.
 """
 
 from collections.abc import Sequence
@@ -14,15 +18,17 @@ from numpy.typing import NDArray
 from scipy.stats import poisson
 
 from calibrate.diagnose.bench import Bench
+from calibrate.diagnose.curve import unit_of
 from calibrate.diagnose.diagnosis import UNKNOWN, Finding, Named, RivalName
 from calibrate.diagnose.linearised import Accepted
+from calibrate.diagnose.port_process import lever
 from calibrate.diagnose.pulled_back import pulled_back
 from calibrate.diagnose.rivals import Rival, confidences
-from calibrate.diagnose.score import gain_of, orthonormal
+from calibrate.diagnose.score import Removed, gain_of, orthonormal, removed
 from calibrate.diagnose.searching import Search
 from calibrate.diagnose.stated_sizes import sizes_of
-from calibrate.diagnose.unknown_cause import unknown_cause
-from calibrate.effects.term import Term
+from calibrate.effects.term import Size, Term
+from calibrate.effects.words import plain
 
 Floats = NDArray[np.float64]
 
@@ -56,6 +62,30 @@ def findings_of(
     explained = max(sum(f.share for f in (*names, *unknown)), 1e-300)
     found = [replace(f, share=f.share / explained) for f in (*_no_leftovers(names, unknown), *unknown)]
     return tuple(sorted(found, key=lambda f: -f.share))
+
+
+def bare_findings(at: Search) -> tuple[Finding, ...]:
+    """What is known as soon as the causes are: names and shares, no sizes, and no name more likely than not."""
+    found = [_bare(at, i) for i in range(len(at.state.accepted))]
+    explained = max(sum(f.share for f in found), 1e-300)
+    return tuple(sorted((replace(f, share=f.share / explained) for f in found), key=lambda f: -f.share))
+
+
+def _bare(at: Search, i: int) -> Finding:
+    a = at.state.accepted[i]
+    name, p = named(a.term), at.p.get(a.term.key, 0.0)
+    return Finding(
+        name=name,
+        parameters={},
+        share=at.bench.gone[i].squares,
+        confidence=NOT_FINAL * (1.0 - p),
+        p=p,
+        gain=gain_of(at.bench.gone[i], at.bench.sight),
+        predicts=float("nan"),
+        says=f"{name.physics} at {name.where}, depends on {' and '.join(name.depends_on)}: size not determined",
+        rivals=(),
+        pulled=None,
+    )
 
 
 def _unnamed(at: Search) -> list[list[int]]:
@@ -143,3 +173,48 @@ def _meet_too_often(here: int, elsewhere: int, places: int) -> bool:
 
 def _of_pose(driver: str) -> bool:
     return driver.startswith("gravity_torque") or (driver[0] == "q" and driver[1:].isdigit())
+
+
+def unknown_cause(at: Search, group: Sequence[int], predicts: Floats) -> Finding:
+    """One finding for the accepted open terms `group`, all of one port, the largest one first in the picture.
+
+    `predicts` (term,) as calibrate/diagnose/doubt.py gives it. The share is a square, not divided by that of
+    all findings.
+    """
+    bench = at.bench
+    gone = removed(bench.state, bench.sight, tuple(group))
+    mine = [bench.state.accepted[i] for i in sorted(group, key=lambda i: -bench.gone[i].squares)]
+    p = max(at.p.get(a.term.key, 0.0) for a in mine)
+    name, size = _unnamed_size(bench, mine[0], gone)
+    where, drivers = mine[0].term.port.where, tuple(dict.fromkeys(d for a in mine for d in a.term.depends_on))
+    return Finding(
+        name=Named(where, drivers, mine[0].term.shape.value, None, UNKNOWN),
+        parameters={name: size},
+        share=gone.squares,
+        confidence=1.0 - p,
+        p=p,
+        gain=gain_of(gone, bench.sight),
+        predicts=float(sum(predicts[i] for i in group)),
+        says=f"Unknown cause at {where}, depends on {' and '.join(drivers)}: shows as {plain(name, size)} rms",
+        rivals=(),
+        pulled=pulled_back(bench, mine[0]),
+    )
+
+
+def _unnamed_size(bench: Bench, largest: Accepted, gone: Removed) -> tuple[str, Size]:
+    """Root mean square at the port that only these terms explain, noise taken out, its name with its unit."""
+    port, component = largest.term.port, _component(bench, largest)
+    felt = float(np.linalg.norm(lever(bench, port, component)))
+    left = max(bench.sight.rss / max(bench.sight.data, 1), 1e-300)
+    shown = float(np.sqrt(max(gone.squares - len(gone.part) * left, 0.0)))
+    # Each of the directions has the noise of a row: so has the length of them all, to first order.
+    return f"rms_{unit_of(port, component)}", Size(shown / max(felt, 1e-300), float(np.sqrt(left)) / max(felt, 1e-300))
+
+
+def _component(bench: Bench, accepted: Accepted) -> int:
+    """Of the port, the one through which the readings feel the term most."""
+    amount = accepted.term.amount(bench.state.drivers, accepted.coefficients, accepted.inner)
+    moved = np.flatnonzero(np.any(amount != 0.0, axis=0))
+    sample = np.maximum(bench.state.rows.sample, 0)
+    felt = [float(np.linalg.norm(lever(bench, accepted.term.port, int(c)) * amount[sample, c])) for c in moved]
+    return int(moved[int(np.argmax(felt))]) if len(moved) else 0

@@ -14,35 +14,35 @@ from numpy.typing import NDArray
 from calibrate.diagnose.assumed import Assumed
 from calibrate.diagnose.augmented import Around, Augmented, plain_sizes
 from calibrate.diagnose.driver_values import drivers_of
+from calibrate.diagnose.in_sight import in_sight, solve_in_sight
 from calibrate.diagnose.linearised import Accepted, Rows, Unseen
 from calibrate.diagnose.noise_of_fit import Noise, covariance_at, noise_of, whiteners_of
 from calibrate.diagnose.scatter import Scatter, likelihood_of
 from calibrate.diagnose.session import Session
-from calibrate.diagnose.unmet_places import places_found
 from calibrate.effects.catalogue import terms_of
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.since_model import changes
 from calibrate.effects.term import Term
-from calibrate.fit import FAR_START, Loss, Stop, solve
+from calibrate.fit import FAR_START, NEAR_START, Loss, Stop, solve
 from calibrate.identification.session import believed_sigma
-from calibrate.parameters import plausible_sizes, priors, start_values
+from calibrate.parameters import Parameter, plausible_sizes, priors, start_values
 from calibrate.problem import whitener_of
+from calibrate.sensors import point_line, seat
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
-TURNS = 12  # of weights and least squares; mismatch wants at least four
+TURNS = 40  # of weights and least squares; most settle in 5 to 8
 FEWEST_TURNS = 4
 REFRESHED = 2  # turns after which drivers have settled: what a nanometre changes in them decides nothing
-STEPS = 6  # of a solver in the first turn
-FEW_STEPS = 2  # in each further turn: the next one goes on from there
+STEPS = 12  # of a solver in a turn: the next one goes on from there
 TOLERANCE = 1e-3  # of chi2 in a turn, 3 % of a sigma
-# Of the largest diagonal element. Next to nothing holds a term's coefficients where geometry can stand in for them: a
-# full step along such a direction leaves the range in which the model is linear.
-DAMPING = 1e-9
+DAMPING = 1e-9  # of the first step: along what the data see it is a Gauss-Newton step
 WILD = 0.1  # weight of a row that may have bent a plain fit
 SWALLOWED = 0.3  # weight of a row that next to nothing of a model follows: five sigmas off
 SETTLED = 0.1  # of -2 log L: far below any difference that decides
+AT_REST = (Stop.GAIN, Stop.ROUNDING)  # of a solver that found the least squares of its weights
+PLACES = ("placement", seat.POINTS, point_line.POINTS)  # of where something stood; a place may be met unseen
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,6 +167,11 @@ class Fitted:
         return np.concatenate([*data, np.zeros((rest, data[0].shape[1]))])
 
     def candidates(self) -> Sequence[Term]:
+        return self._candidates
+
+    @cached_property
+    def _candidates(self) -> tuple[Term, ...]:
+        """Closed and open menus and the ports ask for them in turn."""
         since = () if self.problem.assumed is None else changes(self.drivers)
         return (*terms_of(self.drivers), *since)
 
@@ -216,7 +221,8 @@ def fit_geometry(session: Session, active: Ints | None = None) -> Fitted:
     problem = Augmented(session, (), None, rows, whiteners, ())
     fits: list[Fitted] = []
     for loss in (Loss.SQUARE, Loss.HUBER):
-        rough = solve(problem, start=session.start, damping=FAR_START, loss=loss)
+        seen = in_sight(problem, session.start)
+        rough = solve_in_sight(problem, session.start, seen, damping=FAR_START, loss=loss)
         fits.append(_settled(_turn(problem, chosen, rough.theta, noise_of(problem, rough))))
         if all(np.all(s.weights > WILD) for s in fits[0].scatters):
             break
@@ -250,23 +256,31 @@ def _makes_outliers(term: Term) -> bool:
 
 
 def _settled(fitted: Fitted) -> Fitted:
-    """Weights and least squares in turns, until neither changes the likelihood."""
+    """Weights and least squares in turns, until the solver is at rest and the likelihood changes no more.
+
+    Of turns that differ in what they take noise for, the likeliest: no refit ends worse than it was.
+    """
+    best = fitted
     for turn in range(1, TURNS):
-        last, problem = fitted.minus_two_log_likelihood, fitted.problem
+        last, problem = fitted, fitted.problem
         if fitted.problem.terms and turn <= REFRESHED:
             problem = problem.refreshed(fitted.drivers)
-        new = _turn(problem, fitted.active, fitted.values, fitted.noise, FEW_STEPS)
+        new = _turn(problem, fitted.active, fitted.values, fitted.noise)
         fitted = replace(new, steps=fitted.steps + new.steps)
-        if turn + 1 >= FEWEST_TURNS and abs(last - fitted.minus_two_log_likelihood) < SETTLED:
-            return replace(fitted, stop=Stop.LIKELIHOOD)
-    return fitted
+        best = min(best, fitted, key=lambda fit: fit.minus_two_log_likelihood)
+        gained = last.minus_two_log_likelihood - fitted.minus_two_log_likelihood
+        if turn + 1 >= FEWEST_TURNS and new.stop in AT_REST and abs(gained) < SETTLED:
+            return replace(best, steps=fitted.steps, stop=Stop.LIKELIHOOD)
+    return replace(best, steps=fitted.steps, stop=Stop.ROUNDS)
 
 
-def _turn(problem: Augmented, active: Ints, start: Floats, noise: Noise, steps: int = STEPS) -> Fitted:
-    """Least squares under the noise so far, then the noise that is left."""
+def _turn(problem: Augmented, active: Ints, start: Floats, noise: Noise) -> Fitted:
+    """Least squares under the noise so far, along what the data see, then the noise that is left."""
     problem = noise.under(problem)
-    fit = solve(problem, start=start, damping=DAMPING, max_steps=steps, tolerance=TOLERANCE)
-    return Fitted(problem.session, active, problem, fit.theta, noise_of(problem, fit), fit.covariance, fit.steps)
+    seen = in_sight(problem, start)
+    fit = solve_in_sight(problem, start, seen, damping=DAMPING, max_steps=STEPS, tolerance=TOLERANCE)
+    noise = noise_of(problem, fit)
+    return Fitted(problem.session, active, problem, fit.theta, noise, fit.covariance, fit.steps, fit.stop)
 
 
 def _cut(state: Fitted, active: Ints) -> Fitted:
@@ -286,3 +300,38 @@ def _cut(state: Fitted, active: Ints) -> Fitted:
 
 def _rows_of(session: Session, active: Ints) -> tuple[Ints, ...]:
     return tuple(np.flatnonzero(np.isin(m.sample_rows, active).all(axis=1)) for m in session.measured)
+
+
+def places_found(
+    problem: Augmented, values: Floats, scatters: tuple[Scatter, ...], rows: tuple[Ints, ...], data_rows: int
+) -> Floats:
+    """Values in which places that the fit has not met are found from these rows of each instrument, all else held.
+
+    `data_rows`: of the problem's own rows, those of readings.
+    """
+    parameters = problem.parameters
+    place = np.array([p.free and p.name.startswith(PLACES) for p in parameters])
+    met = np.any(problem.jacobian(values)[:data_rows] != 0.0, axis=0)
+    unmet = place & ~met
+    if not unmet.any():
+        return values
+    whiteners = tuple(
+        whitener_of(covariance_at(s, old, r)) for s, old, r in zip(scatters, problem.rows, rows, strict=True)
+    )
+    held = tuple(p if u else replace(p, free=False) for p, u in zip(parameters, unmet, strict=True))
+    there = _Held(replace(problem, rows=rows, whiteners=whiteners, last={}, slopes={}), held)
+    return solve(there, start=values, damping=NEAR_START).theta
+
+
+@dataclass(frozen=True, eq=False)
+class _Held:
+    """A problem with other beliefs."""
+
+    problem: Augmented
+    parameters: tuple[Parameter, ...]
+
+    def residual(self, theta: Floats) -> Floats:
+        return self.problem.residual(theta)
+
+    def jacobian(self, theta: Floats) -> Floats:
+        return self.problem.jacobian(theta)

@@ -21,6 +21,7 @@ from calibrate.diagnose.diagnosis import Diagnosis, Unexplained, Verdict
 from calibrate.diagnose.fitted import Fitted, fit_geometry
 from calibrate.diagnose.free_space_change import FreeSpaceChange, free_space_change
 from calibrate.diagnose.session import Session, session_of
+from calibrate.diagnose.stages import DECIDING, Incomplete, Stage, Stages
 from calibrate.diagnose.tail import LEAST
 from calibrate.diagnose.wild_rows import unexplained_rows
 from calibrate.effects.catalogue import missing_of
@@ -54,21 +55,29 @@ class Physics:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosed:
-    """`physics` is None where the whole file is wrong: nothing was sought then."""
+    """`physics` is None where the whole file is wrong, or geometry could not be fitted: nothing was sought then."""
 
     cleared: Cleared
     blunders: tuple[Blunder, ...]  # of the file, and rows that no model explains
     physics: Physics | None
+    incomplete: tuple[Incomplete, ...] = ()  # stages without a result, where there is no physics
 
 
 def diagnose_samples(
-    rig: Rig, samples: Samples, rng: Generator, begin: Callable[[Session], Fitted] = fit_geometry
+    rig: Rig,
+    samples: Samples,
+    rng: Generator,
+    begin: Callable[[Session], Fitted] = fit_geometry,
+    known: Callable[[Diagnosed], None] | None = None,
 ) -> Diagnosed:
-    """`begin`: the fit beside which something is sought, geometry alone or what a model knows already.
+    """`begin`: the fit beside which something is sought, geometry alone or what a model knows already. `known` is
+    called once as soon as the causes are known, before sizes, alternatives and proofs.
 
     DataError where there is too little to diagnose.
     """
-    cleared = blunders_first(rig, samples)
+    stages = Stages()
+    every = Cleared(samples, np.arange(len(samples)), ())
+    cleared = stages.attempt(Stage.FAULTS, lambda: blunders_first(rig, samples), every, refuses=True)
     if cleared.whole_file:
         return Diagnosed(cleared, cleared.blunders, None)
     if len(cleared.rows) < FEWEST:
@@ -76,13 +85,32 @@ def diagnose_samples(
             f"{len(cleared.rows)} samples are left to diagnose, fewer than {FEWEST}: no cause can be told from noise; "
             "measure more poses"
         )
-    geometry = begin(session_of(rig, cleared.samples))
-    diagnosis = diagnose(geometry, rng, missing_of(geometry.drivers))
+    geometry = stages.attempt(Stage.GEOMETRY, lambda: begin(session_of(rig, cleared.samples)), None, refuses=True)
+    if geometry is None:
+        return Diagnosed(cleared, cleared.blunders, None, stages.failed)
+
+    def causes(found: Diagnosis) -> None:
+        if known is not None:
+            known(Diagnosed(cleared, cleared.blunders, Physics(found, geometry, _fitted(found), None)))
+
+    diagnosis = diagnose(geometry, rng, missing_of(geometry.drivers), stages, causes)
     model = geometry if not diagnosis.findings else _fitted(diagnosis)
-    diagnosis = _with_scatter(diagnosis, model)
-    change = None if geometry.problem.given else free_space_change(geometry, model, rng)
-    physics = Physics(diagnosis, geometry, model, change)
-    return Diagnosed(cleared, cleared.blunders + _left(model, cleared), physics)
+    attempt = stages.attempt
+    diagnosis = attempt(Stage.BEYOND_NOISE, lambda: _with_scatter(diagnosis, model), diagnosis)
+    change = attempt(Stage.FREE_SPACE, lambda: _free_space_change(geometry, model, rng), None)
+    left = attempt(Stage.FAR_ROWS, lambda: _left(model, cleared), ())
+    physics = Physics(unfinished(diagnosis, stages.failed), geometry, model, change)
+    return Diagnosed(cleared, cleared.blunders + left, physics)
+
+
+def unfinished(diagnosis: Diagnosis, failed: tuple[Incomplete, ...]) -> Diagnosis:
+    """With the stages that have no result; a session that was not looked at to the end is not consistent."""
+    open_ = diagnosis.verdict is Verdict.CONSISTENT and any(one.stage in DECIDING for one in failed)
+    return replace(diagnosis, incomplete=failed, verdict=Verdict.UNDECIDABLE if open_ else diagnosis.verdict)
+
+
+def _free_space_change(geometry: Fitted, model: Fitted, rng: Generator) -> FreeSpaceChange | None:
+    return None if geometry.problem.given else free_space_change(geometry, model, rng)
 
 
 def _with_scatter(diagnosis: Diagnosis, model: Fitted) -> Diagnosis:

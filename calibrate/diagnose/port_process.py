@@ -60,7 +60,7 @@ class Processes:
         count, k = self.gram.shape[:2]
         gram, along, rss = self.gram, (self.columns @ residual).reshape(count, k, 1), float(residual @ residual)
         if without is not None:
-            back = (self.raw @ without.span).reshape(count, k, -1)
+            back = (self.raw @ without.span).reshape(count, k, without.span.shape[1])
             gram, along = gram + back @ np.swapaxes(back, 1, 2), along + (back @ without.part)[:, :, None]
             rss += without.squares
         bound = np.where(allowed, self._bound(gram, along[..., 0], rss), -np.inf)

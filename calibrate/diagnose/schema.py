@@ -191,6 +191,13 @@ class ChangedRecord(Record, frozen=True):
     sigma: Statistic
 
 
+class IncompleteRecord(Record, frozen=True):
+    """A stage of the diagnosis that has no result."""
+
+    stage: Label
+    reason: Sentence
+
+
 class RigRecord(Record, frozen=True):
     """Which rig the session was made with."""
 
@@ -230,3 +237,4 @@ class DiagnosisFile(Record, frozen=True):
     streams: StreamsRecord | None = None
     known: KnownRecord | None = None  # of a diagnosis beside a model
     changed: Many[ChangedRecord] = ()
+    incomplete: Many[IncompleteRecord] = ()  # what could not be looked at, and why

@@ -24,6 +24,7 @@ from calibrate.diagnose.schema import (
     FindingRecord,
     FloorRecord,
     FreeSpaceRecord,
+    IncompleteRecord,
     LackOfFitRecord,
     NameRecord,
     NotRecorded,
@@ -36,6 +37,7 @@ from calibrate.diagnose.schema import (
     UnexplainedRecord,
 )
 from calibrate.diagnose.smallest_visible import Smallest, smallest_visible
+from calibrate.diagnose.stages import Incomplete, Stage, Stages
 from calibrate.effects.catalogue import EFFECTS
 from calibrate.effects.form import Form
 from calibrate.effects.term import Size
@@ -66,6 +68,7 @@ def file_of(diagnosed: Diagnosed, recording: Recording) -> DiagnosisFile:
             rig=rig,
             samples=len(recording.samples),
             blunders=blunders,
+            incomplete=tuple(map(_incomplete, diagnosed.incomplete)),
         )
     return _with_physics(diagnosed.physics, rig, blunders)
 
@@ -78,7 +81,10 @@ def _with_physics(physics: Physics, rig: RigRecord, blunders: tuple[BlunderRecor
     first, *others = [_unexplained(u, after_m) for u in said.unexplained] or [None]
     drivers, misfit, change = physics.geometry.drivers, said.lack_of_fit, physics.free_space
     bench, limits = Bench(physics.geometry), _limits(physics.model)
-    sizes = smallest_visible(bench)
+    stages = Stages(list(said.incomplete))
+    early = any(one.not_reached for one in said.incomplete)  # written before them: only what is known
+    sizes = () if early else stages.attempt(Stage.DETECTION, lambda: smallest_visible(bench), ())
+    confusable = () if early else stages.attempt(Stage.CONFUSABLE, lambda: _confusable(bench), ())
     return DiagnosisFile(
         schema=SCHEMA,
         verdict=said.verdict.value,
@@ -103,11 +109,16 @@ def _with_physics(physics: Physics, rig: RigRecord, blunders: tuple[BlunderRecor
         rejected=tuple(map(_rejected, said.rejected)),
         invisible=tuple(map(_name, dict.fromkeys((*said.invisible, *(s.name for s in sizes if not s.plausible))))),
         smallest=tuple(_smallest(s) for s in sizes if s.plausible),
-        confusable=_confusable(bench),
+        confusable=confusable,
         not_recorded=tuple(dict.fromkeys(NotRecorded(m.driver, m.column, m.physics) for m in said.missing)),
         derived=(DERIVED_APPROACH,) if drivers.approach_derived else (),
         blunders=blunders,
+        incomplete=tuple(map(_incomplete, stages.failed)),
     )
+
+
+def _incomplete(one: Incomplete) -> IncompleteRecord:
+    return IncompleteRecord(one.stage.value, one.reason)
 
 
 def _judged(said: Diagnosis) -> HeldOut | None:

@@ -61,7 +61,10 @@ def by_corrected(drivers: Drivers, by: By) -> Weighed | None:
     A coefficient of one of these, over the first, is a number of sigmas. None where the doubts add nothing.
     """
     stated = by(drivers, carried(drivers)).sum(axis=2).ravel()
-    each = by(drivers, doubts(drivers))
+    off = doubts(
+        drivers
+    )  # kept: a rig with one more mass stated has other doubts, but these columns keep their meaning
+    each = by(drivers, off)
     each = each.reshape(-1, each.shape[2])
     along = stated @ each / max(float(stated @ stated), 1e-300)
     _, s, Vt = np.linalg.svd(each - np.outer(stated, along), full_matrices=False)
@@ -72,7 +75,7 @@ def by_corrected(drivers: Drivers, by: By) -> Weighed | None:
 
     def at(drivers: Drivers) -> Floats:
         plain = by(drivers, carried(drivers)).sum(axis=2, keepdims=True)
-        moved = by(drivers, doubts(drivers)) @ mix - plain * (along @ mix)
+        moved = by(drivers, off) @ mix - plain * (along @ mix)
         return np.concatenate([plain, moved], axis=2)
 
     return Weighed(lru_cache(maxsize=KEPT)(at), 1 + kept, kept)

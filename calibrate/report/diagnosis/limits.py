@@ -19,6 +19,7 @@ def limits(file: DiagnosisFile) -> Html:
         TITLE,
         lead,
         *_unexplained(file),
+        *_listed("Not completed", [f"{one.stage}: {one.reason}" for one in file.incomplete]),
         *_listed("Faults of the file", [b.says for b in file.blunders]),
         *_listed("In the streams", list(stream_words(file))),
         *_listed("Derived, not recorded", list(file.derived)),

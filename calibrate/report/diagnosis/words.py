@@ -33,6 +33,9 @@ def verdict_words(file: DiagnosisFile) -> str:
             return f"Recording and model part: {n} cause{'s' if n > 1 else ''} found{_how_far(file)}."
         case "consistent":
             return f"Recording and model agree: nothing is there beyond the noise{_tested(file)}."
+        case _ if file.incomplete and file.unexplained is None:
+            stages = ", ".join(one.stage for one in file.incomplete)
+            return f"Undecidable: the diagnosis was not completed ({stages})."
         case _:
             return f"Undecidable: {_something(file)}{_tested(file)}."
 

@@ -12,7 +12,7 @@ from calibrate.effects.base_compliance import EFFECT as BASE
 from calibrate.effects.gravity import stated_torque_nm
 from calibrate.effects.joint_compliance import EFFECT as JOINT
 from calibrate.effects.link_bending import EFFECT as LINK
-from calibrate.effects.loads import MASS_SHARE, stated_masses
+from calibrate.effects.loads import MASS_SHARE, doubtful_rigs, stated_masses
 from calibrate.effects.psd_gain import EFFECT as GAIN
 
 from .conftest import full_session
@@ -118,3 +118,15 @@ def test_skew_of_a_detector_holds_no_turn_of_it():
     assert basis[:, :, 2] == pytest.approx(spot[:, ::-1] / 2.0)
     mapped = np.linalg.lstsq(spot, basis[:, :, 2], rcond=None)[0]
     assert mapped == pytest.approx(mapped.T, abs=1e-9)
+
+
+def test_corrections_keep_their_meaning_on_a_rig_that_states_the_mass_of_the_tool_too(drivers):
+    """Sizes ask what masses that are off would do; of a tool whose mass is not stated, by a rig that states it."""
+    stated = weighed(drivers)
+    stated = replace(stated, rig=structs.replace(stated.rig, tool=structs.replace(stated.rig.tool, mass_kg=None)))
+    term = term_of(JOINT, stated, "joint2.angle", "masses corrected")
+    off = doubtful_rigs(stated)[-1]
+    assert off.tool.mass_kg is not None
+    plain, moved = term.basis(stated, NOTHING), term.basis(replace(stated, rig=off), NOTHING)
+    assert moved.shape == plain.shape
+    assert np.ptp(moved[:, 1, 0] - plain[:, 1, 0]) > 0.0
