@@ -88,7 +88,8 @@ def _add_frame(parent: ElementTree.Element, name: str, pose: Pose) -> ElementTre
     frame = ElementTree.SubElement(parent, "body", name=name, pos=_numbers(*pose.origin_m))
     angle_rad = math.sqrt(sum(component * component for component in pose.rotation_rad))
     if angle_rad > 0.0:
-        frame.set("axisangle", _numbers(*pose.rotation_rad, angle_rad))
+        # of length 1: MuJoCo refuses an axis as short as what rounding leaves of a rotation
+        frame.set("axisangle", _numbers(*(component / angle_rad for component in pose.rotation_rad), angle_rad))
     return frame
 
 

@@ -71,3 +71,11 @@ def test_flange_frame_of_the_rig_comes_after_the_last_link(ur5e):
     extra = turn(2, 0.5)
     extra[:3, 3] = [0.01, 0.02, 0.03]
     np.testing.assert_allclose(World.from_rig(rig).T_base_flange(), without @ extra, atol=1e-12)
+
+
+def test_a_frame_that_is_turned_by_no_more_than_rounding_is_built(ur5e):
+    """Corrections of a model leave such turns: the axis that MuJoCo is given has length 1 all the same."""
+    rig = ur5e()
+    turned = [1e-16, -2e-17, 0.0]
+    rig["arm"]["flange"] = {"origin_m": [0.0, 0.0, 0.0], "rotation_rad": turned}
+    assert World.from_rig(rig, seed=1).truth.flange.rotation_rad == pytest.approx(turned)
