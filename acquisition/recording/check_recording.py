@@ -28,18 +28,36 @@ class Problem(enum.Enum):
     ERROR_FRAMES = "error-frames"
 
 
+class Severity(enum.Enum):
+    """What a finding means for whoever computes with the recording."""
+
+    ERROR = "error"  # something that was measured is lost, or stamped wrongly
+    WARNING = "warning"  # usable; what is named should be looked at before the next session
+    INFORMATION = "information"  # ordinary: it costs nothing
+
+
 @dataclass(frozen=True)
 class Finding:
-    """One problem: its kind, where it is ("stream psd", "samples", "file"), and a sentence for a person."""
+    """One problem: its kind, where it is ("stream psd", "samples", "file"), a sentence for a person, its weight."""
 
     problem: Problem
     where: str
     says: str
+    severity: Severity = Severity.ERROR
+
+    @property
+    def is_error(self) -> bool:
+        return self.severity is Severity.ERROR
+
+
+USUAL_SHARE = 0.02  # of a stream's samples may be missing without a word: settled samples average over those that came
+USUAL_GAP = 50  # samples in one gap: half a second of encoders asked every 10 ms
 
 
 def check(recording: Recording) -> tuple[Finding, ...]:
-    """Everything found, the file first, then stream by stream, then the samples; empty when all is well."""
-    return (*_file(recording), *_streams(recording), *_samples(recording))
+    """Everything found: errors, warnings, information; of each the file, streams, then samples. Empty: all is well."""
+    found = (*_file(recording), *_streams(recording), *_samples(recording))
+    return tuple(sorted(found, key=lambda finding: list(Severity).index(finding.severity)))
 
 
 def _file(recording: Recording) -> Iterator[Finding]:
@@ -47,7 +65,9 @@ def _file(recording: Recording) -> Iterator[Finding]:
         yield Finding(Problem.DAMAGED, "file", damage)
     if not recording.complete:
         yield Finding(
-            Problem.INCOMPLETE, "file", "the session was cut short or its end is missing; what is here is good"
+            Problem.INCOMPLETE,
+            "file",
+            "the session was cut short or its end is missing; what is here is good",
         )
 
 
@@ -57,14 +77,30 @@ def _streams(recording: Recording) -> Iterator[Finding]:
         if stream.host_s.size == 0:
             yield Finding(Problem.SILENT, where, "declared, but not one sample came")
             continue
-        for gap in stream.gaps:
-            count = "an unknown number of" if gap.missing < 0 else str(gap.missing)
-            between = f"between {_since(recording, gap.from_s)} and {_since(recording, gap.to_s)}"
-            yield Finding(Problem.GAP, where, f"{count} samples missing {between}: {gap.reason}")
+        yield from _gaps(recording, where, stream)
         yield from _device_times(where, stream)
         yield from _order(where, "host_s", stream.host_s)
         yield from _saturation(recording, where, stream)
         yield from _error_frames(where, stream)
+
+
+def _gaps(recording: Recording, where: str, stream: Stream) -> Iterator[Finding]:
+    """One finding for all gaps of a stream: how much is missing, and the longest gap."""
+    if not stream.gaps:
+        return
+    longest = max(stream.gaps, key=lambda gap: gap.missing if gap.missing >= 0 else USUAL_GAP + 1)
+    counted, unknown = sum(max(gap.missing, 0) for gap in stream.gaps), any(gap.missing < 0 for gap in stream.gaps)
+    share = counted / (counted + stream.host_s.size)
+    between = f"between {_since(recording, longest.from_s)} and {_since(recording, longest.to_s)}: {longest.reason}"
+    count = f"{'at least ' if unknown else ''}{counted} samples missing ({100.0 * share:.2g} %)"
+    if len(stream.gaps) == 1:
+        says = f"{count} {between}"
+    else:
+        most = "an unknown number" if longest.missing < 0 else str(longest.missing)
+        first = min(stream.gaps, key=lambda gap: gap.from_s)
+        says = f"{count} in {len(stream.gaps)} gaps from {_since(recording, first.from_s)} on, {most} of them {between}"
+    usual = not unknown and share <= USUAL_SHARE and longest.missing <= USUAL_GAP
+    yield Finding(Problem.GAP, where, says, Severity.INFORMATION if usual else Severity.WARNING)
 
 
 def _saturation(recording: Recording, where: str, stream: Stream) -> Iterator[Finding]:
@@ -83,7 +119,12 @@ def _error_frames(where: str, stream: Stream) -> Iterator[Finding]:
         return
     count = int(np.count_nonzero(stream.values[FLAGS].astype(np.int64) & FrameFlag.ERROR))
     if count:
-        yield Finding(Problem.ERROR_FRAMES, where, f"{count} error frames; check termination, bit rate and cables")
+        yield Finding(
+            Problem.ERROR_FRAMES,
+            where,
+            f"{count} error frames; check termination, bit rate and cables",
+            Severity.WARNING,
+        )
 
 
 def _device_times(where: str, stream: Stream) -> Iterator[Finding]:

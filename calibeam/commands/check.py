@@ -20,17 +20,18 @@ from calibeam.outcome import CheckFailed
 from drivers.clock import SystemClock
 
 SAME_S = 1.0  # longer than any driver keeps a sample
+EMULATED = 0.01  # of the rate: no clock of a device runs so far off; emulators run at another pace than real time
 MOST_LINES = 20  # findings of one file told one by one; a script gets all of them with --json
 
 
 def check_recording(path: Path, *, as_json: bool = False) -> bool:
-    """Print what is in it and what was found; True when nothing is wrong. RecordingError when it cannot be read."""
+    """Print what is in it and what was found; True when there is no error. RecordingError when it cannot be read."""
     files = segments(path) if path.is_dir() else []
     good = True
     for file in files or [path]:
         recording = read(file)
         findings = check(recording)
-        good = good and not findings
+        good = good and not any(finding.is_error for finding in findings)
         if as_json:
             print(msgspec.json.encode(_as_json(recording, findings)).decode())
         else:
@@ -42,10 +43,11 @@ def lines(recording: Recording, findings: tuple[Finding, ...]) -> list[str]:
     """For a person: the file, each stream with its rate and clock, each finding."""
     told = [f"{recording.path}: {len(recording.samples)} settled samples, {len(recording.events)} events"]
     told += [f"  {stream.name}: {_rate(stream)}; {_clock(stream)}" for stream in recording.streams.values()]
-    told += [f"  {finding.problem.value}: {finding.where}: {finding.says}" for finding in findings[:MOST_LINES]]
+    told += [f"  {f.severity.value}: {f.problem.value}: {f.where}: {f.says}" for f in findings[:MOST_LINES]]
     if len(findings) > MOST_LINES:
         told.append(f"  and {len(findings) - MOST_LINES} findings more; --json tells all")
-    return told if findings else [*told, "  nothing is wrong with it"]
+    errors = any(finding.is_error for finding in findings)
+    return [*told, "  errors: see above"] if errors else [*told, "  no errors"]
 
 
 def _rate(stream: Stream) -> str:
@@ -64,7 +66,10 @@ def _clock(stream: Stream) -> str:
         return f"clock: {model.status.value}"
     delays = f"arrive {_ms(model.delay_median_s)} late in the median, {_ms(model.delay_p99_s)} at 99 %"
     wander = "" if model.wander_s is None else f", clock wanders {_ms(model.wander_s)}"
-    return f"clock {1e6 * ((model.rate or 1.0) - 1.0):+.1f} us/s against the host, {delays}{wander}"
+    rate = model.rate or 1.0
+    if abs(rate - 1.0) > EMULATED:
+        return f"recorded at {1.0 / rate:.3g} x real time, {delays}{wander}"
+    return f"clock {1e6 * (rate - 1.0):+.1f} us/s against the host, {delays}{wander}"
 
 
 def _after_host_stamps(stream: Stream) -> Floats | None:
@@ -91,7 +96,13 @@ def _as_json(recording: Recording, findings: tuple[Finding, ...]) -> dict[str, A
             for stream in recording.streams.values()
         },
         "findings": [
-            {"problem": finding.problem.value, "where": finding.where, "says": finding.says} for finding in findings
+            {
+                "severity": finding.severity.value,
+                "problem": finding.problem.value,
+                "where": finding.where,
+                "says": finding.says,
+            }
+            for finding in findings
         ],
     }
 

@@ -24,6 +24,7 @@ def diagnose_command(
     model_out: Path | None = None,
     report: Path | None = None,
     plan_out: Path | None = None,
+    verbose: bool = False,
     json: bool = False,
 ) -> None:
     """Find the physics that the geometric model leaves out.
@@ -49,6 +50,8 @@ def diagnose_command(
         Where to write the pages for a person; beside the diagnosis, if not said otherwise.
     plan_out
         Where to write the poses that would best tell rivals apart: `calibeam session RIG --plan` takes them.
+    verbose
+        Print all causes and their rivals, clocks, and what was not recorded, too.
     json
         Print the diagnosis as it stands in the file, on one line, and nothing else.
 
@@ -64,7 +67,7 @@ def diagnose_command(
         if json:
             print(msgspec.json.encode(file).decode())
         else:
-            print_diagnosis(console, file)
+            print_diagnosis(console, file, verbose=verbose)
         refuse_wrong_file(found, out)
         if model_out is not None:
             write_model(model_out, model_of_diagnosis(found, source))

@@ -36,6 +36,7 @@ def identify_command(
     bootstrap: Annotated[int, Parameter(validator=validators.Number(gte=0))] | None = None,
     out: Path = Path("model.json"),
     export: tuple[ExportForm, ...] = (),
+    verbose: bool = False,
     json: bool = False,
 ) -> None:
     """Identify the arm's geometry from a recording.
@@ -64,6 +65,8 @@ def identify_command(
         Where to write the model.
     export
         Also write the arm for another program, beside the model: the forms of `calibeam export-model`.
+    verbose
+        Print all parameters, rank, second methods, observability and noise, too.
     json
         Print the model as it stands in the file, on one line, and nothing else.
 
@@ -78,7 +81,7 @@ def identify_command(
         return
     planned = Planned.read(plan)
     with naming_source(recording):
-        status = _identify(Console(quiet=json), recording, planned, bootstrap, out, export)
+        status = _identify(Console(quiet=json), recording, planned, bootstrap, out, export, verbose=verbose)
     if json:
         print(msgspec.json.encode(read_model(out)).decode())
     report_unfinished(status, out)
@@ -91,12 +94,14 @@ def _identify(
     bootstrap: int | None,
     out: Path,
     export: tuple[ExportForm, ...],
+    *,
+    verbose: bool,
 ) -> Status:
     source = read(recording)
     result = identify_session(source, planned, bootstrap)
     refuse_undetermined(result.status, result.estimates)
     model = write_session_model(result, source, out, planned)
-    print_identification(console, result, session_verdict(session_evidence(source, model)), source.rig)
+    print_identification(console, result, session_verdict(session_evidence(source, model)), source.rig, verbose=verbose)
     for sentence in unused_columns(source.samples):
         console.print(sentence, markup=False, highlight=False)
     console.print(f"model: {out}", markup=False)

@@ -19,17 +19,17 @@ from calibrate.model_file import ModelFile, ModelParameter
 from calibrate.observability import Observability
 from calibrate.physics.records import Effect
 from calibrate.report.answers import Answers
-from calibrate.report.quantities import length
+from calibrate.report.quantities import angle, length
 from calibrate.report.verdict import Trust, Verdict
 from calibrate.sensors import spots
-from calibrate.sensors.catalogue import thousandth_of
+from calibrate.sensors.catalogue import SENSORS, thousandth_of
 
 COLOUR = {Trust.GOOD: "green", Trust.CARE: "yellow", Trust.NONE: "red"}
 
 
 def print_verdict(console: Console, judged: Verdict) -> None:
     """How far to trust what was found, and every reason for care."""
-    console.print(f"\n{judged.sentence}", style=f"bold {COLOUR[judged.trust]}", highlight=False, markup=False)
+    console.print(judged.sentence, style=f"bold {COLOUR[judged.trust]}", highlight=False, markup=False)
     for reason in judged.reasons:
         console.print(f"  {reason}", highlight=False, markup=False)
 
@@ -93,11 +93,64 @@ def _free_space(room: FreeSpace) -> list[str]:
 UNITS = {"m": ("um", 1e6), "rad": ("urad", 1e6)}
 
 
-def print_identification(console: Console, result: Identification, judged: Verdict, rig: Rig) -> None:
-    """What was wrong with the file comes first, since all that follows is without these rows; last the verdict."""
+MOST = 2  # of what is listed one by one; the rest is counted
+SEE = "--verbose lists them"
+
+
+def print_identification(
+    console: Console, result: Identification, judged: Verdict, rig: Rig, *, verbose: bool = False
+) -> None:
+    """Verdict first, then what a person acts on; `verbose`: rank, every parameter, second methods, observability."""
+    print_verdict(console, judged)
     of_spots = any(one.name == spots.KIND.name for one in result.instruments)
-    if of_spots and (said := said_of(rig)) is not None:
-        console.print(said, highlight=False, markup=False)
+    if of_spots and (assumed := said_of(rig)) is not None:
+        console.print(assumed, highlight=False, markup=False)
+    if verbose:
+        _print_details(console, result, of_spots=of_spots)
+        return
+    for line in _brief(result):
+        console.print(line, highlight=False, markup=False)
+
+
+def _brief(result: Identification) -> Iterator[str]:
+    """What was left out, the proof, the workspace, joint zeros, and how much more there is."""
+    for listed in ([f"left out: {b.says}" for b in result.blunders], [f"ALARM: {says}" for says in result.alarms]):
+        yield from listed[:MOST]
+        if len(listed) > MOST:
+            yield f"  and {len(listed) - MOST} more: {SEE}"
+    for one in result.evidence.proven.held_out:
+        says, of = angle if one.name in IN_RAD else length, f", {one.name}" if len(result.instruments) > 1 else ""
+        yield (
+            f"unseen rows ({one.split}){of}: {says(one.rms_distance_before_m)} as drawn, "
+            f"{says(one.rms_distance_after_m)} identified"
+        )
+    room = result.evidence.free_space
+    if room is not None and room.geometry.rms_m is not None and room.geometry.max_m is not None:
+        rms, most = length(room.geometry.rms_m), length(room.geometry.max_m)
+        yield f"tool over the workspace, one sigma: {rms} rms, {most} at most"
+    listed = parameter_records(result.estimates, result.identifiability, result.evidence.bootstrap)
+    known = [(p.name, p.value, p.sigma) for p in listed if p.value is not None and p.sigma is not None]
+    zeros = [one for one in known if one[0].endswith(ZERO)]
+    for name, zero_rad, sigma_rad in zeros:
+        yield (
+            f"  J{name.removeprefix('joint').removesuffix(ZERO)} zero {np.degrees(zero_rad):+10.5f} deg "
+            f"± {np.degrees(sigma_rad):.5f} deg (± {1e6 * sigma_rad:.1f} µrad)"
+        )
+    if more := len(known) - len(zeros):
+        yield f"{more} more parameters are determined: {SEE}; all are in the model"
+    missing = [p.name for p in listed if p.value is None]
+    if missing:
+        shown = ", ".join(missing[:NAMED]) + (f" and {len(missing) - NAMED} more" if len(missing) > NAMED else "")
+        yield f"not determined: {shown} (why: --verbose)"
+
+
+NAMED = 4  # undetermined parameters
+ZERO = ".zero"
+IN_RAD = {kind.name for kind in SENSORS if kind.quantities[0].unit == "rad"}
+
+
+def _print_details(console: Console, result: Identification, *, of_spots: bool) -> None:
+    """What was wrong with the file comes first, since all that follows is without these rows."""
     for blunder in result.blunders:
         console.print(f"left out: {blunder.says}", highlight=False, markup=False)
     for alarm in result.alarms:
@@ -123,7 +176,6 @@ def print_identification(console: Console, result: Identification, judged: Verdi
         _print_point_constraints(console, result.point_constraints)
     for line in (*_figures(result), *evidence_lines(result.evidence)):
         console.print(line, highlight=False, markup=False)
-    print_verdict(console, judged)
 
 
 def _print_parameters(console: Console, parameters: tuple[ModelParameter, ...]) -> None:
@@ -208,8 +260,9 @@ def _figures(result: Identification) -> list[str]:
         for one in result.instruments
     ]
     for noise in result.noise:
-        found, believed = 1e6 * noise.found, 1e6 * noise.believed
-        out.append(f"noise of {noise.source}: {found:.3g}e-6 found, {believed:.3g}e-6 believed")
+        unit = "µrad" if noise.source in ("joint", *IN_RAD) else "µm"
+        found, believed = f"{1e6 * noise.found:.3g} {unit}", f"{1e6 * noise.believed:.3g} {unit}"
+        out.append(f"noise of {noise.source}: {found} found, {believed} stated")
     stated = result.stated_noise
     if np.isfinite(stated.p_above):
         out.append(f"chi-square under the noise as stated: {stated.chi2:.4g} at {stated.dof} degrees of freedom")

@@ -19,11 +19,55 @@ from calibrate.report.diagnosis.words import (
 MOST = 8  # of what is only told by the way; all of it stands in the file
 
 
-def print_diagnosis(console: Console, file: DiagnosisFile) -> None:
-    """Everything that decides; the rest is in the file and in the report."""
+def print_diagnosis(console: Console, file: DiagnosisFile, *, verbose: bool = False) -> None:
+    """Verdict first, then what decides; `verbose`: all causes and rivals, clocks, what was not recorded, the proof."""
+    console.print(f"[bold]{verdict_words(file)}[/bold]", highlight=False)
+    if verbose:
+        _print_details(console, file)
+        return
+    for line in _brief(file):
+        console.print(line, highlight=False, markup=False)
+
+
+FEW, CAUSES, RIVALS = 2, 3, 1  # of a kind, of causes, of other names for one
+
+
+def _brief(file: DiagnosisFile) -> Iterator[str]:
+    """Causes with their best rival, what is unexplained, unseen rows before and after, what to do next."""
+    yield from _few([f"fault of the file: {blunder.says}" for blunder in file.blunders])
+    for number, finding in enumerate(file.findings[:CAUSES], start=1):
+        yield from list(_finding(number, finding))[: 2 + RIVALS]
+    if len(file.findings) > CAUSES:
+        yield f"and {len(file.findings) - CAUSES} more causes: --verbose"
+    yield from _few(list(_changes(file)))
+    for one in (u for u in (file.unexplained, *file.also_unexplained) if u is not None):
+        yield f"unexplained{f' at {one.where}' if one.where else ''}: {one.says}"
+    floors = {f.instrument: f.rms_m for f in file.floors}
+    for split in file.splits:
+        before, after = before_after(split)
+        of = f", {split.instrument}" if len(floors) > 1 else ""
+        yield (
+            f"unseen rows ({split.split}){of}: {before} geometry alone, {after} with the physics; "
+            f"floor {micrometres(floors.get(split.instrument))}"
+        )
+    if file.free_space is not None:
+        yield free_space_words(file.free_space)
+    yield from _few([f"not completed: {one.stage}: {one.reason}" for one in file.incomplete])
+    yield from _few([f"not recorded: {one.column} ({one.physics} cannot be tested)" for one in file.not_recorded])
+    yield from _few([f"next: {line}" for line in file.next])
+
+
+def _few(lines: list[str]) -> Iterator[str]:
+    """The first ones, and how many more there are."""
+    yield from lines[:FEW]
+    if len(lines) > FEW:
+        yield f"  and {len(lines) - FEW} more: --verbose"
+
+
+def _print_details(console: Console, file: DiagnosisFile) -> None:
+    """Everything; the figures are in the report."""
     for blunder in file.blunders:
         console.print(f"fault of the file: {blunder.says}", highlight=False, markup=False)
-    console.print(f"\n[bold]{verdict_words(file)}[/bold]", highlight=False)
     for number, finding in enumerate(file.findings, start=1):
         for line in _finding(number, finding):
             console.print(line, highlight=False, markup=False)
@@ -91,7 +135,7 @@ def _doubt(file: DiagnosisFile) -> Iterator[str]:
         yield free_space_words(file.free_space)
     yield from stream_words(file)
     for missing in file.not_recorded[:MOST]:
-        yield f"not recorded: {missing.column} (without it no word about {missing.physics})"
+        yield f"not recorded: {missing.column} ({missing.physics} cannot be tested)"
 
 
 def _proof(file: DiagnosisFile) -> Table:

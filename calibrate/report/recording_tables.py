@@ -81,5 +81,5 @@ def findings(recording: Recording) -> Html:
     found = check(recording)
     if not found:
         return tag("p", "The check of the recording found nothing wrong.")
-    rows = [(finding.problem.value, finding.where, finding.says) for finding in found]
-    return table(("Problem", "where", "what"), rows, caption="Found by the check of the recording")
+    rows = [(finding.severity.value, finding.problem.value, finding.where, finding.says) for finding in found]
+    return table(("Severity", "problem", "where", "what"), rows, caption="Found by the check of the recording")

@@ -43,14 +43,14 @@ def printed(recording, plan=None):
     planned = None if plan is None else Planned(parse_plan(plan, "fit.toml"), plan)
     result = identify_session(recording, planned)
     judged = session_verdict(session_evidence(recording, session_model(result, recording, planned)))
-    print_identification(Console(file=text, width=400), result, judged, recording.rig)
+    print_identification(Console(file=text, width=400), result, judged, recording.rig, verbose=True)
     return text.getvalue(), judged
 
 
-def test_the_last_lines_are_the_report_s_verdict_and_no_name_of_a_status_is_printed(recording):
+def test_the_first_lines_are_the_report_s_verdict_and_no_name_of_a_status_is_printed(recording):
     told, judged = printed(recording)
-    last = [line.strip() for line in told.splitlines() if line.strip()][-1 - len(judged.reasons) :]
-    assert last == [judged.sentence, *judged.reasons]
+    first = [line.strip() for line in told.splitlines()][: 1 + len(judged.reasons)]
+    assert first == [judged.sentence, *judged.reasons]
     assert "RANK_DEFICIENT" not in told
 
 
