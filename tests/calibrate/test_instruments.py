@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Samples
 from acquisition.recording.rig import Pose, load_rig
-from acquisition.recording.rig.schema import Bar
-from acquisition.recording.rig.schema import KnownDistance
+from acquisition.recording.rig.schema import Bar, KnownDistance
 from calibrate.arms.catalogue import arm_of
 from calibrate.errors import DataError
 from calibrate.fit import Status, solve
