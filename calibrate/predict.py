@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording import Samples
 from acquisition.recording.rig import ArmModel, Rig, parse_rig
 from calibrate.arms.catalogue import arm_of
-from calibrate.arms.eccentric import with_discs
+from calibrate.arms.eccentric import EccentricArm, with_discs
 from calibrate.arms.model import KinematicModel
 from calibrate.converted_rig import rig_in_model
 from calibrate.dual_psd_rig import dual_psd_of
@@ -93,6 +93,11 @@ class Predictor:
     def _target(self) -> Target:
         drawn = self.rig.tool.point_m if self.rig.tool.point_m is not None else NOWHERE[:3]
         return Target(np.array(self.about.get("tool", drawn)[:3]))
+
+    def at_shafts(self, q_rad: Floats) -> Floats:
+        """(pose, joint) readings less the errors of encoder discs that the model has numbers of; arms/eccentric.py."""
+        arm = self._arm
+        return arm.at_shafts(self.values_of(arm.parameters), q_rad) if isinstance(arm, EccentricArm) else q_rad
 
     def values_of(self, parameters: tuple[Parameter, ...]) -> Floats:
         """Values of these parameters, corrections where the model has them."""

@@ -126,7 +126,7 @@ def session_of_arrays(
     SamplesError for a table that does not fit it.
     """
     from acquisition.recording.rig import load_rig, rig_text
-    from acquisition.recording.session_folder.tables import check_header, parse_csv
+    from acquisition.recording.session_folder import check_header, parse_csv
 
     loaded, q = load_rig(rig), np.asarray(q_rad, dtype=np.float64)
     if q.ndim != 2 or q.shape[1] != loaded.n_joints:

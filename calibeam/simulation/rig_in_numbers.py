@@ -47,8 +47,12 @@ def rigged(predictor: Predictor, samples: Samples) -> Rigged:
 
 
 def arm_in_numbers(predictor: Predictor) -> Arm:
-    """Fixed parts, zeros and masses. Where a rig states no mass, one kilogram at the end of every link."""
+    """Fixed parts, zeros and masses. Where a rig states no mass, one kilogram at the end of every link.
+
+    DataError for a rig with coupled joints: the simulators turn every joint from the link in front.
+    """
     rig = predictor.rig
+    _refuse_coupled(rig)
     arm = arm_of(rig)
     theta = predictor.values_of(arm.parameters)
     fixed = _from_their_start(arm.fixed_parts(theta), beyond_m(rig))
@@ -68,6 +72,15 @@ def arm_in_numbers(predictor: Predictor) -> Arm:
         tool_com_m=np.array(rig.tool.com_m or ZERO),
         gravity_m_s2=np.array(rig.arm.gravity_m_s2),
     )
+
+
+def _refuse_coupled(rig: Rig) -> None:
+    for number, joint in enumerate(rig.arm.joints, start=1):
+        if joint.follows is not None:
+            raise DataError(
+                f"rig {rig.name}: joint {number} follows joint {joint.follows.joint}, and the simulated arm has no "
+                "coupled joints; predict and compare --simulated-model take this model"
+            )
 
 
 def beyond_m(rig: Rig) -> Floats:

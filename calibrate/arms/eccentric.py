@@ -41,8 +41,12 @@ class EccentricArm:
         return self.arm.parameters + tuple(Parameter(n, "rad", self.sigma_rad, prior=self.sigma_rad) for n in discs)
 
     def flange(self, theta: Floats, q_rad: Floats) -> Floats:
-        own, sine, cosine = self._split(theta)
-        return self.arm.flange(own, q_rad + sine * np.sin(q_rad) + cosine * np.cos(q_rad))
+        return self.arm.flange(self._split(theta)[0], self.at_shafts(theta, q_rad))
+
+    def at_shafts(self, theta: Floats, q_rad: Floats) -> Floats:
+        """(pose, joint) readings less the errors of the discs: what `arm` is to be given."""
+        _, sine, cosine = self._split(theta)
+        return q_rad + sine * np.sin(q_rad) + cosine * np.cos(q_rad)
 
     def twists(self, theta: Floats, q_rad: Floats) -> Floats:
         own, sine, cosine = self._split(theta)

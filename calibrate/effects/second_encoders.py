@@ -42,7 +42,8 @@ def at_second_encoders(terms: Iterable[Term], drivers: Drivers) -> tuple[Term, .
 
 def placed(term: Term) -> str:
     """Of PLACES, or "" where a term stands as listed."""
-    return next((place for place in PLACES if term.variant.endswith(place)), "")
+    named = (place for place in PLACES if term.variant.endswith(place))
+    return max(named, key=len, default="")  # the name of one place ends with that of another
 
 
 def _moved(term: Form, drivers: Drivers, joints: tuple[int, ...]) -> Iterator[Term]:

@@ -81,11 +81,11 @@ def listed(effects: Sequence[Effect], drivers: Drivers) -> tuple[Carried, ...]:
 
 def flange_frames(arm: SerialArm, predictor: Predictor, q_rad: Floats, by: Perturbation) -> Floats:
     """(row, joint + 1, 4, 4)"""
-    return perturbed_frames(arm, predictor.values_of(arm.parameters), q_rad, by)
+    return perturbed_frames(arm, predictor.values_of(arm.parameters), predictor.at_shafts(q_rad), by)
 
 
 def arm_in(predictor: Predictor) -> SerialArm:
-    """The arm whose frames effects act at."""
+    """The arm whose frames effects act at, behind its encoder discs."""
     return arm_of(predictor.rig)
 
 

@@ -77,10 +77,11 @@ def _flange(predictor: Predictor, applied: Applied, q_rad: Floats) -> Callable[[
     if not applied.found:
         return lambda other, by: other.flange(q_rad)
     arm = arm_in(predictor)
-    known = Flanges.of(arm, predictor.values_of(arm.parameters), q_rad, applied.by)
+    at_shafts = predictor.at_shafts(q_rad)
+    known = Flanges.of(arm, predictor.values_of(arm.parameters), at_shafts, applied.by)
 
     def at(other: Predictor, by: Perturbation) -> Floats:
-        if by is applied.by:
+        if by is applied.by and np.array_equal(other.at_shafts(q_rad), at_shafts):
             return known.at(other.values_of(arm.parameters))
         return flange_frames(arm, other, q_rad, by)[:, -1]
 

@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Samples
-from acquisition.recording.rig import Bar, Pose, load_rig
-from acquisition.recording.rig.schema import KnownDistance
+from acquisition.recording.rig import Pose, load_rig
+from acquisition.recording.rig.schema import Bar, KnownDistance
 from calibrate.arms.catalogue import arm_of
 from calibrate.errors import DataError
 from calibrate.fit import Status, solve

@@ -9,7 +9,6 @@ from acquisition.recording.rig.read import load_rig, parse_rig, plain_rig, rig_s
 from acquisition.recording.rig.schema import (
     Arm,
     ArmModel,
-    Bar,
     Camera,
     Joint,
     Make,
@@ -23,7 +22,6 @@ from acquisition.recording.rig.schema import (
 __all__ = [
     "Arm",
     "ArmModel",
-    "Bar",
     "Camera",
     "Joint",
     "Make",

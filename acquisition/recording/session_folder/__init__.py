@@ -7,14 +7,23 @@ of one (apart, because writing loads sockets). A new kind of table is a member o
 
 from acquisition.recording.session_folder.folder import CSV, PARQUET, RIG, export, read_folder
 from acquisition.recording.session_folder.stream_tables import write_streams
-from acquisition.recording.session_folder.tables import TableFormat, read_csv, read_parquet, write_csv
+from acquisition.recording.session_folder.tables import (
+    TableFormat,
+    check_header,
+    parse_csv,
+    read_csv,
+    read_parquet,
+    write_csv,
+)
 
 __all__ = [
     "CSV",
     "PARQUET",
     "RIG",
     "TableFormat",
+    "check_header",
     "export",
+    "parse_csv",
     "read_csv",
     "read_folder",
     "read_parquet",

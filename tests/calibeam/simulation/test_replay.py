@@ -8,13 +8,16 @@ import pytest
 from msgspec import structs
 
 from acquisition.recording import Recording, Samples, read, readings_sha256
+from acquisition.recording.rig.schema import Follows
 from calibeam.commands.replay import replay_command
 from calibeam.simulation.physics import names_of
 from calibeam.simulation.replayed_recording import replay, write_replayed
+from calibeam.simulation.rig_in_numbers import arm_in_numbers
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile, RigIdentity, write_model
 from calibrate.physics.predicting import predict_with_physics
 from calibrate.physics.records import Effect, SessionRecord
+from calibrate.predict import Predictor
 from tests.calibeam.simulation.test_mechanism_laws import Bench, bench
 
 DEMO = Path("tests/golden/data/demo.mcap")
@@ -218,3 +221,13 @@ def test_what_is_written_reads_as_a_recording(tmp_path: Path, capsys: pytest.Cap
     assert written.rig_text == place.rig_text
     assert written.notes["without"] == "joint2-compliance"
     assert written.samples.names == place.samples.names
+
+
+def test_a_coupled_arm_is_refused():
+    """The simulators would turn joint 3 by the controller's number."""
+    recording = read(DEMO)
+    joints = list(recording.rig.arm.joints)
+    joints[2] = structs.replace(joints[2], follows=Follows(2, 1.0))
+    rig = structs.replace(recording.rig, arm=structs.replace(recording.rig.arm, joints=tuple(joints)))
+    with pytest.raises(DataError, match="joint 3 follows joint 2"):
+        arm_in_numbers(Predictor(rig, {}, {}, ()))

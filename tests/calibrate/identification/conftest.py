@@ -8,7 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Samples, read
-from acquisition.recording.rig import Bar, load_rig
+from acquisition.recording.rig import load_rig
+from acquisition.recording.rig.schema import Bar
 
 TOOL = np.array([0.021, -0.012, 0.083])
 TURN, SHIFT = Rotation.from_rotvec([0.3, -0.4, 2.2]), np.array([1.8, -0.6, 0.4])  # of the tracker, in the base
