@@ -7,7 +7,7 @@ from rich.console import Console
 from calibeam.results.reconciliation import ReconcileFile
 from calibrate.report.quantities import length
 
-MOST = 5  # lines of a list; all of them stand in the file
+MOST = 5  # lines of a list, cut at the width of the terminal; all of them stand whole in the file
 
 
 def print_reconciliation(console: Console, file: ReconcileFile) -> None:
@@ -33,7 +33,7 @@ def _list(console: Console, title: str, lines: Sequence[str]) -> None:
         return
     _say(console, title)
     for line in lines[:MOST]:
-        _say(console, f"  {line}")
+        console.print(f"  {line}", highlight=False, markup=False, no_wrap=True, overflow="ellipsis")
     if len(lines) > MOST:
         _say(console, f"  {len(lines) - MOST} more stand in reconcile.json")
 
