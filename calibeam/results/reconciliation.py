@@ -282,17 +282,16 @@ def _remains(told: tuple[UnseenRecord, ...], diagnosis: DiagnosisFile, after: Co
 
 
 def _left_out(before: ComparisonFile, diagnosis: DiagnosisFile) -> Iterator[LeftOut]:
-    """What the comparison names, then what the diagnosis of the seen rows names beside it."""
+    """Physics as the diagnosis of the seen rows names it, then what the comparison names beside it."""
     named: set[tuple[str, str]] = set()
+    for finding in diagnosis.findings:
+        named.add((finding.where, finding.physics))
+        others = tuple(f"{r.physics} at {r.where}" for r in finding.rivals)
+        yield LeftOut(finding.where, finding.physics, finding.says, others)
     for one in before.differences:
-        if one.decides:
-            named.add((one.where, one.physics))
+        if one.decides and (one.where, one.physics) not in named:
             others = tuple(f"{a.physics} at {a.where}" for a in one.alternatives)
             yield LeftOut(one.where, one.physics, one.says, others)
-    for finding in diagnosis.findings:
-        if (finding.where, finding.physics) not in named:
-            others = tuple(f"{r.physics} at {r.where}" for r in finding.rivals)
-            yield LeftOut(finding.where, finding.physics, finding.says, others)
 
 
 def _says(told: tuple[UnseenRecord, ...], before: ComparisonFile, remains: tuple[str, ...]) -> str:
