@@ -59,6 +59,7 @@ GROUPS: dict[str, tuple[ListedCommand, ...]] = {
             "Move a simulated rig through a recording's motion, with a model's physics.",
         ),
         ListedCommand("compare", "compare:compare_command", "Find where a simulation and a measurement disagree."),
+        ListedCommand("reconcile", "reconcile:reconcile_command", "Bring a simulation to agree with a recording."),
         ListedCommand("motion", "motion:motion_command", "Run the motion examples on an emulated controller."),
         ListedCommand(
             "simulate-errors", "simulate_errors:simulate_errors_command", "Propagate an arm's errors to its tool."

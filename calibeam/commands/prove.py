@@ -2,11 +2,14 @@
 
 import sys
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
+from cyclopts import Parameter
 from rich.console import Console
 
 from calibeam.printing.proof import print_proof, print_real
+from calibeam.prove.loop import prove_loop
 from calibeam.prove.prove import Plan, ending_early, fresh, prove
 from calibeam.prove.real import prove_real, write_real_page
 from calibeam.prove.scenario import DEVELOPMENT, KINDS, Kind, Mix
@@ -32,6 +35,7 @@ def prove_command(
     wire: int = 0,
     compare: int = 0,
     real: Path | None = None,
+    loop: Annotated[bool, Parameter(negative=())] = False,
     publish: bool = False,
     json: bool = False,
 ) -> None:
@@ -68,6 +72,9 @@ def prove_command(
         For how many cases an oracle, which is told the truth, and other methods are asked for comparison.
     real
         A folder with session folders of real recordings: these are diagnosed, and what is hidden of them inferred.
+    loop
+        Reconcile each case with the simulation of its rig file instead: how far off it is on unseen rows, before, after
+        geometry and after physics. Takes --cases, --seed, --jobs and --out, and no other option.
     publish
         Refuse what no published table may be made of.
     json
@@ -77,6 +84,9 @@ def prove_command(
     console = Console(stderr=json)
     if real is not None:
         _real(console, real, out, jobs)
+        return
+    if loop:
+        _loop(console, out, cases, DEVELOPED_SEED if seed is None else seed, jobs, json=json)
         return
     seed = seed if seed is not None else PUBLISHED_SEED if publish else DEVELOPED_SEED
     mix = Mix(kind, family, enr, mechanism)
@@ -96,6 +106,19 @@ def prove_command(
     console.print(f"proof: {out / 'proof.json'}\npage: {out / 'proof.html'}", markup=False, highlight=False)
     if json:
         print(out / "proof.json")
+
+
+def _loop(console: Console, out: Path, cases: int, seed: int, jobs: int, *, json: bool) -> None:
+    if cases < 1 or jobs < 1:
+        raise DataError(f"--cases {cases} --jobs {jobs}: cases, jobs 1 or more")
+    file = prove_loop(out, cases, seed, jobs, lambda word: _tell(console, word))
+    failed = [one for one in file.cases if one.failure]
+    _tell(console, f"{len(failed)} of {len(file.cases)} cases failed")
+    for one in failed:
+        _tell(console, f"{one.name}: {one.failure}")
+    _tell(console, f"table: {out / 'loop.md'}")
+    if json:
+        print(out / "loop.json")
 
 
 def _tell(console: Console, word: str) -> None:

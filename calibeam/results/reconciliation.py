@@ -1,0 +1,304 @@
+"""A simulation brought to agree with a recording: compared, diagnosed, replayed with what was found, compared again.
+
+Rows are split by pose, so that repeats stay together: the diagnosis sees three quarters, and how far the simulation is
+away, before and after, is told on the others. The two comparisons take all rows. reconcile.json, version 1, is
+described in docs/formats.md.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.recording import Recording, Samples, readings_sha256
+from acquisition.recording.rig import parse_rig
+from acquisition.recording.samples import POSITION, SPOTS, WIRE
+from calibeam.results.comparison import ComparisonFile, compare
+from calibeam.results.diagnosis import diagnose_recording
+from calibeam.results.identification import Planned, identify_session, session_model
+from calibeam.simulation.replayed_recording import Replayed, replay
+from calibeam.software import SOFTWARE
+from calibrate.diagnose.compare.beside import device_between
+from calibrate.diagnose.compare.corrected import simulated_of
+from calibrate.diagnose.compare.matched import match
+from calibrate.diagnose.compare.seated import is_seated
+from calibrate.diagnose.diagnosis import Verdict
+from calibrate.diagnose.from_recording import Diagnosed
+from calibrate.diagnose.schema import DiagnosisFile
+from calibrate.diagnose.session import session_of
+from calibrate.errors import DataError
+from calibrate.fit_plan import FitPlan
+from calibrate.model_file import ModelFile
+from calibrate.physics.from_diagnosis import model_of_diagnosis, model_of_fit
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+AGREES = 1.3  # rms over noise on unseen rows, up to which nothing is left
+UNSEEN = 0.25  # share of the poses
+FEWEST_UNSEEN = 5
+SAME_POSE_RAD = 2e-3  # a servo comes back closer, and other poses are farther away
+ARM = ("joint", "link")  # parameters of the arm, which a rig file states; where instruments stand is fitted
+QUANTITIES = {"dual-psd": SPOTS, "position": POSITION, "wire": (WIRE,)}  # instrument -> lengths that it reads
+
+
+class RowRecord(msgspec.Struct, frozen=True):
+    """Of one unseen row: rms of its coordinates, measured less simulated; `after_m`: with geometry and physics."""
+
+    instrument: str
+    t_s: float
+    before_m: float
+    geometry_m: float
+    after_m: float
+
+
+class UnseenRecord(msgspec.Struct, frozen=True):
+    """Measured less simulated of one instrument on the unseen rows, rms of a coordinate."""
+
+    instrument: str
+    rows: int
+    before_m: float
+    geometry_m: float
+    after_m: float
+    noise_m: float
+    noise_from: str
+    before: float  # over noise
+    geometry: float
+    after: float
+
+
+class LeftOut(msgspec.Struct, frozen=True):
+    """What the simulation lacks, as `before` or the diagnosis says it."""
+
+    where: str
+    physics: str
+    says: str
+    alternatives: tuple[str, ...]
+
+
+class ReconcileFile(msgspec.Struct, frozen=True):
+    """Everything; what was found in full stands in the files beside it."""
+
+    schema: int
+    kind: str
+    software: str
+    measured: str
+    simulation: str
+    verdict: str  # agree or differ
+    says: str
+    seed: int
+    seen: int
+    unseen_rows: tuple[int, ...]  # from 0, in the measured samples that the simulation has, too
+    unseen: tuple[UnseenRecord, ...]
+    rows: tuple[RowRecord, ...]
+    left_out: tuple[LeftOut, ...]
+    remains: tuple[str, ...]
+    next: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Reconciled:
+    """All that is written."""
+
+    file: ReconcileFile
+    before: ComparisonFile
+    diagnosis: DiagnosisFile
+    model: ModelFile
+    simulated: Replayed
+    measured: Recording  # the rows that both have
+    after: ComparisonFile
+
+
+def reconcile(measured: Recording, simulation: Recording | str, name: str, *, seed: int = 0) -> Reconciled:
+    """`simulation`: its recording of the same plan, or the text of its rig file; `name` as a person knows it.
+
+    DataError where the two cannot be compared, or where there is too little to diagnose or to keep unseen.
+    """
+    _refuse_unread(measured.samples)
+    measured, simulated, seen, unseen = _sides(measured, simulation, name, seed)
+    before = compare(measured, simulated)
+    part = replace(measured, samples=measured.samples.take(seen), streams={}, events=())
+    found, diagnosis = diagnose_recording(part)
+    model = _timed(model_of_diagnosis(found, part), measured.samples)
+    geometry = _timed(_geometry(found, part), measured.samples)
+    replayed = replay(measured, model, seed=seed, noise_found=True)
+    plain = replay(measured, geometry, noisy=False)
+    after = compare(measured, _as_recording(measured, replayed.samples, "simulated.mcap"))
+    told, rows = _unseen(
+        measured.samples,
+        (_set_alike(measured, simulated, seen), plain.exact, replayed.exact),
+        unseen,
+        diagnosis,
+    )
+    remains = tuple(_remains(told, diagnosis, after))
+    agrees = not remains
+    file = ReconcileFile(
+        1,
+        "calibeam-reconciliation",
+        SOFTWARE,
+        measured.path.name,
+        name,
+        "agree" if agrees else "differ",
+        _says(told, before, remains),
+        seed,
+        len(seen),
+        tuple(unseen.tolist()),
+        told,
+        rows,
+        tuple(_left_out(before, diagnosis)),
+        remains,
+        diagnosis.next,
+        tuple(dict.fromkeys((*before.notes, *replayed.notes, *after.notes))),
+    )
+    return Reconciled(file, before, diagnosis, model, replayed, measured, after)
+
+
+def _refuse_unread(samples: Samples) -> None:
+    if np.any(is_seated(samples)):
+        raise DataError(
+            "rows with a probe in a cone or at a bar: the joint angles are the reading; how far a simulation is off "
+            "on unseen rows cannot be told; use compare and diagnose"
+        )
+    if not any(name in samples for names in QUANTITIES.values() for name in names):
+        raise DataError("the samples hold no spots, positions or wire lengths to bring a simulation to agree with")
+
+
+def _sides(
+    measured: Recording, simulation: Recording | str, name: str, seed: int
+) -> tuple[Recording, Recording, Ints, Ints]:
+    """Both with the same rows, and which of them are seen and unseen."""
+    if isinstance(simulation, Recording):
+        rows = match(measured.samples, simulation.samples, None)
+        here = replace(measured, samples=measured.samples.take(rows.measured), events=())
+        there = replace(simulation, samples=simulation.samples.take(rows.simulated), events=())
+        return here, there, *_split(here.samples, seed)
+    seen, unseen = _split(measured.samples, seed)
+    here = replace(measured, events=())
+    drawn = replace(here, rig=parse_rig(simulation, name), rig_text=simulation)
+    part = replace(drawn, samples=here.samples.take(seen))
+    told = Planned(FitPlan(schema=1, hold=_stated(part), share=0.0, splits=()))
+    model = session_model(identify_session(part, told), part, told)
+    exact = replay(drawn, model, noisy=False).exact
+    return here, _as_recording(drawn, exact, name), seen, unseen
+
+
+def _stated(drawn: Recording) -> tuple[str, ...]:
+    """Parameters that the rig file states: the arm, and the target on it where it has a point."""
+    stated = (*ARM, "tool.") if drawn.rig.tool.point_m is not None else ARM
+    return tuple(p.name for p in session_of(drawn.rig, drawn.samples).parameters if p.name.startswith(stated))
+
+
+def _split(samples: Samples, seed: int) -> tuple[Ints, Ints]:
+    """Rows seen and unseen, a pose and its repeats on one side. DataError where too few are left."""
+    steps = np.round(samples.joints() / SAME_POSE_RAD)
+    _, pose = np.unique(steps, axis=0, return_inverse=True)
+    drawn = np.random.default_rng(seed).permutation(int(pose.max(initial=-1)) + 1)
+    away = drawn[: round(UNSEEN * len(drawn))]
+    unseen = np.flatnonzero(np.isin(pose, away))
+    seen = np.flatnonzero(~np.isin(pose, away))
+    if len(unseen) < FEWEST_UNSEEN or not len(seen):
+        raise DataError(
+            f"{len(samples)} rows in {len(drawn)} poses: too few to keep a quarter unseen; measure more poses"
+        )
+    return seen, unseen
+
+
+def _geometry(found: Diagnosed, part: Recording) -> ModelFile:
+    if found.physics is None:
+        raise DataError("the whole file is wrong; diagnosis.json says how")
+    alone = found.physics.geometry
+    return model_of_fit(alone, alone, found.cleared, part, "geometry alone")
+
+
+def _timed(model: ModelFile, samples: Samples) -> ModelFile:
+    """The model as one of the whole session, whose clock and temperatures its rows share."""
+    return msgspec.structs.replace(model, readings_sha256=readings_sha256(samples))
+
+
+def _as_recording(source: Recording, samples: Samples, name: str) -> Recording:
+    return replace(source, path=Path(name), samples=samples, streams={}, events=())
+
+
+def _set_alike(measured: Recording, simulated: Recording, seen: Ints) -> Samples:
+    """The simulated readings as the measuring device has them where it stood, by the seen rows."""
+    samples = simulated.samples
+    if not all(name in samples for name in POSITION):
+        return samples
+    pair = measured.samples.take(seen), samples.take(seen)
+    T = device_between(simulated_of(simulated.rig, pair[1]), pair)
+    there_m = np.stack([samples.column(name) for name in POSITION], axis=1)
+    here_m = (there_m - T[:3, 3]) @ T[:3, :3]
+    return Samples({**samples.columns, **dict(zip(POSITION, here_m.T, strict=True))}, samples.n_joints)
+
+
+def _unseen(
+    measured: Samples, states: tuple[Samples, Samples, Samples], unseen: Ints, diagnosis: DiagnosisFile
+) -> tuple[tuple[UnseenRecord, ...], tuple[RowRecord, ...]]:
+    """DataError where no instrument has a noise and unseen readings."""
+    floors = {floor.instrument: floor for floor in diagnosis.floors}
+    told: list[UnseenRecord] = []
+    rows: list[RowRecord] = []
+    for name, columns in QUANTITIES.items():
+        floor = floors.get(name)
+        if not all(c in measured and all(c in state for state in states) for c in columns):
+            continue
+        if floor is None or not floor.rms_m:
+            continue
+        read = _stacked(measured, columns)[unseen]
+        misfits = [read - _stacked(state, columns)[unseen] for state in states]
+        known = np.all([np.isfinite(m).all(axis=1) for m in misfits], axis=0)
+        if not known.any():
+            continue
+        was, plain, now = (float(np.sqrt(np.mean(m[known] ** 2))) for m in misfits)
+        noise_m = float(floor.rms_m)
+        over = was / noise_m, plain / noise_m, now / noise_m
+        told.append(UnseenRecord(name, int(known.sum()), was, plain, now, noise_m, floor.source, *over))
+        each = [np.sqrt(np.mean(m[known] ** 2, axis=1)).tolist() for m in misfits]
+        t_s = measured.column("t_s")[unseen][known].tolist()
+        rows += [RowRecord(name, *row) for row in zip(t_s, *each, strict=True)]
+    if not told:
+        raise DataError("no unseen reading with a known noise: how far the simulation is away cannot be told")
+    return tuple(told), tuple(rows)
+
+
+def _stacked(samples: Samples, names: tuple[str, ...]) -> Floats:
+    return np.stack([samples.column(name) for name in names], axis=1)
+
+
+def _remains(told: tuple[UnseenRecord, ...], diagnosis: DiagnosisFile, after: ComparisonFile) -> Iterator[str]:
+    """Why the two do not agree yet; nothing where they do."""
+    for one in told:
+        if not one.after <= AGREES:
+            yield f"{one.instrument}: {one.after:.2f} times the noise on unseen rows, more than {AGREES}"
+    for left in (diagnosis.unexplained, *diagnosis.also_unexplained):
+        if left is not None:
+            yield left.says
+    if after.verdict != Verdict.CONSISTENT.value:
+        yield from [one.says for one in after.differences if one.decides] or [after.says]
+
+
+def _left_out(before: ComparisonFile, diagnosis: DiagnosisFile) -> Iterator[LeftOut]:
+    """Physics as the diagnosis of the seen rows names it, then what the comparison names beside it."""
+    named: set[tuple[str, str]] = set()
+    for finding in diagnosis.findings:
+        named.add((finding.where, finding.physics))
+        others = tuple(f"{r.physics} at {r.where}" for r in finding.rivals)
+        yield LeftOut(finding.where, finding.physics, finding.says, others)
+    for one in before.differences:
+        if one.decides and (one.where, one.physics) not in named:
+            others = tuple(f"{a.physics} at {a.where}" for a in one.alternatives)
+            yield LeftOut(one.where, one.physics, one.says, others)
+
+
+def _says(told: tuple[UnseenRecord, ...], before: ComparisonFile, remains: tuple[str, ...]) -> str:
+    worst = max(told, key=lambda one: one.after)
+    far = f"on unseen rows {worst.before:.3g} times the noise before, {worst.after:.3g} after"
+    if remains:
+        return f"Simulation and recording do not agree yet: {far}; {len(remains)} things remain."
+    if before.verdict == Verdict.CONSISTENT.value:
+        return f"Simulation and recording agree as they are: {far}."
+    return f"With what was found the simulation agrees with the recording: {far}."

@@ -1,0 +1,129 @@
+"""The page of a reconciliation: before, what was left out, after with the same picture, what remains."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from calibeam.results.reconciliation import Reconciled, ReconcileFile, RowRecord, UnseenRecord
+from calibeam.software import SOFTWARE
+from calibrate.report.diagnosis.chain_figure import chain_figure, chain_of
+from calibrate.report.elements import Html, bullets, figure, panels, section, table, tag
+from calibrate.report.page import page, write_page
+from calibrate.report.quantities import length
+from calibrate.report.svg import drawn, log_axis
+from calibrate.report.tiles import tile
+from calibrate.report.tones import Tone
+
+CONTENTS = {
+    "before": "Before",
+    "left-out": "What the simulation left out",
+    "after": "After",
+    "remains": "What remains",
+}
+SMALLEST_M = 1e-12  # of a row that a logarithmic axis can show
+CHAINS = 3  # pictures of the chain: the first differences
+
+
+def write_reconciliation_page(path: Path, found: Reconciled) -> Path:
+    """One HTML file at `path`; returns it. DataError where it cannot be written."""
+    return write_page(path, reconciliation_html(found))
+
+
+def reconciliation_html(found: Reconciled) -> str:
+    """The page as text."""
+    file = found.file
+    masthead = tag(
+        "header",
+        tag("p", "A simulation and a recording", cls="kicker"),
+        tag("h1", found.measured.rig.name),
+        tag("p", f"{file.measured} · {file.simulation} · {SOFTWARE}", cls="byline"),
+    )
+    verdict = tag("div", tag("strong", file.says), cls=f"verdict {'good' if file.verdict == 'agree' else 'care'}")
+    chapters = (verdict, _before(found), _left_out(found), _after(file), _remains(file))
+    return page(f"Reconciliation of {file.measured}", masthead, CONTENTS, chapters, SOFTWARE)
+
+
+def _before(found: Reconciled) -> Html:
+    file, first = found.file, found.before.first_link
+    where = f" They part first at the {first}." if first else ""
+    lead = (
+        f"Measured less simulated on {len(file.unseen_rows)} rows that nothing was fitted to; where the measuring "
+        f"device stands is taken into account.{where}"
+    )
+    tiles = [
+        tile(one.instrument, length(one.before_m), f"rms of a coordinate, {one.before:.3g} times the noise")
+        for one in file.unseen
+    ]
+    return section("before", CONTENTS["before"], lead, tag("div", *tiles, cls="tiles"), *_pictures(file, "before"))
+
+
+def _left_out(found: Reconciled) -> Html:
+    file = found.file
+    lead = "Each difference with its size and one sigma, and what else would explain it."
+    if not file.left_out:
+        return section("left-out", CONTENTS["left-out"], lead, tag("p", "Nothing that these samples show."))
+    rows = [(one.where or "-", one.physics, one.says, ", ".join(one.alternatives) or "none") for one in file.left_out]
+    listed = table(("Where", "what", "how much", "alternatives"), rows)
+    instruments = tuple(one.instrument for one in file.unseen)
+    chain = chain_of(len(found.measured.rig.arm.joints), instruments)
+    places = list(dict.fromkeys(one.where for one in file.left_out if one.where))[:CHAINS]
+    shown = [figure(chain_figure(f"place{i}", where, chain), where) for i, where in enumerate(places)]
+    return section("left-out", CONTENTS["left-out"], lead, listed, *((panels(*shown),) if shown else ()))
+
+
+def _after(file: ReconcileFile) -> Html:
+    lead = "The same rows on the same scale: the simulation now has the geometry and the physics that were found."
+    rows = [
+        (
+            one.instrument,
+            str(one.rows),
+            *(
+                f"{length(value)} ({over:.3g})"
+                for value, over in (
+                    (one.before_m, one.before),
+                    (one.geometry_m, one.geometry),
+                    (one.after_m, one.after),
+                )
+            ),
+            f"{length(one.noise_m)}, {one.noise_from}",
+        )
+        for one in file.unseen
+    ]
+    head = ("Instrument", "unseen rows", "before", "after geometry", "after physics", "noise")
+    listed = table(head, rows, numeric=range(1, 5), caption="rms of a coordinate, and how many times the noise")
+    return section("after", CONTENTS["after"], lead, listed, *_pictures(file, "after"))
+
+
+def _remains(file: ReconcileFile) -> Html:
+    lead = "They agree where the unseen rows are within 1.3 times the noise and a comparison finds nothing more."
+    parts = [bullets(file.remains) if file.remains else tag("p", "Nothing that these samples show.")]
+    if file.next:
+        parts += [tag("p", tag("b", "What to record next")), bullets(file.next)]
+    if file.notes:
+        parts += [tag("p", tag("b", "Beside")), bullets(file.notes)]
+    return section("remains", CONTENTS["remains"], lead, *parts)
+
+
+def _pictures(file: ReconcileFile, state: str) -> Sequence[Html]:
+    out: list[Html] = []
+    for one in file.unseen:
+        rows = [row for row in file.rows if row.instrument == one.instrument]
+        says = f"{one.instrument}: distance of each unseen row, {state}"
+        name = f"{state}-{one.instrument}"
+        drawing = drawn(name, says, 9.9, 2.6, lambda f, rows=rows, one=one: _paint(f, rows, one, state))
+        caption = f"Each dot is one unseen row, {state}; the line is the noise. Both pictures have one scale."
+        out.append(tag("div", figure(drawing, caption), cls="wide"))
+    return out
+
+
+def _paint(figure: Figure, rows: Sequence[RowRecord], one: UnseenRecord, state: str) -> None:
+    axes = figure.add_subplot()
+    values = [row.before_m if state == "before" else row.after_m for row in rows]
+    every = [value for row in rows for value in (row.before_m, row.after_m)]
+    shown = [max(value, SMALLEST_M) for value in every if math.isfinite(value)]
+    axes.plot([row.t_s for row in rows], values, "o", ms=4.0, color=Tone.BEAM.value)
+    axes.axhline(one.noise_m, color=Tone.INK.value, lw=1.2)
+    log_axis(axes, "y", [*shown, one.noise_m], length)
+    axes.set(xlabel="time (s)", ylabel="measured less simulated")

@@ -1,0 +1,85 @@
+"""`calibeam reconcile`: a rig file against a session with a zero error and a soft joint, and against one like it."""
+
+import json
+
+import numpy as np
+import pytest
+
+from calibeam.cli import run
+from tests.calibeam.test_compare_simulations import EXAMPLES, arm, session
+
+RIG = EXAMPLES / "rig.toml"
+SAMPLES = 140
+FEW = 80
+ZERO_RAD = 1e-3
+SOFT_RAD_NM = 4e-6
+LOAD_NM = 120.0  # of joint 2 with the arm stretched out
+
+
+def poses(seed=5):
+    return np.random.default_rng(seed).uniform(-1.5, 1.5, (SAMPLES, 6)) + np.array([0.0, -1.0, 0.5, 0.0, 0.8, 0.0])
+
+
+def soft(q_rad):
+    """Joints as they truly stand: joint 3 off, joint 2 turned by the weight of what lies beyond it."""
+    true_q_rad = q_rad.copy()
+    true_q_rad[:, 2] += ZERO_RAD
+    reach = np.cos(q_rad[:, 1]) + 0.6 * np.cos(q_rad[:, 1] + q_rad[:, 2])
+    true_q_rad[:, 1] += SOFT_RAD_NM * LOAD_NM * reach
+    return true_q_rad
+
+
+def reconciled(tmp_path, measured):
+    out = tmp_path / "out"
+    assert run(["reconcile", str(measured), "--simulation", str(RIG), "--out", str(out)]) == 0
+    return json.loads((out / "reconcile.json").read_bytes()), out
+
+
+def test_a_zero_is_named_and_the_simulation_then_agrees(tmp_path):
+    q_rad = poses()[:FEW]
+    off_rad = np.array([0.0, 0.0, ZERO_RAD, 0.0, 0.0, 0.0])
+    said, out = reconciled(tmp_path, session(tmp_path / "measured", q_rad, q_rad + off_rad, arm()))
+    assert [one["where"] for one in said["left_out"]] == ["joint3.angle"]
+    (position,) = said["unseen"]
+    assert position["rows"] == FEW // 4 == len(said["unseen_rows"])
+    assert position["before"] > 5.0
+    assert position["after"] < 1.3
+    assert said["verdict"] == "agree"
+    assert said["seen"] == json.loads((out / "diagnosis.json").read_bytes())["samples"] == FEW - FEW // 4
+
+
+@pytest.mark.endure
+def test_a_soft_joint_and_a_zero_are_named_and_the_simulation_then_agrees(tmp_path, capsys):
+    q_rad = poses()
+    said, out = reconciled(tmp_path, session(tmp_path / "measured", q_rad, soft(q_rad), arm()))
+    named = {(one["where"], one["physics"]) for one in said["left_out"]}
+    assert {("joint3.angle", "joint-zero-moved"), ("joint2.angle", "joint-compliance")} <= named
+    (position,) = said["unseen"]
+    assert position["rows"] == SAMPLES // 4
+    assert position["before"] > 5.0
+    assert position["geometry"] > position["after"]
+    assert position["after"] <= 1.2
+    assert said["verdict"] == "agree"
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[0].startswith("agree")
+    assert len(printed) <= 25
+    names = ("before.json", "diagnosis.json", "model.json", "simulated.mcap", "after.json", "page.html")
+    assert all((out / name).stat().st_size for name in names)
+    page = (out / "page.html").read_text(encoding="utf-8")
+    assert [page.count(f'id="{anchor}"') for anchor in ("before", "left-out", "after", "remains")] == [1] * 4
+
+
+@pytest.mark.endure
+def test_a_simulation_that_lacks_nothing_agrees_as_it_is(tmp_path):
+    said, _ = reconciled(tmp_path, session(tmp_path / "measured", poses(), poses(), arm()))
+    assert said["left_out"] == []
+    assert said["verdict"] == "agree"
+    assert said["unseen"][0]["before"] < 1.3
+
+
+def test_too_few_rows_and_a_full_folder_are_one_sentence(tmp_path, capsys):
+    few = session(tmp_path / "few", poses()[:12], poses()[:12], arm())
+    assert run(["reconcile", str(few), "--simulation", str(RIG), "--out", str(tmp_path / "out")]) == 1
+    assert "too few to keep a quarter unseen" in capsys.readouterr().err
+    assert run(["reconcile", str(few), "--simulation", str(RIG), "--out", str(few)]) == 1
+    assert "not an empty folder" in capsys.readouterr().err
