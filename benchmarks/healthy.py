@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Samples
-from acquisition.recording.rig import Bar, Rig, load_rig
+from acquisition.recording.rig import Rig, load_rig
+from acquisition.recording.rig.schema import Bar
 from acquisition.recording.samples import ORIENTATION, POSITION, SPOTS
 from benchmarks.drawn_sessions import POSITION_SIGMA_M, T_BASE_DEVICE, TARGET_M, Bench, forward, frame, reach
 

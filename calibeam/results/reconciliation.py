@@ -33,6 +33,7 @@ from calibrate.errors import DataError
 from calibrate.fit_plan import FitPlan
 from calibrate.model_file import ModelFile
 from calibrate.physics.from_diagnosis import model_of_diagnosis, model_of_fit
+from calibrate.sensors import position, spots, wire
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -42,7 +43,11 @@ UNSEEN = 0.25  # share of the poses
 FEWEST_UNSEEN = 5
 SAME_POSE_RAD = 2e-3  # a servo comes back closer, and other poses are farther away
 ARM = ("joint", "link")  # parameters of the arm, which a rig file states; where instruments stand is fitted
-QUANTITIES = {"dual-psd": SPOTS, "position": POSITION, "wire": (WIRE,)}  # instrument -> lengths that it reads
+QUANTITIES = {
+    spots.KIND.name: SPOTS,
+    position.KIND.name: POSITION,
+    wire.KIND.name: (WIRE,),
+}  # instrument -> lengths that it reads
 
 
 class RowRecord(msgspec.Struct, frozen=True):

@@ -65,7 +65,7 @@ class SharedPoints:
         """(pose, k, 3 * point) derivative by the shifts, from that by each pose's own point (pose, k, 3)."""
         out = np.zeros((*by_point.shape[:2], len(self.numbers), 3))
         out[range(len(by_point)), :, self._index] = by_point
-        return out.reshape(*by_point.shape[:2], -1)
+        return out.reshape(*by_point.shape[:2], 3 * len(self.numbers))
 
     @cached_property
     def _index(self) -> NDArray[np.intp]:
