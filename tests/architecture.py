@@ -147,12 +147,12 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 920,
-    "lines": 105_000,
+    "files": 897,
+    "lines": 104_200,
     "longest_function": 54,
-    "one_importer": 49,
+    "one_importer": 45,
     "classes": 38,
-    "file_names": 100,
+    "file_names": 98,
     "chain": 36,
 }
 
