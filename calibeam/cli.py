@@ -3,6 +3,7 @@
 0 good, 1 failed, 2 wrong usage, 3 partial (what was recorded is kept, but the job did not end as asked).
 """
 
+import os
 import sys
 from importlib.metadata import version
 
@@ -86,6 +87,9 @@ def run(arguments: list[str]) -> int:
     except TOLD as error:
         errors.print("error:", brief(str(error)), markup=False)
         return 1
+    except BrokenPipeError:  # `calibeam rig list | head`: who reads has had enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except OSError as error:  # a folder that cannot be made or written; devices' own are DeviceErrors above
         errors.print(
             "error:", f"{error.filename or 'file'}: {error.strerror or error}; choose another --out", markup=False

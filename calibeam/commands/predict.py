@@ -11,7 +11,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording import Samples, read
+from acquisition.recording.rig import Rig
 from acquisition.recording.session_folder import read_csv, read_parquet
+from calibrate.errors import DataError
 from calibrate.model_file import read_model
 from calibrate.physics.predicting import predict_with_physics
 from calibrate.predict import Predictor
@@ -30,6 +33,16 @@ def write_predicted(path: Path, columns: Mapping[str, NDArray[np.float64]], outs
             writer.writerow([*("" if math.isnan(value) else repr(value) for value in row), beyond])
 
 
+def _table(path: Path, rig: Rig) -> Samples:
+    """The samples of a table or a recording. SamplesError, RecordingError; DataError for an arm of other joints."""
+    if path.is_dir() or path.suffix == ".mcap":
+        samples = read(path).samples
+        if samples.n_joints != rig.n_joints:
+            raise DataError(f"{path}: samples of {samples.n_joints} joints, but the model's arm has {rig.n_joints}")
+        return samples
+    return read_parquet(path, rig) if path.suffix == ".parquet" else read_csv(path, rig)
+
+
 def predict_command(
     model: Path, samples: Path, *, out: Path = Path("predicted.csv"), same_session: bool = False
 ) -> None:
@@ -44,7 +57,8 @@ def predict_command(
     model
         The model.json of an identification or of a diagnosis; it holds the rig.
     samples
-        A samples.csv or samples.parquet with t_s and joint angles; it need not hold observations.
+        A samples.csv or samples.parquet with t_s and joint angles, a recording or a session folder; it need not hold
+        observations.
     out
         The CSV file to write.
     same_session
@@ -54,8 +68,7 @@ def predict_command(
     """
     known = read_model(model)
     rig = Predictor.of(known).rig
-    read = read_parquet if samples.suffix == ".parquet" else read_csv
-    found = predict_with_physics(known, read(samples, rig), same_session)
+    found = predict_with_physics(known, _table(samples, rig), same_session)
     write_predicted(out, found.columns, found.outside)
     for note in found.notes:
         print(note)

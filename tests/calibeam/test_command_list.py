@@ -1,3 +1,4 @@
+import os
 import subprocess
 import sys
 
@@ -26,3 +27,18 @@ def test_help_imports_no_command() -> None:
     assert "Start here" in ended.stdout
     loaded = ended.stdout.splitlines()[-1].split()
     assert [name for name in loaded if name.startswith(("calibeam.commands.", "scipy", "mujoco", "matplotlib"))] == []
+
+
+def test_a_reader_that_has_had_enough_ends_the_output_without_a_word():
+    """As `calibeam --help | head -1`; the pipe is closed before anything was written."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    with os.fdopen(writer, "w") as closed:
+        done = subprocess.run(
+            [sys.executable, "-m", "calibeam", "rig", "list"],
+            stdout=closed,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=60,
+        )
+    assert (done.returncode, done.stderr) == (0, "")

@@ -2,6 +2,7 @@
 
 import csv
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -149,3 +150,14 @@ def test_a_parquet_table_is_read_as_well(model, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", SimpleNamespace(read_table=lambda path: table))
     from_csv = predicted(model, {"wire_m": ["1.0", "", "1.0"]})
     assert predicted(model, {"wire_m": ["1.0", "", "1.0"]}, ".parquet") == from_csv
+
+
+def test_a_recording_is_predicted_like_its_table(tmp_path, capsys):
+    folder = Path(__file__).parents[1] / "golden" / "data" / "formats" / "tracker"
+    assert run(["identify", str(folder), "--out", str(tmp_path / "model.json")]) == 0
+    for name, samples in (("folder", folder), ("table", folder / "samples.csv")):
+        assert run(["predict", str(tmp_path / "model.json"), str(samples), "--out", str(tmp_path / name)]) == 0
+    assert (tmp_path / "folder").read_bytes() == (tmp_path / "table").read_bytes()
+    other = Path(__file__).parents[1] / "golden" / "data" / "demo.mcap"
+    assert run(["predict", str(tmp_path / "model.json"), str(other), "--out", str(tmp_path / "x")]) == 1
+    assert "samples of 6 joints, but the model's arm has 3" in " ".join(capsys.readouterr().err.split())
