@@ -25,7 +25,7 @@ from calibrate.report.page import write_page
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_report import session_answers, session_page
 from calibrate.report.session_verdict import session_verdict
-from calibrate.report.session_workspace import session_arm
+from calibrate.report.session_workspace import session_arm, session_room
 
 NOW = "now"
 
@@ -51,8 +51,9 @@ def write_recording_report(
     drift = None
     if against is not None:
         drift = drift_of(Calibration(NOW, known.model, recording, diagnosis), against, session_arm(known))
-    write_page(path, session_page(known, diagnosis, drift, interactive=interactive))
-    return session_answers(known, drift)
+    room = session_room(known)
+    write_page(path, session_page(known, diagnosis, drift, interactive=interactive, room=room))
+    return session_answers(known, drift, room)
 
 
 def write_session_results(recording_path: Path, console: Console) -> Identification:

@@ -1,4 +1,4 @@
-"""The first screen of every report: how good is this robot now, can I trust it, what to do; and three numbers.
+"""The first screen of every report: how good is this robot now, can I trust it, what to do; and the numbers.
 
 Colour only repeats what a mark and a word say.
 """
@@ -36,7 +36,7 @@ class Answers:
     """All of the first screen."""
 
     verdict: Verdict
-    numbers: tuple[Number, Number, Number]
+    numbers: tuple[Number, ...]
     known: tuple[str, ...] = ()  # what to know before the numbers are used: what is missing, what limits
     also: tuple[str, ...] = ()  # smaller numbers, in words
     drift: str = ""  # what changed since another calibration, in one sentence

@@ -29,8 +29,9 @@ from calibrate.report.sections import (
     workspace,
 )
 from calibrate.report.session_evidence import SessionEvidence
-from calibrate.report.session_workspace import NOT_IN_SPACE, session_arm, session_measured
+from calibrate.report.session_workspace import NOT_IN_SPACE, session_arm, session_measured, session_room
 from calibrate.report.spot_session import spot_session
+from calibrate.report.workspace.room import Room
 
 
 def session_page(
@@ -39,29 +40,31 @@ def session_page(
     drift: Drift | None = None,
     *,
     interactive: bool = False,
+    room: Room | str | None = None,
 ) -> str:
-    """The page as text; `drift` adds its chapter, `interactive` figures that can be turned."""
+    """The page as text; `drift` adds its chapter, `interactive` figures that can be turned; `room` of session_room."""
     recording, model = known.recording, known.model
-    chapters = dict(_chapters(known, drift, interactive=interactive))
+    room = session_room(known) if room is None else room
+    chapters = dict(_chapters(known, drift, room, interactive=interactive))
     contents, parts = inserted(
         {anchor: title for anchor, (title, _) in chapters.items()},
         tuple(chapter for _, chapter in chapters.values()),
         diagnosis,
         recording.rig,
     )
-    first = arm_summary.summary(session_answers(known, drift), known)
+    first = arm_summary.summary(session_answers(known, drift, room), known)
     title, head = f"The arm {recording.rig.name}", arm_summary.masthead(known)
     return page(title, head, contents, (first, *parts), model.software, scripts=interactive)
 
 
-def session_answers(known: SessionEvidence, drift: Drift | None = None) -> Answers:
-    """The first screen."""
-    answers = arm_summary.answers(known)
+def session_answers(known: SessionEvidence, drift: Drift | None = None, room: Room | str | None = None) -> Answers:
+    """The first screen; `room` of session_room, computed where it is not given."""
+    answers = arm_summary.answers(known, session_room(known) if room is None else room)
     return answers if drift is None else replace(answers, drift=sentence(drift), warnings=drift.warnings)
 
 
 def _chapters(
-    known: SessionEvidence, drift: Drift | None, *, interactive: bool
+    known: SessionEvidence, drift: Drift | None, room: Room | str, *, interactive: bool
 ) -> Iterator[tuple[str, tuple[str, Html]]]:
     """Anchor, heading, content."""
     recording, model = known.recording, known.model
@@ -69,7 +72,7 @@ def _chapters(
         yield "drift", (DRIFT, drift_chapter(drift))
     arm = session_arm(known)
     measured = None if isinstance(arm, str) else session_measured(known, arm)
-    yield "workspace", (workspace.TITLE, workspace.workspace(arm, measured, NOT_IN_SPACE))
+    yield "workspace", (workspace.TITLE, workspace.workspace(room, measured, NOT_IN_SPACE))
     if interactive:
         yield "interactive", (INTERACTIVE, interactive_chapter(session_figures(known)))
     yield from _chapters_of_spots(known)

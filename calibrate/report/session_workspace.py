@@ -16,7 +16,7 @@ from calibrate.problem import Problem
 from calibrate.report.session_evidence import SessionEvidence
 from calibrate.report.workspace.known_arm import KnownArm, scatter_of, unpredicted, whole_covariance
 from calibrate.report.workspace.pictures import Measured
-from calibrate.report.workspace.room import target_at
+from calibrate.report.workspace.room import Room, room_of, target_at
 from calibrate.sensors.catalogue import names_with
 from calibrate.sensors.kind import Trait
 from calibrate.unseen_along import analyse_along
@@ -52,6 +52,12 @@ def session_arm(evidence: SessionEvidence) -> KnownArm | str:
         upper,
         evidence.q_rad,
     )
+
+
+def session_room(evidence: SessionEvidence) -> Room | str:
+    """Errors of the tool over the workspace, or why none can be told. About half a second."""
+    known = session_arm(evidence)
+    return known if isinstance(known, str) else room_of(known)
 
 
 def session_measured(evidence: SessionEvidence, known: KnownArm) -> Measured | None:

@@ -7,10 +7,11 @@ from calibrate.report.anywhere import anywhere
 from calibrate.report.elements import Html, figure, panels, tag
 from calibrate.report.error_figures import by_sample, errors
 from calibrate.report.model_tests import proofs
-from calibrate.report.quantities import significant
+from calibrate.report.quantities import DASH, length, significant
 from calibrate.report.sections.zeros import determined, limits_of_zeros, zeros_part
 from calibrate.report.session_evidence import Readings, SessionEvidence
 from calibrate.report.session_verdict import session_verdict
+from calibrate.report.workspace.room import Room
 from calibrate.sensors.catalogue import kind_of
 
 
@@ -39,8 +40,8 @@ def summary(said: Answers, evidence: SessionEvidence) -> Html:
     return tag("div", first_screen(said), pictures, *zeros_part(evidence), id="summary")
 
 
-def answers(evidence: SessionEvidence) -> Answers:
-    """How good, whether to trust it, what to do."""
+def answers(evidence: SessionEvidence, room: Room | str) -> Answers:
+    """How good, whether to trust it, what to do; first of all the error of the tool over the workspace."""
     model, first = evidence.model, evidence.readings[0]
     known = sum(p.value is not None for p in model.parameters)
     rest = ", the others only in combinations" if known < len(model.parameters) else ""
@@ -51,7 +52,31 @@ def answers(evidence: SessionEvidence) -> Answers:
         *([determined(evidence)] if limits else []),
         f"rows of the fit: {first.says(_rms(first.error_after))} rms distance",
     )
-    return Answers(session_verdict(evidence), (*_errors(evidence), anywhere(model.free_space)), limits, also)
+    numbers = (*_tool(room), *_errors(evidence), anywhere(model.free_space))
+    return Answers(session_verdict(evidence), numbers, limits, also)
+
+
+def _tool(room: Room | str) -> tuple[Number, Number]:
+    """Over the workspace, where the data support a statement: nominal arm, and calibrated."""
+    if isinstance(room, str):
+        why = f"not told: {room}"
+        return (
+            Number("tool_nominal", TOOL_NOMINAL, None, "m", DASH, why),
+            Number("tool_calibrated", TOOL_CALIBRATED, None, "m", DASH, why),
+        )
+    nominal, calibrated = _rms(room.drawn_m[room.supported]), _rms(room.found_m[room.supported])
+    where = "rms between the joint angles of the session"
+    return (
+        Number(
+            "tool_nominal", TOOL_NOMINAL, nominal, "m", length(nominal), f"{where}; the base put where it fits best"
+        ),
+        Number(
+            "tool_calibrated", TOOL_CALIBRATED, calibrated, "m", length(calibrated), f"{where}; one sigma, predicted"
+        ),
+    )
+
+
+TOOL_NOMINAL, TOOL_CALIBRATED = "Tool error, nominal", "Tool error, calibrated"
 
 
 def _errors(evidence: SessionEvidence) -> tuple[Number, Number]:
@@ -65,8 +90,15 @@ def _errors(evidence: SessionEvidence) -> tuple[Number, Number]:
         on = f"rms distance of {proof.observations} {_what(first)} that the fit has not seen"
     gain = f"; {significant(before / after)} times better" if after > 0.0 else ""
     return (
-        Number("as_drawn", "As drawn", before, first.unit, first.says(before), f"{on}; arm as the drawing says"),
-        Number("now", "Identified", after, first.unit, first.says(after), on + gain),
+        Number(
+            "as_drawn",
+            "Unseen readings, nominal",
+            before,
+            first.unit,
+            first.says(before),
+            f"{on}; arm as the drawing says",
+        ),
+        Number("now", "Unseen readings, calibrated", after, first.unit, first.says(after), on + gain),
     )
 
 

@@ -1,19 +1,17 @@
 """The chapter with the error over the workspace, before and after."""
 
 from calibrate.report.elements import Html, figure, section, tag
-from calibrate.report.workspace.known_arm import KnownArm
 from calibrate.report.workspace.pictures import Measured, before_and_after
-from calibrate.report.workspace.room import room_of
+from calibrate.report.workspace.room import Room
 
 TITLE = "Error over the workspace"
 LEAD = "How far the tool is from where the controller believes it to be, wherever the arm can go."
 
 
-def workspace(known: KnownArm | str, measured: Measured | None, why_not_measured: str) -> Html:
+def workspace(room: Room | str, measured: Measured | None, why_not_measured: str) -> Html:
     """Pictures; or why there are none. `why_not_measured` is told where `measured` is None."""
-    if isinstance(known, str):
-        return section("workspace", TITLE, LEAD, tag("p", f"Not drawn: {known}."))
-    room = room_of(known)
+    if isinstance(room, str):
+        return section("workspace", TITLE, LEAD, tag("p", f"Not drawn: {room}."))
     share = float(room.supported.mean())
     caption = (
         "Left from the side, all directions together (radius: from the base's z axis); right from above, all heights "

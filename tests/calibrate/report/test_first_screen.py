@@ -1,15 +1,17 @@
-"""The first screen: three questions answered in words, three numbers; and every figure can be read on paper."""
+"""The first screen: three questions answered in words, the numbers; and every figure can be read on paper."""
 
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
 
 import msgspec
+import numpy as np
 import pytest
 
 from calibrate.report.answers import MARKS, Answers, Number, first_screen
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_report import session_answers
+from calibrate.report.session_workspace import session_room
 from calibrate.report.verdict import Trust, Verdict
 
 QUESTIONS = ("How good is it now?", "Can I trust it?", "What to do?")
@@ -63,10 +65,14 @@ def test_trust_is_told_by_mark_and_word_not_by_colour_alone(trust):
     assert "do it" in page
 
 
-def test_three_numbers_as_drawn_now_and_anywhere(known):
+def test_the_tool_comes_first_then_readings_and_anywhere(known):
     answers, proof = session_answers(known), known.model.proofs[0]
-    assert [n.key for n in answers.numbers] == ["as_drawn", "now", "anywhere"]
-    assert [n.value for n in answers.numbers] == [
+    assert [n.key for n in answers.numbers] == ["tool_nominal", "tool_calibrated", "as_drawn", "now", "anywhere"]
+    room = session_room(known)
+    assert answers.numbers[0].value == np.sqrt(np.mean(room.drawn_m[room.supported] ** 2))
+    assert answers.numbers[1].value == np.sqrt(np.mean(room.found_m[room.supported] ** 2))
+    assert answers.numbers[1].value < answers.numbers[0].value
+    assert [n.value for n in answers.numbers[2:]] == [
         proof.rms_distance_before_m,
         proof.rms_distance_after_m,
         known.model.free_space.pose_p95_m,
@@ -76,7 +82,7 @@ def test_three_numbers_as_drawn_now_and_anywhere(known):
 def test_a_number_that_cannot_be_told_is_a_dash_with_its_reason(known):
     hidden = msgspec.structs.replace(known.model.free_space, pose_p95_m=None, says="something moves the target")
     model = msgspec.structs.replace(known.model, free_space=hidden)
-    number = session_answers(replace(known, model=model)).numbers[2]
+    number = session_answers(replace(known, model=model)).numbers[4]
     assert number.value is None
     assert number.said == "–"
     assert "something moves the target" in number.about

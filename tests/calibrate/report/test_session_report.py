@@ -120,7 +120,7 @@ def test_a_model_from_before_these_fields_has_a_report_too(wire_and_positions):
     assert "random 20% of the rows" in text
     assert "Observability" not in text
     assert "Predicted error of the target" not in text
-    assert session_answers(known).numbers[2].value is None
+    assert session_answers(known).numbers[4].value is None
     assert isinstance(session_arm(known), str)
 
 
