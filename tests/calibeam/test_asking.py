@@ -26,6 +26,7 @@ PRODUCT = ("acquisition", "calibeam", "calibrate", "drivers", "simulators")
 # Every module that asks, or hands on who is asked.
 ASKS = {
     "calibeam/commands/camera.py",
+    "calibeam/commands/centre.py",
     "calibeam/commands/import_files.py",
     "calibeam/commands/psd_check.py",
     "calibeam/commands/session.py",

@@ -71,9 +71,10 @@ def test_another_strategy_centres_as_well_and_the_recording_says_which(rig, plai
     bench = direct_bench(rig, plain_rig, seed=6)
     summary = Session(bench, FittedLearner(rig), kept, few, np.array(rig.motion.home_rad)).run((1,))
     assert {detail["strategy"] for kind, detail in kept.events if kind == "centring"} == {by.value}
-    centred = [sample.look.spots_m() for sample in summary.samples if sample.centred]
-    assert len(centred) == 4
-    assert np.max(np.abs(centred)) < 6e-6
+    fine = [detail for kind, detail in kept.events if kind == "centring" and detail["tolerance_m"] == 5e-6]
+    assert len(fine) == 4 == sum(sample.centred for sample in summary.samples)
+    for detail in fine:
+        assert np.max(np.abs(np.array(detail["spots_m"][-1]) - detail["target_m"])) <= 5e-6
 
 
 def test_off_centre_poses_spread_over_the_faces(taken) -> None:

@@ -59,6 +59,33 @@ position_m = 1e-5
 """
 
 
+POSES = """name,x_m,y_m,z_m,rx_rad,ry_rad,rz_rad
+a,0.4,0.1,0.3,3.1,0.0,0.0
+b,0.35,-0.2,0.4,2.9,0.2,0.1
+"""
+WELD = """DEF weld()
+PTP {A1 0, A2 -90, A3 90, A4 0, A5 90, A6 0}
+LIN {X 400.0, Y 100.0, Z 300.0, A 180.0, B 0.0, C 180.0}
+END
+"""
+URDF = """<robot name="two">
+<link name="base"/>
+<link name="upper"><inertial><origin xyz="0 0 0.1"/><mass value="2"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="tip"/>
+<joint name="a" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 0.3" rpy="0 0 0"/>
+<axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+<joint name="b" type="revolute"><parent link="upper"/><child link="tip"/><origin xyz="0.4 0 0" rpy="1.57 0 0"/>
+<axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
+</robot>
+"""
+DH = """a_mm,alpha_deg,d_mm,theta_deg
+0,90,300,0
+400,0,0,0
+300,0,0,0
+"""
+
+
 def write_inputs(folder: Path, run: Run) -> None:
     """All of them. `run` is calibeam's command line in this process: models and diagnoses are its own."""
     folder.mkdir(parents=True)
@@ -177,6 +204,10 @@ def _ur(folder: Path) -> None:
     plan = f'schema = 1\nrig = "ur5e-dual-psd"\npurpose = ["a test"]\n[[block]]\nplacement = 1\nfirst_psd = 1\n{poses}'
     (folder / "plan.toml").write_text(plan, encoding="utf-8")
     spots = "\n".join(f"{x:.3f},{y:.3f}" for x in (-0.006, -0.002, 0.002, 0.006) for y in (-0.006, 0.0, 0.006))
+    (folder / "poses.csv").write_text(POSES, encoding="utf-8")
+    (folder / "weld.src").write_text(WELD, encoding="utf-8")
+    (folder / "arm.urdf").write_text(URDF, encoding="utf-8")
+    (folder / "dh.csv").write_text(DH, encoding="utf-8")
     (folder / "points.csv").write_text(f"x_m,y_m\n{spots}\n", encoding="utf-8")
     fit = 'schema = 1\nmodel = "mdh"\nfree = ["joint*.zero"]\nhold = ["link3.*"]\nloss = "huber"\nseed = 1\n'
     (folder / "fit.toml").write_text(fit + '[priors]\n"link*.length" = 1e-3\n"link*.twist" = 1e-3\n', encoding="utf-8")

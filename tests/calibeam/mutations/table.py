@@ -20,6 +20,7 @@ from tests.calibeam.mutations.text_mutators import BINARY, LINES, TOML, Mutator
 KINDS = {
     ".toml": "toml", ".json": "json", ".csv": "csv", ".parquet": "parquet", ".mcap": "recording", ".blf": "binary",
     ".log": "lines", ".asc": "lines", ".dbc": "lines", ".jsonl": "lines",
+    ".urdf": "lines", ".src": "lines",
 }  # fmt: skip
 MUTATORS: dict[str, tuple[Mutator, ...]] = {
     "toml": TOML, "json": JSON, "csv": CSV, "lines": LINES, "binary": BINARY, "parquet": PARQUET,
@@ -29,7 +30,9 @@ REFUSED = {"bad_utf8": ("toml", "json", "csv")}  # what no reader of these kinds
 SMALL = "--arms 500 --poses 2"  # of an error simulation
 DAILY, ENDURE = 20, 300
 FEW, FEWER = 8, 4  # daily, of commands that take half a second, or two, of a core on a small valid input
-DAILY_OF = dict.fromkeys(("diagnose", "compare", "design"), FEW) | {"report": FEWER}
+DAILY_OF = dict.fromkeys(
+    ("diagnose", "compare", "design", "correct", "export-model", "rig", "centre"), FEW
+) | dict.fromkeys(("report", "replay", "reconcile"), FEWER)
 
 
 @dataclass(frozen=True)
@@ -134,6 +137,13 @@ MODELS = (
     Pair("earlier/model.json", "report tracker --against earlier"),
     Pair("model.json", "diagnose tracker --model model.json"),
     Pair("guided.json", "verify guided --model guided.json"),
+    Pair("arm.json", "correct arm.json poses.csv --out made.csv"),
+    Pair("poses.csv", "correct arm.json poses.csv --out made.csv"),
+    Pair("weld.src", "correct arm.json weld.src --out made.src"),
+    Pair("model.json", "export-model model.json --to urdf --out made.urdf"),
+    Pair("physics.json", "export-model physics.json --to mjcf --out made.xml"),
+    Pair("model.json", "replay tracker --model model.json --out made.mcap"),
+    Pair("tracker/rig.toml", "reconcile tracker --simulation tracker/rig.toml --out made"),
     Pair("arm.json", "live rig.toml --model arm.json --port 0 --for-s 0"),
     Pair("arm.json", "move rig.toml --home --model arm.json --dry-run"),
     Pair("arm.json", "jog rig.toml --joint 1 --by-deg 1 --model arm.json --dry-run"),
@@ -145,6 +155,9 @@ RIGS = (
     Pair("rig.toml", "session rig.toml --out made --yes"),
     Pair("rig.toml", "emulate rig.toml --end-with-stdin --robot-host auto"),
     Pair("rig.toml", "live rig.toml --port 0 --for-s 0"),
+    Pair("rig.toml", "centre rig.toml --out made.mcap --yes"),
+    Pair("arm.urdf", "rig new --from-urdf arm.urdf --out made.toml"),
+    Pair("dh.csv", "rig new --from-dh dh.csv --out made.toml"),
     Pair("rig.toml", "log encoders rig.toml --out made --for-s 0"),
     Pair("rig.toml", "design rig.toml --poses 8 --repeats 0 --candidates 4"),
     Pair("rig.toml", "move rig.toml --home --dry-run"),
