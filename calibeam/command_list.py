@@ -27,6 +27,7 @@ GROUPS: dict[str, tuple[ListedCommand, ...]] = {
         ListedCommand("live", "live:live_command", "Show a rig's devices live in the browser, with a STOP button."),
         ListedCommand("move", "move:move_command", "Move the arm to a pose: planned, shown, confirmed, then executed."),
         ListedCommand("jog", "jog:jog_command", "Step one joint, or move the flange along an axis, slowly."),
+        ListedCommand("task", "task:task_command", "Teach a task by placing the arm, or run its program."),
         ListedCommand("centre", "centre:centre_command", "Centre the beam once, from where the arm stands."),
         ListedCommand("camera", "camera:camera_command", "Calibrate the camera with a tour of the arm round a board."),
         ListedCommand("psd-check", "psd_check:psd_check_command", "Check a detector against known spot positions."),

@@ -31,6 +31,7 @@ WIRED = (
     "calibeam/test_motion_cli.py",
     "calibeam/test_psd_check_cli.py",
     "calibeam/test_same_on_wires.py",
+    "calibeam/test_task_cli.py",
     "calibeam/test_wired_session.py",
     "drivers",
     "simulators/encoders",

@@ -153,7 +153,7 @@ def move_by_hand(rig: Rig, model: Path | None, asked: Asked, agreement: Agreemen
         now_rad = robot.joints()
         made = gate.plan(now_rad, asked(solver, now_rad))
         draw_plan_file(made, cell_of(rig), agreement.plan_file)
-        console.print(_said(made, agreement.plan_file), soft_wrap=True)
+        console.print(said(made, agreement.plan_file), soft_wrap=True)
         if agreement.dry:
             console.print("nothing was moved")
             return now_rad
@@ -176,7 +176,8 @@ def _drive(gate: Gate, made: Plan, joints: Callable[[], Floats], watch: Callable
     return end_rad
 
 
-def _said(made: Plan, plan_file: Path) -> str:
+def said(made: Plan, plan_file: Path) -> str:
+    """A plan in one line for the terminal."""
     speed, _ = made.rates()
     fastest = int(np.argmax(np.max(np.abs(speed), axis=0)))
     names = ", ".join(f"{segment.name} ({segment.by.value})" for segment in made.segments)

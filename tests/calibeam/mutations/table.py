@@ -179,6 +179,9 @@ PLANS = (
     Pair("plan.toml", "session rig.toml --plan plan.toml --out made --yes"),
     Pair("fit.toml", "identify tracker --plan fit.toml"),
     Pair("task.toml", "move rig.toml --task task.toml --position bin --dry-run"),
+    Pair("cell.toml", "task run cell.toml --rig rig.toml --dry-run"),
+    Pair("cell.toml", "task teach cell.toml --rig rig.toml --poses taught.csv --out made.toml"),
+    Pair("taught.csv", "task teach cell.toml --rig rig.toml --poses taught.csv --out made.toml"),
     Pair("errors.toml", f"simulate-errors tracker/rig.toml --errors errors.toml {SMALL}"),
 )
 DEVICES = (
