@@ -11,6 +11,7 @@ from acquisition.errors import StoppedError
 from acquisition.recording import Channel, Event, RecordingError, RecordingWriter, RigFileError
 from acquisition.recording.rig import Rig
 from acquisition.recording.rig.devices import EncodersDevice, PsdDevice, RobotDevice
+from acquisition.recording.samples import SPOTS
 from acquisition.wires.attaching import Guarded
 from acquisition.wires.bench import Pumps, Speeds, WiredBench
 from acquisition.wires.psd_view import PsdView, psd_window
@@ -27,7 +28,6 @@ from drivers.device import Block, Device, Movable
 from drivers.errors import DeviceError, DeviceRefused
 
 DRIVEN_JOINTS = 6
-SPOTS = ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")
 VIEWED = {
     "psd": ("flags", "temperature_degC"),
     "robot": ("actual_q_rad", "actual_qd_rad_s"),
