@@ -60,7 +60,7 @@ def live_command(
 
     """
     from calibeam.live.devices import devices_of, reading
-    from calibeam.live.outlets import Views, outlets
+    from calibeam.live.outlets import LiveViews, outlets
     from calibeam.live.page import PageAddress, live_page  # the web server takes a while to load: only here
 
     loaded, clock = load_rig(rig), SystemClock()
@@ -70,7 +70,7 @@ def live_command(
         outlets(foxglove, plotjuggler, loaded.name) as (served, says),
     ):
         page.feed.believes(believed)
-        page.feed.also = Views(served, lambda: page.feed.view).heard
+        page.feed.also = LiveViews(served, lambda: page.feed.view).heard
         print(json.dumps({"url": page.url}) if json_ else f"live page: {page.url} (Ctrl-C ends it)", flush=True)
         for sentence in () if json_ else says:
             print(sentence, flush=True)

@@ -36,7 +36,7 @@ class Outlet(Protocol):
     def view(self, topic: str, kind: MessageType, values: Mapping[str, float]) -> None: ...
 
 
-class Views:
+class LiveViews:
     """Thins what readers hear to VIEW_S for the outlets. `spots`: how currents become spots, once that is known."""
 
     def __init__(self, outlets: Sequence[Outlet], spots: Callable[[], PsdView | None]) -> None:

@@ -12,7 +12,7 @@ from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 from acquisition.recording.mcap.layout import embedded_type
-from calibeam.live.outlets import FoxgloveOutlet, OutletError, Views, outlets
+from calibeam.live.outlets import FoxgloveOutlet, OutletError, LiveViews, outlets
 from drivers.device import Block
 
 PATIENCE_S = 20.0
@@ -35,7 +35,7 @@ class Kept:
 
 def test_curves_are_thinned_to_twenty_a_second_by_device() -> None:
     kept = Kept()
-    views = Views([kept], lambda: None)
+    views = LiveViews([kept], lambda: None)
     for k in range(64):
         views.heard("robot", block(k / 64, [0.1, 0.2]))
     assert len(kept.views) == 16  # every fourth sample in a second: three are less than 50 ms
@@ -54,7 +54,7 @@ def test_curves_are_thinned_to_twenty_a_second_by_device() -> None:
 def test_a_foxglove_client_reads_the_joints() -> None:
     with outlets(0, None, "cell") as (found, says):
         url = says[0].rsplit(" ", 1)[-1]
-        views = Views(found, lambda: None)
+        views = LiveViews(found, lambda: None)
         views.heard("robot", block(1.0, [0.1, 0.2]))
         with connect(url, subprotocols=[Subprotocol("foxglove.sdk.v1")]) as client:
             said: dict[str, Any] = {}
@@ -87,7 +87,7 @@ def test_plotjuggler_hears_json_with_its_time() -> None:
         listener.bind(("127.0.0.1", 0))
         listener.settimeout(PATIENCE_S)
         with outlets(None, listener.getsockname()[1], "cell") as (found, _):
-            Views(found, lambda: None).heard("robot", block(1.5, [0.1, float("nan")]))
+            LiveViews(found, lambda: None).heard("robot", block(1.5, [0.1, float("nan")]))
             heard = json.loads(listener.recv(65536))
     assert heard["timestamp"] == 1.5
     assert heard["view/robot"]["actual_q_rad_1"] == 0.1
