@@ -12,7 +12,7 @@ from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 from acquisition.recording.mcap.layout import embedded_type
-from calibeam.live.outlets import FoxgloveOutlet, OutletError, LiveViews, outlets
+from calibeam.live.outlets import FoxgloveOutlet, LiveViews, OutletError, outlets
 from drivers.device import Block
 
 PATIENCE_S = 20.0
