@@ -128,7 +128,7 @@ class Fitted:
         )
         beliefs = np.zeros((len(believed), len(free)))
         beliefs[range(len(believed)), np.searchsorted(free, believed)] = scale[believed] / sigma[believed]
-        slope = self.problem.jacobian(self.values)[:, free] * scale[free]
+        slope = self.problem.jacobian_anew(self.values)[:, free] * scale[free]
         none = np.full(known + len(believed), -1, dtype=np.intp)
         labels = [np.concatenate([x, none]) for x in self._labels]
         stated = len(self._labels[0]) + blocks + np.arange(assumed)
@@ -205,6 +205,7 @@ class Fitted:
         drivers, whiteners, rows = self.drivers if terms else None, whiteners_of(noise.scatters), self.problem.rows
         sizes = plain_sizes(self.session, terms, drivers, whiteners, rows)
         problem = Augmented(self.session, terms, drivers, rows, whiteners, sizes, given, assumed)
+        problem = replace(problem, kept=list(self.problem.kept))
         start = np.concatenate([self.geometry, problem.start[len(self.geometry) :]])
         return _settled(_turn(problem, self.active, start, noise))
 
@@ -294,7 +295,8 @@ def _cut(state: Fitted, active: Ints) -> Fitted:
         value, weights = likelihood_of(apart[i][r], covariance)
         scatters.append(Scatter(covariance, weights, value, state.scatters[i].free))
     noise = Noise(tuple(scatters), shared)
-    problem = replace(noise.under(state.problem), rows=rows, last=dict(state.problem.last), slopes={})
+    problem = replace(noise.under(state.problem), rows=rows, last=dict(state.problem.last), slopes={}, added={})
+    problem = replace(problem, kept=list(problem.kept))
     return replace(state, active=active, problem=problem, noise=noise)
 
 
