@@ -15,6 +15,7 @@ from calibrate.diagnose.assumed import Assumed
 from calibrate.diagnose.augmented import Around, Augmented, plain_sizes
 from calibrate.diagnose.driver_values import drivers_of
 from calibrate.diagnose.in_sight import in_sight, solve_in_sight
+from calibrate.diagnose.kept_columns import Setting
 from calibrate.diagnose.linearised import Accepted, Rows, Unseen
 from calibrate.diagnose.noise_of_fit import Noise, covariance_at, noise_of, whiteners_of
 from calibrate.diagnose.scatter import Scatter, likelihood_of
@@ -161,10 +162,30 @@ class Fitted:
         return sum(s.minus_two_log_likelihood for s in self.scatters) + float(away @ away + known @ known)
 
     def columns(self, term: Term, inner: Floats) -> Floats:
-        parts = self.problem.columns(term.port, term.basis(self.drivers, inner), self.around)
-        data = [whitened.reshape(-1, whitened.shape[-1]) for whitened in self.problem.whitened(parts)]
+        data = [
+            whitened.reshape(-1, whitened.shape[-1])
+            for whitened in self.problem.whitened(self._unweighted(term, inner))
+        ]
         rest = len(self.rows.residual) - len(self._labels[0])
         return np.concatenate([*data, np.zeros((rest, data[0].shape[1]))])
+
+    def _unweighted(self, term: Term, inner: Floats) -> Sequence[Floats]:
+        """Of each instrument (row, k, coefficient); closed candidates on their grid are asked for at every state."""
+
+        def compute() -> list[Floats]:
+            return self.problem.columns(term.port, term.basis(self.drivers, inner), self.around)
+
+        if id(term) not in self._kept_candidates or not _on_grid(term, inner):
+            return compute()
+        return self.problem.candidates.of((term.key, inner.tobytes()), self._setting, compute)
+
+    @cached_property
+    def _kept_candidates(self) -> frozenset[int]:
+        return frozenset(id(term) for term in self._candidates if not term.open)
+
+    @cached_property
+    def _setting(self) -> Setting:
+        return Setting(self.geometry, self.around.by)
 
     def candidates(self) -> Sequence[Term]:
         return self._candidates
@@ -205,7 +226,7 @@ class Fitted:
         drivers, whiteners, rows = self.drivers if terms else None, whiteners_of(noise.scatters), self.problem.rows
         sizes = plain_sizes(self.session, terms, drivers, whiteners, rows)
         problem = Augmented(self.session, terms, drivers, rows, whiteners, sizes, given, assumed)
-        problem = replace(problem, kept=list(self.problem.kept))
+        problem = replace(problem, kept=list(self.problem.kept), candidates=self.problem.candidates)
         start = np.concatenate([self.geometry, problem.start[len(self.geometry) :]])
         return _settled(_turn(problem, self.active, start, noise))
 
@@ -223,7 +244,7 @@ def fit_geometry(session: Session, active: Ints | None = None) -> Fitted:
     fits: list[Fitted] = []
     for loss in (Loss.SQUARE, Loss.HUBER):
         seen = in_sight(problem, session.start)
-        rough = solve_in_sight(problem, session.start, seen, damping=FAR_START, loss=loss)
+        rough = solve_in_sight(problem, session.start, seen, damping=FAR_START, tolerance=TOLERANCE, loss=loss)
         fits.append(_settled(_turn(problem, chosen, rough.theta, noise_of(problem, rough))))
         if all(np.all(s.weights > WILD) for s in fits[0].scatters):
             break
@@ -249,6 +270,10 @@ def fit_from_model(
     free = np.flatnonzero([p.free for p in problem.parameters])
     near = assumed.held_near(problem.jacobian(start), np.setdiff1d(free, assumed.at), unit)
     return _settled(_turn(replace(problem, assumed=near), geometry.active, start, noise))
+
+
+def _on_grid(term: Term, inner: Floats) -> bool:
+    return all(value in spec.grid for value, spec in zip(inner.tolist(), term.inner, strict=True))
 
 
 def _makes_outliers(term: Term) -> bool:

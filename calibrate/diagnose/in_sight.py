@@ -165,7 +165,7 @@ def solve_in_sight(
     sigma, centre = priors(parameters), start_values(parameters)
     believed = free[np.isfinite(sigma[free])]
     along = _Along(problem, directions, start, believed, centre[believed], sigma[believed])
-    found = solve(along, damping=damping, max_steps=max_steps, tolerance=tolerance, loss=loss)
+    found = solve(along, damping=damping, max_steps=max_steps, tolerance=tolerance, loss=loss, covariance=False)
     theta = along.values(found.theta)
     return Fit(
         theta,
