@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from calibrate.arms.coupled_readings import by_readings, recoupled
 from calibrate.arms.serial import SerialArm
 from calibrate.diagnose.assumed import Assumed
-from calibrate.diagnose.kept_columns import KeptColumns, Setting
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.ported import (
     Look,
@@ -34,6 +33,7 @@ from calibrate.weighting import Measured
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
+NEAR = 1e-5  # m, rad: directions that the data hardly see are differences of columns that are large by themselves
 INNER_STEP = 1e-3  # of the range of an inner parameter, for its difference quotient
 PART_STEP = 1e-3  # m, rad: whether a part of the arm follows a parameter at all
 KEPT = 8  # arms of which that is remembered
@@ -68,14 +68,25 @@ class Around:
 
 @dataclass(frozen=True, eq=False)
 class Kept:
-    """Derivatives by geometry at one setting, without weights: they hold for all values near it.
+    """Derivatives by geometry at one set of values, without weights; they serve for all values near it.
 
-    A slope that is off by a ten-thousandth moves the least squares by as little of a sigma, since what it is multiplied
-    with is noise; residuals are never taken from it.
+    A slope that is hardly off moves the least squares by next to nothing of a sigma, since what it is multiplied with
+    is noise; residuals are never taken from it.
     """
 
-    at: Setting
+    geometry: Floats  # (param,)
+    by: Perturbation
     slopes: tuple[Floats, ...]  # of each instrument (row, k, param)
+
+    def near(self, geometry: Floats, by: Perturbation) -> bool:
+        """Whether frames are nearly those of the slopes. What acts on a reading moves no frame."""
+        parts = zip(_moving(self.by), _moving(by), strict=True)
+        off = [np.abs(geometry - self.geometry), *(np.abs(old - new) for old, new in parts)]
+        return max(float(part.max(initial=0.0)) for part in off) < NEAR
+
+
+def _moving(by: Perturbation) -> tuple[Floats, ...]:
+    return by.joints_rad, by.frames, by.surroundings
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +108,6 @@ class Augmented:
     last: dict[bytes, Around] = field(default_factory=dict[bytes, Around])
     slopes: dict[bytes, list[Floats]] = field(default_factory=dict[bytes, list[Floats]])
     kept: list[Kept] = field(default_factory=list[Kept])  # at most one: where derivatives were computed last
-    candidates: KeptColumns = field(default_factory=KeptColumns)
     added: dict[int, list[Floats]] = field(default_factory=dict[int, list[Floats]])  # of terms, as near as `kept`
 
     def under(self, whiteners: tuple[Floats, ...], shared: SharedScatter | None = None) -> "Augmented":
@@ -185,16 +195,7 @@ class Augmented:
 
     def jacobian(self, theta: Floats) -> Floats:
         """By derivatives that were kept, where these values are near them."""
-        return self._weighted(theta, self._slopes(theta))
-
-    def jacobian_anew(self, theta: Floats) -> Floats:
-        """By derivatives at just these values, which are kept from now on."""
-        self.slopes.clear()
-        self.kept.clear()
-        return self._weighted(theta, self._slopes(theta))
-
-    def _weighted(self, theta: Floats, slopes: Sequence[Floats]) -> Floats:
-        parts = [whitened.reshape(-1, whitened.shape[-1]) for whitened in self.whitened(slopes)]
+        parts = [whitened.reshape(-1, whitened.shape[-1]) for whitened in self.whitened(self._slopes(theta))]
         joint, geometry = self.session.weighting.unweighted, theta[: len(self.session.parameters)]
         extra = len(theta) - len(geometry)
         for i, block in enumerate(self.session.weighting.known, start=len(self.session.measured)):
@@ -202,6 +203,10 @@ class Augmented:
             parts.append(np.concatenate([known, np.zeros((len(known), extra))], axis=1))
         parts += [] if self.assumed is None else [self.assumed.jacobian(len(theta))]
         return np.concatenate(parts)
+
+    def forgetting(self) -> "Augmented":
+        """The same; derivatives are computed where they are asked for next."""
+        return replace(self, slopes={}, kept=[], added={})
 
     def apart(self, parts: Sequence[Floats]) -> list[Floats]:
         """Rows (row, k, ...) of every instrument less what they share with those of the second encoders."""
@@ -217,9 +222,8 @@ class Augmented:
         if key not in self.slopes:
             self.slopes.clear()
             at, (geometry, terms) = self.around(theta), self.split(theta)
-            here = Setting(geometry, at.by)
-            if not (self.kept and self.kept[0].at.near(here)):
-                self.kept[:] = [Kept(here, self._own_slopes(geometry, at))]
+            if not (self.kept and self.kept[0].near(geometry, at.by)):
+                self.kept[:] = [Kept(geometry, at.by, self._own_slopes(geometry, at))]
                 self.added.clear()
             added = [self._added(i, accepted, at) for i, accepted in enumerate(terms)]
             self.slopes[key] = [

@@ -15,7 +15,6 @@ from calibrate.diagnose.assumed import Assumed
 from calibrate.diagnose.augmented import Around, Augmented, plain_sizes
 from calibrate.diagnose.driver_values import drivers_of
 from calibrate.diagnose.in_sight import in_sight, solve_in_sight
-from calibrate.diagnose.kept_columns import Setting
 from calibrate.diagnose.linearised import Accepted, Rows, Unseen
 from calibrate.diagnose.noise_of_fit import Noise, covariance_at, noise_of, whiteners_of
 from calibrate.diagnose.scatter import Scatter, likelihood_of
@@ -129,7 +128,7 @@ class Fitted:
         )
         beliefs = np.zeros((len(believed), len(free)))
         beliefs[range(len(believed)), np.searchsorted(free, believed)] = scale[believed] / sigma[believed]
-        slope = self.problem.jacobian_anew(self.values)[:, free] * scale[free]
+        slope = self.problem.forgetting().jacobian(self.values)[:, free] * scale[free]
         none = np.full(known + len(believed), -1, dtype=np.intp)
         labels = [np.concatenate([x, none]) for x in self._labels]
         stated = len(self._labels[0]) + blocks + np.arange(assumed)
@@ -162,30 +161,10 @@ class Fitted:
         return sum(s.minus_two_log_likelihood for s in self.scatters) + float(away @ away + known @ known)
 
     def columns(self, term: Term, inner: Floats) -> Floats:
-        data = [
-            whitened.reshape(-1, whitened.shape[-1])
-            for whitened in self.problem.whitened(self._unweighted(term, inner))
-        ]
+        parts = self.problem.columns(term.port, term.basis(self.drivers, inner), self.around)
+        data = [whitened.reshape(-1, whitened.shape[-1]) for whitened in self.problem.whitened(parts)]
         rest = len(self.rows.residual) - len(self._labels[0])
         return np.concatenate([*data, np.zeros((rest, data[0].shape[1]))])
-
-    def _unweighted(self, term: Term, inner: Floats) -> Sequence[Floats]:
-        """Of each instrument (row, k, coefficient); closed candidates on their grid are asked for at every state."""
-
-        def compute() -> list[Floats]:
-            return self.problem.columns(term.port, term.basis(self.drivers, inner), self.around)
-
-        if id(term) not in self._kept_candidates or not _on_grid(term, inner):
-            return compute()
-        return self.problem.candidates.of((term.key, inner.tobytes()), self._setting, compute)
-
-    @cached_property
-    def _kept_candidates(self) -> frozenset[int]:
-        return frozenset(id(term) for term in self._candidates if not term.open)
-
-    @cached_property
-    def _setting(self) -> Setting:
-        return Setting(self.geometry, self.around.by)
 
     def candidates(self) -> Sequence[Term]:
         return self._candidates
@@ -226,7 +205,7 @@ class Fitted:
         drivers, whiteners, rows = self.drivers if terms else None, whiteners_of(noise.scatters), self.problem.rows
         sizes = plain_sizes(self.session, terms, drivers, whiteners, rows)
         problem = Augmented(self.session, terms, drivers, rows, whiteners, sizes, given, assumed)
-        problem = replace(problem, kept=list(self.problem.kept), candidates=self.problem.candidates)
+        problem = replace(problem, kept=list(self.problem.kept))
         start = np.concatenate([self.geometry, problem.start[len(self.geometry) :]])
         return _settled(_turn(problem, self.active, start, noise))
 
@@ -272,10 +251,6 @@ def fit_from_model(
     return _settled(_turn(replace(problem, assumed=near), geometry.active, start, noise))
 
 
-def _on_grid(term: Term, inner: Floats) -> bool:
-    return all(value in spec.grid for value, spec in zip(inner.tolist(), term.inner, strict=True))
-
-
 def _makes_outliers(term: Term) -> bool:
     """Whether data without the term may look like wild rows: few of them follow it."""
     return term.slow or term.open
@@ -284,18 +259,22 @@ def _makes_outliers(term: Term) -> bool:
 def _settled(fitted: Fitted) -> Fitted:
     """Weights and least squares in turns, until the solver is at rest and the likelihood changes no more.
 
-    Of turns that differ in what they take noise for, the likeliest: no refit ends worse than it was.
+    Of turns that differ in what they take noise for, the likeliest: no refit ends worse than it was. Derivatives may be
+    kept from turn to turn, but the turn that ends it begins with those of its own values.
     """
-    best = fitted
+    best, resting = fitted, False
     for turn in range(1, TURNS):
         last, problem = fitted, fitted.problem
+        anew = resting or turn + 1 == FEWEST_TURNS
+        problem = problem.forgetting() if anew else problem
         if fitted.problem.terms and turn <= REFRESHED:
-            problem = problem.refreshed(fitted.drivers)
+            problem = problem.refreshed(last.drivers)
         new = _turn(problem, fitted.active, fitted.values, fitted.noise)
         fitted = replace(new, steps=fitted.steps + new.steps)
         best = min(best, fitted, key=lambda fit: fit.minus_two_log_likelihood)
         gained = last.minus_two_log_likelihood - fitted.minus_two_log_likelihood
-        if turn + 1 >= FEWEST_TURNS and new.stop in AT_REST and abs(gained) < SETTLED:
+        resting = turn + 1 >= FEWEST_TURNS and new.stop in AT_REST and abs(gained) < SETTLED
+        if resting and anew:
             return replace(best, steps=fitted.steps, stop=Stop.LIKELIHOOD)
     return replace(best, steps=fitted.steps, stop=Stop.ROUNDS)
 
