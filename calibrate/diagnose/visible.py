@@ -138,8 +138,12 @@ def grid_of(term: Term) -> list[Floats]:
     return list(np.stack([m.ravel() for m in meshed], axis=1)) if meshed else [np.zeros(0)]
 
 
-def _block(chosen: Ints, columns: Sequence[Floats], sight: Sight) -> Block:
-    raw = np.stack([columns[i].T for i in chosen])
+def _block(chosen: Ints, columns: list[Floats], sight: Sight) -> Block:
+    """Takes its columns out of the list: all candidates at once are most of what a diagnosis holds."""
+    raw = np.empty((len(chosen), columns[chosen[0]].shape[1], columns[chosen[0]].shape[0]))
+    for at, i in enumerate(chosen):
+        raw[at] = columns[i].T
+        columns[i] = np.zeros((0, 0))
     size = np.linalg.norm(raw, axis=2)
     raw /= np.where(size > 0.0, size, 1.0)[:, :, None]
     flat = raw.reshape(-1, raw.shape[2])
