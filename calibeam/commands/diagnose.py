@@ -8,6 +8,7 @@ from rich.console import Console
 
 from acquisition.recording import Recording, read
 from calibeam.printing.results import print_diagnosis, print_streams
+from calibeam.printing.stage_progress import stages_shown
 from calibeam.results.diagnosis import diagnose_recording, diagnose_streams, plan_next, refuse_wrong_file
 from calibeam.results.identification import naming_source
 from calibrate.diagnose.file import write_diagnosis
@@ -62,7 +63,8 @@ def diagnose_command(
         _streams_only(console, source, out, json=json)
         return
     with naming_source(recording):
-        found, file = diagnose_recording(source, known, partial(write_diagnosis, out))
+        with stages_shown(Console(stderr=True), len(source.samples)) as begun:
+            found, file = diagnose_recording(source, known, partial(write_diagnosis, out), begun)
         write_diagnosis(out, file)
         if json:
             print(msgspec.json.encode(file).decode())

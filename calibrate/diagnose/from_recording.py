@@ -69,13 +69,14 @@ def diagnose_samples(
     rng: Generator,
     begin: Callable[[Session], Fitted] = fit_geometry,
     known: Callable[[Diagnosed], None] | None = None,
+    begun: Callable[[Stage], None] | None = None,
 ) -> Diagnosed:
     """`begin`: the fit beside which something is sought, geometry alone or what a model knows already. `known` is
-    called once as soon as the causes are known, before sizes, alternatives and proofs.
+    called once as soon as the causes are known, before sizes, alternatives and proofs; `begun` as each stage begins.
 
     DataError where there is too little to diagnose.
     """
-    stages = Stages()
+    stages = Stages(begun=begun)
     every = Cleared(samples, np.arange(len(samples)), ())
     cleared = stages.attempt(Stage.FAULTS, lambda: blunders_first(rig, samples), every, refuses=True)
     if cleared.whole_file:
