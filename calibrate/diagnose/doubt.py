@@ -117,7 +117,7 @@ def doubted(
     if left and not lacking:
         lacking = list(missing)
     unexplained = (*left, *(untold(f, hidden) for f, hidden in drifts))
-    return Doubted(at, findings, unexplained, misfit, _records(lacking), stages.undecided)
+    return Doubted(at, findings, unexplained, misfit, records(lacking), stages.undecided)
 
 
 def _found(state: State, rng: Generator, stages: Stages) -> Search:
@@ -176,7 +176,8 @@ def _repeated(misfit: LackOfFit | None) -> list[Unexplained]:
     return [Unexplained("", (), share, misfit.p, "misfit that comes back when a pose is repeated")]
 
 
-def _records(lacking: Sequence[Missing]) -> tuple[str, ...]:
+def records(lacking: Sequence[Missing]) -> tuple[str, ...]:
+    """One sentence for each column to record."""
     return tuple(f"record {m.column}: without it {m.physics} cannot be told" for m in dict.fromkeys(lacking))
 
 
