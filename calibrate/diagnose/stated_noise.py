@@ -51,6 +51,7 @@ class Statement(Enum):
     WRONG = "wrong"  # what is left is noise, but of another size
     EXCEEDED = "exceeded"  # what is left is more than noise
     ABSENT = "absent"
+    UNTESTED = "untested"  # too few readings to say more than how large it is
 
 
 @dataclass(frozen=True)
@@ -121,9 +122,10 @@ def _found(
     answer, supports, opposes = Statement.AGREES, (), ()
     if times > MORE and mean - 1.0 > SIGMAS * error:
         supports, opposes = _evidence(model, i, quantity, unseen, tame, rng)
-        if times > WRONG_BY:
+        if supports + opposes and times > WRONG_BY:
             opposes = (f"no statement is wrong by more than {WRONG_BY:.0f} times", *opposes)
-        answer = Statement.EXCEEDED if opposes or elsewhere else Statement.WRONG
+        noise = Statement.EXCEEDED if opposes or elsewhere else Statement.WRONG
+        answer = noise if supports + opposes else Statement.UNTESTED
     said, sigma = float(np.sqrt(np.mean(stated**2))), float(error / max(2.0 * times, 1e-300))
     return NoiseFound(name, quantity.name, quantity.unit, said, found, times, sigma, answer, supports, opposes)
 
@@ -150,17 +152,28 @@ def _levers(model: Fitted, i: int, quantity: Quantity) -> Floats:
 def _evidence(
     model: Fitted, i: int, quantity: Quantity, unseen: Unseen, tame: NDArray[np.bool_], rng: Generator
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """What supports that the scatter is noise, and what opposes it."""
+    """What supports that the scatter is noise, and what opposes it; nothing of either where rows are too few."""
     misfit, sample, drivers = unseen.misfit[tame][:, quantity.part], unseen.sample[tame], model.drivers
     if len(misfit) < FEWEST:
-        return (), (f"{len(misfit)} readings are too few to test it",)
+        return (), ()
     told = [
         _close_in_time(misfit, np.array([]) if drivers.repeat is None else drivers.repeat[sample], sample),
-        _by_lever(misfit, _levers(model, i, quantity)[:, tame]),
+        _by_lever(*_whitened(model, i, quantity, misfit, tame)),
         _by_posture(misfit, drivers.q_rad[sample], sample, rng),
     ]
     given = [one for one in told if one is not None]
     return tuple(words for good, words in given if good), tuple(words for good, words in given if not good)
+
+
+def _whitened(
+    model: Fitted, i: int, quantity: Quantity, misfit: Floats, tame: NDArray[np.bool_]
+) -> tuple[Floats, Floats]:
+    """Misfit (row, k) and levers (joint, row, k) by the noise as stated, which may be that of the joints."""
+    own = believed_sigma(model.session.measured[i])[model.problem.rows[i]][tame][:, quantity.part]
+    levers, joint_rad = _levers(model, i, quantity)[:, tame], model.session.rig.noise.joint_rad or 0.0
+    form = joint_rad**2 * np.einsum("jok,jol->okl", levers, levers) + own[:, :, None] ** 2 * np.eye(own.shape[1])
+    L = np.linalg.cholesky(form)
+    return np.linalg.solve(L, misfit[..., None])[..., 0], np.linalg.solve(L, levers[..., None])[..., 0]
 
 
 def _close_in_time(misfit: Floats, repeat: Ints, sample: Ints) -> tuple[bool, str] | None:

@@ -1,4 +1,4 @@
-"""Does what a model leaves hang together in time, beyond noise that wanders: blocks, first and last rows, repeats.
+"""Does what a model leaves hang together in time, beyond noise that wanders: level, blocks, repeats.
 
 Rows left out are missed by (I - H)^-1 r, whose size by noise alone is known; so a block of neighbours that is left out
 may be missed by more than rows at random, but not than such a block of noise. Source of the identity: Cook, Weisberg,
@@ -6,26 +6,30 @@ Residuals and Influence in Regression, 1982, section 2.2. Null: noise drawn as t
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
 from calibrate.diagnose.bench import Bench
-from calibrate.diagnose.noise_law import noise_law
+from calibrate.diagnose.linearised import Rows
+from calibrate.diagnose.noise_law import NoiseLaw, capture_orders, noise_law
 from calibrate.diagnose.tail import Tail
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 BLOCKS = 5  # of equal length along the session
-DRAWS = 300
+DRAWS, AT_ONCE = 300, 50
 ALPHA = 0.002  # of all three together
 LARGER = 1.2  # times what noise gives: less decides nothing
 FEWEST = 40  # samples
 FEWEST_PAIRS = 20  # of repeats
 RIDGE = 1e-9
+EDGE = 0.05  # of the session, at either end: too few rows to say
+LONGEST = 0.95  # correlation of neighbours: noise that has forgotten itself after some sixty rows
+MOST = 0.5  # of the variance
 
 
 @dataclass(frozen=True)
@@ -45,21 +49,56 @@ def time_left(bench: Bench, rng: Generator) -> TimeLeft | None:
     if len(used) < FEWEST:
         return None
     order = used[np.argsort(t_s[used], kind="stable")]
-    tests = {"blocks of the session are predicted worse than rows at random": _blocks(bench, order)}
+    tests = {
+        "readings before and after some moment differ": _level(rows, t_s),
+        "blocks of the session are predicted worse than rows at random": _blocks(bench, order),
+    }
     if (pairs := _by_gap(bench)) is not None:
         tests["repeats disagree more, the farther apart in time they were taken"] = pairs
-    law = noise_law(rows, bench.sight, t_s, rng)
-    drawn = bench.sight.complement(law.draw(rng, DRAWS).T)
+    law = _short(noise_law(rows, bench.sight, t_s, rng))
+    nulls: dict[str, list[Floats]] = {what: [] for what in tests}
+    for _ in range(DRAWS // AT_ONCE):
+        drawn = bench.sight.complement(law.draw(rng, AT_ONCE).T)
+        for what, value_of in tests.items():
+            nulls[what].append(value_of(drawn))
     found: list[TimeLeft] = []
     for what, value_of in tests.items():
-        null, seen = value_of(drawn), float(value_of(bench.sight.residual[None])[0])
+        null, seen = np.concatenate(nulls[what]), float(value_of(bench.sight.residual[None])[0])
         p = min(1.0, len(tests) * Tail(null).p(seen))
         found.append(TimeLeft(what, seen / max(float(np.mean(null)), 1e-300), p))
     worst = min(found, key=lambda one: one.p)
     return worst if worst.p < ALPHA and worst.ratio > LARGER else None
 
 
+def _short(law: NoiseLaw) -> NoiseLaw:
+    """With wander that lasts for some neighbours only: what lasts for much of a session is not noise."""
+    series = tuple(
+        replace(s, wander=replace(s.wander, rho=min(s.wander.rho, LONGEST), share=min(s.wander.share, MOST)))
+        for s in law.series
+    )
+    return replace(law, series=series)
+
+
 Value = Callable[[Floats], Floats]  # (draw, row) of residuals behind geometry -> (draw,)
+
+
+def _level(rows: Rows, t_s: Floats) -> Value:
+    """Squares that a change of every channel's mean explains at the moment that suits it best, over the mean square."""
+    orders = capture_orders(rows, t_s)
+
+    def value(residual: Floats) -> Floats:
+        best = np.zeros(len(residual))
+        for at in orders:
+            z = residual[:, at]  # (draw, time, channel)
+            n = z.shape[1]
+            before = np.arange(1, n)
+            gone = np.cumsum(z, axis=1)[:, :-1] - before[:, None] / n * np.sum(z, axis=1, keepdims=True)
+            explained = np.sum(gone**2, axis=2) * n / (before * (n - before))
+            inner = explained[:, int(EDGE * n) : n - int(EDGE * n)]
+            best = np.maximum(best, inner.max(axis=1) / np.mean(z**2, axis=(1, 2)))
+        return best
+
+    return value
 
 
 def _blocks(bench: Bench, order: Ints) -> Value:
