@@ -14,6 +14,7 @@ from scipy.stats import norm
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from calibrate.blunders.finding import Blunder, BlunderKind
+from calibrate.blunders.same_posture import err_alike, postures
 from calibrate.diagnose.blunders_first import Cleared, blunders_first
 from calibrate.diagnose.diagnose import diagnose
 from calibrate.diagnose.diagnosis import Diagnosis, Unexplained, Verdict
@@ -141,7 +142,9 @@ def _left(model: Fitted, cleared: Cleared) -> tuple[Blunder, ...]:
     for unseen in model.held_out(model.active):
         if unseen.instrument == ENCODER_DIFFERENCE:
             continue
-        for i in unexplained_rows(unseen.whitened):
+        far = unexplained_rows(unseen.whitened)
+        posture = postures(model.session.samples.joints()[unseen.sample])
+        for i in far[~err_alike(unseen.whitened, posture, far)]:
             away_m = float(np.linalg.norm(unseen.misfit[i, :3]))
             sigmas = float(np.linalg.norm(unseen.whitened[i]))
             out.append(_far(by_name[unseen.instrument], int(cleared.rows[unseen.sample[i]]), away_m, sigmas))
