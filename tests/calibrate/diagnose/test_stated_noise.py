@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from acquisition.recording import read
+from calibrate.diagnose.diagnosis import Verdict
 from calibrate.diagnose.fitted import fit_geometry
-from calibrate.diagnose.from_recording import beyond_noise
+from calibrate.diagnose.from_recording import beyond_noise, diagnose_samples
 from calibrate.diagnose.session import session_of
 from calibrate.diagnose.stated_noise import MORE, Statement, close_pairs, neighbours, noise_found
 from calibrate.effects.term import Missing
@@ -20,12 +21,17 @@ SESSION = {"family": "tracker", "arm": "irb120", "samples": 120}
 CASES = 20
 
 
-def found(folder, times=1.0, *, stated=True, elsewhere=False, **wanted):
-    """The noise of one instrument; the rig file states the true one over `times`. The truth stays outside."""
+def stating(folder, times=1.0, *, stated=True, **wanted):
+    """A recording whose rig states the true noise over `times`, or none."""
     case = conceal(Wanted(**{**SESSION, **wanted}))
     noise = {"position_m": case.sigma_m / times} if stated else {}
     write_case(replace(case, belief=replace(case.belief, noise=noise)), folder)
-    recording = read(folder / "recording")
+    return read(folder / "recording")
+
+
+def found(folder, times=1.0, *, stated=True, elsewhere=False, **wanted):
+    """The noise of one instrument; the rig file states the true one over `times`. The truth stays outside."""
+    recording = stating(folder, times, stated=stated, **wanted)
     model = fit_geometry(session_of(recording.rig, recording.samples))
     (one,) = noise_found(model, np.random.default_rng(1), elsewhere=elsewhere)
     return one
@@ -66,6 +72,16 @@ def test_a_late_clock_without_the_speed_is_more_than_noise(tmp_path):
     assert "× the stated noise of the positions" in left.why
     assert "missing columns that could explain it: qd1_rad_s" in left.why
     assert left.p < 0.01
+
+
+def test_without_the_needed_column_no_name_is_likely_and_the_column_comes_first(tmp_path):
+    recording = stating(tmp_path, seed=8, defects=("late-clock",), enr=10.0, withhold=True, samples=80)
+    diagnosis = diagnose_samples(recording.rig, recording.samples, np.random.default_rng(1)).physics.diagnosis
+    assert diagnosis.verdict is not Verdict.CONSISTENT
+    assert all(one.confidence <= 0.5 for one in diagnosis.findings)
+    assert any("× the stated noise" in one.why for one in diagnosis.unexplained)
+    assert diagnosis.next[0].startswith("record ")
+    assert any("qd1_rad_s" in line for line in diagnosis.next)
 
 
 def test_no_statement_is_wrong_by_a_hundred(tmp_path):
