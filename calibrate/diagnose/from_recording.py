@@ -114,7 +114,9 @@ def _with_noise(diagnosis: Diagnosis, model: Fitted, rng: Generator) -> Diagnosi
     """Beside the stated noise. What exceeds it is left without a name, no session with it is consistent, no name in it
     is more likely than not, and the columns that could explain it come first among what to do.
     """
-    noise = noise_found(model, rng, elsewhere=bool(diagnosis.unexplained))
+    named = {finding.name.where for finding in diagnosis.findings}  # a drift without its thermometer leaves nothing
+    elsewhere = any(left.where not in named for left in diagnosis.unexplained)
+    noise = noise_found(model, rng, elsewhere=elsewhere)
     more = tuple(beyond_noise(n, diagnosis.missing) for n in noise if n.statement is Statement.EXCEEDED)
     if not more:
         return replace(diagnosis, noise=noise)

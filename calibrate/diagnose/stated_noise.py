@@ -13,7 +13,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
+from calibrate.blunders.same_posture import postures
 from calibrate.diagnose.fitted import Fitted
 from calibrate.diagnose.joint_scatter import innocent
 from calibrate.diagnose.linearised import Unseen
@@ -219,10 +221,10 @@ def _by_posture(misfit: Floats, q_rad: Floats, sample: Ints, rng: Generator) -> 
 
 def neighbours(q_rad: Floats, sample: Ints) -> Ints:
     """(row, few) the rows nearest in posture, of those taken at other times."""
-    apart = q_rad[:, None, :] - q_rad[None, :, :]
-    far = np.sum(1.0 - np.cos(apart), axis=2)
-    far[np.abs(sample[:, None] - sample[None, :]) <= CLOSE] = np.inf
-    return np.argsort(far, axis=1)[:, :NEIGHBOURS]
+    posture = postures(q_rad)
+    near = KDTree(posture).query(posture, k=min(len(q_rad), NEIGHBOURS + 2 * CLOSE + 1))[1]
+    soon = np.abs(sample[near] - sample[:, None]) <= CLOSE
+    return np.take_along_axis(near, np.argsort(soon, axis=1, kind="stable"), axis=1)[:, :NEIGHBOURS]
 
 
 def _alike(z: Floats, near: Ints) -> float:
@@ -237,7 +239,7 @@ def _tame(z: Floats) -> NDArray[np.bool_]:
 
 
 def _noun(kind: SensorKind, quantity: str) -> str:
-    return kind.noun if quantity in ("", "position") else f"{quantity}s"
+    return kind.noun if quantity == kind.quantities[0].name else f"{quantity}s"
 
 
 def _size(value: float, unit: str) -> str:
