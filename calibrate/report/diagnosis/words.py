@@ -51,7 +51,7 @@ def _how_far(file: DiagnosisFile) -> str:
     if file.rms_after_m is None or not file.noise_floor_m:
         return ""
     ratio = max(_over_the_floor(file), default=file.rms_after_m / file.noise_floor_m)
-    if any(one.statement == ABSENT for one in file.noise):
+    if _unstated(file):
         return f"; what remains is {ratio:.2g} times the floor, and no noise is stated to compare it with"
     if ratio <= NOISE:
         return f", and what remains is {_noise(file).removeprefix('the ')}"
@@ -67,12 +67,17 @@ def _over_the_floor(file: DiagnosisFile) -> Iterator[float]:
             yield split.rms_after_m / floor_m
 
 
+def _unstated(file: DiagnosisFile) -> bool:
+    """Whether the rig file states no noise at all of what was read."""
+    return bool(file.noise) and all(one.statement == ABSENT for one in file.noise)
+
+
 def _noise(file: DiagnosisFile) -> str:
     """The noise, and whether it is that of the rig file."""
     wrong = [one.says for one in file.noise if one.statement == WRONG]
     if wrong:
         return f"the noise; the {'; the '.join(wrong)}"
-    if any(one.statement == ABSENT for one in file.noise):
+    if _unstated(file):
         return "scatter of which no size is stated"
     return "the noise"
 
