@@ -10,6 +10,7 @@ from calibrate.report.diagnosis.words import (
     before_after,
     free_space_words,
     micrometres,
+    noise_words,
     place_words,
     rival_words,
     stream_words,
@@ -52,6 +53,7 @@ def _brief(file: DiagnosisFile) -> Iterator[str]:
         )
     if file.free_space is not None:
         yield free_space_words(file.free_space)
+    yield from _few([f"noise: {line}" for line in noise_words(file)])
     yield from _few([f"not completed: {one.stage}: {one.reason}" for one in file.incomplete])
     yield from _few([f"not recorded: {one.column} ({one.physics} cannot be tested)" for one in file.not_recorded])
     yield from _few([f"next: {line}" for line in file.next])
@@ -73,6 +75,8 @@ def _print_details(console: Console, file: DiagnosisFile) -> None:
             console.print(line, highlight=False, markup=False)
     for line in _changes(file):
         console.print(line, highlight=False, markup=False)
+    for line in noise_words(file):
+        console.print(f"noise: {line}", highlight=False, markup=False)
     for line in _doubt(file):
         console.print(line, highlight=False, markup=False)
     if file.splits:

@@ -75,7 +75,7 @@ def _without_proof(found: Doubted, missing: Sequence[Missing]) -> Diagnosis:
         rejected=(),
         invisible=(),
         missing=tuple(missing),
-        next=(*to_measure(found.findings), *found.next),
+        next=(*found.next, *to_measure(found.findings)),
         model=found.at.state,
     )
 

@@ -27,6 +27,7 @@ class Stage(Enum):
     ALTERNATIVES = "alternatives"
     SCATTER = "scatter without a driver"
     REPEATS = "misfit of repeats"
+    TIME = "misfit that lasts"
     SIZES = "sizes"
     NOISE = "wander of the noise"
     PROOFS = "proofs"
@@ -50,6 +51,7 @@ DECIDING = frozenset(
         Stage.PREDICTION,
         Stage.SCATTER,
         Stage.REPEATS,
+        Stage.TIME,
         Stage.BEYOND_NOISE,
     }
 )

@@ -42,7 +42,6 @@ class Trait(Enum):
     TOUCHED = "a hand presses the probe into place"
     SCALELESS = "an arm half as large would give the same readings"
     BETWEEN_ENCODERS = "two encoders of a joint, read against each other: it sees joints, not the flange"
-    CERTIFIED = "its noise is certified: scatter far beyond it is something else"
 
 
 class Found(Protocol):

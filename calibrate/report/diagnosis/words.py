@@ -12,8 +12,10 @@ from calibrate.diagnose.schema import (
     SplitRecord,
     UnexplainedRecord,
 )
+from calibrate.diagnose.stated_noise import Statement
 from calibrate.report.diagnosis.units import unit_of
 
+ABSENT, WRONG = Statement.ABSENT.value, Statement.WRONG.value
 NOISE = 1.15  # times the floor: some dozen samples held out scatter by so much
 TOLD = ("encoder-eccentricity", "joint-compliance", "backlash")  # in a sentence; all of them stand in the table
 
@@ -27,12 +29,12 @@ def verdict_words(file: DiagnosisFile) -> str:
             n = len(file.findings)
             return f"Recording and model differ: {n} change{'s' if n > 1 else ''} found{_how_far(file)}."
         case "consistent" if file.known is not None:
-            return f"Nothing new: recording and model agree to within the noise{_tested(file)}."
+            return f"Nothing new: recording and model agree to within {_noise(file)}{_tested(file)}."
         case "mismatch":
             n = len(file.findings)
             return f"Recording and model part: {n} cause{'s' if n > 1 else ''} found{_how_far(file)}."
         case "consistent":
-            return f"Recording and model agree: nothing is there beyond the noise{_tested(file)}."
+            return f"Recording and model agree: nothing is there beyond {_noise(file)}{_tested(file)}."
         case _ if file.incomplete and file.unexplained is None:
             stages = ", ".join(one.stage for one in file.incomplete)
             return f"Undecidable: the diagnosis was not completed ({stages})."
@@ -48,10 +50,36 @@ def _how_far(file: DiagnosisFile) -> str:
         return f", but not the whole of it: something{size} stays without a name ({_places(left)})"
     if file.rms_after_m is None or not file.noise_floor_m:
         return ""
-    ratio = file.rms_after_m / file.noise_floor_m
+    ratio = max(_over_the_floor(file), default=file.rms_after_m / file.noise_floor_m)
+    if _unstated(file):
+        return f"; what remains is {ratio:.2g} times the floor, and no noise is stated to compare it with"
     if ratio <= NOISE:
-        return ", and what remains is noise"
+        return f", and what remains is {_noise(file).removeprefix('the ')}"
     return f"; unseen samples are still missed by {ratio:.2g} times the noise"
+
+
+def _over_the_floor(file: DiagnosisFile) -> Iterator[float]:
+    """Error on unseen rows over the floor, in every split."""
+    floors = {f.instrument: f.rms_m for f in file.floors}
+    for split in file.splits:
+        floor_m = floors.get(split.instrument)
+        if floor_m and split.rms_after_m is not None:
+            yield split.rms_after_m / floor_m
+
+
+def _unstated(file: DiagnosisFile) -> bool:
+    """Whether the rig file states no noise at all of what was read."""
+    return bool(file.noise) and all(one.statement == ABSENT for one in file.noise)
+
+
+def _noise(file: DiagnosisFile) -> str:
+    """The noise, and whether it is that of the rig file."""
+    wrong = [one.says for one in file.noise if one.statement == WRONG]
+    if wrong:
+        return f"the noise; the {'; the '.join(wrong)}"
+    if _unstated(file):
+        return "scatter of which no size is stated"
+    return "the noise"
 
 
 def _something(file: DiagnosisFile) -> str:
@@ -155,3 +183,12 @@ def _behind(margin: float) -> str:
     """A rival's margin in words; what rounds to nothing is no margin."""
     words = f"{abs(margin):.1f} BIC"
     return "as good" if words == "0.0 BIC" else f"{words} {'behind' if margin > 0.0 else 'ahead'}"
+
+
+def noise_words(file: DiagnosisFile) -> Iterator[str]:
+    """Every stated noise that is wrong, with what supports it and what opposes it."""
+    for one in file.noise:
+        if one.statement == WRONG:
+            told = [f"for it: {', '.join(one.supports)}"] if one.supports else []
+            told += [f"against it: {', '.join(one.opposes)}"] if one.opposes else []
+            yield "; ".join((one.says, *told))

@@ -16,6 +16,7 @@ from calibrate.diagnose.schema import (
     FreeSpaceRecord,
     LackOfFitRecord,
     NameRecord,
+    NoiseRecord,
     NotRecorded,
     RejectedRecord,
     RigRecord,
@@ -154,3 +155,25 @@ def test_pages_go_before_the_last_chapter_of_another_report():
 def test_a_diagnosis_of_another_rig_is_refused():
     with pytest.raises(DataError, match="of rig 'irb', the recording of 'other'"):
         inserted({}, [], FILE, SimpleNamespace(name="other"))
+
+
+def noise(statement, times):
+    words = f"noise of the spots is {times} × the stated value" if statement == "wrong" else ""
+    stated = None if times is None else 1e-6
+    return NoiseRecord("dual-psd", "", "m", stated, 2.1e-6, times, None, statement, words)
+
+
+def test_noise_is_said_only_where_it_is_stated_and_what_is_wrong_with_the_statement():
+    quiet = msgspec.structs.replace(FILE, unexplained=None, verdict="consistent", findings=())
+    wrong = msgspec.structs.replace(quiet, noise=(noise("wrong", 2.1),))
+    assert "2.1 × the stated value" in verdict_words(wrong)
+    unstated = msgspec.structs.replace(quiet, noise=(noise("absent", None),))
+    assert "beyond the noise" not in verdict_words(unstated)
+    found = msgspec.structs.replace(FILE, unexplained=None, noise=(noise("absent", None),))
+    assert "remains is noise" not in verdict_words(found)
+
+
+def test_every_split_is_compared_with_the_noise():
+    last = SplitRecord("last block", "dual-psd", 12, 0, 4.1e-5, 6.3e-6, 0.9, 0.99)
+    told = msgspec.structs.replace(FILE, unexplained=None, splits=(*FILE.splits, last))
+    assert "missed by 3 times the noise" in verdict_words(told)
