@@ -76,28 +76,26 @@ def _largest(what: str, poses: Sequence[PosePerformance]) -> str:
 
 
 def _poses(found: EvaluatedTest) -> Table:
-    corrected = {one.pose: one for one in found.corrected.poses} if found.corrected is not None else {}
-    table = Table("pose", "cycles", "AP, mm", "RP, mm", "vAP, mm")
-    turned = any(one.turn_rad for one in found.measured.poses)
-    if corrected:
-        for name in ("AP by the model, mm", "AP corrected, mm", "RP corrected, mm"):
-            table.add_column(name)
-    if turned:
-        for name in ("AP about x, y, z, mrad", "RP about x, y, z, ± mrad"):
-            table.add_column(name)
-    for one in found.measured.poses:
-        cells = [
-            f"P{one.pose}",
-            str(one.cycles),
-            *map(millimetres, (one.accuracy_m, one.repeatability_m, one.variation_m)),
-        ]
-        if corrected:
-            better = corrected[one.pose]
-            cells.append(_with_sigma(*found.predicted_m[one.pose], MM))
-            cells += [millimetres(better.accuracy_m), millimetres(better.repeatability_m)]
-        if turned:
-            cells += [_angles(one.turn_rad), _angles(one.turn_repeatability_rad)]
-        table.add_row(*cells)
+    """mm; RP with the correction is that of the measured test but for conditions that change: it is in the file."""
+    poses = found.measured.poses
+    columns: list[tuple[str, list[str]]] = [
+        ("", [f"P{one.pose}" for one in poses]),
+        ("n", [str(one.cycles) for one in poses]),
+        ("AP, mm", [millimetres(one.accuracy_m) for one in poses]),
+    ]
+    if found.corrected is not None:
+        better = {one.pose: one.accuracy_m for one in found.corrected.poses}
+        columns.append(("predicted", [_with_sigma(*found.predicted_m[one.pose], MM) for one in poses]))
+        columns.append(("corrected", [millimetres(better[one.pose]) for one in poses]))
+    columns.append(("RP, mm", [millimetres(one.repeatability_m) for one in poses]))
+    if any(one.variation_m is not None for one in poses):
+        columns.append(("vAP, mm", [millimetres(one.variation_m) for one in poses]))
+    if any(one.turn_rad for one in poses):
+        columns.append(("AP about x, y, z, mrad", [_angles(one.turn_rad) for one in poses]))
+        columns.append(("RP about them, ± mrad", [_angles(one.turn_repeatability_rad) for one in poses]))
+    table = Table(*(name for name, _ in columns), padding=(0, 0))
+    for row in zip(*(cells for _, cells in columns), strict=True):
+        table.add_row(*row)
     return table
 
 
@@ -112,7 +110,7 @@ def _others(test: PoseTest) -> list[str]:
         out.append(_distance(test.distance))
     if (drift := test.drift) is not None:
         out.append(
-            f"drift{{}} of P{drift.pose} over {drift.after_s[-1] / 3600.0:.2f} h, {len(drift.after_s)} sets: dAP "
+            f"drift of P{drift.pose}{{}} over {drift.after_s[-1] / 3600.0:.2f} h, {len(drift.after_s)} sets: dAP "
             f"{millimetres(drift.dap_m)} mm, dRP {millimetres(drift.drp_m)} mm; barycentre moved by at most "
             f"{millimetres(drift.moved_m)} mm"
         )
@@ -121,6 +119,6 @@ def _others(test: PoseTest) -> list[str]:
 
 def _distance(one: DistancePerformance) -> str:
     return (
-        f"distance{{}} P{one.poses[0]} to P{one.poses[1]}, {MM * one.command_m:.3f} mm, {one.cycles} cycles: "
+        f"distance P{one.poses[0]} to P{one.poses[1]}{{}}, {MM * one.command_m:.3f} mm, {one.cycles} cycles: "
         f"AD {millimetres(one.accuracy_m)} mm, RD ± {millimetres(one.repeatability_m)} mm"
     )

@@ -173,20 +173,18 @@ def _alike(given: Floats, wanted: NDArray[np.bool_]) -> Ints:
 
 
 def _target(rig: Rig, known: ModelFile | None) -> tuple[Floats, tuple[str, ...]]:
-    """(3,) of the target in the drawn flange, and a sentence where it is the model's."""
-    if known is not None:
-        # With a tool of no length, the real tool is the drawn flange as the model's arm carries it.
-        mounted = Arms.of(known, Options(tool=np.eye(4))).real_tool
-        point_m = Predictor.of(known).tip_at(inverse(mounted)[None])[0]
-        return point_m, (
-            "the target is where the model has it: how it is mounted on the flange is no error of the robot",
-        )
-    if rig.tool.point_m is None:
+    """(3,) of the target in the drawn flange, as the controller has it, and a sentence where it is the model's."""
+    if rig.tool.point_m is not None:
+        return np.array(rig.tool.point_m), ()
+    if known is None:
         raise DataError(
             f"rig {rig.name}: no [tool] point_m: where the target sits in the flange is part of what was commanded; "
             "measure it (calibeam tool-axes), or give the --model of a calibration with this target"
         )
-    return np.array(rig.tool.point_m), ()
+    # With a tool of no length, the real tool is the drawn flange as the model's arm carries it.
+    mounted = Arms.of(known, Options(tool=np.eye(4))).real_tool
+    point_m = Predictor.of(known).tip_at(inverse(mounted)[None])[0]
+    return point_m, ("the rig file has no [tool] point_m: the target is taken to be where the model has it",)
 
 
 def _device(frame: Frame, rig: Rig, known: ModelFile | None, there_m: Floats, seen_m: Floats) -> Floats:
@@ -235,7 +233,7 @@ def _off_rad(attained: Floats, wanted: Floats) -> Floats:
 
 
 def _sides(samples: Samples) -> Ints:
-    """(row,) number of the way in which all joints came; -1 of a row before which nothing was recorded."""
+    """(row,) number of the way in which all joints came; -1 where this is not known."""
     names = [f"approach{j + 1}" for j in range(samples.n_joints)]
     recorded = [name for name in names if name in samples]
     if recorded:
@@ -243,8 +241,8 @@ def _sides(samples: Samples) -> Ints:
     else:
         ways = moves_of(samples)[1]
     number = np.unique(ways, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
-    if not recorded:
-        number[0] = -1
+    if not recorded:  # a joint that moves later has not moved yet: whence it came, nobody recorded
+        number[np.any((ways == 0.0) & np.any(ways != 0.0, axis=0), axis=1)] = -1
     return number
 
 
