@@ -13,6 +13,7 @@ from calibrate.export.json_text import json_text
 from calibrate.export.mastering import abb_moc_text, fanuc_mastering_text, kuka_mastering_text
 from calibrate.export.matlab import matlab_text
 from calibrate.export.mjcf import mjcf_text
+from calibrate.export.nominal_table import nominal_table_text
 from calibrate.export.ur import ur_calibration_text, ur_kinematics_text
 from calibrate.export.urdf import urdf_text
 from calibrate.model_file import ModelFile, corrections
@@ -34,6 +35,7 @@ class ExportForm(enum.Enum):
     KUKA_MASTERING = "kuka-mastering"
     ABB_MOC = "abb-moc"
     FANUC_MASTERING = "fanuc-mastering"
+    TABLE = "table"  # nominal, correction, calibrated
 
 
 FORMS: Mapping[ExportForm, Callable[[IdentifiedArm], str]] = {
@@ -47,6 +49,7 @@ FORMS: Mapping[ExportForm, Callable[[IdentifiedArm], str]] = {
     ExportForm.KUKA_MASTERING: kuka_mastering_text,
     ExportForm.ABB_MOC: abb_moc_text,
     ExportForm.FANUC_MASTERING: fanuc_mastering_text,
+    ExportForm.TABLE: nominal_table_text,
 }
 
 SUFFIX: Mapping[ExportForm, str] = {
@@ -60,6 +63,7 @@ SUFFIX: Mapping[ExportForm, str] = {
     ExportForm.KUKA_MASTERING: ".kuka-mastering.csv",
     ExportForm.ABB_MOC: ".abb-moc.csv",
     ExportForm.FANUC_MASTERING: ".fanuc-mastering.csv",
+    ExportForm.TABLE: ".table.csv",
 }
 MAKES: Mapping[ExportForm, Make] = {  # whose controllers a form is for
     ExportForm.UR_KINEMATICS: Make.UR,

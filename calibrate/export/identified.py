@@ -45,6 +45,7 @@ class IdentifiedArm:
     not_carried: tuple[str, ...] = ()  # sentences: what the form cannot hold (not_carried.py)
     zeros: tuple[AxisOffset, ...] = ()
     compliance_rad_nm: Mapping[int, float] = field(default_factory=dict[int, float])  # joint from 1: linear ones
+    stated: tuple[ModelParameter, ...] = ()  # what the model holds of each correction
 
     @property
     def sign(self) -> str:
@@ -108,7 +109,7 @@ def identified_arm(
     tool_m = _tool_m(rig.tool.point_m if tool_about_m is None else tool_about_m[:3], corrections)
     zeros = _of_readings(rig, tuple(_zero(i, own, stated) for i in range(1, rig.n_joints + 1)), covariance)
     parts, yields = corrected_parts(rig.arm, own), dict(compliance_rad_nm or {})
-    return IdentifiedArm(rig, own, parts, tool_m, not_carried, zeros, yields)
+    return IdentifiedArm(rig, own, parts, tool_m, not_carried, zeros, yields, tuple(stated or ()))
 
 
 def _zero(joint: int, own: Mapping[str, float], stated: Sequence[ModelParameter] | None) -> AxisOffset:

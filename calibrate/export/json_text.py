@@ -7,6 +7,7 @@ from calibrate.arms.convert import convert, pose_of
 from calibrate.arms.coupled_readings import by_reading
 from calibrate.export.dh_csv import FRAME, TABLE, dh_numbers
 from calibrate.export.identified import IdentifiedArm
+from calibrate.export.nominal_table import nominal_table
 
 
 def json_text(arm: IdentifiedArm) -> str:
@@ -23,6 +24,7 @@ def json_text(arm: IdentifiedArm) -> str:
             "parts": "T_base_flange = F_0 Rz(q_1) F_1 ... Rz(q_n) F_n; 4x4 row by row",
             "dh": "T_base_flange = base T_1 ... T_n flange; T_i = Rz(q_i + theta_offset) Tz(d) Tx(a) Rx(alpha)"
             " Ry(tilt); rx, ry, rz is a rotation vector",
+            "table": "degrees and millimetres, in the robot's own signs; calibrated = nominal + correction",
             "tool_point_m": "in the flange frame",
         },
         "joints": [{"lower_rad": low, "upper_rad": high} for low, high in arm.limits_rad],
@@ -32,6 +34,7 @@ def json_text(arm: IdentifiedArm) -> str:
             "rows": [dict(zip(TABLE, row, strict=True)) for row in dh_numbers(new)],
             "flange": dict(zip(FRAME, (*flange.origin_m, *flange.rotation_rad), strict=True)),
         },
+        "table": nominal_table(arm),
         "tool_point_m": arm.tool_m,
         "not_carried": arm.not_carried,
     }
