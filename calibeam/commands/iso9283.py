@@ -133,7 +133,7 @@ def plan(
     print(f"cube: edge {1e3 * cube.edge_m:.0f} mm, centre {centre} mm in the base, plane {plane}")
     print(f"plan: {out}, {len(visits)} visits; poses: {poses_csv}")
     if model is not None:
-        known = read_model(model)
+        known = _model(model, loaded)
         commands, why = _corrected(known, cube, visits)
         write_pose_plan(corrected, _plan_of(loaded, cube, visits, commands, f"corrected by {model.name}"))
         for line in why:
@@ -209,9 +209,12 @@ def _model(path: Path, rig: Rig) -> ModelFile:
     known = read_model(path)
     if known.rig.text is None:
         raise DataError(f"{path}: the rig's text is not in the file; identify again")
-    joints = parse_rig(known.rig.text, f"rig.toml in {path}").n_joints
-    if joints != rig.n_joints:
-        raise DataError(f"{path}: a model of {joints} joints, but the arm of rig {rig.name} has {rig.n_joints}")
+    its = parse_rig(known.rig.text, f"rig.toml in {path}")
+    if (its.name, its.n_joints) != (rig.name, rig.n_joints):
+        raise DataError(
+            f"{path}: a model of rig '{its.name}' with {its.n_joints} joints, not of '{rig.name}' with {rig.n_joints}; "
+            "give the model of this arm"
+        )
     return known
 
 
@@ -267,8 +270,6 @@ def _plan_of(rig: Rig, cube: CubeInReach, visits: Sequence[_Visit], q_rad: Float
 def _corrected(known: ModelFile, cube: CubeInReach, visits: Sequence[_Visit]) -> tuple[Floats, tuple[str, ...]]:
     """(visit, joint) commands, and sentences. DataError where a pose has none."""
     rig = parse_rig(known.rig.text or "", "rig.toml in the model")
-    if rig.n_joints != cube.q_rad.shape[1]:
-        raise DataError(f"a model of {rig.n_joints} joints, but the arm of the rig has {cube.q_rad.shape[1]}")
     at = np.array([visit.pose - 1 for visit in visits])
     n = rig.n_joints
     sides = np.array([visit.ways or (0,) * n for visit in visits], dtype=np.float64)

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from acquisition.recording.pose_plan import read_pose_plan
 from acquisition.recording.rig import load_rig
@@ -11,10 +12,10 @@ from acquisition.recording.session_folder import write_csv
 from calibeam.cli import run
 from calibeam.motion.cube_in_reach import cube_in_reach, ways_to
 from calibrate.iso9283.cube import cube_corners_m, cube_poses_m
-from calibrate.model_file import write_model
+from calibrate.model_file import RigIdentity, write_model
 
 from ..calibrate.correct.six_joints import drawn
-from ..calibrate.iso9283.six_joint_test import DRAWN, REAL, RIG_HERE, RIG_TEXT, cycles, known, seen
+from ..calibrate.iso9283.tracked_six_joints import DRAWN, REAL, RIG_HERE, RIG_TEXT, cycles, known, seen
 
 CUBE = ["--centre-m", "0.4", "0", "0.35", "--edge-m", "0.2"]
 
@@ -98,6 +99,14 @@ def test_the_cube_that_is_found_is_in_reach():
     assert cube.edge_m > 0.15
     assert np.all(np.linalg.norm(corners, axis=1) < 0.8)
     assert np.allclose(DRAWN.tip_m(cube.q_rad), cube.T_base_tool[:, :3, 3], atol=1e-8)
+
+
+def test_a_model_of_another_arm_is_refused(folder, capsys):
+    other = replace(known(), rig=RigIdentity("other", "0" * 64, RIG_TEXT.replace('name = "', 'name = "other-', 1)))
+    write_model(folder / "other.json", other)
+    words = ["iso9283", "evaluate", str(folder / "plan"), "--out", str(folder / "x.json")]
+    assert run([*words, "--model", str(folder / "other.json")]) == 1
+    assert "a model of rig 'other-" in " ".join(capsys.readouterr().err.split())
 
 
 def test_a_cube_out_of_reach_is_refused(folder, capsys):

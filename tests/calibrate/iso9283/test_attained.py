@@ -11,7 +11,7 @@ from calibrate.errors import DataError
 from calibrate.iso9283.attained import evaluate
 
 from ..correct.six_joints import inverse as inverse_kinematics
-from .six_joint_test import DEVICE, DRAWN, POINT_M, REAL, RIG_HERE, RIG_TEXT, cycles, known, planned_rad, seen
+from .tracked_six_joints import DEVICE, DRAWN, POINT_M, REAL, RIG_HERE, RIG_TEXT, cycles, known, planned_rad, seen
 
 Q = planned_rad()
 POSE = cycles(6)
