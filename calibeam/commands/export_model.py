@@ -26,7 +26,7 @@ def export_model_command(model: Path, *, to: ExportForm, out: Path | None = None
         The model.json of an identification or of a diagnosis; it holds the rig.
     to
         urdf, mjcf (MuJoCo, with joint stiffness), dh-csv, ur-kinematics, ur-calibration, kuka-mastering, abb-moc,
-        fanuc-mastering, json, matlab.
+        fanuc-mastering, json, matlab, table (nominal, correction, calibrated; degrees and mm, in the robot's signs).
     out
         The file to write. Default: beside the model, under its name.
 

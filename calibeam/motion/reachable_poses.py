@@ -130,14 +130,21 @@ def _before_device(rig: Rig, wanted: int, rng: Generator) -> Candidates:
     q = rng.uniform(lower, upper, (TRIES * wanted, rig.n_joints))
     frames = solver.arm.frames(q)
     tips = frames[:, -1, :3, :3] @ np.array(rig.tool.point_m) + frames[:, -1, :3, 3]
-    above = (frames[:, 2:, 2, 3].min(axis=1) > LOWEST_M) & (tips[:, 2] > LOWEST_M)
-    good = np.flatnonzero(above & _clear(rig, q))[:wanted]
+    good = np.flatnonzero(clear_for_device(rig, q))[:wanted]
     nothing = np.zeros(len(good), dtype=np.int64)
     if len(good) == 0:
         raise DataError(f"rig {rig.name}: no pose is clear of table and keep-out boxes; check [motion]")
     device = transform(rig.device.origin_m, rig.device.rotation_rad) if rig.device is not None else np.eye(4)
     seen = (tips[good] - device[:3, 3]) @ device[:3, :3]
     return Candidates(q[good], seen, nothing, nothing)
+
+
+def clear_for_device(rig: Rig, q_rad: Floats) -> NDArray[np.bool_]:
+    """(pose,) whether arm and target are above the table and keep their clearance of every keep-out box."""
+    frames = solver_of(rig).arm.frames(q_rad)
+    tips = frames[:, -1, :3, :3] @ np.array(rig.tool.point_m or (0.0, 0.0, 0.0)) + frames[:, -1, :3, 3]
+    above = (frames[:, 2:, 2, 3].min(axis=1) > LOWEST_M) & (tips[:, 2] > LOWEST_M)
+    return np.asarray(above & _clear(rig, q_rad), dtype=np.bool_)
 
 
 def _clear(rig: Rig, q_rad: Floats) -> NDArray[np.bool_]:

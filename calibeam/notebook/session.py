@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording import Recording, Samples, SamplesError, read
+from acquisition.recording import Recording, RecordingError, Samples, SamplesError, read
 from calibeam.notebook.model import Model, model_of
 from calibeam.notebook.tables import SCREEN, pandas_if_installed
 from calibrate.errors import DataError
@@ -113,6 +113,8 @@ class Session:
 
 def open_recording(path: Path | str) -> Session:
     """A recording (.mcap) or session folder. RecordingError where it is neither, with the reason."""
+    if Path(path).suffix == ".json":
+        raise RecordingError(f"{path}: a recording or a session folder is opened here; open a model with open_model")
     return Session(read(Path(path)))
 
 

@@ -93,6 +93,10 @@ def write_inputs(folder: Path, run: Run) -> None:
     q = rng.uniform(-2.0, 2.0, (20, len(LINKS)))
     _session(folder / "tracker", q, seen(q + np.array([0.0, 2e-4, 3e-4]), rng))
     _session(folder / "other", q, seen(q, rng))
+    again = np.tile(q[:4], (3, 1))
+    _session(folder / "cycled", again, seen(again, rng))
+    cycles = "".join(f"[[block.pose]]\nq_rad = {one.tolist()}\nrepeat = {k}\n" for k, one in enumerate(q[:4], start=1))
+    (folder / "cycles.toml").write_text(f'schema = 1\nrig = "three-joints"\n[[block]]\n{cycles}', encoding="utf-8")
     turned = np.tile([0.2, -0.9, 0.8], (20, 1))
     for row in range(20):
         turned[row, 1 + row // 10] += -1.2 + 2.4 * (row % 10) / 9.0

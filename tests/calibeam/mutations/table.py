@@ -31,7 +31,7 @@ SMALL = "--arms 500 --poses 2"  # of an error simulation
 DAILY, ENDURE = 20, 300
 FEW, FEWER = 8, 4  # daily, of commands that take half a second, or two, of a core on a small valid input
 DAILY_OF = dict.fromkeys(
-    ("diagnose", "compare", "design", "correct", "export-model", "rig", "centre"), FEW
+    ("diagnose", "compare", "design", "correct", "export-model", "rig", "centre", "iso9283"), FEW
 ) | dict.fromkeys(("report", "replay", "reconcile"), FEWER)
 
 
@@ -140,6 +140,9 @@ MODELS = (
     Pair("arm.json", "correct arm.json poses.csv --out made.csv"),
     Pair("poses.csv", "correct arm.json poses.csv --out made.csv"),
     Pair("weld.src", "correct arm.json weld.src --out made.src"),
+    Pair("model.json", "iso9283 evaluate cycled --model model.json --out made.json"),
+    Pair("cycled/samples.csv", "iso9283 evaluate cycled --model model.json --frame fit --out made.json"),
+    Pair("cycled/rig.toml", "iso9283 evaluate cycled/samples.csv --rig cycled/rig.toml --out made.json"),
     Pair("model.json", "export-model model.json --to urdf --out made.urdf"),
     Pair("physics.json", "export-model physics.json --to mjcf --out made.xml"),
     Pair("model.json", "replay tracker --model model.json --out made.mcap"),
@@ -160,6 +163,7 @@ RIGS = (
     Pair("dh.csv", "rig new --from-dh dh.csv --out made.toml"),
     Pair("rig.toml", "log encoders rig.toml --out made --for-s 0"),
     Pair("rig.toml", "design rig.toml --poses 8 --repeats 0 --candidates 4"),
+    Pair("rig.toml", "iso9283 plan rig.toml --cycles 2 --centre-m 0.5 0 0.3 --edge-m 0.2 --out made.toml"),
     Pair("rig.toml", "move rig.toml --home --dry-run"),
     Pair("rig.toml", "jog rig.toml --axis z --by-mm 1 --dry-run"),
     Pair("rig.toml", "motion --rig rig.toml --out points.csv"),
@@ -176,6 +180,7 @@ RIGS = (
     Pair("guided/rig.toml", f"simulate-errors guided/rig.toml --only joint2.* {SMALL}"),
 )
 PLANS = (
+    Pair("cycles.toml", "iso9283 evaluate cycled --plan cycles.toml --out made.json"),
     Pair("plan.toml", "session rig.toml --plan plan.toml --out made --yes"),
     Pair("fit.toml", "identify tracker --plan fit.toml"),
     Pair("task.toml", "move rig.toml --task task.toml --position bin --dry-run"),
