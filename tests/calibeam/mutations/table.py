@@ -90,12 +90,12 @@ def _of_sessions() -> Iterator[Pair]:
     """Whatever reads a session folder or a recording."""
     for file in ("tracker/samples.csv", "tracker/rig.toml", "columns/samples.parquet", "recording.mcap"):
         what = file if file.endswith(".mcap") else file.partition("/")[0]
+        yield Pair(file, f"check {what}" if "rig" not in file else "check tracker")
         yield Pair(file, f"identify {what} --export urdf --export json")
         yield Pair(file, f"diagnose {what}")
         yield Pair(file, f"report {what}")
         yield Pair(file, f"compare {what} other")
         yield Pair(file, f"export {what} --out made")
-        yield Pair(file, f"check {what}" if "rig" not in file else "check tracker")
         if not file.endswith(".mcap"):
             yield Pair(file, f"import {what} --out made.mcap")
     for folder in ("dual-psd", "cones", "wire"):
