@@ -26,7 +26,7 @@ from drivers.ur.reader import UrReader
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
 
-SMALL = PlanOptions(centred=1, off_centre=1, repeats=1)  # about 5 s at the tests' pace
+SMALL = PlanOptions(centred=2, off_centre=2, repeats=1)  # about 8 s at the tests' pace
 
 
 class Takes:
@@ -81,7 +81,7 @@ def test_a_whole_session_is_in_the_recording(takes: Takes) -> None:
     summary = takes.run()
     recording = takes.recording()
     assert recording.complete
-    assert len(recording.samples) == len(summary.samples) == 8
+    assert len(recording.samples) == len(summary.samples) == 12
     assert set(recording.streams) == {"psd", "spots", "robot", "encoders"}
     assert recording.streams["psd"].gaps == ()
     assert recording.streams["robot"].gaps == ()
@@ -148,7 +148,7 @@ def test_a_box_at_its_slowest_rate_serves_a_session(takes: Takes) -> None:
     """At 100 Hz every frame holds one sample, and a glance few."""
     psd = msgspec.structs.replace(takes.rig.devices.psd, rate_hz=100.0)
     takes.rig = msgspec.structs.replace(takes.rig, devices=msgspec.structs.replace(takes.rig.devices, psd=psd))
-    assert len(takes.run().samples) == 8
+    assert len(takes.run().samples) == 12
 
 
 def test_a_full_disk_stops_the_arm_and_keeps_what_was_written(takes: Takes, full_after: Callable) -> None:
