@@ -3,6 +3,7 @@
 import re
 from functools import cache
 from pathlib import Path
+from typing import Any, TextIO
 
 import pytest
 
@@ -56,6 +57,20 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if on_wires(item.path):
             item.add_marker("wired")
+
+
+@pytest.fixture
+def bare_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures of a page are painted, but not set out and written, which takes seconds a page.
+
+    For tests of what stands beside them; whole pages are those of tests/calibrate/report.
+    """
+
+    def bare(figure: Any, file: TextIO, **_: object) -> None:
+        width, height = 72.0 * figure.get_size_inches()
+        file.write(f'<svg viewBox="0 0 {width:g} {height:g}"></svg>')
+
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", bare)
 
 
 @cache

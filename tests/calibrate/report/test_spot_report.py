@@ -99,7 +99,7 @@ def test_all_chapters_are_there_and_the_point_constraint_only_where_it_is_asked_
     assert page.count("<svg") >= 9
 
 
-def test_the_point_constraint_stands_beside_the_fit_where_the_plan_names_it(recorded, spots) -> None:
+def test_the_point_constraint_stands_beside_the_fit_where_the_plan_names_it(recorded, spots, bare_figures) -> None:
     planned = Planned(parse_plan(PLAN, "fit.toml"), PLAN)
     found = identify_session(recorded, planned)
     assert found.point_constraints is not None
