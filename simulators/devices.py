@@ -15,7 +15,7 @@ from simulators.faults.injector import Injector
 from simulators.hand.world import HandWorld
 from simulators.host.errors import HostError
 from simulators.host.loop import Host
-from simulators.wire import Bench, SerialPort, TcpPort
+from simulators.wire import Bench, SerialPort, TcpPort, UdpPort
 from simulators.world.world import World
 
 DEFAULT_BITRATE = 1_000_000
@@ -33,11 +33,13 @@ class EmulatedDevices:
     encoders: Bench | None
     robot: Bench | None
     camera: Bench | None = None
+    tracker: Bench | None = None
     injectors: Mapping[str, Injector] = field(default_factory=dict[str, Injector])  # by the announcement's names
 
     @property
     def benches(self) -> list[Bench]:
-        return [bench for bench in (self.psd, self.encoders, self.robot, self.camera) if bench is not None]
+        every = (self.psd, self.encoders, self.robot, self.camera, self.tracker)
+        return [bench for bench in every if bench is not None]
 
 
 def build_devices(world: World | HandWorld, rig: Mapping[str, Any], robot_host: str | None) -> EmulatedDevices:
@@ -47,15 +49,18 @@ def build_devices(world: World | HandWorld, rig: Mapping[str, Any], robot_host: 
     psd = _build(PSDS[wanted["psd"].get("driver", PSD_DAQ)], light, rig) if "psd" in wanted else None
     encoders = _build("encoders", world, rig) if "encoders" in wanted else None
     robot = _robot(world, rig, wanted["robot"], robot_host) if "robot" in wanted else None
+    tracker = _build("tracker", world, rig) if "tracker" in wanted else None
     faulty = {
         name: with_faults(name, bench, light if bench is psd else None)
-        for name, bench in (("psd", psd), ("can", encoders), ("robot", robot))
+        for name, bench in (("psd", psd), ("can", encoders), ("robot", robot), ("tracker", tracker))
         if bench is not None
     }
     benches = {name: bench for name, (bench, _) in faulty.items()}
     injectors = {name: injector for name, (_, injector) in faulty.items()}
     camera = _build("camera", world, rig, world.truth.seed) if "camera" in rig else None
-    return EmulatedDevices(benches.get("psd"), benches.get("can"), benches.get("robot"), camera, injectors)
+    return EmulatedDevices(
+        benches.get("psd"), benches.get("can"), benches.get("robot"), camera, benches.get("tracker"), injectors
+    )
 
 
 def _robot(
@@ -89,24 +94,30 @@ def without_links(devices: EmulatedDevices) -> EmulatedDevices:
         ports = [replace(port, link=None) if isinstance(port, SerialPort) else port for port in bench.ports]
         return replace(bench, ports=ports)
 
-    camera = devices.camera
-    if camera is not None:
-        ports = [replace(port, port=0) if isinstance(port, TcpPort) else port for port in camera.ports]
-        camera = replace(camera, ports=ports)
+    camera = _anywhere(devices.camera)
     return replace(
         devices,
         psd=unlinked(devices.psd),
         encoders=unlinked(devices.encoders),
         robot=unlinked(devices.robot),
         camera=camera,
+        tracker=_anywhere(unlinked(devices.tracker)),
     )
+
+
+def _anywhere(bench: Bench | None) -> Bench | None:
+    """Listening where the system has room."""
+    if bench is None:
+        return None
+    ports = [replace(port, port=0) if isinstance(port, TcpPort) else port for port in bench.ports]
+    return replace(bench, ports=ports)
 
 
 def check_private(devices: EmulatedDevices) -> None:
     """HostError when a device would listen where other machines reach it: their protocols know no password."""
     for bench in devices.benches:
         for port in bench.ports:
-            if isinstance(port, TcpPort) and not is_loopback(port.host):
+            if isinstance(port, TcpPort | UdpPort) and not is_loopback(port.host):
                 raise HostError(
                     f"{port.name}: {port.host} can be reached from the network, and {port.name} knows no password; "
                     "emulate on one of 127.0.0.x, or ask for it with --expose"
@@ -137,6 +148,8 @@ def addresses(host: Host, devices: EmulatedDevices, rig: Mapping[str, Any]) -> d
         found["robot"] = _robot_address(host, devices.robot, rig["devices"]["robot"].get("driver", UR))
     if devices.camera is not None:
         found["camera"] = {"source": _source(*host.tcp_address(devices.camera.ports[0].name))}
+    if devices.tracker is not None:
+        found["tracker"] = _tracker_address(host, devices.tracker.ports[0])
     control_host, control_port = host.tcp_address("control")
     found["control"] = {"host": control_host, "port": control_port}
     return found
@@ -150,6 +163,13 @@ def _robot_address(host: Host, robot: Bench, driver: str) -> dict[str, Any]:
     if driver != "modbus":
         return {"host": sockets[0].host}
     address, number = host.tcp_address(sockets[0].name)
+    return {"host": address, "port": number}
+
+
+def _tracker_address(host: Host, port: SerialPort | TcpPort | UdpPort) -> dict[str, Any]:
+    if isinstance(port, SerialPort):
+        return {"serial_port": host.serial_address(port.name)}
+    address, number = (port.host, port.port) if isinstance(port, UdpPort) else host.tcp_address(port.name)
     return {"host": address, "port": number}
 
 
