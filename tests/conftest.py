@@ -32,6 +32,7 @@ WIRED = (
     "calibeam/test_psd_check_cli.py",
     "calibeam/test_same_on_wires.py",
     "calibeam/test_wired_session.py",
+    "calibeam/tracked/test_wired_tracker.py",
     "drivers",
     "simulators/encoders",
     "simulators/faults",

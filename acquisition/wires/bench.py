@@ -168,7 +168,7 @@ class WiredBench:
     def look(self, dwell_s: float) -> Look:
         self.supervisor.check()
         seen_s = self.clock.now_s()
-        begin_s = self._psd_time(seen_s)
+        begin_s = device_time(self.pumps.psd, seen_s, self.hurry)
         blocks: list[Block] = []
         while True:
             arrived = self.pumps.psd.wait(seen_s, SILENCE_S)
@@ -183,23 +183,12 @@ class WiredBench:
                 look = self._summed(window.between(stretch.from_s, stretch.to_s), settled=stretch.settled)
                 return replace(look, settle_s=stretch.from_s - begin_s if stretch.settled else None)
 
-    def _psd_time(self, host_s: float) -> float:
-        """What the PSD box's clock showed, or later, at `host_s`: earlier samples may be of before the motion ended.
-
-        The promptest sample of the last seconds ties both clocks; every other one came later than it could have, by
-        the line, this machine's load, or an emulator that fell behind. So the guess is late rather than early. The
-        seconds are of the device: an emulator that does not keep its pace falls behind all the time, and each look
-        waits for as much as it lost in them.
-        """
-        blocks = self.pumps.psd.recent(host_s - LATENESS_S / self.hurry) or self.pumps.psd.wait(-np.inf, SILENCE_S)
-        prompt_s = min(float(block.host_s[-1]) - float(block.device_s[-1]) / self.hurry for block in blocks)
-        return (host_s - prompt_s) * self.hurry
-
     def _summed(self, window: PsdWindow, *, settled: bool) -> Look:
         if self._start_s is None:
             self._start_s = float(window.device_s[0])
         psd1, psd2 = self.view.mean(window)
-        robot = self._since(self.pumps.robot, window)
+        begin_s = float(window.host_s[0])
+        robot = since(self.pumps.robot, begin_s)
         joint_degC = robot["joint_temperature_degC"][-1] if "joint_temperature_degC" in robot else ()
         temperatures = {f"joint{i + 1}": float(t) for i, t in enumerate(joint_degC)}
         q_rad = robot["actual_q_rad"]
@@ -210,7 +199,7 @@ class WiredBench:
             q_rad=q_rad.mean(axis=0),
             qd_rad_s=qd_rad_s.mean(axis=0),
             cmd_rad=self._cmd_rad.copy(),
-            encoder_rad=self._encoders(window),
+            encoder_rad=encoders_since(self.pumps.encoders, begin_s),
             psd1=psd1,
             psd2=psd2,
             temperatures_degC={**window.mean_temperature(), **temperatures},
@@ -218,20 +207,34 @@ class WiredBench:
             window_s=(float(window.device_s[0]), float(window.device_s[-1])),
         )
 
-    def _encoders(self, window: PsdWindow) -> Floats | None:
-        """Mean of the link-side encoders (joint,), NaN for one that did not answer."""
-        if self.pumps.encoders is None:
-            return None
-        each = self._since(self.pumps.encoders, window)["position_rad"]
-        answered = np.isfinite(each)
-        count = answered.sum(axis=0)
-        return np.where(count > 0, np.where(answered, each, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
 
-    def _since(self, pump: Pump, window: PsdWindow) -> dict[str, Floats]:
-        """Every channel of the samples that arrived since the window began, at least one: the arm stands, so one that
-        comes a little after the window serves as well.
-        """
-        begin_s = float(window.host_s[0])
-        blocks = pump.recent(begin_s) or pump.wait(begin_s, SILENCE_S)
-        keep = np.concatenate([block.host_s for block in blocks]) >= begin_s
-        return {name: np.concatenate([block.values[name] for block in blocks])[keep] for name in blocks[0].values}
+def device_time(pump: Pump, host_s: float, hurry: float) -> float:
+    """What a device's clock showed, or later, at `host_s`: earlier samples may be of before the motion ended.
+
+    The promptest sample of the last seconds ties both clocks; every other one came later than it could have, by
+    the line, this machine's load, or an emulator that fell behind. So the guess is late rather than early. The
+    seconds are of the device: an emulator that does not keep its pace falls behind all the time, and each look
+    waits for as much as it lost in them.
+    """
+    blocks = pump.recent(host_s - LATENESS_S / hurry) or pump.wait(-np.inf, SILENCE_S)
+    prompt_s = min(float(block.host_s[-1]) - float(block.device_s[-1]) / hurry for block in blocks)
+    return (host_s - prompt_s) * hurry
+
+
+def encoders_since(pump: Pump | None, begin_s: float) -> Floats | None:
+    """Mean of the link-side encoders (joint,), NaN for one that did not answer; None: there are none."""
+    if pump is None:
+        return None
+    each = since(pump, begin_s)["position_rad"]
+    answered = np.isfinite(each)
+    count = answered.sum(axis=0)
+    return np.where(count > 0, np.where(answered, each, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
+
+
+def since(pump: Pump, begin_s: float) -> dict[str, Floats]:
+    """Every channel of the samples that arrived since the window began (host time), at least one: the arm stands, so
+    one that comes a little after the window serves as well.
+    """
+    blocks = pump.recent(begin_s) or pump.wait(begin_s, SILENCE_S)
+    keep = np.concatenate([block.host_s for block in blocks]) >= begin_s
+    return {name: np.concatenate([block.values[name] for block in blocks])[keep] for name in blocks[0].values}

@@ -1,8 +1,8 @@
 """`calibeam check` of a rig: every device tried for a moment, and what it is, how it reads, what is wrong with it."""
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from calibeam.devices.encoders import (
 )
 from calibeam.devices.psd import psd_driver, psd_view
 from calibeam.devices.robot import robot_of
+from calibeam.devices.tracker import place_of, tracker_driver
 from drivers.clock import Clock
 from drivers.device import Block, Device
 from drivers.errors import DeviceError
@@ -35,7 +36,7 @@ from drivers.ur.reader import UrReader
 PICTURES = 3  # of the camera
 READ_S = 1.0  # host time that a device is listened to
 FIRST_SAMPLE_S = 1.0
-NAMES = ("psd", "encoders", "robot")
+NAMES = ("psd", "tracker", "encoders", "robot")
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,12 @@ class DeviceCheck:
 
 def check_devices(rig: Rig, clock: Clock) -> Iterator[DeviceCheck]:
     """One after the other, the arm stands still; devices that the rig does not name are left out."""
-    checks: dict[str, Callable[[Rig, Clock], DeviceCheck]] = {"psd": _psd, "encoders": _encoders, "robot": _robot}
+    checks: dict[str, Callable[[Rig, Clock], DeviceCheck]] = {
+        "psd": _psd,
+        "tracker": _tracker,
+        "encoders": _encoders,
+        "robot": _robot,
+    }
     for name in NAMES:
         if getattr(rig.devices, name) is None:
             continue
@@ -117,6 +123,33 @@ def _psd(rig: Rig, clock: Clock) -> DeviceCheck:
         wrong = wrong or uneven_layers(identity.faces, [k + 1 not in dark for k in (0, 1)], window.current_a)
     what = "" if identity is None else f"{identity.model} {identity.serial_number}"
     return DeviceCheck("psd", what, "" if identity is None else identity.firmware, rate_hz, told, wrong)
+
+
+def _tracker(rig: Rig, clock: Clock) -> DeviceCheck:
+    device = rig.devices.tracker
+    assert device is not None  # noqa: S101 - asked by check_devices
+    tracker = tracker_driver(device, clock)
+    with _listened(tracker, clock) as blocks:
+        position_m = np.concatenate([block.values["position_m"] for block in blocks])
+    good_m = position_m[np.isfinite(position_m).all(axis=1)]
+    rate_hz, wrong = _tracker_rate(blocks, device.rate_hz)
+    if tracker.bad_lines and tracker.last_bad is not None:
+        wrong = wrong or f"{tracker.bad_lines} lines cannot be read, the last: {tracker.last_bad.reason}"
+    what = f"{device.driver.value} from {place_of(device)}"
+    if len(good_m) < 2:
+        return DeviceCheck("tracker", what, "", rate_hz, "", "no valid reading: let it see the target")
+    x, y, z = good_m.mean(axis=0)
+    told = f"noise {1e6 * sample_noise(good_m):.2f} um a sample, target at ({x:.3f}, {y:.3f}, {z:.3f}) m"
+    if len(good_m) < len(position_m):
+        wrong = wrong or f"{len(position_m) - len(good_m)} of {len(position_m)} readings are not valid: free the beam"
+    return DeviceCheck("tracker", what, "", rate_hz, told, wrong)
+
+
+def _tracker_rate(blocks: Sequence[Block], wanted_hz: float) -> tuple[float, str]:
+    """As `sample_rate`; of an instrument without a clock by this machine's."""
+    if all(np.isfinite(block.device_s).all() for block in blocks):
+        return sample_rate(blocks, wanted_hz)
+    return sample_rate([replace(block, device_s=block.host_s) for block in blocks], wanted_hz)
 
 
 def _encoders(rig: Rig, clock: Clock) -> DeviceCheck:

@@ -10,15 +10,18 @@ from typing import Any
 from acquisition.errors import StoppedError
 from acquisition.recording import Channel, Event, RecordingError, RecordingWriter, RigFileError
 from acquisition.recording.rig import Rig
-from acquisition.recording.rig.devices import EncodersDevice, PsdDevice, RobotDevice
+from acquisition.recording.rig.devices import EncodersDevice, PsdDevice, RobotDevice, TrackerDevice
 from acquisition.wires.attaching import Guarded
 from acquisition.wires.bench import Pumps, Speeds, WiredBench
 from acquisition.wires.psd_view import PsdView, psd_window
 from acquisition.wires.streams import Pump, Supervisor
+from acquisition.wires.tracker_bench import TrackerBench, TrackerPumps
 from calibeam.devices.encoders import emulated_encoders, encoder_driver
 from calibeam.devices.psd import PsdInstrument, emulated_psd, psd_driver, psd_view
 from calibeam.devices.recorder import uninterrupted
 from calibeam.devices.robot import emulated_robot, robot_of
+from calibeam.devices.tracker import VIEWED as TRACKER_VIEWED
+from calibeam.devices.tracker import emulated_tracker, tracker_driver
 from calibeam.live.feed import PAGE_STOP, SILENT, Feed
 from calibeam.motion.gate_of_rig import gated_arm
 from calibrate.dual_psd_rig import fixture_of, laser_of
@@ -32,6 +35,7 @@ VIEWED = {
     "psd": ("flags", "temperature_degC"),
     "robot": ("actual_q_rad", "actual_qd_rad_s"),
     "encoders": ("position_rad",),
+    "tracker": TRACKER_VIEWED,
 }
 
 
@@ -40,6 +44,17 @@ class Addresses:
     """Where the devices are. `hurry`: device seconds in one second of this program's clock; 1 on site."""
 
     psd: PsdDevice
+    robot: RobotDevice
+    encoders: EncodersDevice | None
+    hurry: float = 1.0
+    emulated: bool = False
+
+
+@dataclass(frozen=True)
+class TrackerAddresses:
+    """The same of a session with a tracker."""
+
+    tracker: TrackerDevice
     robot: RobotDevice
     encoders: EncodersDevice | None
     hurry: float = 1.0
@@ -60,6 +75,10 @@ def check_session(rig: Rig) -> None:
     """What a session needs of a rig beyond what every rig file has. DataError, RigFileError; no device is touched."""
     fixture_of(rig)  # said before an hour of measuring that could not be identified
     laser_of(rig)
+    _check_driven(rig)
+
+
+def _check_driven(rig: Rig) -> None:
     if rig.motion.home_rad is None:
         raise RigFileError(
             f"rig {rig.name}: [motion] has no home_rad; give joint readings that are clear of everything"
@@ -81,6 +100,65 @@ def addresses_of(rig: Rig, emulated: Mapping[str, Any] | None = None, hurry: flo
     if encoders is not None:
         encoders = emulated_encoders(encoders, emulated["can"])
     return Addresses(psd, robot, encoders, hurry, emulated=True)
+
+
+def is_tracked(rig: Rig) -> bool:
+    """Whether a session of this rig measures with a tracker."""
+    return rig.devices.tracker is not None and rig.devices.psd is None
+
+
+def check_tracked_session(rig: Rig) -> None:
+    """What a session with a tracker needs of a rig. RigFileError; no device is touched."""
+    if rig.tool.point_m is None:
+        raise RigFileError(f"rig {rig.name}: [tool] has no point_m; say where the target is at the flange")
+    _check_driven(rig)
+
+
+def tracker_addresses_of(rig: Rig, emulated: Mapping[str, Any] | None = None, hurry: float = 1.0) -> TrackerAddresses:
+    """As `addresses_of`, of a rig with a tracker."""
+    tracker, robot, encoders = rig.devices.tracker, rig.devices.robot, rig.devices.encoders
+    if tracker is None or robot is None:
+        missing = "tracker" if tracker is None else "robot"
+        raise DeviceRefused(f"rig {rig.name}: no [devices.{missing}]; a session needs the tracker and the controller")
+    if emulated is None:
+        return TrackerAddresses(tracker, robot, encoders, hurry)
+    if encoders is not None:
+        encoders = emulated_encoders(encoders, emulated["can"])
+    tracker, robot = emulated_tracker(tracker, emulated["tracker"]), emulated_robot(robot, emulated["robot"])
+    return TrackerAddresses(tracker, robot, encoders, hurry, emulated=True)
+
+
+@contextmanager
+def connected_tracker(
+    rig: Rig, addresses: TrackerAddresses, writer: RecordingWriter, clock: Clock, feed: Feed = SILENT
+) -> Generator[TrackerBench]:
+    """The bench of a tracker on wires, its readers running. At the end the arm is stopped, every port released."""
+    with ExitStack() as cleaning:
+        robot = robot_of(addresses.robot, clock, addresses.hurry)
+        arm = robot.arm()
+        supervisor = Supervisor(arm.hold, clock)
+        cleaning.callback(feed.stops_by, None)
+        feed.stops_by(partial(supervisor.stop, StoppedError(PAGE_STOP)))  # while connecting, too
+        kept = Kept(writer, clock, supervisor, feed)
+        tracker = tracker_driver(addresses.tracker, clock, addresses.hurry)
+        pumps = TrackerPumps(
+            tracker=cleaning.enter_context(_pumped(tracker, kept)),
+            robot=cleaning.enter_context(_pumped(robot.reader, kept)),
+            encoders=_encoders(addresses, kept, cleaning),
+        )
+        cleaning.callback(_released, arm)
+        _connect_arm(arm, supervisor)
+        speeds = Speeds(rig.motion.speed_rad_s, rig.motion.acceleration_rad_s2)
+        gated = gated_arm(arm, rig, pumps.robot)
+        yield TrackerBench(gated, pumps, speeds, supervisor, clock, addresses.tracker.rate_hz, addresses.hurry)
+
+
+def _connect_arm(arm: Movable, supervisor: Supervisor) -> None:
+    try:
+        arm.connect()
+    except DeviceError:
+        supervisor.check()  # another device failed meanwhile, and its stop ended this too: that is the news
+        raise
 
 
 @contextmanager
@@ -108,11 +186,7 @@ def connected(
         )
         feed.sees(psd_view(psd, addresses.psd))
         cleaning.callback(_released, arm)
-        try:
-            arm.connect()
-        except DeviceError:
-            supervisor.check()  # another device failed meanwhile, and its stop ended this too: that is the news
-            raise
+        _connect_arm(arm, supervisor)
         speeds = Speeds(rig.motion.speed_rad_s, rig.motion.acceleration_rad_s2)
         gated = gated_arm(arm, rig, pumps.robot)
         yield WiredBench(gated, pumps, psd_view(psd, addresses.psd), speeds, supervisor, clock, place, addresses.hurry)
@@ -123,7 +197,7 @@ def _released(arm: Movable) -> None:
         arm.close()
 
 
-def _encoders(addresses: Addresses, kept: Kept, cleaning: ExitStack) -> Pump | None:
+def _encoders(addresses: Addresses | TrackerAddresses, kept: Kept, cleaning: ExitStack) -> Pump | None:
     device = addresses.encoders
     if device is None:
         return None

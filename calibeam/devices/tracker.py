@@ -14,6 +14,7 @@ from drivers.transports.serial_port import SerialAddress, open_serial
 from drivers.transports.socket_line import TcpLine, UdpReceiver
 from drivers.transports.transport import Transport
 
+VIEWED = ("position_m", "good")  # channels that viewers show at once
 EVERYWHERE = "0.0.0.0"  # noqa: S104 - where datagrams are awaited when the rig file names no address of this machine
 
 

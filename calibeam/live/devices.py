@@ -12,6 +12,7 @@ from acquisition.wires.attaching import Guarded, one_error_tree
 from calibeam.devices.encoders import encoder_driver
 from calibeam.devices.psd import psd_driver, psd_view
 from calibeam.devices.robot import robot_of
+from calibeam.devices.tracker import tracker_driver
 from calibeam.live.feed import Feed
 from drivers.clock import Clock
 from drivers.device import Device
@@ -40,6 +41,8 @@ def devices_of(rig: Rig, clock: Clock, feed: Feed) -> list[Watched]:
     if rig.devices.psd is not None:
         given, psd = rig.devices.psd, psd_driver(rig.devices.psd, rig, clock)
         watched.append(Watched(psd, lambda: feed.sees(psd_view(psd, given))))
+    if rig.devices.tracker is not None:
+        watched.append(Watched(tracker_driver(rig.devices.tracker, clock)))
     if rig.devices.encoders is not None:
         watched.append(Watched(encoder_driver(rig.devices.encoders, clock)))
     if rig.devices.robot is not None:

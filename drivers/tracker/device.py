@@ -4,7 +4,8 @@ One thread uses it at a time, except `close`, which any thread may call. It star
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,7 @@ from drivers.tracker.layout import FARTHEST_M, Parse, TargetReading
 from drivers.transports.transport import Transport
 
 FIRST_LINE_S = 2.0  # after the connection; a stream of 1 Hz has one by then
+HEADER_LINES = 20  # lines that cannot be read, before the first reading; some exporters begin with a heading
 WRITE_S = 1.0
 READ_BYTES = 65536
 SLOWEST_HZ = 5.0  # a reader calls a device silent after 0.5 s
@@ -72,15 +74,25 @@ class LineTracker(StreamDevice[Transport]):
         self.last_bad: BadLine | None = None
 
     def _open(self) -> Transport:
-        return self._open_line()
+        with self._named():
+            return self._open_line()
+
+    @contextmanager
+    def _named(self) -> Generator[None]:
+        """A line that is lost is that of this instrument."""
+        try:
+            yield
+        except DeviceLost as lost:
+            raise DeviceLost(f"{self.name}: {lost}") from lost
 
     def _set_up(self, line: Transport) -> None:
         """The first line tells whether the right instrument is there. DeviceStale, DeviceRefused, DeviceLost."""
         self._reset()
         if self._dialogue.start:
-            line.write(self._dialogue.start, WRITE_S)
+            with self._named():
+                line.write(self._dialogue.start, WRITE_S)
         deadline_s = self._clock.now_s() + FIRST_LINE_S
-        while not self._pending and (left_s := self._left_s(deadline_s)) > 0.0:
+        while not self._pending and self.bad_lines < HEADER_LINES and (left_s := self._left_s(deadline_s)) > 0.0:
             self._receive(left_s)
         if self._pending:
             return
@@ -140,9 +152,11 @@ class LineTracker(StreamDevice[Transport]):
                 self._clock.sleep_s(min(wait_s, timeout_s))
                 if wait_s >= timeout_s:
                     return
-            line.write(self._dialogue.trigger, WRITE_S)
+            with self._named():
+                line.write(self._dialogue.trigger, WRITE_S)
             self._awaiting, self._due_s = True, self._clock.now_s() + self._period_s
-        data = line.read(READ_BYTES, timeout_s)
+        with self._named():
+            data = line.read(READ_BYTES, timeout_s)
         host_s = self._clock.now_s()
         for found in self._codec.feed(data):
             self._awaiting = False

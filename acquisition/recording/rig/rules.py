@@ -212,6 +212,8 @@ def _instrument_faults(rig: Rig) -> Iterator[Fault]:
         yield from _psd_faults(rig.devices.psd)
     if rig.devices.tracker is not None:
         yield from _tracker_faults(rig.devices.tracker)
+        if rig.devices.psd is not None:
+            yield TRACKER, "a session measures with [devices.psd] or with [devices.tracker]; write two rig files"
     if rig.devices.encoders is not None:
         yield from _bus_faults(rig.devices.encoders)
         yield from _encoder_faults(rig.devices.encoders, rig.n_joints)

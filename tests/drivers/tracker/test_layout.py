@@ -21,8 +21,12 @@ def test_columns_units_and_status() -> None:
 
 
 def test_decimal_comma_blanks_and_a_separator_at_the_end() -> None:
-    assert ascii_lines(("x", "y", "z"), ";", ",", MM)("1,5;-2,25;1000,0;").position_m == pytest.approx((0.0015, -0.00225, 1.0))
-    assert ascii_lines(("x", "y", "z"), " ", ".", MM)("  1.5\t 2   3 ").position_m == pytest.approx((0.0015, 0.002, 0.003))
+    assert ascii_lines(("x", "y", "z"), ";", ",", MM)("1,5;-2,25;1000,0;").position_m == pytest.approx(
+        (0.0015, -0.00225, 1.0)
+    )
+    assert ascii_lines(("x", "y", "z"), " ", ".", MM)("  1.5\t 2   3 ").position_m == pytest.approx(
+        (0.0015, 0.002, 0.003)
+    )
     assert ascii_lines(("x", "y", "z"), ",", ".", Units(0.0254))("1,2,3").position_m[0] == 0.0254
 
 
