@@ -15,6 +15,7 @@ from simulators.faults.injector import Injector
 from simulators.hand.world import HandWorld
 from simulators.host.errors import HostError
 from simulators.host.loop import Host
+from simulators.plug_ins import plug_in_bench
 from simulators.wire import Bench, SerialPort, TcpPort, UdpPort
 from simulators.world.world import World
 
@@ -34,11 +35,12 @@ class EmulatedDevices:
     robot: Bench | None
     camera: Bench | None = None
     tracker: Bench | None = None
+    others: Mapping[str, Bench] = field(default_factory=dict[str, Bench])  # of plug-ins, by name
     injectors: Mapping[str, Injector] = field(default_factory=dict[str, Injector])  # by the announcement's names
 
     @property
     def benches(self) -> list[Bench]:
-        every = (self.psd, self.encoders, self.robot, self.camera, self.tracker)
+        every = (self.psd, self.encoders, self.robot, self.camera, self.tracker, *self.others.values())
         return [bench for bench in every if bench is not None]
 
 
@@ -55,11 +57,23 @@ def build_devices(world: World | HandWorld, rig: Mapping[str, Any], robot_host: 
         for name, bench in (("psd", psd), ("can", encoders), ("robot", robot), ("tracker", tracker))
         if bench is not None
     }
+    others = [str(other["name"]) for other in wanted.get("other", ())]
+    faulty |= {
+        other["name"]: with_faults(other["name"], bench)
+        for other in wanted.get("other", ())
+        if (bench := plug_in_bench(world, other)) is not None
+    }
     benches = {name: bench for name, (bench, _) in faulty.items()}
     injectors = {name: injector for name, (_, injector) in faulty.items()}
     camera = _build("camera", world, rig, world.truth.seed) if "camera" in rig else None
     return EmulatedDevices(
-        benches.get("psd"), benches.get("can"), benches.get("robot"), camera, benches.get("tracker"), injectors
+        benches.get("psd"),
+        benches.get("can"),
+        benches.get("robot"),
+        camera,
+        benches.get("tracker"),
+        {name: benches[name] for name in others if name in benches},
+        injectors,
     )
 
 
@@ -102,7 +116,21 @@ def without_links(devices: EmulatedDevices) -> EmulatedDevices:
         robot=unlinked(devices.robot),
         camera=camera,
         tracker=_anywhere(unlinked(devices.tracker)),
+        others={name: _elsewhere(bench) for name, bench in devices.others.items()},
     )
+
+
+def _elsewhere(bench: Bench) -> Bench:
+    """On ports that only the announcement names."""
+    ports = [
+        replace(port, link=None)
+        if isinstance(port, SerialPort)
+        else replace(port, port=0)
+        if isinstance(port, TcpPort)
+        else port
+        for port in bench.ports
+    ]
+    return replace(bench, ports=ports)
 
 
 def _anywhere(bench: Bench | None) -> Bench | None:
@@ -149,7 +177,9 @@ def addresses(host: Host, devices: EmulatedDevices, rig: Mapping[str, Any]) -> d
     if devices.camera is not None:
         found["camera"] = {"source": _source(*host.tcp_address(devices.camera.ports[0].name))}
     if devices.tracker is not None:
-        found["tracker"] = _tracker_address(host, devices.tracker.ports[0])
+        found["tracker"] = _first_address(host, devices.tracker.ports[0])
+    for name, bench in devices.others.items():
+        found[name] = _first_address(host, bench.ports[0])
     control_host, control_port = host.tcp_address("control")
     found["control"] = {"host": control_host, "port": control_port}
     return found
@@ -166,7 +196,7 @@ def _robot_address(host: Host, robot: Bench, driver: str) -> dict[str, Any]:
     return {"host": address, "port": number}
 
 
-def _tracker_address(host: Host, port: SerialPort | TcpPort | UdpPort) -> dict[str, Any]:
+def _first_address(host: Host, port: SerialPort | TcpPort | UdpPort) -> dict[str, Any]:
     if isinstance(port, SerialPort):
         return {"serial_port": host.serial_address(port.name)}
     address, number = (port.host, port.port) if isinstance(port, UdpPort) else host.tcp_address(port.name)

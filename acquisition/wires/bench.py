@@ -4,7 +4,7 @@ Readings have settled when two neighbouring short windows of the spots agree wit
 box's own sample times, so that the rule is the same whether the world runs in real time or faster.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -92,6 +92,7 @@ def _agree(one: Floats, two: Floats, rule: SettleRule) -> bool:
 
 LATENESS_S = 2.0  # of device time looked back on, to learn how early a PSD sample can arrive at all
 SOFT_S = 0.8  # within which a pause brakes at most: rigs with a gentler acceleration are braked harder
+DEGC = "_degC"
 SILENCE_S = 0.5  # host time without a sample after which a wait gives up
 
 
@@ -125,6 +126,7 @@ class WiredBench:
     place: Callable[[int], None]
     hurry: float = 1.0  # device seconds in one second of this program's clock
     rule: SettleRule = field(default_factory=SettleRule)
+    beside: Mapping[str, Pump] = field(default_factory=dict[str, Pump])  # further instruments, by name
     _cmd_rad: Floats = field(default_factory=lambda: np.empty(0), init=False)
     _start_s: float | None = field(default=None, init=False)
 
@@ -202,7 +204,7 @@ class WiredBench:
             encoder_rad=encoders_since(self.pumps.encoders, begin_s),
             psd1=psd1,
             psd2=psd2,
-            temperatures_degC={**window.mean_temperature(), **temperatures},
+            temperatures_degC={**window.mean_temperature(), **temperatures, **temperatures_beside(self.beside)},
             settled=settled,
             window_s=(float(window.device_s[0]), float(window.device_s[-1])),
         )
@@ -229,6 +231,19 @@ def encoders_since(pump: Pump | None, begin_s: float) -> Floats | None:
     answered = np.isfinite(each)
     count = answered.sum(axis=0)
     return np.where(count > 0, np.where(answered, each, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
+
+
+def temperatures_beside(pumps: Mapping[str, Pump]) -> dict[str, float]:
+    """The newest of every temperature that further instruments measure: by their names, or name and channel."""
+    found: dict[str, float] = {}
+    for name, pump in pumps.items():
+        block = pump.latest()
+        for channel, values in () if block is None else block.values.items():
+            if channel.endswith(DEGC) and values.ndim == 1 and np.isfinite(values[-1]):
+                found[name if channel == f"temperature{DEGC}" else f"{name}_{channel.removesuffix(DEGC)}"] = float(
+                    values[-1]
+                )
+    return found
 
 
 def since(pump: Pump, begin_s: float) -> dict[str, Floats]:

@@ -4,7 +4,7 @@ Settling is judged as before two detectors (`bench`): neighbouring short windows
 instrument without a clock of its own is taken to keep the rate that its rig file states.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,6 +19,7 @@ from acquisition.wires.bench import (
     encoders_since,
     since,
     stretch_to_average,
+    temperatures_beside,
 )
 from acquisition.wires.streams import Pump, Supervisor
 from drivers.clock import Clock
@@ -67,6 +68,7 @@ class TrackerBench:
     rate_hz: float
     hurry: float = 1.0
     rule: SettleRule = field(default_factory=lambda: SettleRule(limit_s=3.0))
+    beside: Mapping[str, Pump] = field(default_factory=dict[str, Pump])  # further instruments, by name
     _cmd_rad: Floats = field(default_factory=lambda: np.empty(0), init=False)
     _start_s: float | None = field(default=None, init=False)
 
@@ -130,7 +132,11 @@ class TrackerBench:
             position_m=good_m.mean(axis=0) if enough else nowhere,
             sigma_m=good_m.std(axis=0, ddof=1) / np.sqrt(len(good_m)) if enough else nowhere,
             samples=len(good_m),
-            temperatures_degC=air | {f"joint{i + 1}": float(t) for i, t in enumerate(joint_degC)},
+            temperatures_degC={
+                **air,
+                **{f"joint{i + 1}": float(t) for i, t in enumerate(joint_degC)},
+                **temperatures_beside(self.beside),
+            },
             settled=settled,
         )
 

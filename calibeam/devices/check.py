@@ -11,7 +11,7 @@ from acquisition.errors import AcquisitionError
 from acquisition.recording import RigFileError
 from acquisition.recording.files import brief
 from acquisition.recording.rig import Camera, Rig
-from acquisition.recording.rig.devices import EncoderDriver, RobotDriver
+from acquisition.recording.rig.devices import EncoderDriver, OtherDevice, RobotDriver
 from acquisition.wires.attaching import one_error_tree
 from acquisition.wires.psd_view import psd_window
 from calibeam.devices.camera import camera_sight
@@ -23,6 +23,7 @@ from calibeam.devices.encoders import (
     sample_rate,
     uneven_layers,
 )
+from calibeam.devices.others import other_drivers
 from calibeam.devices.psd import psd_driver, psd_view
 from calibeam.devices.robot import robot_of
 from calibeam.devices.tracker import place_of, tracker_driver
@@ -75,6 +76,12 @@ def check_devices(rig: Rig, clock: Clock) -> Iterator[DeviceCheck]:
                 yield checks[name](rig, clock)
         except DeviceError as error:
             yield DeviceCheck(name, wrong=str(error))
+    for other in rig.devices.others:
+        try:
+            with one_error_tree(other.name, "checking"):
+                yield _other(other, clock)
+        except DeviceError as error:
+            yield DeviceCheck(other.name, wrong=str(error))
     if rig.camera is not None:
         try:
             yield _camera(rig, rig.camera, clock)
@@ -143,6 +150,23 @@ def _tracker(rig: Rig, clock: Clock) -> DeviceCheck:
     if len(good_m) < len(position_m):
         wrong = wrong or f"{len(position_m) - len(good_m)} of {len(position_m)} readings are not valid: free the beam"
     return DeviceCheck("tracker", what, "", rate_hz, told, wrong)
+
+
+def _other(other: OtherDevice, clock: Clock) -> DeviceCheck:
+    """Of a plug-in's instrument all that can be told is that it sends, and how fast."""
+    (found,) = other_drivers((other,), clock)
+    try:
+        found.device.connect()
+        block = found.device.read(found.silence_s)
+        channels = ", ".join(channel.name for channel in found.device.describe())
+        begin_s, count = clock.now_s(), 0
+        while clock.now_s() - begin_s < READ_S:
+            block = found.device.read(found.silence_s)
+            count += len(block.host_s)
+        rate_hz = count / max(float(block.host_s[-1]) - begin_s, READ_S)
+    finally:
+        found.device.close()
+    return DeviceCheck(other.name, f"{channels} by {found.package}", rate_hz=rate_hz)
 
 
 def _tracker_rate(blocks: Sequence[Block], wanted_hz: float) -> tuple[float, str]:

@@ -1,7 +1,7 @@
 """Connects the devices of a rig, whether real or emulated, and runs their readers into the recording."""
 
 import itertools
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
@@ -10,13 +10,14 @@ from typing import Any
 from acquisition.errors import StoppedError
 from acquisition.recording import Channel, Event, RecordingError, RecordingWriter, RigFileError
 from acquisition.recording.rig import Rig
-from acquisition.recording.rig.devices import EncodersDevice, PsdDevice, RobotDevice, TrackerDevice
+from acquisition.recording.rig.devices import EncodersDevice, OtherDevice, PsdDevice, RobotDevice, TrackerDevice
 from acquisition.wires.attaching import Guarded
-from acquisition.wires.bench import Pumps, Speeds, WiredBench
+from acquisition.wires.bench import SILENCE_S, Pumps, Speeds, WiredBench
 from acquisition.wires.psd_view import PsdView, psd_window
-from acquisition.wires.streams import Pump, Supervisor
+from acquisition.wires.streams import STALE_S, Pump, Supervisor
 from acquisition.wires.tracker_bench import TrackerBench, TrackerPumps
 from calibeam.devices.encoders import emulated_encoders, encoder_driver
+from calibeam.devices.others import Other, emulated_others, other_drivers
 from calibeam.devices.psd import PsdInstrument, emulated_psd, psd_driver, psd_view
 from calibeam.devices.recorder import uninterrupted
 from calibeam.devices.robot import emulated_robot, robot_of
@@ -48,6 +49,7 @@ class Addresses:
     encoders: EncodersDevice | None
     hurry: float = 1.0
     emulated: bool = False
+    others: tuple[OtherDevice, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,7 @@ class TrackerAddresses:
     encoders: EncodersDevice | None
     hurry: float = 1.0
     emulated: bool = False
+    others: tuple[OtherDevice, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -94,12 +97,13 @@ def addresses_of(rig: Rig, emulated: Mapping[str, Any] | None = None, hurry: flo
         missing = "psd" if psd is None else "robot"
         raise DeviceRefused(f"rig {rig.name}: no [devices.{missing}]; a session needs the PSD box and the controller")
     if emulated is None:
-        return Addresses(psd, robot, encoders, hurry)
+        return Addresses(psd, robot, encoders, hurry, others=rig.devices.others)
     psd = emulated_psd(psd, emulated["psd"])
     robot = emulated_robot(robot, emulated["robot"])
     if encoders is not None:
         encoders = emulated_encoders(encoders, emulated["can"])
-    return Addresses(psd, robot, encoders, hurry, emulated=True)
+    others = emulated_others(rig.devices.others, emulated)
+    return Addresses(psd, robot, encoders, hurry, emulated=True, others=others)
 
 
 def is_tracked(rig: Rig) -> bool:
@@ -121,11 +125,12 @@ def tracker_addresses_of(rig: Rig, emulated: Mapping[str, Any] | None = None, hu
         missing = "tracker" if tracker is None else "robot"
         raise DeviceRefused(f"rig {rig.name}: no [devices.{missing}]; a session needs the tracker and the controller")
     if emulated is None:
-        return TrackerAddresses(tracker, robot, encoders, hurry)
+        return TrackerAddresses(tracker, robot, encoders, hurry, others=rig.devices.others)
     if encoders is not None:
         encoders = emulated_encoders(encoders, emulated["can"])
     tracker, robot = emulated_tracker(tracker, emulated["tracker"]), emulated_robot(robot, emulated["robot"])
-    return TrackerAddresses(tracker, robot, encoders, hurry, emulated=True)
+    others = emulated_others(rig.devices.others, emulated)
+    return TrackerAddresses(tracker, robot, encoders, hurry, emulated=True, others=others)
 
 
 @contextmanager
@@ -140,6 +145,7 @@ def connected_tracker(
         cleaning.callback(feed.stops_by, None)
         feed.stops_by(partial(supervisor.stop, StoppedError(PAGE_STOP)))  # while connecting, too
         kept = Kept(writer, clock, supervisor, feed)
+        beside = _others(other_drivers(addresses.others, clock), kept, cleaning)
         tracker = tracker_driver(addresses.tracker, clock, addresses.hurry)
         pumps = TrackerPumps(
             tracker=cleaning.enter_context(_pumped(tracker, kept)),
@@ -149,8 +155,8 @@ def connected_tracker(
         cleaning.callback(_released, arm)
         _connect_arm(arm, supervisor)
         speeds = Speeds(rig.motion.speed_rad_s, rig.motion.acceleration_rad_s2)
-        gated = gated_arm(arm, rig, pumps.robot)
-        yield TrackerBench(gated, pumps, speeds, supervisor, clock, addresses.tracker.rate_hz, addresses.hurry)
+        gated, rate_hz = gated_arm(arm, rig, pumps.robot), addresses.tracker.rate_hz
+        yield TrackerBench(gated, pumps, speeds, supervisor, clock, rate_hz, addresses.hurry, beside=beside)
 
 
 def _connect_arm(arm: Movable, supervisor: Supervisor) -> None:
@@ -179,6 +185,7 @@ def connected(
         feed.stops_by(partial(supervisor.stop, StoppedError(PAGE_STOP)))  # while connecting, too
         psd = psd_driver(addresses.psd, rig, clock, addresses.hurry)
         kept = Kept(writer, clock, supervisor, feed)
+        beside = _others(other_drivers(addresses.others, clock), kept, cleaning)
         pumps = Pumps(
             psd=cleaning.enter_context(_pumped(psd, kept, _spots_beside(psd, addresses.psd, writer))),
             robot=cleaning.enter_context(_pumped(robot.reader, kept)),
@@ -189,7 +196,8 @@ def connected(
         _connect_arm(arm, supervisor)
         speeds = Speeds(rig.motion.speed_rad_s, rig.motion.acceleration_rad_s2)
         gated = gated_arm(arm, rig, pumps.robot)
-        yield WiredBench(gated, pumps, psd_view(psd, addresses.psd), speeds, supervisor, clock, place, addresses.hurry)
+        view, hurry = psd_view(psd, addresses.psd), addresses.hurry
+        yield WiredBench(gated, pumps, view, speeds, supervisor, clock, place, hurry, beside=beside)
 
 
 def _released(arm: Movable) -> None:
@@ -203,6 +211,13 @@ def _encoders(addresses: Addresses | TrackerAddresses, kept: Kept, cleaning: Exi
         return None
     driver = encoder_driver(device, kept.clock, emulated=addresses.emulated, hurry=addresses.hurry)
     return cleaning.enter_context(_pumped(driver, kept))
+
+
+def _others(others: Sequence[Other], kept: Kept, cleaning: ExitStack) -> dict[str, Pump]:
+    """Readers of the plug-ins' instruments, by name."""
+    return {
+        one.device.name: cleaning.enter_context(_pumped(one.device, kept, silence_s=one.silence_s)) for one in others
+    }
 
 
 def _spots_beside(psd: PsdInstrument, device: PsdDevice, writer: RecordingWriter) -> Callable[[Block], None]:
@@ -228,7 +243,9 @@ def newest_s(pump: Pump) -> float | None:
 
 
 @contextmanager
-def _pumped(device: Device, kept: Kept, beside: Callable[[Block], None] = lambda block: None) -> Generator[Pump]:
+def _pumped(
+    device: Device, kept: Kept, beside: Callable[[Block], None] = lambda block: None, silence_s: float = SILENCE_S
+) -> Generator[Pump]:
     """The device connected, its blocks going into the recording until left, to the live page and to `beside`."""
 
     def keep(block: Block) -> None:
@@ -243,14 +260,17 @@ def _pumped(device: Device, kept: Kept, beside: Callable[[Block], None] = lambda
             kept.writer.event(Event(kept.clock.now_s(), "device failed", {"device": device.name, "why": str(failure)}))
 
     guarded = Guarded(device)
-    pump = Pump(guarded, kept.clock, keep, failed)
+    pump = Pump(guarded, kept.clock, keep, failed, stale_s=silence_s)
     try:
         guarded.connect()
         channels = tuple(Channel(c.name, c.unit, c.shape, c.full_scale, c.resolution) for c in device.describe())
-        viewed = tuple(name for name in VIEWED[device.name] if name in {channel.name for channel in channels})
+        scalars = tuple(channel.name for channel in channels if channel.shape == ())
+        viewed = tuple(
+            name for name in VIEWED.get(device.name, scalars) if name in {channel.name for channel in channels}
+        )
         stream = kept.writer.stream(device.name, channels, viewed)
         pump.start()
-        with kept.supervisor.watching(device.name, lambda: newest_s(pump)):
+        with kept.supervisor.watching(device.name, lambda: newest_s(pump), silence_s * STALE_S / SILENCE_S):
             yield pump
     finally:
         with uninterrupted():

@@ -39,7 +39,7 @@ def asked_rates(rig: Rig) -> dict[str, float | None]:
         rates["tracker"] = rig.devices.tracker.rate_hz
     if encoders is not None:
         rates["encoders"] = encoders.sync_hz if encoders.driver is EncoderDriver.CIA406 else None
-    return rates
+    return rates | {other.name: None for other in rig.devices.others}
 
 
 class Watch:

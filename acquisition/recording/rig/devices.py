@@ -185,6 +185,14 @@ class TrackerDevice(Struct, frozen=True, forbid_unknown_fields=True):
         return self.serial_port is not None or self.serial_number is not None
 
 
+class OtherDevice(Struct, frozen=True, forbid_unknown_fields=True):
+    """An instrument of a plug-in, recorded beside the others. Its package says which settings it takes."""
+
+    name: Annotated[str, Meta(pattern="^[a-z][a-z0-9_-]{0,31}$")]  # of its stream, and of its temperatures' columns
+    driver: Name  # entry point of the group calibeam.devices
+    settings: Mapping[Name, bool | Whole | Number | Label | Few[bool | Whole | Number | Label]] = {}
+
+
 class Devices(Struct, frozen=True, forbid_unknown_fields=True):
     """How each instrument is reached; one that is not named is not there."""
 
@@ -192,3 +200,4 @@ class Devices(Struct, frozen=True, forbid_unknown_fields=True):
     encoders: EncodersDevice | None = None
     robot: RobotDevice | None = None
     tracker: TrackerDevice | None = None
+    others: Few[OtherDevice] = field(name="other", default=())

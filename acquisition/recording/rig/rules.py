@@ -46,6 +46,7 @@ DAQ_ONLY = ("port", "serial_number")
 PAIR_ONLY = ("ports", "serial_numbers", "length_m")
 CIA406_ONLY, DBC_ONLY = ("nodes",), ("dbc", "signals", "units_per_turn")
 FASTEST_POLL_HZ = 500.0
+OWN_NAMES = ("psd", "spots", "encoders", "robot", "tracker", "camera", "can", "control")  # streams and emulators
 SLOWEST_TRACKER_HZ = 5.0  # a stream that pauses longer counts as silent
 TRACKER_COLUMNS = ("x", "y", "z", "time", "status", "temperature")
 SHORTEST = 1e-6  # feels right: no hand writes a direction so short
@@ -208,6 +209,13 @@ def _artefact_faults(rig: Rig) -> Iterator[Fault]:
 
 
 def _instrument_faults(rig: Rig) -> Iterator[Fault]:
+    names = [other.name for other in rig.devices.others]
+    for index, name in enumerate(names):
+        if name in OWN_NAMES or name in names[:index]:
+            yield (
+                ("devices", "other", index, "name"),
+                f"name = '{name}' in [[devices.other]] is taken; give every instrument a name of its own",
+            )
     if rig.devices.psd is not None:
         yield from _psd_faults(rig.devices.psd)
     if rig.devices.tracker is not None:
