@@ -5,8 +5,10 @@ A section missing from [devices] is a device that is not emulated.
 
 import importlib
 import ipaddress
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from importlib.metadata import entry_points
 from typing import Any
 
 from simulators.faults.fault import DisturbedLight
@@ -15,11 +17,11 @@ from simulators.faults.injector import Injector
 from simulators.hand.world import HandWorld
 from simulators.host.errors import HostError
 from simulators.host.loop import Host
-from simulators.plug_ins import plug_in_bench
 from simulators.wire import Bench, SerialPort, TcpPort, UdpPort
 from simulators.world.world import World
 
 DEFAULT_BITRATE = 1_000_000
+PLUG_INS = "calibeam.devices"  # group of entry points
 UR = "ur-rtde"
 PSD_DAQ = "psd-daq"
 PSDS = {PSD_DAQ: "psd_daq", "kpa101": "kpa101"}
@@ -210,3 +212,31 @@ def _source(host: str, port: int) -> str:
 
 def _serial_name(bench: Bench) -> str:
     return next(port.name for port in bench.ports if isinstance(port, SerialPort))
+
+
+def plug_in_bench(world: Any, other: Mapping[str, Any]) -> Bench | None:
+    """The bench of one [[devices.other]]; None, said on standard error, where its package emulates nothing.
+
+    The entry point of an installed package is an object with `emulator`, "module:function" or an empty text; the
+    function is called with the world and the settings of the rig file. HostError naming the package where that fails,
+    and where no package has this driver.
+    """
+    driver = str(other.get("driver"))
+    found = next(iter(entry_points(group=PLUG_INS, name=driver)), None)
+    if found is None:
+        raise HostError(f"{other.get('name')}: no installed package brings the driver '{driver}'; install it")
+    package = "?" if found.dist is None else f"{found.dist.name} {found.dist.version}"
+    try:
+        where = str(found.load().emulator)
+        if not where:
+            print(f"{other.get('name')}: the package {package} brings no emulator; left out", file=sys.stderr)
+            return None
+        module, _, function = where.partition(":")
+        bench = getattr(importlib.import_module(module), function)(world, dict(other.get("settings", {})))
+    except Exception as why:  # whatever a stranger's module raises
+        raise HostError(
+            f"{other.get('name')}: the emulator of the package {package} cannot be made: {type(why).__name__}: {why}"
+        ) from why
+    if not isinstance(bench, Bench) or not bench.ports:
+        raise HostError(f"{other.get('name')}: the package {package} gives no bench with a port")
+    return bench

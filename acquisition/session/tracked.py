@@ -1,6 +1,7 @@
 """A session with a tracker: poses of a plan, each from its side, read once the target has settled."""
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -126,7 +127,8 @@ class TrackedSession:
         q_rad, way = np.array(pose.q_rad), np.array(pose.approach or np.zeros(len(pose.q_rad)))
         try:
             if np.any(way):
-                self._move(q_rad - self._options.opposite_rad * way)
+                with suppress(RefusedMotionError):  # at a limit or a box: it comes as it can, and `approach` says how
+                    self._move(q_rad - self._options.opposite_rad * way)
             self._move(q_rad)
         except RefusedMotionError as why:
             return self._skip(str(why))

@@ -24,9 +24,12 @@ from acquisition.wires.bench import (
 from acquisition.wires.streams import Pump, Supervisor
 from drivers.clock import Clock
 from drivers.device import Block
-from drivers.errors import DeviceError
+from drivers.errors import DeviceError, DeviceStale
 
 Floats = NDArray[np.float64]
+CLOCK_S = 5.0  # host time within which a reading of after the motion comes; emulators fall behind by less
+LEAST_HALF = 5  # samples of half a dwell: with fewer their scatter says nothing
+CALMER = 2.5  # of 20 samples of noise one half scatters so much more in 2 of 100 dwells, which then begin a little later
 GOOD_SHARE = 0.5  # of the samples of a dwell that have to be good
 
 
@@ -92,6 +95,7 @@ class TrackerBench:
         seen_s = self.clock.now_s()
         begin_s = self._begin_s(seen_s)
         blocks: list[Block] = []
+        from_s = -np.inf
         while True:
             arrived = self.pumps.tracker.wait(seen_s, SILENCE_S)
             self.supervisor.check()
@@ -99,11 +103,23 @@ class TrackerBench:
             blocks += arrived
             window = _window(blocks, begin_s, self.rate_hz)
             if len(window.time_s) == 0:
+                if seen_s - float(blocks[0].host_s[0]) > CLOCK_S:
+                    raise DeviceStale(
+                        "tracker: its time does not go on, or went back, since the last motion; check its clock (some "
+                        "begin anew at midnight), or leave out the time column"
+                    )
                 continue
+            first_s = float(window.time_s[0])
+            window = window.only(window.time_s >= from_s)
             stretch = stretch_to_average(window.time_s, window.position_m, dwell_s, self.rule)
-            if stretch is not None:
-                keep = (window.time_s >= stretch.from_s) & (window.time_s <= stretch.to_s)
-                return self._averaged(window.only(keep), settled=stretch.settled)
+            if stretch is None:
+                continue
+            held = window.only((window.time_s >= stretch.from_s) & (window.time_s <= stretch.to_s))
+            late = stretch.to_s - first_s > self.rule.limit_s + dwell_s
+            steady = stretch.settled and not calms_down(held.position_m, self.rule)
+            if steady or late or not stretch.settled:
+                return self._averaged(held, settled=steady)
+            from_s = float(held.time_s[len(held.time_s) // 4])  # begin later
 
     def _begin_s(self, host_s: float) -> float | None:
         """By the instrument's clock; None: it has none."""
@@ -139,6 +155,19 @@ class TrackerBench:
             },
             settled=settled,
         )
+
+
+def calms_down(position_m: Floats, rule: SettleRule) -> bool:
+    """Whether positions (sample, 3) of a dwell scatter more at its beginning than at its end: the arm still swings.
+
+    The windows of a slow instrument are of few samples, between which a swing of the arm looks like noise.
+    """
+    half = len(position_m) // 2
+    early_m, later_m = (part[np.isfinite(part).all(axis=1)] for part in (position_m[:half], position_m[half:]))
+    if min(len(early_m), len(later_m)) < LEAST_HALF:
+        return False
+    early, later = early_m.std(axis=0), later_m.std(axis=0)
+    return bool(np.any(early > np.maximum(CALMER * later, rule.floor_m)))
 
 
 @dataclass(frozen=True)

@@ -137,15 +137,17 @@ def _is_over(job: EncoderLog, for_s: float | None, clock: Clock) -> bool:
 
 
 def _now(state: LogState) -> str:
+    frames = f", {state.frames} frames" if state.frames else ""
     away = "" if state.away is None else f"; AWAY: {state.away}"
-    return f"{state.segment.name}: {state.rows} rows, {state.frames} frames{away} (Ctrl-C ends the log)"
+    return f"{state.segment.name}: {state.rows} rows{frames}{away} (Ctrl-C ends the log)"
 
 
 def _summary(state: LogState, segments: list[Path]) -> str:
     which = segments[0].name if len(segments) == 1 else f"{segments[0].name} to {segments[-1].name}"
     outages = f", {state.outages} outages" if state.outages else ""
+    frames = f", {state.frames} frames" if state.frames else ""
     errors = f", {state.error_frames} of them error frames" if state.error_frames else ""
-    return f"{segments[0].parent}: {which}: {state.rows} rows, {state.frames} frames{errors}{outages}"
+    return f"{segments[0].parent}: {which}: {state.rows} rows{frames}{errors}{outages}"
 
 
 def _as_json(state: LogState, segments: list[Path]) -> dict[str, Any]:

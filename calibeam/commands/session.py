@@ -275,7 +275,7 @@ def _session_of_robot(wanted: Wanted, robot: RobotOptions, page: PageOptions, co
 
 def _session_with_tracker(wanted: Wanted, tracker: TrackerOptions, page: PageOptions, *, agrees: bool) -> None:
     """The session of a driven arm whose target a tracker measures."""
-    from calibeam.tracked.run import TrackedJob, run_tracked
+    from calibeam.sessions.with_tracker import TrackedJob, run_tracked
 
     rig, console, control = wanted.rig, Console(), wanted.emulators.address()
     check_tracked_session(rig)

@@ -26,7 +26,7 @@ from calibeam.devices.encoders import (
 from calibeam.devices.others import other_drivers
 from calibeam.devices.psd import psd_driver, psd_view
 from calibeam.devices.robot import robot_of
-from calibeam.devices.tracker import place_of, tracker_driver
+from calibeam.devices.tracker_of_rig import place_of, tracker_driver
 from drivers.clock import Clock
 from drivers.device import Block, Device
 from drivers.errors import DeviceError

@@ -20,8 +20,8 @@ from acquisition.wires.frame_log import FrameLog
 from acquisition.wires.streams import Pump
 from calibeam.devices.encoders import VIEWED, encoder_driver, identities_of, names_of
 from calibeam.devices.recorder import uninterrupted
-from calibeam.devices.tracker import VIEWED as TRACKER_VIEWED
-from calibeam.devices.tracker import tracker_driver
+from calibeam.devices.tracker_of_rig import VIEWED as TRACKER_VIEWED
+from calibeam.devices.tracker_of_rig import tracker_driver
 from calibeam.interrupts import ENDING
 from calibeam.software import SOFTWARE
 from drivers.clock import Clock

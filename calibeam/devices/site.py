@@ -21,8 +21,8 @@ from calibeam.devices.others import Other, emulated_others, other_drivers
 from calibeam.devices.psd import PsdInstrument, emulated_psd, psd_driver, psd_view
 from calibeam.devices.recorder import uninterrupted
 from calibeam.devices.robot import emulated_robot, robot_of
-from calibeam.devices.tracker import VIEWED as TRACKER_VIEWED
-from calibeam.devices.tracker import emulated_tracker, tracker_driver
+from calibeam.devices.tracker_of_rig import VIEWED as TRACKER_VIEWED
+from calibeam.devices.tracker_of_rig import emulated_tracker, tracker_driver
 from calibeam.live.feed import PAGE_STOP, SILENT, Feed
 from calibeam.motion.gate_of_rig import gated_arm
 from calibrate.dual_psd_rig import fixture_of, laser_of

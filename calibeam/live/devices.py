@@ -13,7 +13,7 @@ from calibeam.devices.encoders import encoder_driver
 from calibeam.devices.others import other_drivers
 from calibeam.devices.psd import psd_driver, psd_view
 from calibeam.devices.robot import robot_of
-from calibeam.devices.tracker import tracker_driver
+from calibeam.devices.tracker_of_rig import tracker_driver
 from calibeam.live.feed import Feed
 from drivers.clock import Clock
 from drivers.device import Device

@@ -13,8 +13,7 @@ import numpy as np
 from drivers.clock import Clock
 from drivers.device import Block, Channel, StreamDevice
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale, WireError
-from drivers.tracker.codec import BadLine, LineCodec
-from drivers.tracker.layout import FARTHEST_M, Parse, TargetReading
+from drivers.tracker.codec import FARTHEST_M, BadLine, LineCodec, Parse, TargetReading
 from drivers.transports.transport import Transport
 
 FIRST_LINE_S = 2.0  # after the connection; a stream of 1 Hz has one by then

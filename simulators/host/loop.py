@@ -20,8 +20,7 @@ from typing import Protocol
 
 from simulators.host.line import Log, Report, check_link, log_to_stderr
 from simulators.host.serial_line import SerialLine
-from simulators.host.tcp import Connection, Listener
-from simulators.host.udp import UdpSender
+from simulators.host.tcp import Connection, Listener, UdpSender
 from simulators.wire import TICK_S, Bench, SerialPort, TcpPort, UdpPort
 
 STALL_S = 0.050  # wall time; longer than any scheduling delay of a working machine, shorter than a client's time-outs

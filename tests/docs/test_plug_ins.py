@@ -17,9 +17,9 @@ from calibrate.effects.kind import Kind
 from calibrate.plug_ins import DEVICES, EFFECTS, loaded, plug_ins
 from drivers.clock import SystemClock
 from drivers.errors import DeviceRefused
+from simulators.devices import plug_in_bench
 from simulators.host.errors import HostError
 from simulators.host.loop import Host
-from simulators.plug_ins import plug_in_bench
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "docs" / "examples" / "lab-thermometer"

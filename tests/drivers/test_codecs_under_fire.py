@@ -22,8 +22,7 @@ from drivers.psd_daq.codec import PsdDaqCodec, frame
 from drivers.psd_daq.messages import BadFrame, MessageType
 from drivers.psd_kpa101.codec import Kpa101Codec
 from drivers.psd_kpa101.messages import StrayBytes
-from drivers.tracker.codec import BadLine, LineCodec
-from drivers.tracker.layout import Units, ascii_lines, json_lines
+from drivers.tracker.codec import BadLine, LineCodec, Units, ascii_lines, json_lines
 from drivers.transports.slcan_bus import BlockSlcanBus
 from simulators.kpa101 import frames as kpa101
 

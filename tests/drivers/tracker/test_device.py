@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig.devices import TrackerDevice
-from calibeam.devices.tracker import tracker_driver
+from calibeam.devices.tracker_of_rig import tracker_driver
 from drivers.clock import SystemClock
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale, WireError
+from drivers.tracker.codec import LineRefusedError
 from drivers.tracker.device import LineTracker
-from drivers.tracker.layout import LineRefusedError
 from drivers.transports.socket_line import UdpReceiver
 from simulators.faults.faulty_wire import with_faults
 from simulators.faults.injector import Injector

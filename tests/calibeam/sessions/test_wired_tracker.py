@@ -14,8 +14,7 @@ from calibeam.devices.site import connected_tracker, tracker_addresses_of
 from calibeam.emulation import Emulation
 from calibeam.outcome import PartialResult
 from calibeam.printing.progress import progress_bar
-from calibeam.tracked.poses import drawn_plan
-from calibeam.tracked.run import nominal_target, record_tracked
+from calibeam.sessions.with_tracker import drawn_plan, nominal_target, record_tracked
 from drivers.clock import SystemClock
 from simulators.world.truth import read_truth
 

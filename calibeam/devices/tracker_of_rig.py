@@ -8,8 +8,8 @@ from msgspec import structs
 from acquisition.recording.rig.devices import TrackerDevice, TrackerDriver
 from drivers.clock import Clock
 from drivers.errors import DeviceRefused
+from drivers.tracker.codec import LENGTH_UNITS, TIME_UNITS, Parse, Units, ascii_lines, json_lines
 from drivers.tracker.device import Dialogue, LineTracker
-from drivers.tracker.layout import LENGTH_UNITS, TIME_UNITS, Parse, Units, ascii_lines, json_lines
 from drivers.transports.serial_port import SerialAddress, open_serial
 from drivers.transports.socket_line import TcpLine, UdpReceiver
 from drivers.transports.transport import Transport

@@ -4,8 +4,7 @@ import math
 
 import pytest
 
-from drivers.tracker.codec import BadLine, LineCodec
-from drivers.tracker.layout import LineRefusedError, TargetReading, Units, ascii_lines, json_lines
+from drivers.tracker.codec import BadLine, LineCodec, LineRefusedError, TargetReading, Units, ascii_lines, json_lines
 
 MM = Units(1e-3)
 WITH_STATUS = Units(1e-3, 1e-3, ("0", "OK"))

@@ -1,4 +1,7 @@
-"""A whole session with a tracker: devices, plan, arm, measure, results."""
+"""A whole session with a tracker: devices, plan, arm, measure, results.
+
+Without a plan poses are drawn evenly over the joints' ranges, ordered by short ways, some of them repeated.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,8 +12,8 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import Progress as Bar
 
-from acquisition.recording import Event, RecordingWriter
-from acquisition.recording.pose_plan import PosePlan
+from acquisition.recording import Event, RecordingWriter, RigFileError
+from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
 from acquisition.recording.rig import Rig
 from acquisition.session.tracked import TrackedOptions, TrackedSession, TrackedSummary, check_tracked_plan
 from acquisition.wires.tracker_bench import TrackerBench
@@ -19,8 +22,8 @@ from calibeam.devices.check import check_devices
 from calibeam.devices.recorder import RecordingJournal, kept, new_recording
 from calibeam.devices.site import TrackerAddresses, connected_tracker
 from calibeam.live.feed import SILENT, Feed, Progress
+from calibeam.motion.reachable_poses import candidates_of, way_is_clear
 from calibeam.printing.progress import progress_bar
-from calibeam.tracked.poses import drawn_plan
 from calibrate.arms.rig_arm import RigArm
 from drivers.clock import Clock, SystemClock
 from drivers.errors import DeviceRefused
@@ -112,3 +115,48 @@ def _check(rig: Rig, console: Console, clock: Clock) -> None:
         console.print(check.line, highlight=False, markup=False, soft_wrap=True)
     if wrong := [check.line for check in checks if check.wrong]:
         raise DeviceRefused("; ".join(wrong))
+
+
+SPARE = 3  # candidates for each pose that is wanted: of many the next one is near
+PER_CANDIDATE = 6  # `candidates_of` draws so many for each that it is asked for
+REPEATED_EVERY = 8  # poses: one of so many is taken twice more, each joint from either side
+
+
+def drawn_plan(rig: Rig, poses: int, seed: int) -> PosePlan:
+    """A plan of so many poses and their repeats, each the nearest one by a clear way from the one before.
+
+    RigFileError where fewer can be reached.
+    """
+    if rig.device is None:
+        raise RigFileError(
+            f"rig {rig.name}: no [device]; poses are drawn for an instrument that stands somewhere, so say roughly "
+            "where, or give a --plan"
+        )
+    rng = np.random.default_rng(seed)
+    left = list(candidates_of(rig, -(-SPARE * poses // PER_CANDIDATE), rng).q_rad)
+    at, chosen = np.array(rig.motion.home_rad), list[Floats]()
+    while left and len(chosen) < poses:
+        left.sort(key=lambda q: float(np.max(np.abs(q - at))))
+        near = next((k for k, q in enumerate(left) if way_is_clear(rig, at, q)), None)
+        if near is None:
+            break
+        at = left.pop(near)
+        chosen.append(at)
+    if len(chosen) < poses:
+        raise RigFileError(
+            f"rig {rig.name}: {len(chosen)} of {poses} poses are reached by clear ways from home; ask for fewer, or "
+            "look at home_rad and the boxes of [motion]"
+        )
+    return PosePlan(1, rig.name, (PlannedBlock(tuple(_with_repeats(chosen))),))
+
+
+def _with_repeats(chosen: list[Floats]) -> list[PlannedPose]:
+    out: list[PlannedPose] = []
+    for number, q in enumerate(chosen):
+        values = tuple(map(float, q))
+        if number % REPEATED_EVERY != 0:
+            out.append(PlannedPose(values))
+            continue
+        group = 1 + number // REPEATED_EVERY
+        out += [PlannedPose(values, (way,) * len(values), repeat=group) for way in (1, -1, 1)]
+    return out
