@@ -31,7 +31,7 @@ GROUPS: dict[str, tuple[ListedCommand, ...]] = {
         ListedCommand("centre", "centre:centre_command", "Centre the beam once, from where the arm stands."),
         ListedCommand("camera", "camera:camera_command", "Calibrate the camera with a tour of the arm round a board."),
         ListedCommand("psd-check", "psd_check:psd_check_command", "Check a detector against known spot positions."),
-        ListedCommand("log", "log:log", "Log the encoders until Ctrl-C, with every CAN frame."),
+        ListedCommand("log", "log:log", "Log the encoders, or the tracker, until Ctrl-C."),
     ),
     "Calibrate": (
         ListedCommand("design", "design:design_command", "Choose the poses of a session before it is run."),

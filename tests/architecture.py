@@ -147,8 +147,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 906,
-    "lines": 105_677,
+    "files": 909,
+    "lines": 106_279,
     "longest_function": 54,
     "one_importer": 45,
     "classes": 38,

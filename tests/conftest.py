@@ -22,6 +22,7 @@ WIRED = (
     "calibeam/prove/test_wired.py",
     "calibeam/sessions/test_wired_pause.py",
     "calibeam/sessions/test_wired_stops.py",
+    "calibeam/sessions/test_wired_tracker.py",
     "calibeam/test_camera_cli.py",
     "calibeam/test_centre_cli.py",
     "calibeam/test_check_cli.py",

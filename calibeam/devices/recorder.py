@@ -25,6 +25,7 @@ from acquisition.session.plan import PlanOptions
 from acquisition.session.planned import PlannedSession
 from acquisition.session.records import Progress, Sample
 from acquisition.session.session import Session, Summary
+from acquisition.session.tracked import TrackedSample
 from calibeam.emulation import EmulationError
 from calibeam.interrupts import ENDING
 from calibeam.learner import FittedLearner
@@ -35,12 +36,12 @@ from drivers.errors import DeviceError
 
 
 class RecordingJournal:
-    """Implements acquisition.session.records.Journal."""
+    """Implements acquisition.session.records.Journal, and that of acquisition.session.tracked."""
 
     def __init__(self, writer: RecordingWriter, clock: Clock) -> None:
         self._writer, self._clock = writer, clock
 
-    def sample(self, sample: Sample) -> None:
+    def sample(self, sample: Sample | TrackedSample) -> None:
         self._writer.sample(sample.row(), sample.look.host_s)
 
     def event(self, kind: str, detail: Mapping[str, Any]) -> None:
@@ -119,7 +120,15 @@ def end_event(writer: RecordingWriter, clock: Clock, summary: Summary) -> None:
     writer.event(Event(clock.now_s(), "end", {"samples": len(summary.samples), "skipped": summary.skipped}))
 
 
-def kept(bench: Bench, writer: RecordingWriter, clock: Clock, session: Counted, run: Callable[[], Result]) -> Result:
+class Stoppable(Protocol):
+    """A bench whose arm can be told to stop."""
+
+    def stop(self) -> None: ...
+
+
+def kept(
+    bench: Stoppable, writer: RecordingWriter, clock: Clock, session: Counted, run: Callable[[], Result]
+) -> Result:
     """What `run` gives. PartialResult when it ended early: the arm stands, what was taken is on the disk."""
     try:
         return run()
@@ -133,7 +142,7 @@ def kept(bench: Bench, writer: RecordingWriter, clock: Clock, session: Counted, 
 
 
 def _ended_early(
-    bench: Bench, writer: RecordingWriter, clock: Clock, session: Counted, why: BaseException
+    bench: Stoppable, writer: RecordingWriter, clock: Clock, session: Counted, why: BaseException
 ) -> PartialResult:
     """Stop the arm, put what there is on the disk; a second Ctrl-C may not get in between.
 

@@ -330,6 +330,10 @@ EMULATION_KEYS = (
     "artefact_sigma_m",
     "hand_force_n",
     "joint_compliance_rad_nm",
+    "position_noise_m",
+    "target_sigma_m",
+    "device_origin_sigma_m",
+    "device_rotation_sigma_rad",
 )
 
 
