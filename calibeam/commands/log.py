@@ -67,7 +67,7 @@ def encoders(
     loaded, clock = load_rig(rig), SystemClock()
     device = loaded.devices.encoders
     if device is None:
-        raise DeviceRefused(f"rig {loaded.name}: no [devices.encoders]; say there how the encoders are reached")
+        raise DeviceRefused(f"rig {loaded.name}: no [devices.encoders]; add it, with how the encoders are reached")
     rotation = Rotation(round(rotate_mb * MEGABYTE), 60.0 * rotate_min)
     job = EncoderLog(device, rig_text(rig), out, clock, rotation, raw=raw)
     console = Console(quiet=json_)

@@ -35,7 +35,8 @@ def promise_lines(rig: Rig, made: Design) -> list[str]:
     out = [
         f"{rig.name}: {len(made.taken.poses)} poses of {len(made.candidates)} candidates by criterion "
         f"{made.asked.criterion}",
-        f"predicted error in free space ({information.target}): {length(made.free_space_m)} rms; as many random poses: "
+        f"predicted error over the workspace ({information.target}): {length(made.free_space_m)} rms; as many random "
+        "poses: "
         f"{length(made.random_m)} (ratio {made.free_space_m / made.random_m:.2f}); scale to "
         f"{1e6 * made.scale_sigma:.1f} ppm",
         f"of a steady drift geometry would absorb {100.0 * order.absorbed:.0f} % (in the order of shortest ways "
@@ -43,8 +44,9 @@ def promise_lines(rig: Rig, made: Design) -> list[str]:
     ]
     if information.hidden_m > MATTERS_M:
         out.append(
-            f"what no pose of these shows may still move the target by {length(information.hidden_m)} as believed, and "
-            "is not in these numbers"
+            f"what none of these poses shows may still move the target by {length(information.hidden_m)} (assumed "
+            "tolerances); "
+            "it is not in these numbers"
         )
     return out
 
@@ -120,7 +122,7 @@ def _print_smallest(console: Console, seen: Seen) -> None:
 
 def _print_confusable(console: Console, seen: Seen) -> None:
     lines = [
-        f"could not be told apart: {name_of(a)} and {name_of(b)} (R2 {r2:.3f})"
+        f"could not be separated: {name_of(a)} and {name_of(b)} (R2 {r2:.3f})"
         for a, b, r2 in sorted(seen.confusable, key=lambda pair: pair[2])
         if (a.physics, a.where) != (b.physics, b.where)
     ]
@@ -129,7 +131,7 @@ def _print_confusable(console: Console, seen: Seen) -> None:
     for one in seen.invisible:
         places.setdefault(one.physics, {})[one.where] = None
     lines += [f"not shown, or not in every form: {physics} at {', '.join(at)}" for physics, at in places.items()]
-    for line in lines or ["all causes of the catalogue can be told apart"]:
+    for line in lines or ["all causes of the catalogue can be separated"]:
         console.print(line, markup=False, highlight=False)
 
 

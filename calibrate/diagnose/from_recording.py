@@ -82,7 +82,8 @@ def diagnose_samples(
         return Diagnosed(cleared, cleared.blunders, None)
     if len(cleared.rows) < FEWEST:
         raise DataError(
-            f"{len(cleared.rows)} samples are left to diagnose, fewer than {FEWEST}: no cause can be told from noise; "
+            f"{len(cleared.rows)} samples are left to diagnose, fewer than {FEWEST}: no cause can be separated from "
+            "noise; "
             "measure more poses"
         )
     geometry = stages.attempt(Stage.GEOMETRY, lambda: begin(session_of(rig, cleared.samples)), None, refuses=True)
@@ -143,7 +144,7 @@ def _left(model: Fitted, cleared: Cleared) -> tuple[Blunder, ...]:
 
 
 def _far(measured: Measured, row: int, away_m: float, sigmas: float) -> Blunder:
-    what = f"{1e6 * away_m:.3g} um away from what all other rows say ({sigmas:.0f} sigma), also after all physics"
+    what = f"{1e6 * away_m:.3g} µm away from what all other rows predict ({sigmas:.0f} sigma), also after all physics"
     return Blunder(
         BlunderKind.BAD_SHOT, (row,), ", ".join(columns_of(measured)), what, "measure it again, or remove it"
     )
@@ -169,6 +170,6 @@ def beyond_noise(model: Fitted, missing: Sequence[Missing]) -> Unexplained | Non
 
 def _untold(times: float, lacking: Sequence[Missing]) -> Unexplained:
     columns = ", ".join(dict.fromkeys(m.column for m in lacking))
-    why = f"positions scatter {times:.0f} times what the device is believed to, and no recorded column tells why"
-    why += f"; not recorded: {columns}" if columns else ""
+    why = f"positions scatter {times:.0f} times the assumed noise of the device, and no recorded column explains it"
+    why += f"; missing column: {columns}" if columns else ""
     return Unexplained("", tuple(dict.fromkeys(m.driver for m in lacking)), 1.0 - 1.0 / times**2, LEAST, why)

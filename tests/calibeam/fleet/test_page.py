@@ -92,5 +92,5 @@ def test_causes_are_counted_by_robots_and_recordings(fleet):
 def test_a_fleet_of_failures_has_its_page():
     lost = [Row(f"/{i}", str(i), "", 1, 1, Outcome.LOST, "c", error="gone") for i in range(LISTED + 5)]
     page = fleet_html(Fleet(tuple(lost)), "nothing")
-    assert "nothing is known of drift" in page
+    assert "drift is not determined" in page
     assert "5 more are in fleet.parquet" in page

@@ -86,7 +86,7 @@ def test_a_click_on_stop_reaches_the_arm(shown: Page, living: LivingRig) -> None
     pressed: list[int] = []
     living.feed.stops_by(lambda: pressed.append(1))
     shown.click("#stop")
-    expect(shown.locator("#stop-says")).to_have_text("✓ the controller was told to stop, and took it")
+    expect(shown.locator("#stop-says")).to_have_text("✓ the controller confirmed the stop command")
     assert pressed == [1]
     shown.focus("#stop")
     shown.keyboard.press("Enter")
@@ -159,7 +159,7 @@ def test_a_stop_that_failed_stays_told_until_one_came_after_it(browser: Browser,
         is_live(page)
         expect(says).to_have_text(failed)
         living.feed.stop.press("a third page")
-        expect(says).to_contain_text("by a third page: the controller was told to stop, and took it")
+        expect(says).to_contain_text("by a third page: the controller confirmed the stop command")
     living.feed.stops_by(None)
 
 
