@@ -11,7 +11,7 @@ MOSTLY = 0.9  # of the error of a single pose, by the doubt of the parameters: t
 def anywhere(room: FreeSpaceRecord | None) -> Number:
     """What 95 % of all poses between the joint limits stay below, one sigma, as predicted; or why it is not told."""
     if room is None or room.pose_p95_m is None:
-        why = "not predicted" if room is None else f"not told: {room.says}"
+        why = "not predicted" if room is None else f"not determined: {room.says}"
         return Number("anywhere", NAME, None, "m", DASH, why)
     about = "one sigma of a single pose, in 95 % of the workspace; predicted, as far as the model is right"
     if room.p95_m is not None and room.p95_m > MOSTLY * room.pose_p95_m:

@@ -13,7 +13,7 @@ from calibrate.report.quantities import fixed, significant
 Floats = NDArray[np.float64]
 
 EXTRAS = (
-    ("cmd1_rad", "commanded joint angles", "whether the controller reached what it was told"),
+    ("cmd1_rad", "commanded joint angles", "whether the controller reached its command"),
     ("enc1_rad", "second encoders on the joints", "transmission errors between motor and link"),
     ("repeat", "repeated poses", "noise apart from missing physics"),
     ("approach1", "direction of approach", "backlash"),
@@ -46,7 +46,7 @@ def recorded(recording: Recording, extras: Sequence[tuple[str, str, str]]) -> Ht
         rows.append(
             (f"temperature {where}", "yes", f"{fixed(float(values.min()), 2)} to {fixed(float(values.max()), 2)} °C")
         )
-    return table(("Quantity", "recorded", "what it tells"), rows, caption="Beside angles and spots")
+    return table(("Quantity", "recorded", "what it is for"), rows, caption="Beside angles and spots")
 
 
 def temperatures(recording: Recording) -> list[tuple[str, Floats]]:

@@ -7,7 +7,7 @@ from calibrate.report.diagnosis.words import hardest_to_see, place_words, size_o
 from calibrate.report.elements import Html, bullets, folded, section, table, tag
 from calibrate.report.quantities import DASH, fixed, length, significant
 
-TITLE = "Doubt and limits"
+TITLE = "Uncertainty and limits"
 MOST_PAIRS = 40  # of confusable causes: the file holds them all
 
 
@@ -51,7 +51,7 @@ def _listed(title: str, lines: Sequence[str]) -> Iterator[Html]:
 def _missing(file: DiagnosisFile) -> Iterator[Html]:
     if file.not_recorded:
         rows = [(m.column, m.driver, m.physics) for m in file.not_recorded]
-        caption = "Not recorded: of this physics nothing can be said"
+        caption = "Not tested: columns that are missing"
         yield table(("Column", "driver", "physics"), rows, caption=caption)
 
 
@@ -62,7 +62,7 @@ def _visible(file: DiagnosisFile) -> Iterator[Html]:
         (one.physics, one.where, size_of(one.parameter, one.value), one.parameter) for one in hardest_to_see(file)
     ]
     head = ("Physics", "where it is seen worst", "found from", "of")
-    caption = "What these poses could show: a smaller one may be there, and nobody could know (19 times out of 20)"
+    caption = "Detection limits of these poses (95 %): a smaller error would not be found"
     yield table(head, hardest, numeric=(2,), caption=caption)
     every = [(one.where, one.physics, size_of(one.parameter, one.value), one.parameter) for one in file.smallest]
     title = f"The same at every place: {len(every)} causes"
@@ -87,7 +87,7 @@ def _confusable(file: DiagnosisFile) -> Iterator[Html]:
         ranked = sorted(file.confusable, key=lambda pair: -pair[2])[:MOST_PAIRS]
         rows = [(place_words(a), place_words(b), f"{r2:.3f}") for a, b, r2 in ranked]
         more = len(file.confusable) - len(ranked)
-        title = f"Not to be told apart with these poses: {len(file.confusable)} pairs"
+        title = f"Cannot be separated with these poses: {len(file.confusable)} pairs"
         note = (tag("p", f"{more} more in diagnosis.json."),) if more else ()
         yield folded(title, table(("One cause", "another", "R²"), rows, numeric=(2,)), *note)
 

@@ -76,7 +76,10 @@ def _linear(s: Simulation) -> Html:
         for i in range(len(s.drawn_at_rad))
     ]
     head = ("pose", "joints", "linear rms", "drawn rms", "95 % below", "worst arm")
-    lead = "Linear propagation is at once and says why; drawn arms know no linearisation and any law."
+    lead = (
+        "Linear propagation is immediate and gives the causes; random arms need no linearisation and take any "
+        "distribution."
+    )
     return section(
         "linear", CONTENTS["linear"], lead, _picture("side-by-side", s), table(head, rows, numeric=range(2, 6))
     )
@@ -118,5 +121,5 @@ def _worst(s: Simulation) -> Html:
     ]
     if not s.worst:
         return section("worst", CONTENTS["worst"], "None of these errors moves the probe in any posture.")
-    lead = "Tops of the error over the joint ranges; postures of the same error are told once."
+    lead = "Tops of the error over the joint ranges; postures of the same error are listed once."
     return section("worst", CONTENTS["worst"], lead, table(("rms", "joints", "probe in the base (m)"), rows))

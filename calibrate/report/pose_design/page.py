@@ -38,16 +38,18 @@ def _tiles(made: Design, seen: Seen) -> Html:
     enough = "more than shown" if made.curve.enough is None else str(made.curve.enough)
     return tag(
         "div",
-        tile("Predicted error", length(made.free_space_m), f"rms in free space: {made.information.target}"),
+        tile("Predicted error", length(made.free_space_m), f"rms over the workspace:  {made.information.target}"),
         tile("Random poses", length(made.random_m), "as many, median of draws"),
         tile("Enough", enough, "poses; more of them do little but average noise"),
-        tile("Alike", str(len(seen.confusable)), "pairs of terms that could not be told apart"),
+        tile("Alike", str(len(seen.confusable)), "pairs of terms that could not be separated"),
         cls="tiles",
     )
 
 
 def _promise(made: Design) -> Html:
-    caption = "Predicted rms error in free space. The plan was chosen by exchange, the curve one pose after the other."
+    caption = (
+        "Predicted rms error over the workspace. The plan was chosen by exchange, the curve one pose after the other."
+    )
     return section("promise", CONTENTS["promise"], "What more poses would bring.", figure(curve_figure(made), caption))
 
 
@@ -84,14 +86,14 @@ def _causes(seen: Seen) -> Html:
     alike = [f"{_name(a)} and {_name(b)}: R2 {r2:.3f}" for a, b, r2 in seen.confusable]
     caption = (
         "Largest share, in percent, of the signal of a cause (row) that any form of another one (column) could "
-        "explain, geometry refitted. From 97 % on the poses cannot tell them apart."
+        "explain, geometry refitted. From 97 % on the poses cannot separate them."
     )
     return section(
         "causes",
         CONTENTS["causes"],
         "What a diagnosis of this plan could find, and what it would confuse.",
         figure(isolability_figure(seen), caption),
-        tag("h3", "Could not be told apart"),
+        tag("h3", "Could not be separated"),
         bullets(alike or ["nothing"]),
         *([tag("h3", "Not shown at all"), bullets([_name(one) for one in seen.invisible])] if seen.invisible else []),
         tag("h3", "Found from this size on, 19 times out of 20"),

@@ -59,7 +59,7 @@ def _combinations(evidence: SessionEvidence) -> Iterator[Html]:
     yield tag("p", f"{model.rank} of {model.free} combinations are seen.")
     yield from _observability(model)
     if not model.unseen:
-        yield tag("p", "Every parameter can be told from every other.")
+        yield tag("p", "Every parameter can be separated from every other.")
         return
     kinds = dict.fromkeys(kind_of(u) for u in model.unseen)
     for kind in kinds:
@@ -78,7 +78,7 @@ def _observability(model: ModelFile) -> Iterator[Html]:
 
 def _numbers(evidence: SessionEvidence, known: list[ModelParameter]) -> Html:
     if not known:
-        return tag("p", "No single parameter can be told alone; together they predict (model.json: chain).")
+        return tag("p", "No single parameter is determined alone; together they predict (model.json: chain).")
     believed = {p.name: p for p in evidence.parameters}
     drawn = any(p.bootstrap_sigma is not None for p in known)
     head = (

@@ -59,7 +59,7 @@ def answers(evidence: SessionEvidence, room: Room | str) -> Answers:
 def _tool(room: Room | str) -> tuple[Number, Number]:
     """Over the workspace, where the data support a statement: nominal arm, and calibrated."""
     if isinstance(room, str):
-        why = f"not told: {room}"
+        why = f"not determined: {room}"
         return (
             Number("tool_nominal", TOOL_NOMINAL, None, "m", DASH, why),
             Number("tool_calibrated", TOOL_CALIBRATED, None, "m", DASH, why),
@@ -96,7 +96,7 @@ def _errors(evidence: SessionEvidence) -> tuple[Number, Number]:
             before,
             first.unit,
             first.says(before),
-            f"{on}; arm as the drawing says",
+            f"{on}; nominal arm",
         ),
         Number("now", "Unseen readings, calibrated", after, first.unit, first.says(after), on + gain),
     )

@@ -46,7 +46,7 @@ def _pictures(runs: Sequence[Trace], wanted_m: float, places: Sequence[int]) -> 
 
 def _at_once(steps: Sequence[int]) -> str:
     none = sum(s == 0 for s in steps)
-    return f"{none} of {len(steps)} runs were there at the first look. " if none else ""
+    return f"{none} of {len(steps)} runs were centred at the first reading.  " if none else ""
 
 
 def _endings(groups: dict[float, tuple[Trace, ...]]) -> Html:

@@ -59,15 +59,15 @@ def before_and_after(room: Room, measured: Measured | None) -> Html:
     grids = tuple(grid_of(view, room.reach_m) for view in VIEWS)
     rows = {"predicted": _predicted(room, grids)}
     if measured is not None:
-        titles = ("as drawn", "identified")
+        titles = ("nominal", "calibrated")
         values = (measured.drawn_m, measured.found_m)
         rows["measured"] = [Layer(t, (), measured.points_m, v) for t, v in zip(titles, values, strict=True)]
-    says = "predicted error of the target over the workspace, as drawn and identified, from the side and from above"
+    says = "predicted error of the target over the workspace, nominal and calibrated, from the side and from above"
     return pictures("workspace", says, room, grids, rows, "error of the target")
 
 
 def _predicted(room: Room, grids: tuple[Grid, ...]) -> list[Layer]:
-    states = (("as drawn", room.drawn_m), ("identified", room.found_m))
+    states = (("nominal", room.drawn_m), ("calibrated", room.found_m))
     return [
         Layer(title, tuple(grid.rms(room.points_m, values, room.supported) for grid in grids))
         for title, values in states
