@@ -21,7 +21,7 @@ def quantiles(whitened: Floats, name: str = "residual-quantiles") -> Html:
     Source: order statistics of n uniform numbers follow Beta(i, n + 1 - i) (David, Nagaraja, Order Statistics, 2003).
     """
     says = "ordered residuals in units of their noise against the quantiles of a normal law"
-    return drawn(name, says, 4.6, 3.9, lambda figure: _paint_quantiles(figure, np.sort(whitened.ravel())))
+    return drawn(name, says, 4.6, 3.2, lambda figure: _paint_quantiles(figure, np.sort(whitened.ravel())))
 
 
 def _paint_quantiles(figure: Figure, ordered: Floats) -> None:
@@ -49,7 +49,7 @@ def _ranks_to_show(n: int) -> NDArray[np.intp]:
 def histogram(whitened: Floats, name: str = "residual-histogram") -> Html:
     """The same residuals as a histogram beside the normal law."""
     says = "histogram of the residuals in units of their noise beside the normal law"
-    return drawn(name, says, 4.6, 3.9, lambda figure: _paint_histogram(figure, whitened.ravel()))
+    return drawn(name, says, 4.6, 3.2, lambda figure: _paint_histogram(figure, whitened.ravel()))
 
 
 def _paint_histogram(figure: Figure, values: Floats) -> None:

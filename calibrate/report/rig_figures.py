@@ -53,7 +53,7 @@ def _height_in(scene: Scene, view: Floats) -> float:
     low, high, level = _floor_extent(_points(scene))
     corners = np.array([[x, y, level] for x in (low[0], high[0]) for y in (low[1], high[1])])
     wide, tall = np.ptp(np.concatenate([_points(scene), corners]) @ view, axis=0)
-    return float(np.clip(WIDTH_IN * tall / wide, 0.6 * WIDTH_IN, 1.1 * WIDTH_IN))
+    return float(np.clip(WIDTH_IN * tall / wide, 0.6 * WIDTH_IN, 0.74 * WIDTH_IN))
 
 
 def _best_azimuth(scene: Scene) -> float:

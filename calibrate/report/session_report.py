@@ -10,7 +10,7 @@ from calibrate.report.drift.chapter import TITLE as DRIFT
 from calibrate.report.drift.chapter import drift_chapter
 from calibrate.report.drift.drift import Drift
 from calibrate.report.drift.words import sentence
-from calibrate.report.elements import Html
+from calibrate.report.elements import Html, section, tag
 from calibrate.report.interactive.chapter import TITLE as INTERACTIVE
 from calibrate.report.interactive.chapter import interactive_chapter
 from calibrate.report.interactive.session_figures import session_figures
@@ -28,6 +28,8 @@ from calibrate.report.sections import (
     spots,
     workspace,
 )
+from calibrate.report.sections.certificate import when
+from calibrate.report.sections.zeros import ZEROS, zeros_part
 from calibrate.report.session_evidence import SessionEvidence
 from calibrate.report.session_workspace import NOT_IN_SPACE, session_arm, session_measured, session_room
 from calibrate.report.spot_session import spot_session
@@ -52,14 +54,22 @@ def session_page(
         diagnosis,
         recording.rig,
     )
-    first = arm_summary.summary(session_answers(known, drift, room), known)
+    first = arm_summary.summary(session_answers(known, drift, room, diagnosis), known, room)
     title, head = f"The arm {recording.rig.name}", arm_summary.masthead(known)
-    return page(title, head, contents, (first, *parts), model.software, scripts=interactive)
+    running = " · ".join(
+        part for part in (recording.rig.name, recording.rig.arm.serial_number, when(recording)) if part
+    )
+    return page(title, head, contents, (first, *parts), model.software, scripts=interactive, running=running)
 
 
-def session_answers(known: SessionEvidence, drift: Drift | None = None, room: Room | str | None = None) -> Answers:
+def session_answers(
+    known: SessionEvidence,
+    drift: Drift | None = None,
+    room: Room | str | None = None,
+    diagnosis: DiagnosisFile | None = None,
+) -> Answers:
     """The first screen; `room` of session_room, computed where it is not given."""
-    answers = arm_summary.answers(known, session_room(known) if room is None else room)
+    answers = arm_summary.answers(known, session_room(known) if room is None else room, diagnosis)
     return answers if drift is None else replace(answers, drift=sentence(drift), warnings=drift.warnings)
 
 
@@ -78,6 +88,9 @@ def _chapters(
     yield from _chapters_of_spots(known)
     yield "errors", (arm_errors.TITLE, arm_errors.errors_chapter(known))
     yield "proofs", (arm_proofs.TITLE, arm_proofs.proofs_chapter(known))
+    zeros = tuple(zeros_part(known))
+    if zeros:
+        yield "zeros", (ZEROS, tag("div", section("zeros", ZEROS, "", *zeros), cls="no-print"))
     yield "parameters", (arm_parameters.TITLE, arm_parameters.parameters_chapter(known))
     yield "data", (arm_data.TITLE, arm_data.data_chapter(known))
     made = provenance.provenance(recording, model.poses, "took part in the fit", model.software)

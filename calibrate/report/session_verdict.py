@@ -5,6 +5,7 @@ from math import isfinite
 
 import numpy as np
 
+from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.fit import Status
 from calibrate.model_file import Fields, UnseenRows
 from calibrate.report.model_tests import Repeated, Scatter, proofs, repeated, scatter
@@ -22,10 +23,10 @@ WORTH_SAYING = 0.1  # of what remains: a pattern of less changes no decision
 FAILED = (Status.NOT_FINITE.name, Status.OUT_OF_STEPS.name, Status.STALLED.name)
 
 
-def session_verdict(evidence: SessionEvidence) -> Verdict:
+def session_verdict(evidence: SessionEvidence, diagnosis: DiagnosisFile | None = None) -> Verdict:
     """From model and recording; the thresholds are those at the top of this file and of verdict.py."""
     model = evidence.model
-    doubts = list(_doubts(evidence))
+    doubts = [*_doubts(evidence), *_doubts_of_rank(evidence), *_doubts_of_diagnosis(diagnosis)]
     reasons = tuple(says for says, _ in doubts)
     advice = tuple(dict.fromkeys((*(do for _, do in doubts if do), *_harmless(scatter(model)))))
     if model.status in FAILED:
@@ -100,6 +101,35 @@ def _doubts(evidence: SessionEvidence) -> Iterator[Doubt]:
         yield "The recording was cut short; what is in it is good, but the plan was not finished.", "Finish the plan."
     for damage in recording.damage:
         yield f"The file is damaged: {damage}.", "Keep the file as it is, and record again if you can."
+
+
+def _doubts_of_rank(evidence: SessionEvidence) -> Iterator[Doubt]:
+    """Combinations of the arm's own parameters that other poses would separate; what no pose could is no fault."""
+    arm = {p.name for p in evidence.arm.parameters}
+    weak = [u for u in evidence.model.unseen if not u.structural and len(u.members) > 1 and arm & set(u.members)]
+    if weak:
+        yield (
+            f"{len(weak)} combination{'s' if len(weak) > 1 else ''} of parameters of the arm cannot be separated with "
+            "these poses.",
+            "Measure more different poses: `calibeam design` chooses them.",
+        )
+
+
+def _doubts_of_diagnosis(found: DiagnosisFile | None) -> Iterator[Doubt]:
+    """What the diagnosis of the same recording opposes; nothing where it agrees or was not made."""
+    if found is None or found.verdict == "consistent":
+        return
+    if found.verdict == "mismatch":
+        causes = f"{len(found.findings)} cause{'s' if len(found.findings) != 1 else ''}"
+        yield (
+            f"Geometry alone does not explain the readings: the diagnosis found {causes}.",
+            "Use the model with the physics, which `calibeam diagnose --model-out` writes.",
+        )
+        return
+    yield (
+        "The diagnosis is not conclusive: something may be there that the recorded columns do not explain.",
+        "See the chapter on what the model lacks; record the missing columns it names.",
+    )
 
 
 def _doubts_of_scatter(found: Scatter | None, repeats: Repeated | None) -> Iterator[Doubt]:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from calibrate.diagnose.schema import DiagnosisFile, NameRecord
 from calibrate.report.diagnosis.words import hardest_to_see, place_words, size_of, stream_words
-from calibrate.report.elements import Html, bullets, folded, section, table, tag
+from calibrate.report.elements import Html, bullets, folded, halves, section, table, tag
 from calibrate.report.quantities import DASH, fixed, length, significant
 
 TITLE = "Uncertainty and limits"
@@ -21,7 +21,7 @@ def limits(file: DiagnosisFile) -> Html:
         *_unexplained(file),
         *_listed("Not completed", [f"{one.stage}: {one.reason}" for one in file.incomplete]),
         *_listed("Faults of the file", [b.says for b in file.blunders]),
-        *_listed("In the streams", list(stream_words(file))),
+        *_streams(file),
         *_listed("Derived, not recorded", list(file.derived)),
         *_missing(file),
         *_visible(file),
@@ -48,6 +48,14 @@ def _listed(title: str, lines: Sequence[str]) -> Iterator[Html]:
         yield bullets(lines)
 
 
+def _streams(file: DiagnosisFile) -> Iterator[Html]:
+    """What the streams usually show says nothing about the arm: one line, the rest to open."""
+    lines = list(stream_words(file))
+    if lines:
+        notes = "1 note, none of it a finding" if len(lines) == 1 else f"{len(lines)} notes, none of them a finding"
+        yield folded(f"In the streams: {notes}", bullets(lines), on_paper=False)
+
+
 def _missing(file: DiagnosisFile) -> Iterator[Html]:
     if file.not_recorded:
         rows = [(m.column, m.driver, m.physics) for m in file.not_recorded]
@@ -63,17 +71,19 @@ def _visible(file: DiagnosisFile) -> Iterator[Html]:
     ]
     head = ("Physics", "where it is seen worst", "found from", "of")
     caption = "Detection limits of these poses (95 %): a smaller error would not be found"
-    yield table(head, hardest, numeric=(2,), caption=caption)
+    yield halves(table(head, hardest, numeric=(2,), caption=caption))
     every = [(one.where, one.physics, size_of(one.parameter, one.value), one.parameter) for one in file.smallest]
     title = f"The same at every place: {len(every)} causes"
-    yield folded(title, table(("Where", "physics", "found from", "of"), sorted(every), numeric=(2,)))
+    listed = table(("Where", "physics", "found from", "of"), sorted(every), numeric=(2,))
+    yield folded(title, listed, on_paper=False)
 
 
 def _rejected(file: DiagnosisFile) -> Iterator[Html]:
     if file.rejected:
         rows = [(place_words(r), DASH if r.bic_gain is None else fixed(r.bic_gain, 1), r.why) for r in file.rejected]
         head = ("Best candidate of its kind", "BIC gain", "why not")
-        yield table(head, rows, numeric=(1,), caption="Tested and rejected")
+        title = f"Tested and rejected: {len(rows)} kinds of cause"
+        yield folded(title, table(head, rows, numeric=(1,)), on_paper=False)
 
 
 def _invisible(names: Sequence[NameRecord]) -> Iterator[Html]:
@@ -89,7 +99,7 @@ def _confusable(file: DiagnosisFile) -> Iterator[Html]:
         more = len(file.confusable) - len(ranked)
         title = f"Cannot be separated with these poses: {len(file.confusable)} pairs"
         note = (tag("p", f"{more} more in diagnosis.json."),) if more else ()
-        yield folded(title, table(("One cause", "another", "R²"), rows, numeric=(2,)), *note)
+        yield folded(title, table(("One cause", "another", "R²"), rows, numeric=(2,)), *note, on_paper=False)
 
 
 def _length(value_m: float | None) -> str:

@@ -45,7 +45,7 @@ def _tiles(file: DiagnosisFile) -> Html:
     if file.free_space is not None:
         change = file.free_space
         said = f"{length(change.rms_before_m)} with geometry alone; predicted rms between these angles"
-        tiles.append(tile("Tool error over the workspace", length(change.rms_after_m), said))
+        tiles.append(tile("Tool error, frames fitted", length(change.rms_after_m), said))
     return tag("div", *tiles, cls="tiles")
 
 

@@ -125,8 +125,9 @@ def micrometres(value_m: float | None) -> str:
 def free_space_words(change: FreeSpaceRecord) -> str:
     """One sentence."""
     return (
-        f"predicted tool error between the joint angles of this session: {micrometres(change.rms_before_m)} "
-        f"with geometry alone, {micrometres(change.rms_after_m)} with the physics (rms, {change.poses} poses)"
+        "predicted tool error between the joint angles of this session, base and tool point fitted: "
+        f"{micrometres(change.rms_before_m)} with geometry alone, {micrometres(change.rms_after_m)} with the physics "
+        f"(rms, {change.poses} poses)"
     )
 
 

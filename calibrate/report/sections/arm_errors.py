@@ -38,8 +38,7 @@ def _instrument(evidence: SessionEvidence, index: int) -> list[Html]:
     readings = evidence.readings[index]
     found = patterns_of(evidence, index)
     out = [tag("h3", readings.title)]
-    if index > 0:  # those of the first are on the first page
-        out.append(_before_and_after(readings))
+    out.append(_before_and_after(readings))
     out.append(_noise_like(readings))
     if found:
         out += [tag("div", figure(along(readings, found), _caption(found)), cls="wide"), _pattern_table(found)]
@@ -52,7 +51,7 @@ def _before_and_after(readings: Readings) -> Html:
     some = f" {MOST_POINTS} of them are drawn." if len(readings.rows) > MOST_POINTS else ""
     return panels(
         figure(errors(readings), "Every reading, before and after, on a logarithmic axis."),
-        figure(by_sample(readings), f"The same in the order of the file.{some}"),
+        figure(by_sample(readings), f"The same in the order of the file: a drift or a knock would show here.{some}"),
     )
 
 
@@ -94,4 +93,4 @@ def _pattern_table(found: tuple[Pattern, ...]) -> Html:
     ]
     caption = f"Does what remains depend on it (one-way analysis of variance, up to {GROUPS} groups)"
     head = ("Factor", "F", "p", "share of what remains", "reads as")
-    return folded("The same in numbers", table(head, rows, numeric=(1, 2, 3), caption=caption))
+    return folded("The same in numbers", table(head, rows, numeric=(1, 2, 3), caption=caption), on_paper=False)

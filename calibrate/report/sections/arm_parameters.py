@@ -9,7 +9,7 @@ from calibrate.identifiability import WEAK
 from calibrate.identification.session import holds_spots
 from calibrate.model_file import ModelFile, ModelParameter
 from calibrate.parameters import Parameter
-from calibrate.report.elements import Html, bullets, figure, folded, panels, section, table, tag
+from calibrate.report.elements import Html, bullets, figure, folded, halves, join, panels, section, table, tag
 from calibrate.report.observability_table import observability
 from calibrate.report.quantities import DASH, aligned, decimals_of, fixed, significant
 from calibrate.report.rank_figures import spectrum
@@ -17,6 +17,7 @@ from calibrate.report.reasons import in_plain_words, kind_of, reason_among
 from calibrate.report.session_evidence import SessionEvidence
 
 TITLE = "What was identified, and what was not"
+MOST_LISTED = 12  # parameters without a number: of more, one line a reason, the rest folded
 LEARNED = 0.9  # sigma over drawing tolerance: above, these data taught nothing about the parameter
 
 
@@ -96,7 +97,7 @@ def _numbers(evidence: SessionEvidence, known: list[ModelParameter]) -> Html:
         (tag("code", p.name), in_plain_words(p.name), value, sigma, *_by_refits(p, drawn), unit, _source(p, believed))
         for p, value, sigma, (_, _, unit) in zip(known, values, sigmas, numbers, strict=True)
     ]
-    return table(head, rows, numeric=(2, 3, 4) if drawn else (2, 3))
+    return halves(table(head, rows, numeric=(2, 3, 4) if drawn else (2, 3)), terse=True)
 
 
 def _number(found: ModelParameter) -> tuple[str, str, str]:
@@ -133,4 +134,13 @@ def _refusals(evidence: SessionEvidence, refused: list[ModelParameter]) -> Html:
         for p in refused
     ]
     listed = table(("Parameter", "what it is", "why there is no number"), rows)
-    return listed if len(rows) <= 12 else folded(f"All {len(rows)}, each with its reason", listed)
+    if len(rows) <= MOST_LISTED:
+        return listed
+    by_reason: dict[str, list[str]] = {}
+    for (_, _, why), p in zip(rows, refused, strict=True):
+        by_reason.setdefault(why, []).append(p.name)
+    summed = [(f"{why[0].upper()}{why[1:]}", ", ".join(names)) for why, names in by_reason.items()]
+    return join(
+        table(("Why there is no number", "parameters"), summed),
+        folded(f"All {len(rows)}, each with its reason", listed, on_paper=False),
+    )

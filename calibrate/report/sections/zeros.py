@@ -13,6 +13,7 @@ from calibrate.report.workspace.known_arm import whole_covariance
 from calibrate.report.zero_figure import doubts
 from calibrate.sensors import spots
 
+ZEROS = "Joint zeros"
 SMALL_SHARE = 0.5  # measurement under this share of sigma: something else limits the zero
 
 
@@ -36,7 +37,6 @@ def zeros_part(evidence: SessionEvidence) -> Iterator[Html]:
     if not zeros:
         return
     lead = "True joint angle = reading + zero. Sigma is one standard deviation. All other parameters are further down."
-    yield tag("h3", "Joint zeros")
     yield tag("p", lead, cls="lead")
     if spots.KIND.name not in evidence.model.instruments:
         yield table(("Joint", "zero (°)", "± sigma (°)", "± sigma (µrad)"), _rows(evidence, zeros), numeric=(1, 2, 3))
