@@ -162,7 +162,7 @@ def _now(fleet: Fleet) -> Html | None:
             _change(row.held_out_before_m, row.held_out_after_m),
             _change(row.free_space_before_m, row.free_space_after_m),
             row.verdict or DASH,
-            {"good": "yes", "care": "with care", "bad": "no"}.get(row.trust, DASH),
+            row.trust or DASH,
         )
         for row in newest[:LISTED]
     ]

@@ -27,7 +27,7 @@ class Model:
     """An identified arm: numbers with their doubt. `file` holds everything that model.json does."""
 
     file: "ModelFile"
-    trust: str  # "good", "care" or "bad"
+    trust: str  # "yes", "with care" or "no"
     says: str  # the verdict in one sentence
     reasons: tuple[str, ...]  # what speaks against trusting it
 

@@ -13,6 +13,7 @@ from calibrate.pose_design.design import Design
 from calibrate.pose_design.places import Places
 from calibrate.pose_design.seen import Seen
 from calibrate.report.diagnosis.words import size_of
+from calibrate.report.pose_design.page import of_the_curve
 from calibrate.report.quantities import length
 
 MATTERS_M = 1e-7  # of what no pose shows: below, the target does not feel it
@@ -60,10 +61,11 @@ def _table(title: str, *headings: str) -> Table:
 
 def _print_curve(console: Console, made: Design) -> None:
     curve = made.curve
-    table = _table("predicted error by number of poses", "poses", "chosen one by one", "random")
+    table = _table("predicted error by number of poses", "poses", "added one by one", "random")
     for i in np.unique(np.linspace(0, len(curve.poses) - 1, 8).astype(int)):
         table.add_row(str(curve.poses[i]), length(float(curve.chosen_m[i])), length(float(curve.random_m[i])))
     console.print(table)
+    console.print(of_the_curve(made), markup=False, highlight=False)
     console.print(enough_line(made), markup=False, highlight=False)
 
 
@@ -123,10 +125,8 @@ def _print_smallest(console: Console, seen: Seen) -> None:
 def _print_confusable(console: Console, seen: Seen) -> None:
     lines = [
         f"could not be separated: {name_of(a)} and {name_of(b)} (R2 {r2:.3f})"
-        for a, b, r2 in sorted(seen.confusable, key=lambda pair: pair[2])
-        if (a.physics, a.where) != (b.physics, b.where)
+        for a, b, r2 in sorted(seen.confusable_causes, key=lambda pair: pair[2])
     ]
-    lines = list({line.partition(" (R2")[0]: line for line in lines}.values())  # forms of one cause: the most alike
     places: dict[str, dict[str, None]] = {}
     for one in seen.invisible:
         places.setdefault(one.physics, {})[one.where] = None

@@ -59,7 +59,7 @@ def first_screen(answers: Answers, maps: Html | None = None) -> Html:
     ]
     tiles = tag("div", *(tile(n.name, n.said, n.about) for n in rest), cls="tiles")
     below = [tag("p", " · ".join(answers.also), cls="also")] if answers.also else []
-    colour = f"verdict {judged.trust.value}"
+    colour = f"verdict {judged.trust.css}"
     box = tag("div", tag("div", *rows), maps, cls=f"{colour} with-maps") if maps else tag("div", *rows, cls=colour)
     return tag("div", box, tiles, *below, cls="answers")
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.report.answers import Answers
+from calibrate.report.diagnosis.beyond_model import beyond_model
 from calibrate.report.diagnosis.page import inserted
 from calibrate.report.drift.chapter import TITLE as DRIFT
 from calibrate.report.drift.chapter import drift_chapter
@@ -47,12 +48,14 @@ def session_page(
     """The page as text; `drift` adds its chapter, `interactive` figures that can be turned; `room` of session_room."""
     recording, model = known.recording, known.model
     room = session_room(known) if room is None else room
+    diagnosis, held = (None, ()) if diagnosis is None else beyond_model(diagnosis, model)
     chapters = dict(_chapters(known, drift, room, interactive=interactive))
     contents, parts = inserted(
         {anchor: title for anchor, (title, _) in chapters.items()},
         tuple(chapter for _, chapter in chapters.values()),
         diagnosis,
         recording.rig,
+        held,
     )
     first = arm_summary.summary(session_answers(known, drift, room, diagnosis), known, room)
     title, head = f"The arm {recording.rig.name}", arm_summary.masthead(known)
@@ -69,6 +72,7 @@ def session_answers(
     diagnosis: DiagnosisFile | None = None,
 ) -> Answers:
     """The first screen; `room` of session_room, computed where it is not given."""
+    diagnosis = None if diagnosis is None else beyond_model(diagnosis, known.model)[0]
     answers = arm_summary.answers(known, session_room(known) if room is None else room, diagnosis)
     return answers if drift is None else replace(answers, drift=sentence(drift), warnings=drift.warnings)
 

@@ -74,7 +74,7 @@ def _verdict(found: Verification) -> Html:
     reasons += [f"{one.symbol}: {one.taken} of the {one.asked} measurements of the whole test" for one in short]
     reasons += found.left_out
     return tag(
-        "div", tag("strong", found.sentence), *([bullets(reasons)] if reasons else []), cls=f"verdict {trust.value}"
+        "div", tag("strong", found.sentence), *([bullets(reasons)] if reasons else []), cls=f"verdict {trust.css}"
     )
 
 

@@ -2,8 +2,15 @@
 
 from collections.abc import Iterator, Sequence
 
-from calibrate.diagnose.schema import DiagnosisFile, NameRecord
-from calibrate.report.diagnosis.words import hardest_to_see, place_words, size_of, stream_words
+from calibrate.diagnose.schema import DiagnosisFile, FindingRecord, NameRecord
+from calibrate.report.diagnosis.words import (
+    confusable_causes,
+    hardest_to_see,
+    place_words,
+    size_of,
+    stream_words,
+    untested_physics,
+)
 from calibrate.report.elements import Html, bullets, folded, halves, section, table, tag
 from calibrate.report.quantities import DASH, fixed, length, significant
 
@@ -11,14 +18,15 @@ TITLE = "Uncertainty and limits"
 MOST_PAIRS = 40  # of confusable causes: the file holds them all
 
 
-def limits(file: DiagnosisFile) -> Html:
-    """Chapter `diagnosis-limits`."""
+def limits(file: DiagnosisFile, held: Sequence[FindingRecord] = ()) -> Html:
+    """Chapter `diagnosis-limits`; `held`: findings that the calibrated arm of the page holds already."""
     lead = "What could be there and was not found, or could not be."
     return section(
         "diagnosis-limits",
         TITLE,
         lead,
         *_unexplained(file),
+        *_listed("Found as well, and part of the calibrated arm already", [f.says for f in held]),
         *_listed("Not completed", [f"{one.stage}: {one.reason}" for one in file.incomplete]),
         *_listed("Faults of the file", [b.says for b in file.blunders]),
         *_streams(file),
@@ -57,10 +65,16 @@ def _streams(file: DiagnosisFile) -> Iterator[Html]:
 
 
 def _missing(file: DiagnosisFile) -> Iterator[Html]:
-    if file.not_recorded:
-        rows = [(m.column, m.driver, m.physics) for m in file.not_recorded]
-        caption = "Not tested: columns that are missing"
-        yield table(("Column", "driver", "physics"), rows, caption=caption)
+    """Physics of which no form was tested, apart from physics that another column could show."""
+    untested = untested_physics(file)
+    apart = {
+        "Not tested: columns that are missing": [m for m in file.not_recorded if m.physics in untested],
+        "Tested with other columns; these would add to it": [m for m in file.not_recorded if m.physics not in untested],
+    }
+    for caption, listed in apart.items():
+        if listed:
+            rows = [(m.column, m.driver, m.physics) for m in listed]
+            yield table(("Column", "driver", "physics"), rows, caption=caption)
 
 
 def _visible(file: DiagnosisFile) -> Iterator[Html]:
@@ -93,11 +107,12 @@ def _invisible(names: Sequence[NameRecord]) -> Iterator[Html]:
 
 
 def _confusable(file: DiagnosisFile) -> Iterator[Html]:
-    if file.confusable:
-        ranked = sorted(file.confusable, key=lambda pair: -pair[2])[:MOST_PAIRS]
+    pairs = confusable_causes(file)
+    if pairs:
+        ranked = pairs[:MOST_PAIRS]
         rows = [(place_words(a), place_words(b), f"{r2:.3f}") for a, b, r2 in ranked]
-        more = len(file.confusable) - len(ranked)
-        title = f"Cannot be separated with these poses: {len(file.confusable)} pairs"
+        more = len(pairs) - len(ranked)
+        title = f"Cannot be separated with these poses: {len(pairs)} pair{'s' if len(pairs) > 1 else ''} of causes"
         note = (tag("p", f"{more} more in diagnosis.json."),) if more else ()
         yield folded(title, table(("One cause", "another", "R²"), rows, numeric=(2,)), *note, on_paper=False)
 

@@ -7,9 +7,10 @@ from calibrate.report.diagnosis.words import free_space_words, verdict_words
 from calibrate.report.elements import Html, bullets, section, table, tag
 from calibrate.report.quantities import DASH, fixed, length, significant
 from calibrate.report.tiles import tile
+from calibrate.report.verdict import Trust
 
 TITLE = "What the model lacks"
-TRUST = {"mismatch": "care", "consistent": "good", "undecidable": "bad"}
+TRUST = {"mismatch": Trust.CARE, "consistent": Trust.GOOD, "undecidable": Trust.NONE}
 SPLITS = {"random": "samples at random", "place": "each place in turn", "last block": "the end of the session"}
 
 
@@ -33,7 +34,7 @@ def _verdict(file: DiagnosisFile) -> Html:
         )
     if file.next:
         content += [tag("p", tag("b", "What to do")), bullets(file.next)]
-    return tag("div", *content, cls=f"verdict {TRUST[file.verdict]}")
+    return tag("div", *content, cls=f"verdict {TRUST[file.verdict].css}")
 
 
 def _tiles(file: DiagnosisFile) -> Html:

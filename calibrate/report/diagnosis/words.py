@@ -72,9 +72,21 @@ def _tested(file: DiagnosisFile) -> str:
     kinds = len({one.physics for one in file.smallest})
     shown = [visible_words(one) for one in hardest_to_see(file) if one.physics in TOLD]
     seen = f"; detection limits: {'; '.join(shown)}" if shown else ""
-    lacking = ", ".join(dict.fromkeys(m.physics for m in file.not_recorded))
+    lacking = ", ".join(untested_physics(file))
     blind = f". Not tested, for lack of columns: {lacking}" if lacking else ""
     return f". Tested were {kinds} kinds of physics, {len(file.smallest)} places and causes{seen}{blind}"
+
+
+def untested_physics(file: DiagnosisFile) -> tuple[str, ...]:
+    """Kinds of physics of which no form was tested: a kind that another recorded column could show was."""
+    tested = {one.physics for one in file.smallest}
+    return tuple(dict.fromkeys(m.physics for m in file.not_recorded if m.physics not in tested))
+
+
+def confusable_causes(file: DiagnosisFile) -> tuple[tuple[NameRecord, NameRecord, float], ...]:
+    """Pairs that the poses cannot separate, the most alike first; forms of one cause are no pair of causes."""
+    pairs = (pair for pair in file.confusable if (pair[0].physics, pair[0].where) != (pair[1].physics, pair[1].where))
+    return tuple(sorted(pairs, key=lambda pair: -pair[2]))
 
 
 def visible_words(smallest: SmallestRecord) -> str:

@@ -41,16 +41,23 @@ def _tiles(made: Design, seen: Seen) -> Html:
         tile("Predicted error", length(made.free_space_m), f"rms over the workspace:  {made.information.target}"),
         tile("Random poses", length(made.random_m), "as many, median of draws"),
         tile("Enough", enough, "poses; more of them do little but average noise"),
-        tile("Alike", str(len(seen.confusable)), "pairs of terms that could not be separated"),
+        tile("Alike", str(len(seen.confusable_causes)), "pairs of causes that could not be separated"),
         cls="tiles",
     )
 
 
 def _promise(made: Design) -> Html:
-    caption = (
-        "Predicted rms error over the workspace. The plan was chosen by exchange, the curve one pose after the other."
-    )
+    caption = f"Predicted rms error over the workspace. {of_the_curve(made)}"
     return section("promise", CONTENTS["promise"], "What more poses would bring.", figure(curve_figure(made), caption))
+
+
+def of_the_curve(made: Design) -> str:
+    """Why plan and curve differ at the same number of poses."""
+    return (
+        f"The plan was chosen by exchanging all its poses (criterion {made.asked.criterion}). The curve adds one pose "
+        "after the other (criterion d): quicker, but not as good. The plan may therefore lie below the curve, even "
+        "where the curve has more poses; the curve shows how the error falls, the plan what to expect."
+    )
 
 
 def _plan(made: Design) -> Html:
@@ -83,7 +90,7 @@ def _places(places: Sequence[Places]) -> Html:
 
 def _causes(seen: Seen) -> Html:
     rows = [(one.name.physics, one.name.where, size_of(one.parameter, one.value)) for one in seen.smallest]
-    alike = [f"{_name(a)} and {_name(b)}: R2 {r2:.3f}" for a, b, r2 in seen.confusable]
+    alike = [f"{_name(a)} and {_name(b)}: R2 {r2:.3f}" for a, b, r2 in seen.confusable_causes]
     caption = (
         "Largest share, in percent, of the signal of a cause (row) that any form of another one (column) could "
         "explain, geometry refitted. From 97 % on the poses cannot separate them."
