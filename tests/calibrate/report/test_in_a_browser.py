@@ -13,6 +13,7 @@ from calibrate.report.interactive.chapter import interactive_chapter
 from calibrate.report.interactive.session_figures import session_figures
 from calibrate.report.page import page
 from calibrate.report.session_evidence import session_evidence
+from tests.support.overlaps import OVERLAPS
 
 MOST_PAGES = 8
 SOFTWARE_GL = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
@@ -64,23 +65,6 @@ def test_the_interactive_report_is_drawn_from_the_file_alone(tab, wire_and_posit
     opened.wait_for_selector("#plot-residuals .scatterlayer .trace", state="attached")
     assert asked == [path.as_uri()]
     assert wrong == []
-
-
-OVERLAPS = """() => {
-  const bad = [];
-  for (const svg of document.querySelectorAll('svg')) {
-    const texts = [...svg.querySelectorAll('text')].filter(t => t.textContent.trim());
-    const boxes = texts.map(t => t.getBoundingClientRect());
-    for (let i = 0; i < boxes.length; i++) for (let j = 0; j < i; j++) {
-      const a = boxes[i], b = boxes[j];
-      const wide = Math.min(a.right, b.right) - Math.max(a.left, b.left);
-      const high = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
-      if (wide > 1 && high > 0.3 * Math.min(a.height, b.height))
-        bad.push(`${svg.getAttribute('aria-label')}: "${texts[j].textContent}" and "${texts[i].textContent}"`);
-    }
-  }
-  return bad;
-}"""
 
 
 @pytest.mark.parametrize("which", ["spots_html", "session_html"])
