@@ -6,8 +6,7 @@ Colour only repeats what a mark and a word say.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from calibrate.report.elements import Html, bullets, join, tag
-from calibrate.report.tiles import tile
+from calibrate.report.elements import Html, bullets, join, tag, tile
 from calibrate.report.verdict import Trust, Verdict
 
 MARKS = {

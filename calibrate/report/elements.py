@@ -96,3 +96,8 @@ def folded(title: str, *children: str, on_paper: bool = True) -> Html:
 def halves(*children: str, terse: bool = False) -> Html:
     """Long narrow tables, which paper has room for twice side by side; `terse`: there without their second column."""
     return tag("div", *children, cls="halves terse" if terse else "halves")
+
+
+def tile(name: str, value: str, says: str) -> Html:
+    """A number that is to be seen first: name, number, and one line about it."""
+    return tag("div", tag("span", name, cls="name"), tag("b", value), tag("span", says), cls="tile")

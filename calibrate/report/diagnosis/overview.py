@@ -4,9 +4,8 @@ from collections.abc import Iterator
 
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.report.diagnosis.words import free_space_words, verdict_words
-from calibrate.report.elements import Html, bullets, section, table, tag
+from calibrate.report.elements import Html, bullets, section, table, tag, tile
 from calibrate.report.quantities import DASH, fixed, length, significant
-from calibrate.report.tiles import tile
 from calibrate.report.verdict import Trust
 
 TITLE = "What the model lacks"

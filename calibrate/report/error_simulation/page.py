@@ -7,12 +7,11 @@ import numpy as np
 from calibrate.error_simulation.linear import ROUNDING_M
 from calibrate.error_simulation.record import SHARE
 from calibrate.error_simulation.simulate import Simulation
-from calibrate.report.elements import Html, figure, section, table, tag
+from calibrate.report.elements import Html, figure, section, table, tag, tile
 from calibrate.report.error_simulation.figures import PICTURES, Picture
 from calibrate.report.page import page, write_page
 from calibrate.report.quantities import angle, length, significant
 from calibrate.report.svg import drawn
-from calibrate.report.tiles import tile
 
 CONTENTS = {"budget": "Budget", "each": "Each error alone", "linear": "Linear and drawn", "ranking": "Ranking",
             "worst": "Worst postures"}  # fmt: skip

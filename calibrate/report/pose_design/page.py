@@ -9,11 +9,10 @@ from calibrate.pose_design.design import Design
 from calibrate.pose_design.places import Places
 from calibrate.pose_design.seen import Seen
 from calibrate.report.diagnosis.words import size_of
-from calibrate.report.elements import Html, bullets, figure, section, table, tag
+from calibrate.report.elements import Html, bullets, figure, section, table, tag, tile
 from calibrate.report.page import page, write_page
 from calibrate.report.pose_design.figures import curve_figure, isolability_figure, joints_figure
 from calibrate.report.quantities import length
-from calibrate.report.tiles import tile
 
 CONTENTS = {"promise": "How many poses", "plan": "The plan", "places": "Places of the fixture", "causes": "Causes"}
 

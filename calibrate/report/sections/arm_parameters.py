@@ -8,9 +8,9 @@ from calibrate.default_belief import said_of
 from calibrate.identifiability import WEAK
 from calibrate.identification.session import holds_spots
 from calibrate.model_file import ModelFile, ModelParameter
+from calibrate.observability import WELL_CONDITIONED
 from calibrate.parameters import Parameter
 from calibrate.report.elements import Html, bullets, figure, folded, halves, join, panels, section, table, tag
-from calibrate.report.observability_table import observability
 from calibrate.report.quantities import DASH, aligned, decimals_of, fixed, significant
 from calibrate.report.rank_figures import spectrum
 from calibrate.report.reasons import in_plain_words, kind_of, reason_among
@@ -74,7 +74,16 @@ def _observability(model: ModelFile) -> Iterator[Html]:
         if model.condition is not None:
             yield tag("p", f"Condition of what is seen: {significant(model.condition)}.")
         return
-    yield from observability(seen)
+    values = (seen.o1, seen.o2, seen.o3, seen.o4, seen.o5, seen.condition)
+    row = tuple(DASH if value is None else significant(value) for value in values)
+    caption = f"Observability of the {seen.parameters} parameters that the data determine"
+    head = (*(f"O{k}" for k in range(1, 6)), "condition")
+    yield table(head, [row], numeric=range(6), caption=caption)
+    if seen.condition is not None and seen.condition > WELL_CONDITIONED:
+        says = (
+            f"A condition above {WELL_CONDITIONED:g} means that other poses would determine some parameters far better."
+        )
+        yield tag("p", says, cls="lead")
 
 
 def _numbers(evidence: SessionEvidence, known: list[ModelParameter]) -> Html:

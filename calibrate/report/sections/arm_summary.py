@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from calibrate.diagnose.schema import DiagnosisFile
+from calibrate.model_file import FreeSpaceRecord
 from calibrate.report.answers import Answers, Number, first_screen
-from calibrate.report.anywhere import anywhere
 from calibrate.report.elements import Html, figure, tag
 from calibrate.report.model_tests import proofs
 from calibrate.report.quantities import DASH, length, significant
@@ -18,6 +18,9 @@ from calibrate.report.session_verdict import session_verdict
 from calibrate.report.workspace.pictures import tool_maps
 from calibrate.report.workspace.room import Room
 from calibrate.sensors.catalogue import kind_of
+
+ANYWHERE = "Anywhere"
+MOSTLY = 0.9  # of the error of a single pose, by the doubt of the parameters: the rest adds in quadrature
 
 
 def masthead(evidence: SessionEvidence) -> Html:
@@ -52,7 +55,7 @@ def answers(evidence: SessionEvidence, room: Room | str, diagnosis: DiagnosisFil
         *([determined(evidence)] if limits else []),
         f"rows of the fit: {first.says(_rms(first.error_after))} rms distance",
     )
-    numbers = (*_tool(room, diagnosis), *_errors(evidence), anywhere(model.free_space))
+    numbers = (*_tool(room, diagnosis), *_errors(evidence), _anywhere(model.free_space))
     return Answers(session_verdict(evidence, diagnosis), numbers, limits, also)
 
 
@@ -117,3 +120,14 @@ def _what(readings: Readings) -> str:
 
 def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
+
+
+def _anywhere(room: FreeSpaceRecord | None) -> Number:
+    """What 95 % of all poses between the joint limits stay below, one sigma, as predicted; or why it is not told."""
+    if room is None or room.pose_p95_m is None:
+        why = "not predicted" if room is None else f"not determined: {room.says}"
+        return Number("anywhere", ANYWHERE, None, "m", DASH, why)
+    about = "one sigma of a single pose, in 95 % of the workspace; predicted, as far as the model is right"
+    if room.p95_m is not None and room.p95_m > MOSTLY * room.pose_p95_m:
+        about += "; nearly all of it is what these data leave open of the arm's geometry"
+    return Number("anywhere", ANYWHERE, room.pose_p95_m, "m", length(room.pose_p95_m), about)
