@@ -96,7 +96,7 @@ def pivot(T_base_flange: Floats, seat: NDArray[np.int64]) -> tuple[Floats, dict[
     solution, _, rank, _ = np.linalg.lstsq(rows, -T_base_flange[:, :3, 3].ravel(), rcond=1e-6)
     found = np.asarray(solution, dtype=np.float64)
     if rank < rows.shape[1]:
-        raise DataError("seats: the probe leans the same way in all rows; its tip is not told: give tool.point_m")
+        raise DataError("seats: the probe leans the same way in all rows; its tip is not determined: give tool.point_m")
     return found[:3], {k: found[3 + 3 * i : 6 + 3 * i] for i, k in enumerate(seats)}
 
 

@@ -27,7 +27,7 @@ class ClockStatus(enum.Enum):
     """How the comparison ended."""
 
     FOUND = "found"
-    TOO_SHORT = "too few samples, or too short a time, to tell a rate from delays"
+    TOO_SHORT = "too few samples, or too short a time, to separate a rate from delays"
     GOES_BACK = "the device's clock goes back: it was restarted or set"
     UNSTAMPED = "the device does not stamp its samples"
 

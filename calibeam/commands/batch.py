@@ -103,4 +103,4 @@ def _end(ran: "RunResult", fleet: "Fleet", out: Path, *, again: bool) -> None:
     if fleet.bad and len(fleet.bad) == len(fleet.rows):
         raise DataError(f"none of {len(fleet.rows)} recordings could be identified; the first: {fleet.bad[0].error}")
     if fleet.bad:
-        raise PartialResult(f"{len(fleet.bad)} of {len(fleet.rows)} recordings failed; {out / PAGE} says why")
+        raise PartialResult(f"{len(fleet.bad)} of {len(fleet.rows)} recordings failed; the reasons are in {out / PAGE}")

@@ -42,7 +42,9 @@ def camera_command(
     loaded, text, clock, console = load_rig(rig), rig_text(rig), SystemClock(), Console()
     check_session(loaded)
     if loaded.camera is None:
-        raise RigFileError(f"rig {loaded.name}: no [camera]; say how it is reached, and what board is on the fixture")
+        raise RigFileError(
+            f"rig {loaded.name}: no [camera]; add how it is reached and [camera.board], the board on the fixture"
+        )
     if not yes:
         someone(at_terminal(), "whether the arm may move", YES).may_move()
     from acquisition.centring.camera.measuring import CameraMeasuring

@@ -125,7 +125,7 @@ def _checked(
 def _print_run(console: Console, run: "Centring") -> None:
     """The outcome, then a line a step: what it was for, how far the joints went, where the spots are."""
     console.print(f"{run.strategy}: {run.status.value} ({run.steps} steps)", soft_wrap=True, markup=False)
-    table = Table("step", "for", "largest joint step (mrad)", "PSD 1 x, y (um)", "PSD 2 x, y (um)", box=None)
+    table = Table("step", "for", "largest joint step (mrad)", "PSD 1 x, y (µm)", "PSD 2 x, y (µm)", box=None)
     before = run.trace[0].q_rad
     for number, step in enumerate(run.trace):
         x1, y1, x2, y2 = (f"{1e6 * value:.1f}" if np.isfinite(value) else "dark" for value in step.spots_m)

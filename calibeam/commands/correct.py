@@ -200,7 +200,7 @@ def _print_found(
     for line in bad if verbose else bad[:LISTED]:
         say(line)
     if not verbose and len(bad) > LISTED:
-        say(f"... {len(bad) - LISTED} more (--verbose, or column says)")
+        say(f"... {len(bad) - LISTED} more (--verbose lists all; so does the column 'says')")
     for note in notes:
         say(note)
 

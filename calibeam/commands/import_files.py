@@ -110,7 +110,7 @@ def import_command(
     if sheet is not None and not any(path.suffix.lower() in WORKBOOKS for path in (source, *others)):
         raise RecordingError(f"{source}: --sheet {sheet}: only a workbook has sheets; leave --sheet out")
     if rig is None:
-        raise RecordingError(f"{source}: a table or a log does not say of which rig it is; give --rig RIG.toml")
+        raise RecordingError(f"{source}: a table or a log names no rig; give --rig RIG.toml")
     if _is_can(source) and not others:
         _refuse(source, "a CAN log has no columns", columns=columns, sheet=sheet, streams=streams)
         _can(source, out, rig)

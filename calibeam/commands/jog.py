@@ -74,7 +74,7 @@ def jog_command(
         or (by_deg is None) == (by_mm is None)
         or (joint is not None and by_deg is None)
     ):
-        raise TaskError("say --joint N --by-deg A, or --axis x|y|z with --by-mm or --by-deg")
+        raise TaskError("what to jog is missing; give --joint N --by-deg A, or --axis x|y|z with --by-mm or --by-deg")
     if abs(by_mm or 0.0) > LARGEST_MM or abs(by_deg or 0.0) > LARGEST_DEG:
         raise TaskError(f"a jog is at most {LARGEST_MM:.0f} mm or {LARGEST_DEG:.0f} deg; use calibeam move")
     if joint is not None and not 1 <= joint <= loaded.n_joints:

@@ -66,7 +66,7 @@ def encoders(
     loaded = load_rig(rig)
     device = loaded.devices.encoders
     if device is None:
-        raise DeviceRefused(f"rig {loaded.name}: no [devices.encoders]; say there how the encoders are reached")
+        raise DeviceRefused(f"rig {loaded.name}: no [devices.encoders]; add it, with how the encoders are reached")
     _log(EncoderLog(device, rig_text(rig), out, SystemClock(), rotation, raw=raw), out, for_s, json_=json_)
 
 
@@ -107,7 +107,7 @@ def tracker(
     loaded = load_rig(rig)
     device = loaded.devices.tracker
     if device is None:
-        raise DeviceRefused(f"rig {loaded.name}: no [devices.tracker]; say there how the tracker is reached")
+        raise DeviceRefused(f"rig {loaded.name}: no [devices.tracker]; add it, with how the tracker is reached")
     _log(EncoderLog(device, rig_text(rig), out, SystemClock(), rotation, raw=False), out, for_s, json_=json_)
 
 

@@ -70,7 +70,7 @@ def move_command(
 
     loaded = load_rig(rig)
     if sum((bool(joints_deg), task is not None, home)) != 1:
-        raise TaskError("say where to with one of --joints-deg, --task with --position, --home")
+        raise TaskError("the target is missing; give one of --joints-deg, --task with --position, --home")
     if not 0.0 < speed <= 1.0:
         raise TaskError(f"--speed {speed}: a share of the rig's speeds, above 0 and up to 1")
     by = By.LINE if line else By.JOINTS
@@ -89,7 +89,7 @@ def move_command(
 
 def _task_place(task: Path, position: str | None) -> Place:
     if position is None:
-        raise TaskError(f"--task {task}: say which of its positions with --position")
+        raise TaskError(f"--task {task}: no position of the task is named; give --position")
     place = read_task(task).graph.place(position)
     if place.coord is not None:
         raise TaskError(f"{position}: moves with a belt; only a program can go there")

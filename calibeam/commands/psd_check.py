@@ -29,7 +29,7 @@ READ_S = 1.0
 COLUMNS = ("x_m", "y_m")
 NO_WAIT = "give --no-wait where something else moves the spot"
 LARGEST_M = 0.1  # of a place from the middle; faces are some centimetres long
-RIG_DIFFERS = "the rig says"
+RIG_DIFFERS = "the rig file has"
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,6 @@ from calibrate.diagnose.file import read_diagnosis
 from calibrate.model_file import read_model
 from calibrate.report.answers import Answers
 from calibrate.report.drift.drift import Calibration
-from calibrate.report.verdict import Trust
 
 MODEL, DIAGNOSIS = "model.json", "diagnosis.json"  # as sessions name them
 
@@ -36,9 +35,6 @@ def read_earlier_calibration(path: Path) -> Calibration:
 def _label(recording: Recording) -> str:
     """The day, where the recording says it."""
     return recording.started_utc.partition("T")[0] or recording.path.name
-
-
-WORDS = {Trust.GOOD: "yes", Trust.CARE: "with care", Trust.NONE: "no"}
 
 
 class NumberRecord(msgspec.Struct, frozen=True):
@@ -72,7 +68,7 @@ def summary_of(answers: Answers, path: Path) -> SummaryRecord:
         1,
         "calibeam-report",
         str(path),
-        WORDS[judged.trust],
+        judged.trust.value,
         judged.sentence,
         judged.reasons,
         answers.known,

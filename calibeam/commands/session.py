@@ -335,7 +335,7 @@ def _check_verify(rig: Rig, plan: Path | None, *, verify: bool) -> None:
         raise AcquisitionError(f"rig {rig.name}: --verify is of a measuring arm that a hand moves; leave it out")
     if verify and plan is not None:
         raise AcquisitionError(
-            f"--plan {plan} with --verify: the standards say which readings a verification takes, a plan those that an "
+            f"--plan {plan} with --verify: the standards fix the readings of a verification, a plan those that an "
             "arm is identified from; give one of them"
         )
 

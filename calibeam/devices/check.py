@@ -122,7 +122,7 @@ def _psd(rig: Rig, clock: Clock) -> DeviceCheck:
         window = psd_window(blocks)
         spots_m = psd_view(psd, device).each(window)
     dark = [k + 1 for k in (0, 1) if np.isnan(spots_m[:, 2 * k]).mean() > 0.5]
-    told = "no light on either face" if len(dark) == 2 else f"noise {1e6 * sample_noise(spots_m):.2f} um a sample"
+    told = "no light on either face" if len(dark) == 2 else f"noise {1e6 * sample_noise(spots_m):.2f} µm a sample"
     rate_hz, wrong = sample_rate(blocks, device.rate_hz)
     if (window.flags & (Flag.PSD1_SATURATED | Flag.PSD2_SATURATED)).any():
         wrong = wrong or "a face is saturated: lessen the laser's power or the gain"
@@ -194,7 +194,7 @@ def _encoders(rig: Rig, clock: Clock) -> DeviceCheck:
     what = f"{q_rad.shape[1]} encoders on {device.interface} {device.channel}"
     what += f" (serial numbers {numbers})" if numbers else ""
     firmware = "/".join(sorted({f"{identity.get('revision', 0):#x}" for identity in identities}))
-    return DeviceCheck("encoders", what, firmware, rate_hz, f"noise {1e6 * sample_noise(q_rad):.2f} urad", wrong)
+    return DeviceCheck("encoders", what, firmware, rate_hz, f"noise {1e6 * sample_noise(q_rad):.2f} µrad", wrong)
 
 
 def _robot(rig: Rig, clock: Clock) -> DeviceCheck:
@@ -214,7 +214,7 @@ def _robot(rig: Rig, clock: Clock) -> DeviceCheck:
         robot.arm().close()  # DeviceRefused when the map cannot move it
         wrong = _stopped(blocks[-1]) or wrong
     wrong = wrong or _misplaced(rig, q_rad[-1])
-    return DeviceCheck("robot", what, firmware, rate_hz, f"noise {1e6 * sample_noise(q_rad):.2f} urad", wrong)
+    return DeviceCheck("robot", what, firmware, rate_hz, f"noise {1e6 * sample_noise(q_rad):.2f} µrad", wrong)
 
 
 def _ur(host: str) -> tuple[str, str]:

@@ -39,7 +39,7 @@ def devices_of(rig: Rig, clock: Clock, feed: Feed) -> list[Watched]:
     """
     watched: list[Watched] = []
     if rig.devices == Devices():
-        raise RigFileError(f"rig {rig.name}: no [devices]; say how the detectors, encoders or controller are reached")
+        raise RigFileError(f"rig {rig.name}: no [devices]; add how the detectors, encoders or controller are reached")
     if rig.devices.psd is not None:
         given, psd = rig.devices.psd, psd_driver(rig.devices.psd, rig, clock)
         watched.append(Watched(psd, lambda: feed.sees(psd_view(psd, given))))

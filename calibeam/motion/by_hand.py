@@ -33,6 +33,7 @@ from calibeam.motion.robot import streamed_robot
 from drivers.clock import SystemClock
 from drivers.errors import DeviceError
 
+ARRIVED_RAD = 1e-3  # a motion that ended as it should stands this near the end of its plan
 WORDS = "r resume, s stop, a abort, h halt, then ENTER"
 
 
@@ -169,11 +170,18 @@ def _drive(gate: Gate, made: Plan, joints: Callable[[], Floats], watch: Callable
     end_rad = joints()
     off = float(np.max(np.abs(end_rad - made.q_rad[-1])))
     console.print(
-        f"{gate.state.value}; {followed.sent} set-points, {followed.missed} cycles missed; joints now "
-        f"{np.round(np.degrees(end_rad), 3).tolist()} deg, {np.degrees(off):.4f} deg from the plan's end",
+        f"{ending_words(gate.state, off)}; {followed.sent} set-points, {followed.missed} cycles missed; joints now "
+        f"{(np.round(np.degrees(end_rad), 3) + 0.0).tolist()} deg, {np.degrees(off):.4f} deg from the plan's end",
         soft_wrap=True,
     )
     return end_rad
+
+
+def ending_words(state: MotionState, off_rad: float) -> str:
+    """How the motion ended; `off_rad`: the farthest joint from the end of the plan."""
+    if state is MotionState.DONE and off_rad > ARRIVED_RAD:
+        return "stopped on request before the end of the plan"
+    return state.value
 
 
 def said(made: Plan, plan_file: Path) -> str:

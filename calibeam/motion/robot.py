@@ -78,7 +78,7 @@ def _resting(supervisor: Supervisor, pump: Pump, clock: Clock) -> Floats:
         if float(np.max(np.abs(now - before))) < SETTLED_RAD:
             return now
         before = now
-    raise DeviceStale("robot: the arm does not come to rest; look whether something pushes it")
+    raise DeviceStale("robot: the arm does not come to rest; check whether something pushes it")
 
 
 @contextmanager
@@ -106,7 +106,7 @@ def streamed_robot(rig: Rig, clock: Clock, emulated: Mapping[str, Any] | None = 
     """
     device = rig.devices.robot
     if device is None:
-        raise RigFileError(f"rig {rig.name}: no [devices.robot]; say how the controller is reached")
+        raise RigFileError(f"rig {rig.name}: no [devices.robot]; add how the controller is reached")
     robot = robot_of(device if emulated is None else emulated_robot(device, emulated), clock)
     arm = robot.arm()
     if not hasattr(arm, "servo_joints"):

@@ -30,7 +30,7 @@ class Model:
     """An identified arm: numbers with their doubt. `file` holds everything that model.json does."""
 
     file: "ModelFile"
-    trust: str  # "good", "care" or "bad"; "unknown" where the model was opened without its session
+    trust: str  # "yes", "with care" or "no"; "unknown" where the model was opened without its session
     says: str  # the verdict in one sentence
     reasons: tuple[str, ...]  # what speaks against trusting it
 

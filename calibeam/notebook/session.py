@@ -174,7 +174,7 @@ def _errors_along_session(found: "Sequence[ReadingErrors]") -> "Figure":
     for axes, one in zip(figure.subplots(len(found), 1, squeeze=False).ravel(), found, strict=True):
         number = np.arange(len(one.after)) + 1
         for values, colour, mark, label in (
-            (one.before, BEFORE, "x", "arm as drawn"),
+            (one.before, BEFORE, "x", "nominal arm"),
             (one.after, AFTER, "o", "identified"),
         ):
             axes.plot(number, MICRO * _positive(values), mark, ms=4, color=colour, label=f"{label}: {_rms(values)} rms")

@@ -145,7 +145,7 @@ def _taken(recording: Recording) -> Taken:
     """ConcealError where the recording does not say when its samples were taken."""
     samples, windows = recording.samples, sample_windows(recording)
     if windows is None:
-        raise ConcealError("the session on the wires took no sample, or does not say when")
+        raise ConcealError("the session on the wires took no sample, or recorded no times")
     t_s = samples.column("t_s")
     n = range(1, samples.n_joints + 1)
     return Taken(

@@ -40,7 +40,10 @@ def table_of(proof: ProofFile) -> str:
         "",
         *_findings(cases),
         "",
-        *_rows(("doubt and proof", "measured", "wanted"), [(f.label, f.said, f.wanted or " ") for f in figures(cases)]),
+        *_rows(
+            ("uncertainty and proof", "measured", "wanted"),
+            [(f.label, f.said, f.wanted or " ") for f in figures(cases)],
+        ),
     ]
     others = rivals(cases)
     if others:
@@ -48,7 +51,13 @@ def table_of(proof: ProofFile) -> str:
         lines += ["", *_rows(head, [(f.label, f.said) for f in others])]
     free = by_instrument(cases)
     if free:
-        head = ("free space against the truth, median", "cases", "geometry", "with what was found", "oracle")
+        head = (
+            "tool error over the workspace against the truth, median",
+            "cases",
+            "geometry",
+            "with what was found",
+            "oracle",
+        )
         found = [(f.label, str(f.cases), length(f.geometry_m), length(f.found_m), length(f.oracle_m)) for f in free]
         lines += ["", *_rows(head, found)]
     return "\n".join(lines) + "\n"
@@ -64,7 +73,14 @@ def _findings(cases: Sequence[CaseScore]) -> list[str]:
         over_the_wire(cases),
         in_streams(cases),
     ]
-    head = ("hidden, effect over noise", "n", "located", "named", "named or among rivals", "others said, a case")
+    head = (
+        "hidden, effect over noise",
+        "n",
+        "located",
+        "named",
+        "named or among alternatives",
+        "others reported, a case",
+    )
     return _rows(head, [_cells(line) for line in lines if line.located.n])
 
 

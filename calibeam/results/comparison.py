@@ -491,7 +491,7 @@ def _says(verdict: Verdict, found: list[Mismatch], asked: _Asked) -> str:
         return f"{deciding[0].says if deciding else asked.why}."
     named = [one for one in deciding if one.level is not Level.UNEXPLAINED]
     if not named:
-        return "Measured and simulated differ; the links below say where."
+        return "Measured and simulated differ; the links below show where."
     levels = list(dict.fromkeys(one.level.value.replace("-", " ") for one in named))
     left = " Something is left over besides." if len(named) < len(deciding) else ""
     many = f"{len(named)} differences" if len(named) > 1 else "1 difference"

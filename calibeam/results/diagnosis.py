@@ -123,11 +123,12 @@ def plan_next(found: Diagnosed, path: Path) -> str:
     except DataError as why:  # an effect of the known model that cannot be told at other poses
         return f"no plan: {why}; diagnose without --model"
     if chosen is None:
-        return "no plan: no finding has a rival that more poses could tell from it"
+        return "no plan: no finding has an alternative explanation that more poses could exclude"
     plan = plan_of(chosen, physics.model)
     write_pose_plan(path, plan)
     return (
-        f"{plan.poses} poses that tell the rivals apart: {path} (margin to expect: {chosen.before:.0f} BIC before, "
+        f"{plan.poses} poses that separate the alternative explanations: {path} (margin to expect: "
+        f"{chosen.before:.0f} BIC before, "
         f"{chosen.after:.0f} with them)"
     )
 

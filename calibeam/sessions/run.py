@@ -173,13 +173,13 @@ class OnSite:
         part = part_of(self._job, earlier, self._half_size_m)
         if not part.open_at(standing):
             return replace(earlier, standing=None)
-        question = f"does the fixture still stand at place {standing}?"
-        told = {"y": "yes, nobody has touched it", "n": "no, or nobody knows: it is measured anew, as a new place"}
+        question = f"does the fixture still stand at station {standing}?"
+        told = {"y": "yes, it was not touched", "n": "no or not sure: it is measured again, as a new station"}
         if stands or self._person.choose(question, told, "n", "n") == "y":
             return earlier
         place = same_place(part.rig, standing)
         self.reporter.report(
-            f"place {standing} is measured anew as place {place.id}; what was taken there still counts"
+            f"station {standing} is measured again as station {place.id}; what was taken there still counts"
         )
         return with_fixture_moved(earlier, place, standing)
 
@@ -214,7 +214,7 @@ class OnSite:
                     summary = session.take(more_at(part, session.placement, self._half_size_m, part.options, rounds))
         except KeyboardInterrupt as why:  # at a question, while the arm stands
             INTERRUPTS.close()
-            raise PartialResult(f"{interruption(why)}; what was taken is kept in {path}; {GO_ON}") from why
+            raise PartialResult(f"{interruption(why)}; what was taken is kept in {self._job.out}; {GO_ON}") from why
         except PartialResult as early:
             raise PartialResult(f"{early}; {GO_ON}") from early.__cause__
         self.reporter.report(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {path}")
@@ -234,12 +234,12 @@ class OnSite:
             self.reporter.report(f"no forecast: {type(why).__name__}: {why}")
             return
         self.reporter.forecast(forecast)
-        self.reporter.report(f"predicted error of the beam in free space: {forecast.says}")
+        self.reporter.report(f"predicted error of the beam over the workspace: {forecast.says}")
 
     def _decide(self, part: Part) -> str:
         choices = {FINISH: "finish: identify, diagnose, report"}
         if part.plan is None:
-            choices |= {MORE: "more poses, the fixture stays", PLACE: "a further place of the fixture"}
+            choices |= {MORE: "more poses, the fixture stays", PLACE: "another station of the fixture"}
         return self._person.choose("what next?", choices, FINISH, FINISH)
 
     def _new_place(self, part: Part) -> Placement | None:
@@ -248,7 +248,7 @@ class OnSite:
         if numbers is None:
             return None
         place = new_place(part.rig, numbers)
-        self.reporter.report(f"place {place.id}; to keep it, add to the rig file:{placement_text(place)}")
+        self.reporter.report(f"station {place.id}; to keep it, add to the rig file:{placement_text(place)}")
         return place
 
 

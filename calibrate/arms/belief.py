@@ -22,7 +22,7 @@ class LinkBelief:
     def __post_init__(self) -> None:
         if not (self.length_sigma_m >= 0.0 and self.angle_sigma_rad >= 0.0):
             raise ValueError(
-                f"link belief {self.length_sigma_m} m, {self.angle_sigma_rad} rad: a sigma is not negative"
+                f"link tolerance {self.length_sigma_m} m, {self.angle_sigma_rad} rad: a sigma is not negative"
             )
 
 

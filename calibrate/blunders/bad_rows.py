@@ -51,10 +51,10 @@ def _named(shots: Shots, i: int, misfit: Floats, scale: float) -> Blunder:
     best = suspects[0]
     alone = len(suspects) == 1 or suspects[1].left > CLEARER * max(best.left, scale)
     if len(misfit) > 1 and best.left < EXPLAINED * scale and alone:
-        what = f"reads {best.written:.9g} where the other rows say about {best.meant:.6g} {best.unit}"
+        what = f"reads {best.written:.9g} where the other rows give about {best.meant:.6g} {best.unit}"
         return Blunder(BlunderKind.WRONG_VALUE, rows, best.column, what, "correct the cell, or remove the row")
     away = float(np.linalg.norm(misfit * shots.sigma))
-    what = f"{1e3 * away:.3g} mm away from what all other rows say ({np.linalg.norm(misfit) / scale:.0f} sigma)"
+    what = f"{1e3 * away:.3g} mm away from what all other rows predict ({np.linalg.norm(misfit) / scale:.0f} sigma)"
     return Blunder(BlunderKind.BAD_SHOT, rows, ", ".join(shots.columns), what, "measure it again, or remove the row")
 
 

@@ -154,7 +154,7 @@ def _scattered(found: Unrecorded | None) -> list[Unexplained]:
         return []
     columns = ", ".join(dict.fromkeys(m.column for m in found.missing))
     why = "scatter that follows the lever of this port, and no recorded column"
-    why += f"; not recorded: {columns}" if columns else ""
+    why += f"; missing column: {columns}" if columns else ""
     drivers = tuple(dict.fromkeys(m.driver for m in found.missing))
     return [Unexplained(found.port.where, drivers, found.share, found.p, why)]
 
@@ -167,7 +167,10 @@ def _moving(at: Search, speed: Sequence[Missing]) -> list[Unexplained]:
     lost = sum(at.bench.gone[i].squares for i in lagging)
     share = lost / (lost + at.bench.sight.rss)
     p = max(at.p.get(at.state.accepted[i].term.key, 0.0) for i in lagging)
-    why = f"{len(lagging)} joints lag by the way they came: slack, or one late clock; not recorded: {speed[0].column}"
+    why = (
+        f"{len(lagging)} joints lag behind their direction of approach: slack, or one late clock; missing column: "
+        f"{speed[0].column}"
+    )
     return [Unexplained(TIME, (SPEED,), share, p, why)]
 
 
@@ -186,7 +189,7 @@ def _lasting(found: TimeLeft | None) -> list[Unexplained]:
 
 def records(lacking: Sequence[Missing]) -> tuple[str, ...]:
     """One sentence for each column to record."""
-    return tuple(f"record {m.column}: without it {m.physics} cannot be told" for m in dict.fromkeys(lacking))
+    return tuple(f"record {m.column}: without it {m.physics} cannot be determined" for m in dict.fromkeys(lacking))
 
 
 def with_best_names(at: Search) -> tuple[Search, Rivals]:

@@ -43,7 +43,7 @@ def doubtful(finding: Finding) -> Finding:
 def untold(finding: Finding, lacking: Sequence[Missing]) -> Unexplained:
     """What cannot be told of a drift, and the columns that would tell."""
     columns = ", ".join(dict.fromkeys(m.column for m in lacking))
-    why = f"it changes along the session, and what it follows cannot be told; not recorded: {columns}"
+    why = f"it changes along the session, and what it follows cannot be determined; missing column: {columns}"
     drivers = tuple(dict.fromkeys(m.driver for m in lacking))
     return Unexplained(finding.name.where, drivers, finding.share, finding.p, why)
 

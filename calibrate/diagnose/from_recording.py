@@ -80,7 +80,8 @@ def diagnose_samples(
         return Diagnosed(cleared, cleared.blunders, None)
     if len(cleared.rows) < FEWEST:
         raise DataError(
-            f"{len(cleared.rows)} samples are left to diagnose, fewer than {FEWEST}: no cause can be told from noise; "
+            f"{len(cleared.rows)} samples are left to diagnose, fewer than {FEWEST}: no cause can be separated from "
+            "noise; "
             "measure more poses"
         )
     geometry = stages.attempt(Stage.GEOMETRY, lambda: begin(session_of(rig, cleared.samples)), None, refuses=True)
@@ -155,7 +156,7 @@ def _left(model: Fitted, cleared: Cleared) -> tuple[Blunder, ...]:
 
 
 def _far(measured: Measured, row: int, away_m: float, sigmas: float) -> Blunder:
-    what = f"{1e6 * away_m:.3g} um away from what all other rows say ({sigmas:.0f} sigma), also after all physics"
+    what = f"{1e6 * away_m:.3g} µm away from what all other rows predict ({sigmas:.0f} sigma), also after all physics"
     return Blunder(
         BlunderKind.BAD_SHOT, (row,), ", ".join(columns_of(measured)), what, "measure it again, or remove it"
     )

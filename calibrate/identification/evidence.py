@@ -25,7 +25,7 @@ from calibrate.weighting import JOINT
 Floats = NDArray[np.float64]
 
 OF_JOINTS = "the scatter of the joint readings"
-OF_INSTRUMENT = "the scatter of the instrument's readings, which that of the arm's cannot be told from"
+OF_INSTRUMENT = "the scatter of the instrument's readings, which cannot be separated from that of the arm's"
 FLANGE = (0.0, 0.0, 0.0)  # stands for the target where nobody names one
 
 

@@ -118,7 +118,7 @@ def _why_untold(p: Parameter, fit: Fit, i: int, seen: Identifiability, *, told: 
     if not told:
         return untold(p, seen) or HELD
     if np.isfinite(p.prior) and np.sqrt(fit.covariance[i, i]) > ONLY_PRIOR * p.prior:
-        return f"{ONLY_BELIEVED}: {p.prior:.3g} {p.unit} as believed, to which the data add nothing"
+        return f"{ONLY_BELIEVED}: {p.prior:.3g} {p.unit} as assumed, to which the data add nothing"
     return None
 
 

@@ -90,7 +90,8 @@ def design(
     promised = found.free_space_m(information)
     drawn = _random_m(found, asked.poses, rng)
     purpose = (
-        f"{asked.poses} poses by criterion {asked.criterion}: predicted error in free space {1e6 * promised:.1f} um "
+        f"{asked.poses} poses by criterion {asked.criterion}: predicted error over the workspace "
+        f"{1e6 * promised:.1f} um "
         f"rms, random poses {1e6 * drawn:.1f} um",
     )
     plan = plan_of(rig.name, candidates, shots, purpose)

@@ -118,7 +118,7 @@ def session_evidence(recording: Recording, model: ModelFile) -> SessionEvidence:
     rms = float(np.sqrt(np.mean(readings[0].error_after ** 2)))
     if abs(rms - model.rms_distance_after_m) > SAME * model.rms_distance_after_m + 1e-12:
         raise DataError(
-            f"report: the model says {length(model.rms_distance_after_m)} rms distance, but misses the "
+            f"report: the model has {length(model.rms_distance_after_m)} rms distance, but misses the "
             f"{model.instruments[0]} rows of "
             f"{recording.path.name} by {length(rms)}; give the model of this recording, or identify it again"
         )

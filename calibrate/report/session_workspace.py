@@ -23,7 +23,8 @@ from calibrate.unseen_along import analyse_along
 
 IN_SPACE = names_with(Trait.IN_SPACE)  # instruments that measure where the target is
 NOT_IN_SPACE = (
-    "No measured errors are drawn: no instrument of this session says where the target is; errors of the readings are "
+    "No measured errors are drawn: no instrument of this session measures where the target is; errors of the "
+    "readings are "
     "in the next chapter."
 )
 

@@ -159,11 +159,11 @@ def _placement_faults(rig: Rig) -> Iterator[Fault]:
     if rig.camera is not None and rig.fixture is None:
         yield (
             ("camera", "board"),
-            "[camera.board] says where the board is on the fixture, but there is no [fixture]; add it",
+            "[camera.board] places the board on the fixture, but there is no [fixture]; add it",
         )
     yield from _twice(("placement",), tuple(placement.id for placement in rig.placement_list))
     if rig.placement_list and rig.fixture is None:
-        yield ("placement",), "[[placement]] says where the fixture stood, but there is no [fixture]; add it"
+        yield ("placement",), "[[placement]] places the fixture, but there is no [fixture]; add it"
     known = sorted(rig.placements)
     for index, distance in enumerate(rig.known_distances):
         path = ("known_distance", index)
@@ -187,7 +187,7 @@ def _tolerance_faults(rig: Rig) -> Iterator[Fault]:
         sizes = {key: getattr(tolerance, key) for key in (f"{what}_m", f"{what}_rad")}
         missing = [key for key, value in sizes.items() if value is None]
         if len(missing) == 1:
-            yield ("tolerance",), f"[tolerance] says only half of how well {what} is known: add '{missing[0]}'"
+            yield ("tolerance",), f"[tolerance] gives only one of the two sigmas of {what}: add '{missing[0]}'"
         elif not missing and getattr(rig, owner) is None:
             yield ("tolerance", f"{what}_m"), f"{what}_m is there, but there is no [{owner}] that it is the sigma of"
 
@@ -203,7 +203,10 @@ def _artefact_faults(rig: Rig) -> Iterator[Fault]:
             known = ", ".join(map(str, rig.bars)) or "none"
             yield (*path, "bar"), f"bar = {position.bar} is no [[bar]] of this rig (known: {known}); add or correct it"
         if math.hypot(*position.direction) < SHORTEST:
-            yield (*path, "direction"), f"direction = {list(position.direction)} points nowhere; say how the bar lies"
+            yield (
+                (*path, "direction"),
+                (f"direction = {list(position.direction)} is the zero vector; give the direction of the bar"),
+            )
     if rig.sphere_list and rig.tool.probe_diameter_m is None:
         yield ("tool",), "[[sphere]] is touched from outside: add 'probe_diameter_m', the ball's, to [tool]"
 
@@ -245,7 +248,7 @@ def _psd_faults(psd: PsdDevice) -> Iterator[Fault]:
     if pair and psd.head is PsdHead.QUADRANT and psd.spot_radius_m is None:
         yield (
             PSD,
-            "[devices.psd] with head = \"quadrant\" needs 'spot_radius_m': its ratio says nothing of metres alone",
+            "[devices.psd] with head = \"quadrant\" needs 'spot_radius_m': its ratio alone gives no metres",
         )
 
 

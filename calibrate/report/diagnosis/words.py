@@ -23,7 +23,7 @@ TOLD = ("encoder-eccentricity", "joint-compliance", "backlash")  # in a sentence
 def verdict_words(file: DiagnosisFile) -> str:
     """What was found, what is left, and what the answer is worth."""
     if any(not blunder.rows for blunder in file.blunders):
-        return "The file is wrong as a whole: nothing can be said about the arm."
+        return "The file is wrong as a whole: nothing can be determined about the arm."
     match file.verdict:
         case "mismatch" if file.known is not None:
             n = len(file.findings)
@@ -99,10 +99,22 @@ def _tested(file: DiagnosisFile) -> str:
         return ""
     kinds = len({one.physics for one in file.smallest})
     shown = [visible_words(one) for one in hardest_to_see(file) if one.physics in TOLD]
-    seen = f"; it would have shown, for instance, {'; '.join(shown)}" if shown else ""
-    lacking = ", ".join(dict.fromkeys(m.physics for m in file.not_recorded))
+    seen = f"; detection limits: {'; '.join(shown)}" if shown else ""
+    lacking = ", ".join(untested_physics(file))
     blind = f". Not tested, for lack of columns: {lacking}" if lacking else ""
     return f". Tested were {kinds} kinds of physics, {len(file.smallest)} places and causes{seen}{blind}"
+
+
+def untested_physics(file: DiagnosisFile) -> tuple[str, ...]:
+    """Kinds of physics of which no form was tested: a kind that another recorded column could show was."""
+    tested = {one.physics for one in file.smallest}
+    return tuple(dict.fromkeys(m.physics for m in file.not_recorded if m.physics not in tested))
+
+
+def confusable_causes(file: DiagnosisFile) -> tuple[tuple[NameRecord, NameRecord, float], ...]:
+    """Pairs that the poses cannot separate, the most alike first; forms of one cause are no pair of causes."""
+    pairs = (pair for pair in file.confusable if (pair[0].physics, pair[0].where) != (pair[1].physics, pair[1].where))
+    return tuple(sorted(pairs, key=lambda pair: -pair[2]))
 
 
 def visible_words(smallest: SmallestRecord) -> str:
@@ -153,8 +165,9 @@ def micrometres(value_m: float | None) -> str:
 def free_space_words(change: FreeSpaceRecord) -> str:
     """One sentence."""
     return (
-        f"predicted error anywhere between the angles of this session: {micrometres(change.rms_before_m)} "
-        f"with geometry alone, {micrometres(change.rms_after_m)} with the physics (rms, {change.poses} poses)"
+        "predicted tool error between the joint angles of this session, base and tool point fitted: "
+        f"{micrometres(change.rms_before_m)} with geometry alone, {micrometres(change.rms_after_m)} with the physics "
+        f"(rms, {change.poses} poses)"
     )
 
 
@@ -172,7 +185,7 @@ def stream_words(file: DiagnosisFile) -> Iterator[str]:
 
 def _clock_words(clock: ClockRecord) -> str:
     if clock.offset_s is None or clock.offset_sigma_s is None:
-        return f"clock of {clock.stream}: not told ({clock.status})"
+        return f"clock of {clock.stream}: not determined ({clock.status})"
     said = f"clock of {clock.stream}: {1e3 * clock.offset_s:.3f} ± {1e3 * clock.offset_sigma_s:.3f} ms"
     if clock.drift is None or clock.drift_sigma is None:
         return said

@@ -115,7 +115,7 @@ def _more_than_noise(now: Calibration, then: Calibration) -> Iterator[str]:
     if short:
         yield (
             f"The model of {' and of '.join(short)} leaves more than noise, so its sigmas are too small: measuring at "
-            "other poses can alone look like a drift. Compare sessions of the same poses, or find the missing physics "
+            "other poses can alone appear as a drift. Compare sessions of the same poses, or find the missing physics "
             "first (`calibeam diagnose`)."
         )
 
