@@ -28,7 +28,7 @@ from simulators.world.truth import read_truth
 
 @dataclass(frozen=True)
 class ZeroAgainstTruth:
-    """One joint: what was said, what is true. `deviation` is in stated sigmas, None where nothing was said."""
+    """One joint: what was reported, what is true. `deviation` is in stated sigmas, None where nothing was said."""
 
     joint: int
     value_rad: float | None
@@ -84,7 +84,11 @@ def demo(*, out: Path = Path("out/demo"), rig: Path = RIG, seed: int = 1, time_s
     Starts the emulators, records a session, identifies, diagnoses and reports; the truth is opened only after the
     fit. About a minute on two quiet cores.
 
-    Example: calibeam demo --out out/demo
+    For example:
+
+    ```
+    calibeam demo --out out/demo
+    ```
 
     Parameters
     ----------

@@ -20,16 +20,20 @@ def motion_command(
     *,
     out: Path = Path("out/motion"),
     rig: Path = RIG,
-    only: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = (),
+    only: Annotated[tuple[str, ...], Parameter(show_default=False)] = (),
     json_: Annotated[bool, Parameter(name="--json")] = False,
 ) -> None:
     """Run the motion examples on an emulated controller.
 
     Joint moves, straight lines, blends, a belt, two pins with teaching.
 
-    Each leaves its plan as drawn before the arm moved (plan-NAME.svg), and what the controller then said beside it.
+    Each leaves its plan (plan-NAME.svg), and beside it what the controller reported.
 
-    Example: calibeam motion --out out/motion
+    For example:
+
+    ```
+    calibeam motion --out out/motion
+    ```
 
     Parameters
     ----------

@@ -45,7 +45,11 @@ def psd_check_command(rig: Path, *, points: Path, unit: int = 1, out: Path | Non
 
     Finds the sign of x, the scale of the sum signal (KPA101) and an error map.
 
-    Example: calibeam psd-check rig.toml --points points.csv --unit 1 --out psd1.json
+    For example:
+
+    ```
+    calibeam psd-check rig.toml --points points.csv --unit 1 --out psd1.json
+    ```
 
     Parameters
     ----------
@@ -92,7 +96,7 @@ def psd_check_command(rig: Path, *, points: Path, unit: int = 1, out: Path | Non
 
 
 def collect(psd: PsdInstrument, face: Face, unit: int, place_m: Floats, ready: Callable[[int, Floats], None]) -> Seen:
-    """Averages READ_S at every place, once `ready` says that the spot is there. DeviceRefused where it is dark."""
+    """Averages READ_S at every place, once `ready` confirms that the spot is there. DeviceRefused where it is dark."""
     shown: list[tuple[float, float]] = []
     counts: list[Floats] = []
     for number, place in enumerate(place_m, 1):
@@ -109,7 +113,7 @@ def collect(psd: PsdInstrument, face: Face, unit: int, place_m: Floats, ready: C
 
 
 def unit_lines(check: UnitCheck, device: PsdDevice, unit: int) -> list[str]:
-    """What was measured beside what the rig says, a remedy where they differ."""
+    """What was measured beside what the rig file has, a remedy where they differ."""
     if check.status is not CheckStatus.GOOD or check.x is None or check.y is None:
         return [f"unit {unit}: {check.status.value}"]
     lines: list[str] = []

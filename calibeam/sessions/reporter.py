@@ -18,7 +18,7 @@ from calibrate.arms.rig_arm import limits_of
 from drivers.clock import Clock
 from drivers.errors import DeviceError
 
-STEPS = ("devices", "plan", "arm", "measure", "look", "result")
+STEPS = ("device check", "plan preview", "confirmation", "measurement", "review", "results")
 WORKING = (RunState.RUNNING, RunState.PAUSING, RunState.ENDING)
 
 
