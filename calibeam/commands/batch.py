@@ -62,7 +62,7 @@ def batch_command(
     timeout
         Seconds that one recording may take; 0: no limit, with loky only.
     again
-        Do all anew, whatever stands.
+        Do all again, also what is done.
     robot_by_folder
         The first folder below names the robot; else its serial number, where the recording has one, else the rig.
     json

@@ -113,7 +113,7 @@ def report_command(
         A recording, or a session folder.
     model
         The model.json of this recording, also one with physics, whose effects are then taken out of the readings;
-        without it the recording is identified anew.
+        without it the recording is identified again.
     diagnosis
         The diagnosis.json of this recording: its pages are added.
     against
