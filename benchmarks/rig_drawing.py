@@ -44,18 +44,18 @@ def _section(axes: Axes, rig: Rig) -> None:
         ends = np.array([centre - half_mm * along, centre + half_mm * along])
         axes.plot(*ends.T, color=FACE, linewidth=5.0, solid_capstyle="butt")
         beside = np.array([0.0, -9.0]) if number == 1 else np.array([0.0, 15.0])
-        axes.annotate(f"PSD {number}, face {2 * half_mm:.0f} × {2 * half_mm:.0f} mm", centre + beside, ha="center")
+        axes.annotate(f"PSD {number}, face {2 * half_mm:.0f} × {2 * half_mm:.0f} mm", _at(centre + beside), ha="center")
     distance_mm = float(np.hypot(*second_mm))
     to_second = second_mm / distance_mm
     incoming = np.array([-to_second[0], to_second[1]])
     for start, end in ((INCOMING_MM * incoming, np.zeros(2)), (np.zeros(2), second_mm)):
-        axes.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": BEAM, "linewidth": 1.6})
+        axes.annotate("", _at(end), _at(start), arrowprops={"arrowstyle": "-|>", "color": BEAM, "linewidth": 1.6})
     axes.plot([0.0, 0.0], [0.0, 45.0], color=QUIET, linewidth=0.8, linestyle="--")
     angle_deg = float(np.degrees(np.arctan2(to_second[0], to_second[1])))
     axes.annotate(f"{angle_deg:.0f}°", (4.0, 30.0), color=QUIET)
     axes.annotate(f"{angle_deg:.0f}°", (-12.0, 30.0), color=QUIET)
-    axes.annotate(f"{distance_mm:.0f} mm", 0.5 * second_mm + np.array([5.0, -6.0]), color=BEAM)
-    axes.annotate("laser on the flange", INCOMING_MM * incoming + np.array([0.0, 4.0]), ha="center", color=BEAM)
+    axes.annotate(f"{distance_mm:.0f} mm", _at(0.5 * second_mm + np.array([5.0, -6.0])), color=BEAM)
+    axes.annotate("laser on the flange", _at(INCOMING_MM * incoming + np.array([0.0, 4.0])), ha="center", color=BEAM)
     _dimension(axes, (0.0, -18.0), (second_mm[0], -18.0), f"{second_mm[0]:.1f} mm")
     _dimension(axes, (72.0, 0.0), (72.0, second_mm[1]), f"{second_mm[1]:.1f} mm", upright=True)
     axes.set(title="Fixture, section through both centres", xlim=(-62.0, 92.0), ylim=(-30.0, 95.0), aspect="equal")
@@ -80,6 +80,10 @@ def _from_above(axes: Axes, rig: Rig) -> None:
     axes.set(title="Cell from above: stations of PSD 1 (x, y, z in m)", xlim=(-0.95, 1.0), ylim=(-0.95, 0.95))
     axes.set_aspect("equal")
     axes.set_axis_off()
+
+
+def _at(point: Floats) -> tuple[float, float]:
+    return float(point[0]), float(point[1])
 
 
 def _dimension(

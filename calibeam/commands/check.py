@@ -69,7 +69,7 @@ def _clock(stream: Stream) -> str:
     rate = model.rate or 1.0
     if abs(rate - 1.0) > EMULATED:
         return f"recorded at {1.0 / rate:.3g} x real time, {delays}{wander}"
-    return f"clock {1e6 * (rate - 1.0):+.1f} µs/s against the host, {delays}{wander}"
+    return f"clock {1e6 * (rate - 1.0):+z.1f} µs/s against the host, {delays}{wander}"
 
 
 def _after_host_stamps(stream: Stream) -> Floats | None:

@@ -11,7 +11,7 @@ from rich.table import Table
 from acquisition.errors import TaskError
 from acquisition.motion.plan import Plan
 from acquisition.recording.rig import load_rig
-from calibeam.commands.demo import RIG
+from calibeam.commands.demo import RIG, ShippedRig
 from calibeam.emulation import Emulation
 from drivers.clock import SystemClock
 
@@ -19,7 +19,7 @@ from drivers.clock import SystemClock
 def motion_command(
     *,
     out: Path = Path("out/motion"),
-    rig: Path = RIG,
+    rig: ShippedRig = RIG,
     only: Annotated[tuple[str, ...], Parameter(show_default=False)] = (),
     json_: Annotated[bool, Parameter(name="--json")] = False,
 ) -> None:

@@ -181,7 +181,7 @@ def asked_at(asking: Asking) -> Callable[[int, Floats], None]:
     """Asks for the spot at each place. NotAgreedError, when it is called, on a refusal or the end of input."""
 
     def ask(number: int, place: Floats) -> None:
-        where = f"x = {place[0] * 1e3:+.3f} mm, y = {place[1] * 1e3:+.3f} mm"
+        where = f"x = {place[0] * 1e3:+z.3f} mm, y = {place[1] * 1e3:+z.3f} mm"
         if not asking.enter(f"place {number}: put the spot to {where}"):
             raise NotAgreedError(f"the check was ended at place {number}; nothing was written")
 

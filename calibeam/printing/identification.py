@@ -202,7 +202,7 @@ def _print_zeros(console: Console, zeros: tuple[JointZero, ...]) -> None:
             table.add_row(f"J{zero.joint}", "not determined", "-", "-", "-")
             continue
         alone = "-" if zero.measurement_sigma_rad is None else f"{1e6 * zero.measurement_sigma_rad:.1f}"
-        degrees, sigma = f"{np.degrees(zero.value_rad):+.5f}", f"{np.degrees(zero.sigma_rad):.5f}"
+        degrees, sigma = f"{np.degrees(zero.value_rad):+z.5f}", f"{np.degrees(zero.sigma_rad):.5f}"
         table.add_row(f"J{zero.joint}", degrees, sigma, f"{1e6 * zero.sigma_rad:.1f}", alone)
     console.print(table)
     for zero in zeros:

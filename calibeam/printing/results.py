@@ -102,9 +102,9 @@ def _clock(clock: ClockRecord) -> Iterator[str]:
     if clock.offset_s is None or clock.offset_sigma_s is None:
         yield f"clock of {clock.stream}: {clock.status}"
         return
-    line = f"clock of {clock.stream}: joints' clock {1e3 * clock.offset_s:+.3f} ± {1e3 * clock.offset_sigma_s:.3f} ms"
+    line = f"clock of {clock.stream}: joints' clock {1e3 * clock.offset_s:+z.3f} ± {1e3 * clock.offset_sigma_s:.3f} ms"
     if clock.drift is not None and clock.drift_sigma is not None:
-        line += f", drift {1e6 * clock.drift:+.1f} ± {1e6 * clock.drift_sigma:.1f} µs/s"
+        line += f", drift {1e6 * clock.drift:+z.1f} ± {1e6 * clock.drift_sigma:.1f} µs/s"
     yield f"{line}, at {clock.middle_s:.1f} s"
 
 
