@@ -39,7 +39,7 @@ class Asked:
 
 @dataclass(frozen=True)
 class Curve:
-    """Predicted error in free space by number of poses, m: chosen one by one, and drawn at random (median)."""
+    """Predicted error over the workspace by number of poses, m: chosen one by one, and drawn at random (median)."""
 
     poses: NDArray[np.intp]
     chosen_m: Floats

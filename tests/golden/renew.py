@@ -1,7 +1,7 @@
 """`python -m tests.golden.renew [NAME...]`: freezes what the program answers today. Only where a change is meant.
 
-Names are those of the files in data/expected, without their suffix; without a name all are made anew. The inputs are
-never made anew.
+Names are those of the files in data/expected, without their suffix; without a name all are made again. The inputs are
+never made again.
 """
 
 import json
