@@ -69,7 +69,7 @@ def refuse_wrong_model(recording: Recording, model: ModelFile) -> None:
     if model.rig.name != rig.name:
         raise DataError(
             f"model of rig {model.rig.name}, recording of rig {rig.name}: the model is of another "
-            "arm; give the model of this one"
+            "arm; give the model of this arm"
         )
     if model.rig.text is not None:
         _refuse_other_drawing(parse_rig(model.rig.text, f"rig.toml in the model of {model.rig.name}"), rig)
