@@ -78,7 +78,8 @@ def _free_space(room: FreeSpace) -> list[str]:
         return [f"tool error over the workspace: {one.status.value}", *(f"  {words}" for words in one.undetermined)]
     out = [
         f"tool error over the workspace, {room.poses} poses drawn evenly between the joint limits: "
-        f"{1e3 * one.rms_m:.3g} mm rms, {1e3 * one.p95_m:.3g} mm at 95 %, {1e3 * one.max_m:.3g} mm at most (one sigma of the calibrated geometry)"
+        f"{1e3 * one.rms_m:.3g} mm rms, {1e3 * one.p95_m:.3g} mm at 95 %, {1e3 * one.max_m:.3g} mm at most "
+        "(one sigma of the calibrated geometry)"
     ]
     if pose.rms_m is not None and pose.p95_m is not None and pose.max_m is not None:
         out.append(
