@@ -8,7 +8,7 @@ import os
 import sys
 from importlib.metadata import version
 
-from cyclopts import App, CycloptsError, Group
+from cyclopts import App, CycloptsError, Group, Parameter
 from rich.console import Console
 from rich.markup import escape
 
@@ -48,6 +48,7 @@ def _new_app() -> App:
         name="calibeam",
         version=version("calibeam"),
         help="Record, calibrate and diagnose robot arms with a laser and two position-sensitive detectors.",
+        default_parameter=Parameter(negative_iterable=(), consume_multiple=True),  # several values: --only a b
         suppress_keyboard_interrupt=False,  # cyclopts would end with 130 and no message
     )
 

@@ -64,7 +64,7 @@ def align_with_tool(T_base_flange: Floats, points_device_m: Floats) -> tuple[Ali
     """Device frame in the base and target in the flange (3,), neither known, from flange poses (pose, 4, 4).
 
     R t + p = A y + o is linear in t, A, o; A is then brought to a rotation and t, o are found again. Where all flange
-    orientations are alike, t and o cannot be told apart and the smallest t is taken. DataError for fewer than 5 poses.
+    orientations are alike, t and o cannot be separated and the smallest t is taken. DataError for fewer than 5 poses.
     """
     n = len(points_device_m)
     if n < 5:

@@ -34,7 +34,7 @@ class LitPose:
 
     target: BeamTarget
     q_rad: Floats
-    T_base_fixture: Floats  # as it must be believed for the believed arm to agree with the spots here
+    T_base_fixture: Floats  # as it must be believed for the assumed arm to agree with the spots here
 
 
 class Navigator:
@@ -148,7 +148,7 @@ class Navigator:
             ) from lost
 
     def relearned(self) -> None:
-        """The believed rig was refitted: what was right at single poses before is now worse than the fit."""
+        """The assumed rig was refitted: what was right at single poses before is now worse than the fit."""
         T = self._learner.T_base_fixture(self._placement)
         self._lit = [replace(pose, T_base_fixture=T) for pose in self._lit]
 

@@ -41,12 +41,16 @@ def centre_command(
 
     Where it is dark, the light is searched first: a spiral of some centimetres. Clear the cell first. Ctrl-C stops.
 
-    Example: calibeam centre rigs/ur5e-dual-psd.toml --first 2 --centring measured
+    For example:
+
+    ```
+    calibeam centre rigs/ur5e-dual-psd.toml --first 2 --centring measured
+    ```
 
     Parameters
     ----------
     rig
-        The rig file; [devices] says how each device is reached.
+        The rig file; [devices] holds how each device is reached.
     first
         Which detector the beam strikes first, 1 or 2.
     spots_mm
@@ -59,7 +63,7 @@ def centre_command(
     gain
         Of law8: the share of the correction that each step takes, above 0 and up to 1.
     placement
-        Where the fixture stands now; the first one of the rig file if not said.
+        Where the fixture stands now; default: the first one of the rig file.
     aim
         First go before the fixture, as a session does: through the rig's home_rad.
     out

@@ -38,8 +38,8 @@ def correct_command(
     margin_deg: Annotated[float, Parameter(validator=validators.Number(gte=0.0))] = 1.0,
     tool: tuple[float, float, float, float, float, float] | None = None,
     frame: tuple[float, float, float, float, float, float] | None = None,
-    start: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (),
-    condition: tuple[str, ...] = (),
+    start: Annotated[tuple[float, ...], Parameter(show_default=False)] = (),
+    condition: Annotated[tuple[str, ...], Parameter(show_default=False)] = (),
     verbose: bool = False,
 ) -> None:
     """Correct poses or a program, so that the real tool reaches them.
@@ -48,9 +48,12 @@ def correct_command(
     FANUC LS only the numbers of targets change. The predicted tool error of every pose stands beside it, before and
     after, with its sigma. Poses that are unreachable, near a limit or beyond the calibrated range are listed.
 
-    Example: calibeam correct model.json poses.csv --out corrected.csv --approach positive --condition payload_kg=2.5
+    For example:
 
-    Example: calibeam correct model.json weld.src --out weld-corrected.src --frame 0.8 0.1 0.2 0 0 0
+    ```
+    calibeam correct model.json poses.csv --out corrected.csv --approach positive --condition payload_kg=2.5
+    calibeam correct model.json weld.src --out weld-corrected.src --frame 0.8 0.1 0.2 0 0 0
+    ```
 
     Parameters
     ----------

@@ -16,9 +16,12 @@ def export_model_command(model: Path, *, to: ExportForm, out: Path | None = None
     rig file states its make, [arm] make = "kuka". Where each number is entered, what to verify and how to go back
     stands in docs/controllers.
 
-    Example: calibeam export-model model.json --to mjcf
+    For example:
 
-    Example: calibeam export-model model.json --to kuka-mastering --out a1-a6.csv
+    ```
+    calibeam export-model model.json --to mjcf
+    calibeam export-model model.json --to kuka-mastering --out a1-a6.csv
+    ```
 
     Parameters
     ----------

@@ -38,7 +38,11 @@ def jog_command(
     The flange is shifted or turned along an axis; every step passes the same checks as a move. Clear the cell
     first.
 
-    Example: calibeam jog rigs/ur5e-dual-psd.toml --axis z --by-mm 5
+    For example:
+
+    ```
+    calibeam jog rigs/ur5e-dual-psd.toml --axis z --by-mm 5
+    ```
 
     Parameters
     ----------
@@ -55,11 +59,11 @@ def jog_command(
     tool
         The axis is the flange's own, not the base's.
     model
-        The model.json of an identification, for its corrected kinematics; else the arm as drawn.
+        The model.json of an identification, for its corrected kinematics; else the nominal arm.
     speed
         Share of the rig's speeds, up to 1.
     out
-        The drawing of the plan.
+        The picture of the plan.
     dry_run
         Plan and draw only.
     yes

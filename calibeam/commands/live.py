@@ -30,9 +30,12 @@ def live_command(
 
     Detectors, robot with its beam, joints and the state of every device.
 
-    Example: calibeam live rigs/ur5e-dual-psd.toml
+    For example:
 
-    Example: calibeam live rigs/ur5e-dual-psd.toml --host 0.0.0.0
+    ```
+    calibeam live rigs/ur5e-dual-psd.toml
+    calibeam live rigs/ur5e-dual-psd.toml --host 0.0.0.0
+    ```
 
     Nothing is moved or recorded. STOP ends the program that the controller runs; it is no safety stop. A session opens
     the same devices: watch it by `calibeam session RIG.toml --live` instead.
@@ -40,7 +43,7 @@ def live_command(
     Parameters
     ----------
     rig
-        The rig file; [devices] says how each device is reached.
+        The rig file; [devices] holds how each device is reached.
     model
         The model.json of an identification, by which the robot and its beam are drawn; else as in the rig file.
     host

@@ -19,7 +19,7 @@ from drivers.errors import DeviceError, DeviceRefused
 
 log = App(
     name="log",
-    help="Log the encoders, or the tracker, until Ctrl-C.\n\nExample: calibeam log encoders rig.toml",
+    help="Log the encoders, or the tracker, until Ctrl-C.\n\nFor example:\n\n```\ncalibeam log encoders rig.toml\n```",
 )
 
 MEGABYTE = 1e6
@@ -38,7 +38,11 @@ def encoders(
 ) -> None:
     """Log the encoders until Ctrl-C: positions and every CAN frame, in segments of which each is a whole recording.
 
-    Example: calibeam log encoders rigs/ur5e-dual-psd.toml --out encoder-log
+    For example:
+
+    ```
+    calibeam log encoders rigs/ur5e-dual-psd.toml --out encoder-log
+    ```
 
     A bus that is lost is attached again, with a gap in the recording. Started again with the same folder, the log goes
     on in a new segment. Whatever ends it, 0.1 s are lost at most.
@@ -46,7 +50,7 @@ def encoders(
     Parameters
     ----------
     rig
-        The rig file; [devices.encoders] says how they are reached.
+        The rig file; [devices.encoders] holds how they are reached.
     out
         Folder for segment-0001.mcap and those after it; nothing in it is overwritten.
     raw

@@ -51,7 +51,7 @@ class RobotOptions:
     place
         A further place of the fixture: X Y Z of PSD 1 in the base (m), and its turn about z (degrees).
     accuracy_um
-        Predicted error of the beam in free space that is good enough: how many more poses it takes is told.
+        Error of the beam over the workspace that is good enough; the session forecasts the poses that it takes.
     yes
         Ask nothing: the cell is clear, the arm may move.
     centring
@@ -93,7 +93,7 @@ class PageOptions:
     live
         Also a page for browsers, with spots, arm, devices and a STOP (no safety stop).
     live_host
-        Address of the page; anywhere but on loopback it wants a token.
+        Address of the page; other than loopback it needs a token.
     live_port
         Port of the page; 0 takes any that is free.
     live_token
@@ -205,17 +205,22 @@ def session(
     Checks the devices, shows the pose plan, asks for confirmation, then aligns, centres, measures, identifies,
     diagnoses and reports.
 
-    Example: calibeam session rigs/ur5e-dual-psd.toml --out session-1
+    For example:
+
+    ```
+    calibeam session rigs/ur5e-dual-psd.toml --out session-1
+    ```
+
     The arm moves: clear the cell first. SPACE or Ctrl-C pauses, r resumes, s finishes, a aborts, h halts.
     Of a measuring arm a person moves the probe, and is guided: rigs/arm-cmm-reference.toml.
 
     Parameters
     ----------
     rig
-        The rig file; [devices] says how each device is reached.
+        The rig file; [devices] holds how each device is reached.
     out
-        Folder for recording.mcap, session.log, the drawing of the plan, model.json, diagnosis.json and report.html;
-        a recording in it is never written over, what was found from it is made anew.
+        Folder for recording.mcap, session.log, the picture of the plan, model.json, diagnosis.json and report.html;
+        a recording in it is never written over, results are computed again.
     plan
         A plan of joint poses, as `calibeam diagnose --plan-out` writes it: these are taken, and no others.
     seed

@@ -76,8 +76,8 @@ def _joints(progress: GuidedProgress) -> Table:
     for joint, (now_rad, wanted_rad) in enumerate(each):
         table.add_row(
             str(joint + 1),
-            f"{np.degrees(now_rad):+.0f}°",
-            f"{np.degrees(wanted_rad):+.0f}°",
+            f"{np.degrees(now_rad):+z.0f}°",
+            f"{np.degrees(wanted_rad):+z.0f}°",
             _way(now_rad, wanted_rad),
             progress.coverage.marks(joint),
         )

@@ -207,7 +207,7 @@ class Model:
     def __str__(self) -> str:
         lines = [self.says, *(f"  {reason}" for reason in self.reasons)]
         for joint, (zero, sigma) in self.zeros().items():
-            told = "not determined" if zero is None or sigma is None else f"{zero:+.6f} ± {sigma:.6f} rad"
+            told = "not determined" if zero is None or sigma is None else f"{zero:+z.6f} ± {sigma:.6f} rad"
             lines.append(f"joint {joint} zero: {told}")
         return "\n".join(lines)
 

@@ -77,9 +77,9 @@ def _free_space(room: FreeSpace) -> list[str]:
     if one.rms_m is None or one.p95_m is None or one.max_m is None:
         return [f"tool error over the workspace: {one.status.value}", *(f"  {words}" for words in one.undetermined)]
     out = [
-        f"tool error over the workspace, {room.poses} random poses between the joint limits: {1e3 * one.rms_m:.3g} "
-        "mm rms, "
-        f"{1e3 * one.p95_m:.3g} mm at 95 %, {1e3 * one.max_m:.3g} mm at most (one sigma of the calibrated geometry)"
+        f"tool error over the workspace, {room.poses} poses drawn evenly between the joint limits: "
+        f"{1e3 * one.rms_m:.3g} mm rms, {1e3 * one.p95_m:.3g} mm at 95 %, {1e3 * one.max_m:.3g} mm at most "
+        "(one sigma of the calibrated geometry)"
     ]
     if pose.rms_m is not None and pose.p95_m is not None and pose.max_m is not None:
         out.append(
@@ -202,7 +202,7 @@ def _print_zeros(console: Console, zeros: tuple[JointZero, ...]) -> None:
             table.add_row(f"J{zero.joint}", "not determined", "-", "-", "-")
             continue
         alone = "-" if zero.measurement_sigma_rad is None else f"{1e6 * zero.measurement_sigma_rad:.1f}"
-        degrees, sigma = f"{np.degrees(zero.value_rad):+.5f}", f"{np.degrees(zero.sigma_rad):.5f}"
+        degrees, sigma = f"{np.degrees(zero.value_rad):+z.5f}", f"{np.degrees(zero.sigma_rad):.5f}"
         table.add_row(f"J{zero.joint}", degrees, sigma, f"{1e6 * zero.sigma_rad:.1f}", alone)
     console.print(table)
     for zero in zeros:

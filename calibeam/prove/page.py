@@ -316,7 +316,7 @@ def _repeat(proof: ProofFile) -> Html:
         lead,
         tag("pre", proof.command),
         tag("p", f"SHA-256 of the list of all seals: {proof.published}"),
-        tag("p", "Drawn anew because a seed gave no session: " + str(sum(c.attempts for c in proof.cases))),
+        tag("p", "Drawn again because a seed gave no session: " + str(sum(c.attempts for c in proof.cases))),
     )
 
 

@@ -1,4 +1,4 @@
-"""Sums of a proof: shares by kind of case, by effect over noise, by instrument, by effect; error in free space.
+"""Sums of a proof: shares by kind of case, by effect over noise, by instrument, by effect; error over the workspace.
 
 Shares have the interval of Wilson, J. Am. Stat. Assoc. 22, 1927, whose level also holds near 0 and 1.
 """
@@ -78,7 +78,7 @@ def by_instrument(cases: Sequence[CaseScore]) -> list[FreeSpaceLine]:
 
 
 def shares_of_oracle(cases: Sequence[CaseScore]) -> list[float]:
-    """Share of the squared error in free space that the oracle removes and the diagnosis removed, too."""
+    """Share of the squared error over the workspace that the oracle removes and the diagnosis removed, too."""
     out: list[float] = []
     for numbers in map(_numbers, cases):
         if numbers is not None and numbers[2] <= WORTH * numbers[0]:

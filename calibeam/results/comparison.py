@@ -484,7 +484,7 @@ def _verdict(found: list[Mismatch], parted: tuple[Parted, ...], asked: _Asked) -
 
 def _says(verdict: Verdict, found: list[Mismatch], asked: _Asked) -> str:
     deciding = [one for one in found if one.decides]
-    anew = "; what is set up anew for every recording is taken into account" if len(deciding) < len(found) else ""
+    anew = "; what is set up again for every recording is taken into account" if len(deciding) < len(found) else ""
     if verdict is Verdict.CONSISTENT:
         return f"Measured and simulated agree to within the noise at every level{anew}."
     if verdict is Verdict.UNDECIDABLE:

@@ -155,7 +155,7 @@ def measuring(
 
 
 def _emulated(part: Part, place: Callable[[int], None], placement: int) -> None:
-    """An emulated fixture knows the places of the rig file only: one that was measured anew is where it was."""
+    """An emulated fixture knows the places of the rig file only: one that was measured again is where it was."""
     origin = {new: old for old, new in part.earlier.stands_in.items()}
     while placement in origin:
         placement = origin[placement]

@@ -18,7 +18,7 @@ from calibrate.arms.rig_arm import limits_of
 from drivers.clock import Clock
 from drivers.errors import DeviceError
 
-STEPS = ("devices", "plan", "arm", "measure", "look", "result")
+STEPS = ("device check", "plan preview", "confirmation", "measurement", "review", "results")
 WORKING = (RunState.RUNNING, RunState.PAUSING, RunState.ENDING)
 
 
@@ -151,7 +151,7 @@ def _of_sample(sample: Sample, progress: Progress | None) -> str:
     x1, y1, x2, y2 = (1e3 * look.spots_m()).tolist()
     return (
         f"pose{count}: station {sample.placement}, PSD {sample.first} first, {settled}{after}; spots "
-        f"({x1:+.3f}, {y1:+.3f}) ({x2:+.3f}, {y2:+.3f}) mm"
+        f"({x1:+z.3f}, {y1:+z.3f}) ({x2:+z.3f}, {y2:+z.3f}) mm"
     )
 
 

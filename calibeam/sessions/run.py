@@ -77,7 +77,7 @@ class OnSite:
                     break
                 self._plan(part)
                 if not agreed:
-                    self.reporter.step("arm")
+                    self.reporter.step("confirmation")
                     self._person.arm()
                     agreed = True
             try:
@@ -91,7 +91,7 @@ class OnSite:
             if place is None:
                 break
             earlier = with_place(read_earlier_parts(self._job.out, self._job.rig), place)
-        self.reporter.step("result")
+        self.reporter.step("results")
         files = parts(self._job.out)
         from calibeam.results.session_results import (
             write_session_results,  # a second of libraries that no device waits for
@@ -111,7 +111,7 @@ class OnSite:
 
     def _devices(self) -> None:
         """One line each; goes on when all are good, or a person says so. DeviceRefused where one cannot be had."""
-        self.reporter.step("devices")
+        self.reporter.step("device check")
         if self._job.addresses.hurry != 1.0:
             self.reporter.report("emulators at another pace than real time: their devices are not judged")
             return
@@ -187,7 +187,7 @@ class OnSite:
         """Gone through and drawn before anything moves."""
         from calibeam.motion.rehearsal_figure import draw_session  # matplotlib takes a second to load
 
-        self.reporter.step("plan")
+        self.reporter.step("plan preview")
         drawing = next_part(self._job.out).with_suffix(".plan.svg")
         self.reporter.report(draw_session(part.rig, drawing, part.options, part.plan))
         before = f", {len(part.earlier.taken)} taken before" if part.earlier.begun else ""
@@ -196,7 +196,7 @@ class OnSite:
 
     def _measure(self, part: Part) -> Placement | None:
         """A part; a further place that a person wants, None: it is enough."""
-        self.reporter.step("measure")
+        self.reporter.step("measurement")
         ahead = ahead_of_blocks(part.rig, part.blocks) if part.plan is None else ahead_of_plan(part.rig, part.plan)
         path = next_part(self._job.out)
         try:
@@ -210,7 +210,7 @@ class OnSite:
                     if answer != MORE or session.placement is None:
                         break
                     rounds += 1
-                    self.reporter.step("measure")
+                    self.reporter.step("measurement")
                     summary = session.take(more_at(part, session.placement, self._half_size_m, part.options, rounds))
         except KeyboardInterrupt as why:  # at a question, while the arm stands
             INTERRUPTS.close()
@@ -222,7 +222,7 @@ class OnSite:
 
     def _look(self, session: Measuring, summary: Summary, part: Part) -> None:
         """How good it is."""
-        self.reporter.step("look")
+        self.reporter.step("review")
         quality = self.reporter.shown.quality
         settled = "" if quality is None or not quality.unsettled else f", {quality.unsettled} of them did not settle"
         self.reporter.report(

@@ -1,4 +1,4 @@
-"""What is believed of an arm's links before any data: held as drawn, free, or drawn to a tolerance."""
+"""What is believed of an arm's links before any data: held nominal, free, or drawn to a tolerance."""
 
 import math
 from dataclasses import dataclass

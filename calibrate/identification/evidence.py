@@ -47,7 +47,7 @@ def evidence_of(
     asked: Asked,
     rng: Generator,
 ) -> Evidence:
-    """All proofs of a fit. `seen`: at its end; `before`: the arm as drawn; `samples`: the whole file."""
+    """All proofs of a fit. `seen`: at its end; `before`: the nominal arm; `samples`: the whole file."""
     if fitted.fit.status is Status.NOT_FINITE:
         return Evidence(Proven(), None, None, None)
     return Evidence(

@@ -132,7 +132,7 @@ class Identification:
     instruments: tuple[InstrumentFound, ...]
     noise: tuple[Noise, ...]
     noise_settled: bool  # False: the sizes of the noise did not converge, and every sigma is a guess
-    stated_noise: StatedNoise  # chi-square under the noise as believed
+    stated_noise: StatedNoise  # chi-square under the noise as assumed
     repeats: RepeatNoise | None  # of the first instrument that repeated poses
     evidence: Evidence
     parameters: tuple[Parameter, ...]

@@ -34,7 +34,7 @@ ALONE = 1e-6  # of 1 - J C J': below, the observation alone determines something
 
 
 def session_arm(evidence: SessionEvidence) -> KnownArm | str:
-    """The arm with its doubt, or why no error over the workspace can be told."""
+    """The arm with its doubt, or why no error over the workspace can be determined."""
     problem, model, theta = evidence.problem, evidence.model, evidence.theta
     why = unpredicted(model.free_space)
     if why is not None or model.free_space is None:
@@ -56,7 +56,7 @@ def session_arm(evidence: SessionEvidence) -> KnownArm | str:
 
 
 def session_room(evidence: SessionEvidence) -> Room | str:
-    """Errors of the tool over the workspace, or why none can be told. About half a second."""
+    """Errors of the tool over the workspace, or why none can be determined. About half a second."""
     known = session_arm(evidence)
     return known if isinstance(known, str) else room_of(known)
 

@@ -36,7 +36,7 @@ class Joint(Part, frozen=True, kw_only=True):
 
 
 class Arm(msgspec.Struct, frozen=True):
-    """The arm as drawn, a local product of exponentials."""
+    """The nominal arm, a local product of exponentials."""
 
     joint: Annotated[tuple[Joint, ...], msgspec.Meta(min_length=1)]
     model: str

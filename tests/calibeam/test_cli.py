@@ -53,7 +53,7 @@ def test_help_is_good_and_an_unknown_command_is_usage(capsys: pytest.CaptureFixt
 @pytest.mark.parametrize("command", ["demo", "session", "emulate", "check", "identify", "report", "export", "import"])
 def test_every_command_has_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run([command, "--help"]) == 0
-    assert f"Example: calibeam {command}" in " ".join(capsys.readouterr().out.split())
+    assert f"For example: calibeam {command}" in " ".join(capsys.readouterr().out.split())
 
 
 def test_a_misspelt_key_names_line_and_nearest_key(rig_with, session_of) -> None:

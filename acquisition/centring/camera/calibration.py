@@ -56,7 +56,7 @@ class Calibration:
 
 
 def calibrate_camera(views: Sequence[View], start: CameraModel) -> Calibration:
-    """`start`: the camera as drawn. Never raises for bad views."""
+    """`start`: the nominal camera. Never raises for bad views."""
     if len(views) < LEAST_VIEWS:
         return Calibration(CameraStatus.TOO_FEW_VIEWS)
     if _turn_rad(views) < LEAST_TURN_RAD:

@@ -131,7 +131,7 @@ def _noise(one: Difference, model: Predictor, pair: Pair) -> tuple[Floats | None
 
 
 def _through_joints(one: Difference, model: Predictor, pair: Pair) -> Floats:
-    """(row, channel) what the joints' believed noise does to a reading, by differences of the model."""
+    """(row, channel) what the joints' assumed noise does to a reading, by differences of the model."""
     joint = _joint_noise(model.rig, pair[0].n_joints)
     explained = next(reading.by_joints for reading in READINGS if reading.link == one.link)
     total = np.zeros(one.own.shape)

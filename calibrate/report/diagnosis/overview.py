@@ -40,7 +40,7 @@ def _tiles(file: DiagnosisFile) -> Html:
     tiles = [
         tile("Geometry alone", _length(file.rms_before_m), "rms on samples held out"),
         tile("With the physics", _length(file.rms_after_m), "rms on the same samples"),
-        tile("Floor", _length(file.noise_floor_m), file.noise_floor_source or "not known"),
+        tile("Noise floor", _length(file.noise_floor_m), file.noise_floor_source or "not known"),
     ]
     if file.free_space is not None:
         change = file.free_space
@@ -69,7 +69,7 @@ def _proof(file: DiagnosisFile) -> Html:
         "readings",
         "geometry alone",
         "with the physics",
-        "floor",
+        "noise floor",
         "removed of the squares",
     )
     return table(head, rows, numeric=range(2, 7), caption="Proof on samples that neither fit has seen")

@@ -32,7 +32,7 @@ def verdict_words(file: DiagnosisFile) -> str:
             return f"Nothing new: recording and model agree to within {_noise(file)}{_tested(file)}."
         case "mismatch":
             n = len(file.findings)
-            return f"Recording and model part: {n} cause{'s' if n > 1 else ''} found{_how_far(file)}."
+            return f"Recording and model disagree: {n} cause{'s' if n > 1 else ''} found{_how_far(file)}."
         case "consistent":
             return f"Recording and model agree: nothing is there beyond {_noise(file)}{_tested(file)}."
         case _ if file.incomplete and file.unexplained is None:
