@@ -148,7 +148,7 @@ def figures() -> tuple[Figure, ...]:
 
 TODAY = {
     "files": 897,
-    "lines": 104_210,
+    "lines": 104_430,
     "longest_function": 54,
     "one_importer": 45,
     "classes": 38,
