@@ -7,8 +7,8 @@ import msgspec
 from rich.console import Console
 
 from acquisition.recording import Recording, read
+from calibeam.printing.progress import stages_shown
 from calibeam.printing.results import print_diagnosis, print_streams
-from calibeam.printing.stage_progress import stages_shown
 from calibeam.results.diagnosis import diagnose_recording, diagnose_streams, plan_next, refuse_wrong_file
 from calibeam.results.identification import naming_source
 from calibrate.diagnose.file import write_diagnosis

@@ -4,7 +4,7 @@ import threading
 import pytest
 from rich.console import Console
 
-from calibeam.printing.stage_progress import SHARES, Outlook, stages_shown
+from calibeam.printing.progress import SHARES, Outlook, stages_shown
 from calibrate.diagnose.stages import Stage
 
 
@@ -56,7 +56,7 @@ def test_without_a_terminal_short_work_prints_nothing():
 
 
 def test_without_a_terminal_a_line_comes_at_every_interval(monkeypatch):
-    monkeypatch.setattr("calibeam.printing.stage_progress.LINE_S", 0.001)
+    monkeypatch.setattr("calibeam.printing.progress.LINE_S", 0.001)
     page = Page()
 
     with stages_shown(Console(file=page, width=120), 300, lambda: 0.0) as begun:
