@@ -106,7 +106,7 @@ class TrackerBench:
                 if seen_s - float(blocks[0].host_s[0]) > CLOCK_S:
                     raise DeviceStale(
                         "tracker: its time does not go on, or went back, since the last motion; check its clock (some "
-                        "begin anew at midnight), or leave out the time column"
+                        "restart at midnight), or leave out the time column"
                     )
                 continue
             first_s = float(window.time_s[0])

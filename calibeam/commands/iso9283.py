@@ -49,8 +49,8 @@ iso9283 = App(
     name="iso9283",
     help="Plan a pose test after ISO 9283, or evaluate a recording of one.\n\n"
     "Pose accuracy and repeatability, their variation by approach, distances, drift; before and after correction.\n\n"
-    "Example: calibeam iso9283 plan rig.toml --out iso9283.toml\n\n"
-    "Example: calibeam iso9283 evaluate session --model model.json",
+    "For example:\n\n```\ncalibeam iso9283 plan rig.toml --out iso9283.toml\n"
+    "calibeam iso9283 evaluate session --model model.json\n```",
 )
 
 
@@ -93,7 +93,11 @@ def plan(
     P2 to P5 a tenth of a diagonal from its corners. A cycle visits P5, P4, P3, P2, P1; the visit of P1 before the first
     cycle does not count. The number of a pose is its `repeat`.
 
-    Example: calibeam iso9283 plan rig.toml --out iso9283.toml --three-sides
+    For example:
+
+    ```
+    calibeam iso9283 plan rig.toml --out iso9283.toml --three-sides
+    ```
 
     Parameters
     ----------
@@ -127,7 +131,7 @@ def plan(
     sides = {number: ways_to(loaded, cube.q_rad[number - 1]) for number in FROM_THREE_SIDES} if three_sides else {}
     visits = tuple(_visits(cycles, sides))
     poses_csv = out.with_suffix(".poses.csv")
-    write_pose_plan(out, _plan_of(loaded, cube, visits, cube.q_rad[[v.pose - 1 for v in visits]], "as drawn"))
+    write_pose_plan(out, _plan_of(loaded, cube, visits, cube.q_rad[[v.pose - 1 for v in visits]], "nominal"))
     _write_poses(poses_csv, cube)
     centre = ", ".join(f"{1e3 * float(x):.0f}" for x in cube.centre_m)
     print(f"cube: edge {1e3 * cube.edge_m:.0f} mm, centre {centre} mm in the base, plane {plane}")
@@ -156,7 +160,11 @@ def evaluate_test(
 
     Rows of one pose are those of one number in column `repeat`; without it, those with the same joints.
 
-    Example: calibeam iso9283 evaluate session --model model.json
+    For example:
+
+    ```
+    calibeam iso9283 evaluate session --model model.json
+    ```
 
     Parameters
     ----------
@@ -171,7 +179,7 @@ def evaluate_test(
         A model.json: what it predicts of this test, and the test with its correction.
     frame
         How the device stands in the base: `fit` (best fit of the poses), `model` (as in the model's session), `rig` (as
-        [device] says). Default: model where there is one, else fit.
+        [device] states). Default: model where there is one, else fit.
     out
         Where to write the figures as JSON.
     json_

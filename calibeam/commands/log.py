@@ -86,7 +86,11 @@ def tracker(
 ) -> None:
     """Log the tracker until Ctrl-C: every position that it prints, in segments of which each is a whole recording.
 
-    Example: calibeam log tracker rigs/ur5e-tracker.toml --out tracker-log
+    For example:
+
+    ```
+    calibeam log tracker rigs/ur5e-tracker.toml --out tracker-log
+    ```
 
     An instrument that is lost is attached again, with a gap in the recording. Started again with the same folder, the
     log goes on in a new segment.
@@ -94,7 +98,7 @@ def tracker(
     Parameters
     ----------
     rig
-        The rig file; [devices.tracker] says how the instrument is reached and what it prints.
+        The rig file; [devices.tracker] states how the instrument is reached and what it prints.
     out
         Folder for segment-0001.mcap and those after it; nothing in it is overwritten.
     rotate_mb

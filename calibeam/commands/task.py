@@ -29,9 +29,12 @@ def task_command(
     hand guiding, or with `calibeam jog` in another terminal. A run is refused before anything moves where the
     program lacks something, with what supplies it. Clear the cell first.
 
-    Example: calibeam task teach cell.toml --rig rig.toml --out taught.toml
+    For example:
 
-    Example: calibeam task run taught.toml --rig rig.toml
+    ```
+    calibeam task teach cell.toml --rig rig.toml --out taught.toml
+    calibeam task run taught.toml --rig rig.toml
+    ```
 
     Parameters
     ----------

@@ -146,7 +146,7 @@ def _tracker(rig: Rig, clock: Clock) -> DeviceCheck:
     if len(good_m) < 2:
         return DeviceCheck("tracker", what, "", rate_hz, "", "no valid reading: let it see the target")
     x, y, z = good_m.mean(axis=0)
-    told = f"noise {1e6 * sample_noise(good_m):.2f} um a sample, target at ({x:.3f}, {y:.3f}, {z:.3f}) m"
+    told = f"noise {1e6 * sample_noise(good_m):.2f} µm a sample, target at ({x:.3f}, {y:.3f}, {z:.3f}) m"
     if len(good_m) < len(position_m):
         wrong = wrong or f"{len(position_m) - len(good_m)} of {len(position_m)} readings are not valid: free the beam"
     return DeviceCheck("tracker", what, "", rate_hz, told, wrong)

@@ -114,7 +114,7 @@ def is_tracked(rig: Rig) -> bool:
 def check_tracked_session(rig: Rig) -> None:
     """What a session with a tracker needs of a rig. RigFileError; no device is touched."""
     if rig.tool.point_m is None:
-        raise RigFileError(f"rig {rig.name}: [tool] has no point_m; say where the target is at the flange")
+        raise RigFileError(f"rig {rig.name}: [tool] has no point_m; give the target's place at the flange")
     _check_driven(rig)
 
 

@@ -86,7 +86,7 @@ def watched_joints(rig: Rig, clock: Clock) -> Generator[Callable[[], Floats]]:
     """Readings (joint,) of the rig's arm at rest, as often as asked; nothing that could move it is opened."""
     device = rig.devices.robot
     if device is None:
-        raise RigFileError(f"rig {rig.name}: no [devices.robot]; say how the controller is reached")
+        raise RigFileError(f"rig {rig.name}: no [devices.robot]; add it, with how the controller is reached")
     reader = robot_of(device, clock).reader
     supervisor = Supervisor(lambda: None, clock)
     pump = Pump(reader, clock, lambda block: None, supervisor.failed)

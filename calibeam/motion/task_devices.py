@@ -75,7 +75,7 @@ class OutputHand:
             if now_s > deadline_s:
                 raise DeviceRefused(
                     f"[hand] output {self._hand.output}: the controller took {action}, but its stream shows no change "
-                    f"within {SWITCHED_S:.0f} s; look at the wiring and at the pendant's I/O tab"
+                    f"within {SWITCHED_S:.0f} s; check the wiring and the pendant's I/O tab"
                 )
             self._robot.pump.wait(now_s, SWITCHED_S)
 
@@ -182,6 +182,6 @@ def _board(rig: Rig, eye: "CameraDevice | None") -> Floats:
     seen = Board(rig.camera.board).find(eye.picture())
     poses = [] if seen is None else board_poses(model, seen)
     if not poses:
-        raise TaskError("READ by the camera: its board is not in the picture; look at the light and at the position")
+        raise TaskError("READ by the camera: its board is not in the picture; check the light and the position")
     out: Floats = model.T_flange_camera @ poses[0][0]
     return out

@@ -15,7 +15,7 @@ DASH = "–"
 FRAMES = {
     "fit": "the device stands where the poses themselves fit best: what moves all of them alike is no error here",
     "model": "the device stands where the model's session found it",
-    "rig": "the device stands where [device] of the rig file says, taken to be exact",
+    "rig": "the device stands where [device] of the rig file puts it, taken to be exact",
 }
 
 

@@ -129,7 +129,7 @@ def drawn_plan(rig: Rig, poses: int, seed: int) -> PosePlan:
     """
     if rig.device is None:
         raise RigFileError(
-            f"rig {rig.name}: no [device]; poses are drawn for an instrument that stands somewhere, so say roughly "
+            f"rig {rig.name}: no [device]; poses are drawn for an instrument that stands somewhere, so give roughly "
             "where, or give a --plan"
         )
     rng = np.random.default_rng(seed)
@@ -145,7 +145,7 @@ def drawn_plan(rig: Rig, poses: int, seed: int) -> PosePlan:
     if len(chosen) < poses:
         raise RigFileError(
             f"rig {rig.name}: {len(chosen)} of {poses} poses are reached by clear ways from home; ask for fewer, or "
-            "look at home_rad and the boxes of [motion]"
+            "check home_rad and the boxes of [motion]"
         )
     return PosePlan(1, rig.name, (PlannedBlock(tuple(_with_repeats(chosen))),))
 

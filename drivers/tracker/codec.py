@@ -60,7 +60,7 @@ def ascii_lines(columns: tuple[str, ...], separator: str, decimal: str, units: U
     if not (separator == " " or (len(separator) == 1 and separator.isprintable()) or separator == "\t"):
         raise ValueError(f'separator = {separator!r}; give one character, " " for any run of blanks')
     if separator == decimal or separator in "+-.eE0123456789":
-        raise ValueError(f"separator = {separator!r} and decimal = {decimal!r} cannot be told apart in numbers")
+        raise ValueError(f"separator = {separator!r} and decimal = {decimal!r} cannot be distinguished in numbers")
 
     def parse(line: str) -> TargetReading:
         cells = line.split() if separator == " " else [cell.strip() for cell in line.split(separator)]

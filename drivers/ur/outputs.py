@@ -48,7 +48,7 @@ class UrOutputs:
         except RuntimeError as error:
             raise DeviceLost(f"{self.place}: output {bit} was not switched: {error}") from error
         if not taken:
-            raise DeviceRefused(f"{self.place}: the controller did not take output {bit}; look at its pendant")
+            raise DeviceRefused(f"{self.place}: the controller did not take output {bit}; check its pendant")
 
     def close(self) -> None:
         """Safe in every state, and more than once."""

@@ -35,6 +35,7 @@ ASKS = {
     "calibeam/sessions/keys.py",
     "calibeam/sessions/person.py",
     "calibeam/sessions/run.py",
+    "calibeam/sessions/with_tracker.py",
 }
 TASK = """[transform]
 P = { origin_m = [-0.45, -0.25, 0.25], rotation_rad = [3.1, 0.1, 0.05] }
