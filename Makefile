@@ -55,7 +55,7 @@ prove: $(BENCH)/.ready
 
 # Its table into the README: of the published seed only.
 prove-table: $(READY)
-	$(BIN)/python -m calibeam.prove.published out/proof/proof.json README.md
+	$(BIN)/python -m calibeam.prove.published out/proof/proof.json docs/figures.md
 
 # Effects taken out of the catalogue, one after the other: their cases have to turn into "unknown, at the right place".
 mutate: $(READY)
@@ -76,7 +76,7 @@ $(BENCH)/.ready: requirements/all.txt requirements/bench.txt pyproject.toml
 
 # Renew the pins after changing pyproject.toml (needs pip-tools). Hashes only: no address enters the file.
 pins:
-	pip-compile --quiet --generate-hashes --strip-extras --extra dev --extra fleet --allow-unsafe \
+	pip-compile --quiet --generate-hashes --strip-extras --extra dev --extra fleet --extra viewers --allow-unsafe \
 	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host -o requirements/all.txt pyproject.toml
 	pip-compile --quiet --generate-hashes --strip-extras --allow-unsafe \
 	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host -o requirements/bench.txt requirements/bench.in

@@ -18,6 +18,7 @@ from benchmarks import (
     damaged,
     designed_poses,
     device_faults,
+    diagnosis_speed,
     error_simulation,
     false_alarms,
     fleet,
@@ -109,6 +110,12 @@ def run_speed() -> None:
 def run_real() -> None:
     print("diagnosis of the real recordings")
     for row in real_diagnosis.lines(RIG.parents[2] / "shared" / "data"):
+        print(row, flush=True)
+
+
+def run_diagnosis_speed() -> None:
+    print("cost of a diagnosis: drawn sessions, growth by rows, the real recordings")
+    for row in diagnosis_speed.lines(RIG.parents[2] / "shared" / "data"):
         print(row, flush=True)
 
 
@@ -247,6 +254,7 @@ BENCHMARKS: dict[str, Callable[[], None]] = {
     "errors": run_errors,
     "designed_poses": run_designed_poses,
     "real": run_real,
+    "diagnosis_speed": run_diagnosis_speed,
     "measuring-arm": run_measuring_arm,
     "measuring-arm-bearings": run_perfect_bearings,
     "recording": run_recording,

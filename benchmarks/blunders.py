@@ -1,7 +1,7 @@
 """Are blunders found and named, and healthy sessions left alone? Counts by instrument and mistake.
 
-A mistake that the data cannot show is no miss and is counted apart: the arm as drawn then explains the spoilt file as
-well as the true one, so nobody could tell them apart by these data.
+A mistake that the data cannot show is no miss and is counted apart: the nominal arm then explains the spoilt file as
+well as the true one, so nobody could separate them by these data.
 """
 
 from collections import defaultdict
@@ -55,7 +55,7 @@ def false_alarms(draw: Draw, sessions: int, seed: int = 7_000) -> list[str]:
 
 
 def counts(draw: Draw, mistakes: tuple[Mistake, ...], sessions: int, seed: int = 8_000) -> dict[str, Count]:
-    """Every mistake in as many sessions, drawn anew."""
+    """Every mistake in as many sessions, drawn again."""
     out: dict[str, Count] = defaultdict(Count)
     for mistake in mistakes:
         for i in range(sessions):

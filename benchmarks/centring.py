@@ -60,7 +60,7 @@ def run(
     strategies: tuple[str, ...] = tuple(name for name, _ in STRATEGIES),
     turn_rad: float = TURN_RAD,
 ) -> dict[str, list[Centring]]:
-    """Runs of the named strategies, all if not said, from the same starts; the guess is off by up to `turn_rad`.
+    """Runs of the named strategies, all by default, from the same starts; the guess is off by up to `turn_rad`.
 
     `cases`: numbers of the starts. Each has its own draw, so that a run in parts has the starts of one in a piece.
     """

@@ -46,7 +46,7 @@ LOOKED_AT = 500  # poses of the comparison
 
 @dataclass(frozen=True)
 class Compared:
-    """One truth: rms error of the beam in free space, m, and samples that the session kept."""
+    """One truth: rms error of the beam over the workspace, m, and samples that the session kept."""
 
     seed: int
     designed_m: float
@@ -56,7 +56,7 @@ class Compared:
 
 
 def run(rig_file: Path, seeds: range, criterion: str = "free-space") -> Iterator[Compared]:
-    """One design for all; truth and random poses are drawn anew with every seed."""
+    """One design for all; truth and random poses are drawn again with every seed."""
     rig, rng = load_rig(rig_file), np.random.default_rng(1)
     candidates = candidates_of(rig, 120, rng)
     found = information_of(rig, candidates, rng)

@@ -1,7 +1,7 @@
 """`python -m benchmarks fleet`: how long a fleet takes against the number of files, the workers and the engine.
 
 The time of a run is start-up plus a rate; its exponent over the number of files is fitted to whole runs, so start-up
-makes it less than 1, and anything that grows with what is done already (a table written anew for every row, say) more.
+makes it less than 1, and anything that grows with what is done already (a table written again for every row, say) more.
 """
 
 import time

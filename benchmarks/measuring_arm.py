@@ -65,7 +65,7 @@ class Outcome:
     seed: int
     readings: int
     slips: int
-    before_m: float  # point error with the arm as drawn
+    before_m: float  # point error with the nominal arm
     point_m: float
     point_floor_m: float
     repeat_m: float

@@ -3,7 +3,7 @@
     python -m benchmarks designed_poses --seeds 1:4        seeds 1, 2, 3
     python -m benchmarks designed_poses --seeds 4:7        3 more, beside those
 
-Without --seeds all are taken anew. What was kept of another rig file is forgotten; what the program was like then is
+Without --seeds all are taken again. What was kept of another rig file is forgotten; what the program was like then is
 not known to the file: delete it after a change.
 """
 
@@ -35,7 +35,7 @@ class Slices(Generic[Row]):
         return [msgspec.convert(row, type=self._row) for _, row in sorted(self._kept().items())]
 
     def forget(self) -> None:
-        """Before all are taken anew."""
+        """Before all are taken again."""
         self._path.unlink(missing_ok=True)
 
     def keep(self, seed: int, row: Row) -> None:

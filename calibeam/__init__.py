@@ -1,7 +1,7 @@
 """The program: the only place where drivers, acquisition, calibrate and simulators are joined.
 
-In a notebook: `calibeam.open("recording.mcap")` or `calibeam.session("rig.toml", q_rad, positions_m)`, and the errors
-that they raise; see docs/python.md.
+In a notebook: `calibeam.open("recording.mcap")`, `calibeam.session("rig.toml", q_rad, positions_m)` or
+`calibeam.open_model("model.json")`, and the errors that they raise; see docs/python.md.
 """
 
 import importlib
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from acquisition.errors import AcquisitionError
     from acquisition.recording import RecordingError, RigFileError, SamplesError
-    from calibeam.notebook import Model, Session
+    from calibeam.notebook import Model, Session, open_model
     from calibeam.notebook import open_recording as open  # noqa: A004 - `calibeam.open` is what a notebook says
     from calibeam.notebook import session_of_arrays as session
     from calibrate.errors import DataError
@@ -27,6 +27,7 @@ __all__ = [
     "SamplesError",
     "Session",
     "open",
+    "open_model",
     "session",
 ]
 
@@ -45,6 +46,7 @@ _PLACES = {
     "SamplesError": ("acquisition.recording", "SamplesError"),
     "Session": ("calibeam.notebook", "Session"),
     "open": ("calibeam.notebook", "open_recording"),
+    "open_model": ("calibeam.notebook", "open_model"),
     "session": ("calibeam.notebook", "session_of_arrays"),
 }
 

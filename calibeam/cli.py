@@ -3,11 +3,12 @@
 0 good, 1 failed, 2 wrong usage, 3 partial (what was recorded is kept, but the job did not end as asked).
 """
 
+import errno
 import os
 import sys
 from importlib.metadata import version
 
-from cyclopts import App, CycloptsError, Group
+from cyclopts import App, CycloptsError, Group, Parameter
 from rich.console import Console
 from rich.markup import escape
 
@@ -47,6 +48,7 @@ def _new_app() -> App:
         name="calibeam",
         version=version("calibeam"),
         help="Record, calibrate and diagnose robot arms with a laser and two position-sensitive detectors.",
+        default_parameter=Parameter(negative_iterable=(), consume_multiple=True),  # several values: --only a b
         suppress_keyboard_interrupt=False,  # cyclopts would end with 130 and no message
     )
 
@@ -91,11 +93,22 @@ def run(arguments: list[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:  # a folder that cannot be made or written; devices' own are DeviceErrors above
-        errors.print(
-            "error:", f"{error.filename or 'file'}: {error.strerror or error}; choose another --out", markup=False
-        )
+        errors.print("error:", f"{error.filename or 'file'}: {error.strerror or error}{_remedy(error)}", markup=False)
         return 1
     return 0
+
+
+def _remedy(error: OSError) -> str:
+    """Inputs and outputs fail alike: a path that is not there may be the one or the folder of the other."""
+    match error:
+        case FileNotFoundError():
+            return "; check the path"
+        case PermissionError() | FileExistsError() | IsADirectoryError() | NotADirectoryError():
+            return "; check the path, or choose another --out"
+        case _ if error.errno == errno.ENOSPC:
+            return "; free space, or choose another --out"
+        case _:
+            return ""
 
 
 def _list_of_commands() -> App:

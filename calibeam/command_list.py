@@ -27,10 +27,11 @@ GROUPS: dict[str, tuple[ListedCommand, ...]] = {
         ListedCommand("live", "live:live_command", "Show a rig's devices live in the browser, with a STOP button."),
         ListedCommand("move", "move:move_command", "Move the arm to a pose: planned, shown, confirmed, then executed."),
         ListedCommand("jog", "jog:jog_command", "Step one joint, or move the flange along an axis, slowly."),
+        ListedCommand("task", "task:task_command", "Teach a task by placing the arm, or run its program."),
         ListedCommand("centre", "centre:centre_command", "Centre the beam once, from where the arm stands."),
         ListedCommand("camera", "camera:camera_command", "Calibrate the camera with a tour of the arm round a board."),
         ListedCommand("psd-check", "psd_check:psd_check_command", "Check a detector against known spot positions."),
-        ListedCommand("log", "log:log", "Log the encoders until Ctrl-C, with every CAN frame."),
+        ListedCommand("log", "log:log", "Log the encoders, or the tracker, until Ctrl-C."),
     ),
     "Calibrate": (
         ListedCommand("design", "design:design_command", "Choose the poses of a session before it is run."),
@@ -49,6 +50,7 @@ GROUPS: dict[str, tuple[ListedCommand, ...]] = {
             "tool-axes", "tool_axes:tool_axes_command", "Locate the target on the flange by single-axis turns."
         ),
         ListedCommand("verify", "verify:verify_command", "Verify a measuring arm by spheres, cones and length bars."),
+        ListedCommand("iso9283", "iso9283:iso9283", "Plan a pose test after ISO 9283, or evaluate a recording of one."),
         ListedCommand("batch", "batch:batch_command", "Identify every recording below a folder; table and drift page."),
     ),
     "Simulation": (

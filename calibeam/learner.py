@@ -1,4 +1,4 @@
-"""The believed rig during a session: refitted to the samples so far, so that the next pose is hit.
+"""The assumed rig during a session: refitted to the samples so far, so that the next pose is hit.
 
 Not the identification that is reported: joint zeros, laser mount and places are bettered under wide beliefs, links
 stay as drawn.
@@ -31,7 +31,7 @@ class Beliefs:
     mount_rad: float = 4e-3
     place_m: float = 1e-2  # a fixture set down by hand where the rig file says
     place_rad: float = 0.03
-    links_m: float = 3e-4  # links are held as drawn; this much of the spots they leave unexplained
+    links_m: float = 3e-4  # links are held nominal; this much of the spots they leave unexplained
 
     def of(self, parameter: Parameter) -> float | None:
         """The prior sigma; None for what is held."""

@@ -64,7 +64,7 @@ def align_with_tool(T_base_flange: Floats, points_device_m: Floats) -> tuple[Ali
     """Device frame in the base and target in the flange (3,), neither known, from flange poses (pose, 4, 4).
 
     R t + p = A y + o is linear in t, A, o; A is then brought to a rotation and t, o are found again. Where all flange
-    orientations are alike, t and o cannot be told apart and the smallest t is taken. DataError for fewer than 5 poses.
+    orientations are alike, t and o cannot be separated and the smallest t is taken. DataError for fewer than 5 poses.
     """
     n = len(points_device_m)
     if n < 5:
@@ -96,7 +96,7 @@ def pivot(T_base_flange: Floats, seat: NDArray[np.int64]) -> tuple[Floats, dict[
     solution, _, rank, _ = np.linalg.lstsq(rows, -T_base_flange[:, :3, 3].ravel(), rcond=1e-6)
     found = np.asarray(solution, dtype=np.float64)
     if rank < rows.shape[1]:
-        raise DataError("seats: the probe leans the same way in all rows; its tip is not told: give tool.point_m")
+        raise DataError("seats: the probe leans the same way in all rows; its tip is not determined: give tool.point_m")
     return found[:3], {k: found[3 + 3 * i : 6 + 3 * i] for i, k in enumerate(seats)}
 
 

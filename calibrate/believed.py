@@ -1,4 +1,4 @@
-"""The believed rig at one pose: expected spots and their derivative by the joints."""
+"""The assumed rig at one pose: expected spots and their derivative by the joints."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

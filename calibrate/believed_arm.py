@@ -1,4 +1,4 @@
-"""The believed arm with its laser: what servo and pose plan ask, one pose at a time."""
+"""The assumed arm with its laser: what servo and pose plan ask, one pose at a time."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

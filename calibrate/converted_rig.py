@@ -18,7 +18,7 @@ def rig_in_model(rig: Rig, model: ArmModel) -> Rig:
     if made.corrections or made.error.position_max_m > EXACT_M:
         needs = ", ".join(f"{name} = {value:.3g} rad" for name, value in made.corrections.items())
         why = f"it needs {needs}" if needs else f"{made.error.position_max_m:.2g} m are left"
-        raise DataError(f"rig {rig.name}: its arm as drawn is no '{model.value}': {why}; keep '{rig.arm.model.value}'")
+        raise DataError(f"rig {rig.name}: its nominal arm is no '{model.value}': {why}; keep '{rig.arm.model.value}'")
     placements = tuple(replace(p, psd1_in_base=_in_new_base(p.psd1_in_base, made)) for p in rig.placement_list)
     device = None if rig.device is None else _in_new_base(rig.device, made)
     return replace(rig, arm=made.arm, placement_list=placements, device=device)

@@ -1,4 +1,4 @@
-"""From the rig file to the dual-PSD chain that is fitted, and to the noise that is believed."""
+"""From the rig file to the dual-PSD chain that is fitted, and to the noise that is assumed."""
 
 from dataclasses import dataclass
 

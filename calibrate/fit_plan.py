@@ -79,7 +79,7 @@ class FitPlan(Struct, frozen=True, forbid_unknown_fields=True):
     """A whole plan; every key but `schema` may be absent and then leaves things as they are without a plan."""
 
     schema: Literal[1]
-    model: ArmModel | None = None  # the rig's arm is written anew in this model
+    model: ArmModel | None = None  # the rig's arm is written again in this model
     instruments: Few[Name] = ()  # sensors by name, of calibrate/sensors/catalogue.py; none: all that the samples allow
     angles: AnglesName = AnglesName.CONTROLLER
     free: Few[Name] = ()  # without an opinion of the drawing

@@ -1,6 +1,6 @@
 """Scatter that second encoders and other instruments share: rows of one sample are made independent.
 
-A joint comes to rest off what its controller reads, by eps, drawn anew at every stand. An encoder on the link reads it
+A joint comes to rest off what its controller reads, by eps, drawn again at every stand. An encoder on the link reads it
 as d = eps + its own noise, any other instrument through its lever as J eps + its own noise, with the same sign. Given
 d, the best guess at eps is share d, with share = var eps / var d of each joint: 1 for a perfect encoder on the link, 0
 for one that sits in front of the gear. So the density of a sample is p(d) p(s | d), and s - J share d has noise of its

@@ -19,10 +19,10 @@ __all__ = ["FIXED", "NoisyRows", "VarianceFactors", "as_believed", "covariance_o
 
 Floats = NDArray[np.float64]
 
-LOG_VARIANCE_PRIOR = 2.0 * np.log(4.0)  # believed noise is often wrong by 1.5 to 8 times: one sigma is a factor 4
+LOG_VARIANCE_PRIOR = 2.0 * np.log(4.0)  # assumed noise is often wrong by 1.5 to 8 times: one sigma is a factor 4
 STEP_LIMIT = 1.5  # of the log variance in one step
 MAX_STEPS = 30
-TOLD = 2.0  # of its own sigmas: a smaller variance cannot be told from none
+TOLD = 2.0  # of its own sigmas: a smaller variance cannot be separated from none
 TOLERANCE = 2e-3  # of the log variance in a last step of Newton's; a quarter of its square is left: 1e-6 of a sigma
 
 

@@ -13,6 +13,7 @@ from calibeam.simulation.mechanism_table import TABLE
 from calibrate.effects.catalogue import EFFECTS
 
 OPEN = "unknown"
+SHIM = "https://unpkg.com/iframe-worker/shim"  # which the theme names for pages that are opened from a folder
 ROOT = Path(__file__).parents[1]
 
 
@@ -70,3 +71,14 @@ def on_page_content(html: str, page: Page, **_: object) -> str:
 def on_page_markdown(markdown: str, **_: object) -> str:
     """Called by MkDocs for every page."""
     return re.sub(r"\{\{ (\w+) \}\}", lambda found: TABLES[found[1]](), markdown)
+
+
+def on_post_page(output: str, page: Page, **_: object) -> str:
+    """Called by MkDocs for every page as it is written: what the search needs from a folder is in the folder."""
+    here = "../" * page.file.dest_uri.count("/") + "javascripts/worker-of-file.js"
+    return output.replace(SHIM, here)
+
+
+def on_post_template(output: str, template_name: str, **_: object) -> str:
+    """The same for 404.html, which is no page."""
+    return output.replace(SHIM, "javascripts/worker-of-file.js")

@@ -121,7 +121,7 @@ class StreamDevice(ABC, Generic[LineT]):
 
 
 class Movable(Protocol):
-    """An arm that can be told where to go; `stop` and `hold` work in every state, also from another thread."""
+    """An arm that can be sent somewhere; `stop` and `hold` work in every state, also from another thread."""
 
     name: str
 

@@ -68,6 +68,16 @@ class TcpPort:
 
 
 @dataclass(frozen=True)
+class UdpPort:
+    """Datagrams to one address, whoever listens there or not: all that became due in a tick is one datagram."""
+
+    name: str
+    host: str
+    port: int
+    wire: Wire
+
+
+@dataclass(frozen=True)
 class Bench:
     """Everything that the host loop serves: instruments, where clients reach them, and side-channel verbs.
 
@@ -77,6 +87,6 @@ class Bench:
     """
 
     instruments: Sequence[Instrument]
-    ports: Sequence[SerialPort | TcpPort]
+    ports: Sequence[SerialPort | TcpPort | UdpPort]
     verbs: Mapping[str, Callable[..., Any]] = field(default_factory=dict[str, Callable[..., Any]])
     clock: DeviceClock | None = None

@@ -147,8 +147,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 897,
-    "lines": 104_210,
+    "files": 927,
+    "lines": 110_160,
     "longest_function": 54,
     "one_importer": 45,
     "classes": 38,

@@ -3,6 +3,7 @@
 import re
 from functools import cache
 from pathlib import Path
+from typing import Any, TextIO
 
 import pytest
 
@@ -21,6 +22,7 @@ WIRED = (
     "calibeam/prove/test_wired.py",
     "calibeam/sessions/test_wired_pause.py",
     "calibeam/sessions/test_wired_stops.py",
+    "calibeam/sessions/test_wired_tracker.py",
     "calibeam/test_camera_cli.py",
     "calibeam/test_centre_cli.py",
     "calibeam/test_check_cli.py",
@@ -31,6 +33,7 @@ WIRED = (
     "calibeam/test_motion_cli.py",
     "calibeam/test_psd_check_cli.py",
     "calibeam/test_same_on_wires.py",
+    "calibeam/test_task_cli.py",
     "calibeam/test_wired_session.py",
     "drivers",
     "simulators/encoders",
@@ -55,6 +58,20 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if on_wires(item.path):
             item.add_marker("wired")
+
+
+@pytest.fixture
+def bare_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures of a page are painted, but not set out and written, which takes seconds a page.
+
+    For tests of what stands beside them; whole pages are those of tests/calibrate/report.
+    """
+
+    def bare(figure: Any, file: TextIO, **_: object) -> None:
+        width, height = 72.0 * figure.get_size_inches()
+        file.write(f'<svg viewBox="0 0 {width:g} {height:g}"></svg>')
+
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", bare)
 
 
 @cache

@@ -16,13 +16,14 @@ from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig import Rig
 from acquisition.recording.session_folder.stream_tables import StreamsAbout
 from calibeam.fleet.row import Row
+from calibeam.motion.task_devices import PartFile
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.error_simulation.plan import ErrorPlan
 from calibrate.fit_plan import FitPlan
 from calibrate.model_file import ModelFile
 
 ROOT = Path(__file__).parents[1]
-RECORDS = (Rig, PosePlan, FitPlan, ErrorPlan, TaskEntries, ModelFile, DiagnosisFile, Row, StreamsAbout)
+RECORDS = (Rig, PosePlan, FitPlan, ErrorPlan, TaskEntries, ModelFile, DiagnosisFile, Row, StreamsAbout, PartFile)
 PRIVATE = (camera._File, read._ChannelRow)  # pyright: ignore[reportPrivateUsage] - records of one reader
 # Read by the program that wrote them, in one run or in a sealed folder; nobody edits them.
 OWN = {"Truth": "prove", "ProofFile": "prove", "Task": "fleet", "ReconcileFile": "prove"}

@@ -2,7 +2,7 @@
 there.
 
 Four spot coordinates fix the line; stand-off (along the beam) and roll (about it) are the two freedoms left
-(Deng, Ding, Zhang 2019: "slide along the beam, roll about it"). Joint readings are those of a believed arm, near where
+(Deng, Ding, Zhang 2019: "slide along the beam, roll about it"). Joint readings are those of an assumed arm, near where
 it stands and clear of the table.
 """
 
@@ -58,7 +58,7 @@ def flange_for(arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, 
 
 
 def laser_in_flange(arm: BelievedArm) -> tuple[Floats, Floats]:
-    """Laser origin (3,) m and direction (3,) in the flange frame, read off the believed arm at its zero."""
+    """Laser origin (3,) m and direction (3,) in the flange frame, read off the assumed arm at its zero."""
     q_rad = np.zeros(arm.lower_rad.size)
     T = flange(arm, q_rad)
     origin_m, direction = arm.beam(q_rad)

@@ -34,7 +34,7 @@ class LitPose:
 
     target: BeamTarget
     q_rad: Floats
-    T_base_fixture: Floats  # as it must be believed for the believed arm to agree with the spots here
+    T_base_fixture: Floats  # as it must be believed for the assumed arm to agree with the spots here
 
 
 class Navigator:
@@ -75,7 +75,7 @@ class Navigator:
         try:
             self._stand_in_light(self._stand_before(target, T), T)
         except UnreachableError as why:
-            raise UnreachableError(f"place {placement}, PSD {first} first: {why}") from why
+            raise UnreachableError(f"station {placement}, PSD {first} first: {why}") from why
 
     def find_near(self, placement: int, first: int, spots_m: tuple[float, float, float, float]) -> Floats:
         """Search the light around where the arm stands, bring it near these spots; joint readings (joint,) there.
@@ -143,12 +143,12 @@ class Navigator:
             self._centre(aimed, fixture, NEAR)
         except SpotLostError as lost:
             raise NoLightError(
-                f"place {self._placement}, PSD {target.first} first: light was found, but {lost}; "
+                f"station {self._placement}, PSD {target.first} first: light was found, but {lost}; "
                 "check that the fixture stands still and that nothing crosses the beam"
             ) from lost
 
     def relearned(self) -> None:
-        """The believed rig was refitted: what was right at single poses before is now worse than the fit."""
+        """The assumed rig was refitted: what was right at single poses before is now worse than the fit."""
         T = self._learner.T_base_fixture(self._placement)
         self._lit = [replace(pose, T_base_fixture=T) for pose in self._lit]
 
@@ -202,8 +202,9 @@ class Navigator:
         self._journal.event("search", {"found": result.found.name, "motions": result.motions})
         if result.found is not Found.BOTH:
             raise NoLightError(
-                f"place {self._placement}, PSD {first} first: {result.found.value} ({result.motions} positions tried); "
-                "check that the laser is on and that the fixture stands where the rig file says, to a few centimetres "
+                f"station {self._placement}, PSD {first} first: {result.found.value} ({result.motions} positions "
+                "tried); "
+                "check that the laser is on and that the fixture stands as in the rig file, to a few centimetres  "
                 "and degrees"
             )
 

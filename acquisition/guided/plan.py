@@ -30,7 +30,8 @@ class GuidedOptions:
     def __post_init__(self) -> None:
         if self.postures < 2 or self.lengths < 1:
             raise AcquisitionError(
-                f"{self.postures} postures a cone, {self.lengths} lengths a bar position: one posture in a cone says "
+                f"{self.postures} postures a cone, {self.lengths} lengths a bar position: one posture in a cone "
+                "determines "
                 "nothing; take 2 or more, and 1 or more lengths"
             )
 

@@ -203,7 +203,7 @@ def _old_posture(q_rad: Floats, earlier: Sequence[Floats]) -> str | None:
 
 
 def _old_spot(arm: GuidedArm, q_rad: Floats, earlier: Sequence[Floats]) -> str | None:
-    """In one posture the believed arm is off by the same at every spot, so that their distances are good."""
+    """In one posture the assumed arm is off by the same at every spot, so that their distances are good."""
     if not earlier:
         return None
     tips_m = arm.tip_m(np.array([*earlier, q_rad]))

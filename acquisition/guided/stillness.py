@@ -1,7 +1,7 @@
 """When a reading may be taken: the probe stays where it is, though the hand trembles. Across a slip it does not.
 
 A ball in a seat stays while the joints go round it, so it is the probe's place that is judged, from windows of whole
-rows of the newest time, as the reader thread brings them. The believed arm, passed in, serves well enough: geometry
+rows of the newest time, as the reader thread brings them. The assumed arm, passed in, serves well enough: geometry
 that is off by 1e-3 shows a tremble of a milliradian as a micrometre.
 """
 

@@ -52,6 +52,7 @@ class Followed:
     missed: int = 0  # cycles in which no set-point could be sent in time
     worst_late_s: float = 0.0
     restarts: int = 0  # the stream was silent so long that the arm came to rest
+    cut_short: bool = False  # a stop ended it before the end of its path
 
 
 @dataclass(frozen=True)
@@ -151,6 +152,7 @@ class Following:
             if self._said.state() is not MotionState.ENDING:
                 return
             self._send(q_rad)
+        self.followed.cut_short = True
         self._said.braked()
 
     def _wait(self) -> float:

@@ -53,6 +53,11 @@ class Gate:
     def state(self) -> MotionState:
         return self._state
 
+    @property
+    def solver(self) -> Solver:
+        """The kinematics that plans are made with."""
+        return self._solver
+
     def plan(self, start_rad: Floats, segments: Sequence[Segment], belt: BeltAt = lambda t_s: STANDING) -> Plan:
         """Goes through the motion without moving. RefusedMotionError names what is wrong with it."""
         rest_s = PIPELINE / self._stream.solve_hz

@@ -5,12 +5,11 @@ A sweep is what the arm does in one go: the segments of a path up to the next re
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.errors import TaskError
+from acquisition.errors import InterruptedMotionError, TaskError
 from acquisition.motion.following import Followed
 from acquisition.motion.gate import Gate
 from acquisition.motion.inverse.solve import Solver
@@ -47,13 +46,6 @@ def next_sweep(graph: TaskGraph, steps: Sequence[Plain]) -> tuple[tuple[Segment,
 
 
 Floats = NDArray[np.float64]
-
-
-class Hand(Protocol):
-    """What grips; both return when it has."""
-
-    def grasp(self) -> None: ...
-    def release(self) -> None: ...
 
 
 def undrawn(made: Plan) -> None:
@@ -115,12 +107,23 @@ def run_task(gate: Gate, task: Task, around: Around) -> Ran:
             around.planned(made)
             followed = gate.run(made, around.joints(), around.belt, around.act, around.watch)
             ran.sweeps.append((made, followed))
+            if followed.cut_short:
+                raise InterruptedMotionError("the motion was stopped before its end, and the program with it")
         if count < len(plain):
             name = plain[count].transform  # type: ignore[union-attr] - a sweep ends before a READ only
-            ran.graph = ran.graph.with_value(name, around.read(name))
+            ran.graph = _read(gate, task, ran.graph, name, around)
             ran.graph.check()
         plain = plain[count + 1 :]
     return ran
+
+
+def _read(gate: Gate, task: Task, graph: TaskGraph, name: str, around: Around) -> TaskGraph:
+    """The task with what a READ brings, and with what follows from it where the arm stands."""
+    graph = graph.with_value(name, around.read(name))
+    reading = task.read.get(name)
+    if reading is None or reading.at is None or reading.gives is None:
+        return graph
+    return graph.taught(reading.gives, reading.at, gate.solver.flange(around.joints()))
 
 
 def _expected(belt: BeltState) -> Callable[[float], BeltState]:

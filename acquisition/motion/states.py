@@ -53,7 +53,7 @@ class MotionState(enum.Enum):
     PAUSING = "on the path until its next rest"
     HELD = "braked on the path, or resting on it; may go on"
     ENDING = "braking for good, then cleaning up"
-    DONE = "arrived, or stopped as a success"
+    DONE = "arrived"
     ABORTED = "given up; the arm stands"
     HALTED = "stopped without clean-up"
 

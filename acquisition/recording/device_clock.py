@@ -5,7 +5,7 @@
 A sample cannot arrive before it was measured, so the line lies under every point, as close as it can: the smallest sum
 of delays (Moon, Skelly and Towsley, "Estimation and removal of clock skew from network delay measurements", IEEE
 INFOCOM 1999, section IV). Its answer is an edge of the lower convex hull: the one over the mean of the device's times.
-What a busy host, a USB frame or a batch adds is delay, not clock; a constant delay cannot be told from the offset.
+What a busy host, a USB frame or a batch adds is delay, not clock; a constant delay cannot be separated from the offset.
 """
 
 import enum
@@ -27,7 +27,7 @@ class ClockStatus(enum.Enum):
     """How the comparison ended."""
 
     FOUND = "found"
-    TOO_SHORT = "too few samples, or too short a time, to tell a rate from delays"
+    TOO_SHORT = "too few samples, or too short a time, to separate a rate from delays"
     GOES_BACK = "the device's clock goes back: it was restarted or set"
     UNSTAMPED = "the device does not stamp its samples"
 

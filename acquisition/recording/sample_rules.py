@@ -158,7 +158,7 @@ def _table_faults(table: Table, rig: Rig) -> Iterator[Fault]:
         if SPOTS[0] in table and needed in table:
             lacking = ~np.isnan(table[SPOTS[0]]) & np.isnan(table[needed])
             yield from _first(
-                lacking, needed, "the value is missing, though the row has spots; say which fixture and order"
+                lacking, needed, "the value is missing, though the row has spots; give the placement and first_psd"
             )
     yield from _among(table, "placement", tuple(rig.placements), "a [[placement]] of the rig")
     yield from _among(table, "first_psd", (1, 2), "a detector")
@@ -192,7 +192,7 @@ def _bar_faults(table: Table, rig: Rig) -> Iterator[Fault]:
         yield row, "bar_end", f"'{shown(ends[row])}' is no end of a bar; write a or b"
     with_bar, with_end = ~np.isnan(table["bar"]), ends != ""
     yield from _first(with_bar & ~with_end, "bar_end", "the value is missing, though the row names a bar; write a or b")
-    yield from _first(with_end & ~with_bar, "bar", "the value is missing, though the row names an end; say which bar")
+    yield from _first(with_end & ~with_bar, "bar", "the value is missing, though the row names an end; give the bar")
 
 
 def _first(faulty: NDArray[np.bool_], column: str, says: str) -> Iterator[Fault]:

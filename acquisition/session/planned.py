@@ -118,7 +118,8 @@ class PlannedSession:
         """To the pose from its side; where it is dark there, to light near it and the spots that were expected."""
         q_rad = np.array(pose.q_rad)
         if not clear_of_table(self._learner.arm, q_rad):
-            raise UnreachableError(f"pose {np.round(q_rad, 3).tolist()}: elbow, wrist or laser would touch the table")
+            at_rad = (np.round(q_rad, 3) + 0.0).tolist()
+            raise UnreachableError(f"pose {at_rad} rad: elbow, wrist or laser would touch the table")
         self._approach(q_rad, pose)
         if not all(self._bench.look(GLANCE_S).lit(first)):
             found_rad = self._navigator.find_near(placement, first, pose.spots_m or (0.0, 0.0, 0.0, 0.0))

@@ -1,6 +1,6 @@
 """What a session leaves and shows: samples (one row each), events, progress; and who learns the arm from them.
 
-The learner betters the believed rig during a session. It is passed in, because it rests on the kinematic models.
+The learner betters the assumed rig during a session. It is passed in, because it rests on the kinematic models.
 """
 
 import enum

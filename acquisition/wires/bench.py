@@ -4,7 +4,7 @@ Readings have settled when two neighbouring short windows of the spots agree wit
 box's own sample times, so that the rule is the same whether the world runs in real time or faster.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -92,6 +92,7 @@ def _agree(one: Floats, two: Floats, rule: SettleRule) -> bool:
 
 LATENESS_S = 2.0  # of device time looked back on, to learn how early a PSD sample can arrive at all
 SOFT_S = 0.8  # within which a pause brakes at most: rigs with a gentler acceleration are braked harder
+DEGC = "_degC"
 SILENCE_S = 0.5  # host time without a sample after which a wait gives up
 
 
@@ -125,6 +126,7 @@ class WiredBench:
     place: Callable[[int], None]
     hurry: float = 1.0  # device seconds in one second of this program's clock
     rule: SettleRule = field(default_factory=SettleRule)
+    beside: Mapping[str, Pump] = field(default_factory=dict[str, Pump])  # further instruments, by name
     _cmd_rad: Floats = field(default_factory=lambda: np.empty(0), init=False)
     _start_s: float | None = field(default=None, init=False)
 
@@ -168,7 +170,7 @@ class WiredBench:
     def look(self, dwell_s: float) -> Look:
         self.supervisor.check()
         seen_s = self.clock.now_s()
-        begin_s = self._psd_time(seen_s)
+        begin_s = device_time(self.pumps.psd, seen_s, self.hurry)
         blocks: list[Block] = []
         while True:
             arrived = self.pumps.psd.wait(seen_s, SILENCE_S)
@@ -183,23 +185,12 @@ class WiredBench:
                 look = self._summed(window.between(stretch.from_s, stretch.to_s), settled=stretch.settled)
                 return replace(look, settle_s=stretch.from_s - begin_s if stretch.settled else None)
 
-    def _psd_time(self, host_s: float) -> float:
-        """What the PSD box's clock showed, or later, at `host_s`: earlier samples may be of before the motion ended.
-
-        The promptest sample of the last seconds ties both clocks; every other one came later than it could have, by
-        the line, this machine's load, or an emulator that fell behind. So the guess is late rather than early. The
-        seconds are of the device: an emulator that does not keep its pace falls behind all the time, and each look
-        waits for as much as it lost in them.
-        """
-        blocks = self.pumps.psd.recent(host_s - LATENESS_S / self.hurry) or self.pumps.psd.wait(-np.inf, SILENCE_S)
-        prompt_s = min(float(block.host_s[-1]) - float(block.device_s[-1]) / self.hurry for block in blocks)
-        return (host_s - prompt_s) * self.hurry
-
     def _summed(self, window: PsdWindow, *, settled: bool) -> Look:
         if self._start_s is None:
             self._start_s = float(window.device_s[0])
         psd1, psd2 = self.view.mean(window)
-        robot = self._since(self.pumps.robot, window)
+        begin_s = float(window.host_s[0])
+        robot = since(self.pumps.robot, begin_s)
         joint_degC = robot["joint_temperature_degC"][-1] if "joint_temperature_degC" in robot else ()
         temperatures = {f"joint{i + 1}": float(t) for i, t in enumerate(joint_degC)}
         q_rad = robot["actual_q_rad"]
@@ -210,28 +201,55 @@ class WiredBench:
             q_rad=q_rad.mean(axis=0),
             qd_rad_s=qd_rad_s.mean(axis=0),
             cmd_rad=self._cmd_rad.copy(),
-            encoder_rad=self._encoders(window),
+            encoder_rad=encoders_since(self.pumps.encoders, begin_s),
             psd1=psd1,
             psd2=psd2,
-            temperatures_degC={**window.mean_temperature(), **temperatures},
+            temperatures_degC={**window.mean_temperature(), **temperatures, **temperatures_beside(self.beside)},
             settled=settled,
             window_s=(float(window.device_s[0]), float(window.device_s[-1])),
         )
 
-    def _encoders(self, window: PsdWindow) -> Floats | None:
-        """Mean of the link-side encoders (joint,), NaN for one that did not answer."""
-        if self.pumps.encoders is None:
-            return None
-        each = self._since(self.pumps.encoders, window)["position_rad"]
-        answered = np.isfinite(each)
-        count = answered.sum(axis=0)
-        return np.where(count > 0, np.where(answered, each, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
 
-    def _since(self, pump: Pump, window: PsdWindow) -> dict[str, Floats]:
-        """Every channel of the samples that arrived since the window began, at least one: the arm stands, so one that
-        comes a little after the window serves as well.
-        """
-        begin_s = float(window.host_s[0])
-        blocks = pump.recent(begin_s) or pump.wait(begin_s, SILENCE_S)
-        keep = np.concatenate([block.host_s for block in blocks]) >= begin_s
-        return {name: np.concatenate([block.values[name] for block in blocks])[keep] for name in blocks[0].values}
+def device_time(pump: Pump, host_s: float, hurry: float) -> float:
+    """What a device's clock showed, or later, at `host_s`: earlier samples may be of before the motion ended.
+
+    The promptest sample of the last seconds ties both clocks; every other one came later than it could have, by
+    the line, this machine's load, or an emulator that fell behind. So the guess is late rather than early. The
+    seconds are of the device: an emulator that does not keep its pace falls behind all the time, and each look
+    waits for as much as it lost in them.
+    """
+    blocks = pump.recent(host_s - LATENESS_S / hurry) or pump.wait(-np.inf, SILENCE_S)
+    prompt_s = min(float(block.host_s[-1]) - float(block.device_s[-1]) / hurry for block in blocks)
+    return (host_s - prompt_s) * hurry
+
+
+def encoders_since(pump: Pump | None, begin_s: float) -> Floats | None:
+    """Mean of the link-side encoders (joint,), NaN for one that did not answer; None: there are none."""
+    if pump is None:
+        return None
+    each = since(pump, begin_s)["position_rad"]
+    answered = np.isfinite(each)
+    count = answered.sum(axis=0)
+    return np.where(count > 0, np.where(answered, each, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
+
+
+def temperatures_beside(pumps: Mapping[str, Pump]) -> dict[str, float]:
+    """The newest of every temperature that further instruments measure: by their names, or name and channel."""
+    found: dict[str, float] = {}
+    for name, pump in pumps.items():
+        block = pump.latest()
+        for channel, values in () if block is None else block.values.items():
+            if channel.endswith(DEGC) and values.ndim == 1 and np.isfinite(values[-1]):
+                found[name if channel == f"temperature{DEGC}" else f"{name}_{channel.removesuffix(DEGC)}"] = float(
+                    values[-1]
+                )
+    return found
+
+
+def since(pump: Pump, begin_s: float) -> dict[str, Floats]:
+    """Every channel of the samples that arrived since the window began (host time), at least one: the arm stands, so
+    one that comes a little after the window serves as well.
+    """
+    blocks = pump.recent(begin_s) or pump.wait(begin_s, SILENCE_S)
+    keep = np.concatenate([block.host_s for block in blocks]) >= begin_s
+    return {name: np.concatenate([block.values[name] for block in blocks])[keep] for name in blocks[0].values}

@@ -38,9 +38,12 @@ def batch_command(
     A file that is broken, crashes its process or never ends becomes a row with the reason. What was done stands when
     the same command runs again; only what is new or changed is done. Ends with 3 when some failed.
 
-    Example: calibeam batch recordings --out out/fleet --diagnose
+    For example:
 
-    Example: calibeam batch /site/recordings --engine dask --scheduler tcp://10.0.0.5:8786
+    ```
+    calibeam batch recordings --out out/fleet --diagnose
+    calibeam batch /site/recordings --engine dask --scheduler tcp://10.0.0.5:8786
+    ```
 
     Parameters
     ----------
@@ -51,7 +54,7 @@ def batch_command(
     diagnose
         Also seek missing physics: some seconds more for each.
     jobs
-        Recordings at a time; one a core, if not said otherwise.
+        Recordings at a time; default: one a core.
     engine
         loky: processes of this machine. dask: workers of a Dask cluster, by --scheduler, or of this machine.
     scheduler
@@ -59,7 +62,7 @@ def batch_command(
     timeout
         Seconds that one recording may take; 0: no limit, with loky only.
     again
-        Do all anew, whatever stands.
+        Do all again, also what is done.
     robot_by_folder
         The first folder below names the robot; else its serial number, where the recording has one, else the rig.
     json
@@ -103,4 +106,4 @@ def _end(ran: "RunResult", fleet: "Fleet", out: Path, *, again: bool) -> None:
     if fleet.bad and len(fleet.bad) == len(fleet.rows):
         raise DataError(f"none of {len(fleet.rows)} recordings could be identified; the first: {fleet.bad[0].error}")
     if fleet.bad:
-        raise PartialResult(f"{len(fleet.bad)} of {len(fleet.rows)} recordings failed; {out / PAGE} says why")
+        raise PartialResult(f"{len(fleet.bad)} of {len(fleet.rows)} recordings failed; the reasons are in {out / PAGE}")

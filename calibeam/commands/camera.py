@@ -20,7 +20,11 @@ def camera_command(
 
     The arm goes round the board, then into the light in both beam orders. Clear the cell first.
 
-    Example: calibeam camera rigs/ur5e-dual-psd-camera.toml --out out/camera
+    For example:
+
+    ```
+    calibeam camera rigs/ur5e-dual-psd-camera.toml --out out/camera
+    ```
 
     The tour begins where the arm stands, if the camera sees the board from there, else in front of where the rig file
     has the fixture. Name the file camera.json in [camera] calibration: sessions then aim by it.
@@ -28,11 +32,11 @@ def camera_command(
     Parameters
     ----------
     rig
-        The rig file; [camera] says how it is reached and how it is mounted, roughly.
+        The rig file; [camera] holds how it is reached and roughly how it is mounted.
     out
         Folder for camera.json and recording.mcap; nothing in it is overwritten.
     placement
-        Where the fixture stands now; the first one of the rig file if not said.
+        Where the fixture stands now; default: the first one of the rig file.
     time_scale
         Of the emulators, if it is not 1.
     yes
@@ -42,7 +46,9 @@ def camera_command(
     loaded, text, clock, console = load_rig(rig), rig_text(rig), SystemClock(), Console()
     check_session(loaded)
     if loaded.camera is None:
-        raise RigFileError(f"rig {loaded.name}: no [camera]; say how it is reached, and what board is on the fixture")
+        raise RigFileError(
+            f"rig {loaded.name}: no [camera]; add how it is reached and [camera.board], the board on the fixture"
+        )
     if not yes:
         someone(at_terminal(), "whether the arm may move", YES).may_move()
     from acquisition.centring.camera.measuring import CameraMeasuring

@@ -41,12 +41,16 @@ def centre_command(
 
     Where it is dark, the light is searched first: a spiral of some centimetres. Clear the cell first. Ctrl-C stops.
 
-    Example: calibeam centre rigs/ur5e-dual-psd.toml --first 2 --centring measured
+    For example:
+
+    ```
+    calibeam centre rigs/ur5e-dual-psd.toml --first 2 --centring measured
+    ```
 
     Parameters
     ----------
     rig
-        The rig file; [devices] says how each device is reached.
+        The rig file; [devices] holds how each device is reached.
     first
         Which detector the beam strikes first, 1 or 2.
     spots_mm
@@ -59,7 +63,7 @@ def centre_command(
     gain
         Of law8: the share of the correction that each step takes, above 0 and up to 1.
     placement
-        Where the fixture stands now; the first one of the rig file if not said.
+        Where the fixture stands now; default: the first one of the rig file.
     aim
         First go before the fixture, as a session does: through the rig's home_rad.
     out
@@ -125,7 +129,7 @@ def _checked(
 def _print_run(console: Console, run: "Centring") -> None:
     """The outcome, then a line a step: what it was for, how far the joints went, where the spots are."""
     console.print(f"{run.strategy}: {run.status.value} ({run.steps} steps)", soft_wrap=True, markup=False)
-    table = Table("step", "for", "largest joint step (mrad)", "PSD 1 x, y (um)", "PSD 2 x, y (um)", box=None)
+    table = Table("step", "for", "largest joint step (mrad)", "PSD 1 x, y (µm)", "PSD 2 x, y (µm)", box=None)
     before = run.trace[0].q_rad
     for number, step in enumerate(run.trace):
         x1, y1, x2, y2 = (f"{1e6 * value:.1f}" if np.isfinite(value) else "dark" for value in step.spots_m)

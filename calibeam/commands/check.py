@@ -45,7 +45,7 @@ def lines(recording: Recording, findings: tuple[Finding, ...]) -> list[str]:
     told += [f"  {stream.name}: {_rate(stream)}; {_clock(stream)}" for stream in recording.streams.values()]
     told += [f"  {f.severity.value}: {f.problem.value}: {f.where}: {f.says}" for f in findings[:MOST_LINES]]
     if len(findings) > MOST_LINES:
-        told.append(f"  and {len(findings) - MOST_LINES} findings more; --json tells all")
+        told.append(f"  and {len(findings) - MOST_LINES} more findings; --json prints all")
     errors = any(finding.is_error for finding in findings)
     return [*told, "  errors: see above"] if errors else [*told, "  no errors"]
 
@@ -69,7 +69,7 @@ def _clock(stream: Stream) -> str:
     rate = model.rate or 1.0
     if abs(rate - 1.0) > EMULATED:
         return f"recorded at {1.0 / rate:.3g} x real time, {delays}{wander}"
-    return f"clock {1e6 * (rate - 1.0):+.1f} us/s against the host, {delays}{wander}"
+    return f"clock {1e6 * (rate - 1.0):+z.1f} µs/s against the host, {delays}{wander}"
 
 
 def _after_host_stamps(stream: Stream) -> Floats | None:
@@ -116,11 +116,14 @@ def check_command(what: Path, *, json_: Annotated[bool, Parameter(name="--json")
 
     One line a device; the arm does not move. A recording is checked for missing samples, clocks and gross errors.
 
-    Example: calibeam check rigs/ur5e-dual-psd.toml
+    For example:
 
-    Example: calibeam check session-1/recording.mcap
+    ```
+    calibeam check rigs/ur5e-dual-psd.toml
+    calibeam check session-1/recording.mcap
+    ```
 
-    Each line says what the device is, its firmware, rate and noise, and else what is wrong and what to do. A recording
+    Each line reports what the device is, its firmware, rate and noise, or what is wrong and the remedy. A recording
     is looked through for gaps, wrong order and saturation. Exit code 1 when something is wrong.
 
     Parameters

@@ -32,7 +32,11 @@ def compare_command(
 
     Samples are matched by plan, order, repeat and station, and by joint angles only where these are missing.
 
-    Example: calibeam compare out/demo/recording.mcap --simulated-model out/demo/model.json --out compare.json
+    For example:
+
+    ```
+    calibeam compare out/demo/recording.mcap --simulated-model out/demo/model.json --out compare.json
+    ```
 
     Parameters
     ----------
@@ -55,7 +59,7 @@ def compare_command(
     json
         Print the comparison as it stands in the file, on one line, and nothing else.
     verbose
-        Print also the links of the chain, the streams and what the diagnosis says.
+        Print also the links of the chain, the streams and the diagnosis.
 
     """
     source = read(measured)

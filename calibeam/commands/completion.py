@@ -9,11 +9,13 @@ from calibeam.command_list import COMMANDS
 def completion_command(shell: Literal["bash", "zsh", "fish"]) -> None:
     """Print the completion script of a shell.
 
-    Example: calibeam completion bash > ~/.local/share/bash-completion/completions/calibeam
+    For example:
 
-    Example: calibeam completion fish > ~/.config/fish/completions/calibeam.fish
-
-    Example: calibeam completion zsh > "${fpath[1]}/_calibeam"
+    ```
+    calibeam completion bash > ~/.local/share/bash-completion/completions/calibeam
+    calibeam completion fish > ~/.config/fish/completions/calibeam.fish
+    calibeam completion zsh > "${fpath[1]}/_calibeam"
+    ```
 
     Parameters
     ----------

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from rich.console import Console
 from scipy.spatial.transform import Rotation
 
-from acquisition.motion.inverse.closed_form import closed_form
-from acquisition.motion.inverse.solve import AtPose, all_solutions, refine
 from acquisition.recording.rig import parse_rig
+from calibeam.motion.motion_inverse import MotionInverse
 from calibeam.outcome import PartialResult
 from calibrate.arms.rig_arm import RigArm
 from calibrate.correct.corrected import Corrected, Options, Wanted, correct
@@ -25,23 +24,8 @@ from calibrate.model_file import ModelFile, read_model
 Floats = NDArray[np.float64]
 
 LISTED = 12  # poses that are not ok, before the rest is counted
-SEED = 1  # of the starts of an arm without a closed form: the same poses always give the same commands
 SIDES = {"positive": 1, "negative": -1}
 UM = 1e6
-
-
-class MotionInverse:
-    """The inverse kinematics of motion, with the closed form of the rig file's arm for its starts."""
-
-    def __init__(self, drawn: RigArm) -> None:
-        self._starts = closed_form(drawn)
-
-    def solutions(self, arm: RigArm, T_base_flange: Floats, near_rad: Floats) -> Floats:
-        return all_solutions(arm, T_base_flange, near_rad, self._starts, np.random.default_rng(SEED))
-
-    def refined(self, arm: RigArm, T_base_flange: Floats, start_rad: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-        solved = refine(arm, AtPose(T_base_flange), start_rad)
-        return solved.q_rad, solved.found
 
 
 def correct_command(
@@ -54,8 +38,8 @@ def correct_command(
     margin_deg: Annotated[float, Parameter(validator=validators.Number(gte=0.0))] = 1.0,
     tool: tuple[float, float, float, float, float, float] | None = None,
     frame: tuple[float, float, float, float, float, float] | None = None,
-    start: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (),
-    condition: tuple[str, ...] = (),
+    start: Annotated[tuple[float, ...], Parameter(show_default=False)] = (),
+    condition: Annotated[tuple[str, ...], Parameter(show_default=False)] = (),
     verbose: bool = False,
 ) -> None:
     """Correct poses or a program, so that the real tool reaches them.
@@ -64,9 +48,12 @@ def correct_command(
     FANUC LS only the numbers of targets change. The predicted tool error of every pose stands beside it, before and
     after, with its sigma. Poses that are unreachable, near a limit or beyond the calibrated range are listed.
 
-    Example: calibeam correct model.json poses.csv --out corrected.csv --approach positive --condition payload_kg=2.5
+    For example:
 
-    Example: calibeam correct model.json weld.src --out weld-corrected.src --frame 0.8 0.1 0.2 0 0 0
+    ```
+    calibeam correct model.json poses.csv --out corrected.csv --approach positive --condition payload_kg=2.5
+    calibeam correct model.json weld.src --out weld-corrected.src --frame 0.8 0.1 0.2 0 0 0
+    ```
 
     Parameters
     ----------
@@ -216,7 +203,7 @@ def _print_found(
     for line in bad if verbose else bad[:LISTED]:
         say(line)
     if not verbose and len(bad) > LISTED:
-        say(f"... {len(bad) - LISTED} more (--verbose, or column says)")
+        say(f"... {len(bad) - LISTED} more (--verbose lists all; so does the column 'says')")
     for note in notes:
         say(note)
 

@@ -8,8 +8,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
@@ -28,7 +30,7 @@ from simulators.world.truth import read_truth
 
 @dataclass(frozen=True)
 class ZeroAgainstTruth:
-    """One joint: what was said, what is true. `deviation` is in stated sigmas, None where nothing was said."""
+    """One joint: what was reported, what is true. `deviation` is in stated sigmas, None where nothing was said."""
 
     joint: int
     value_rad: float | None
@@ -59,32 +61,37 @@ def print_against_truth(console: Console, revealed: tuple[ZeroAgainstTruth, ...]
         table.add_column(heading, justify="right")
     for one in revealed:
         if one.value_rad is None or one.sigma_rad is None or one.deviation is None:
-            table.add_row(f"J{one.joint}", "-", "-", f"{np.degrees(one.truth_rad):+.5f}", "-", "not determined")
+            table.add_row(f"J{one.joint}", "-", "-", f"{np.degrees(one.truth_rad):+z.5f}", "-", "not determined")
             continue
         off_rad = one.value_rad - one.truth_rad
         table.add_row(
             f"J{one.joint}",
-            f"{np.degrees(one.value_rad):+.5f}",
+            f"{np.degrees(one.value_rad):+z.5f}",
             f"{np.degrees(one.sigma_rad):.5f}",
-            f"{np.degrees(one.truth_rad):+.5f}",
-            f"{np.degrees(off_rad):+.5f}",
-            f"{one.deviation:+.2f}",
+            f"{np.degrees(one.truth_rad):+z.5f}",
+            f"{np.degrees(off_rad):+z.5f}",
+            f"{one.deviation:+z.2f}",
         )
     console.print(table)
 
 
 RIG = RIGS / "ur5e-dual-psd.toml"
+ShippedRig = Annotated[Path, Parameter(show_default="rigs/ur5e-dual-psd.toml")]  # not where it is installed
 RECORDING, TRUTH = "recording.mcap", "truth.json"
 RESULTS = (RECORDING, "model.json", "diagnosis.json", "report.html", TRUTH)
 
 
-def demo(*, out: Path = Path("out/demo"), rig: Path = RIG, seed: int = 1, time_scale: float = 8.0) -> None:
+def demo(*, out: Path = Path("out/demo"), rig: ShippedRig = RIG, seed: int = 1, time_scale: float = 8.0) -> None:
     """Run a whole session on emulated devices and show the truth.
 
     Starts the emulators, records a session, identifies, diagnoses and reports; the truth is opened only after the
     fit. About a minute on two quiet cores.
 
-    Example: calibeam demo --out out/demo
+    For example:
+
+    ```
+    calibeam demo --out out/demo
+    ```
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""`calibeam design`: which poses to take and where, what they promise, and which causes they could tell apart."""
+"""`calibeam design`: which poses to take and where, what they promise, and which causes they could separate."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -41,14 +41,18 @@ def design_command(
 
     Reachable, clear of obstacles, lit; the best of them, ordered so that drift is not mistaken for geometry.
 
-    Prints the predicted error in free space, how many poses are enough, and which causes a diagnosis could find.
+    Prints the predicted error over the workspace, how many poses are enough, and which causes a diagnosis could find.
 
-    Example: calibeam design rigs/ur5e-dual-psd.toml --out plan.toml; calibeam session RIG --plan plan.toml
+    For example:
+
+    ```
+    calibeam design rigs/ur5e-dual-psd.toml --out plan.toml; calibeam session RIG --plan plan.toml
+    ```
 
     Parameters
     ----------
     rig
-        The rig file; its beliefs and its noise are taken at their word.
+        The rig file; its tolerances and its noise are taken as they are.
     poses
         Readings of the plan, repeats among them.
     repeats
@@ -56,7 +60,7 @@ def design_command(
     criterion
         free-space (predicted error of the target over the workspace), d (determinant), o1 ... o5.
     places
-        Also say how many places of the fixture are worth it, up to so many, where they would be, and whether distances
+        Also report how many stations of the fixture are worth it (up to so many), where they are, and whether distances
         between them are needed. Takes a minute; the plan stays with the places of the rig.
     candidates
         For each place and order of the faces.

@@ -1,4 +1,4 @@
-"""`calibeam diagnose`: where a recording parts from its model, what physics was left out, and the proof."""
+"""`calibeam diagnose`: where a recording and its model disagree, what physics was left out, and the proof."""
 
 from functools import partial
 from pathlib import Path
@@ -7,6 +7,7 @@ import msgspec
 from rich.console import Console
 
 from acquisition.recording import Recording, read
+from calibeam.printing.progress import stages_shown
 from calibeam.printing.results import print_diagnosis, print_streams
 from calibeam.results.diagnosis import diagnose_recording, diagnose_streams, plan_next, refuse_wrong_file
 from calibeam.results.identification import naming_source
@@ -31,9 +32,13 @@ def diagnose_command(
 
     Where model and measurement disagree, which physics is missing, its size, and the proof on unseen samples.
 
-    Faults of the file come first; a file that is wrong as a whole ends with code 1, and diagnosis.json says why.
+    Faults of the file come first; a file that is wrong as a whole ends with code 1; the reason is in diagnosis.json.
 
-    Example: calibeam diagnose out/demo/recording.mcap --model out/demo/model.json --out diagnosis.json
+    For example:
+
+    ```
+    calibeam diagnose out/demo/recording.mcap --model out/demo/model.json --out diagnosis.json
+    ```
 
     Parameters
     ----------
@@ -47,11 +52,11 @@ def diagnose_command(
     model_out
         Where to write the model: geometry fitted together with the physics found, which `calibeam predict` uses.
     report
-        Where to write the pages for a person; beside the diagnosis, if not said otherwise.
+        Where to write the pages for a person; default: beside the diagnosis.
     plan_out
-        Where to write the poses that would best tell rivals apart: `calibeam session RIG --plan` takes them.
+        Where to write the poses that best separate alternative explanations: `calibeam session RIG --plan` takes them.
     verbose
-        Print all causes and their rivals, clocks, and what was not recorded, too.
+        Print all causes, their alternatives, clocks and missing columns, too.
     json
         Print the diagnosis as it stands in the file, on one line, and nothing else.
 
@@ -62,7 +67,8 @@ def diagnose_command(
         _streams_only(console, source, out, json=json)
         return
     with naming_source(recording):
-        found, file = diagnose_recording(source, known, partial(write_diagnosis, out))
+        with stages_shown(Console(stderr=True), len(source.samples)) as begun:
+            found, file = diagnose_recording(source, known, partial(write_diagnosis, out), begun)
         write_diagnosis(out, file)
         if json:
             print(msgspec.json.encode(file).decode())

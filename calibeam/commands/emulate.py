@@ -28,12 +28,16 @@ def emulate(
     expose: bool = False,
     control_host: str = "127.0.0.1",
     model: Path | None = None,
-    hide: Annotated[tuple[str, ...], Parameter(negative=())] = (),
+    hide: Annotated[tuple[str, ...], Parameter(show_default=False)] = (),
     end_with_stdin: Annotated[bool, Parameter(show=False)] = False,
 ) -> None:
     """Emulate every device of a rig on real wires until Ctrl-C.
 
-    Example: calibeam emulate rigs/ur5e-dual-psd.toml
+    For example:
+
+    ```
+    calibeam emulate rigs/ur5e-dual-psd.toml
+    ```
 
     It prints where each device listens. Trouble on their wires is asked for by one line of JSON to the address
     "control", for example by nc 127.0.0.1 PORT; the kinds stand in docs/protocols/faults.md:
@@ -42,9 +46,12 @@ def emulate(
 
     A rig with the geometry and the physics of a model, and one that mechanisms were put into by hand:
 
-    Example: calibeam emulate rigs/ur5e-dual-psd.toml --model model.json
+    For example:
 
-    Example: calibeam emulate rigs/ur5e-dual-psd.toml --hide "soft-joint joint2 8e-6" --hide "slack-drive joint5 1e-4"
+    ```
+    calibeam emulate rigs/ur5e-dual-psd.toml --model model.json
+    calibeam emulate rigs/ur5e-dual-psd.toml --hide "soft-joint joint2 8e-6" --hide "slack-drive joint5 1e-4"
+    ```
 
     Parameters
     ----------
@@ -67,7 +74,7 @@ def emulate(
     expose
         Let devices listen on addresses that other machines reach. Device protocols know no password.
     control_host
-        Address of the side channel. Anywhere but on loopback it wants the token that is announced with it.
+        Address of the side channel. Other than loopback it needs the token that is announced with it.
     model
         A model.json: the emulated rig has its geometry, and a mechanism for each effect that holds on any day.
     hide

@@ -10,11 +10,13 @@ from acquisition.recording.session_folder import TableFormat, export, write_stre
 def export_command(recording: Path, *, out: Path, table: TableFormat = TableFormat.CSV, streams: bool = False) -> None:
     """Write a recording as tables, or its CAN frames as a CAN log.
 
-    Example: calibeam export out/demo/recording.mcap --out session
+    For example:
 
-    Example: calibeam export out/demo/recording.mcap --out tables --streams --table parquet
-
-    Example: calibeam export encoder-log/segment-0001.mcap --out bus.blf
+    ```
+    calibeam export out/demo/recording.mcap --out session
+    calibeam export out/demo/recording.mcap --out tables --streams --table parquet
+    calibeam export encoder-log/segment-0001.mcap --out bus.blf
+    ```
 
     Parameters
     ----------

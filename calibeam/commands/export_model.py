@@ -16,9 +16,12 @@ def export_model_command(model: Path, *, to: ExportForm, out: Path | None = None
     rig file states its make, [arm] make = "kuka". Where each number is entered, what to verify and how to go back
     stands in docs/controllers.
 
-    Example: calibeam export-model model.json --to mjcf
+    For example:
 
-    Example: calibeam export-model model.json --to kuka-mastering --out a1-a6.csv
+    ```
+    calibeam export-model model.json --to mjcf
+    calibeam export-model model.json --to kuka-mastering --out a1-a6.csv
+    ```
 
     Parameters
     ----------
@@ -26,7 +29,7 @@ def export_model_command(model: Path, *, to: ExportForm, out: Path | None = None
         The model.json of an identification or of a diagnosis; it holds the rig.
     to
         urdf, mjcf (MuJoCo, with joint stiffness), dh-csv, ur-kinematics, ur-calibration, kuka-mastering, abb-moc,
-        fanuc-mastering, json, matlab.
+        fanuc-mastering, json, matlab, table (nominal, correction, calibrated; degrees and mm, in the robot's signs).
     out
         The file to write. Default: beside the model, under its name.
 

@@ -35,7 +35,7 @@ def identify_command(
     model: Path | None = None,
     bootstrap: Annotated[int, Parameter(validator=validators.Number(gte=0))] | None = None,
     out: Path = Path("model.json"),
-    export: tuple[ExportForm, ...] = (),
+    export: Annotated[tuple[ExportForm, ...], Parameter(show_default=False)] = (),
     verbose: bool = False,
     json: bool = False,
 ) -> None:
@@ -46,21 +46,24 @@ def identify_command(
     Spots of the dual PSD show joint zeros, but no length; positions, wire, cones, bars, full poses (several at once)
     the whole arm.
 
-    Example: calibeam identify out/demo/recording.mcap --out model.json
+    For example:
 
-    Example: calibeam identify now/recording.mcap --model last-year/model.json --out now/model.json
+    ```
+    calibeam identify out/demo/recording.mcap --out model.json
+    calibeam identify now/recording.mcap --model last-year/model.json --out now/model.json
+    ```
 
     Parameters
     ----------
     recording
         A recording, or a session folder with rig.toml and samples.csv.
     plan
-        A fit plan (fit.toml): what is free, held or believed, which instruments, loss, solver, proofs.
+        A fit plan (fit.toml): what is free, held or assumed, which instruments, loss, solver, proofs.
     model
         A known model with physics: its structure, geometry and effects, is fitted to this recording, and nothing is
         searched. Not with --plan or --bootstrap.
     bootstrap
-        Also refit so many times to drawn rows: intervals that trust no law of noise.
+        Also refit so many times to drawn rows: intervals without assuming a noise distribution.
     out
         Where to write the model.
     export

@@ -62,15 +62,15 @@ def import_command(
     Of a table of poses (xlsx, CSV, Parquet) a session folder, of everything else a recording. What the columns of a
     table are understood to mean is shown and asked for once, and written beside what is made.
 
-    Example: calibeam import lab.xlsx --rig rig.toml --out session
+    For example:
 
-    Example: calibeam import lab.csv --rig rig.toml --columns "A1..A6 [deg] = q, X Y Z [mm] = position" --out session
-
-    Example: calibeam import session --out session.mcap
-
-    Example: calibeam import bus.blf --rig rigs/ur5e-dual-psd.toml --out bus.mcap
-
-    Example: calibeam import robot.csv encoders.csv --streams --rig rig.toml --out streams.mcap
+    ```
+    calibeam import lab.xlsx --rig rig.toml --out session
+    calibeam import lab.csv --rig rig.toml --columns "A1..A6 [deg] = q, X Y Z [mm] = position" --out session
+    calibeam import session --out session.mcap
+    calibeam import bus.blf --rig rigs/ur5e-dual-psd.toml --out bus.mcap
+    calibeam import robot.csv encoders.csv --streams --rig rig.toml --out streams.mcap
+    ```
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def import_command(
     if sheet is not None and not any(path.suffix.lower() in WORKBOOKS for path in (source, *others)):
         raise RecordingError(f"{source}: --sheet {sheet}: only a workbook has sheets; leave --sheet out")
     if rig is None:
-        raise RecordingError(f"{source}: a table or a log does not say of which rig it is; give --rig RIG.toml")
+        raise RecordingError(f"{source}: a table or a log names no rig; give --rig RIG.toml")
     if _is_can(source) and not others:
         _refuse(source, "a CAN log has no columns", columns=columns, sheet=sheet, streams=streams)
         _can(source, out, rig)

@@ -38,7 +38,11 @@ def jog_command(
     The flange is shifted or turned along an axis; every step passes the same checks as a move. Clear the cell
     first.
 
-    Example: calibeam jog rigs/ur5e-dual-psd.toml --axis z --by-mm 5
+    For example:
+
+    ```
+    calibeam jog rigs/ur5e-dual-psd.toml --axis z --by-mm 5
+    ```
 
     Parameters
     ----------
@@ -55,11 +59,11 @@ def jog_command(
     tool
         The axis is the flange's own, not the base's.
     model
-        The model.json of an identification, for its corrected kinematics; else the arm as drawn.
+        The model.json of an identification, for its corrected kinematics; else the nominal arm.
     speed
         Share of the rig's speeds, up to 1.
     out
-        The drawing of the plan.
+        The picture of the plan.
     dry_run
         Plan and draw only.
     yes
@@ -74,7 +78,7 @@ def jog_command(
         or (by_deg is None) == (by_mm is None)
         or (joint is not None and by_deg is None)
     ):
-        raise TaskError("say --joint N --by-deg A, or --axis x|y|z with --by-mm or --by-deg")
+        raise TaskError("what to jog is missing; give --joint N --by-deg A, or --axis x|y|z with --by-mm or --by-deg")
     if abs(by_mm or 0.0) > LARGEST_MM or abs(by_deg or 0.0) > LARGEST_DEG:
         raise TaskError(f"a jog is at most {LARGEST_MM:.0f} mm or {LARGEST_DEG:.0f} deg; use calibeam move")
     if joint is not None and not 1 <= joint <= loaded.n_joints:

@@ -19,7 +19,11 @@ def layouts_command(recording: Path, *, out: Path = Path("layouts")) -> None:
     Foxglove: open the recording, then Layouts, Import from file. PlotJuggler: Data, then Layout, Load. They fit every
     recording of the same rig.
 
-    Example: calibeam layouts out/demo/recording.mcap --out out/layouts
+    For example:
+
+    ```
+    calibeam layouts out/demo/recording.mcap --out out/layouts
+    ```
 
     Parameters
     ----------

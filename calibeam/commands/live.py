@@ -21,6 +21,8 @@ def live_command(
     host: str = "127.0.0.1",
     port: int = 8765,
     token: str | None = None,
+    foxglove: int | None = None,
+    plotjuggler: int | None = None,
     for_s: float | None = None,
     json_: Annotated[bool, Parameter(name="--json")] = False,
 ) -> None:
@@ -28,9 +30,12 @@ def live_command(
 
     Detectors, robot with its beam, joints and the state of every device.
 
-    Example: calibeam live rigs/ur5e-dual-psd.toml
+    For example:
 
-    Example: calibeam live rigs/ur5e-dual-psd.toml --host 0.0.0.0
+    ```
+    calibeam live rigs/ur5e-dual-psd.toml
+    calibeam live rigs/ur5e-dual-psd.toml --host 0.0.0.0
+    ```
 
     Nothing is moved or recorded. STOP ends the program that the controller runs; it is no safety stop. A session opens
     the same devices: watch it by `calibeam session RIG.toml --live` instead.
@@ -38,7 +43,7 @@ def live_command(
     Parameters
     ----------
     rig
-        The rig file; [devices] says how each device is reached.
+        The rig file; [devices] holds how each device is reached.
     model
         The model.json of an identification, by which the robot and its beam are drawn; else as in the rig file.
     host
@@ -47,6 +52,10 @@ def live_command(
         Port to serve at; 0 takes any that is free.
     token
         What the address must hold, instead of one made at random.
+    foxglove
+        Serve the curves to Foxglove, too, on this port of this machine (8765 is the page's; 8766 is free).
+    plotjuggler
+        Send the curves to PlotJuggler's UDP Server, too, on this port of this machine (it offers 9870).
     for_s
         End by itself after so many seconds.
     json_
@@ -54,13 +63,20 @@ def live_command(
 
     """
     from calibeam.live.devices import devices_of, reading
+    from calibeam.live.outlets import LiveViews, outlets
     from calibeam.live.page import PageAddress, live_page  # the web server takes a while to load: only here
 
     loaded, clock = load_rig(rig), SystemClock()
     believed = {} if model is None else _corrections(model, loaded)
-    with live_page(loaded, clock, PageAddress(host, port, token), "watch") as page:
+    with (
+        live_page(loaded, clock, PageAddress(host, port, token), "watch") as page,
+        outlets(foxglove, plotjuggler, loaded.name) as (served, says),
+    ):
         page.feed.believes(believed)
+        page.feed.also = LiveViews(served, lambda: page.feed.view).heard
         print(json.dumps({"url": page.url}) if json_ else f"live page: {page.url} (Ctrl-C ends it)", flush=True)
+        for sentence in () if json_ else says:
+            print(sentence, flush=True)
         with reading(devices_of(loaded, clock, page.feed), page.feed):
             threading.Event().wait(for_s)
 

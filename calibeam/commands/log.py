@@ -19,7 +19,7 @@ from drivers.errors import DeviceError, DeviceRefused
 
 log = App(
     name="log",
-    help="Log the encoders until Ctrl-C, with every CAN frame.\n\nExample: calibeam log encoders rig.toml",
+    help="Log the encoders, or the tracker, until Ctrl-C.\n\nFor example:\n\n```\ncalibeam log encoders rig.toml\n```",
 )
 
 MEGABYTE = 1e6
@@ -38,7 +38,11 @@ def encoders(
 ) -> None:
     """Log the encoders until Ctrl-C: positions and every CAN frame, in segments of which each is a whole recording.
 
-    Example: calibeam log encoders rigs/ur5e-dual-psd.toml --out encoder-log
+    For example:
+
+    ```
+    calibeam log encoders rigs/ur5e-dual-psd.toml --out encoder-log
+    ```
 
     A bus that is lost is attached again, with a gap in the recording. Started again with the same folder, the log goes
     on in a new segment. Whatever ends it, 0.1 s are lost at most.
@@ -46,7 +50,7 @@ def encoders(
     Parameters
     ----------
     rig
-        The rig file; [devices.encoders] says how they are reached.
+        The rig file; [devices.encoders] holds how they are reached.
     out
         Folder for segment-0001.mcap and those after it; nothing in it is overwritten.
     raw
@@ -62,18 +66,70 @@ def encoders(
         Print one line of JSON at the end, and nothing else.
 
     """
-    if not (0.0 < rotate_mb < math.inf and 0.0 < rotate_min < math.inf):
-        raise DeviceRefused(f"--rotate-mb {rotate_mb:g}, --rotate-min {rotate_min:g}: give finite numbers above 0")
-    loaded, clock = load_rig(rig), SystemClock()
+    rotation = _rotation(rotate_mb, rotate_min)
+    loaded = load_rig(rig)
     device = loaded.devices.encoders
     if device is None:
-        raise DeviceRefused(f"rig {loaded.name}: no [devices.encoders]; say there how the encoders are reached")
-    rotation = Rotation(round(rotate_mb * MEGABYTE), 60.0 * rotate_min)
-    job = EncoderLog(device, rig_text(rig), out, clock, rotation, raw=raw)
+        raise DeviceRefused(f"rig {loaded.name}: no [devices.encoders]; add it, with how the encoders are reached")
+    _log(EncoderLog(device, rig_text(rig), out, SystemClock(), rotation, raw=raw), out, for_s, json_=json_)
+
+
+@log.command
+def tracker(
+    rig: Path,
+    *,
+    out: Path = Path("tracker-log"),
+    rotate_mb: float = 256.0,
+    rotate_min: float = 60.0,
+    for_s: float | None = None,
+    json_: Annotated[bool, Parameter(name="--json")] = False,
+) -> None:
+    """Log the tracker until Ctrl-C: every position that it prints, in segments of which each is a whole recording.
+
+    For example:
+
+    ```
+    calibeam log tracker rigs/ur5e-tracker.toml --out tracker-log
+    ```
+
+    An instrument that is lost is attached again, with a gap in the recording. Started again with the same folder, the
+    log goes on in a new segment.
+
+    Parameters
+    ----------
+    rig
+        The rig file; [devices.tracker] states how the instrument is reached and what it prints.
+    out
+        Folder for segment-0001.mcap and those after it; nothing in it is overwritten.
+    rotate_mb
+        Size of a segment from which the next is begun.
+    rotate_min
+        Age of a segment, in minutes, from which the next is begun.
+    for_s
+        End by itself after so many seconds.
+    json_
+        Print one line of JSON at the end, and nothing else.
+
+    """
+    rotation = _rotation(rotate_mb, rotate_min)
+    loaded = load_rig(rig)
+    device = loaded.devices.tracker
+    if device is None:
+        raise DeviceRefused(f"rig {loaded.name}: no [devices.tracker]; add it, with how the tracker is reached")
+    _log(EncoderLog(device, rig_text(rig), out, SystemClock(), rotation, raw=False), out, for_s, json_=json_)
+
+
+def _rotation(rotate_mb: float, rotate_min: float) -> Rotation:
+    if not (0.0 < rotate_mb < math.inf and 0.0 < rotate_min < math.inf):
+        raise DeviceRefused(f"--rotate-mb {rotate_mb:g}, --rotate-min {rotate_min:g}: give finite numbers above 0")
+    return Rotation(round(rotate_mb * MEGABYTE), 60.0 * rotate_min)
+
+
+def _log(job: EncoderLog, out: Path, for_s: float | None, *, json_: bool) -> None:
     console = Console(quiet=json_)
     try:
         with console.status("connecting", refresh_per_second=2.0) as status:
-            job.run(partial(_is_over, job, for_s, clock), lambda state: status.update(_now(state)))
+            job.run(partial(_is_over, job, for_s, SystemClock()), lambda state: status.update(_now(state)))
     except (DeviceError, RecordingError) as why:
         if job.state.rows == 0:
             raise
@@ -89,15 +145,17 @@ def _is_over(job: EncoderLog, for_s: float | None, clock: Clock) -> bool:
 
 
 def _now(state: LogState) -> str:
+    frames = f", {state.frames} frames" if state.frames else ""
     away = "" if state.away is None else f"; AWAY: {state.away}"
-    return f"{state.segment.name}: {state.rows} rows, {state.frames} frames{away} (Ctrl-C ends the log)"
+    return f"{state.segment.name}: {state.rows} rows{frames}{away} (Ctrl-C ends the log)"
 
 
 def _summary(state: LogState, segments: list[Path]) -> str:
     which = segments[0].name if len(segments) == 1 else f"{segments[0].name} to {segments[-1].name}"
     outages = f", {state.outages} outages" if state.outages else ""
+    frames = f", {state.frames} frames" if state.frames else ""
     errors = f", {state.error_frames} of them error frames" if state.error_frames else ""
-    return f"{segments[0].parent}: {which}: {state.rows} rows, {state.frames} frames{errors}{outages}"
+    return f"{segments[0].parent}: {which}: {state.rows} rows{frames}{errors}{outages}"
 
 
 def _as_json(state: LogState, segments: list[Path]) -> dict[str, Any]:

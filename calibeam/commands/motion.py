@@ -11,7 +11,7 @@ from rich.table import Table
 from acquisition.errors import TaskError
 from acquisition.motion.plan import Plan
 from acquisition.recording.rig import load_rig
-from calibeam.commands.demo import RIG
+from calibeam.commands.demo import RIG, ShippedRig
 from calibeam.emulation import Emulation
 from drivers.clock import SystemClock
 
@@ -19,17 +19,21 @@ from drivers.clock import SystemClock
 def motion_command(
     *,
     out: Path = Path("out/motion"),
-    rig: Path = RIG,
-    only: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = (),
+    rig: ShippedRig = RIG,
+    only: Annotated[tuple[str, ...], Parameter(show_default=False)] = (),
     json_: Annotated[bool, Parameter(name="--json")] = False,
 ) -> None:
     """Run the motion examples on an emulated controller.
 
     Joint moves, straight lines, blends, a belt, two pins with teaching.
 
-    Each leaves its plan as drawn before the arm moved (plan-NAME.svg), and what the controller then said beside it.
+    Each leaves its plan (plan-NAME.svg), and beside it what the controller reported.
 
-    Example: calibeam motion --out out/motion
+    For example:
+
+    ```
+    calibeam motion --out out/motion
+    ```
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 def move_command(
     rig: Path,
     *,
-    joints_deg: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (),
+    joints_deg: Annotated[tuple[float, ...], Parameter(show_default=False)] = (),
     task: Path | None = None,
     position: str | None = None,
     home: bool = False,
@@ -38,7 +38,11 @@ def move_command(
     The arm moves once `go` is typed. Ctrl-C rests at the next place, or brakes where that is more than a second away;
     again brakes at once, then gives up.
 
-    Example: calibeam move rigs/ur5e-dual-psd.toml --joints-deg 17 -80 92 -29 29 0
+    For example:
+
+    ```
+    calibeam move rigs/ur5e-dual-psd.toml --joints-deg 17 -80 92 -29 29 0
+    ```
 
     Parameters
     ----------
@@ -55,11 +59,11 @@ def move_command(
     line
         Straight, instead of by joints.
     model
-        The model.json of an identification, for its corrected kinematics; else the arm as drawn.
+        The model.json of an identification, for its corrected kinematics; else the nominal arm.
     speed
         Share of the rig's speeds, up to 1.
     out
-        The drawing of the plan.
+        The picture of the plan.
     dry_run
         Plan and draw only.
     yes
@@ -70,7 +74,7 @@ def move_command(
 
     loaded = load_rig(rig)
     if sum((bool(joints_deg), task is not None, home)) != 1:
-        raise TaskError("say where to with one of --joints-deg, --task with --position, --home")
+        raise TaskError("the target is missing; give one of --joints-deg, --task with --position, --home")
     if not 0.0 < speed <= 1.0:
         raise TaskError(f"--speed {speed}: a share of the rig's speeds, above 0 and up to 1")
     by = By.LINE if line else By.JOINTS
@@ -89,7 +93,7 @@ def move_command(
 
 def _task_place(task: Path, position: str | None) -> Place:
     if position is None:
-        raise TaskError(f"--task {task}: say which of its positions with --position")
+        raise TaskError(f"--task {task}: no position of the task is named; give --position")
     place = read_task(task).graph.place(position)
     if place.coord is not None:
         raise TaskError(f"{position}: moves with a belt; only a program can go there")

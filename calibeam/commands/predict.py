@@ -1,4 +1,4 @@
-"""`calibeam predict`: what a model says the instruments should read at given samples, with the physics it carries.
+"""`calibeam predict`: what the instruments should read by a model at given samples, with the physics it carries.
 
 predicted.csv has one row per sample, the shortest text of every number, nothing where there is none.
 """
@@ -50,7 +50,11 @@ def predict_command(
 
     One row a sample, in input order: predicted reading, its sigma, and the residual where it was measured.
 
-    Example: calibeam predict model.json samples.csv --out predicted.csv
+    For example:
+
+    ```
+    calibeam predict model.json samples.csv --out predicted.csv
+    ```
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ from calibeam.software import SOFTWARE
 from calibrate.errors import DataError
 from simulators.conceal.wanted import FAMILIES, Family
 
-PUBLISHED_SEED = 20261121  # of the table in the README; nobody has looked at its cases while the diagnosis was made
+PUBLISHED_SEED = 20261121  # of the table in docs/figures.md; its cases were not examined while the diagnosis was made
 DEVELOPED_SEED = 1
 
 
@@ -31,7 +31,7 @@ def prove_command(
     enr: tuple[float, float] | None = None,
     mechanism: str | None = None,
     jobs: int = 2,
-    without: tuple[str, ...] = (),
+    without: Annotated[tuple[str, ...], Parameter(show_default=False)] = (),
     wire: int = 0,
     compare: int = 0,
     real: Path | None = None,
@@ -43,21 +43,25 @@ def prove_command(
 
     Physics is hidden in emulated sessions, diagnosed in processes that cannot see it, then revealed and counted.
 
-    Example: calibeam prove --cases 300 --out out/proof
+    For example:
+
+    ```
+    calibeam prove --cases 300 --out out/proof
+    ```
 
     Parameters
     ----------
     cases
         How many sessions.
     seed
-        Everything is drawn from it. Below 1000: development, no figure for the public. If not said: that of the
+        Everything is drawn from it. Below 1000: development, no figure for the public. Default: that of the
         published table with --publish, else 1.
     out
         Folder for recordings, seals, answers, proof.json and proof.html; has to be empty.
     family
-        Instruments: all, if not said otherwise; may be repeated.
+        Instruments; default: all.
     kind
-        Kinds of cases: all in their shares, if not said otherwise; may be repeated.
+        Kinds of cases; default: all in their shares.
     enr
         Smallest and largest effect over noise.
     mechanism
@@ -69,7 +73,7 @@ def prove_command(
     wire
         Further cases whose recordings come over emulated wires: a minute each, two cores.
     compare
-        For how many cases an oracle, which is told the truth, and other methods are asked for comparison.
+        For how many cases an oracle, which knows the truth, and other methods are asked for comparison.
     real
         A folder with session folders of real recordings: these are diagnosed, and what is hidden of them inferred.
     loop

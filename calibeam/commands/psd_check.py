@@ -29,7 +29,7 @@ READ_S = 1.0
 COLUMNS = ("x_m", "y_m")
 NO_WAIT = "give --no-wait where something else moves the spot"
 LARGEST_M = 0.1  # of a place from the middle; faces are some centimetres long
-RIG_DIFFERS = "the rig says"
+RIG_DIFFERS = "the rig file has"
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,11 @@ def psd_check_command(rig: Path, *, points: Path, unit: int = 1, out: Path | Non
 
     Finds the sign of x, the scale of the sum signal (KPA101) and an error map.
 
-    Example: calibeam psd-check rig.toml --points points.csv --unit 1 --out psd1.json
+    For example:
+
+    ```
+    calibeam psd-check rig.toml --points points.csv --unit 1 --out psd1.json
+    ```
 
     Parameters
     ----------
@@ -92,7 +96,7 @@ def psd_check_command(rig: Path, *, points: Path, unit: int = 1, out: Path | Non
 
 
 def collect(psd: PsdInstrument, face: Face, unit: int, place_m: Floats, ready: Callable[[int, Floats], None]) -> Seen:
-    """Averages READ_S at every place, once `ready` says that the spot is there. DeviceRefused where it is dark."""
+    """Averages READ_S at every place, once `ready` confirms that the spot is there. DeviceRefused where it is dark."""
     shown: list[tuple[float, float]] = []
     counts: list[Floats] = []
     for number, place in enumerate(place_m, 1):
@@ -109,7 +113,7 @@ def collect(psd: PsdInstrument, face: Face, unit: int, place_m: Floats, ready: C
 
 
 def unit_lines(check: UnitCheck, device: PsdDevice, unit: int) -> list[str]:
-    """What was measured beside what the rig says, a remedy where they differ."""
+    """What was measured beside what the rig file has, a remedy where they differ."""
     if check.status is not CheckStatus.GOOD or check.x is None or check.y is None:
         return [f"unit {unit}: {check.status.value}"]
     lines: list[str] = []
@@ -177,7 +181,7 @@ def asked_at(asking: Asking) -> Callable[[int, Floats], None]:
     """Asks for the spot at each place. NotAgreedError, when it is called, on a refusal or the end of input."""
 
     def ask(number: int, place: Floats) -> None:
-        where = f"x = {place[0] * 1e3:+.3f} mm, y = {place[1] * 1e3:+.3f} mm"
+        where = f"x = {place[0] * 1e3:+z.3f} mm, y = {place[1] * 1e3:+z.3f} mm"
         if not asking.enter(f"place {number}: put the spot to {where}"):
             raise NotAgreedError(f"the check was ended at place {number}; nothing was written")
 

@@ -24,9 +24,13 @@ def reconcile_command(
     """Bring a simulation to agree with a recording.
 
     Compares the two, diagnoses what the simulation lacks, replays it with that, and compares again. A quarter of the
-    poses stays unseen: how far the simulation is away, before and after, is told there.
+    poses stays unseen: how far the simulation is away, before and after, is measured there.
 
-    Example: calibeam reconcile measured.mcap --simulation rig.toml --out out/reconcile
+    For example:
+
+    ```
+    calibeam reconcile measured.mcap --simulation rig.toml --out out/reconcile
+    ```
 
     Parameters
     ----------

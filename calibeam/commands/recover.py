@@ -14,10 +14,14 @@ def recover_command(recording: Path, *, out: Path, rig: Path | None = None, json
 
     What can be read of a damaged or cut-off recording goes into a new, complete file.
 
-    Example: calibeam recover session-1/recording.mcap --out recovered.mcap
+    For example:
+
+    ```
+    calibeam recover session-1/recording.mcap --out recovered.mcap
+    ```
 
     Every batch is proved by its checksum: what is in the new file is as it was recorded. Ends with 0 when nothing was
-    wrong, 3 when something is lost (the new file tells what), 1 when nothing can be had.
+    wrong, 3 when something is lost (the new file lists it), 1 when nothing can be had.
 
     Parameters
     ----------

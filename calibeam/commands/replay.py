@@ -19,7 +19,7 @@ def replay_command(
     *,
     model: Path,
     out: Path = Path("simulated.mcap"),
-    without: Annotated[tuple[str, ...], Parameter(negative=())] = (),
+    without: Annotated[tuple[str, ...], Parameter(show_default=False)] = (),
     seed: int = 0,
     noise: bool = True,
     noise_found: Annotated[bool, Parameter(negative=())] = False,
@@ -31,9 +31,12 @@ def replay_command(
     stands where the recorded one stood, at the same temperatures, with the same payload; what its instruments read is
     written as a recording of its own, which compare, identify and diagnose take.
 
-    Example: calibeam replay site.mcap --model model.json --out simulated.mcap
+    For example:
 
-    Example: calibeam replay site.mcap --model model.json --without joint2-compliance --out stiff.mcap
+    ```
+    calibeam replay site.mcap --model model.json --out simulated.mcap
+    calibeam replay site.mcap --model model.json --without joint2-compliance --out stiff.mcap
+    ```
 
     Parameters
     ----------

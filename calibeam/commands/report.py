@@ -17,7 +17,6 @@ from calibrate.diagnose.file import read_diagnosis
 from calibrate.model_file import read_model
 from calibrate.report.answers import Answers
 from calibrate.report.drift.drift import Calibration
-from calibrate.report.verdict import Trust
 
 MODEL, DIAGNOSIS = "model.json", "diagnosis.json"  # as sessions name them
 
@@ -34,15 +33,12 @@ def read_earlier_calibration(path: Path) -> Calibration:
 
 
 def _label(recording: Recording) -> str:
-    """The day, where the recording says it."""
+    """The day, where the recording has it."""
     return recording.started_utc.partition("T")[0] or recording.path.name
 
 
-WORDS = {Trust.GOOD: "yes", Trust.CARE: "with care", Trust.NONE: "no"}
-
-
 class NumberRecord(msgspec.Struct, frozen=True):
-    """A number of the first screen; null where it cannot be told, `about` then says why."""
+    """A number of the first screen; null where it is not determined, with the reason in `about`."""
 
     value: float | None
     unit: str
@@ -72,7 +68,7 @@ def summary_of(answers: Answers, path: Path) -> SummaryRecord:
         1,
         "calibeam-report",
         str(path),
-        WORDS[judged.trust],
+        judged.trust.value,
         judged.sentence,
         judged.reasons,
         answers.known,
@@ -100,9 +96,12 @@ def report_command(
     Errors by instrument, proof on unseen rows, what was identified and what was not and why; of spots also the rig, the
     faces, the centring and the joint zeros. How to read it: docs/report.md.
 
-    Example: calibeam report out/demo/recording.mcap --out report.html
+    For example:
 
-    Example: calibeam report now/recording.mcap --against last-year/model.json
+    ```
+    calibeam report out/demo/recording.mcap --out report.html
+    calibeam report now/recording.mcap --against last-year/model.json
+    ```
 
     Parameters
     ----------
@@ -110,12 +109,12 @@ def report_command(
         A recording, or a session folder.
     model
         The model.json of this recording, also one with physics, whose effects are then taken out of the readings;
-        without it the recording is identified anew.
+        without it the recording is identified again.
     diagnosis
         The diagnosis.json of this recording: its pages are added.
     against
         An earlier calibration of the same arm: its model.json, the folder that a session left (model.json, and
-        diagnosis.json if there is one), or a recording. A chapter says what has changed since.
+        diagnosis.json if there is one), or a recording. A chapter reports what has changed since.
     interactive
         Add figures that can be turned and asked; the file grows by five megabytes and still needs no other.
     out

@@ -35,7 +35,11 @@ def rig_command(
     A new rig file is never written over an old one. It has the arm's geometry, limits and, where the source has them,
     masses; target, instrument and signs of the joints are to be checked: docs/robots.md.
 
-    Example: calibeam rig new --from-urdf arm.urdf --tip-link tool0 --out rig.toml
+    For example:
+
+    ```
+    calibeam rig new --from-urdf arm.urdf --tip-link tool0 --out rig.toml
+    ```
 
     Parameters
     ----------
@@ -121,5 +125,5 @@ def shipped_text(name: str) -> str:
 
 
 def first_comment(text: str) -> str:
-    """What the first line of a rig file says of it."""
+    """The first line of a rig file, which describes it."""
     return text.splitlines()[0].removeprefix("#").strip()

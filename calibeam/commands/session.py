@@ -19,7 +19,13 @@ from acquisition.recording.pose_plan import read_pose_plan
 from acquisition.recording.rig import Rig, load_rig, rig_text
 from acquisition.session.plan import PlanOptions
 from calibeam.asking import at_terminal
-from calibeam.devices.site import addresses_of, check_session
+from calibeam.devices.site import (
+    addresses_of,
+    check_session,
+    check_tracked_session,
+    is_tracked,
+    tracker_addresses_of,
+)
 from calibeam.emulation import ask_emulators, moves_nothing_real
 from calibeam.guided.recorded import encoder_address, is_guided
 from calibeam.guided.run import plan_of, run_guided
@@ -29,6 +35,7 @@ from calibeam.sessions.run import run_session
 from drivers.clock import SystemClock
 
 ACCURACY_UM = 20.0  # as Job.goal_m
+DRAWN_POSES = 40  # of a session with a tracker: twice the rows that 30 parameters of a 6-axis arm need at 3 a row
 
 
 @dataclass(frozen=True)
@@ -44,7 +51,7 @@ class RobotOptions:
     place
         A further place of the fixture: X Y Z of PSD 1 in the base (m), and its turn about z (degrees).
     accuracy_um
-        Predicted error of the beam in free space that is good enough: how many more poses it takes is told.
+        Error of the beam over the workspace that is good enough; the session forecasts the poses that it takes.
     yes
         Ask nothing: the cell is clear, the arm may move.
     centring
@@ -86,7 +93,7 @@ class PageOptions:
     live
         Also a page for browsers, with spots, arm, devices and a STOP (no safety stop).
     live_host
-        Address of the page; anywhere but on loopback it wants a token.
+        Address of the page; other than loopback it needs a token.
     live_port
         Port of the page; 0 takes any that is free.
     live_token
@@ -151,6 +158,25 @@ class HandOptions:
 
 
 @dataclass(frozen=True)
+class TrackerOptions:
+    """What is asked of a session with a tracker.
+
+    Parameters
+    ----------
+    poses
+        Of a tracker: how many poses are drawn, beside repeats.
+
+    """
+
+    poses: int = DRAWN_POSES
+
+    @property
+    def given(self) -> dict[str, bool]:
+        """Which of them were given."""
+        return {"--poses": self.poses != DRAWN_POSES}
+
+
+@dataclass(frozen=True)
 class Wanted:
     """What every session is asked for, whoever moves the arm."""
 
@@ -172,23 +198,29 @@ def session(
     page: Annotated[PageOptions, Parameter(name="*")] = PageOptions(),
     emulators: Annotated[EmulatorOptions, Parameter(name="*")] = EmulatorOptions(),
     hand: Annotated[HandOptions, Parameter(name="*")] = HandOptions(),
+    tracker: Annotated[TrackerOptions, Parameter(name="*")] = TrackerOptions(),
 ) -> None:
     """Run a session: check, plan, align, centre, measure, report.
 
     Checks the devices, shows the pose plan, asks for confirmation, then aligns, centres, measures, identifies,
     diagnoses and reports.
 
-    Example: calibeam session rigs/ur5e-dual-psd.toml --out session-1
+    For example:
+
+    ```
+    calibeam session rigs/ur5e-dual-psd.toml --out session-1
+    ```
+
     The arm moves: clear the cell first. SPACE or Ctrl-C pauses, r resumes, s finishes, a aborts, h halts.
     Of a measuring arm a person moves the probe, and is guided: rigs/arm-cmm-reference.toml.
 
     Parameters
     ----------
     rig
-        The rig file; [devices] says how each device is reached.
+        The rig file; [devices] holds how each device is reached.
     out
-        Folder for recording.mcap, session.log, the drawing of the plan, model.json, diagnosis.json and report.html;
-        a recording in it is never written over, what was found from it is made anew.
+        Folder for recording.mcap, session.log, the picture of the plan, model.json, diagnosis.json and report.html;
+        a recording in it is never written over, results are computed again.
     plan
         A plan of joint poses, as `calibeam diagnose --plan-out` writes it: these are taken, and no others.
     seed
@@ -201,14 +233,22 @@ def session(
         Of emulated devices.
     hand
         Of a measuring arm.
+    tracker
+        Of a rig with a tracker.
 
     """
     wanted = Wanted(load_rig(rig), rig_text(rig), out, plan, seed, emulators)
     _check_verify(wanted.rig, plan, verify=hand.verify)
     of_robot = {**robot.given, "--live": page != PageOptions()}
+    if not is_tracked(wanted.rig):
+        _refuse_ignored(wanted.rig, tracker.given, "a rig with a tracker")
     if is_guided(wanted.rig):
         _refuse_ignored(wanted.rig, of_robot, "a rig that a controller moves, and a hand moves this one")
         _session_by_hand(wanted, hand, Console())
+    elif is_tracked(wanted.rig):
+        of_light = {name: given for name, given in robot.given.items() if name != "--yes"}
+        _refuse_ignored(wanted.rig, {**of_light, **hand.given}, "detectors or a measuring arm; this rig has a tracker")
+        _session_with_tracker(wanted, tracker, page, agrees=robot.yes)
     else:
         _refuse_ignored(wanted.rig, hand.given, "a measuring arm")
         _session_of_robot(wanted, robot, page, Console())
@@ -236,6 +276,22 @@ def _session_of_robot(wanted: Wanted, robot: RobotOptions, page: PageOptions, co
     agrees = robot.yes or (control is not None and asking is None and moves_nothing_real(job.addresses.robot))
     with _page(wanted.rig, page, console) as feed:
         run_session(job, console, earlier, feed, asking=asking, agrees=agrees, stands=robot.stands)
+
+
+def _session_with_tracker(wanted: Wanted, tracker: TrackerOptions, page: PageOptions, *, agrees: bool) -> None:
+    """The session of a driven arm whose target a tracker measures."""
+    from calibeam.sessions.with_tracker import TrackedJob, run_tracked
+
+    rig, console, control = wanted.rig, Console(), wanted.emulators.address()
+    check_tracked_session(rig)
+    addresses, asking = tracker_addresses_of(rig, hurry=wanted.emulators.time_scale), at_terminal()
+    if parts(wanted.out):
+        raise RecordingError(f"{wanted.out}: holds a session already; choose another --out")
+    plan = read_pose_plan(wanted.plan, rig) if wanted.plan is not None else None
+    agreed = agrees or (control is not None and asking is None and moves_nothing_real(addresses.robot))
+    job = TrackedJob(rig, wanted.text, wanted.out, addresses, plan, tracker.poses, wanted.seed)
+    with _page(rig, page, console) as feed:
+        run_tracked(job, console, feed, asking=asking, agrees=agreed)
 
 
 def _session_by_hand(wanted: Wanted, hand: HandOptions, console: Console) -> None:
@@ -284,7 +340,7 @@ def _check_verify(rig: Rig, plan: Path | None, *, verify: bool) -> None:
         raise AcquisitionError(f"rig {rig.name}: --verify is of a measuring arm that a hand moves; leave it out")
     if verify and plan is not None:
         raise AcquisitionError(
-            f"--plan {plan} with --verify: the standards say which readings a verification takes, a plan those that an "
+            f"--plan {plan} with --verify: the standards fix the readings of a verification, a plan those that an "
             "arm is identified from; give one of them"
         )
 

@@ -26,7 +26,7 @@ def simulate_errors_command(
     rig: Path,
     *,
     errors: Path | None = None,
-    only: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = (),
+    only: Annotated[tuple[str, ...], Parameter(show_default=False)] = (),
     arms: Count = 1_000_000,
     poses: Count = 10,
     workers: Count = 1,
@@ -38,16 +38,20 @@ def simulate_errors_command(
 
     Each error alone and all together: linear, by Monte Carlo, by Sobol indices, and the worst postures.
 
-    Example: calibeam simulate-errors rigs/arm-cmm-reference.toml --errors rigs/errors/arm-cmm.toml --out out/errors
+    For example:
+
+    ```
+    calibeam simulate-errors rigs/arm-cmm-reference.toml --errors rigs/errors/arm-cmm.toml --out out/errors
+    ```
 
     Parameters
     ----------
     rig
         A rig file, or an identified model (model.json): its arm is then as identified.
     errors
-        Which errors, by which law and how large (errors.toml); beside what the rig file believes.
+        Which errors, by which law and how large (errors.toml); beside what the rig file assumes.
     only
-        Some of the errors, by name or shell pattern: "link2.*" "joint*.zero".
+        Some of the errors, by name or shell pattern: `link2.*` `joint*.zero`.
     arms
         Drawn at every pose. Memory does not grow with them.
     poses

@@ -48,7 +48,11 @@ def tool_axes_command(
     The target is fitted to the rows with those joints there; all other rows are a check: turn a joint before the
     wrist, too. The uncertainty includes what the arm's own errors add, as far as the rotations do not show them.
 
-    Example: calibeam tool-axes session/ --out tool.json
+    For example:
+
+    ```
+    calibeam tool-axes session/ --out tool.json
+    ```
 
     Parameters
     ----------

@@ -30,7 +30,12 @@ def verify_command(
 
     Compares each figure with the permissible error in the rig's [mpe].
 
-    Example: calibeam verify check/recording.mcap --model session/model.json
+    For example:
+
+    ```
+    calibeam verify check/recording.mcap --model session/model.json
+    ```
+
     Exit code 1 when a figure is beyond its limit; the files are written all the same.
 
     Parameters

@@ -1,8 +1,8 @@
 """`calibeam check` of a rig: every device tried for a moment, and what it is, how it reads, what is wrong with it."""
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from acquisition.errors import AcquisitionError
 from acquisition.recording import RigFileError
 from acquisition.recording.files import brief
 from acquisition.recording.rig import Camera, Rig
-from acquisition.recording.rig.devices import EncoderDriver, RobotDriver
+from acquisition.recording.rig.devices import EncoderDriver, OtherDevice, RobotDriver
 from acquisition.wires.attaching import one_error_tree
 from acquisition.wires.psd_view import psd_window
 from calibeam.devices.camera import camera_sight
@@ -23,8 +23,10 @@ from calibeam.devices.encoders import (
     sample_rate,
     uneven_layers,
 )
+from calibeam.devices.others import other_drivers
 from calibeam.devices.psd import psd_driver, psd_view
 from calibeam.devices.robot import robot_of
+from calibeam.devices.tracker_of_rig import place_of, tracker_driver
 from drivers.clock import Clock
 from drivers.device import Block, Device
 from drivers.errors import DeviceError
@@ -35,7 +37,7 @@ from drivers.ur.reader import UrReader
 PICTURES = 3  # of the camera
 READ_S = 1.0  # host time that a device is listened to
 FIRST_SAMPLE_S = 1.0
-NAMES = ("psd", "encoders", "robot")
+NAMES = ("psd", "tracker", "encoders", "robot")
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,12 @@ class DeviceCheck:
 
 def check_devices(rig: Rig, clock: Clock) -> Iterator[DeviceCheck]:
     """One after the other, the arm stands still; devices that the rig does not name are left out."""
-    checks: dict[str, Callable[[Rig, Clock], DeviceCheck]] = {"psd": _psd, "encoders": _encoders, "robot": _robot}
+    checks: dict[str, Callable[[Rig, Clock], DeviceCheck]] = {
+        "psd": _psd,
+        "tracker": _tracker,
+        "encoders": _encoders,
+        "robot": _robot,
+    }
     for name in NAMES:
         if getattr(rig.devices, name) is None:
             continue
@@ -69,6 +76,12 @@ def check_devices(rig: Rig, clock: Clock) -> Iterator[DeviceCheck]:
                 yield checks[name](rig, clock)
         except DeviceError as error:
             yield DeviceCheck(name, wrong=str(error))
+    for other in rig.devices.others:
+        try:
+            with one_error_tree(other.name, "checking"):
+                yield _other(other, clock)
+        except DeviceError as error:
+            yield DeviceCheck(other.name, wrong=str(error))
     if rig.camera is not None:
         try:
             yield _camera(rig, rig.camera, clock)
@@ -109,7 +122,7 @@ def _psd(rig: Rig, clock: Clock) -> DeviceCheck:
         window = psd_window(blocks)
         spots_m = psd_view(psd, device).each(window)
     dark = [k + 1 for k in (0, 1) if np.isnan(spots_m[:, 2 * k]).mean() > 0.5]
-    told = "no light on either face" if len(dark) == 2 else f"noise {1e6 * sample_noise(spots_m):.2f} um a sample"
+    told = "no light on either face" if len(dark) == 2 else f"noise {1e6 * sample_noise(spots_m):.2f} µm a sample"
     rate_hz, wrong = sample_rate(blocks, device.rate_hz)
     if (window.flags & (Flag.PSD1_SATURATED | Flag.PSD2_SATURATED)).any():
         wrong = wrong or "a face is saturated: lessen the laser's power or the gain"
@@ -117,6 +130,50 @@ def _psd(rig: Rig, clock: Clock) -> DeviceCheck:
         wrong = wrong or uneven_layers(identity.faces, [k + 1 not in dark for k in (0, 1)], window.current_a)
     what = "" if identity is None else f"{identity.model} {identity.serial_number}"
     return DeviceCheck("psd", what, "" if identity is None else identity.firmware, rate_hz, told, wrong)
+
+
+def _tracker(rig: Rig, clock: Clock) -> DeviceCheck:
+    device = rig.devices.tracker
+    assert device is not None  # noqa: S101 - asked by check_devices
+    tracker = tracker_driver(device, clock)
+    with _listened(tracker, clock) as blocks:
+        position_m = np.concatenate([block.values["position_m"] for block in blocks])
+    good_m = position_m[np.isfinite(position_m).all(axis=1)]
+    rate_hz, wrong = _tracker_rate(blocks, device.rate_hz)
+    if tracker.bad_lines and tracker.last_bad is not None:
+        wrong = wrong or f"{tracker.bad_lines} lines cannot be read, the last: {tracker.last_bad.reason}"
+    what = f"{device.driver.value} from {place_of(device)}"
+    if len(good_m) < 2:
+        return DeviceCheck("tracker", what, "", rate_hz, "", "no valid reading: let it see the target")
+    x, y, z = good_m.mean(axis=0)
+    told = f"noise {1e6 * sample_noise(good_m):.2f} µm a sample, target at ({x:.3f}, {y:.3f}, {z:.3f}) m"
+    if len(good_m) < len(position_m):
+        wrong = wrong or f"{len(position_m) - len(good_m)} of {len(position_m)} readings are not valid: free the beam"
+    return DeviceCheck("tracker", what, "", rate_hz, told, wrong)
+
+
+def _other(other: OtherDevice, clock: Clock) -> DeviceCheck:
+    """Of a plug-in's instrument all that can be told is that it sends, and how fast."""
+    (found,) = other_drivers((other,), clock)
+    try:
+        found.device.connect()
+        block = found.device.read(found.silence_s)
+        channels = ", ".join(channel.name for channel in found.device.describe())
+        begin_s, count = clock.now_s(), 0
+        while clock.now_s() - begin_s < READ_S:
+            block = found.device.read(found.silence_s)
+            count += len(block.host_s)
+        rate_hz = count / max(float(block.host_s[-1]) - begin_s, READ_S)
+    finally:
+        found.device.close()
+    return DeviceCheck(other.name, f"{channels} by {found.package}", rate_hz=rate_hz)
+
+
+def _tracker_rate(blocks: Sequence[Block], wanted_hz: float) -> tuple[float, str]:
+    """As `sample_rate`; of an instrument without a clock by this machine's."""
+    if all(np.isfinite(block.device_s).all() for block in blocks):
+        return sample_rate(blocks, wanted_hz)
+    return sample_rate([replace(block, device_s=block.host_s) for block in blocks], wanted_hz)
 
 
 def _encoders(rig: Rig, clock: Clock) -> DeviceCheck:
@@ -137,7 +194,7 @@ def _encoders(rig: Rig, clock: Clock) -> DeviceCheck:
     what = f"{q_rad.shape[1]} encoders on {device.interface} {device.channel}"
     what += f" (serial numbers {numbers})" if numbers else ""
     firmware = "/".join(sorted({f"{identity.get('revision', 0):#x}" for identity in identities}))
-    return DeviceCheck("encoders", what, firmware, rate_hz, f"noise {1e6 * sample_noise(q_rad):.2f} urad", wrong)
+    return DeviceCheck("encoders", what, firmware, rate_hz, f"noise {1e6 * sample_noise(q_rad):.2f} µrad", wrong)
 
 
 def _robot(rig: Rig, clock: Clock) -> DeviceCheck:
@@ -157,7 +214,7 @@ def _robot(rig: Rig, clock: Clock) -> DeviceCheck:
         robot.arm().close()  # DeviceRefused when the map cannot move it
         wrong = _stopped(blocks[-1]) or wrong
     wrong = wrong or _misplaced(rig, q_rad[-1])
-    return DeviceCheck("robot", what, firmware, rate_hz, f"noise {1e6 * sample_noise(q_rad):.2f} urad", wrong)
+    return DeviceCheck("robot", what, firmware, rate_hz, f"noise {1e6 * sample_noise(q_rad):.2f} µrad", wrong)
 
 
 def _ur(host: str) -> tuple[str, str]:

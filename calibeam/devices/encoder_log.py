@@ -1,4 +1,4 @@
-"""Encoder logging: decoded positions and raw frames, for days, until stopped; a lost bus is attached again."""
+"""Logging of encoders (raw frames, too) or a tracker for days, until stopped; what is lost is attached again."""
 
 import gc
 import signal
@@ -14,12 +14,14 @@ import can
 
 from acquisition.recording import Channel, Gap, RecordingWriter
 from acquisition.recording.mcap import Rotation, SegmentedRecording, SegmentStream
-from acquisition.recording.rig.devices import EncodersDevice
+from acquisition.recording.rig.devices import EncodersDevice, TrackerDevice
 from acquisition.wires.attaching import Guarded, Reopening
 from acquisition.wires.frame_log import FrameLog
 from acquisition.wires.streams import Pump
 from calibeam.devices.encoders import VIEWED, encoder_driver, identities_of, names_of
 from calibeam.devices.recorder import uninterrupted
+from calibeam.devices.tracker_of_rig import VIEWED as TRACKER_VIEWED
+from calibeam.devices.tracker_of_rig import tracker_driver
 from calibeam.interrupts import ENDING
 from calibeam.software import SOFTWARE
 from drivers.clock import Clock
@@ -46,12 +48,24 @@ class EncoderLog:
     """One run of a log. `run` is called once; it ends by `stopped`, Ctrl-C, or an error, and the file is whole."""
 
     def __init__(
-        self, device: EncodersDevice, rig_text: str, folder: Path, clock: Clock, rotation: Rotation, *, raw: bool
+        self,
+        device: EncodersDevice | TrackerDevice,
+        rig_text: str,
+        folder: Path,
+        clock: Clock,
+        rotation: Rotation,
+        *,
+        raw: bool,
     ) -> None:
-        """DeviceRefused for a driver that cannot be made; RecordingError when folder or first segment cannot be."""
+        """`raw`: of encoders, also every frame. DeviceRefused for a driver that cannot be made; RecordingError when
+        folder or first segment cannot be.
+        """
         self._clock = clock
         self._frames: FrameLog | None = None
-        self._driver = encoder_driver(device, clock, self._hear if raw else None)
+        if isinstance(device, TrackerDevice):
+            self._driver, self._viewed = tracker_driver(device, clock), TRACKER_VIEWED
+        else:
+            self._driver, self._viewed = encoder_driver(device, clock, self._hear if raw else None), VIEWED
         who = partial(names_of, self._driver)
         self._device = Reopening(Guarded(self._driver), clock, self._lost, self._back, who=who)
         begin = partial(_begin, rig_text=rig_text, clock=clock)
@@ -95,14 +109,14 @@ class EncoderLog:
             self._stream = self._recording.stream(
                 self._device.name,
                 tuple(Channel(c.name, c.unit, c.shape, c.full_scale, c.resolution) for c in self._device.describe()),
-                VIEWED,
+                self._viewed,
             )
         except BaseException:
             with uninterrupted():
                 self._device.close()
                 self._recording.discard()
             raise
-        self._recording.event("encoders", {"identities": identities_of(self._driver)})
+        self._recording.event(self._device.name, {"identities": identities_of(self._driver)})
         pump = Pump(self._device, self._clock, self._keep, lambda failure: None, memory=1)
         pump.start()
         self.since_s = self._clock.now_s()

@@ -72,7 +72,7 @@ def bus_trouble(block: Block, error_registers: Mapping[int, int]) -> str:
     for number, code in enumerate(block.values.get("emergency_code", np.zeros((1, 0)))[-1], start=1):
         if code:
             words = EMERGENCY_TEXTS.get(int(code), "unknown to this program")
-            return f"the encoder of joint {number} tells emergency {int(code):04X}h, {words}: see its manual"
+            return f"the encoder of joint {number} reports emergency {int(code):04X}h, {words}: see its manual"
     for node, register in error_registers.items():
         if register:
             return f"encoder node {node} is at fault, error register {register:02X}h: see 1003h and its manual"

@@ -65,7 +65,9 @@ def psd_view(psd: PsdInstrument, device: PsdDevice) -> PsdView:
 def _pair(device: PsdDevice, rig: Rig, clock: Clock, hurry: float) -> Kpa101Pair:
     fixture = rig.fixture
     if device.length_m is None and fixture is None:
-        raise ValueError("length_m is missing, and there is no [fixture] whose half_size_m would tell it")
+        raise ValueError(
+            "length_m is missing, and there is no [fixture] with half_size_m to take it from; add one of them"
+        )
     length_m = device.length_m or (2.0 * fixture.half_size_m if fixture is not None else 0.0)
 
     def head(place: int) -> Head:

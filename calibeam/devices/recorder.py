@@ -6,6 +6,7 @@ The journal writes samples and events of the session into the recording.
 import signal
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import FrameType
@@ -25,6 +26,7 @@ from acquisition.session.plan import PlanOptions
 from acquisition.session.planned import PlannedSession
 from acquisition.session.records import Progress, Sample
 from acquisition.session.session import Session, Summary
+from acquisition.session.tracked import TrackedSample
 from calibeam.emulation import EmulationError
 from calibeam.interrupts import ENDING
 from calibeam.learner import FittedLearner
@@ -35,12 +37,12 @@ from drivers.errors import DeviceError
 
 
 class RecordingJournal:
-    """Implements acquisition.session.records.Journal."""
+    """Implements acquisition.session.records.Journal, and that of acquisition.session.tracked."""
 
     def __init__(self, writer: RecordingWriter, clock: Clock) -> None:
         self._writer, self._clock = writer, clock
 
-    def sample(self, sample: Sample) -> None:
+    def sample(self, sample: Sample | TrackedSample) -> None:
         self._writer.sample(sample.row(), sample.look.host_s)
 
     def event(self, kind: str, detail: Mapping[str, Any]) -> None:
@@ -98,7 +100,7 @@ def record_session(
         task = bar.add_task("collecting", total=None)
 
         def tell(now: Progress) -> None:
-            text = f"place {now.placement}, PSD {now.first} first: {now.phase.value}"
+            text = f"station {now.placement}, PSD {now.first} first: {now.phase.value}"
             bar.update(task, completed=now.done, total=now.total, description=text)
 
         learner, journal = FittedLearner(rig), RecordingJournal(writer, clock)
@@ -119,21 +121,50 @@ def end_event(writer: RecordingWriter, clock: Clock, summary: Summary) -> None:
     writer.event(Event(clock.now_s(), "end", {"samples": len(summary.samples), "skipped": summary.skipped}))
 
 
-def kept(bench: Bench, writer: RecordingWriter, clock: Clock, session: Counted, run: Callable[[], Result]) -> Result:
-    """What `run` gives. PartialResult when it ended early: the arm stands, what was taken is on the disk."""
+class Stoppable(Protocol):
+    """A bench whose arm can be told to stop."""
+
+    def stop(self) -> None: ...
+
+
+@dataclass(frozen=True)
+class Earlier:
+    """What the recording under way goes on with: the session's folder, and the samples of its earlier recordings."""
+
+    folder: Path
+    samples: int
+
+
+def kept(
+    bench: Stoppable,
+    writer: RecordingWriter,
+    clock: Clock,
+    session: Counted,
+    run: Callable[[], Result],
+    earlier: Earlier | None = None,
+) -> Result:
+    """What `run` gives. PartialResult when it ended early: the arm stands, what was taken is on the disk.
+
+    The message counts the samples of the whole session: with those that are `earlier`.
+    """
     try:
         return run()
     except Interrupted as why:
         while True:
             try:
-                ended = _ended_early(bench, writer, clock, session, why)
+                ended = _ended_early(bench, writer, clock, session, why, earlier)
             except KeyboardInterrupt:  # in the moment before it is shut out: the arm has to be stopped all the same
                 continue
             raise ended from why
 
 
 def _ended_early(
-    bench: Bench, writer: RecordingWriter, clock: Clock, session: Counted, why: BaseException
+    bench: Stoppable,
+    writer: RecordingWriter,
+    clock: Clock,
+    session: Counted,
+    why: BaseException,
+    earlier: Earlier | None,
 ) -> PartialResult:
     """Stop the arm, put what there is on the disk; a second Ctrl-C may not get in between.
 
@@ -145,15 +176,19 @@ def _ended_early(
         try:
             bench.stop()
         except DeviceError as error:
-            also.append(f"the arm could not be told to stop ({error}); see that it stands")
+            also.append(f"the stop command to the arm failed ({error}); check that the arm stands still")
         try:
             writer.event(Event(clock.now_s(), "ended early", {"why": reason}))
             writer.flush()
         except RecordingError as error:
             also.append(str(error))
-    told = f"{session.taken} samples are kept in {writer.path}"
-    if session.taken:
-        told += f"; `calibeam identify {writer.path}` says what they tell"
+    count, place, newest = session.taken, writer.path, ""
+    if earlier is not None and earlier.samples:
+        count, place = session.taken + earlier.samples, earlier.folder
+        newest = f" ({session.taken} of them in {writer.path.name})"
+    told = f"{count} samples are kept in {place}{newest}"
+    if count:
+        told += f"; `calibeam identify {place}` fits them"
     return PartialResult("; ".join([reason, *dict.fromkeys(also), told]))
 
 

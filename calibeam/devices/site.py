@@ -1,7 +1,7 @@
 """Connects the devices of a rig, whether real or emulated, and runs their readers into the recording."""
 
 import itertools
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
@@ -10,15 +10,20 @@ from typing import Any
 from acquisition.errors import StoppedError
 from acquisition.recording import Channel, Event, RecordingError, RecordingWriter, RigFileError
 from acquisition.recording.rig import Rig
-from acquisition.recording.rig.devices import EncodersDevice, PsdDevice, RobotDevice
+from acquisition.recording.rig.devices import EncodersDevice, OtherDevice, PsdDevice, RobotDevice, TrackerDevice
+from acquisition.recording.samples import SPOTS
 from acquisition.wires.attaching import Guarded
-from acquisition.wires.bench import Pumps, Speeds, WiredBench
+from acquisition.wires.bench import SILENCE_S, Pumps, Speeds, WiredBench
 from acquisition.wires.psd_view import PsdView, psd_window
-from acquisition.wires.streams import Pump, Supervisor
+from acquisition.wires.streams import STALE_S, Pump, Supervisor
+from acquisition.wires.tracker_bench import TrackerBench, TrackerPumps
 from calibeam.devices.encoders import emulated_encoders, encoder_driver
+from calibeam.devices.others import Other, emulated_others, other_drivers
 from calibeam.devices.psd import PsdInstrument, emulated_psd, psd_driver, psd_view
 from calibeam.devices.recorder import uninterrupted
 from calibeam.devices.robot import emulated_robot, robot_of
+from calibeam.devices.tracker_of_rig import VIEWED as TRACKER_VIEWED
+from calibeam.devices.tracker_of_rig import emulated_tracker, tracker_driver
 from calibeam.live.feed import PAGE_STOP, SILENT, Feed
 from calibeam.motion.gate_of_rig import gated_arm
 from calibrate.dual_psd_rig import fixture_of, laser_of
@@ -27,11 +32,11 @@ from drivers.device import Block, Device, Movable
 from drivers.errors import DeviceError, DeviceRefused
 
 DRIVEN_JOINTS = 6
-SPOTS = ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")
 VIEWED = {
     "psd": ("flags", "temperature_degC"),
     "robot": ("actual_q_rad", "actual_qd_rad_s"),
     "encoders": ("position_rad",),
+    "tracker": TRACKER_VIEWED,
 }
 
 
@@ -44,6 +49,19 @@ class Addresses:
     encoders: EncodersDevice | None
     hurry: float = 1.0
     emulated: bool = False
+    others: tuple[OtherDevice, ...] = ()
+
+
+@dataclass(frozen=True)
+class TrackerAddresses:
+    """The same of a session with a tracker."""
+
+    tracker: TrackerDevice
+    robot: RobotDevice
+    encoders: EncodersDevice | None
+    hurry: float = 1.0
+    emulated: bool = False
+    others: tuple[OtherDevice, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -60,6 +78,10 @@ def check_session(rig: Rig) -> None:
     """What a session needs of a rig beyond what every rig file has. DataError, RigFileError; no device is touched."""
     fixture_of(rig)  # said before an hour of measuring that could not be identified
     laser_of(rig)
+    _check_driven(rig)
+
+
+def _check_driven(rig: Rig) -> None:
     if rig.motion.home_rad is None:
         raise RigFileError(
             f"rig {rig.name}: [motion] has no home_rad; give joint readings that are clear of everything"
@@ -75,12 +97,74 @@ def addresses_of(rig: Rig, emulated: Mapping[str, Any] | None = None, hurry: flo
         missing = "psd" if psd is None else "robot"
         raise DeviceRefused(f"rig {rig.name}: no [devices.{missing}]; a session needs the PSD box and the controller")
     if emulated is None:
-        return Addresses(psd, robot, encoders, hurry)
+        return Addresses(psd, robot, encoders, hurry, others=rig.devices.others)
     psd = emulated_psd(psd, emulated["psd"])
     robot = emulated_robot(robot, emulated["robot"])
     if encoders is not None:
         encoders = emulated_encoders(encoders, emulated["can"])
-    return Addresses(psd, robot, encoders, hurry, emulated=True)
+    others = emulated_others(rig.devices.others, emulated)
+    return Addresses(psd, robot, encoders, hurry, emulated=True, others=others)
+
+
+def is_tracked(rig: Rig) -> bool:
+    """Whether a session of this rig measures with a tracker."""
+    return rig.devices.tracker is not None and rig.devices.psd is None
+
+
+def check_tracked_session(rig: Rig) -> None:
+    """What a session with a tracker needs of a rig. RigFileError; no device is touched."""
+    if rig.tool.point_m is None:
+        raise RigFileError(f"rig {rig.name}: [tool] has no point_m; give the target's place at the flange")
+    _check_driven(rig)
+
+
+def tracker_addresses_of(rig: Rig, emulated: Mapping[str, Any] | None = None, hurry: float = 1.0) -> TrackerAddresses:
+    """As `addresses_of`, of a rig with a tracker."""
+    tracker, robot, encoders = rig.devices.tracker, rig.devices.robot, rig.devices.encoders
+    if tracker is None or robot is None:
+        missing = "tracker" if tracker is None else "robot"
+        raise DeviceRefused(f"rig {rig.name}: no [devices.{missing}]; a session needs the tracker and the controller")
+    if emulated is None:
+        return TrackerAddresses(tracker, robot, encoders, hurry, others=rig.devices.others)
+    if encoders is not None:
+        encoders = emulated_encoders(encoders, emulated["can"])
+    tracker, robot = emulated_tracker(tracker, emulated["tracker"]), emulated_robot(robot, emulated["robot"])
+    others = emulated_others(rig.devices.others, emulated)
+    return TrackerAddresses(tracker, robot, encoders, hurry, emulated=True, others=others)
+
+
+@contextmanager
+def connected_tracker(
+    rig: Rig, addresses: TrackerAddresses, writer: RecordingWriter, clock: Clock, feed: Feed = SILENT
+) -> Generator[TrackerBench]:
+    """The bench of a tracker on wires, its readers running. At the end the arm is stopped, every port released."""
+    with ExitStack() as cleaning:
+        robot = robot_of(addresses.robot, clock, addresses.hurry)
+        arm = robot.arm()
+        supervisor = Supervisor(arm.hold, clock)
+        cleaning.callback(feed.stops_by, None)
+        feed.stops_by(partial(supervisor.stop, StoppedError(PAGE_STOP)))  # while connecting, too
+        kept = Kept(writer, clock, supervisor, feed)
+        beside = _others(other_drivers(addresses.others, clock), kept, cleaning)
+        tracker = tracker_driver(addresses.tracker, clock, addresses.hurry)
+        pumps = TrackerPumps(
+            tracker=cleaning.enter_context(_pumped(tracker, kept)),
+            robot=cleaning.enter_context(_pumped(robot.reader, kept)),
+            encoders=_encoders(addresses, kept, cleaning),
+        )
+        cleaning.callback(_released, arm)
+        _connect_arm(arm, supervisor)
+        speeds = Speeds(rig.motion.speed_rad_s, rig.motion.acceleration_rad_s2)
+        gated, rate_hz = gated_arm(arm, rig, pumps.robot), addresses.tracker.rate_hz
+        yield TrackerBench(gated, pumps, speeds, supervisor, clock, rate_hz, addresses.hurry, beside=beside)
+
+
+def _connect_arm(arm: Movable, supervisor: Supervisor) -> None:
+    try:
+        arm.connect()
+    except DeviceError:
+        supervisor.check()  # another device failed meanwhile, and its stop ended this too: that is the news
+        raise
 
 
 @contextmanager
@@ -101,6 +185,7 @@ def connected(
         feed.stops_by(partial(supervisor.stop, StoppedError(PAGE_STOP)))  # while connecting, too
         psd = psd_driver(addresses.psd, rig, clock, addresses.hurry)
         kept = Kept(writer, clock, supervisor, feed)
+        beside = _others(other_drivers(addresses.others, clock), kept, cleaning)
         pumps = Pumps(
             psd=cleaning.enter_context(_pumped(psd, kept, _spots_beside(psd, addresses.psd, writer))),
             robot=cleaning.enter_context(_pumped(robot.reader, kept)),
@@ -108,14 +193,11 @@ def connected(
         )
         feed.sees(psd_view(psd, addresses.psd))
         cleaning.callback(_released, arm)
-        try:
-            arm.connect()
-        except DeviceError:
-            supervisor.check()  # another device failed meanwhile, and its stop ended this too: that is the news
-            raise
+        _connect_arm(arm, supervisor)
         speeds = Speeds(rig.motion.speed_rad_s, rig.motion.acceleration_rad_s2)
         gated = gated_arm(arm, rig, pumps.robot)
-        yield WiredBench(gated, pumps, psd_view(psd, addresses.psd), speeds, supervisor, clock, place, addresses.hurry)
+        view, hurry = psd_view(psd, addresses.psd), addresses.hurry
+        yield WiredBench(gated, pumps, view, speeds, supervisor, clock, place, hurry, beside=beside)
 
 
 def _released(arm: Movable) -> None:
@@ -123,12 +205,19 @@ def _released(arm: Movable) -> None:
         arm.close()
 
 
-def _encoders(addresses: Addresses, kept: Kept, cleaning: ExitStack) -> Pump | None:
+def _encoders(addresses: Addresses | TrackerAddresses, kept: Kept, cleaning: ExitStack) -> Pump | None:
     device = addresses.encoders
     if device is None:
         return None
     driver = encoder_driver(device, kept.clock, emulated=addresses.emulated, hurry=addresses.hurry)
     return cleaning.enter_context(_pumped(driver, kept))
+
+
+def _others(others: Sequence[Other], kept: Kept, cleaning: ExitStack) -> dict[str, Pump]:
+    """Readers of the plug-ins' instruments, by name."""
+    return {
+        one.device.name: cleaning.enter_context(_pumped(one.device, kept, silence_s=one.silence_s)) for one in others
+    }
 
 
 def _spots_beside(psd: PsdInstrument, device: PsdDevice, writer: RecordingWriter) -> Callable[[Block], None]:
@@ -154,7 +243,9 @@ def newest_s(pump: Pump) -> float | None:
 
 
 @contextmanager
-def _pumped(device: Device, kept: Kept, beside: Callable[[Block], None] = lambda block: None) -> Generator[Pump]:
+def _pumped(
+    device: Device, kept: Kept, beside: Callable[[Block], None] = lambda block: None, silence_s: float = SILENCE_S
+) -> Generator[Pump]:
     """The device connected, its blocks going into the recording until left, to the live page and to `beside`."""
 
     def keep(block: Block) -> None:
@@ -169,14 +260,17 @@ def _pumped(device: Device, kept: Kept, beside: Callable[[Block], None] = lambda
             kept.writer.event(Event(kept.clock.now_s(), "device failed", {"device": device.name, "why": str(failure)}))
 
     guarded = Guarded(device)
-    pump = Pump(guarded, kept.clock, keep, failed)
+    pump = Pump(guarded, kept.clock, keep, failed, stale_s=silence_s)
     try:
         guarded.connect()
         channels = tuple(Channel(c.name, c.unit, c.shape, c.full_scale, c.resolution) for c in device.describe())
-        viewed = tuple(name for name in VIEWED[device.name] if name in {channel.name for channel in channels})
+        scalars = tuple(channel.name for channel in channels if channel.shape == ())
+        viewed = tuple(
+            name for name in VIEWED.get(device.name, scalars) if name in {channel.name for channel in channels}
+        )
         stream = kept.writer.stream(device.name, channels, viewed)
         pump.start()
-        with kept.supervisor.watching(device.name, lambda: newest_s(pump)):
+        with kept.supervisor.watching(device.name, lambda: newest_s(pump), silence_s * STALE_S / SILENCE_S):
             yield pump
     finally:
         with uninterrupted():

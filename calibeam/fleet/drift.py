@@ -50,7 +50,7 @@ def all_series(rows: Iterable[Row]) -> tuple[Series, ...]:
     seen: set[str] = set()
     for row in rows:
         year = year_of(row.started_utc)
-        if not row.good or row.trust == "bad" or year is None or row.sha256 in seen:
+        if not row.good or row.trust == "no" or year is None or row.sha256 in seen:
             continue
         seen.add(row.sha256)
         for zero in row.zeros:

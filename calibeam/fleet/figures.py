@@ -17,7 +17,7 @@ from calibrate.report.tones import PLACES, Tone
 
 COLUMNS = 3
 PANEL_IN = 2.35
-MARKS = ("o", "s", "^", "D", "v", "P", "X")  # beside the colour: joints are told apart without it, too
+MARKS = ("o", "s", "^", "D", "v", "P", "X")  # beside the colour: joints are separated without it, too
 ASIDE = 0.008  # of the span of dates, by which joints stand beside each other so that their bars can be seen
 UNITS = ((1.0, "rad"), (1e-3, "mrad"), (1e-6, "µrad"))
 CELL_IN = 0.34

@@ -8,10 +8,9 @@ from calibeam.fleet.figures import over_time, who_shares
 from calibeam.fleet.row import Row
 from calibeam.fleet.summary import Fleet, drift_words, method_words, shared_words
 from calibeam.software import SOFTWARE
-from calibrate.report.elements import Html, bullets, figure, folded, join, section, table, tag
+from calibrate.report.elements import Html, bullets, figure, folded, join, section, table, tag, tile
 from calibrate.report.page import page, write_page
 from calibrate.report.quantities import DASH, angle, doubted_angle, fixed, length, significant
-from calibrate.report.tiles import tile
 
 PANELS = 12  # robots with a picture: those that drift first
 COLUMNS = 30  # robots in the picture of shared causes
@@ -72,10 +71,12 @@ def _verdict(fleet: Fleet) -> Html:
     elif fleet.lines:
         sentence = "No joint zero of any robot is seen to drift."
     else:
-        sentence = f"No robot was recorded on {FEWEST} dates with a zero that can be told: nothing is known of drift."
+        sentence = (
+            f"No robot was recorded on {FEWEST} dates with a zero that can be determined: drift is not determined."
+        )
     advice = (
-        ("Calibrate these again, and look for what moved: an encoder's clamp, a belt, a blow.",) if robots else ()
-    ) + (("A cause of several robots: look at what they have in common before you mend each.",) if fleet.shared else ())
+        ("Calibrate these again, and find what moved: an encoder's clamp, a belt, a collision.",) if robots else ()
+    ) + (("A cause of several robots: check what they have in common before you repair each.",) if fleet.shared else ())
     body = [tag("strong", sentence)]
     body += [bullets(said)] if said else []
     body += [tag("p", tag("b", "What to do")), bullets(advice)] if advice else []
@@ -88,13 +89,13 @@ def _drift(fleet: Fleet) -> Html | None:
         return None
     lead = (
         "True joint angle = reading + zero. Each point is one recording with two sigma either way; a line is drawn "
-        "where the zero drifts by more than its doubt and the number of zeros tested explain."
+        "where the zero drifts by more than its uncertainty and the number of zeros tested explain."
     )
     order = [d.series.robot for d in fleet.lines] + [s.robot for s in series]
     robots = list(dict.fromkeys(order))
     shown = [(robot, [s for s in series if s.robot == robot]) for robot in robots[:PANELS]]
     rest = f" {len(robots) - PANELS} more robots stand in the table." if len(robots) > PANELS else ""
-    caption = f"Zeros less their own mean, joints told by mark and colour, the clearest drift first.{rest}"
+    caption = f"Zeros less their own mean, one mark and colour a joint, the clearest drift first.{rest}"
     drawing = tag("div", figure(over_time(shown, fleet.drifting), caption), cls="wide")
     rows = [
         (
@@ -150,8 +151,8 @@ def _now(fleet: Fleet) -> Html | None:
         return None
     lead = (
         "The last recording of each robot, a whole one where there is one. Unseen rows: rms error on rows that the fit "
-        "has not seen. Free space: rms over the workspace, arm as drawn against the identified one, and the predicted "
-        "error of the identified one."
+        "has not seen. Tool error: rms over the workspace, nominal against calibrated, and the predicted "
+        "error of the calibrated arm."
     )
     rows = [
         (
@@ -160,11 +161,11 @@ def _now(fleet: Fleet) -> Html | None:
             _change(row.held_out_before_m, row.held_out_after_m),
             _change(row.free_space_before_m, row.free_space_after_m),
             row.verdict or DASH,
-            {"good": "trust it", "care": "with care", "bad": "do not use"}.get(row.trust, DASH),
+            row.trust or DASH,
         )
         for row in newest[:LISTED]
     ]
-    head = ("Robot", "recorded", "unseen rows", "free space", "diagnosis", "numbers")
+    head = ("Robot", "recorded", "unseen rows", "tool error", "diagnosis", "trust")
     return section("now", CONTENTS["now"], lead, table(head, rows), *_more(len(newest)))
 
 

@@ -140,13 +140,14 @@ def method_words(found: Drifts) -> str:
     lines = found.lines
     robots = len({drift.series.robot for drift in lines})
     more = (
-        f" The zeros of the fleet scatter {significant(found.scatter, 2)} times as much as their sigmas say; all are "
+        f" The zeros of the fleet scatter {significant(found.scatter, 2)} times as much as their sigmas predict; all "
+        "are "
         "widened by it."
         if found.scatter > 1.0
         else ""
     )
     return (
         f"{len(lines)} zeros of {robots} robots were seen on three dates or more and tested for a drift. By Holm's "
-        "procedure the chance that any of them is said to drift where none does is at most 5 %, over all together."
+        "procedure the chance that any of them is reported to drift where none does is at most 5 %, over all together."
         + more
     )

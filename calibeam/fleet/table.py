@@ -20,6 +20,7 @@ from calibeam.fleet.row import Row
 from calibeam.fleet.settings import JOURNAL, TABLE
 
 VERSION = b"2"
+OLDER_TRUST = {"good": "yes", "care": "with care", "bad": "no"}  # as tables of before December 2026 have it
 KEY = b"calibeam.fleet"
 PLAIN = {str: pa.string(), int: pa.int64(), float: pa.float64(), bool: pa.bool_()}
 NESTED = {
@@ -96,6 +97,7 @@ def _noise_name(source: str) -> str:
 
 def _row(plain: dict[str, Any]) -> Row:
     fields = {name: plain[name] for name in _kinds()}
+    fields["trust"] = OLDER_TRUST.get(fields["trust"], fields["trust"])
     fields["noise"] = {
         name.removeprefix("noise_").rpartition("_")[0]: value
         for name, value in plain.items()

@@ -155,5 +155,5 @@ def _ended_early(writer: RecordingWriter, clock: Clock, session: GuidedSession, 
                 reason = f"{reason}; {error}"
     kept = f"{session.taken} samples are kept in {writer.path}"
     if session.taken:
-        kept += f"; `calibeam identify {writer.path}` says what they tell"
+        kept += f"; `calibeam identify {writer.path}` fits them"
     return PartialResult(f"{reason}; {kept}")

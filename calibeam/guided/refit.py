@@ -1,7 +1,7 @@
 """The arm refitted to what a guided session has so far, without the visits that the others speak against.
 
 Data snooping (Baarda, A testing procedure for use in geodetic networks, 1968): of all visits the one whose misfit is
-largest by the doubt of a fit without it goes first, then the fit is made anew. An early reading on the rim was taken
+largest by the doubt of a fit without it goes first, then the fit is made again. An early reading on the rim was taken
 when nobody could tell, and the fit has bent towards it; left out, all others agree again.
 """
 

@@ -66,7 +66,7 @@ def _head(progress: GuidedProgress) -> Text:
     text = Text(f"{progress.done} of {progress.planned} readings; {progress.request.target.says}: ")
     text.append(progress.says, style="bold green" if progress.says.startswith("taken") else "bold")
     if progress.repeatability_m is not None:
-        text.append(f"; the probe repeats to {1e6 * progress.repeatability_m:.1f} um so far")
+        text.append(f"; the probe repeats to {1e6 * progress.repeatability_m:.1f} µm so far")
     return text
 
 
@@ -76,8 +76,8 @@ def _joints(progress: GuidedProgress) -> Table:
     for joint, (now_rad, wanted_rad) in enumerate(each):
         table.add_row(
             str(joint + 1),
-            f"{np.degrees(now_rad):+.0f}°",
-            f"{np.degrees(wanted_rad):+.0f}°",
+            f"{np.degrees(now_rad):+z.0f}°",
+            f"{np.degrees(wanted_rad):+z.0f}°",
             _way(now_rad, wanted_rad),
             progress.coverage.marks(joint),
         )
@@ -136,7 +136,7 @@ def run_guided(
             **({} if ask is None else {"patience_s": HAND_PATIENCE_S}),
         )
     console.print(
-        f"{len(summary.readings)} samples; {summary.slips} rejected as slips, {summary.doubted} in doubt, "
+        f"{len(summary.readings)} samples; {summary.slips} rejected as slips, {summary.doubted} uncertain, "
         f"{summary.skipped} left out; recording: {recording}",
         highlight=False,
     )

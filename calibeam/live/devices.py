@@ -10,8 +10,10 @@ from acquisition.recording.rig import Rig
 from acquisition.recording.rig.schema import Devices
 from acquisition.wires.attaching import Guarded, one_error_tree
 from calibeam.devices.encoders import encoder_driver
+from calibeam.devices.others import other_drivers
 from calibeam.devices.psd import psd_driver, psd_view
 from calibeam.devices.robot import robot_of
+from calibeam.devices.tracker_of_rig import tracker_driver
 from calibeam.live.feed import Feed
 from drivers.clock import Clock
 from drivers.device import Device
@@ -27,6 +29,7 @@ class Watched:
 
     device: Device
     connected: Callable[[], None] = lambda: None
+    silence_s: float = READ_S
 
 
 def devices_of(rig: Rig, clock: Clock, feed: Feed) -> list[Watched]:
@@ -36,12 +39,15 @@ def devices_of(rig: Rig, clock: Clock, feed: Feed) -> list[Watched]:
     """
     watched: list[Watched] = []
     if rig.devices == Devices():
-        raise RigFileError(f"rig {rig.name}: no [devices]; say how the detectors, encoders or controller are reached")
+        raise RigFileError(f"rig {rig.name}: no [devices]; add how the detectors, encoders or controller are reached")
     if rig.devices.psd is not None:
         given, psd = rig.devices.psd, psd_driver(rig.devices.psd, rig, clock)
         watched.append(Watched(psd, lambda: feed.sees(psd_view(psd, given))))
+    if rig.devices.tracker is not None:
+        watched.append(Watched(tracker_driver(rig.devices.tracker, clock)))
     if rig.devices.encoders is not None:
         watched.append(Watched(encoder_driver(rig.devices.encoders, clock)))
+    watched += [Watched(other.device, silence_s=other.silence_s) for other in other_drivers(rig.devices.others, clock)]
     if rig.devices.robot is not None:
         robot = robot_of(rig.devices.robot, clock)
         watched.append(Watched(robot.reader))
@@ -77,7 +83,7 @@ def _read(watched: Watched, feed: Feed, done: threading.Event) -> None:
             if away:
                 feed.said(f"{device.name}: back")
             while not done.is_set():
-                feed.heard(device.name, device.read(READ_S))
+                feed.heard(device.name, device.read(watched.silence_s))
         except DeviceError as why:
             feed.lost(device.name, str(why))
             if not away:

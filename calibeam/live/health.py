@@ -35,9 +35,11 @@ def asked_rates(rig: Rig) -> dict[str, float | None]:
         rates["robot"] = robot.rate_hz
     if psd is not None:
         rates["psd"] = psd.rate_hz
+    if rig.devices.tracker is not None:
+        rates["tracker"] = rig.devices.tracker.rate_hz
     if encoders is not None:
         rates["encoders"] = encoders.sync_hz if encoders.driver is EncoderDriver.CIA406 else None
-    return rates
+    return rates | {other.name: None for other in rig.devices.others}
 
 
 class Watch:
@@ -75,6 +77,8 @@ class Watch:
         marks = self._marks.setdefault(device, deque())
         assert heard.block is not None  # noqa: S101 - asked by look
         device_s = float(heard.block.device_s[-1])
+        if device_s != device_s:  # NaN: it has no clock of its own
+            device_s = float(heard.block.host_s[-1])
         if marks and device_s < marks[-1][1]:  # restarted
             marks.clear()
         marks.append((now_s, device_s, heard.samples))

@@ -38,6 +38,7 @@ class Latest:
 
     def __init__(self, clock: Clock) -> None:
         self.clock = clock
+        self.also: Callable[[str, Block], None] = lambda device, block: None  # who else hears, after the page
         self.stop = Stop(clock)
         self.view: PsdView | None = None
         self.rig: Rig | None = None  # None: as the page was begun with
@@ -58,6 +59,7 @@ class Latest:
         self._heard[device] = DeviceReadings(
             block, before.samples + count, before.lost + _missed(before.block, block, count)
         )
+        self.also(device, block)
 
     def lost(self, device: str, why: str) -> None:
         self._heard[device] = replace(self.of(device), why=why)

@@ -61,7 +61,7 @@ def measured_m(faces: tuple[FaceNow, FaceNow] | None) -> list[float] | None:
 
 
 Job = Literal["session", "watch"]
-Picture = Literal["now", "state"]  # what is made anew at every beat, or at some
+Picture = Literal["now", "state"]  # what is made again at every beat, or at some
 
 
 class RigMessage(Struct, frozen=True, tag_field="kind", tag="rig"):

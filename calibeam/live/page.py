@@ -19,7 +19,6 @@ from acquisition.recording.rig import Rig
 from calibeam.live.access import LOOPBACK_NAMES, Rules, is_loopback
 from calibeam.live.app import live_app
 from calibeam.live.composer import Composer
-from calibeam.live.feed import Feed
 from calibeam.live.latest import Latest
 from calibeam.live.limits import ACCEPTED_AT_ONCE, LimitedHttp, LimitedServer, LimitedWebSocket, Limits
 from calibeam.live.messages import Job
@@ -48,7 +47,7 @@ class PageAddress:
 class LivePage:
     """A page that is served. `url` opens it, with its token."""
 
-    feed: Feed
+    feed: Latest
     url: str
 
 

@@ -54,7 +54,7 @@ class Stop:
         except DeviceError as error:
             says = f"NOT DELIVERED, press the red emergency stop now: {error}"
             return self._told(Stopped(host_s, who, delivered=False, says=says))
-        return self._told(Stopped(host_s, who, delivered=True, says="the controller was told to stop, and took it"))
+        return self._told(Stopped(host_s, who, delivered=True, says="the controller confirmed the stop command"))
 
     def _told(self, stopped: Stopped) -> Stopped:
         with self._telling:

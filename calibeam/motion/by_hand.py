@@ -33,6 +33,7 @@ from calibeam.motion.robot import streamed_robot
 from drivers.clock import SystemClock
 from drivers.errors import DeviceError
 
+ARRIVED_RAD = 1e-3  # a motion that ended as it should stands this near the end of its plan
 WORDS = "r resume, s stop, a abort, h halt, then ENTER"
 
 
@@ -153,7 +154,7 @@ def move_by_hand(rig: Rig, model: Path | None, asked: Asked, agreement: Agreemen
         now_rad = robot.joints()
         made = gate.plan(now_rad, asked(solver, now_rad))
         draw_plan_file(made, cell_of(rig), agreement.plan_file)
-        console.print(_said(made, agreement.plan_file), soft_wrap=True)
+        console.print(said(made, agreement.plan_file), soft_wrap=True)
         if agreement.dry:
             console.print("nothing was moved")
             return now_rad
@@ -169,14 +170,22 @@ def _drive(gate: Gate, made: Plan, joints: Callable[[], Floats], watch: Callable
     end_rad = joints()
     off = float(np.max(np.abs(end_rad - made.q_rad[-1])))
     console.print(
-        f"{gate.state.value}; {followed.sent} set-points, {followed.missed} cycles missed; joints now "
-        f"{np.round(np.degrees(end_rad), 3).tolist()} deg, {np.degrees(off):.4f} deg from the plan's end",
+        f"{ending_words(gate.state, off)}; {followed.sent} set-points, {followed.missed} cycles missed; joints now "
+        f"{(np.round(np.degrees(end_rad), 3) + 0.0).tolist()} deg, {np.degrees(off):.4f} deg from the plan's end",
         soft_wrap=True,
     )
     return end_rad
 
 
-def _said(made: Plan, plan_file: Path) -> str:
+def ending_words(state: MotionState, off_rad: float) -> str:
+    """How the motion ended; `off_rad`: the farthest joint from the end of the plan."""
+    if state is MotionState.DONE and off_rad > ARRIVED_RAD:
+        return "stopped on request before the end of the plan"
+    return state.value
+
+
+def said(made: Plan, plan_file: Path) -> str:
+    """A plan in one line for the terminal."""
     speed, _ = made.rates()
     fastest = int(np.argmax(np.max(np.abs(speed), axis=0)))
     names = ", ".join(f"{segment.name} ({segment.by.value})" for segment in made.segments)

@@ -127,7 +127,7 @@ def draw_joints(figure: Figure, shown: ExampleResult) -> None:
         position.plot(t_s, np.degrees(q_rad[:, joint]), color=colour, label=f"joint {joint + 1}", linewidth=1.0)
         speed.plot(t_s, np.degrees(np.gradient(q_rad[:, joint], t_s)), color=colour, linewidth=1.0)
     _transitions((position, speed), shown.plan)
-    position.set(ylabel="deg", title="Joints: planned (thin), said by the controller (broad); transitions shaded")
+    position.set(ylabel="deg", title="Joints: planned (thin), reported by the controller (broad); transitions shaded")
     figure.legend(*position.get_legend_handles_labels(), loc="outside lower center", ncols=6)
     speed.set(ylabel="deg/s, planned", xlabel="s")
 
@@ -137,7 +137,7 @@ def draw_track(figure: Figure, shown: ExampleResult, solver: Solver) -> None:
     above, side = figure.subplots(1, 2)
     planned, said = tips(solver, fine(shown.plan)[1]), tips(solver, thinned(shown.q_rad))
     for axes, (i, j), title in ((above, (0, 1), "From above"), (side, (1, 2), "From the side")):
-        axes.plot(said[:, i], said[:, j], color=ACTUAL, alpha=0.4, linewidth=4.0, label="said by the controller")
+        axes.plot(said[:, i], said[:, j], color=ACTUAL, alpha=0.4, linewidth=4.0, label="reported by the controller")
         axes.plot(planned[:, i], planned[:, j], color=PLANNED, linewidth=1.0, label="planned")
         points = np.array([T[:3, 3] for T in shown.corners]).reshape(-1, 3)
         axes.plot(points[:, i], points[:, j], "+", color=TARGET, markersize=8, label="targets")
@@ -156,7 +156,7 @@ def draw_blend(figure: Figure, shown: ExampleResult, solver: Solver) -> None:
     within = tip[np.abs(t_s - corner_s) < 1.1 * tacc_s]
     extent_m = float(np.max(np.linalg.norm(within - corner, axis=1)))
     said = said[np.linalg.norm(said - corner, axis=1) < extent_m]
-    close.plot(1e3 * said[:, 0], 1e3 * said[:, 1], ".", color=ACTUAL, alpha=0.4, label="said by the controller")
+    close.plot(1e3 * said[:, 0], 1e3 * said[:, 1], ".", color=ACTUAL, alpha=0.4, label="reported by the controller")
     close.plot(1e3 * within[:, 0], 1e3 * within[:, 1], color=PLANNED, label="planned")
     close.plot(1e3 * corner[0], 1e3 * corner[1], "+", color=TARGET, markersize=10, label="corner, missed by design")
     close.set(xlabel="x, mm", ylabel="y, mm", title="Blend close up", aspect="equal", adjustable="datalim")
@@ -177,7 +177,7 @@ def draw_belt(figure: Figure, shown: ExampleResult, solver: Solver) -> None:
     along, above = figure.subplots(1, 2)
     at_s, said = thinned(shown.t_s), tips(solver, thinned(shown.q_rad))
     planned = tips(solver, shown.plan.q_rad)
-    along.plot(at_s, said[:, 1], color=ACTUAL, linewidth=4.0, alpha=0.4, label="hand, said by the controller")
+    along.plot(at_s, said[:, 1], color=ACTUAL, linewidth=4.0, alpha=0.4, label="hand, reported by the controller")
     along.plot(shown.plan.t_s, planned[:, 1], color=PLANNED, linewidth=1.0, label="hand, planned")
     if shown.belt is not None:
         way = np.array([shown.belt(float(t)).s_m for t in at_s])

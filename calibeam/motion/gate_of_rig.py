@@ -30,7 +30,7 @@ UR_STREAM_HZ = 500.0  # e-Series control cycle; the older series takes a set-poi
 
 
 def solver_of(rig: Rig, model: Path | None = None) -> Solver:
-    """Inverse kinematics of the rig's arm as drawn, or as identified. DataError for a model of another arm."""
+    """Inverse kinematics of the rig's nominal arm, or as identified. DataError for a model of another arm."""
     if model is None:
         return Solver(RigArm.of_rig(rig), closed_form(RigArm.of_rig(rig)))
     identified = read_geometry(model)

@@ -64,6 +64,7 @@ FUTILE = (
 )  # targets of a place of which none has landed: of a place that fills up in time, 1 in 170 comes to it
 BRANCHES = 2  # of one target, drawn at random
 TURN_RAD = np.pi  # angles of robots that may turn further are drawn within this: a second turn shows nothing new
+WAY_STEP_RAD = 0.05  # of the joint with the longest way, between the postures that are looked at
 LOWEST_M = 0.05  # of a target that a tracker is to see, above the base plane
 
 
@@ -130,14 +131,28 @@ def _before_device(rig: Rig, wanted: int, rng: Generator) -> Candidates:
     q = rng.uniform(lower, upper, (TRIES * wanted, rig.n_joints))
     frames = solver.arm.frames(q)
     tips = frames[:, -1, :3, :3] @ np.array(rig.tool.point_m) + frames[:, -1, :3, 3]
-    above = (frames[:, 2:, 2, 3].min(axis=1) > LOWEST_M) & (tips[:, 2] > LOWEST_M)
-    good = np.flatnonzero(above & _clear(rig, q))[:wanted]
+    good = np.flatnonzero(clear_for_device(rig, q))[:wanted]
     nothing = np.zeros(len(good), dtype=np.int64)
     if len(good) == 0:
         raise DataError(f"rig {rig.name}: no pose is clear of table and keep-out boxes; check [motion]")
     device = transform(rig.device.origin_m, rig.device.rotation_rad) if rig.device is not None else np.eye(4)
     seen = (tips[good] - device[:3, 3]) @ device[:3, :3]
     return Candidates(q[good], seen, nothing, nothing)
+
+
+def clear_for_device(rig: Rig, q_rad: Floats) -> NDArray[np.bool_]:
+    """(pose,) whether arm and target are above the table and keep their clearance of every keep-out box."""
+    frames = solver_of(rig).arm.frames(q_rad)
+    tips = frames[:, -1, :3, :3] @ np.array(rig.tool.point_m or (0.0, 0.0, 0.0)) + frames[:, -1, :3, 3]
+    above = (frames[:, 2:, 2, 3].min(axis=1) > LOWEST_M) & (tips[:, 2] > LOWEST_M)
+    return np.asarray(above & _clear(rig, q_rad), dtype=np.bool_)
+
+
+def way_is_clear(rig: Rig, from_rad: Floats, to_rad: Floats) -> bool:
+    """Whether a motion by joints keeps links, flange and target above the table and clear of every keep-out box."""
+    way_rad = float(np.max(np.abs(to_rad - from_rad)))
+    q = from_rad + np.linspace(0.0, 1.0, int(way_rad / WAY_STEP_RAD) + 2)[:, None] * (to_rad - from_rad)
+    return bool(clear_for_device(rig, q).all())
 
 
 def _clear(rig: Rig, q_rad: Floats) -> NDArray[np.bool_]:

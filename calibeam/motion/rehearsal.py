@@ -56,7 +56,7 @@ class Rehearsal:
         if not self.refused:
             return f"{told}, all within reach and clear of the keep-out boxes"
         first = self.refused[0]
-        return f"{told}, {len(self.refused)} of them cannot be had as drawn, the first: {first.name}: {first.why}"
+        return f"{told}, {len(self.refused)} of them are not possible, the first: {first.name}: {first.why}"
 
 
 @dataclass

@@ -1,6 +1,6 @@
 """The controller alone, for motion by hand and for programs: read, watched, and streamed to; no detectors needed."""
 
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -63,19 +63,39 @@ class StreamedRobot:
 
     def joints(self) -> Floats:
         """Readings (joint,) once the arm rests. DeviceError; DeviceStale where it never does."""
-        before = self._newest()
-        for _ in range(SETTLE_TRIES):
-            now = self._newest()
-            if float(np.max(np.abs(now - before))) < SETTLED_RAD:
-                return now
-            before = now
-        raise DeviceStale("robot: the arm does not come to rest; look whether something pushes it")
+        return _resting(self.supervisor, self.pump, self.clock)
 
-    def _newest(self) -> Floats:
-        self.supervisor.check()
-        blocks = self.pump.wait(self.clock.now_s(), WAIT_S)
-        out: Floats = blocks[-1].values["actual_q_rad"][-1]
+
+def _resting(supervisor: Supervisor, pump: Pump, clock: Clock) -> Floats:
+    def newest() -> Floats:
+        supervisor.check()
+        out: Floats = pump.wait(clock.now_s(), WAIT_S)[-1].values["actual_q_rad"][-1]
         return out
+
+    before = newest()
+    for _ in range(SETTLE_TRIES):
+        now = newest()
+        if float(np.max(np.abs(now - before))) < SETTLED_RAD:
+            return now
+        before = now
+    raise DeviceStale("robot: the arm does not come to rest; check whether something pushes it")
+
+
+@contextmanager
+def watched_joints(rig: Rig, clock: Clock) -> Generator[Callable[[], Floats]]:
+    """Readings (joint,) of the rig's arm at rest, as often as asked; nothing that could move it is opened."""
+    device = rig.devices.robot
+    if device is None:
+        raise RigFileError(f"rig {rig.name}: no [devices.robot]; add it, with how the controller is reached")
+    reader = robot_of(device, clock).reader
+    supervisor = Supervisor(lambda: None, clock)
+    pump = Pump(reader, clock, lambda block: None, supervisor.failed)
+    reader.connect()
+    pump.start()
+    try:
+        yield lambda: _resting(supervisor, pump, clock)
+    finally:
+        pump.stop()
 
 
 @contextmanager
@@ -86,7 +106,7 @@ def streamed_robot(rig: Rig, clock: Clock, emulated: Mapping[str, Any] | None = 
     """
     device = rig.devices.robot
     if device is None:
-        raise RigFileError(f"rig {rig.name}: no [devices.robot]; say how the controller is reached")
+        raise RigFileError(f"rig {rig.name}: no [devices.robot]; add how the controller is reached")
     robot = robot_of(device if emulated is None else emulated_robot(device, emulated), clock)
     arm = robot.arm()
     if not hasattr(arm, "servo_joints"):

@@ -8,7 +8,7 @@
 The same functions stand behind the command line; docs/python.md has all of it as examples.
 """
 
-from calibeam.notebook.model import Model
+from calibeam.notebook.model import Model, open_model
 from calibeam.notebook.session import Session, open_recording, session_of_arrays
 
-__all__ = ["Model", "Session", "open_recording", "session_of_arrays"]
+__all__ = ["Model", "Session", "open_model", "open_recording", "session_of_arrays"]

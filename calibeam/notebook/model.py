@@ -1,5 +1,6 @@
 """An identified arm in a notebook: its numbers with their doubt, as tables and as an arm that computes."""
 
+import math
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,10 +16,12 @@ from calibeam.notebook.tables import SCREEN, pandas_if_installed
 
 if TYPE_CHECKING:
     from calibeam.results.identification import JudgedModel
+    from calibrate.correct.corrected import Corrected, Wanted
     from calibrate.model_file import ModelFile, ModelParameter
     from calibrate.physics.predicting import Placed
 
 Floats = NDArray[np.float64]
+SAME = 1e-6  # of a rotation matrix: more than rounding, less than any slip
 Frame = Literal["robot", "world"]  # of sigmas: the robot's own base frame, or that of the device or fixture
 
 
@@ -27,7 +30,7 @@ class Model:
     """An identified arm: numbers with their doubt. `file` holds everything that model.json does."""
 
     file: "ModelFile"
-    trust: str  # "good", "care" or "bad"
+    trust: str  # "yes", "with care" or "no"; "unknown" where the model was opened without its session
     says: str  # the verdict in one sentence
     reasons: tuple[str, ...]  # what speaks against trusting it
 
@@ -116,6 +119,39 @@ class Model:
         table = Samples({name: np.asarray(values) for name, values in samples.items()}, joints)
         return predict_with_physics(self.file, table, same_session).columns
 
+    def correct(
+        self,
+        poses: "Floats | Path | str",
+        conditions: "Mapping[str, Floats | float] | None" = None,
+        *,
+        near_rad: Floats | None = None,
+        approach: Literal["positive", "negative"] | None = None,
+        overshoot_rad: float = math.radians(2.0),
+        tool: Floats | None = None,
+    ) -> "Corrected":
+        """Joint commands that bring the real tool to poses, as `calibeam correct` has them.
+
+        `poses`: (pose, 4, 4) of the tool in the base, m, in the order in which they are visited; or a poses.csv.
+        `conditions`: as of `flange`. `near_rad`: posture before the first pose (joint,), or one for each (pose, joint).
+        `approach`: every joint comes from this side, by overshoot points `overshoot_rad` away. `tool`: (4, 4) in the
+        flange, taken to be exact; by default the rig file's point for the controller, the model's for the real tool.
+
+        Of the result: `q_rad` (pose, joint), NaN where there is no command; `T_base_tool` (pose, 4, 4) for a controller
+        with the rig file's arm; `via_rad`; `before` and `after` with `error_m` and `s_error_m`; `status` and `says` of
+        each pose; `notes`: what the effects lack of conditions, and what the model does not hold. DataError for poses
+        or a model that cannot be used.
+        """
+        from acquisition.recording.rig import parse_rig
+        from calibeam.motion.motion_inverse import MotionInverse
+        from calibrate.arms.rig_arm import RigArm
+        from calibrate.correct.corrected import Options, correct
+
+        rig = parse_rig(self.file.rig.text or "", "rig.toml in the model")
+        wanted = _wanted(poses, conditions or {}, near_rad, rig.n_joints)
+        side = {"positive": 1, "negative": -1, None: 0}[approach]
+        options = Options(None if tool is None else np.asarray(tool, dtype=np.float64), side, overshoot_rad)
+        return correct(self.file, wanted, MotionInverse(RigArm.of_rig(rig)), options)
+
     def _placed(
         self,
         q_rad: Floats,
@@ -171,9 +207,55 @@ class Model:
     def __str__(self) -> str:
         lines = [self.says, *(f"  {reason}" for reason in self.reasons)]
         for joint, (zero, sigma) in self.zeros().items():
-            told = "not determined" if zero is None or sigma is None else f"{zero:+.6f} ± {sigma:.6f} rad"
+            told = "not determined" if zero is None or sigma is None else f"{zero:+z.6f} ± {sigma:.6f} rad"
             lines.append(f"joint {joint} zero: {told}")
         return "\n".join(lines)
+
+
+def open_model(path: Path | str) -> Model:
+    """A model.json of `calibeam identify` or `diagnose`. DataError where it is none, with the reason.
+
+    What speaks for or against trusting it is seen from its session only: `calibeam.open(...).identify()`.
+    """
+    from calibrate.model_file import read_model
+
+    file = read_model(Path(path))
+    says = f"{file.status}, {file.poses} poses; how far it can be trusted is in the report of its session"
+    return Model(file, "unknown", says, ())
+
+
+def _wanted(
+    poses: "Floats | Path | str", conditions: "Mapping[str, Floats | float]", near_rad: Floats | None, joints: int
+) -> "Wanted":
+    """DataError for poses that are no rigid motions."""
+    from calibrate.correct.corrected import Wanted
+    from calibrate.correct.tables import read_poses
+    from calibrate.errors import DataError
+
+    if isinstance(poses, Path | str):
+        every = {name: float(value) for name, value in conditions.items()}
+        try:
+            text = Path(poses).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise DataError(f"{poses}: cannot be read: {error}") from error
+        wanted = read_poses(text, str(poses), joints, np.eye(4), every)
+    else:
+        given = np.asarray(poses, dtype=np.float64)
+        T = given[None] if given.ndim == 2 else given
+        turn = T[..., :3, :3]
+        if T.shape[1:] != (4, 4) or not np.allclose(turn @ np.swapaxes(turn, 1, 2), np.eye(3), atol=SAME):
+            raise DataError(f"poses of shape {given.shape}: give (pose, 4, 4), each a rotation and a position in m")
+        n = len(T)
+        nothing = np.full((n, joints), np.nan)
+        stated = {name: np.array(np.broadcast_to(value, n), dtype=np.float64) for name, value in conditions.items()}
+        wanted = Wanted(T, nothing, nothing.copy(), stated)
+    if near_rad is not None:
+        near = np.asarray(near_rad, dtype=np.float64)
+        if near.ndim == 2:
+            wanted.near_rad[:] = near
+        elif not np.isfinite(wanted.near_rad[0]).all():
+            wanted.near_rad[0] = near
+    return wanted
 
 
 def model_of(found: "JudgedModel") -> Model:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording import Recording, Samples, SamplesError, read
+from acquisition.recording import Recording, RecordingError, Samples, SamplesError, read
 from calibeam.notebook.model import Model, model_of
 from calibeam.notebook.tables import SCREEN, pandas_if_installed
 from calibrate.errors import DataError
@@ -113,6 +113,8 @@ class Session:
 
 def open_recording(path: Path | str) -> Session:
     """A recording (.mcap) or session folder. RecordingError where it is neither, with the reason."""
+    if Path(path).suffix == ".json":
+        raise RecordingError(f"{path}: a recording or a session folder is opened here; open a model with open_model")
     return Session(read(Path(path)))
 
 
@@ -172,7 +174,7 @@ def _errors_along_session(found: "Sequence[ReadingErrors]") -> "Figure":
     for axes, one in zip(figure.subplots(len(found), 1, squeeze=False).ravel(), found, strict=True):
         number = np.arange(len(one.after)) + 1
         for values, colour, mark, label in (
-            (one.before, BEFORE, "x", "arm as drawn"),
+            (one.before, BEFORE, "x", "nominal arm"),
             (one.after, AFTER, "o", "identified"),
         ):
             axes.plot(number, MICRO * _positive(values), mark, ms=4, color=colour, label=f"{label}: {_rms(values)} rms")

@@ -109,8 +109,8 @@ def _streams(streams: tuple[StreamRecord, ...]) -> Table:
         if one.offset_s is None or one.rms is None or one.noise is None:
             table.add_row(one.stream, "-", "-", "-", "-", one.status)
             continue
-        drift = "-" if one.drift is None else f"{1e6 * one.drift:+.2f} ± {1e6 * (one.drift_sigma or 0.0):.2g}"
-        offset = f"{one.offset_s:+.6f} ± {one.offset_sigma_s:.2g}"
+        drift = "-" if one.drift is None else f"{1e6 * one.drift:+z.2f} ± {1e6 * (one.drift_sigma or 0.0):.2g}"
+        offset = f"{one.offset_s:+z.6f} ± {one.offset_sigma_s:.2g}"
         parts = "other motion" if one.parts is None else "yes" if one.parts else "no"
         table.add_row(one.stream, offset, drift, _size(one.rms, one.unit), _size(one.noise, one.unit), parts)
     return table

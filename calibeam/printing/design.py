@@ -13,6 +13,7 @@ from calibrate.pose_design.design import Design
 from calibrate.pose_design.places import Places
 from calibrate.pose_design.seen import Seen
 from calibrate.report.diagnosis.words import size_of
+from calibrate.report.pose_design.page import of_the_curve
 from calibrate.report.quantities import length
 
 MATTERS_M = 1e-7  # of what no pose shows: below, the target does not feel it
@@ -35,7 +36,8 @@ def promise_lines(rig: Rig, made: Design) -> list[str]:
     out = [
         f"{rig.name}: {len(made.taken.poses)} poses of {len(made.candidates)} candidates by criterion "
         f"{made.asked.criterion}",
-        f"predicted error in free space ({information.target}): {length(made.free_space_m)} rms; as many random poses: "
+        f"predicted error over the workspace ({information.target}): {length(made.free_space_m)} rms; as many random "
+        "poses: "
         f"{length(made.random_m)} (ratio {made.free_space_m / made.random_m:.2f}); scale to "
         f"{1e6 * made.scale_sigma:.1f} ppm",
         f"of a steady drift geometry would absorb {100.0 * order.absorbed:.0f} % (in the order of shortest ways "
@@ -43,8 +45,9 @@ def promise_lines(rig: Rig, made: Design) -> list[str]:
     ]
     if information.hidden_m > MATTERS_M:
         out.append(
-            f"what no pose of these shows may still move the target by {length(information.hidden_m)} as believed, and "
-            "is not in these numbers"
+            f"what none of these poses shows may still move the target by {length(information.hidden_m)} (assumed "
+            "tolerances); "
+            "it is not in these numbers"
         )
     return out
 
@@ -58,10 +61,11 @@ def _table(title: str, *headings: str) -> Table:
 
 def _print_curve(console: Console, made: Design) -> None:
     curve = made.curve
-    table = _table("predicted error by number of poses", "poses", "chosen one by one", "random")
+    table = _table("predicted error by number of poses", "poses", "added one by one", "random")
     for i in np.unique(np.linspace(0, len(curve.poses) - 1, 8).astype(int)):
         table.add_row(str(curve.poses[i]), length(float(curve.chosen_m[i])), length(float(curve.random_m[i])))
     console.print(table)
+    console.print(of_the_curve(made), markup=False, highlight=False)
     console.print(enough_line(made), markup=False, highlight=False)
 
 
@@ -120,16 +124,14 @@ def _print_smallest(console: Console, seen: Seen) -> None:
 
 def _print_confusable(console: Console, seen: Seen) -> None:
     lines = [
-        f"could not be told apart: {name_of(a)} and {name_of(b)} (R2 {r2:.3f})"
-        for a, b, r2 in sorted(seen.confusable, key=lambda pair: pair[2])
-        if (a.physics, a.where) != (b.physics, b.where)
+        f"could not be separated: {name_of(a)} and {name_of(b)} (R2 {r2:.3f})"
+        for a, b, r2 in sorted(seen.confusable_causes, key=lambda pair: pair[2])
     ]
-    lines = list({line.partition(" (R2")[0]: line for line in lines}.values())  # forms of one cause: the most alike
     places: dict[str, dict[str, None]] = {}
     for one in seen.invisible:
         places.setdefault(one.physics, {})[one.where] = None
     lines += [f"not shown, or not in every form: {physics} at {', '.join(at)}" for physics, at in places.items()]
-    for line in lines or ["all causes of the catalogue can be told apart"]:
+    for line in lines or ["all causes of the catalogue can be separated"]:
         console.print(line, markup=False, highlight=False)
 
 

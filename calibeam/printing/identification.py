@@ -68,17 +68,18 @@ def _held_out(unseen: Unseen) -> str:
 
 def _observability(shown: Observability) -> str:
     indices = ", ".join(f"O{i} {v:.3g}" for i, v in enumerate((shown.o1, shown.o2, shown.o3, shown.o4, shown.o5), 1))
-    well = "" if shown.well_conditioned else " (usual limit 100: other poses would show more)"
+    well = "" if shown.well_conditioned else " (usual limit 100: other poses would determine more)"
     return f"observability of {shown.n_free} parameters: {indices}, condition {shown.condition:.3g}{well}"
 
 
 def _free_space(room: FreeSpace) -> list[str]:
     one, pose = room.geometry, room.pose
     if one.rms_m is None or one.p95_m is None or one.max_m is None:
-        return [f"free space: {one.status.value}", *(f"  {words}" for words in one.undetermined)]
+        return [f"tool error over the workspace: {one.status.value}", *(f"  {words}" for words in one.undetermined)]
     out = [
-        f"free space, {room.poses} poses drawn evenly between the joint limits: {1e3 * one.rms_m:.3g} mm rms, "
-        f"{1e3 * one.p95_m:.3g} mm at 95 %, {1e3 * one.max_m:.3g} mm at most (one sigma of the identified geometry)"
+        f"tool error over the workspace, {room.poses} poses drawn evenly between the joint limits: "
+        f"{1e3 * one.rms_m:.3g} mm rms, {1e3 * one.p95_m:.3g} mm at 95 %, {1e3 * one.max_m:.3g} mm at most "
+        "(one sigma of the calibrated geometry)"
     ]
     if pose.rms_m is not None and pose.p95_m is not None and pose.max_m is not None:
         out.append(
@@ -121,8 +122,8 @@ def _brief(result: Identification) -> Iterator[str]:
     for one in result.evidence.proven.held_out:
         says, of = angle if one.name in IN_RAD else length, f", {one.name}" if len(result.instruments) > 1 else ""
         yield (
-            f"unseen rows ({one.split}){of}: {says(one.rms_distance_before_m)} as drawn, "
-            f"{says(one.rms_distance_after_m)} identified"
+            f"unseen rows ({one.split}){of}: {says(one.rms_distance_before_m)} nominal, "
+            f"{says(one.rms_distance_after_m)} calibrated"
         )
     room = result.evidence.free_space
     if room is not None and room.geometry.rms_m is not None and room.geometry.max_m is not None:
@@ -167,7 +168,9 @@ def _print_details(console: Console, result: Identification, *, of_spots: bool) 
         console.print(f"  {about}{combination.says}", highlight=False, markup=False)
     believed = [e.name for e in result.estimates if e.why is not None and e.why.startswith(ONLY_BELIEVED)]
     if believed:
-        console.print(f"  only the drawing speaks of: {', '.join(believed)}", highlight=False, markup=False)
+        console.print(
+            f"  determined by the assumed tolerances only: {', '.join(believed)}", highlight=False, markup=False
+        )
     if of_spots:
         _print_zeros(console, result.zeros)
     listed = parameter_records(result.estimates, seen, result.evidence.bootstrap)
@@ -181,7 +184,7 @@ def _print_details(console: Console, result: Identification, *, of_spots: bool) 
 def _print_parameters(console: Console, parameters: tuple[ModelParameter, ...]) -> None:
     known = [p for p in parameters if p.value is not None]
     if not known:
-        console.print("no single parameter can be told alone; together they predict (model.json: chain)")
+        console.print("no single parameter is determined alone; together they predict (model.json: chain)")
         return
     _print_table(console, ("correction", "sigma", "predicted", "95 %"), known, _by_covariance)
     drawn = [p for p in known if p.bootstrap_sigma is not None]
@@ -192,14 +195,14 @@ def _print_parameters(console: Console, parameters: tuple[ModelParameter, ...]) 
 def _print_zeros(console: Console, zeros: tuple[JointZero, ...]) -> None:
     """Of a session with spots, which is made for them; true angle = reading + zero."""
     table = Table()
-    for heading in ("joint", "zero (deg)", "sigma (deg)", "sigma (urad)", "measurement alone (urad)"):
+    for heading in ("joint", "zero (deg)", "sigma (deg)", "sigma (µrad)", "measurement alone (µrad)"):
         table.add_column(heading, justify="right")
     for zero in zeros:
         if zero.value_rad is None or zero.sigma_rad is None:
             table.add_row(f"J{zero.joint}", "not determined", "-", "-", "-")
             continue
         alone = "-" if zero.measurement_sigma_rad is None else f"{1e6 * zero.measurement_sigma_rad:.1f}"
-        degrees, sigma = f"{np.degrees(zero.value_rad):+.5f}", f"{np.degrees(zero.sigma_rad):.5f}"
+        degrees, sigma = f"{np.degrees(zero.value_rad):+z.5f}", f"{np.degrees(zero.sigma_rad):.5f}"
         table.add_row(f"J{zero.joint}", degrees, sigma, f"{1e6 * zero.sigma_rad:.1f}", alone)
     console.print(table)
     for zero in zeros:
@@ -209,7 +212,7 @@ def _print_zeros(console: Console, zeros: tuple[JointZero, ...]) -> None:
 
 def _print_point_constraints(console: Console, found: PointConstraints) -> None:
     """The method beside the fit, in both forms."""
-    console.print("\nfor comparison: point constraint, Deng, Ding, Zhang 2019; links and laser as drawn")
+    console.print("\nfor comparison: point constraint, Deng, Ding, Zhang 2019; links and laser nominal")
     at = f"at placement {found.placement}"
     forms = (
         (f"four poses {at}, as published", found.four_poses),
@@ -256,7 +259,7 @@ def _cell(value: float | None, factor: float, sign: str = "") -> str:
 def _figures(result: Identification) -> list[str]:
     out = [
         f"{one.name}: {1e3 * one.rms_distance_before_m:.4g} {thousandth_of(one.name)} rms distance "
-        f"with the arm as drawn, {1e3 * one.rms_distance_after_m:.4g} {thousandth_of(one.name)} after"
+        f"nominal, {1e3 * one.rms_distance_after_m:.4g} {thousandth_of(one.name)} calibrated"
         for one in result.instruments
     ]
     for noise in result.noise:

@@ -45,7 +45,7 @@ def print_proof(console: Console, proof: ProofFile) -> None:
 
 def _lines(title: str, lines: Sequence[TallyLine]) -> Table:
     table = Table(title=title, title_justify="left")
-    for heading in ("", "n", "located", "named", "among rivals", "others said, a case"):
+    for heading in ("", "n", "located", "named", "or among alternatives", "others reported, a case"):
         table.add_column(heading)
     for line in lines:
         if line.located.n:
@@ -55,7 +55,7 @@ def _lines(title: str, lines: Sequence[TallyLine]) -> Table:
 
 
 def _figures(cases: Sequence[CaseScore]) -> Table:
-    table = Table(title="doubt and proof", title_justify="left")
+    table = Table(title="uncertainty and proof", title_justify="left")
     for heading in ("", "measured", "wanted"):
         table.add_column(heading)
     for figure in figures(cases):
@@ -64,7 +64,10 @@ def _figures(cases: Sequence[CaseScore]) -> Table:
 
 
 def _free_space(cases: Sequence[CaseScore]) -> Table:
-    table = Table(title="free space against the truth, medians of the cases that were compared", title_justify="left")
+    table = Table(
+        title="tool error over the workspace against the truth, medians of the cases that were compared",
+        title_justify="left",
+    )
     for heading in ("", "cases", "geometry", "with what was found", "oracle"):
         table.add_column(heading)
     for line in by_instrument(cases):
@@ -104,13 +107,13 @@ def print_real(console: Console, sets: Sequence[RealScore]) -> None:
 
 
 def _um(value: float | None) -> str:
-    return "-" if value is None else f"{1e6 * value:.3g} um"
+    return "-" if value is None else f"{1e6 * value:.3g} µm"
 
 
 def _angle(hidden: HiddenAngle) -> str:
     if hidden.rms_rad is None or hidden.expected_rad is None:
-        return f"joint {hidden.joint} hidden: the target sits on its axis and says nothing of it"
+        return f"joint {hidden.joint} hidden: the target sits on its axis and does not depend on it"
     return (
-        f"joint {hidden.joint} hidden at {hidden.poses} poses: inferred to {1e6 * hidden.rms_rad:.0f} urad rms, "
+        f"joint {hidden.joint} hidden at {hidden.poses} poses: inferred to {1e6 * hidden.rms_rad:.0f} µrad rms, "
         f"expected {1e6 * hidden.expected_rad:.0f}; {hidden.unfelt} more poses do not feel it"
     )

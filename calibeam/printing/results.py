@@ -10,6 +10,7 @@ from calibrate.report.diagnosis.words import (
     before_after,
     free_space_words,
     micrometres,
+    noise_words,
     place_words,
     rival_words,
     stream_words,
@@ -48,12 +49,13 @@ def _brief(file: DiagnosisFile) -> Iterator[str]:
         of = f", {split.instrument}" if len(floors) > 1 else ""
         yield (
             f"unseen rows ({split.split}){of}: {before} geometry alone, {after} with the physics; "
-            f"floor {micrometres(floors.get(split.instrument))}"
+            f"noise floor {micrometres(floors.get(split.instrument))}"
         )
     if file.free_space is not None:
         yield free_space_words(file.free_space)
+    yield from _few([f"noise: {line}" for line in noise_words(file)])
     yield from _few([f"not completed: {one.stage}: {one.reason}" for one in file.incomplete])
-    yield from _few([f"not recorded: {one.column} ({one.physics} cannot be tested)" for one in file.not_recorded])
+    yield from _few([f"not tested: {one.physics} (column {one.column} is missing)" for one in file.not_recorded])
     yield from _few([f"next: {line}" for line in file.next])
 
 
@@ -73,6 +75,8 @@ def _print_details(console: Console, file: DiagnosisFile) -> None:
             console.print(line, highlight=False, markup=False)
     for line in _changes(file):
         console.print(line, highlight=False, markup=False)
+    for line in noise_words(file):
+        console.print(f"noise: {line}", highlight=False, markup=False)
     for line in _doubt(file):
         console.print(line, highlight=False, markup=False)
     if file.splits:
@@ -102,9 +106,9 @@ def _clock(clock: ClockRecord) -> Iterator[str]:
     if clock.offset_s is None or clock.offset_sigma_s is None:
         yield f"clock of {clock.stream}: {clock.status}"
         return
-    line = f"clock of {clock.stream}: joints' clock {1e3 * clock.offset_s:+.3f} ± {1e3 * clock.offset_sigma_s:.3f} ms"
+    line = f"clock of {clock.stream}: joints' clock {1e3 * clock.offset_s:+z.3f} ± {1e3 * clock.offset_sigma_s:.3f} ms"
     if clock.drift is not None and clock.drift_sigma is not None:
-        line += f", drift {1e6 * clock.drift:+.1f} ± {1e6 * clock.drift_sigma:.1f} µs/s"
+        line += f", drift {1e6 * clock.drift:+z.1f} ± {1e6 * clock.drift_sigma:.1f} µs/s"
     yield f"{line}, at {clock.middle_s:.1f} s"
 
 
@@ -135,12 +139,12 @@ def _doubt(file: DiagnosisFile) -> Iterator[str]:
         yield free_space_words(file.free_space)
     yield from stream_words(file)
     for missing in file.not_recorded[:MOST]:
-        yield f"not recorded: {missing.column} ({missing.physics} cannot be tested)"
+        yield f"not tested: {missing.physics} (column {missing.column} is missing)"
 
 
 def _proof(file: DiagnosisFile) -> Table:
     table = Table(title="on samples that the fit has not seen (rms)", title_justify="left")
-    for heading in ("left out", "instrument", "samples", "geometry alone", "with the physics", "floor"):
+    for heading in ("left out", "instrument", "samples", "geometry alone", "with the physics", "noise floor"):
         table.add_column(heading, justify="left" if heading in ("left out", "instrument") else "right")
     floors = {f.instrument: f.rms_m for f in file.floors}
     for split in file.splits:

@@ -1,7 +1,7 @@
 """The diagnosing process: `python -m calibeam.prove.blind [PHYSICS ...]`. It gets recordings, and nothing else.
 
 One line of JSON in for each case, one out when its answer is written. It refuses to import the simulators, so that
-nothing can be drawn anew; the truth is under a key that another process holds.
+nothing can be drawn again; the truth is under a key that another process holds.
 """
 
 import json

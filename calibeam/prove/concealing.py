@@ -145,7 +145,7 @@ def _taken(recording: Recording) -> Taken:
     """ConcealError where the recording does not say when its samples were taken."""
     samples, windows = recording.samples, sample_windows(recording)
     if windows is None:
-        raise ConcealError("the session on the wires took no sample, or does not say when")
+        raise ConcealError("the session on the wires took no sample, or recorded no times")
     t_s = samples.column("t_s")
     n = range(1, samples.n_joints + 1)
     return Taken(
@@ -205,7 +205,7 @@ def _conceal(order: _Order) -> Concealed:
     if drawn.kind == "streams":
         truth["defects"] = fault_records(conceal_streams(case, order.mix.mechanism, recorded))
     elif not order.wired:
-        _write_recording(case, order.layout.recording(drawn.name))
+        write_recording(case, order.layout.recording(drawn.name))
     text = json.dumps(truth).encode()
     write_asked(truth["free_space"], order.layout.asked(drawn.name))
     seal = order.layout.seal(drawn.name)
@@ -230,7 +230,7 @@ def _drawn(order: _Order) -> tuple[Scenario, Case, int]:
     raise ConcealError(f"case {order.number}: no draw gave a session; the last one: {last}")
 
 
-def _write_recording(case: Case, folder: Path) -> None:
+def write_recording(case: Case, folder: Path) -> None:
     """The recording alone: nothing else of a case is ever written in clear before all are diagnosed."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "rig.toml").write_text(toml_text(rig_document(case.belief)), encoding="utf-8")

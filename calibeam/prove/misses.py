@@ -17,7 +17,7 @@ def hidden_words(case: CaseScore) -> str:
     if not case.defects:
         return f"nothing, {case.noise} noise"
     each = [f"{d.mechanism} ({d.physics}) at {d.port}, {d.enr:.2g} x noise" for d in case.defects]
-    kept = f"; not recorded: {', '.join(case.withheld)}" if case.withheld else ""
+    kept = f"; missing column: {', '.join(case.withheld)}" if case.withheld else ""
     return ", ".join(each) + kept
 
 
@@ -50,16 +50,16 @@ def faults(case: CaseScore) -> list[str]:
         return out + (["false alarm"] if case.alarmed else [])
     out += [f"misnamed with confidence: {s.physics} at {s.where}" for s in case.said if s.misnamed]
     if case.kind == "withheld":
-        return out + ([] if case.asks_for else ["does not say what is missing"])
+        return out + ([] if case.asks_for else ["does not name the missing column"])
     for d in case.defects:
         if d.enr < PLAIN:
             continue
         if not d.located:
             out.append(f"{d.mechanism} not located")
         elif d.physics == UNKNOWN and not (d.unknown_there or case.unexplained):
-            out.append(f"{d.mechanism} not said to be unknown")
+            out.append(f"{d.mechanism} not reported as unknown")
         elif d.physics != UNKNOWN and not d.named:
-            out.append(f"{d.mechanism} not named" + (", a rival" if d.among_rivals else ""))
+            out.append(f"{d.mechanism} not named" + (", an alternative" if d.among_rivals else ""))
     return out
 
 
@@ -68,7 +68,7 @@ def misses(proof: ProofFile) -> Iterator[str]:
     for case in proof.cases:
         wrong = faults(case)
         if wrong:
-            yield f"{_head(case)}: hidden: {hidden_words(case)}; said: {said_words(case)} [{', '.join(wrong)}]"
+            yield f"{_head(case)}: hidden: {hidden_words(case)}; reported: {said_words(case)} [{', '.join(wrong)}]"
 
 
 def _head(case: CaseScore) -> str:

@@ -45,7 +45,7 @@ def _single(cases: Sequence[CaseScore]) -> str:
         return ""
     return (
         f"{line.located.n} single causes of {PLAIN:g} times the noise and more: located {line.located.brief}, named "
-        f"{line.named.brief}, named or among the rivals {line.among_rivals.brief}."
+        f"{line.named.brief}, named or among the alternatives {line.among_rivals.brief}."
     )
 
 
@@ -53,7 +53,7 @@ def _nothing(cases: Sequence[CaseScore]) -> str:
     null = [c for c in cases if not c.defects]
     if not null:
         return ""
-    return f"{len(null)} sessions with nothing wrong: something was said in {share(c.alarmed for c in null).brief}."
+    return f"{len(null)} sessions with nothing wrong: something was reported in {share(c.alarmed for c in null).brief}."
 
 
 def _outside(cases: Sequence[CaseScore]) -> str:
@@ -73,7 +73,7 @@ def _gain(cases: Sequence[CaseScore]) -> str:
         return ""
     return (
         f"On unseen samples of {len(gains)} cases the diagnosis removes {float(np.median(gains)):.2f} (median) of what "
-        "an oracle removes that is told the truth."
+        "an oracle removes that knows the truth."
     )
 
 
@@ -146,7 +146,7 @@ def confusion_figure(cases: Sequence[CaseScore]) -> Html:
             axes.axvline(j - 0.5, color=Tone.FAINT.value, linewidth=0.6, zorder=0.5)
         axes.tick_params(length=0.0)
 
-    says = f"Hidden against said physics: {right} of {int(counts.sum())} on the diagonal."
+    says = f"Hidden against reported physics: {right} of {int(counts.sum())} on the diagonal."
     width, height = MARGIN_IN + CELL_IN * len(said), MARGIN_IN + CELL_IN * len(hidden)
     return drawn("confusion", says, width, height, paint)
 
@@ -158,13 +158,13 @@ def _cell(x: int, y: int, tone: Tone, share: float) -> Rectangle:
 CONTENTS = {
     "short": "In short",
     "sums": "What was found",
-    "doubt": "Doubt and proof",
+    "doubt": "Uncertainty and proof",
     "confusion": "What is taken for what",
     "others": "Other methods",
     "stories": "Each case",
     "repeat": "To repeat it",
 }
-HEAD = ("", "n", "located", "named", "among rivals", "others said, a case")
+HEAD = ("", "n", "located", "named", "or among alternatives", "others reported, a case")
 
 
 def write_proof_page(path: Path, proof: ProofFile) -> Path:
@@ -229,7 +229,7 @@ def _sums(cases: Sequence[CaseScore]) -> Html:
 
 
 def _doubt(cases: Sequence[CaseScore]) -> Html:
-    lead = "What is said where nothing is to be said, how sizes and errors hold against the truth."
+    lead = "What is reported where nothing is hidden, and how sizes and errors compare with the truth."
     said = _figures(("", "measured", "wanted"), [f for f in figures(cases) if f.said != NONE])
     return section("doubt", CONTENTS["doubt"], lead, said, *_free_space(cases))
 
@@ -240,14 +240,12 @@ def _free_space(cases: Sequence[CaseScore]) -> list[Html]:
         for f in by_instrument(cases)
     ]
     head = ("", "cases", "geometry", "with what was found", "oracle")
-    caption = "Free space against the truth: medians of the cases that were compared with the oracle"
+    caption = "Tool error over the workspace against the truth: medians of the cases that were compared with the oracle"
     return [table(head, found, numeric=(1, 2, 3, 4), caption=caption)] if found else []
 
 
 def _confusion(cases: Sequence[CaseScore]) -> Html:
-    lead = (
-        "Hidden physics in rows, the first thing said in columns; cases with one cause of 0.6 times the noise, or none."
-    )
+    lead = "Hidden physics in rows, the first finding in columns; cases with one cause of 0.6 times the noise, or none."
     drawing = figure(confusion_figure(cases), "On the diagonal: right. Beside it: taken for another cause.")
     return section("confusion", CONTENTS["confusion"], lead, drawing)
 
@@ -257,7 +255,7 @@ def _others(cases: Sequence[CaseScore]) -> Html | None:
     if not others:
         return None
     lead = (
-        "The same unseen samples, the same recordings. 1: all that an oracle removes, which is told the true terms and "
+        "The same unseen samples, the same recordings. 1: all that an oracle removes, which knows the true terms and "
         "has only their sizes to find; 0: no better than geometry alone."
     )
     said = [
@@ -271,12 +269,12 @@ def _others(cases: Sequence[CaseScore]) -> Html | None:
         CONTENTS["others"],
         lead,
         _figures(("", "median, p10"), others),
-        folded("What each of them says of each case", answers),
+        folded("What each of them reports of each case", answers),
     )
 
 
 def _stories(cases: Sequence[CaseScore]) -> Html:
-    lead = "Everything that was hidden and everything that was said. Faults of the diagnosis first."
+    lead = "Everything that was hidden and everything that was reported. Faults of the diagnosis first."
     wrong = [c for c in cases if faults(c)]
     right = [c for c in cases if not faults(c)]
     return section("stories", CONTENTS["stories"], lead, *map(_story, wrong), *map(_story, right))
@@ -289,7 +287,7 @@ def _story(case: CaseScore) -> Html:
     lines = [
         f"{case.kind}, {case.family}{way}, {case.samples} samples.",
         f"Hidden: {hidden_words(case)}.",
-        f"Said: {said_words(case)}.",
+        f"Reported: {said_words(case)}.",
     ]
     lines += [s.says for s in case.said]
     lines.append(
@@ -297,11 +295,12 @@ def _story(case: CaseScore) -> Html:
         f"found; noise {_m(case.floor_m)}; oracle {_m(case.oracle_m)}."
     )
     lines.append(
-        f"Free space, against the truth: {_m(case.free_space_before_m)} before, {_m(case.free_space_after_m)} after; "
+        f"Tool error over the workspace, against the truth: {_m(case.free_space_before_m)} before, "
+        f"{_m(case.free_space_after_m)} after; "
         f"oracle {_m(case.oracle_free_space_m)}."
     )
     lines += [
-        f"Size of {d.mechanism}: {s.name} {s.true:.3g}, said {s.said:.3g} ± {s.sigma:.2g}."
+        f"Size of {d.mechanism}: {s.name} {s.true:.3g}, reported {s.said:.3g} ± {s.sigma:.2g}."
         for d in case.defects
         for s in d.sizes
     ]
@@ -310,14 +309,14 @@ def _story(case: CaseScore) -> Html:
 
 
 def _repeat(proof: ProofFile) -> Html:
-    lead = "Everything is drawn from the seed. The hashes were told before anything was diagnosed."
+    lead = "Everything is drawn from the seed. The hashes were published before anything was diagnosed."
     return section(
         "repeat",
         CONTENTS["repeat"],
         lead,
         tag("pre", proof.command),
         tag("p", f"SHA-256 of the list of all seals: {proof.published}"),
-        tag("p", "Drawn anew because a seed gave no session: " + str(sum(c.attempts for c in proof.cases))),
+        tag("p", "Drawn again because a seed gave no session: " + str(sum(c.attempts for c in proof.cases))),
     )
 
 

@@ -1,8 +1,9 @@
-"""`python -m calibeam.prove.published proof.json README.md`: the table of a proof, between two marks of a text.
+"""`python -m calibeam.prove.published proof.json docs/figures.md`: the table of a proof, between two marks of a text.
 
 So that the table is never typed, and always that of a file.
 """
 
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,6 +12,7 @@ import msgspec
 
 from calibeam.prove.record import PLAIN, CaseScore, ProofFile
 from calibeam.prove.tally import (
+    ProofFigure,
     TallyLine,
     at_once,
     by_enr,
@@ -24,6 +26,7 @@ from calibeam.prove.tally import (
 from calibrate.errors import DataError
 from calibrate.report.quantities import length
 
+NUMBER = re.compile(r"\d+(?:\.\d+)?")
 BEGIN, END = "<!-- proof: begin -->", "<!-- proof: end -->"
 
 
@@ -40,7 +43,10 @@ def table_of(proof: ProofFile) -> str:
         "",
         *_findings(cases),
         "",
-        *_rows(("doubt and proof", "measured", "wanted"), [(f.label, f.said, f.wanted or " ") for f in figures(cases)]),
+        *_rows(
+            ("uncertainty and proof", "measured", "wanted"),
+            [(f.label, f.said, wanted_words(f)) for f in figures(cases)],
+        ),
     ]
     others = rivals(cases)
     if others:
@@ -48,7 +54,13 @@ def table_of(proof: ProofFile) -> str:
         lines += ["", *_rows(head, [(f.label, f.said) for f in others])]
     free = by_instrument(cases)
     if free:
-        head = ("free space against the truth, median", "cases", "geometry", "with what was found", "oracle")
+        head = (
+            "tool error over the workspace against the truth, median",
+            "cases",
+            "geometry",
+            "with what was found",
+            "oracle",
+        )
         found = [(f.label, str(f.cases), length(f.geometry_m), length(f.found_m), length(f.oracle_m)) for f in free]
         lines += ["", *_rows(head, found)]
     return "\n".join(lines) + "\n"
@@ -64,7 +76,14 @@ def _findings(cases: Sequence[CaseScore]) -> list[str]:
         over_the_wire(cases),
         in_streams(cases),
     ]
-    head = ("hidden, effect over noise", "n", "located", "named", "named or among rivals", "others said, a case")
+    head = (
+        "hidden, effect over noise",
+        "n",
+        "located",
+        "named",
+        "named or among alternatives",
+        "others reported, a case",
+    )
     return _rows(head, [_cells(line) for line in lines if line.located.n])
 
 
@@ -75,6 +94,22 @@ def _cells(line: TallyLine) -> tuple[str, ...]:
 def _rows(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     cells = [head, ["---"] * len(head), *rows]
     return ["| " + " | ".join(row) + " |" for row in cells]
+
+
+def wanted_words(figure: ProofFigure) -> str:
+    """What was wanted, marked where the measured value itself misses it; its bracket may reach farther."""
+    return f"{figure.wanted}, **missed**" if _missed(figure) else figure.wanted or " "
+
+
+def _missed(figure: ProofFigure) -> bool:
+    wanted = {"none": "<= 0", "all": ">= 100"}.get(figure.wanted, figure.wanted)
+    measured = [float(number) for number in NUMBER.findall(figure.said.partition("(")[0])]
+    bounds = [float(number) for number in NUMBER.findall(wanted)]
+    if wanted.startswith("<="):
+        return any(value > most for value, most in zip(measured, bounds, strict=False))
+    if wanted.startswith(">="):
+        return any(value < least for value, least in zip(measured, bounds, strict=False))
+    return bool(bounds and measured) and not bounds[0] <= measured[0] <= bounds[-1]
 
 
 def with_table(text: str, table: str, name: str) -> str:

@@ -248,11 +248,11 @@ def _scored(layout: Layout, name: str, recording: Recording, answers: Mapping[st
 
 
 LEAD = (
-    "Nobody knows the truth of a real recording. What counts is the error on samples that no fit has seen, and what is "
+    "The truth of a real recording is unknown. What counts is the error on samples that no fit has seen, and what is "
     "inferred of a column that the file has and the model was not given."
 )
 HEAD = ("", "samples", "unseen samples, geometry", "with what was found", "noise, as it is known", "found")
-ANGLES = ("hidden", "poses", "inferred less recorded, rms", "doubt stated before", "poses that do not feel it")
+ANGLES = ("hidden", "poses", "inferred less recorded, rms", "uncertainty stated before", "poses that do not feel it")
 DOUBT = 2.0  # sigmas that the figure shades
 MOST = 6.0  # sigmas that it shows
 
@@ -310,9 +310,11 @@ def _angles(one: RealScore) -> list[Html]:
     caption = "Each joint in turn hidden at a fifth of the poses, inferred from what the instrument saw"
     found = [table(ANGLES, rows, numeric=(1, 2, 3, 4), caption=caption)]
     if any(a.misses for a in one.angles):
-        says = f"Of {one.name}: hidden angles, inferred less recorded, by the doubt stated before."
+        says = f"Of {one.name}: hidden angles, inferred less recorded, over the uncertainty stated before."
         drawing = drawn(f"angles-{one.name}", says, 7.0, 2.6, lambda figure: _paint(figure, one.angles))
-        found.append(figure(drawing, "Shaded: twice the stated doubt. Inside for 95 % if the doubt is a fair one."))
+        found.append(
+            figure(drawing, "Shaded: twice the stated uncertainty. 95 % are inside if the uncertainty is right.")
+        )
     return found
 
 

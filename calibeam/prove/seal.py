@@ -93,5 +93,5 @@ def open_seal(content: bytes, key: bytes, published: str) -> bytes:
     """The truth. BrokenSealError where its hash is another than the published one."""
     truth = seal_truth(content, key)
     if fingerprint(truth) != published:
-        raise BrokenSealError(f"the seal holds SHA-256 {fingerprint(truth)}, published was {published}; conceal anew")
+        raise BrokenSealError(f"the seal holds SHA-256 {fingerprint(truth)}, published was {published}; conceal again")
     return truth

@@ -1,4 +1,4 @@
-"""Sums of a proof: shares by kind of case, by effect over noise, by instrument, by effect; error in free space.
+"""Sums of a proof: shares by kind of case, by effect over noise, by instrument, by effect; error over the workspace.
 
 Shares have the interval of Wilson, J. Am. Stat. Assoc. 22, 1927, whose level also holds near 0 and 1.
 """
@@ -78,7 +78,7 @@ def by_instrument(cases: Sequence[CaseScore]) -> list[FreeSpaceLine]:
 
 
 def shares_of_oracle(cases: Sequence[CaseScore]) -> list[float]:
-    """Share of the squared error in free space that the oracle removes and the diagnosis removed, too."""
+    """Share of the squared error over the workspace that the oracle removes and the diagnosis removed, too."""
     out: list[float] = []
     for numbers in map(_numbers, cases):
         if numbers is not None and numbers[2] <= WORTH * numbers[0]:
@@ -177,7 +177,7 @@ def at_once(cases: Sequence[CaseScore], kind: str) -> TallyLine:
 
 def in_streams(cases: Sequence[CaseScore]) -> TallyLine:
     """All faults that streams tell, together."""
-    return _line("faults that streams tell", [c for c in cases if c.kind == "streams"])
+    return _line("faults found in streams", [c for c in cases if c.kind == "streams"])
 
 
 def between_encoders(cases: Sequence[CaseScore]) -> list[TallyLine]:
@@ -211,12 +211,14 @@ def figures(cases: Sequence[CaseScore]) -> list[ProofFigure]:
         *out,
         ProofFigure("faint (0.15 - 0.3): what is named is right", str(share(s.right for s in faint)), "all"),
         ProofFigure("outside: place right", str(share(c.defects[0].located for c in outside)), ">= 90 %"),
-        ProofFigure("outside: said to be unknown", str(share(_said_unknown(c) for c in outside)), ">= 90 %"),
+        ProofFigure("outside: reported as unknown", str(share(_said_unknown(c) for c in outside)), ">= 90 %"),
         ProofFigure("outside: misnamed with confidence", str(share(c.misnamed for c in outside)), "<= 5 %"),
         ProofFigure(
-            "withheld: says what is missing", str(share(c.asks_for and not c.misnamed for c in withheld)), ">= 95 %"
+            "withheld: names the missing column", str(share(c.asks_for and not c.misnamed for c in withheld)), ">= 95 %"
         ),
-        ProofFigure("withheld: said to be consistent", str(share(c.verdict == "consistent" for c in withheld)), "none"),
+        ProofFigure(
+            "withheld: reported as consistent", str(share(c.verdict == "consistent" for c in withheld)), "none"
+        ),
         ProofFigure("stated sizes within 1.96 sigma", str(share(s.inside for s in sizes)), "93 - 97 %"),
         ProofFigure("diagnoses that failed", str(share(c.verdict == "failed" for c in cases)), "none"),
         *_ratios(cases),
@@ -225,7 +227,7 @@ def figures(cases: Sequence[CaseScore]) -> list[ProofFigure]:
 
 def _ratios(cases: Sequence[CaseScore]) -> Iterable[ProofFigure]:
     floor = [c.held_out_after_m / c.floor_m for c in cases if c.held_out_after_m and c.floor_m and c.kind in SINGLE]
-    yield ProofFigure("held-out / floor, median and p90", _percentiles(floor, 50, 90), "<= 1.05, 1.15")
+    yield ProofFigure("held-out / noise floor, median and p90", _percentiles(floor, 50, 90), "<= 1.05, 1.15")
     gains = [g for c in cases if (g := oracle_share(c)) is not None]
     yield ProofFigure(
         "held-out gain, share of the oracle's, median and p10", _percentiles(gains, 50, 10), ">= 0.97, 0.85"
@@ -233,10 +235,14 @@ def _ratios(cases: Sequence[CaseScore]) -> Iterable[ProofFigure]:
     free = [c for c in cases if c.free_space_before_m and c.free_space_after_m and c.kind in (*SINGLE, "three")]
     found = [c for c in free if c.said]
     ratio = [(c.free_space_after_m or 0.0) / (c.free_space_before_m or 1.0) for c in found]
-    yield ProofFigure("free-space error, after / before, where something was found", _percentiles(ratio), "")
+    yield ProofFigure(
+        "tool error over the workspace, after / before, where something was found", _percentiles(ratio), ""
+    )
     shares = shares_of_oracle(cases)
-    yield ProofFigure("free-space gain, share of the oracle's, median and p10", _percentiles(shares, 50, 10), ">= 0.9")
-    yield ProofFigure("free-space error worse by more than a tenth", str(share(r > 1.1 for r in ratio)), "")
+    yield ProofFigure(
+        "tool error removed, share of the oracle's, median and p10", _percentiles(shares, 50, 10), (">= 0.9")
+    )
+    yield ProofFigure("tool error worse by more than a tenth", str(share(r > 1.1 for r in ratio)), "")
     yield ProofFigure("seconds a case (CPU), median and p90", _percentiles([c.cpu_s for c in cases]), "<= 5")
 
 

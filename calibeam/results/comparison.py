@@ -484,14 +484,14 @@ def _verdict(found: list[Mismatch], parted: tuple[Parted, ...], asked: _Asked) -
 
 def _says(verdict: Verdict, found: list[Mismatch], asked: _Asked) -> str:
     deciding = [one for one in found if one.decides]
-    anew = "; what is set up anew for every recording is taken into account" if len(deciding) < len(found) else ""
+    anew = "; what is set up again for every recording is taken into account" if len(deciding) < len(found) else ""
     if verdict is Verdict.CONSISTENT:
         return f"Measured and simulated agree to within the noise at every level{anew}."
     if verdict is Verdict.UNDECIDABLE:
         return f"{deciding[0].says if deciding else asked.why}."
     named = [one for one in deciding if one.level is not Level.UNEXPLAINED]
     if not named:
-        return "Measured and simulated differ; the links below say where."
+        return "Measured and simulated differ; the links below show where."
     levels = list(dict.fromkeys(one.level.value.replace("-", " ") for one in named))
     left = " Something is left over besides." if len(named) < len(deciding) else ""
     many = f"{len(named)} differences" if len(named) > 1 else "1 difference"

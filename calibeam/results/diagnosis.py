@@ -34,11 +34,15 @@ Keep = Callable[[DiagnosisFile], None]
 
 
 def diagnose_recording(
-    recording: Recording, model: ModelFile | None = None, keep: Keep | None = None
+    recording: Recording,
+    model: ModelFile | None = None,
+    keep: Keep | None = None,
+    begun: Callable[[Stage], None] | None = None,
 ) -> tuple[Diagnosed, DiagnosisFile]:
     """Both as records and as the file says it; with a `model` only what is new to it.
 
     `keep` is called once with what is known as soon as the causes are: sizes, alternatives and proofs take a while.
+    `begun` is called with each stage as it begins.
     DataError where the recording holds too little, or the model is of another rig.
     """
     if model is not None and model.rig.sha256 != rig_sha256(recording.rig_text):
@@ -46,7 +50,7 @@ def diagnose_recording(
             f"the model is of rig '{model.rig.name}', whose file is another than that of {recording.path.name}; "
             "give the model that was identified with this rig, or none"
         )
-    found, file = _diagnosed(recording, model, keep)
+    found, file = _diagnosed(recording, model, keep, begun)
     return found, msgspec.structs.replace(file, next=(*file.next, *unused_columns(recording.samples)))
 
 
@@ -79,7 +83,9 @@ def diagnose_streams(recording: Recording) -> DiagnosisFile:
     return msgspec.structs.replace(file, verdict=Verdict.UNDECIDABLE.value) if agree else file
 
 
-def _diagnosed(recording: Recording, model: ModelFile | None, keep: Keep | None) -> tuple[Diagnosed, DiagnosisFile]:
+def _diagnosed(
+    recording: Recording, model: ModelFile | None, keep: Keep | None, begun: Callable[[Stage], None] | None
+) -> tuple[Diagnosed, DiagnosisFile]:
     rng = np.random.default_rng(SEED)
     if model is None:
 
@@ -87,10 +93,10 @@ def _diagnosed(recording: Recording, model: ModelFile | None, keep: Keep | None)
             if keep is not None:
                 keep(file_of(so_far, recording))
 
-        found = diagnose_samples(recording.rig, recording.samples, rng, known=causes)
+        found = diagnose_samples(recording.rig, recording.samples, rng, known=causes, begun=begun)
         return found, _with_streams(file_of(found, recording), recording, found)
     known = known_before(model, recording.samples)
-    found = diagnose_samples(recording.rig, recording.samples, rng, known.begin)
+    found = diagnose_samples(recording.rig, recording.samples, rng, known.begin, begun=begun)
     if known.same_recording:
         found = only_new(found)  # what its streams show is no part of a model, and not new either
         return found, beside_known(file_of(found, recording), known)
@@ -117,11 +123,12 @@ def plan_next(found: Diagnosed, path: Path) -> str:
     except DataError as why:  # an effect of the known model that cannot be told at other poses
         return f"no plan: {why}; diagnose without --model"
     if chosen is None:
-        return "no plan: no finding has a rival that more poses could tell from it"
+        return "no plan: no finding has an alternative explanation that more poses could exclude"
     plan = plan_of(chosen, physics.model)
     write_pose_plan(path, plan)
     return (
-        f"{plan.poses} poses that tell the rivals apart: {path} (margin to expect: {chosen.before:.0f} BIC before, "
+        f"{plan.poses} poses that separate the alternative explanations: {path} (margin to expect: "
+        f"{chosen.before:.0f} BIC before, "
         f"{chosen.after:.0f} with them)"
     )
 

@@ -109,7 +109,7 @@ class ReadingErrors:
 
     title: str
     unit: str  # "m" or "rad"
-    before: Floats  # (reading,) arm as drawn, places and target where they fit best
+    before: Floats  # (reading,) nominal arm, places and target where they fit best
     after: Floats  # (reading,)
 
 

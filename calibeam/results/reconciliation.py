@@ -166,7 +166,7 @@ def _refuse_unread(samples: Samples) -> None:
     if np.any(is_seated(samples)):
         raise DataError(
             "rows with a probe in a cone or at a bar: the joint angles are the reading; how far a simulation is off "
-            "on unseen rows cannot be told; use compare and diagnose"
+            "on unseen rows cannot be determined; use compare and diagnose"
         )
     if not any(name in samples for names in QUANTITIES.values() for name in names):
         raise DataError("the samples hold no spots, positions or wire lengths to bring a simulation to agree with")
@@ -214,7 +214,7 @@ def _split(samples: Samples, seed: int) -> tuple[Ints, Ints]:
 
 def _geometry(found: Diagnosed, part: Recording) -> ModelFile:
     if found.physics is None:
-        raise DataError("the whole file is wrong; diagnosis.json says how")
+        raise DataError("the whole file is wrong; how is in diagnosis.json")
     alone = found.physics.geometry
     return model_of_fit(alone, alone, found.cleared, part, "geometry alone")
 
@@ -266,7 +266,7 @@ def _unseen(
         t_s = measured.column("t_s")[unseen][known].tolist()
         rows += [RowRecord(name, *row) for row in zip(t_s, *each, strict=True)]
     if not told:
-        raise DataError("no unseen reading with a known noise: how far the simulation is away cannot be told")
+        raise DataError("no unseen reading with a known noise: how far the simulation is off cannot be determined")
     return tuple(told), tuple(rows)
 
 

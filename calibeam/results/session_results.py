@@ -53,7 +53,7 @@ def write_recording_report(
         drift = drift_of(Calibration(NOW, known.model, recording, diagnosis), against, session_arm(known))
     room = session_room(known)
     write_page(path, session_page(known, diagnosis, drift, interactive=interactive, room=room))
-    return session_answers(known, drift, room)
+    return session_answers(known, drift, room, diagnosis)
 
 
 def write_session_results(recording_path: Path, console: Console) -> Identification:

@@ -150,7 +150,7 @@ def _told(rig: Rig, rows: Samples, fitted: Fitted, nothing: Forecast) -> Forecas
         return replace(nothing, why=_short(open_, int(np.sum(felt_m > FELT_M))), corrections=names)
     error_m = _falling(found, nothing.samples)
     if not error_m[0] <= LARGEST_M:
-        return replace(nothing, why="these poses tell too little", corrections=names)
+        return replace(nothing, why="these poses determine too little", corrections=names)
     under = np.flatnonzero(error_m <= nothing.goal_m)
     more = int(under[0]) if under.size else None
     return replace(nothing, now_m=float(error_m[0]), more=more, end_m=float(error_m[-1]), corrections=names)
@@ -227,7 +227,7 @@ def _short(combinations: list[str], count: int) -> str:
 
 
 def _microns(length_m: float) -> str:
-    return f"{1e6 * length_m:.3g} um" if length_m < 1e-3 else f"{1e3 * length_m:.2g} mm"
+    return f"{1e6 * length_m:.3g} µm" if length_m < 1e-3 else f"{1e3 * length_m:.2g} mm"
 
 
 END_S = 5.0  # longer than any forecast takes: a tenth of a second at ninety poses

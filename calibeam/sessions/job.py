@@ -79,7 +79,8 @@ def _taken(one: Recording) -> dict[PoseKey, Sample]:
     rows = [sample_of(row, one.samples.n_joints) for row in one.samples.rows()]
     if len(one.samples) and not any(told):
         raise RecordingError(
-            f"{one.path}: recorded by an earlier version, which did not say which pose a sample is; begin a new session"
+            f"{one.path}: recorded by an earlier version, which did not record the pose of each sample; begin a new "
+            "session"
         )
     return {PoseKey(**pose): row for pose, row in zip(told, rows, strict=False) if pose is not None}
 

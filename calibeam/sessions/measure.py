@@ -17,7 +17,7 @@ from acquisition.session.records import Sample
 from acquisition.session.session import Session, Summary
 from acquisition.wires.bench import WiredBench
 from calibeam.devices.camera import camera_sight
-from calibeam.devices.recorder import RecordingJournal, end_event, kept, new_recording
+from calibeam.devices.recorder import Earlier, RecordingJournal, end_event, kept, new_recording
 from calibeam.devices.site import connected
 from calibeam.interrupts import INTERRUPTS
 from calibeam.learner import FittedLearner
@@ -69,7 +69,8 @@ class Measuring:
         """All that was taken in this part so far. PartialResult when it ended early: the arm stands."""
         with Keys(self._control, self._person.keyboard) as keys, self._person.at(keys), self._forecaster.running():
             try:
-                summary = kept(self._bench, self._writer, self._clock, self._session, self._run(more))
+                earlier = Earlier(self._job.out, len(self._part.earlier.taken))
+                summary = kept(self._bench, self._writer, self._clock, self._session, self._run(more), earlier)
             except PartialResult as early:
                 INTERRUPTS.close()  # a recording is being closed
                 self._reporter.ended_early(early)
@@ -154,7 +155,7 @@ def measuring(
 
 
 def _emulated(part: Part, place: Callable[[int], None], placement: int) -> None:
-    """An emulated fixture knows the places of the rig file only: one that was measured anew is where it was."""
+    """An emulated fixture knows the places of the rig file only: one that was measured again is where it was."""
     origin = {new: old for old, new in part.earlier.stands_in.items()}
     while placement in origin:
         placement = origin[placement]
@@ -164,4 +165,4 @@ def _emulated(part: Part, place: Callable[[int], None], placement: int) -> None:
 def _asked_for(part: Part, person: Person, placement: int) -> None:
     """Has a person place the fixture."""
     where = ", ".join(f"{value:.3f}" for value in part.rig.placements[placement].psd1_in_base.origin_m)
-    person.place(f"put the fixture at place {placement} (PSD 1 near {where} m in the base)")
+    person.place(f"put the fixture at station {placement} (PSD 1 near {where} m in the base)")

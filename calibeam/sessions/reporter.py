@@ -18,7 +18,7 @@ from calibrate.arms.rig_arm import limits_of
 from drivers.clock import Clock
 from drivers.errors import DeviceError
 
-STEPS = ("devices", "plan", "arm", "measure", "look", "result")
+STEPS = ("device check", "plan preview", "confirmation", "measurement", "review", "results")
 WORKING = (RunState.RUNNING, RunState.PAUSING, RunState.ENDING)
 
 
@@ -50,7 +50,7 @@ class StatusReporter:
         with self._turn:
             before = self.shown.progress
             if before is None or (before.placement, before.first) != (progress.placement, progress.first):
-                self.report(f"place {progress.placement}, PSD {progress.first} first")
+                self.report(f"station {progress.placement}, PSD {progress.first} first")
             self._pace.work(progress.phase is not Phase.PLACE and self.shown.state in WORKING)
             self._now(progress=progress, left_s=self._pace.left_s(progress.left))
 
@@ -150,18 +150,18 @@ def _of_sample(sample: Sample, progress: Progress | None) -> str:
     after = "" if look.settle_s is None else f" in {look.settle_s:.2f} s"
     x1, y1, x2, y2 = (1e3 * look.spots_m()).tolist()
     return (
-        f"pose{count}: place {sample.placement}, PSD {sample.first} first, {settled}{after}; spots "
-        f"({x1:+.3f}, {y1:+.3f}) ({x2:+.3f}, {y2:+.3f}) mm"
+        f"pose{count}: station {sample.placement}, PSD {sample.first} first, {settled}{after}; spots "
+        f"({x1:+z.3f}, {y1:+z.3f}) ({x2:+z.3f}, {y2:+z.3f}) mm"
     )
 
 
 def _of_event(kind: str, detail: Mapping[str, Any]) -> str:
     """What is worth a line of the log."""
     if kind == "skipped":
-        return f"pose left out at place {detail.get('placement')}: {detail.get('why')}"
+        return f"pose left out at station {detail.get('placement')}: {detail.get('why')}"
     if kind == "search":
         return f"search for the light: {detail.get('found')} after {detail.get('motions')} motions"
     if kind == "centring":
         steps = len(detail.get("purpose", ())) - 1
-        return f"centring at place {detail.get('placement')}: {detail.get('status')} after {steps} motions"
+        return f"centring at station {detail.get('placement')}: {detail.get('status')} after {steps} motions"
     return "" if kind == "sample" else f"{kind}: {', '.join(f'{k} {v}' for k, v in detail.items())}"

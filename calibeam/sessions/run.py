@@ -77,7 +77,7 @@ class OnSite:
                     break
                 self._plan(part)
                 if not agreed:
-                    self.reporter.step("arm")
+                    self.reporter.step("confirmation")
                     self._person.arm()
                     agreed = True
             try:
@@ -91,7 +91,7 @@ class OnSite:
             if place is None:
                 break
             earlier = with_place(read_earlier_parts(self._job.out, self._job.rig), place)
-        self.reporter.step("result")
+        self.reporter.step("results")
         files = parts(self._job.out)
         from calibeam.results.session_results import (
             write_session_results,  # a second of libraries that no device waits for
@@ -111,7 +111,7 @@ class OnSite:
 
     def _devices(self) -> None:
         """One line each; goes on when all are good, or a person says so. DeviceRefused where one cannot be had."""
-        self.reporter.step("devices")
+        self.reporter.step("device check")
         if self._job.addresses.hurry != 1.0:
             self.reporter.report("emulators at another pace than real time: their devices are not judged")
             return
@@ -173,13 +173,13 @@ class OnSite:
         part = part_of(self._job, earlier, self._half_size_m)
         if not part.open_at(standing):
             return replace(earlier, standing=None)
-        question = f"does the fixture still stand at place {standing}?"
-        told = {"y": "yes, nobody has touched it", "n": "no, or nobody knows: it is measured anew, as a new place"}
+        question = f"does the fixture still stand at station {standing}?"
+        told = {"y": "yes, it was not touched", "n": "no or not sure: it is measured again, as a new station"}
         if stands or self._person.choose(question, told, "n", "n") == "y":
             return earlier
         place = same_place(part.rig, standing)
         self.reporter.report(
-            f"place {standing} is measured anew as place {place.id}; what was taken there still counts"
+            f"station {standing} is measured again as station {place.id}; what was taken there still counts"
         )
         return with_fixture_moved(earlier, place, standing)
 
@@ -187,7 +187,7 @@ class OnSite:
         """Gone through and drawn before anything moves."""
         from calibeam.motion.rehearsal_figure import draw_session  # matplotlib takes a second to load
 
-        self.reporter.step("plan")
+        self.reporter.step("plan preview")
         drawing = next_part(self._job.out).with_suffix(".plan.svg")
         self.reporter.report(draw_session(part.rig, drawing, part.options, part.plan))
         before = f", {len(part.earlier.taken)} taken before" if part.earlier.begun else ""
@@ -196,7 +196,7 @@ class OnSite:
 
     def _measure(self, part: Part) -> Placement | None:
         """A part; a further place that a person wants, None: it is enough."""
-        self.reporter.step("measure")
+        self.reporter.step("measurement")
         ahead = ahead_of_blocks(part.rig, part.blocks) if part.plan is None else ahead_of_plan(part.rig, part.plan)
         path = next_part(self._job.out)
         try:
@@ -210,11 +210,11 @@ class OnSite:
                     if answer != MORE or session.placement is None:
                         break
                     rounds += 1
-                    self.reporter.step("measure")
+                    self.reporter.step("measurement")
                     summary = session.take(more_at(part, session.placement, self._half_size_m, part.options, rounds))
         except KeyboardInterrupt as why:  # at a question, while the arm stands
             INTERRUPTS.close()
-            raise PartialResult(f"{interruption(why)}; what was taken is kept in {path}; {GO_ON}") from why
+            raise PartialResult(f"{interruption(why)}; what was taken is kept in {self._job.out}; {GO_ON}") from why
         except PartialResult as early:
             raise PartialResult(f"{early}; {GO_ON}") from early.__cause__
         self.reporter.report(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {path}")
@@ -222,7 +222,7 @@ class OnSite:
 
     def _look(self, session: Measuring, summary: Summary, part: Part) -> None:
         """How good it is."""
-        self.reporter.step("look")
+        self.reporter.step("review")
         quality = self.reporter.shown.quality
         settled = "" if quality is None or not quality.unsettled else f", {quality.unsettled} of them did not settle"
         self.reporter.report(
@@ -234,12 +234,12 @@ class OnSite:
             self.reporter.report(f"no forecast: {type(why).__name__}: {why}")
             return
         self.reporter.forecast(forecast)
-        self.reporter.report(f"predicted error of the beam in free space: {forecast.says}")
+        self.reporter.report(f"predicted error of the beam over the workspace: {forecast.says}")
 
     def _decide(self, part: Part) -> str:
         choices = {FINISH: "finish: identify, diagnose, report"}
         if part.plan is None:
-            choices |= {MORE: "more poses, the fixture stays", PLACE: "a further place of the fixture"}
+            choices |= {MORE: "more poses, the fixture stays", PLACE: "another station of the fixture"}
         return self._person.choose("what next?", choices, FINISH, FINISH)
 
     def _new_place(self, part: Part) -> Placement | None:
@@ -248,7 +248,7 @@ class OnSite:
         if numbers is None:
             return None
         place = new_place(part.rig, numbers)
-        self.reporter.report(f"place {place.id}; to keep it, add to the rig file:{placement_text(place)}")
+        self.reporter.report(f"station {place.id}; to keep it, add to the rig file:{placement_text(place)}")
         return place
 
 

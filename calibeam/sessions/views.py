@@ -117,7 +117,7 @@ KEYS = {
     RunState.PAUSED: "r go on    s finish here    a abort    h halt\n   leave the fixture where it is",
     RunState.ENDING: "SPACE SPACE stop the arm now    a abort    h halt",
     RunState.ABORTING: "h halt",
-    RunState.HALTED: "h say the stop again",
+    RunState.HALTED: "h repeat the stop",
 }
 
 
@@ -180,7 +180,7 @@ def _head(shown: SessionStatus) -> Text:
     text = Text(f"   {shown.head.upper()}   ", style=style)
     if shown.progress is not None:
         text.append(
-            f"   place {shown.progress.placement}, PSD {shown.progress.first} first",
+            f"   station {shown.progress.placement}, PSD {shown.progress.first} first",
             style="not bold default on default",
         )
     return text

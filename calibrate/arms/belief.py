@@ -1,4 +1,4 @@
-"""What is believed of an arm's links before any data: held as drawn, free, or drawn to a tolerance."""
+"""What is believed of an arm's links before any data: held nominal, free, or drawn to a tolerance."""
 
 import math
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ class LinkBelief:
     def __post_init__(self) -> None:
         if not (self.length_sigma_m >= 0.0 and self.angle_sigma_rad >= 0.0):
             raise ValueError(
-                f"link belief {self.length_sigma_m} m, {self.angle_sigma_rad} rad: a sigma is not negative"
+                f"link tolerance {self.length_sigma_m} m, {self.angle_sigma_rad} rad: a sigma is not negative"
             )
 
 

@@ -52,7 +52,7 @@ def serial_arm(arm: Arm, belief: LinkBelief) -> SerialArm:
 
 
 def arm_of(rig: Rig, belief: LinkBelief | None = None) -> SerialArm:
-    """The rig's arm, its links as `belief` says, else as the [tolerance] says, else held as drawn."""
+    """The rig's arm, its links as `belief` says, else as the [tolerance] says, else held nominal."""
     return serial_arm(rig.arm, drawn_belief(rig) if belief is None else belief)
 
 

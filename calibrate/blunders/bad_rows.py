@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.blunders.finding import Blunder, BlunderKind
+from calibrate.blunders.same_posture import err_alike, postures
 from calibrate.blunders.shots import Shots, outlying, robust_scale
 
 Floats = NDArray[np.float64]
@@ -30,13 +31,17 @@ class _Suspect:
 
 
 def bad_rows(shots: Shots, among: Indices | None = None) -> tuple[Blunder, ...]:
-    """One blunder a row, of those `among` the observations. Nothing where they are too few to say what is usual."""
+    """One blunder a row, of those `among` the observations. Nothing where they are too few to say what is usual.
+
+    Rows whose neighbours in posture err alike are the arm's.
+    """
     misfit = shots.misfit()
     k = misfit.shape[1]
     distance = np.linalg.norm(misfit, axis=1)
     scale = robust_scale(distance, k)
     found = np.flatnonzero(outlying(distance, k))
     found = found if among is None else np.intersect1d(found, among)
+    found = found[~err_alike(misfit, postures(shots.q_rad), found)]
     return tuple(_named(shots, int(i), misfit[i], scale) for i in found)
 
 
@@ -46,10 +51,10 @@ def _named(shots: Shots, i: int, misfit: Floats, scale: float) -> Blunder:
     best = suspects[0]
     alone = len(suspects) == 1 or suspects[1].left > CLEARER * max(best.left, scale)
     if len(misfit) > 1 and best.left < EXPLAINED * scale and alone:
-        what = f"reads {best.written:.9g} where the other rows say about {best.meant:.6g} {best.unit}"
+        what = f"reads {best.written:.9g} where the other rows give about {best.meant:.6g} {best.unit}"
         return Blunder(BlunderKind.WRONG_VALUE, rows, best.column, what, "correct the cell, or remove the row")
     away = float(np.linalg.norm(misfit * shots.sigma))
-    what = f"{1e3 * away:.3g} mm away from what all other rows say ({np.linalg.norm(misfit) / scale:.0f} sigma)"
+    what = f"{1e3 * away:.3g} mm away from what all other rows predict ({np.linalg.norm(misfit) / scale:.0f} sigma)"
     return Blunder(BlunderKind.BAD_SHOT, rows, ", ".join(shots.columns), what, "measure it again, or remove the row")
 
 

@@ -1,9 +1,9 @@
-"""Files written by another convention: every known one is tried against the arm as drawn, and the winner is named.
+"""Files written by another convention: every known one is tried against the nominal arm, and the winner is named.
 
 A hypothesis wins where it alone brings the strain between arm and readings down to a fraction. A real arm lies a few
 millimetres beside its drawing, a wrong convention decimetres, so the two are never mixed up. What drawn things would
 have to move counts too: half a turn of a wrist joint can look like a target on the other side. Two mistakes at once
-are tried where one leaves a gross strain. What the readings cannot tell apart from the file as written is not named.
+are tried where one leaves a gross strain. What the readings cannot separate from the file as written is not named.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -71,7 +71,7 @@ class _Account:
 def wrong_convention(flange: Flange, witnesses: Sequence[Witness]) -> Blunder | None:
     """The convention (or two) that explains the readings when those of the rig do not; None if they do.
 
-    `flange` maps angles (pose, joint) to (pose, 4, 4) of the arm as drawn.
+    `flange` maps angles (pose, joint) to (pose, 4, 4) of the nominal arm.
     """
     if not witnesses:
         return None

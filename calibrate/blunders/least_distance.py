@@ -1,4 +1,4 @@
-"""The least sum of distances by Gauss-Newton under Weiszfeld's weights: a few wild rows do not pull.
+"""The least sum of distances by Gauss-Newton under Weiszfeld's weights: a few outlying rows do not pull.
 
 Source: Weiszfeld's weights for sums of distances as in Lawson, Hanson, Solving Least Squares Problems, 1974, ch. 25
 (iteratively reweighted least squares); damping by Levenberg, Quart. Appl. Math. 2, 1944.

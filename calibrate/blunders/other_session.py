@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording.samples import POSITION
 from calibrate.blunders.finding import Blunder, BlunderKind, runs_of
 from calibrate.blunders.rough_fit import frame_between, rough_fit
+from calibrate.blunders.same_posture import err_alike, postures
 from calibrate.blunders.shots import Shots, outlying, robust_scale
 
 Floats = NDArray[np.float64]
@@ -18,6 +19,7 @@ FEWEST_POSES = 30  # a frame of most rows and one of a block must both stand out
 FEWEST_ROWS = 5  # a frame has six unknowns, five positions fifteen numbers
 BRIDGE = 2  # honest-looking rows inside a block: points near the axis of the difference
 REMAINS = 0.2  # share of the distance that may remain under a frame of the block's own
+SHARED = 0.5  # of a block's rows whose neighbours in posture outside err alike: it is the arm's
 USUAL = 10.0  # robust sigmas; a block of the same arm seen from another frame comes down to the same misfit
 
 
@@ -44,7 +46,10 @@ def sessions_apart(
     expected = tips @ found.linear.T + found.shift_m
     sigma = np.full(3, max(found.typical_m, 1e-9))
     nothing = np.zeros((len(rows), 0))
-    return rows_of_another_session(Shots(rows, POSITION, nothing, position_m, sigma, lambda which, _q: expected[which]))
+    reach_m = max(float(np.ptp(tips, axis=0).max()), 1e-9)
+    posture = np.concatenate([T_base_flange[:, :3, :3].reshape(-1, 9), tips / reach_m], axis=1)
+    shots = Shots(rows, POSITION, nothing, position_m, sigma, lambda which, _q: expected[which], posture)
+    return rows_of_another_session(shots)
 
 
 def _blocks(outlying_rows: Bools) -> list[tuple[int, int]]:
@@ -58,9 +63,18 @@ def _blocks(outlying_rows: Bools) -> list[tuple[int, int]]:
     return [(first, last) for first, last in joined if last - first + 1 >= FEWEST_ROWS]
 
 
+def _of_the_arm(shots: Shots, block: Rows, misfit: Floats) -> bool:
+    """Whether rows outside the block err alike at the same postures."""
+    posture = postures(shots.q_rad) if shots.posture is None else shots.posture
+    outside = ~np.isin(np.arange(len(misfit)), block)
+    return int(outside.sum()) >= FEWEST_ROWS and float(np.mean(err_alike(misfit, posture, block, outside))) > SHARED
+
+
 def _block(shots: Shots, first: int, last: int, misfit: Floats, scale: float) -> Blunder | None:
     """The block as another frame, None if a frame of its own does not explain it."""
     inside = slice(first, last + 1)
+    if _of_the_arm(shots, np.arange(first, last + 1), misfit):
+        return None
     observed = shots.observed[inside]
     expected = observed + misfit[inside] * shots.sigma
     linear, shift_m = frame_between(expected, observed, np.ones(len(observed)))

@@ -1,8 +1,8 @@
-"""How well an arm as drawn explains measured positions, whatever frame and target: fast, robust, mirrors allowed.
+"""How well a nominal arm explains measured positions, whatever frame and target: fast, robust, mirrors allowed.
 
 Frame by the weighted Procrustes solution (Umeyama, IEEE PAMI 13(4), 1991, with the sign of the determinant given
 instead of chosen); target as the weighted mean of the measured points in the flange frame; both in turn. Weights are
-those of the least sum of distances (Weiszfeld), so that a few wild rows do not pull.
+those of the least sum of distances (Weiszfeld), so that a few outlying rows do not pull.
 """
 
 from dataclasses import dataclass

@@ -25,6 +25,7 @@ class Shots:
     observed: Floats  # (obs, k)
     sigma: Floats  # (k,) believed, in the unit of the columns
     expect: Callable[[Rows, Floats], Floats]  # which of the obs, their angles (m, joint) -> (m, k)
+    posture: Floats | None = None  # (obs, n) between which distances are those of postures; None: by the angles
 
     def misfit(self) -> Floats:
         """(obs, k) expected minus observed over believed sigma."""

@@ -1,4 +1,4 @@
-"""What an instrument has to say on whether the arm as drawn can have moved as the file says: its strain, in metres.
+"""What an instrument has to say on whether the nominal arm can have moved as the file says: its strain, in metres.
 
 A witness fits, robustly and in milliseconds, whatever nobody states exactly (the device's frame, the target, the cones)
 and tells what distance remains. Files by another convention are found by comparing strains, never by a threshold.
@@ -49,7 +49,7 @@ class Witness(Protocol):
         ...
 
     def strain(self, T_base_flange: Floats) -> Strain:
-        """For flange poses (pose, 4, 4) of the arm as drawn."""
+        """For flange poses (pose, 4, 4) of the nominal arm."""
         ...
 
     def otherwise(self) -> "Iterator[Otherwise]":

@@ -2,7 +2,7 @@
 
 The controller is taken to compute with the rig file's arm: what it is told to reach, it commands the joints of that arm
 to. The model's flange P(q) = G(q) D(q) is its geometry G with what the physics adds, D, which changes slowly; so the
-geometric arm is sent to W D(q)^-1 for a wanted flange W, and D is evaluated anew until nothing changes. Each round
+geometric arm is sent to W D(q)^-1 for a wanted flange W, and D is evaluated again until nothing changes. Each round
 leaves about a thousandth of what was left before.
 """
 

@@ -33,6 +33,7 @@ from calibrate.weighting import Measured
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
+NEAR = 1e-5  # m, rad: directions that the data hardly see are differences of columns that are large by themselves
 INNER_STEP = 1e-3  # of the range of an inner parameter, for its difference quotient
 PART_STEP = 1e-3  # m, rad: whether a part of the arm follows a parameter at all
 KEPT = 8  # arms of which that is remembered
@@ -66,6 +67,29 @@ class Around:
 
 
 @dataclass(frozen=True, eq=False)
+class Kept:
+    """Derivatives by geometry at one set of values, without weights; they serve for all values near it.
+
+    A slope that is hardly off moves the least squares by next to nothing of a sigma, since what it is multiplied with
+    is noise; residuals are never taken from it.
+    """
+
+    geometry: Floats  # (param,)
+    by: Perturbation
+    slopes: tuple[Floats, ...]  # of each instrument (row, k, param)
+
+    def near(self, geometry: Floats, by: Perturbation) -> bool:
+        """Whether frames are nearly those of the slopes. What acts on a reading moves no frame."""
+        parts = zip(_moving(self.by), _moving(by), strict=True)
+        off = [np.abs(geometry - self.geometry), *(np.abs(old - new) for old, new in parts)]
+        return max(float(part.max(initial=0.0)) for part in off) < NEAR
+
+
+def _moving(by: Perturbation) -> tuple[Floats, ...]:
+    return by.joints_rad, by.frames, by.surroundings
+
+
+@dataclass(frozen=True, eq=False)
 class Augmented:
     """LeastSquares. Values are those of the geometry, then coefficients and smooth inner values of each term.
 
@@ -83,6 +107,8 @@ class Augmented:
     shared: SharedScatter | None = None  # scatter that instruments have in common; a weight, too
     last: dict[bytes, Around] = field(default_factory=dict[bytes, Around])
     slopes: dict[bytes, list[Floats]] = field(default_factory=dict[bytes, list[Floats]])
+    kept: list[Kept] = field(default_factory=list[Kept])  # at most one: where derivatives were computed last
+    added: dict[int, list[Floats]] = field(default_factory=dict[int, list[Floats]])  # of terms, as near as `kept`
 
     def under(self, whiteners: tuple[Floats, ...], shared: SharedScatter | None = None) -> "Augmented":
         """The same with other weights: what was computed last without weights is kept."""
@@ -90,7 +116,7 @@ class Augmented:
 
     def refreshed(self, drivers: Drivers) -> "Augmented":
         """The same with other drivers."""
-        return replace(self, drivers=drivers, last={}, slopes={})
+        return replace(self, drivers=drivers, last={}, slopes={}, added={})
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -168,6 +194,7 @@ class Augmented:
         return np.concatenate(parts)
 
     def jacobian(self, theta: Floats) -> Floats:
+        """By derivatives that were kept, where these values are near them."""
         parts = [whitened.reshape(-1, whitened.shape[-1]) for whitened in self.whitened(self._slopes(theta))]
         joint, geometry = self.session.weighting.unweighted, theta[: len(self.session.parameters)]
         extra = len(theta) - len(geometry)
@@ -176,6 +203,10 @@ class Augmented:
             parts.append(np.concatenate([known, np.zeros((len(known), extra))], axis=1))
         parts += [] if self.assumed is None else [self.assumed.jacobian(len(theta))]
         return np.concatenate(parts)
+
+    def forgetting(self) -> "Augmented":
+        """The same; derivatives are computed where they are asked for next."""
+        return replace(self, slopes={}, kept=[], added={})
 
     def apart(self, parts: Sequence[Floats]) -> list[Floats]:
         """Rows (row, k, ...) of every instrument less what they share with those of the second encoders."""
@@ -191,14 +222,28 @@ class Augmented:
         if key not in self.slopes:
             self.slopes.clear()
             at, (geometry, terms) = self.around(theta), self.split(theta)
-            arm = self._arm_twists(geometry[: len(self.session.arm.parameters)], at)
-            joint = self.session.weighting.unweighted
-            added = [self._term_columns(accepted, at) for accepted in terms]
+            if not (self.kept and self.kept[0].near(geometry, at.by)):
+                self.kept[:] = [Kept(geometry, at.by, self._own_slopes(geometry, at))]
+                self.added.clear()
+            added = [self._added(i, accepted, at) for i, accepted in enumerate(terms)]
             self.slopes[key] = [
-                np.concatenate([self._own_slope(joint, i, m, at, arm), *(columns[i] for columns in added)], axis=-1)
-                for i, m in enumerate(self.session.measured)
+                np.concatenate([own, *(columns[i] for columns in added)], axis=-1)
+                for i, own in enumerate(self.kept[0].slopes)
             ]
         return self.slopes[key]
+
+    def _own_slopes(self, geometry: Floats, at: Around) -> tuple[Floats, ...]:
+        """Of each instrument (row, k, param)."""
+        arm, joint = self._arm_twists(geometry[: len(self.session.arm.parameters)], at), self.session.weighting
+        return tuple(self._own_slope(joint.unweighted, i, m, at, arm) for i, m in enumerate(self.session.measured))
+
+    def _added(self, i: int, accepted: Accepted, at: Around) -> list[Floats]:
+        """Columns of a term; those that bend with an inner value are computed for every one."""
+        if any(not spec.discrete for spec in accepted.term.inner):
+            return self._term_columns(accepted, at)
+        if i not in self.added:
+            self.added[i] = self._term_columns(accepted, at)
+        return self.added[i]
 
     def _arm_twists(self, theta: Floats, at: Around) -> Floats:
         """(sample, 6, param) of the frames as terms have moved them, each before or behind what a term adds there."""

@@ -18,6 +18,8 @@ from calibrate.blunders.bad_rows import bad_rows
 from calibrate.blunders.finding import Blunder, BlunderKind
 from calibrate.blunders.other_session import sessions_apart
 from calibrate.blunders.rough_fit import frame_between, rough_fit
+from calibrate.blunders.same_posture import err_alike, postures
+from calibrate.blunders.shots import Shots
 from calibrate.blunders.witness import by_target
 from calibrate.diagnose.session import Session, session_of
 from calibrate.diagnose.wild_rows import FEWEST_ROWS, alone, behind_gap, lasting
@@ -137,13 +139,24 @@ def _wild(session: Session) -> list[Blunder]:
             out += [_pair(measured, int(i), float(away_m[i])) for i in single]
             continue
         out += bad_rows(shots, single)
-        out += _blocks(measured, behind_gap(distance, k), here, away_m, _limit_m(session, measured))
+        block = lasting_rows(behind_gap(distance, k), here, shots)
+        out += _blocks(measured, block, away_m, _limit_m(session, measured))
     return out
 
 
-def _blocks(measured: Measured, apart: NDArray[np.bool_], place: Ints, away_m: Floats, limit_m: float) -> list[Blunder]:
-    """Rows that follow one another, all farther off than a bump moves anything."""
+def lasting_rows(apart: NDArray[np.bool_], place: Ints, shots: Shots) -> Ints:
+    """Of the rows that are `apart` (row,) those that follow one another, and whose neighbours in posture at other times
+    do not err alike.
+    """
     block = np.flatnonzero(apart & lasting(apart, place))
+    if len(block) == 0:
+        return block
+    others = ~np.isin(np.arange(len(apart)), block)
+    return block[~err_alike(shots.misfit(), postures(shots.q_rad), block, others)]
+
+
+def _blocks(measured: Measured, block: Ints, away_m: Floats, limit_m: float) -> list[Blunder]:
+    """Rows that follow one another, all farther off than a bump moves anything."""
     if len(block) == 0 or float(np.median(away_m[block])) < limit_m:
         return []
     rows = tuple(sorted(int(r) for r in measured.sample_rows[block, -1]))
@@ -160,5 +173,5 @@ def _limit_m(session: Session, measured: Measured) -> float:
 def _pair(measured: Measured, i: int, away_m: float) -> Blunder:
     """Of a pair of rows nobody can say which one is wrong."""
     rows = tuple(sorted(int(r) for r in measured.sample_rows[i]))
-    what = f"{measured.name} {1e3 * away_m:.3g} mm away from what all other rows say"
+    what = f"{measured.name} {1e3 * away_m:.3g} mm away from what all other rows predict"
     return Blunder(BlunderKind.BAD_SHOT, rows, ", ".join(columns_of(measured)), what, "take both again, or remove them")

@@ -37,7 +37,7 @@ class NextPoses:
 
 
 def separating(diagnosis: Diagnosis, rng: Generator, count: int = COUNT) -> NextPoses | None:
-    """The poses to take next; None where no finding has a rival, or where no pose tells them apart."""
+    """The poses to take next; None where no finding has a rival, or where no pose separates them."""
     state = diagnosis.model
     if not isinstance(state, Fitted):
         raise TypeError(f"a diagnosis of {type(state).__name__}, which is no fit to a recording")

@@ -26,7 +26,7 @@ Ints = NDArray[np.intp]
 
 POSES = "measure poses that separate them (calibeam diagnose --plan-out)"
 # Temperature follows time unless the arm is cooled and warmed again (mismatch catalogue, confusable by nature).
-COOLED = "no pose tells them apart; measure on while the arm is cooled and warmed again"
+COOLED = "no pose separates them; measure on while the arm is cooled and warmed again"
 WITNESS = "alike at every pose to this instrument; watch either with a second one, or measure fixed marks again"
 
 
@@ -75,7 +75,7 @@ def _without_proof(found: Doubted, missing: Sequence[Missing]) -> Diagnosis:
         rejected=(),
         invisible=(),
         missing=tuple(missing),
-        next=(*to_measure(found.findings), *found.next),
+        next=(*found.next, *to_measure(found.findings)),
         model=found.at.state,
     )
 

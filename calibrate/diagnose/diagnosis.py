@@ -11,6 +11,7 @@ from calibrate.diagnose.lack_of_fit import LackOfFit
 from calibrate.diagnose.linearised import State
 from calibrate.diagnose.proof import Floor, HeldOut
 from calibrate.diagnose.stages import Incomplete
+from calibrate.diagnose.stated_noise import NoiseFound
 from calibrate.effects.term import Missing, Size
 
 Floats = NDArray[np.float64]
@@ -119,3 +120,4 @@ class Diagnosis:
     next: tuple[str, ...]
     model: State  # geometry, and the terms behind the findings
     incomplete: tuple[Incomplete, ...] = ()  # stages without a result
+    noise: tuple[NoiseFound, ...] = ()  # beside what the rig file states of it

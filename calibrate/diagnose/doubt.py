@@ -38,6 +38,7 @@ from calibrate.diagnose.score import gain_of
 from calibrate.diagnose.search import search
 from calibrate.diagnose.searching import BETTER, Search
 from calibrate.diagnose.stages import Stage, Stages
+from calibrate.diagnose.time_left import TimeLeft, time_left
 from calibrate.diagnose.unknown import with_unknowns
 from calibrate.diagnose.unrecorded import Unrecorded, unrecorded
 from calibrate.effects.term import Missing, Term
@@ -103,9 +104,10 @@ def doubted(
     )
     scatter = stages.attempt(Stage.SCATTER, lambda: unrecorded(at.bench, rng, missing), None)
     misfit = stages.attempt(Stage.REPEATS, lambda: lack_of_fit(at.bench), None)
+    lasting = stages.attempt(Stage.TIME, lambda: time_left(at.bench, rng), None)
     speed = [m for m in missing if m.driver == SPEED]
     moving = _moving(at, speed)
-    left = [*_scattered(scatter), *_repeated(misfit), *moving]
+    left = [*_scattered(scatter), *_repeated(misfit), *_lasting(lasting), *moving]
     final = not left and not stages.undecided
     findings = stages.attempt(
         Stage.SIZES, lambda: findings_of(at, rivals, predicts(at.bench, rng), final), bare_findings(at)
@@ -117,7 +119,7 @@ def doubted(
     if left and not lacking:
         lacking = list(missing)
     unexplained = (*left, *(untold(f, hidden) for f, hidden in drifts))
-    return Doubted(at, findings, unexplained, misfit, _records(lacking), stages.undecided)
+    return Doubted(at, findings, unexplained, misfit, records(lacking), stages.undecided)
 
 
 def _found(state: State, rng: Generator, stages: Stages) -> Search:
@@ -152,7 +154,7 @@ def _scattered(found: Unrecorded | None) -> list[Unexplained]:
         return []
     columns = ", ".join(dict.fromkeys(m.column for m in found.missing))
     why = "scatter that follows the lever of this port, and no recorded column"
-    why += f"; not recorded: {columns}" if columns else ""
+    why += f"; missing column: {columns}" if columns else ""
     drivers = tuple(dict.fromkeys(m.driver for m in found.missing))
     return [Unexplained(found.port.where, drivers, found.share, found.p, why)]
 
@@ -165,7 +167,10 @@ def _moving(at: Search, speed: Sequence[Missing]) -> list[Unexplained]:
     lost = sum(at.bench.gone[i].squares for i in lagging)
     share = lost / (lost + at.bench.sight.rss)
     p = max(at.p.get(at.state.accepted[i].term.key, 0.0) for i in lagging)
-    why = f"{len(lagging)} joints lag by the way they came: slack, or one late clock; not recorded: {speed[0].column}"
+    why = (
+        f"{len(lagging)} joints lag behind their direction of approach: slack, or one late clock; missing column: "
+        f"{speed[0].column}"
+    )
     return [Unexplained(TIME, (SPEED,), share, p, why)]
 
 
@@ -176,8 +181,15 @@ def _repeated(misfit: LackOfFit | None) -> list[Unexplained]:
     return [Unexplained("", (), share, misfit.p, "misfit that comes back when a pose is repeated")]
 
 
-def _records(lacking: Sequence[Missing]) -> tuple[str, ...]:
-    return tuple(f"record {m.column}: without it {m.physics} cannot be told" for m in dict.fromkeys(lacking))
+def _lasting(found: TimeLeft | None) -> list[Unexplained]:
+    if found is None:
+        return []
+    return [Unexplained("", ("t",), max(0.0, 1.0 - 1.0 / found.ratio), found.p, found.what)]
+
+
+def records(lacking: Sequence[Missing]) -> tuple[str, ...]:
+    """One sentence for each column to record."""
+    return tuple(f"record {m.column}: without it {m.physics} cannot be determined" for m in dict.fromkeys(lacking))
 
 
 def with_best_names(at: Search) -> tuple[Search, Rivals]:

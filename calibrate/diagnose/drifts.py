@@ -29,7 +29,7 @@ def suspects(finding: Finding, missing: Sequence[Missing]) -> tuple[Missing, ...
 
 
 def parted_by_time(one: Named, other: Named) -> bool:
-    """Whether two names differ in what they follow along the session only: no pose tells them apart."""
+    """Whether two names differ in what they follow along the session only: no pose separates them."""
     return one.where == other.where and all(map(is_slow_cause, (*one.depends_on, *other.depends_on)))
 
 
@@ -41,9 +41,9 @@ def doubtful(finding: Finding) -> Finding:
 
 
 def untold(finding: Finding, lacking: Sequence[Missing]) -> Unexplained:
-    """What cannot be told of a drift, and the columns that would tell."""
+    """What cannot be determined of a drift, and the columns that would tell."""
     columns = ", ".join(dict.fromkeys(m.column for m in lacking))
-    why = f"it changes along the session, and what it follows cannot be told; not recorded: {columns}"
+    why = f"it changes along the session, and what it follows cannot be determined; missing column: {columns}"
     drivers = tuple(dict.fromkeys(m.driver for m in lacking))
     return Unexplained(finding.name.where, drivers, finding.share, finding.p, why)
 

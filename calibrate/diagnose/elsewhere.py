@@ -83,7 +83,7 @@ class Elsewhere:
     def brought(self) -> tuple[Accepted, ...]:
         """Terms of a known model, which come first: what that model assumes is of their values, too.
 
-        DataError for one that cannot be told where poses have not been taken.
+        DataError for one that cannot be determined where poses have not been taken.
         """
         out = tuple(self.carried(a) for a in self.state.brought)
         unknown = next((a for a, now in zip(self.state.brought, out, strict=True) if now is None), None)

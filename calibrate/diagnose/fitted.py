@@ -128,7 +128,7 @@ class Fitted:
         )
         beliefs = np.zeros((len(believed), len(free)))
         beliefs[range(len(believed)), np.searchsorted(free, believed)] = scale[believed] / sigma[believed]
-        slope = self.problem.jacobian(self.values)[:, free] * scale[free]
+        slope = self.problem.forgetting().jacobian(self.values)[:, free] * scale[free]
         none = np.full(known + len(believed), -1, dtype=np.intp)
         labels = [np.concatenate([x, none]) for x in self._labels]
         stated = len(self._labels[0]) + blocks + np.arange(assumed)
@@ -205,6 +205,7 @@ class Fitted:
         drivers, whiteners, rows = self.drivers if terms else None, whiteners_of(noise.scatters), self.problem.rows
         sizes = plain_sizes(self.session, terms, drivers, whiteners, rows)
         problem = Augmented(self.session, terms, drivers, rows, whiteners, sizes, given, assumed)
+        problem = replace(problem, kept=list(self.problem.kept))
         start = np.concatenate([self.geometry, problem.start[len(self.geometry) :]])
         return _settled(_turn(problem, self.active, start, noise))
 
@@ -222,7 +223,7 @@ def fit_geometry(session: Session, active: Ints | None = None) -> Fitted:
     fits: list[Fitted] = []
     for loss in (Loss.SQUARE, Loss.HUBER):
         seen = in_sight(problem, session.start)
-        rough = solve_in_sight(problem, session.start, seen, damping=FAR_START, loss=loss)
+        rough = solve_in_sight(problem, session.start, seen, damping=FAR_START, tolerance=TOLERANCE, loss=loss)
         fits.append(_settled(_turn(problem, chosen, rough.theta, noise_of(problem, rough))))
         if all(np.all(s.weights > WILD) for s in fits[0].scatters):
             break
@@ -258,18 +259,22 @@ def _makes_outliers(term: Term) -> bool:
 def _settled(fitted: Fitted) -> Fitted:
     """Weights and least squares in turns, until the solver is at rest and the likelihood changes no more.
 
-    Of turns that differ in what they take noise for, the likeliest: no refit ends worse than it was.
+    Of turns that differ in what they take noise for, the likeliest: no refit ends worse than it was. Derivatives may be
+    kept from turn to turn, but the turn that ends it begins with those of its own values.
     """
-    best = fitted
+    best, resting = fitted, False
     for turn in range(1, TURNS):
         last, problem = fitted, fitted.problem
+        anew = resting or turn + 1 == FEWEST_TURNS
+        problem = problem.forgetting() if anew else problem
         if fitted.problem.terms and turn <= REFRESHED:
-            problem = problem.refreshed(fitted.drivers)
+            problem = problem.refreshed(last.drivers)
         new = _turn(problem, fitted.active, fitted.values, fitted.noise)
         fitted = replace(new, steps=fitted.steps + new.steps)
         best = min(best, fitted, key=lambda fit: fit.minus_two_log_likelihood)
         gained = last.minus_two_log_likelihood - fitted.minus_two_log_likelihood
-        if turn + 1 >= FEWEST_TURNS and new.stop in AT_REST and abs(gained) < SETTLED:
+        resting = turn + 1 >= FEWEST_TURNS and new.stop in AT_REST and abs(gained) < SETTLED
+        if resting and anew:
             return replace(best, steps=fitted.steps, stop=Stop.LIKELIHOOD)
     return replace(best, steps=fitted.steps, stop=Stop.ROUNDS)
 
@@ -294,7 +299,8 @@ def _cut(state: Fitted, active: Ints) -> Fitted:
         value, weights = likelihood_of(apart[i][r], covariance)
         scatters.append(Scatter(covariance, weights, value, state.scatters[i].free))
     noise = Noise(tuple(scatters), shared)
-    problem = replace(noise.under(state.problem), rows=rows, last=dict(state.problem.last), slopes={})
+    problem = replace(noise.under(state.problem), rows=rows, last=dict(state.problem.last), slopes={}, added={})
+    problem = replace(problem, kept=list(problem.kept))
     return replace(state, active=active, problem=problem, noise=noise)
 
 

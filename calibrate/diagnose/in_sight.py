@@ -19,12 +19,13 @@ from calibrate.diagnose.augmented import Augmented
 from calibrate.diagnose.visible import VISIBLE
 from calibrate.fit import Fit, Loss, solve
 from calibrate.parameters import Parameter, plausible_sizes, priors, start_values
-from calibrate.solvers.linear import covariance_of
+from calibrate.solvers.linear import covariance_of, triangle_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Bools = NDArray[np.bool_]
 
+DEPENDENT = 1e-9  # of a unit column: what is left below is rounding
 UNSEEN = 1.0  # a direction that the data know no better than what is to be expected stays (docs/mathematics.md, 5)
 
 
@@ -37,21 +38,23 @@ class Directions:
 
 
 def in_sight(problem: Augmented, theta: Floats) -> Directions:
-    """Of a problem at values theta (value,). Terms in the order in which they were accepted."""
+    """Of a problem at values theta (value,). Terms in the order in which they were accepted.
+
+    The rows of the data enter as their triangle, which has the same products of columns in far fewer rows.
+    """
     parameters, owner = problem.parameters, problem.owner
     assumed = priors(parameters)
     unit = _units(problem)
     free = np.array([p.free for p in parameters])
     bounded = free & np.array([bool(np.isfinite(p.lower) or np.isfinite(p.upper)) for p in parameters])
-    rows = np.concatenate([problem.jacobian(theta) * unit, np.diag(unit / assumed)])
+    rows = np.concatenate([triangle_of(problem.jacobian(theta) * unit), np.diag(unit / assumed)])
     out = [_of_geometry(rows, np.flatnonzero(free & ~bounded & (owner < 0)), len(parameters))]
     basis = np.linalg.qr(rows[:, free & (owner < 0)])[0]
     for term in range(int(owner.max(initial=-1)) + 1):
         mine = np.flatnonzero(free & (owner == term) & ~bounded)
         found, span = _of_term(rows, mine, basis, len(parameters))
         out.append(found)
-        smooth = rows[:, bounded & (owner == term)]
-        basis = np.linalg.qr(np.concatenate([basis, span, smooth], axis=1))[0]
+        basis = _with(basis, np.concatenate([span, rows[:, bounded & (owner == term)]], axis=1))
     own = [np.full(sum(part.shape[1] for part in out), -1, dtype=np.intp), np.flatnonzero(bounded)]
     out.append(np.eye(len(parameters))[:, bounded])
     moves = np.concatenate(out, axis=1) * np.where(bounded, 1.0, unit)[:, None]
@@ -72,6 +75,20 @@ def _of_geometry(rows: Floats, mine: Ints, values: int) -> Floats:
     out = np.zeros((values, int(kept.sum())))
     out[mine] = Vt[kept].T
     return out
+
+
+def _with(basis: Floats, columns: Floats) -> Floats:
+    """An orthonormal basis (row, k) and what further columns (row, m) add to it.
+
+    Taken out twice: once leaves the rounding of what is taken out. Source: Giraud, Langou, Rozloznik, The loss of
+    orthogonality in the Gram-Schmidt orthogonalization process, Comput. Math. Appl. 50(7), 2005.
+    """
+    size = np.linalg.norm(columns, axis=0)
+    left = columns[:, size > 0.0] / size[size > 0.0]
+    for _ in range(2):
+        left = left - basis @ (basis.T @ left)
+    Q, R = np.linalg.qr(left)
+    return np.concatenate([basis, Q[:, np.abs(np.diag(R)) > DEPENDENT]], axis=1)
 
 
 def _of_term(rows: Floats, mine: Ints, basis: Floats, values: int) -> tuple[Floats, Floats]:
@@ -148,7 +165,7 @@ def solve_in_sight(
     sigma, centre = priors(parameters), start_values(parameters)
     believed = free[np.isfinite(sigma[free])]
     along = _Along(problem, directions, start, believed, centre[believed], sigma[believed])
-    found = solve(along, damping=damping, max_steps=max_steps, tolerance=tolerance, loss=loss)
+    found = solve(along, damping=damping, max_steps=max_steps, tolerance=tolerance, loss=loss, covariance=False)
     theta = along.values(found.theta)
     return Fit(
         theta,

@@ -27,7 +27,7 @@ class Isolability:
     r2: Floats  # (term, term)
 
     def confusable(self, level: float = CONFUSABLE) -> tuple[tuple[Term, Term, float], ...]:
-        """Pairs that the poses cannot tell apart in either sense."""
+        """Pairs that the poses cannot separate in either sense."""
         both = np.minimum(self.r2, self.r2.T)
         pairs = np.argwhere(np.triu(both >= level, 1))
         return tuple((self.terms[a], self.terms[b], float(both[a, b])) for a, b in pairs)

@@ -44,6 +44,7 @@ class Innocent:
     two_log_likelihood: float
     through_joints: bool
     restless: float  # 2 ln L by which some samples scatter through the joints and the others do not; 0 where none do
+    share: float = 0.0  # of the variance that comes through the joints
 
 
 def innocent(raw: Floats, joints: Floats) -> Innocent:
@@ -56,7 +57,7 @@ def innocent(raw: Floats, joints: Floats) -> Innocent:
     width = 1.0 + best.loud * w
     root = np.einsum("okm,om,ojm->okj", V, 1.0 / np.sqrt(width), V) @ best.by / np.sqrt(best.scale)
     restless = _restless(np.einsum("okm,ok->om", V, y) ** 2, w) if best.loud > 0.0 else 0.0
-    return Innocent(root, best.two_log_likelihood, best.loud > 0.0, restless)
+    return Innocent(root, best.two_log_likelihood, best.loud > 0.0, restless, best.loud / (1.0 + best.loud))
 
 
 @dataclass(frozen=True, eq=False)

@@ -101,7 +101,7 @@ class NoiseLaw:
         return sum(s.minus_two_log_likelihood(before) - s.minus_two_log_likelihood(after) for s in self.series)
 
     def draw(self, rng: Generator, count: int) -> Floats:
-        """(row, count): residuals of whole samples with signs and lengths drawn anew where noise is white, Gaussian
+        """(row, count): residuals of whole samples with signs and lengths drawn again where noise is white, Gaussian
         wander where not.
 
         All instruments of a sample flip together, since the repeatability of the joints may be in each of them. Lengths

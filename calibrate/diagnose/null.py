@@ -12,7 +12,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from calibrate.diagnose.noise_law import NoiseLaw
-from calibrate.diagnose.score import Removed, bic_gain, directions, whitened
+from calibrate.diagnose.score import Removed, bic_gain, directions, turned_out
 from calibrate.diagnose.tail import Tail
 from calibrate.diagnose.visible import Menu, Sight
 from calibrate.effects.term import Term
@@ -80,10 +80,11 @@ def gains_of(menu: Menu, left: Floats) -> Floats:
     """(entry, draw) of residuals (row, draw) that geometry has left."""
     rss, gains = np.sum(left**2, axis=0), np.full((len(menu.entries), left.shape[1]), -np.inf)
     for block in menu.blocks:
-        W = whitened(block)
-        count, k, rows = W.shape
-        squares = np.sum((W.reshape(-1, rows) @ left).reshape(count, k, -1) ** 2, axis=1)
-        rank = np.sum(np.any(W != 0.0, axis=2), axis=1)
+        turn = turned_out(block)
+        count, k, rows = block.raw.shape
+        along = (block.raw.reshape(-1, rows) @ left).reshape(count, k, -1)
+        squares = np.sum((turn @ along) ** 2, axis=1)
+        rank = np.sum(np.any(turn != 0.0, axis=2), axis=1)
         gain = bic_gain(squares, rss, (rank + menu.numbers[block.entries])[:, None], menu.sight.data)
         gains[block.entries] = np.where(rank[:, None] > 0, gain, -np.inf)
     return gains

@@ -6,12 +6,13 @@ Madsen, Jorgensen, Automatica 40(2), 2004; Rasmussen, Williams, Gaussian Process
 2.7 and 5.4.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.causes import acts_at, causes_of
@@ -23,6 +24,7 @@ from calibrate.effects.term import Shape
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+Ints = NDArray[np.intp]
 
 WAVES = {1: 10, 2: 5}  # of each driver, by their number
 SCALES = (0.15, 0.3, 0.6, 1.2)  # length over half the range of a driver
@@ -38,14 +40,14 @@ class Processes:
 
     curves: tuple[Curve, ...]
     gram: Floats  # (curve, k, k) on the complement of what is fitted
-    columns: Floats  # (curve * k, row) on the complement
-    raw: Floats  # (curve * k, row)
+    absorbed: Floats  # (curve, k, rank) coordinates in the basis of what is fitted
+    products: Callable[[Floats], Floats]  # (curve, k, m) of the features with columns (row, m)
+    basis: Floats  # (row, rank) of what is fitted
     rows: int  # data rows
 
     def gains(self, residual: Floats) -> Floats:
         """(curve, draw) of residuals (row, draw) on the complement."""
-        count, k = self.gram.shape[:2]
-        return self._gains(self.gram, (self.columns @ residual).reshape(count, k, -1), np.sum(residual**2, axis=0))
+        return self._gains(self.gram, self.products(residual), np.sum(residual**2, axis=0))
 
     def best(
         self, residual: Floats, allowed: Bools, without: Removed | None = None, least: float = 0.0
@@ -57,10 +59,10 @@ class Processes:
         No process explains more than plain least squares on its features, so curves are asked in the order of that
         bound until it falls below what is found.
         """
-        count, k = self.gram.shape[:2]
-        gram, along, rss = self.gram, (self.columns @ residual).reshape(count, k, 1), float(residual @ residual)
+        count = len(self.curves)
+        gram, along, rss = self.gram, self.products(residual[:, None]), float(residual @ residual)
         if without is not None:
-            back = (self.raw @ without.span).reshape(count, k, without.span.shape[1])
+            back = self.absorbed @ (self.basis.T @ without.span)
             gram, along = gram + back @ np.swapaxes(back, 1, 2), along + (back @ without.part)[:, :, None]
             rss += without.squares
         bound = np.where(allowed, self._bound(gram, along[..., 0], rss), -np.inf)
@@ -116,17 +118,59 @@ def processes(bench: Bench, places: Sequence[tuple[Port, int]], drivers: int) ->
     causes, waves = causes_of(bench.state.drivers), WAVES[drivers]
     names = [c for c in combinations(causes, drivers) if drivers == 1 or _may_pair(c)]
     wanted = [(place, c) for place in places for c in names if all(acts_at(name, place[0].where) for name in c)]
+    used = [place for place in places if any(place == p for p, _ in wanted)]
     curves = tuple(curve(port, component, c, waves) for (port, component), c in wanted)
+    basis = bench.sight.basis
     if not curves:
-        nothing = np.zeros((0, len(bench.sight.residual)))
-        return Processes((), np.zeros((0, 1, 1)), nothing, nothing, bench.sight.data)
-    felt = {place: lever(bench, *place) for place in places}
-    sample = np.maximum(bench.state.rows.sample, 0)
-    shapes = {c: features([causes[n] for n in c], waves).T[:, sample] for c in names}
-    raw = np.concatenate([shapes[c] * felt[place] for place, c in wanted])
-    seen = bench.sight.complement(raw)
-    blocks = seen.reshape(len(curves), -1, seen.shape[1])
-    return Processes(curves, blocks @ np.swapaxes(blocks, 1, 2), seen, raw, bench.sight.data)
+
+        def nothing(columns: Floats) -> Floats:
+            return np.zeros((0, 1, columns.shape[1]))
+
+        return Processes((), np.zeros((0, 1, 1)), nothing(basis), nothing, basis, bench.sight.data)
+    shapes = np.stack([features([causes[n] for n in c], waves).T for c in names])
+    asked = {place: np.array([names.index(c) for p, c in wanted if p == place]) for place in used}
+    felt = [_Felt.of(bench, place, shapes, asked[place]) for place in used]
+
+    def products(columns: Floats) -> Floats:
+        return np.concatenate([one.products(columns) for one in felt])
+
+    absorbed = products(basis)
+    gram = np.concatenate([one.gram for one in felt])
+    gram -= absorbed @ np.swapaxes(absorbed, 1, 2)
+    return Processes(curves, gram, absorbed, products, basis, bench.sight.data)
+
+
+@dataclass(frozen=True, eq=False)
+class _Felt:
+    """Curves at one component of a port: a feature is a function of the sample, a lever the rows' way to follow it.
+
+    Their products with anything over the rows go through sums over the rows of each sample, so that features through
+    levers are never stored.
+    """
+
+    shapes: Floats  # (driver or pair, k, sample) the same at all places
+    asked: Ints  # (curve,) of the drivers or pairs, those that act here
+    lever: csr_matrix  # (sample, row)
+
+    @classmethod
+    def of(cls, bench: Bench, place: tuple[Port, int], shapes: Floats, asked: Ints) -> "_Felt":
+        rows, felt = bench.state.rows, lever(bench, *place)
+        mine = np.flatnonzero(rows.data)
+        by_sample = csr_matrix((felt[mine], (rows.sample[mine], mine)), shape=(shapes.shape[2], len(felt)))
+        return cls(shapes, asked, by_sample)
+
+    def products(self, columns: Floats) -> Floats:
+        """(curve, k, m) with columns (row, m)."""
+        count, k, samples = self.shapes.shape
+        through = np.asarray(self.lever @ columns)
+        return (self.shapes.reshape(-1, samples) @ through).reshape(count, k, -1)[self.asked]
+
+    @property
+    def gram(self) -> Floats:
+        """(curve, k, k)"""
+        square = np.asarray(self.lever.multiply(self.lever).sum(axis=1)).ravel()
+        shapes = self.shapes[self.asked]
+        return (shapes * square) @ np.swapaxes(shapes, 1, 2)
 
 
 def lever(bench: Bench, port: Port, component: int) -> Floats:

@@ -21,6 +21,7 @@ Ints = NDArray[np.intp]
 ROUNDS = 500
 WILD = 6.0  # sigmas after the terms: a wild row, which no model is to blame for
 FEWEST_DOF = 20  # of repeats, for a floor
+EXCHANGES, BY_CHANCE = 300, 0.01
 POSITION = 3  # components of a reading that are lengths
 
 
@@ -55,8 +56,11 @@ def proofs(bare: State, full: State, samples: Ints, rng: Generator) -> tuple[Hel
 
 
 def floors(state: State, samples: Ints, parameters: int) -> tuple[Floor, ...]:
-    """Of every instrument: robust scatter within repeats after the model, or what the fit leaves."""
-    repeat, out = state.drivers.repeat, list[Floor]()
+    """Of every instrument: robust scatter within repeats after the model, or what the fit leaves.
+
+    Repeats far apart in time do not count where they disagree more than those that are nearer.
+    """
+    repeat, t_s, out = state.drivers.repeat, state.drivers.t_s, list[Floor]()
     seen = _lengths(state.held_out(samples))
     total = sum(u.misfit[:, :POSITION].size for u in seen)
     for u in seen:
@@ -65,7 +69,10 @@ def floors(state: State, samples: Ints, parameters: int) -> tuple[Floor, ...]:
         if repeat is not None:
             within = _within(misfit[good], repeat[u.sample[good]])
             if within is not None:
-                out.append(Floor(u.instrument, within, "scatter within repeats, after the model"))
+                near = near_in_time(misfit[good], repeat[u.sample[good]], t_s[u.sample[good]])
+                source = "scatter within repeats, after the model"
+                source = source if near is None else "scatter within repeats near in time, after the model"
+                out.append(Floor(u.instrument, within if near is None else near, source))
                 continue
         rms = float(np.sqrt(np.mean(misfit[good] ** 2) * total / max(total - parameters, 1)))
         out.append(Floor(u.instrument, rms, "what the fit leaves, corrected for its parameters"))
@@ -133,6 +140,33 @@ def _within(misfit: Floats, repeat: Ints) -> float | None:
     if dof < FEWEST_DOF:
         return None
     return _rms(np.concatenate(parts))
+
+
+def near_in_time(misfit: Floats, repeat: Ints, t_s: Floats) -> float | None:
+    """Scatter (m) of the nearer half of repeats, of misfit (row, k); None where the farther half disagrees no more.
+
+    Null: the visits of each pose exchanged in time.
+    """
+    groups = [np.flatnonzero(repeat == group) for group in np.unique(repeat[repeat >= 0])]
+    groups = [mine for mine in groups if len(mine) > 1]
+    a, b = (np.concatenate([mine[np.triu_indices(len(mine), 1)[i]] for mine in groups]) for i in (0, 1))
+    gap_s = np.abs(t_s[a] - t_s[b])
+    far = gap_s > np.median(gap_s)
+    if not far.any() or np.sum(~far) * misfit.shape[1] < FEWEST_DOF:
+        return None
+
+    def squares(values: Floats) -> tuple[float, float]:
+        square = np.mean((values[a] - values[b]) ** 2, axis=1) / 2.0
+        return float(np.mean(square[~far])), float(np.mean(square[far]))
+
+    near, away = squares(misfit)
+    rng, above, moved = np.random.default_rng(1), 0, misfit.copy()
+    for _ in range(EXCHANGES):
+        for mine in groups:
+            moved[mine] = misfit[rng.permutation(mine)]
+        one, other = squares(moved)
+        above += other * near >= away * one
+    return float(np.sqrt(near)) if above < BY_CHANCE * EXCHANGES else None
 
 
 def _rms(errors: Floats) -> float:

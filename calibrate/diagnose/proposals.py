@@ -18,7 +18,7 @@ from calibrate.effects.term import Term
 
 REFINED = 6  # terms with inner values whose order is settled by their best values, not by those of the grid
 NEAR = 0.3  # of the best gain, or of the one to beat: what the grid shows less of, no inner value brings up to it
-EQUAL = 3  # decimals of BIC: what the readings cannot tell apart stays in the catalogue's order
+EQUAL = 3  # decimals of BIC: what the readings cannot separate stays in the catalogue's order
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,10 +15,10 @@ from scipy.special import gammaln
 
 Floats = NDArray[np.float64]
 
-NU = 5.0  # degrees of freedom: a tenth less efficient than least squares on Gaussian data, safe against wild rows
+NU = 5.0  # degrees of freedom: a tenth less efficient than least squares on Gaussian data, safe against outlying rows
 TURNS = 20
 SETTLED = 1e-4  # of -2 log L per observation
-FLOOR = 1e-6  # of the believed noise: perfect data have a scale, too
+FLOOR = 1e-6  # of the assumed noise: perfect data have a scale, too
 LOG_RATIO = (-18.0, 18.0)  # of variance by joints over own variance, as believed both
 
 

@@ -126,6 +126,22 @@ class FloorRecord(Record, frozen=True):
     source: Sentence
 
 
+class NoiseRecord(Record, frozen=True):
+    """What is left of one quantity of an instrument, beside the noise that the rig file states of it."""
+
+    instrument: Label
+    quantity: Label
+    unit: Label  # of `stated` and `found`: m or rad
+    stated: Statistic | None  # rms of one coordinate
+    found: Statistic | None
+    times: Statistic | None
+    times_sigma: Statistic | None
+    statement: Label
+    says: Sentence
+    supports: Many[Sentence] = ()  # that what is left is noise
+    opposes: Many[Sentence] = ()
+
+
 class LackOfFitRecord(Record, frozen=True):
     """Misfit that comes back with a repeated pose, over the scatter within repeats."""
 
@@ -238,3 +254,4 @@ class DiagnosisFile(Record, frozen=True):
     known: KnownRecord | None = None  # of a diagnosis beside a model
     changed: Many[ChangedRecord] = ()
     incomplete: Many[IncompleteRecord] = ()  # what could not be looked at, and why
+    noise: Many[NoiseRecord] = ()

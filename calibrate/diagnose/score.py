@@ -23,7 +23,7 @@ RIDGE = 1e-9  # of a unit column: keeps singular ones finite, far below what is 
 class Removed:
     """Terms taken out of a model, the rest refitted: what comes back into sight."""
 
-    span: Floats  # (row, k) orthonormal: what the others cannot absorb of them
+    span: Floats  # (row, k) orthonormal: what the others cannot absorb of them, in the span of what is fitted
     part: Floats  # (k,) of the residual along it
     cost: int  # parameters that are no longer paid for
 
@@ -85,12 +85,10 @@ def scores(menu: Menu, without: Removed | None = None) -> Scores:
 
 def projected(block: Block, sight: Sight, without: Removed | None) -> tuple[Floats, Floats]:
     """Gram matrices (entry, k, k) and products with the residual (entry, k) in the model without some terms."""
-    count, k, rows = block.seen.shape
-    along = (block.seen.reshape(-1, rows) @ sight.residual).reshape(count, k)
     if without is None:
-        return block.gram, along
-    back = (block.raw.reshape(-1, rows) @ without.span).reshape(count, k, -1)
-    return block.gram + back @ np.swapaxes(back, 1, 2), along + back @ without.part
+        return block.gram, block.along
+    back = block.absorbed @ (sight.basis.T @ without.span)
+    return block.gram + back @ np.swapaxes(back, 1, 2), block.along + back @ without.part
 
 
 def coefficients(menu: Menu, entry: int, without: Removed | None = None) -> Floats:
@@ -122,20 +120,21 @@ def _explained(gram: Floats, along: Floats, numbers: Floats, rss: float, data: i
     return squares, rank
 
 
-def whitened(block: Block) -> Floats:
-    """(entry, k, row) orthonormal rows of every entry; zero where nothing is visible."""
+def turned_out(block: Block) -> Floats:
+    """(entry, k, k) what makes orthonormal rows of every entry's columns behind geometry; zero where nothing shows."""
     w, V = np.linalg.eigh(block.gram)
     turn = V * np.where(w > VISIBLE, 1.0 / np.sqrt(np.maximum(w, VISIBLE)), 0.0)[:, None, :]
-    return np.swapaxes(turn, 1, 2) @ block.seen
+    return np.swapaxes(turn, 1, 2)
 
 
 def directions(menu: Menu, entry: int) -> Floats:
     """(rank, row) orthonormal rows of one entry behind geometry."""
-    span = whitened(_alone(menu, entry))[0]
-    return span[np.any(span != 0.0, axis=1)]
+    one = _alone(menu, entry)
+    turn = turned_out(one)[0]
+    return turn[np.any(turn != 0.0, axis=1)] @ menu.sight.complement(one.raw[0])
 
 
 def _alone(menu: Menu, entry: int) -> Block:
     block = next(b for b in menu.blocks if entry in b.entries)
     at = np.flatnonzero(block.entries == entry)
-    return Block(block.entries[at], block.size[at], block.raw[at], block.seen[at], block.gram[at])
+    return Block(block.entries[at], block.size[at], block.raw[at], block.absorbed[at], block.along[at], block.gram[at])

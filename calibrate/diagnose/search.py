@@ -4,7 +4,7 @@ Greedy selection alone is wrong as soon as two effects share a lever, so after e
 tried against all others. Sources: stepwise search with swaps, Miller, Subset selection in regression, 2002, section
 3.7; term-by-term model building of telescopes, Wallace, TPOINT.
 
-Steps that robust weights have swallowed: shots at a fixture that stood elsewhere for a while look like wild rows.
+Steps that robust weights have swallowed: shots at a fixture that stood elsewhere for a while look like outlying rows.
 Trusted again, they propose the step; it stays where a robust refit leaves no doubt.
 """
 
@@ -63,7 +63,7 @@ def unswallowed(at: Search) -> Search | None:
     trial = Bench(at.state.refitted((*at.state.accepted, proposed.accepted)))
     if trial.bic >= at.bench.bic or not trial.plausible[-1]:
         return None
-    # Picked for its wild rows, so the null, which has none, is no judge: heavy tails make such steps, too.
+    # Picked for its outlying rows, so the null, which has none, is no judge: heavy tails make such steps, too.
     if gain_of(trial.gone[-1], trial.sight) < SURE_SLOW:
         return None
     p = p_of(trial, null_at(trial, at.rng), len(trial.state.accepted) - 1)

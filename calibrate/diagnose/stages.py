@@ -27,6 +27,7 @@ class Stage(Enum):
     ALTERNATIVES = "alternatives"
     SCATTER = "scatter without a driver"
     REPEATS = "misfit of repeats"
+    TIME = "misfit that lasts"
     SIZES = "sizes"
     NOISE = "wander of the noise"
     PROOFS = "proofs"
@@ -50,6 +51,7 @@ DECIDING = frozenset(
         Stage.PREDICTION,
         Stage.SCATTER,
         Stage.REPEATS,
+        Stage.TIME,
         Stage.BEYOND_NOISE,
     }
 )
@@ -71,15 +73,18 @@ class Incomplete:
 
 @dataclass(eq=False)
 class Stages:
-    """Runs stages one after the other and keeps which of them failed."""
+    """Runs stages one after the other and keeps which of them failed. `begun` is called with each as it begins."""
 
     _failed: list[Incomplete] = field(default_factory=list[Incomplete])
+    begun: Callable[[Stage], None] | None = None
 
     def attempt(self, stage: Stage, do: Callable[[], T], otherwise: T, *, refuses: bool = False) -> T:
         """The result of a stage; `otherwise` where it fails, and the reason is kept.
 
         A stage that `refuses` ends the diagnosis by a DataError: it says what is wrong with what was given.
         """
+        if self.begun is not None:
+            self.begun(stage)
         try:
             return do()
         except Exception as why:  # whatever it is, what the stages before have found has to survive it

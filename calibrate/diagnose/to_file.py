@@ -27,6 +27,7 @@ from calibrate.diagnose.schema import (
     IncompleteRecord,
     LackOfFitRecord,
     NameRecord,
+    NoiseRecord,
     NotRecorded,
     RejectedRecord,
     RigRecord,
@@ -38,6 +39,7 @@ from calibrate.diagnose.schema import (
 )
 from calibrate.diagnose.smallest_visible import Smallest, smallest_visible
 from calibrate.diagnose.stages import Incomplete, Stage, Stages
+from calibrate.diagnose.stated_noise import NoiseFound
 from calibrate.effects.catalogue import EFFECTS
 from calibrate.effects.form import Form
 from calibrate.effects.term import Size
@@ -114,6 +116,7 @@ def _with_physics(physics: Physics, rig: RigRecord, blunders: tuple[BlunderRecor
         derived=(DERIVED_APPROACH,) if drivers.approach_derived else (),
         blunders=blunders,
         incomplete=tuple(map(_incomplete, stages.failed)),
+        noise=tuple(map(_noise, said.noise)),
     )
 
 
@@ -174,6 +177,22 @@ def _split(proof: HeldOut) -> SplitRecord:
 
 def _floor(floor: Floor) -> FloorRecord:
     return FloorRecord(floor.instrument, _number(floor.rms_m), floor.source)
+
+
+def _noise(found: NoiseFound) -> NoiseRecord:
+    return NoiseRecord(
+        instrument=found.instrument,
+        quantity=found.quantity,
+        unit=found.unit,
+        stated=found.stated,
+        found=_number(found.found),
+        times=None if found.times is None else _number(found.times),
+        times_sigma=None if found.times_sigma is None else _number(found.times_sigma),
+        statement=found.statement.value,
+        says=found.says,
+        supports=found.supports,
+        opposes=found.opposes,
+    )
 
 
 def _rejected(rejected: Rejected) -> RejectedRecord:

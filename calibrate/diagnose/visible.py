@@ -59,13 +59,17 @@ class Entry:
 
 @dataclass(frozen=True)
 class Block:
-    """Entries with the same number of coefficients; columns have unit length before geometry is taken out."""
+    """Entries with the same number of coefficients; columns have unit length before geometry is taken out.
+
+    Columns on the complement are not kept: products with them follow from what geometry absorbs.
+    """
 
     entries: Ints  # (entry,) index in the menu
     size: Floats  # (entry, k) length of the whitened columns
     raw: Floats  # (entry, k, row)
-    seen: Floats  # (entry, k, row) on the complement
-    gram: Floats  # (entry, k, k) of `seen`; the diagonal is the visible share
+    absorbed: Floats  # (entry, k, rank) coordinates in the basis of what is fitted
+    along: Floats  # (entry, k) products with the residual
+    gram: Floats  # (entry, k, k) on the complement; the diagonal is the visible share
 
 
 @dataclass(frozen=True)
@@ -123,7 +127,7 @@ def beyond(menu: Menu, span: Floats) -> Menu:
     return Menu(
         menu.terms,
         menu.entries,
-        tuple(_deflated(block, span) for block in menu.blocks),
+        tuple(_deflated(block, span, span.T @ sight.residual) for block in menu.blocks),
         Sight(basis, residual, sight.dual, sight.data),
     )
 
@@ -134,16 +138,24 @@ def grid_of(term: Term) -> list[Floats]:
     return list(np.stack([m.ravel() for m in meshed], axis=1)) if meshed else [np.zeros(0)]
 
 
-def _block(chosen: Ints, columns: Sequence[Floats], sight: Sight) -> Block:
-    raw = np.stack([columns[i].T for i in chosen])
+def _block(chosen: Ints, columns: list[Floats], sight: Sight) -> Block:
+    """Takes its columns out of the list: all candidates at once are most of what a diagnosis holds."""
+    raw = np.empty((len(chosen), columns[chosen[0]].shape[1], columns[chosen[0]].shape[0]))
+    for at, i in enumerate(chosen):
+        raw[at] = columns[i].T
+        columns[i] = np.zeros((0, 0))
     size = np.linalg.norm(raw, axis=2)
     raw /= np.where(size > 0.0, size, 1.0)[:, :, None]
     flat = raw.reshape(-1, raw.shape[2])
-    seen = sight.complement(flat).reshape(raw.shape)
-    return Block(chosen, size, raw, seen, seen @ np.swapaxes(seen, 1, 2))
+    absorbed = (flat @ sight.basis).reshape(*raw.shape[:2], -1)
+    along = (flat @ sight.residual).reshape(raw.shape[:2])
+    gram = raw @ np.swapaxes(raw, 1, 2) - absorbed @ np.swapaxes(absorbed, 1, 2)
+    return Block(chosen, size, raw, absorbed, along, gram)
 
 
-def _deflated(block: Block, span: Floats) -> Block:
-    along = (block.seen.reshape(-1, block.seen.shape[2]) @ span).reshape(*block.seen.shape[:2], -1)
-    gram = block.gram - along @ np.swapaxes(along, 1, 2)
-    return Block(block.entries, block.size, block.raw, block.seen - along @ span.T, gram)
+def _deflated(block: Block, span: Floats, part: Floats) -> Block:
+    """`part` (k,) of the residual along the span."""
+    more = (block.raw.reshape(-1, block.raw.shape[2]) @ span).reshape(*block.raw.shape[:2], -1)
+    gram = block.gram - more @ np.swapaxes(more, 1, 2)
+    absorbed = np.concatenate([block.absorbed, more], axis=2)
+    return Block(block.entries, block.size, block.raw, absorbed, block.along - more @ part, gram)

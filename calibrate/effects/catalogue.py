@@ -1,5 +1,6 @@
-"""All effects, one line each; tests/calibrate/effects checks every one by law."""
+"""All effects, one line each, and those of installed packages; tests/calibrate/effects checks every one by law."""
 
+from calibrate import plug_ins
 from calibrate.effects import (
     arm_thermal_growth,
     axis_wobble,
@@ -38,8 +39,10 @@ from calibrate.effects import (
     tool_sag,
 )
 from calibrate.effects.drivers import Drivers
+from calibrate.effects.kind import Kind
 from calibrate.effects.second_encoders import at_second_encoders
 from calibrate.effects.term import Effect, Holds, Missing, Term
+from calibrate.plug_ins import loaded
 
 EFFECTS: tuple[Effect, ...] = (
     encoder_eccentricity.EFFECT,
@@ -77,6 +80,7 @@ EFFECTS: tuple[Effect, ...] = (
     open_at_frames.EFFECT,
     open_at_readouts.EFFECT,
     open_by_columns.EFFECT,
+    *loaded(plug_ins.EFFECTS, Kind),
 )
 
 

@@ -23,7 +23,7 @@ EFFECT = Kind(
     "device-drift",
     "A tripod settles or warms, and the frame of the tracker or drum moves with it.",
     ("base-moved",),
-    "ASME B89.4.19-2006, app. D (drift of laser trackers); motion of the base looks exactly the same",
+    "ASME B89.4.19-2006, app. D (drift of laser trackers); motion of the base has exactly the same effect",
     _terms,
     holds=Holds.SESSION,
 )

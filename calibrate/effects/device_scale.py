@@ -87,7 +87,8 @@ EFFECT = Kind(
     "device-scale",
     "A wrong refractive index, drum diameter or wire tension makes every length too long by the same share.",
     ("device-drift",),
-    "refractive index of air, 1e-6 per K: Ciddor, Appl. Optics 35(9), 1996; the arm's own scale looks the same unless "
-    "its drawing is trusted",
+    "refractive index of air, 1e-6 per K: Ciddor, Appl. Optics 35(9), 1996; the arm's own scale has the same effect "
+    "unless "
+    "its nominal lengths are accurate",
     _terms,
 )

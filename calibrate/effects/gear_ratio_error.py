@@ -31,7 +31,9 @@ def _term(drivers: Drivers, joint: int) -> Term:
         function=function,
         names=("scale_error_rad_per_rad",),
         limit=LIMIT_RAD_PER_RAD,
-        sentence=f"Joint {joint} turns {{scale_error_rad_per_rad}} more than it says: gear ratio or encoder scale",
+        sentence=(
+            f"Joint {joint} turns {{scale_error_rad_per_rad}} more than its encoder reads: gear ratio or encoder scale"
+        ),
         directions=direction,
     )
 

@@ -33,7 +33,7 @@ def _missing(drivers: Drivers) -> tuple[Missing, ...]:
 
 EFFECT = Kind(
     "laser-thermal-drift",
-    "Beam pointing of a diode module follows its temperature, 2 to 12 urad per K.",
+    "Beam pointing of a diode module follows its temperature, 2 to 12 µrad per K.",
     ("laser-warm-up", "base-moved"),
     "mismatch catalogue: laser pointing",
     _terms,

@@ -21,7 +21,7 @@ EFFECT = Kind(
     "laser-warm-up",
     "A diode's mount expands after switching on and turns the beam until it is in balance.",
     ("base-moved", "laser-thermal-drift"),
-    "pointing stability of diode modules, 5 to 50 urad over the first half hour (makers' data sheets)",
+    "pointing stability of diode modules, 5 to 50 µrad over the first half hour (makers' data sheets)",
     _terms,
     holds=Holds.SESSION,
 )

@@ -181,7 +181,7 @@ PLACES: tuple[Callable[[Drivers, Column], list[Term]], ...] = (
 
 EFFECT = Kind(
     "unknown",
-    "Something that was recorded goes along with an error, and no entry of this catalogue says why.",
+    "Something that was recorded goes along with an error, and no entry of this catalogue explains it.",
     ("link-thermal-growth", "laser-thermal-drift", "base-moved"),
     "mismatch lesson 8 of section 10: every unrecorded driver is a name that cannot be given",
     _terms,

@@ -64,6 +64,7 @@ EFFECT = Kind(
     "psd-gain",
     "The length that a detector's electronics divide by is not that of its face.",
     ("psd-nonlinearity", "device-scale"),
-    "mismatch catalogue: gain, cross; it looks like the robot's scale unless distances between places are known",
+    "mismatch catalogue: gain, cross; it has the effect of the robot's scale unless distances between stations are "
+    "known",
     _terms,
 )

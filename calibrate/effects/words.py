@@ -4,7 +4,7 @@ import math
 
 from calibrate.effects.term import Size
 
-NOT_TOLD = "(not told by these data)"
+NOT_TOLD = "(not determined by these data)"
 
 # Ending of a name, with (from this size on, factor, unit), largest first. The first ending that fits is taken.
 Steps = tuple[tuple[float, float, str], ...]

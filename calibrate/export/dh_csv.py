@@ -2,7 +2,7 @@
 
 from acquisition.recording.rig import ArmModel, Pose
 from calibrate.arms.convert import Conversion, convert, pose_of
-from calibrate.export.identified import SIGN, IdentifiedArm
+from calibrate.export.identified import IdentifiedArm
 
 TABLE = ("theta_offset_rad", "d_m", "a_m", "alpha_rad", "tilt_rad")
 FRAME = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
@@ -14,7 +14,7 @@ def dh_csv_text(arm: IdentifiedArm) -> str:
     lines = [
         "# Standard Denavit-Hartenberg table, identified by calibeam; m and rad",
         "# T_base_flange = base T_1 ... T_n flange; T_i = Rz(q_i + theta_offset) Tz(d) Tx(a) Rx(alpha) Ry(tilt)",
-        f"# {SIGN}",
+        f"# {arm.sign}",
         *(f"# {says}" for says in arm.not_carried),
         "# base and flange: origin x, y, z and rotation vector rx, ry, rz (axis times angle)",
         ",".join(("row", *TABLE, *FRAME)),

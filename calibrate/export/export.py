@@ -13,6 +13,7 @@ from calibrate.export.json_text import json_text
 from calibrate.export.mastering import abb_moc_text, fanuc_mastering_text, kuka_mastering_text
 from calibrate.export.matlab import matlab_text
 from calibrate.export.mjcf import mjcf_text
+from calibrate.export.nominal_table import nominal_table_text
 from calibrate.export.ur import ur_calibration_text, ur_kinematics_text
 from calibrate.export.urdf import urdf_text
 from calibrate.model_file import ModelFile, corrections
@@ -34,6 +35,7 @@ class ExportForm(enum.Enum):
     KUKA_MASTERING = "kuka-mastering"
     ABB_MOC = "abb-moc"
     FANUC_MASTERING = "fanuc-mastering"
+    TABLE = "table"  # nominal, correction, calibrated
 
 
 FORMS: Mapping[ExportForm, Callable[[IdentifiedArm], str]] = {
@@ -47,6 +49,7 @@ FORMS: Mapping[ExportForm, Callable[[IdentifiedArm], str]] = {
     ExportForm.KUKA_MASTERING: kuka_mastering_text,
     ExportForm.ABB_MOC: abb_moc_text,
     ExportForm.FANUC_MASTERING: fanuc_mastering_text,
+    ExportForm.TABLE: nominal_table_text,
 }
 
 SUFFIX: Mapping[ExportForm, str] = {
@@ -60,6 +63,7 @@ SUFFIX: Mapping[ExportForm, str] = {
     ExportForm.KUKA_MASTERING: ".kuka-mastering.csv",
     ExportForm.ABB_MOC: ".abb-moc.csv",
     ExportForm.FANUC_MASTERING: ".fanuc-mastering.csv",
+    ExportForm.TABLE: ".table.csv",
 }
 MAKES: Mapping[ExportForm, Make] = {  # whose controllers a form is for
     ExportForm.UR_KINEMATICS: Make.UR,
@@ -70,12 +74,19 @@ MAKES: Mapping[ExportForm, Make] = {  # whose controllers a form is for
 }
 OFFSETS = (ExportForm.KUKA_MASTERING, ExportForm.ABB_MOC, ExportForm.FANUC_MASTERING)  # hold zeros, no geometry
 
+UNCOUPLED: Mapping[ExportForm, str] = {  # forms that cannot carry a joint that follows another one, with the reason
+    ExportForm.UR_KINEMATICS: "no arm of Universal Robots has one; take another form, or correct the rig",
+    ExportForm.UR_CALIBRATION: "no arm of Universal Robots has one; take another form, or correct the rig",
+    ExportForm.ABB_MOC: "the rig file does not hold how its motors are coupled: offsets of motors would be guesses",
+}
+
 
 def export_text(rig: Rig, values: Mapping[str, float], form: ExportForm) -> str:
     """The file's text; `values` are corrections by name.
 
     DataError for a correction of no parameter, or an arm that the form cannot hold.
     """
+    _refuse_coupled(rig, form)
     return FORMS[form](identified_arm(rig, values))
 
 
@@ -86,12 +97,15 @@ def export_model(path: Path, rig: Rig, model: ModelFile, form: ExportForm) -> tu
     where effects cannot be evaluated; OSError where the folder cannot be written.
     """
     refuse_other_make(rig, form)
+    _refuse_coupled(rig, form)
     soft = _linear_compliance(rig, model) if form is ExportForm.MJCF else {}
     says = _not_carried(model, tuple(soft)) if model.effects else ()
     if form in OFFSETS:
         says = (_geometry_lost(model), *says)
     compliance = {int(e.where.removeprefix("joint").split(".")[0]): c for e, c in soft.values()}
-    arm = identified_arm(rig, corrections(model), model.about.get("tool"), says, model.parameters, compliance)
+    arm = identified_arm(
+        rig, corrections(model), model.about.get("tool"), says, model.parameters, compliance, model.covariance
+    )
     partial = path.with_name(path.name + ".partial")
     partial.write_text(FORMS[form](arm), encoding="utf-8")
     partial.replace(path)
@@ -111,6 +125,13 @@ def refuse_other_make(rig: Rig, form: ExportForm) -> None:
         f"rig {rig.name}: {form.value} is for arms of make '{wanted.value}', and the make of this one is {state}; take "
         f'another form, or state make = "{wanted.value}" under [arm] if it is one'
     )
+
+
+def _refuse_coupled(rig: Rig, form: ExportForm) -> None:
+    """DataError for an arm with a joint that follows another one, where the form cannot carry that."""
+    followers = [i for i, joint in enumerate(rig.arm.joints, start=1) if joint.follows is not None]
+    if followers and form in UNCOUPLED:
+        raise DataError(f"rig {rig.name}: joint {followers[0]} follows another joint, and {UNCOUPLED[form]}")
 
 
 def _linear_compliance(rig: Rig, model: ModelFile) -> dict[str, tuple[Effect, float]]:

@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 from acquisition.recording.rig import Rig
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.convert import corrected_parts
+from calibrate.arms.coupled_readings import by_reading
 from calibrate.arms.eccentric import COSINE, SINE
 from calibrate.errors import DataError
-from calibrate.model_file import ModelParameter
+from calibrate.model_file import Covariance, ModelParameter
 
 Floats = NDArray[np.float64]
 
-SIGN = (
+SIGN = (  # of an arm whose joints count from the link in front
     "joint values are the readings of the controller or the encoders; identified zeros are already inside the numbers"
     " below, nothing is to be added or subtracted"
 )
@@ -23,7 +24,7 @@ SIGN = (
 
 @dataclass(frozen=True)
 class AxisOffset:
-    """True angle = reading + value."""
+    """Of a reading: the arm stands as if reading + value were read, in the robot's own signs and couplings."""
 
     joint: int  # from 1
     value_rad: float
@@ -33,7 +34,9 @@ class AxisOffset:
 
 @dataclass(frozen=True)
 class IdentifiedArm:
-    """T_base_flange(q) = F_0 Rz(q_1) F_1 ... Rz(q_n) F_n with q the joint readings."""
+    """T_base_flange(q) = F_0 Rz(q_1) F_1 ... Rz(q_n) F_n with q the angles from the link in front: the readings, but
+    of a joint that follows another one (arms/coupled_readings.py).
+    """
 
     rig: Rig
     corrections: Mapping[str, float]  # of the arm only
@@ -42,6 +45,36 @@ class IdentifiedArm:
     not_carried: tuple[str, ...] = ()  # sentences: what the form cannot hold (not_carried.py)
     zeros: tuple[AxisOffset, ...] = ()
     compliance_rad_nm: Mapping[int, float] = field(default_factory=dict[int, float])  # joint from 1: linear ones
+    stated: tuple[ModelParameter, ...] = ()  # what the model holds of each correction
+
+    @property
+    def sign(self) -> str:
+        """What the joint values of a file are, which has no coupled joints of its own."""
+        followers = [
+            f"joint {i} = reading {i} {'+' if joint.follows.by > 0.0 else '-'} reading {joint.follows.joint}"
+            for i, joint in enumerate(self.rig.arm.joints, start=1)
+            if joint.follows is not None
+        ]
+        if not followers:
+            return SIGN
+        return (
+            f"joint values are physical angles, each from the link in front: {', '.join(followers)}; those of all other"
+            " joints are the readings of the controller. Limits are those of the angles over all readings. Identified"
+            " zeros are already inside the numbers below, nothing is to be added or subtracted"
+        )
+
+    @property
+    def limits_rad(self) -> tuple[tuple[float, float], ...]:
+        """(lower, upper) of every angle: of a joint that follows, over the ranges of both readings."""
+        joints, out = self.rig.arm.joints, list[tuple[float, float]]()
+        for joint in joints:
+            low, high = joint.lower_rad, joint.upper_rad
+            if joint.follows is not None:
+                other = joints[joint.follows.joint - 1]
+                ends = sorted(joint.follows.by * end for end in (other.lower_rad, other.upper_rad))
+                low, high = low + ends[0], high + ends[1]
+            out.append((low, high))
+        return tuple(out)
 
 
 def identified_arm(
@@ -51,18 +84,14 @@ def identified_arm(
     not_carried: tuple[str, ...] = (),
     stated: Sequence[ModelParameter] | None = None,
     compliance_rad_nm: Mapping[int, float] | None = None,
+    covariance: Covariance | None = None,
 ) -> IdentifiedArm:
     """Takes what belongs to arm and tool point; `tool_about_m` is what a model's corrections of the tool are about,
     else the rig's point. `stated`: what the model holds of each correction; None: nothing beside its value.
+    `covariance`: of these; without it, zeros count as independent of each other.
 
     DataError for a joint or link that this arm does not have.
     """
-    followers = [i for i, joint in enumerate(rig.arm.joints, start=1) if joint.follows is not None]
-    if followers:
-        raise DataError(
-            f"rig {rig.name}: joint {followers[0]} follows another joint, and this form has no coupled joints; give the"
-            " program that needs the arm angles from the links in front, and a rig without 'follows'"
-        )
     known = {p.name for p in arm_of(rig).parameters}
     discs = [name for name, value in corrections.items() if name.endswith((SINE, COSINE)) and value != 0.0]
     if discs:
@@ -78,9 +107,9 @@ def identified_arm(
             )
     own = {k: v for k, v in corrections.items() if k in known}
     tool_m = _tool_m(rig.tool.point_m if tool_about_m is None else tool_about_m[:3], corrections)
-    zeros = tuple(_zero(i, own, stated) for i in range(1, rig.n_joints + 1))
+    zeros = _of_readings(rig, tuple(_zero(i, own, stated) for i in range(1, rig.n_joints + 1)), covariance)
     parts, yields = corrected_parts(rig.arm, own), dict(compliance_rad_nm or {})
-    return IdentifiedArm(rig, own, parts, tool_m, not_carried, zeros, yields)
+    return IdentifiedArm(rig, own, parts, tool_m, not_carried, zeros, yields, tuple(stated or ()))
 
 
 def _zero(joint: int, own: Mapping[str, float], stated: Sequence[ModelParameter] | None) -> AxisOffset:
@@ -92,6 +121,36 @@ def _zero(joint: int, own: Mapping[str, float], stated: Sequence[ModelParameter]
     if found is None or found.value is None:
         return AxisOffset(joint, own.get(name, 0.0), None, True)
     return AxisOffset(joint, found.value, found.sigma, False)
+
+
+def _of_readings(rig: Rig, zeros: tuple[AxisOffset, ...], covariance: Covariance | None) -> tuple[AxisOffset, ...]:
+    """Offsets of the readings for zeros of the angles: with angle 3 = reading 3 + reading 2, zero 3 less zero 2."""
+    matrix = by_reading(rig.arm)
+    if matrix is None:
+        return zeros
+    back = np.linalg.inv(matrix)
+    value = back @ np.array([zero.value_rad for zero in zeros])
+    C = _covariance(zeros, covariance)
+    variance = np.diag(back @ C @ back.T)
+    out: list[AxisOffset] = []
+    for i, zero in enumerate(zeros):
+        of = [other for other, share in zip(zeros, back[i], strict=True) if share != 0.0]
+        known = all(other.sigma_rad is not None for other in of)
+        sigma = float(np.sqrt(variance[i])) if known else None
+        out.append(AxisOffset(zero.joint, float(value[i]), sigma, any(other.undetermined for other in of)))
+    return tuple(out)
+
+
+def _covariance(zeros: tuple[AxisOffset, ...], held: Covariance | None) -> Floats:
+    """(joint, joint) of the zeros; independent where the model holds no covariance of them."""
+    out = np.diag([(zero.sigma_rad or 0.0) ** 2 for zero in zeros])
+    place = {} if held is None else {name: i for i, name in enumerate(held.names)}
+    for a, one in enumerate(zeros):
+        for b, other in enumerate(zeros):
+            i, j = (place.get(f"joint{zero.joint}.zero") for zero in (one, other))
+            if held is not None and a != b and i is not None and j is not None:
+                out[a, b] = held.rows[i][j]
+    return out
 
 
 def _tool_m(about_m: tuple[float, ...] | None, corrections: Mapping[str, float]) -> tuple[float, float, float] | None:

@@ -4,8 +4,10 @@ import msgspec
 
 from acquisition.recording.rig import ArmModel
 from calibrate.arms.convert import convert, pose_of
+from calibrate.arms.coupled_readings import by_reading
 from calibrate.export.dh_csv import FRAME, TABLE, dh_numbers
-from calibrate.export.identified import SIGN, IdentifiedArm
+from calibrate.export.identified import IdentifiedArm
+from calibrate.export.nominal_table import nominal_table
 
 
 def json_text(arm: IdentifiedArm) -> str:
@@ -18,20 +20,25 @@ def json_text(arm: IdentifiedArm) -> str:
         "name": arm.rig.name,
         "convention": {
             "units": "m, rad",
-            "sign": SIGN,
+            "sign": arm.sign,
             "parts": "T_base_flange = F_0 Rz(q_1) F_1 ... Rz(q_n) F_n; 4x4 row by row",
             "dh": "T_base_flange = base T_1 ... T_n flange; T_i = Rz(q_i + theta_offset) Tz(d) Tx(a) Rx(alpha)"
             " Ry(tilt); rx, ry, rz is a rotation vector",
+            "table": "degrees and millimetres, in the robot's own signs; calibrated = nominal + correction",
             "tool_point_m": "in the flange frame",
         },
-        "joints": [{"lower_rad": j.lower_rad, "upper_rad": j.upper_rad} for j in arm.rig.arm.joints],
+        "joints": [{"lower_rad": low, "upper_rad": high} for low, high in arm.limits_rad],
         "parts": arm.parts.tolist(),
         "dh": {
             "base": dict(zip(FRAME, (*base.origin_m, *base.rotation_rad), strict=True)),
             "rows": [dict(zip(TABLE, row, strict=True)) for row in dh_numbers(new)],
             "flange": dict(zip(FRAME, (*flange.origin_m, *flange.rotation_rad), strict=True)),
         },
+        "table": nominal_table(arm),
         "tool_point_m": arm.tool_m,
         "not_carried": arm.not_carried,
     }
+    matrix = by_reading(arm.rig.arm)
+    if matrix is not None:
+        content["angles_by_readings"] = matrix.tolist()  # q = matrix times readings
     return msgspec.json.format(msgspec.json.encode(content), indent=1).decode() + "\n"

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from acquisition.recording.rig import ArmModel
 from calibrate.arms.convert import convert
 from calibrate.export.dh_csv import dh_numbers
-from calibrate.export.identified import SIGN, IdentifiedArm
+from calibrate.export.identified import IdentifiedArm
 
 TREE = """
 if exist('rigidBodyTree', 'class') == 8  % the struct alone needs no toolbox
@@ -39,12 +39,12 @@ def matlab_text(arm: IdentifiedArm) -> str:
     name = arm.rig.name.replace("'", "''").replace("\n", " ")
     lines = [
         "% Identified by calibeam; m and rad.",
-        f"% {SIGN}.",
+        f"% {arm.sign}.",
         *(f"% {says}" for says in arm.not_carried),
         "% T_base_flange = parts(:,:,1) * Rz(q1) * parts(:,:,2) * ... * Rz(qn) * parts(:,:,n+1)",
         f"arm.name = '{name}';",
         *(f"arm.parts(:, :, {i}) = {_matrix(part.tolist())};" for i, part in enumerate(arm.parts, start=1)),
-        f"arm.limits = {_matrix((j.lower_rad, j.upper_rad) for j in arm.rig.arm.joints)};",
+        f"arm.limits = {_matrix(arm.limits_rad)};",
         "% the same arm as a standard D-H table: base * T_1 * ... * T_n * flange,",
         "% T_i = Rz(q_i + theta_offset) Tz(d) Tx(a) Rx(alpha) Ry(tilt); columns: theta_offset d a alpha tilt",
         f"arm.dh = {_matrix(dh_numbers(new))};",

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording.rig import ArmModel
 from calibrate.arms.catalogue import arm_of
-from calibrate.export.identified import SIGN, IdentifiedArm
+from calibrate.export.identified import IdentifiedArm
 from calibrate.parameters import values_by_name
 from calibrate.rigid import inverse, transform
 
@@ -28,7 +28,7 @@ def mjcf_text(arm: IdentifiedArm) -> str:
     """The file's text; numbers in full precision."""
     lines = [
         f"<mujoco model={quoteattr(arm.rig.name)}>",
-        f"  <!-- Identified by calibeam. m, rad, kg; {SIGN}. -->",
+        f"  <!-- Identified by calibeam. m, rad, kg; {arm.sign}. -->",
         *(f"  <!-- {says.replace('--', '- -')} -->" for says in arm.not_carried),
         "  <!-- A payload is not in this file: attach its mass to the body flange, and soft joints yield to it. -->",
         f"  {LEAST}",
@@ -36,12 +36,12 @@ def mjcf_text(arm: IdentifiedArm) -> str:
         "  <worldbody>",
     ]
     indent = "    "
-    for i, joint in enumerate(arm.rig.arm.joints, start=1):
+    for i, (joint, (low, high)) in enumerate(zip(arm.rig.arm.joints, arm.limits_rad, strict=True), start=1):
         lines.append(f'{indent}<body name="link{i}"{_pose(arm.parts[i - 1])}>')
         indent += "  "
         lines.append(
             f'{indent}<joint name="joint{i}" type="hinge" axis="0 0 1" limited="true" armature="1"'
-            f' range="{joint.lower_rad!r} {joint.upper_rad!r}"/>'
+            f' range="{low!r} {high!r}"/>'
         )
         if i in arm.compliance_rad_nm:
             stiffness = 1.0 / arm.compliance_rad_nm[i]

@@ -53,7 +53,7 @@ def ur_calibration_text(arm: IdentifiedArm) -> str:
     found = convert(arm.rig.arm, ArmModel.DH, arm.corrections, NearParallel.COMMON_NORMAL)
     if _moved(found.T_base_new):
         raise DataError(
-            f"rig {arm.rig.name}: axis 1 is not z of the base, which calibration.conf cannot say; export a URDF"
+            f"rig {arm.rig.name}: axis 1 is not z of the base, which calibration.conf cannot express; export a URDF"
         )
     delta = np.array(_four(found)) - np.array(_four(drawn))
     delta[:, [0, 3]] = (delta[:, [0, 3]] + np.pi) % (2.0 * np.pi) - np.pi

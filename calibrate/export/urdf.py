@@ -9,7 +9,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.export.identified import SIGN, IdentifiedArm, roll_pitch_yaw
+from calibrate.export.identified import IdentifiedArm, roll_pitch_yaw
 
 Floats = NDArray[np.float64]
 
@@ -18,15 +18,12 @@ def urdf_text(arm: IdentifiedArm) -> str:
     """The file's text; numbers in full precision."""
     n = arm.rig.n_joints
     links = ["base", *(f"link{i}" for i in range(1, n + 1)), "flange"]
-    lines = [f"  <!-- Identified by calibeam. m and rad; {SIGN}. -->"]
+    lines = [f"  <!-- Identified by calibeam. m and rad; {arm.sign}. -->"]
     lines += [
         f"  <!-- {says.replace('--', '- -')} -->" for says in arm.not_carried
     ]  # XML ends a comment at two hyphens
-    for i, joint in enumerate(arm.rig.arm.joints, start=1):
-        limit = (
-            f'<limit lower="{joint.lower_rad!r}" upper="{joint.upper_rad!r}" effort="0"'
-            f' velocity="{arm.rig.motion.speed_rad_s!r}"/>'
-        )
+    for i, (low, high) in enumerate(arm.limits_rad, start=1):
+        limit = f'<limit lower="{low!r}" upper="{high!r}" effort="0" velocity="{arm.rig.motion.speed_rad_s!r}"/>'
         lines += _joint(f"joint{i}", "revolute", (links[i - 1], links[i]), arm.parts[i - 1])
         lines += ['    <axis xyz="0 0 1"/>', f"    {limit}", "  </joint>"]
     lines += [*_joint("flange_fixed", "fixed", (links[n], "flange"), arm.parts[n]), "  </joint>"]

@@ -77,7 +77,7 @@ def _bad_pairs(measured: Measured, distance: Floats, away_m: Floats) -> list[Blu
     out: list[Blunder] = []
     for i in np.flatnonzero(outlying(distance, measured.problem.observed.shape[1])):
         rows = tuple(sorted(int(r) for r in measured.sample_rows[i]))
-        what = f"{measured.name} {1e3 * away_m[i]:.3g} mm away from what all other rows say"
+        what = f"{measured.name} {1e3 * away_m[i]:.3g} mm away from what all other rows predict"
         remedy = "take both again, or remove them"
         out.append(Blunder(BlunderKind.BAD_SHOT, rows, ", ".join(columns_of(measured)), what, remedy))
     return out

@@ -25,7 +25,7 @@ from calibrate.weighting import JOINT
 Floats = NDArray[np.float64]
 
 OF_JOINTS = "the scatter of the joint readings"
-OF_INSTRUMENT = "the scatter of the instrument's readings, which that of the arm's cannot be told from"
+OF_INSTRUMENT = "the scatter of the instrument's readings, which cannot be separated from that of the arm's"
 FLANGE = (0.0, 0.0, 0.0)  # stands for the target where nobody names one
 
 
@@ -47,7 +47,7 @@ def evidence_of(
     asked: Asked,
     rng: Generator,
 ) -> Evidence:
-    """All proofs of a fit. `seen`: at its end; `before`: the arm as drawn; `samples`: the whole file."""
+    """All proofs of a fit. `seen`: at its end; `before`: the nominal arm; `samples`: the whole file."""
     if fitted.fit.status is Status.NOT_FINITE:
         return Evidence(Proven(), None, None, None)
     return Evidence(

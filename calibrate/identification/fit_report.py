@@ -84,7 +84,7 @@ def result_of(
 
 
 def fit_places_only(fitted: Fitted) -> Fit:
-    """The arm as drawn, put where the data want it: what there was before the identification."""
+    """The nominal arm, put where the data want it: what there was before the identification."""
     arm = {p.name for m in fitted.weighting.measured for p in m.problem.chain.model.parameters}
     parameters = hold(fitted.fit.parameters, arm)
     start = np.where([p.name in arm for p in parameters], start_values(parameters), fitted.fit.theta)
@@ -92,7 +92,7 @@ def fit_places_only(fitted: Fitted) -> Fit:
 
 
 def _as_stated(fitted: Fitted) -> Fit:
-    """The fit under the noise as believed, for its chi-square."""
+    """The fit under the noise as assumed, for its chi-square."""
     alone = replace(fitted.weighting, shares=None)  # what encoders know of a row is part of the noise that is stated
     problem = alone.problem(fitted.fit.theta).with_parameters(fitted.fit.parameters)
     return fitted.by.with_usual_rules.fit(problem, fitted.fit.theta)
@@ -118,7 +118,7 @@ def _why_untold(p: Parameter, fit: Fit, i: int, seen: Identifiability, *, told: 
     if not told:
         return untold(p, seen) or HELD
     if np.isfinite(p.prior) and np.sqrt(fit.covariance[i, i]) > ONLY_PRIOR * p.prior:
-        return f"{ONLY_BELIEVED}: {p.prior:.3g} {p.unit} as believed, to which the data add nothing"
+        return f"{ONLY_BELIEVED}: {p.prior:.3g} {p.unit} as assumed, to which the data add nothing"
     return None
 
 

@@ -33,7 +33,7 @@ class Splitting:
 
 
 def proof(fitted: Fitted, before: Fit, splits: tuple[Split, ...]) -> Proven:
-    """Both fits predict unseen rows of the joint problem; `before`: the arm held as drawn, for the error before."""
+    """Both fits predict unseen rows of the joint problem; `before`: the arm held nominal, for the error before."""
     after, drawn = (fitted.problem.with_parameters(fit.parameters) for fit in (fitted.fit, before))
     found: list[Unseen] = []
     unproven: list[str] = []

@@ -170,6 +170,6 @@ def _positions(samples: Samples) -> tuple[NDArray[np.intp], Floats]:
 
 
 def _drawn_flange(rig: Rig) -> Callable[[Floats], Floats]:
-    """Angles (pose, joint) to (pose, 4, 4) of the arm as drawn."""
+    """Angles (pose, joint) to (pose, 4, 4) of the nominal arm."""
     arm = arm_of(rig)
     return lambda q_rad: arm.flange(start_values(arm.parameters), q_rad)

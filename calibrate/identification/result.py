@@ -132,7 +132,7 @@ class Identification:
     instruments: tuple[InstrumentFound, ...]
     noise: tuple[Noise, ...]
     noise_settled: bool  # False: the sizes of the noise did not converge, and every sigma is a guess
-    stated_noise: StatedNoise  # chi-square under the noise as believed
+    stated_noise: StatedNoise  # chi-square under the noise as assumed
     repeats: RepeatNoise | None  # of the first instrument that repeated poses
     evidence: Evidence
     parameters: tuple[Parameter, ...]
@@ -180,6 +180,6 @@ def scale_alarms(instruments: Iterable[str]) -> tuple[str, ...]:
     if set(instruments) != SCALELESS:
         return ()
     return (
-        "cones alone show no length: the size of the arm is that of the drawing, and every length that it measures is "
+        "cones alone determine no length: the size of the arm stays nominal, and every length that it measures is "
         "as uncertain as that; measure a bar of known length ([[bar]], columns bar and bar_end) as well",
     )

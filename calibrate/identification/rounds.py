@@ -28,7 +28,7 @@ BLUNT_ROUNDS = 8  # of least distances, to come away from a start that bad rows 
 WARY_ROUNDS = 12  # of letting go of far rows
 NEAR = 0.1  # of the usual distance: closer rows all weigh the same
 STANDING = 1e-3  # of a plausible size: a step below changes no suspicion
-LEAST_SCALE = 1e-6  # of the believed noise: perfect data have a scale, too
+LEAST_SCALE = 1e-6  # of the assumed noise: perfect data have a scale, too
 
 
 @dataclass(frozen=True)

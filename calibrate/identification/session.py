@@ -62,7 +62,7 @@ def columns_of(measured: Measured) -> tuple[str, ...]:
 
 
 def believed_sigma(measured: Measured) -> Floats:
-    """(row, k) the instrument's own noise as believed, all its sources together."""
+    """(row, k) the instrument's own noise as assumed, all its sources together."""
     return np.sqrt(sum((sigma**2 for sigma in measured.own_sigma.values()), np.zeros(measured.problem.observed.shape)))
 
 

@@ -58,7 +58,7 @@ SOFTWARE = f"calibeam {version('calibeam')}"
 CUT = 0.99
 STEP = 1e-6  # m, rad or a factor
 INNER_STEP = 1e-2  # of a plausible size, of what enters non-linearly
-LEAST_CURVED = 0.1  # of a t law: with more wild rows than good ones nothing is known
+LEAST_CURVED = 0.1  # of a t law: with more outlying rows than good ones nothing is known
 TURNS = 30
 KNOTS = 33  # of a curve: a wave of the finest of eight eigenfunctions has eight of them
 UNITS = ("rad_nm", "per_k", "rad", "m", "s", "nm", "share", "k")
@@ -67,7 +67,7 @@ UNITS = ("rad_nm", "per_k", "rad", "m", "s", "nm", "share", "k")
 def model_of_diagnosis(found: Diagnosed, recording: Recording) -> ModelFile:
     """The record to write. DataError where the file is wrong as a whole, or an effect cannot be carried."""
     if found.physics is None:
-        raise DataError("no model: the whole file is wrong; diagnosis.json says how")
+        raise DataError("no model: the whole file is wrong; how is in diagnosis.json")
     if found.physics.model.problem.assumed is not None:
         raise DataError(
             "no model: beside a model of another recording a diagnosis fits changes only; `calibeam identify --model` "
@@ -391,7 +391,9 @@ def _as_listed(
         same, _ = alike(now, was)
         left = float(np.linalg.norm((was - now @ same) @ a.coefficients))
         if now.shape != was.shape or left > NEARLY * float(np.linalg.norm(was @ a.coefficients)):
-            raise DataError(f"no model: effect {effects[i].name} cannot be told from the conditions of the file alone")
+            raise DataError(
+                f"no model: effect {effects[i].name} cannot be determined from the conditions of the file alone"
+            )
         turn[at : at + m, at : at + m] = same
         turned = dict(zip(effects[i].coefficients, (same @ a.coefficients).tolist(), strict=True))
         effects = [

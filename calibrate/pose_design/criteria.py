@@ -1,4 +1,4 @@
-"""What a good set of poses is: small error in free space, a large determinant, or one of the indices O1 to O5.
+"""What a good set of poses is: small error over the workspace, a large determinant, or one of the indices O1 to O5.
 
 A criterion is a loss of an information matrix, smaller is better, with what each candidate would save. A new criterion
 is one entry of CRITERIA. Sources: the error at the poses that matter (test-pose criterion): Klimchik, Caro, Wu,

@@ -39,7 +39,7 @@ class Asked:
 
 @dataclass(frozen=True)
 class Curve:
-    """Predicted error in free space by number of poses, m: chosen one by one, and drawn at random (median)."""
+    """Predicted error over the workspace by number of poses, m: chosen one by one, and drawn at random (median)."""
 
     poses: NDArray[np.intp]
     chosen_m: Floats
@@ -90,8 +90,9 @@ def design(
     promised = found.free_space_m(information)
     drawn = _random_m(found, asked.poses, rng)
     purpose = (
-        f"{asked.poses} poses by criterion {asked.criterion}: predicted error in free space {1e6 * promised:.1f} um "
-        f"rms, random poses {1e6 * drawn:.1f} um",
+        f"{asked.poses} poses by criterion {asked.criterion}: predicted error over the workspace "
+        f"{1e6 * promised:.1f} µm "
+        f"rms, random poses {1e6 * drawn:.1f} µm",
     )
     plan = plan_of(rig.name, candidates, shots, purpose)
     curve = _curve(found, asked, rng)

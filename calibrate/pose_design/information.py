@@ -1,7 +1,7 @@
 """What every candidate pose would tell: whitened rows of its readings, beside what is believed, in scaled unknowns.
 
 Unknowns are divided by what is believed of them, so that what is known before any data is the unit matrix. The error
-in free space is that of calibrate/uncertainty/free_space.py: J C J' over the workspace, rigid motions taken out.
+over the workspace is that of calibrate/uncertainty/free_space.py: J C J' over the workspace, rigid motions taken out.
 """
 
 from dataclasses import dataclass, replace
@@ -72,7 +72,7 @@ class Information:
 
 
 def information_of(rig: Rig, candidates: Candidates, rng: Generator) -> Information:
-    """At the rig as drawn, under its believed noise, with the unknowns that an identification would have."""
+    """At the nominal rig, under its assumed noise, with the unknowns that an identification would have."""
     found = instruments_for_fit(rig, candidates.samples())
     weighting, every = found.weighting, found.weighting.parameters
     free = np.flatnonzero([p.free for p in every])

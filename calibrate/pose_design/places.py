@@ -1,7 +1,7 @@
 """How many places of the fixture, and which; and whether distances between them are needed for the scale.
 
 Places are chosen one after the other: each time the one with which as many poses as asked for, shared out evenly over
-places and their candidates, leave the smallest error in free space. Two sums each: without any known distance, and
+places and their candidates, leave the smallest error over the workspace. Two sums each: without any known distance, and
 with those between all chosen places.
 """
 

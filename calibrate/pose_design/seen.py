@@ -36,6 +36,16 @@ class Seen:
     invisible: tuple[Named, ...]  # what geometry would swallow
     isolability: Isolability
 
+    @property
+    def confusable_causes(self) -> tuple[tuple[Named, Named, float], ...]:
+        """One pair a pair of causes, its most alike forms; forms of one cause are no pair."""
+        best: dict[frozenset[tuple[str, str]], tuple[Named, Named, float]] = {}
+        for a, b, r2 in self.confusable:
+            causes = frozenset({(a.physics, a.where), (b.physics, b.where)})
+            if len(causes) == 2 and (causes not in best or r2 > best[causes][2]):
+                best[causes] = (a, b, r2)
+        return tuple(best.values())
+
 
 def seen_by(rig: Rig, candidates: Candidates, taken: Taken, rng: Generator) -> Seen:
     """Of a plan's poses in their order, with their approaches and repeats. DataError where they are too few to fit."""

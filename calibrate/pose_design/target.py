@@ -1,4 +1,4 @@
-"""What has to be right in free space: the tool's point where a rig names one, else the beam of its laser, else the
+"""What has to be right over the workspace: the tool's point where a rig names one, else the beam of its laser, else the
 flange's origin; by the unknowns, over poses drawn evenly between the joint limits.
 
 A beam has no point that is its own: its error is that across it, at points where detectors stand. What only moves the

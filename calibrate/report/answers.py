@@ -6,8 +6,7 @@ Colour only repeats what a mark and a word say.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from calibrate.report.elements import Html, bullets, join, tag
-from calibrate.report.tiles import tile
+from calibrate.report.elements import Html, bullets, join, tag, tile
 from calibrate.report.verdict import Trust, Verdict
 
 MARKS = {
@@ -15,6 +14,7 @@ MARKS = {
     Trust.CARE: ("!", "With care"),
     Trust.NONE: ("\N{HEAVY MULTIPLICATION X}", "No"),
 }
+TOOL = "tool_"  # keys of the tool error begin so
 NOTHING_AGAINST = "Nothing speaks against it: what remains is noise."
 NOTHING_TO_DO = "Nothing now. Measure again after a collision, a repair, or when the work gets worse."
 
@@ -43,20 +43,40 @@ class Answers:
     warnings: tuple[str, ...] = ()  # what to know before that sentence is believed
 
 
-def first_screen(answers: Answers) -> Html:
-    """Verdict, numbers and the line below them."""
+def first_screen(answers: Answers, maps: Html | None = None) -> Html:
+    """Tool error, verdict, numbers and the line below them; `maps` of the tool error stand beside its number."""
     judged = answers.verdict
     mark, word = MARKS[judged.trust]
     why = (*judged.reasons, *answers.known)
+    tool = [n for n in answers.numbers if n.key.startswith(TOOL)]
+    rest = [n for n in answers.numbers if not n.key.startswith(TOOL)]
     rows = [
-        _row("How good is it now?", tag("strong", judged.sentence)),
+        _row("How good is it now?", *(_headline(tool, judged.sentence) if tool else (tag("strong", judged.sentence),))),
         _row("Can I trust it?", tag("b", tag("span", mark, cls="mark", aria_hidden="true"), word), *_listed(why)),
         *([_row("What has changed?", *_listed((*answers.warnings, answers.drift)))] if answers.drift else []),
         _row("What to do?", *_listed(judged.advice, NOTHING_TO_DO)),
     ]
-    tiles = tag("div", *(tile(n.name, n.said, n.about) for n in answers.numbers), cls="tiles")
+    tiles = tag("div", *(tile(n.name, n.said, n.about) for n in rest), cls="tiles")
     below = [tag("p", " · ".join(answers.also), cls="also")] if answers.also else []
-    return tag("div", tag("div", *rows, cls=f"verdict {judged.trust.value}"), tiles, *below, cls="answers")
+    colour = f"verdict {judged.trust.css}"
+    box = tag("div", tag("div", *rows), maps, cls=f"{colour} with-maps") if maps else tag("div", *rows, cls=colour)
+    return tag("div", box, tiles, *below, cls="answers")
+
+
+def _headline(tool: Sequence[Number], sentence: str) -> list[Html]:
+    """Nominal, calibrated, with physics in one line; or why there is no number."""
+    about = tag("p", sentence)
+    if all(n.value is None for n in tool):
+        return [tag("strong", f"Tool error over the workspace {tool[0].about}"), about]
+    values = [tag("span", tag("b", n.said), tag("span", n.name)) for n in tool]
+    arrow = tag("span", "\N{RIGHTWARDS ARROW}", cls="arrow")
+    parts = [values[0], *(part for value in values[1:] for part in (arrow, value))]
+    return [
+        tag("p", "Tool error over the workspace", cls="kicker"),
+        tag("div", *parts, cls="headline"),
+        tag("p", tool[-1].about, cls="lead"),
+        about,
+    ]
 
 
 def _row(question: str, *content: str) -> Html:

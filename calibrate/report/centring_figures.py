@@ -19,13 +19,13 @@ DRAWN = 120  # traces in one picture; of more, every n-th
 def courses(runs: Sequence[Trace], tolerance_m: float, places: Sequence[int], name: str) -> Html:
     """Error against step, one line a run, colour by placement."""
     says = f"error of {len(runs)} centring runs against the step"
-    return drawn(name, says, 4.6, 3.4, lambda figure: _paint_courses(figure, runs, tolerance_m, places))
+    return drawn(name, says, 4.6, 2.9, lambda figure: _paint_courses(figure, runs, tolerance_m, places))
 
 
 def step_counts(runs: Sequence[Trace], tolerance_m: float, name: str) -> Html:
     """How many runs took how many steps."""
     says = f"histogram of the steps of {len(runs)} centring runs to {stated(tolerance_m)}"
-    return drawn(name, says, 4.6, 3.4, lambda figure: _paint_counts(figure, runs))
+    return drawn(name, says, 4.6, 2.9, lambda figure: _paint_counts(figure, runs))
 
 
 def _paint_courses(figure: Figure, runs: Sequence[Trace], tolerance_m: float, places: Sequence[int]) -> None:

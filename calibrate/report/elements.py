@@ -39,7 +39,8 @@ def tag(name: str, /, *children: str, **attributes: str) -> Html:
 
 def section(anchor: str, title: str, lead: str, *children: str) -> Html:
     """A chapter of the report: heading, one sentence that says what it shows, content."""
-    opening = tag("header", tag("h2", title), tag("p", lead, cls="lead"), cls="opening")
+    said = (tag("p", lead, cls="lead"),) if lead else ()
+    opening = tag("header", tag("h2", title), *said, cls="opening")
     return tag("section", opening, *children, id=anchor)
 
 
@@ -86,6 +87,17 @@ def bullets(items: Iterable[str]) -> Html:
     return tag("ul", *(tag("li", item) for item in items))
 
 
-def folded(title: str, *children: str) -> Html:
-    """Content that opens on a click."""
-    return tag("details", tag("summary", title), *children)
+def folded(title: str, *children: str, on_paper: bool = True) -> Html:
+    """Content that opens on a click. In print it is open, or with `on_paper` false only named as being in the file."""
+    attributes = {} if on_paper else {"cls": "screen-only"}
+    return tag("details", tag("summary", title), *children, **attributes)
+
+
+def halves(*children: str, terse: bool = False) -> Html:
+    """Long narrow tables, which paper has room for twice side by side; `terse`: there without their second column."""
+    return tag("div", *children, cls="halves terse" if terse else "halves")
+
+
+def tile(name: str, value: str, says: str) -> Html:
+    """A number that is to be seen first: name, number, and one line about it."""
+    return tag("div", tag("span", name, cls="name"), tag("b", value), tag("span", says), cls="tile")

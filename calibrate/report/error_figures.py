@@ -31,8 +31,8 @@ def errors(readings: Readings) -> Html:
 def _paint_errors(figure: Figure, readings: Readings) -> None:
     axes = figure.add_subplot()
     sets = (
-        ("as drawn", readings.error_before, Tone.PLACE_2, "////"),
-        ("identified", readings.error_after, Tone.PLACE_1, ""),
+        ("nominal", readings.error_before, Tone.PLACE_2, "////"),
+        ("calibrated", readings.error_after, Tone.PLACE_1, ""),
     )
     sizes = np.concatenate([values[values > 0.0] for _, values, _, _ in sets])
     if len(sizes) == 0:
@@ -59,8 +59,8 @@ def _paint_by_sample(figure: Figure, readings: Readings) -> None:
     number = readings.rows[shown, 0] + 1
     before, after = readings.error_before[shown], readings.error_after[shown]
     for values, tone, mark, label in (
-        (before, Tone.PLACE_2, "+", "as drawn"),
-        (after, Tone.PLACE_1, ".", "identified"),
+        (before, Tone.PLACE_2, "+", "nominal"),
+        (after, Tone.PLACE_1, ".", "calibrated"),
     ):
         some = values > 0.0
         axes.plot(number[some], values[some], mark, ms=3.4, mew=0.7, color=tone.value, alpha=0.65, label=label)

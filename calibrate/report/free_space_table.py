@@ -10,7 +10,10 @@ def free_space(found: FreeSpaceRecord | None) -> list[Html]:
     if found is None:
         return []
     if found.rms_m is None:
-        return [tag("p", tag("b", "Error in free space: "), f"none is stated: {found.says}."), *_because(found)]
+        return [
+            tag("p", tag("b", "Tool error over the workspace: "), f"none is stated: {found.says}."),
+            *_because(found),
+        ]
     rows = [
         (
             "identified geometry alone",

@@ -9,7 +9,7 @@ from calibrate.uncertainty.chi_square import Alarm
 
 @dataclass(frozen=True)
 class Scatter:
-    """Chi-square under the noise as believed."""
+    """Chi-square under the noise as assumed."""
 
     chi2: float
     dof: int
@@ -18,7 +18,7 @@ class Scatter:
 
     @property
     def factor(self) -> float:
-        """Misfit over believed noise; nan without redundancy."""
+        """Misfit over assumed noise; nan without redundancy."""
         return sqrt(self.chi2 / self.dof) if self.dof > 0 else nan
 
 

@@ -22,8 +22,11 @@ def page(
     software: str,
     *,
     scripts: bool = False,
+    running: str = "",
 ) -> Html:
     """The whole document; `contents` are headings by the anchor of their chapter. `scripts`: those of chapters may run.
+
+    `running` stands at the head of every printed page, the title where it is empty.
 
     Each script is allowed by its own hash, so that still nothing runs that a file slipped in.
     """
@@ -34,13 +37,19 @@ def page(
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
         tag("meta", http_equiv="Content-Security-Policy", content=POLICY + _allowed(chapters) if scripts else POLICY),
         tag("title", title),
-        tag("style", style),
+        tag("style", style, _running(running or title)),
     )
     links = (tag("a", heading, href=f"#{anchor}") for anchor, heading in contents.items())
     nav = tag("nav", *links, aria_label="Contents")
     footer = tag("footer", f"Written by {software}. This file needs no network and no other file.")
     body = tag("body", tag("main", masthead, nav, *chapters, footer))
     return join(Html("<!doctype html>\n"), tag("html", head, body, lang="en"), Html("\n"))
+
+
+def _running(text: str) -> Html:
+    """The line at the head of printed pages: a CSS string with all but letters and digits escaped."""
+    quoted = "".join(c if c.isascii() and c.isalnum() else f"\\{ord(c):06x}" for c in text)
+    return Html(f'@page {{ @top-left {{ content: "{quoted}"; font: 8pt sans-serif; color: #4b5763; }} }}')
 
 
 def _allowed(chapters: Sequence[Html]) -> str:

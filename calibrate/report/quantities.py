@@ -18,7 +18,7 @@ def fixed(value: float, decimals: int) -> str:
     """A number with so many decimals and a real minus sign; a dash where there is no number."""
     if not math.isfinite(value):
         return DASH
-    return f"{value:.{decimals}f}".replace("-", MINUS)
+    return f"{value:z.{decimals}f}".replace("-", MINUS)
 
 
 def significant(value: float, digits: int = 3) -> str:

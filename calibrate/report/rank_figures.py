@@ -33,7 +33,7 @@ def _paint_spectrum(figure: Figure, s: Floats, rank: int, with_drawing: bool) ->
     data[rank:] = False
     for rows, tone, mark, filled, label in (
         (data, Tone.PLACE_1, "o", True, "known from the data"),
-        (drawing, Tone.PLACE_5, "s", True, "known from the drawing"),
+        (drawing, Tone.PLACE_5, "s", True, "known from the nominal values"),
         (number > rank, Tone.BEAM, "o", False, "not known"),
     ):
         if rows.any():

@@ -15,7 +15,7 @@ OWNERS = {
     "psd1": "the gains of PSD 1",
     "psd2": "how PSD 2 sits to PSD 1",
 }
-NUMBERED = {**{f.prefix: f.one for f in FRAMES if f.one}, "placement": "where fixture place"}  # one of them alone
+NUMBERED = {**{f.prefix: f.one for f in FRAMES if f.one}, "placement": "where fixture station"}  # one of them alone
 
 
 class Together(Protocol):
@@ -49,8 +49,8 @@ def kind_of(combination: Together) -> str:
     if len(combination.members) == 1:
         return "the measurement does not depend on it"
     if combination.structural:
-        return "cannot be told apart by geometry, whatever the poses"
-    return "hardly told apart by these poses; others might"
+        return "cannot be separated by geometry, whatever the poses"
+    return "hardly separated by these poses; others might"
 
 
 def in_plain_words(words: str) -> str:
@@ -64,8 +64,8 @@ def _says(name: str, combination: Together) -> str:
     others = combination.words.split(" + ")
     rest = " and ".join(_plain(words) for words in others if words != in_words([name]))
     if combination.structural:
-        return f"no data of this kind can tell it from {rest}"
-    return f"these poses hardly tell it from {rest}"
+        return f"no data of this kind can separate it from {rest}"
+    return f"these poses hardly separate it from {rest}"
 
 
 def _plain(words: str) -> str:

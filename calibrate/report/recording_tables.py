@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Recording, check
 from acquisition.recording.rig import Rig
-from calibrate.report.elements import Html, table, tag
+from calibrate.report.elements import Html, folded, join, table, tag
 from calibrate.report.quantities import fixed, significant
 
 Floats = NDArray[np.float64]
 
 EXTRAS = (
-    ("cmd1_rad", "commanded joint angles", "whether the controller reached what it was told"),
+    ("cmd1_rad", "commanded joint angles", "whether the controller reached its command"),
     ("enc1_rad", "second encoders on the joints", "transmission errors between motor and link"),
     ("repeat", "repeated poses", "noise apart from missing physics"),
     ("approach1", "direction of approach", "backlash"),
@@ -41,12 +41,19 @@ def recorded(recording: Recording, extras: Sequence[tuple[str, str, str]]) -> Ht
         (what, "yes" if column in samples else "no", f"shows {shows}" if column in samples else f"cannot show {shows}")
         for column, what, shows in extras
     ]
+    rows += _temperature_rows(recording)
+    return table(("Quantity", "recorded", "what it is for"), rows, caption="Beside angles and spots")
+
+
+def _temperature_rows(recording: Recording) -> list[tuple[str, ...]]:
+    """One row for all sensors that agree to a tenth of a degree."""
+    of_range: dict[tuple[str, str], list[str]] = {}
     for name, values in temperatures(recording):
         where = name.removeprefix("temp_").removesuffix("_degC")
-        rows.append(
-            (f"temperature {where}", "yes", f"{fixed(float(values.min()), 2)} to {fixed(float(values.max()), 2)} °C")
-        )
-    return table(("Quantity", "recorded", "what it tells"), rows, caption="Beside angles and spots")
+        of_range.setdefault((fixed(float(values.min()), 1), fixed(float(values.max()), 1)), []).append(where)
+    return [
+        (f"temperature {', '.join(where)}", "yes", f"{low} to {high} °C") for (low, high), where in of_range.items()
+    ]
 
 
 def temperatures(recording: Recording) -> list[tuple[str, Floats]]:
@@ -66,14 +73,18 @@ def streams(recording: Recording) -> list[Html]:
         span_s = float(np.ptp(stream.host_s)) if len(stream.host_s) > 1 else 0.0
         rate = significant((len(stream.host_s) - 1) / span_s) if span_s > 0.0 else ""
         lost = sum(max(gap.missing, 0) for gap in stream.gaps)
-        channels = ", ".join(c.name for c in stream.channels)
-        rows.append((stream.name, str(len(stream.host_s)), rate, str(len(stream.gaps)), str(lost), channels))
-    head = ("Stream", "samples", "per second", "gaps", "lost", "channels")
+        rows.append((stream.name, str(len(stream.host_s)), rate, str(len(stream.gaps)), str(lost)))
+    head = ("Stream", "samples", "per second", "gaps", "lost")
     note = (
         "Per second of the recording computer's clock: emulated devices may run faster than real time. A lost sample "
         "of the encoders is a SYNC that this computer sent too late; the settled samples average over those that came."
     )
-    return [table(head, rows, numeric=(1, 2, 3, 4), caption="Raw streams"), tag("p", note)]
+    channels = [(s.name, ", ".join(c.name for c in s.channels)) for s in recording.streams.values()]
+    return [
+        table(head, rows, numeric=(1, 2, 3, 4), caption="Raw streams"),
+        tag("p", note),
+        folded("Channels of each stream", table(("Stream", "channels"), channels), on_paper=False),
+    ]
 
 
 def findings(recording: Recording) -> Html:
@@ -81,5 +92,14 @@ def findings(recording: Recording) -> Html:
     found = check(recording)
     if not found:
         return tag("p", "The check of the recording found nothing wrong.")
-    rows = [(finding.severity.value, finding.problem.value, finding.where, finding.says) for finding in found]
-    return table(("Severity", "problem", "where", "what"), rows, caption="Found by the check of the recording")
+    head, caption = ("Severity", "problem", "where", "what"), "Found by the check of the recording"
+    groups: dict[tuple[str, str, str], list[str]] = {}
+    for finding in found:
+        key = (finding.severity.value, finding.problem.value, finding.where)
+        groups.setdefault(key, []).append(finding.says)
+    rows = [
+        (*key, says[0] if len(says) == 1 else f"{len(says)} times; first: {says[0]}") for key, says in groups.items()
+    ]
+    every = [(*key, one) for key, says in groups.items() for one in says]
+    folds = [folded(f"All {len(every)} findings", table(head, every), on_paper=False)] if len(every) > len(rows) else []
+    return join(table(head, rows, caption=caption), *folds)

@@ -21,7 +21,10 @@ ABOVE_RAD = math.radians(90.0)
 TRIAD_M = 0.12
 STAND_M = 0.075  # radius of the base ring, of the picture only
 APART_M = 0.3  # two fixtures this far apart in the picture do not hide each other
+TRIAD_NAME = 1.25  # of the axis' length: where its name stands
 WIDTH_IN = 4.8
+LABEL_IN = 0.22  # between the discs of two joints: 13 points and a gap
+SPREAD_ROUNDS = 100
 
 
 def oblique(scene: Scene) -> Html:
@@ -50,10 +53,15 @@ def _points(scene: Scene) -> Floats:
 
 def _height_in(scene: Scene, view: Floats) -> float:
     """Height of the picture that the drawing fills, floor included."""
-    low, high, level = _floor_extent(_points(scene))
+    wide, tall = _extent_m(_points(scene), view)
+    return float(np.clip(WIDTH_IN * tall / wide, 0.6 * WIDTH_IN, 0.74 * WIDTH_IN))
+
+
+def _extent_m(points: Floats, view: Floats) -> Floats:
+    """(2,) width and height of everything and the floor below it."""
+    low, high, level = _floor_extent(points)
     corners = np.array([[x, y, level] for x in (low[0], high[0]) for y in (low[1], high[1])])
-    wide, tall = np.ptp(np.concatenate([_points(scene), corners]) @ view, axis=0)
-    return float(np.clip(WIDTH_IN * tall / wide, 0.6 * WIDTH_IN, 1.1 * WIDTH_IN))
+    return np.ptp(np.concatenate([points, corners]) @ view, axis=0)
 
 
 def _best_azimuth(scene: Scene) -> float:
@@ -87,6 +95,7 @@ def _paint(figure: Figure, scene: Scene, view: Floats) -> None:
     _base(axes, view, level)
     for number, arm in reversed(list(enumerate(scene.arms))):
         _arm(axes, arm, view, tone_of(number), leading=number == 0)
+    _numbered_joints(axes, scene.arms[0], view, LABEL_IN * float(_extent_m(points, view)[0]) / WIDTH_IN)
     centre = points.mean(axis=0) @ view
     for number, (placement, corners) in enumerate(scene.faces_m.items()):
         _fixture(axes, corners, view, tone_of(number), level)
@@ -120,29 +129,55 @@ def _base(axes: Axes, view: Floats, level_m: float) -> None:
         tip = axis @ view
         if np.linalg.norm(tip) > 0.02:  # else seen from its end
             _line(axes, np.array([[0.0, 0.0], tip]), Tone.SOFT, 1.2)
-            axes.text(
-                1.25 * float(tip[0]),
-                1.25 * float(tip[1]),
-                name,
-                ha="center",
-                va="center",
-                fontsize=10,
-                color=Tone.SOFT.value,
-            )
+            x, y = TRIAD_NAME * tip
+            axes.text(float(x), float(y), name, ha="center", va="center", fontsize=10, color=Tone.SOFT.value)
+
+
+def _triad_names(view: Floats) -> Floats:
+    """(axis, 2) where the names of the base's axes stand."""
+    return TRIAD_NAME * (np.eye(3) * TRIAD_M) @ view
 
 
 def _arm(axes: Axes, arm: StandingArm, view: Floats, tone: Tone, *, leading: bool) -> None:
-    bones, joints = arm.bones_m @ view, arm.axes_m @ view
+    bones = arm.bones_m @ view
     if leading:
         _line(axes, bones, Tone.INK, 5.5, solid_capstyle="round")
         _line(axes, bones, Tone.PAPER, 2.6, solid_capstyle="round")
-        axes.plot(*joints.T, "o", ms=13, mfc=Tone.PAPER.value, mec=Tone.INK.value, mew=1.3, zorder=3)
-        for number, (x, y) in enumerate(joints, start=1):
-            axes.text(x, y, str(number), ha="center", va="center_baseline", fontsize=10, zorder=4)
     else:
         _line(axes, bones, tone, 2.2, alpha=0.45, solid_capstyle="round")
     _line(axes, arm.beam_m @ view, Tone.BEAM, 1.6 if leading else 1.1, zorder=5)
     axes.plot(*(arm.beam_m[0] @ view), "o", ms=4, color=Tone.BEAM.value, zorder=5)
+
+
+def _numbered_joints(axes: Axes, arm: StandingArm, view: Floats, least_m: float) -> None:
+    """A numbered disc at every joint; of joints one behind the other they stand side by side, each tied to its own."""
+    joints = arm.axes_m @ view
+    discs = spread(joints, _triad_names(view), least_m)
+    for joint, disc in zip(joints, discs, strict=True):
+        _line(axes, np.stack([joint, disc]), Tone.INK, 1.0, zorder=3)
+    axes.plot(*discs.T, "o", ms=13, mfc=Tone.PAPER.value, mec=Tone.INK.value, mew=1.3, zorder=3)
+    for number, (x, y) in enumerate(discs, start=1):
+        axes.text(x, y, str(number), ha="center", va="center_baseline", fontsize=10, zorder=4)
+
+
+def spread(points: Floats, fixed: Floats, least: float) -> Floats:
+    """Points (n, 2) moved as little as it takes to be `least` from each other and from the `fixed` (m, 2)."""
+    out = points.astype(np.float64)
+    n = len(out)
+    for _ in range(SPREAD_ROUNDS):
+        everything = np.concatenate([out, fixed])
+        gap = everything[:n, None] - everything[None]
+        away = np.linalg.norm(gap, axis=2)
+        near = (away < least) & ~np.eye(n, len(everything), dtype=bool)
+        if not near.any():
+            break
+        order = np.arange(n)[:, None] - np.arange(len(everything))[None]
+        aside = np.where(order[..., None] > 0, 1.0, -1.0) * np.array([1.0, 0.0])  # of two in one place
+        unit = np.where(away[..., None] > 1e-9 * least, gap / np.maximum(away, 1e-9 * least)[..., None], aside)
+        share = np.where(np.arange(len(everything)) < n, 0.5, 1.0)  # what is fixed does not give way
+        push = np.where(near, 1.02 * least - away, 0.0) * share
+        out = out + np.sum(push[..., None] * unit, axis=1)
+    return out
 
 
 def _fixture(axes: Axes, corners_m: Floats, view: Floats, tone: Tone, level_m: float) -> None:

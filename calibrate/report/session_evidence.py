@@ -34,7 +34,7 @@ class Readings:
     quantity: str  # "orientation", or "" where the instrument reads one quantity only
     unit: str  # "m" or "rad"
     rows: Indices  # (obs, m) of the samples, from 0: two where an observation is made of two poses
-    before: Floats  # (obs, k) arm as drawn, places and target where they fit best
+    before: Floats  # (obs, k) nominal arm, places and target where they fit best
     after: Floats  # (obs, k)
     whitened: Floats  # (obs, k) after, in units of the noise found
 
@@ -72,7 +72,7 @@ class SessionEvidence:
     parameters: tuple[Parameter, ...]
     problem: JointProblem  # weighted by the noise found
     arm: KinematicModel
-    drawn: Floats  # (param,) the arm as drawn, frames and target where they fit best
+    drawn: Floats  # (param,) the nominal arm, frames and target where they fit best
     theta: Floats  # (param,) as identified
 
     @cached_property
@@ -118,7 +118,7 @@ def session_evidence(recording: Recording, model: ModelFile) -> SessionEvidence:
     rms = float(np.sqrt(np.mean(readings[0].error_after ** 2)))
     if abs(rms - model.rms_distance_after_m) > SAME * model.rms_distance_after_m + 1e-12:
         raise DataError(
-            f"report: the model says {length(model.rms_distance_after_m)} rms distance, but misses the "
+            f"report: the model has {length(model.rms_distance_after_m)} rms distance, but misses the "
             f"{model.instruments[0]} rows of "
             f"{recording.path.name} by {length(rms)}; give the model of this recording, or identify it again"
         )
@@ -127,7 +127,7 @@ def session_evidence(recording: Recording, model: ModelFile) -> SessionEvidence:
 
 
 def _places_only(weighting: Weighting, problem: JointProblem, model: ModelFile, theta: Floats) -> Floats:
-    """(param,) the arm as drawn, put where the data want it, with nothing free that the fit had held."""
+    """(param,) the nominal arm, put where the data want it, with nothing free that the fit had held."""
     arm = {p.name for m in weighting.measured for p in m.problem.chain.model.parameters}
     free = {p.name for p in problem.parameters} if model.covariance is None else set(model.covariance.names)
     parameters = tuple(replace(p, free=p.free and p.name in free - arm) for p in problem.parameters)

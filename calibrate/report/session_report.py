@@ -5,12 +5,13 @@ from dataclasses import replace
 
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.report.answers import Answers
+from calibrate.report.diagnosis.beyond_model import beyond_model
 from calibrate.report.diagnosis.page import inserted
 from calibrate.report.drift.chapter import TITLE as DRIFT
 from calibrate.report.drift.chapter import drift_chapter
 from calibrate.report.drift.drift import Drift
 from calibrate.report.drift.words import sentence
-from calibrate.report.elements import Html
+from calibrate.report.elements import Html, section, tag
 from calibrate.report.interactive.chapter import TITLE as INTERACTIVE
 from calibrate.report.interactive.chapter import interactive_chapter
 from calibrate.report.interactive.session_figures import session_figures
@@ -28,6 +29,8 @@ from calibrate.report.sections import (
     spots,
     workspace,
 )
+from calibrate.report.sections.certificate import when
+from calibrate.report.sections.zeros import ZEROS, zeros_part
 from calibrate.report.session_evidence import SessionEvidence
 from calibrate.report.session_workspace import NOT_IN_SPACE, session_arm, session_measured, session_room
 from calibrate.report.spot_session import spot_session
@@ -45,21 +48,32 @@ def session_page(
     """The page as text; `drift` adds its chapter, `interactive` figures that can be turned; `room` of session_room."""
     recording, model = known.recording, known.model
     room = session_room(known) if room is None else room
+    diagnosis, held = (None, ()) if diagnosis is None else beyond_model(diagnosis, model)
     chapters = dict(_chapters(known, drift, room, interactive=interactive))
     contents, parts = inserted(
         {anchor: title for anchor, (title, _) in chapters.items()},
         tuple(chapter for _, chapter in chapters.values()),
         diagnosis,
         recording.rig,
+        held,
     )
-    first = arm_summary.summary(session_answers(known, drift, room), known)
+    first = arm_summary.summary(session_answers(known, drift, room, diagnosis), known, room)
     title, head = f"The arm {recording.rig.name}", arm_summary.masthead(known)
-    return page(title, head, contents, (first, *parts), model.software, scripts=interactive)
+    running = " · ".join(
+        part for part in (recording.rig.name, recording.rig.arm.serial_number, when(recording)) if part
+    )
+    return page(title, head, contents, (first, *parts), model.software, scripts=interactive, running=running)
 
 
-def session_answers(known: SessionEvidence, drift: Drift | None = None, room: Room | str | None = None) -> Answers:
+def session_answers(
+    known: SessionEvidence,
+    drift: Drift | None = None,
+    room: Room | str | None = None,
+    diagnosis: DiagnosisFile | None = None,
+) -> Answers:
     """The first screen; `room` of session_room, computed where it is not given."""
-    answers = arm_summary.answers(known, session_room(known) if room is None else room)
+    diagnosis = None if diagnosis is None else beyond_model(diagnosis, known.model)[0]
+    answers = arm_summary.answers(known, session_room(known) if room is None else room, diagnosis)
     return answers if drift is None else replace(answers, drift=sentence(drift), warnings=drift.warnings)
 
 
@@ -78,6 +92,9 @@ def _chapters(
     yield from _chapters_of_spots(known)
     yield "errors", (arm_errors.TITLE, arm_errors.errors_chapter(known))
     yield "proofs", (arm_proofs.TITLE, arm_proofs.proofs_chapter(known))
+    zeros = tuple(zeros_part(known))
+    if zeros:
+        yield "zeros", (ZEROS, tag("div", section("zeros", ZEROS, "", *zeros), cls="no-print"))
     yield "parameters", (arm_parameters.TITLE, arm_parameters.parameters_chapter(known))
     yield "data", (arm_data.TITLE, arm_data.data_chapter(known))
     made = provenance.provenance(recording, model.poses, "took part in the fit", model.software)

@@ -5,6 +5,7 @@ from math import isfinite
 
 import numpy as np
 
+from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.fit import Status
 from calibrate.model_file import Fields, UnseenRows
 from calibrate.report.model_tests import Repeated, Scatter, proofs, repeated, scatter
@@ -22,10 +23,10 @@ WORTH_SAYING = 0.1  # of what remains: a pattern of less changes no decision
 FAILED = (Status.NOT_FINITE.name, Status.OUT_OF_STEPS.name, Status.STALLED.name)
 
 
-def session_verdict(evidence: SessionEvidence) -> Verdict:
+def session_verdict(evidence: SessionEvidence, diagnosis: DiagnosisFile | None = None) -> Verdict:
     """From model and recording; the thresholds are those at the top of this file and of verdict.py."""
     model = evidence.model
-    doubts = list(_doubts(evidence))
+    doubts = [*_doubts(evidence), *_doubts_of_rank(evidence), *_doubts_of_diagnosis(diagnosis)]
     reasons = tuple(says for says, _ in doubts)
     advice = tuple(dict.fromkeys((*(do for _, do in doubts if do), *_harmless(scatter(model)))))
     if model.status in FAILED:
@@ -34,13 +35,11 @@ def session_verdict(evidence: SessionEvidence) -> Verdict:
         return Verdict(Trust.NONE, f"{UNCHECKED} Do not use this model.", reasons, (MORE_POSES, *advice))
     first = next(iter(proofs(model)), None)
     if first is not None and first.rms_distance_after_m > NO_BETTER * first.rms_distance_before_m:
-        keep = "Keep the drawing; find out what is wrong with arm, instrument or poses, and measure again."
+        keep = "Keep the nominal values; find out what is wrong with arm, instrument or poses, and measure again."
         return Verdict(Trust.NONE, f"{_how_good(evidence, first)} Do not use this model.", reasons, (keep, *advice))
     if not doubts:
         ready = "Export the arm (calibeam identify --export) or use model.json as it is."
-        return Verdict(
-            Trust.GOOD, f"{_how_good(evidence, first)} Trust it: what remains is noise.", (), (ready, *advice)
-        )
+        return Verdict(Trust.GOOD, f"{_how_good(evidence, first)} What remains is noise.", (), (ready, *advice))
     return Verdict(Trust.CARE, f"{_how_good(evidence, first)} Use it, with care.", reasons, advice)
 
 
@@ -63,20 +62,23 @@ def _how_good(evidence: SessionEvidence, proof: UnseenRows | None) -> str:
     if proof is None:
         after, before = (float(np.sqrt(np.mean(e**2))) for e in (readings.error_after, readings.error_before))
         return (
-            f"The identified arm misses the {noun} it was fitted to by {readings.says(after)} rms distance; "
-            f"as drawn it misses them by {readings.says(before)}."
+            f"The calibrated arm misses the {noun} it was fitted to by {readings.says(after)} rms distance; "
+            f"the nominal arm misses them by {readings.says(before)}."
         )
     return (
-        f"The identified arm misses {noun} that the fit has not seen by "
+        f"The calibrated arm misses {noun} that the fit has not seen by "
         f"{readings.says(proof.rms_distance_after_m)} rms distance; "
-        f"as drawn it misses them by {readings.says(proof.rms_distance_before_m)}."
+        f"the nominal arm misses them by {readings.says(proof.rms_distance_before_m)}."
     )
 
 
 def _doubts(evidence: SessionEvidence) -> Iterator[Doubt]:
     model, recording = evidence.model, evidence.recording
     if model.status == Status.AT_BOUND.name:
-        yield f"{Status.AT_BOUND.value}.", "Look up which parameter it is below, and check the rig file's drawing."
+        yield (
+            f"{Status.AT_BOUND.value}.",
+            ("The table of parameters below names it; check its nominal value in the rig file."),
+        )
     yield from _doubts_of_scatter(scatter(model), repeated(model))
     yield from _noisy_sources(model.noise)
     if model.noise.get("settled") is False:
@@ -86,8 +88,7 @@ def _doubts(evidence: SessionEvidence) -> Iterator[Doubt]:
         along = "changes in the session" if worst.factor.startswith("order") else f"follows {worst.factor}"
         yield (
             f"What remains {along} ({worst.share:.0%} of it, F = {significant(worst.f)}): the model lacks something.",
-            "Look for the missing physics where the figures along the joints, below, show it; `calibeam diagnose` says "
-            "what it is.",
+            "The figures along the joints, below, show where physics is missing; `calibeam diagnose` finds what it is.",
         )
     yield from _doubts_of_proofs(proofs(model), by_diagnosis=model.session is not None)
     share = evidence.left_out / max(len(recording.samples), 1)
@@ -102,14 +103,43 @@ def _doubts(evidence: SessionEvidence) -> Iterator[Doubt]:
         yield f"The file is damaged: {damage}.", "Keep the file as it is, and record again if you can."
 
 
+def _doubts_of_rank(evidence: SessionEvidence) -> Iterator[Doubt]:
+    """Combinations of the arm's own parameters that other poses would separate; what no pose could is no fault."""
+    arm = {p.name for p in evidence.arm.parameters}
+    weak = [u for u in evidence.model.unseen if not u.structural and len(u.members) > 1 and arm & set(u.members)]
+    if weak:
+        yield (
+            f"{len(weak)} combination{'s' if len(weak) > 1 else ''} of parameters of the arm cannot be separated with "
+            "these poses.",
+            "Measure more different poses: `calibeam design` chooses them.",
+        )
+
+
+def _doubts_of_diagnosis(found: DiagnosisFile | None) -> Iterator[Doubt]:
+    """What the diagnosis of the same recording opposes; nothing where it agrees or was not made."""
+    if found is None or found.verdict == "consistent":
+        return
+    if found.verdict == "mismatch":
+        causes = f"{len(found.findings)} cause{'s' if len(found.findings) != 1 else ''}"
+        yield (
+            f"Geometry alone does not explain the readings: the diagnosis found {causes}.",
+            "Use the model with the physics, which `calibeam diagnose --model-out` writes.",
+        )
+        return
+    yield (
+        "The diagnosis is not conclusive: something may be there that the recorded columns do not explain.",
+        "See the chapter on what the model lacks; record the missing columns it names.",
+    )
+
+
 def _doubts_of_scatter(found: Scatter | None, repeats: Repeated | None) -> Iterator[Doubt]:
     if found is None:
         return
     if found.alarm is Alarm.ABOVE_STATED:
         yield (
-            f"What remains is {significant(found.factor)} times the noise that was believed: the instruments are worse "
+            f"What remains is {significant(found.factor)} times the assumed noise: the instruments are worse "
             "than that, or the arm does something that the model lacks.",
-            "Measure some poses several times (column repeat): only that tells noise from missing physics."
+            "Measure some poses several times (column repeat): only that separates noise from missing physics."
             if repeats is None
             else "",
         )
@@ -119,8 +149,7 @@ def _doubts_of_scatter(found: Scatter | None, repeats: Repeated | None) -> Itera
         yield (
             f"Repeated poses scatter less than the model misses them (F = {significant(repeats.ratio)}): "
             "physics is missing from the model.",
-            "Look for the missing physics where the figures along the joints, below, show it; `calibeam diagnose` says "
-            "what it is.",
+            "The figures along the joints, below, show where physics is missing; `calibeam diagnose` finds what it is.",
         )
 
 
@@ -128,7 +157,7 @@ def _harmless(found: Scatter | None) -> Iterator[str]:
     """An alarm that makes no number worse: sigmas are of the scatter found."""
     if found is not None and found.alarm is Alarm.BELOW_STATED:
         yield (
-            f"What remains is only {significant(found.factor)} times the noise that was believed: put the noise that "
+            f"What remains is only {significant(found.factor)} times the assumed noise: put the noise that "
             "was found into [noise] of the rig file."
         )
 
@@ -140,7 +169,7 @@ def _noisy_sources(noise: Fields) -> Iterator[Doubt]:
         found, believed = noise.get(name), noise.get(f"{name}_believed")
         if isinstance(found, float) and isinstance(believed, float) and found > NOISIER * believed > 0.0:
             times = significant(found / believed)
-            yield f"The noise of {name} is {times} times what was believed.", f"Check the instrument: {name}."
+            yield f"The noise of {name} is {times} times the assumed one.", f"Check the instrument: {name}."
 
 
 def _doubts_of_proofs(found: tuple[UnseenRows, ...], *, by_diagnosis: bool) -> Iterator[Doubt]:
@@ -159,6 +188,6 @@ def _doubts_of_proofs(found: tuple[UnseenRows, ...], *, by_diagnosis: bool) -> I
             continue
         told.add(proof.split)
         yield (
-            f"Unseen rows ({proof.split}) are missed by {significant(beyond)} times what noise and sigmas say.",
+            f"Unseen rows ({proof.split}) are missed by {significant(beyond)} times what noise and sigmas predict.",
             "Check that nothing moved during the session, and measure where the arm will work.",
         )

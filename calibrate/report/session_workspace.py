@@ -23,7 +23,8 @@ from calibrate.unseen_along import analyse_along
 
 IN_SPACE = names_with(Trait.IN_SPACE)  # instruments that measure where the target is
 NOT_IN_SPACE = (
-    "No measured errors are drawn: no instrument of this session says where the target is; errors of the readings are "
+    "No measured errors are drawn: no instrument of this session measures where the target is; errors of the "
+    "readings are "
     "in the next chapter."
 )
 
@@ -33,7 +34,7 @@ ALONE = 1e-6  # of 1 - J C J': below, the observation alone determines something
 
 
 def session_arm(evidence: SessionEvidence) -> KnownArm | str:
-    """The arm with its doubt, or why no error over the workspace can be told."""
+    """The arm with its doubt, or why no error over the workspace can be determined."""
     problem, model, theta = evidence.problem, evidence.model, evidence.theta
     why = unpredicted(model.free_space)
     if why is not None or model.free_space is None:
@@ -55,7 +56,7 @@ def session_arm(evidence: SessionEvidence) -> KnownArm | str:
 
 
 def session_room(evidence: SessionEvidence) -> Room | str:
-    """Errors of the tool over the workspace, or why none can be told. About half a second."""
+    """Errors of the tool over the workspace, or why none can be determined. About half a second."""
     known = session_arm(evidence)
     return known if isinstance(known, str) else room_of(known)
 

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 def face(data: Observations, psd: int, half_size_m: float, places: Sequence[int]) -> Html:
     """One face as the beam sees it from its front; circle: struck directly, triangle: by reflection."""
     says = f"spots on the face of PSD {psd}"
-    return drawn(f"spots-{psd}", says, 4.3, 4.5, lambda figure: _paint(figure, data, psd, half_size_m, places))
+    return drawn(f"spots-{psd}", says, 3.5, 3.65, lambda figure: _paint(figure, data, psd, half_size_m, places))
 
 
 def _paint(figure: Figure, data: Observations, psd: int, half_size_m: float, places: Sequence[int]) -> None:

@@ -17,7 +17,7 @@ def unseen_rows(found: Sequence[UnseenRows], unproven: Sequence[str]) -> list[Ht
         "Left out",
         "reading",
         "count",
-        "as drawn, rms distance",
+        "nominal, rms distance",
         "identified, rms distance",
         "over the noise",
         "over noise and sigmas",

@@ -15,11 +15,16 @@ Doubt = tuple[str, str]  # what speaks against trust, and what to do about it
 
 
 class Trust(Enum):
-    """How far the result may be used; the value is the page's colour for it."""
+    """How far a result may be used, on the one scale of all pages, files and messages."""
 
-    GOOD = "good"
-    CARE = "care"
-    NONE = "bad"
+    GOOD = "yes"
+    CARE = "with care"
+    NONE = "no"
+
+    @property
+    def css(self) -> str:
+        """The page's class for it."""
+        return {Trust.GOOD: "good", Trust.CARE: "care", Trust.NONE: "bad"}[self]
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,11 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from acquisition.recording import Recording
-from calibrate.report.elements import Html, bullets, figure, panels, section, table, tag
+from calibrate.report.elements import Html, bullets, figure, panels, section, table, tag, tile
 from calibrate.report.page import page, write_page
 from calibrate.report.quantities import DASH, fixed, length, significant
 from calibrate.report.sections import provenance
 from calibrate.report.svg import drawn
-from calibrate.report.tiles import tile
 from calibrate.report.tones import PLACES, Tone
 from calibrate.report.verdict import Trust
 from calibrate.verification.figure import Figure, Judgement
@@ -74,7 +73,7 @@ def _verdict(found: Verification) -> Html:
     reasons += [f"{one.symbol}: {one.taken} of the {one.asked} measurements of the whole test" for one in short]
     reasons += found.left_out
     return tag(
-        "div", tag("strong", found.sentence), *([bullets(reasons)] if reasons else []), cls=f"verdict {trust.value}"
+        "div", tag("strong", found.sentence), *([bullets(reasons)] if reasons else []), cls=f"verdict {trust.css}"
     )
 
 

@@ -79,7 +79,7 @@ def _build(table: SampleTable) -> Measured | None:
     if len(rows) == 0:
         return None
     if BAR_END not in table.samples:
-        raise DataError("samples: column bar without bar_end; say which end, a or b, each row is")
+        raise DataError("samples: column bar without bar_end; add the end, a or b, of each row")
     bar = table.samples.integers(BAR, 0)
     pairs = bar_pairs(rows, bar[rows], table.samples.columns[BAR_END][rows])
     lengths = {k: b.length_m for k, b in table.rig.bars.items()}

@@ -1,8 +1,10 @@
-"""All sensors, one line each; the order is that of blocks and parameters in a fit."""
+"""All sensors, one line each, and those of installed packages; the order is that of blocks and parameters in a fit."""
 
 from collections.abc import Iterable
 
 from acquisition.recording import Samples
+from calibrate import plug_ins
+from calibrate.plug_ins import loaded
 from calibrate.sensors import (
     bar,
     camera,
@@ -28,6 +30,7 @@ SENSORS: tuple[SensorKind, ...] = (
     bar.KIND,
     camera.KIND,
     encoder_difference.KIND,
+    *loaded(plug_ins.SENSORS, SensorKind),
 )
 BY_NAME = {kind.name: kind for kind in SENSORS}
 SOURCES: dict[str, NoiseSource] = {source.name: source for kind in SENSORS for source in kind.noise}

@@ -39,11 +39,10 @@ class Trait(Enum):
     IN_SPACE = "its first three readings are the target's position in the device's frame"
     ANGLE_ENCODERS = "turns about an upright and a level axis, each with an encoder"
     DRUM = "one length, paid out by a drum"
-    CONES = "a probe in a seat whose place nobody knows"
+    CONES = "a probe in a seat of unknown position"
     TOUCHED = "a hand presses the probe into place"
     SCALELESS = "an arm half as large would give the same readings"
     BETWEEN_ENCODERS = "two encoders of a joint, read against each other: it sees joints, not the flange"
-    CERTIFIED = "its noise is certified: scatter far beyond it is something else"
 
 
 class Found(Protocol):

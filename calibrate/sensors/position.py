@@ -190,12 +190,7 @@ KIND = SensorKind(
     title="Measured positions",
     noun="positions",
     noise=(NOISE,),
-    traits=frozenset(
-        {
-            *(Trait.TARGET, Trait.SEVERAL_TARGETS, Trait.DEVICE, Trait.IN_SPACE),
-            *(Trait.ANGLE_ENCODERS, Trait.CERTIFIED),
-        }
-    ),
+    traits=frozenset({Trait.TARGET, Trait.SEVERAL_TARGETS, Trait.DEVICE, Trait.IN_SPACE, Trait.ANGLE_ENCODERS}),
     frames=(Frame(TARGETS, "target", "where the targets sit on the flange", "where target"),),
     reads=POSITION,
     asks=POSITION,

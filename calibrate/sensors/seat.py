@@ -88,7 +88,8 @@ def mean_tips(tips_m: Floats, seat: Ints) -> SharedPoints:
         rows = np.flatnonzero(seat == k)
         if len(rows) < 2:
             raise DataError(
-                f"seat {k}: 1 row; one articulation says nothing, take it again from other sides or drop it"
+                f"seat {k}: 1 row; one articulation determines nothing; take it again from other sides or remove the "
+                "row"
             )
         out[k] = tips_m[rows].mean(axis=0)
     return SharedPoints(POINTS, out, seat, PLAUSIBLE_M)

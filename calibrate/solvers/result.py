@@ -26,8 +26,8 @@ class Stop(Enum):
     """The rule that ended the iteration; the value is the sentence for a person."""
 
     GAIN = "a full step promises less than the tolerance"
-    ROUNDING = "neither a step nor its promise can be told from rounding of the sum of squares"
-    DAMPING = "damping reached its limit: the residual is at its rounding floor"
+    ROUNDING = "neither a step nor its promise is above the rounding error of the sum of squares"
+    DAMPING = "damping reached its limit: the residual is at its rounding error"
     GRADIENT = "largest element of the gradient is at most e1"
     RESIDUAL = "2-norm of the residual is at most e3"
     RADIUS = "trust radius shrank to e2 of the parameters"

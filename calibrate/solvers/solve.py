@@ -38,6 +38,7 @@ def solve(
     rules: DogLegRules | None = None,
     max_steps: int = 100,
     tolerance: float = 1e-8,
+    covariance: bool = True,
 ) -> Fit:
     """Least squares, or least loss, from `start` (param,), nominal if None, within the bounds of the parameters.
 
@@ -50,7 +51,7 @@ def solve(
     run = _run(method, LevenbergRules(damping, max_steps, tolerance), rules or DogLegRules(kmax=max_steps))
     robust = loss.kind is not LossKind.SQUARE
     ended = reweighted(rows, theta, loss, run, tolerance) if robust else run(rows, theta)
-    return _fit(rows, ended, loss, tolerance)
+    return _fit(rows, ended, loss, tolerance, covariance=covariance)
 
 
 def _run(method: Method, levenberg_rules: LevenbergRules, dogleg_rules: DogLegRules) -> Run:
@@ -59,21 +60,21 @@ def _run(method: Method, levenberg_rules: LevenbergRules, dogleg_rules: DogLegRu
     return lambda rows, theta: levenberg(rows, theta, levenberg_rules)
 
 
-def _fit(rows: Rows, ended: Ended, loss: Loss, tolerance: float) -> Fit:
+def _fit(rows: Rows, ended: Ended, loss: Loss, tolerance: float, *, covariance: bool) -> Fit:
     parameters, theta = rows.problem.parameters, ended.theta
     robust = loss.kind is not LossKind.SQUARE
     plain = rows.residual(theta) if robust else ended.residual
     data, beliefs = plain[: len(plain) - len(rows.believed)], plain[len(plain) - len(rows.believed) :]
     chi2 = float(plain @ plain)
     scaled = None
-    if ended.slope is not None:
+    if covariance and ended.slope is not None:
         scaled = robust_covariance(rows, theta, loss) if robust else covariance_of(ended.slope)
     at_bound = tuple(parameters[rows.free[i]].name for i in np.flatnonzero(rows.at_bound(theta)))
     return Fit(
         theta,
         parameters,
         _in_full(rows, scaled),
-        _status(rows, ended, scaled is None, bool(at_bound), tolerance),
+        _status(rows, ended, covariance and scaled is None, bool(at_bound), tolerance),
         chi2,
         len(plain) - len(rows.free),
         ended.steps,

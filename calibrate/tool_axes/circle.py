@@ -70,7 +70,7 @@ def fit_circle(points_m: Floats, angle_rad: Floats) -> Circle:
     Instrum. Meas. 25(1), 1976); then geometric least squares. Doubt from the residuals' own scatter.
     """
     if len(points_m) < 5:
-        raise DataError(f"circle: {len(points_m)} points; at least 5 are needed to fit it and to tell its noise")
+        raise DataError(f"circle: {len(points_m)} points; at least 5 are needed to fit it and to estimate its noise")
     start = _start(points_m, angle_rad)
     parameters = tuple(
         Parameter(n, "rad" if "tilt" in n else "m", 0.1 if "tilt" in n else max(start.radius_m, 1e-3)) for n in NAMES

@@ -2,7 +2,7 @@
 
 Sources: Efron, Tibshirani, An Introduction to the Bootstrap, 1993, ch. 9.5 (pairs) and 13.3 (percentiles); block
 bootstrap for rows that belong together: Kuensch, Ann. Statist. 17(3), 1989. Priors are observations of their own, so
-their centres are drawn anew as well.
+their centres are drawn again as well.
 """
 
 from dataclasses import dataclass, replace

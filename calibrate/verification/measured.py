@@ -99,7 +99,7 @@ def _lengths(samples: Samples, rig: Rig, tips_m: Floats) -> tuple[Length, ...]:
     if len(rows) == 0:
         return ()
     if "bar_end" not in samples:
-        raise DataError("samples: bars without bar_end; say which end (a or b) each reading is of")
+        raise DataError("samples: bars without bar_end; add the end (a or b) of each reading")
     unknown = set(bar[rows].tolist()) - set(rig.bars)
     if unknown:
         raise DataError(f"samples: bar {min(unknown)} is not in the rig; add a [[bar]] with its length")

@@ -68,8 +68,8 @@ def refuse_wrong_model(recording: Recording, model: ModelFile) -> None:
     rig = recording.rig
     if model.rig.name != rig.name:
         raise DataError(
-            f"model of rig {model.rig.name}, recording of rig {rig.name}: another arm's model says nothing of this "
-            "one; give the model of this arm"
+            f"model of rig {model.rig.name}, recording of rig {rig.name}: the model is of another "
+            "arm; give the model of this arm"
         )
     if model.rig.text is not None:
         _refuse_other_drawing(parse_rig(model.rig.text, f"rig.toml in the model of {model.rig.name}"), rig)

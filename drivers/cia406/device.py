@@ -147,7 +147,7 @@ class Cia406Encoders(StreamDevice[can.BusABC]):
         return to_block(rows)
 
     def preset(self, node: int, angle_rad: float, *, store: bool = False) -> None:
-        """The present position of that encoder reads `angle_rad` from now on; all are set up anew. DeviceRefused."""
+        """The present position of that encoder reads `angle_rad` from now on; all are set up again. DeviceRefused."""
         place = self._place(node)
         self._change(place, lambda encoder: preset(encoder, self.identities[place].scale, angle_rad, store=store))
 
@@ -182,7 +182,7 @@ class Cia406Encoders(StreamDevice[can.BusABC]):
         return self.nodes.index(node)
 
     def _change(self, place: int, change: Callable[[EncoderObjects], None]) -> None:
-        """Parameters are writable in the pre-operational state only (CiA 406); then everything is set up anew."""
+        """Parameters are writable in the pre-operational state only (CiA 406); then everything is set up again."""
         bus, number = self._opened(), self.nodes[place]
         with lost_as_device_lost(self.name, "setting up"):
             self._stop_taking()

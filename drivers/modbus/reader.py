@@ -1,7 +1,7 @@
 """Recorder of a controller over Modbus: polls the register map at a fixed rate; it never moves anything.
 
 Modbus sends no time stamps: the device time of a sample is the host's, in the middle between question and answer. What
-was not polled in time is a gap in `sequence`. Values that no longer change cannot be told from an arm that stands,
+was not polled in time is a gap in `sequence`. Values that no longer change cannot be separated from an arm that stands,
 unless the map has a `life` register: then a controller whose program has stopped is stale.
 """
 

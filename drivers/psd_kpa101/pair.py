@@ -240,7 +240,7 @@ class Kpa101Pair(StreamDevice[tuple[Kpa101Unit, ...]]):
         for place, (head, number) in enumerate(zip(self._heads, found, strict=True), 1):
             if head.serial_number is not None and head.serial_number != number:
                 raise DeviceRefused(
-                    f"{self.name}: unit {place} is {number}, the rig says {head.serial_number}; "
+                    f"{self.name}: unit {place} is {number}, the rig file has {head.serial_number}; "
                     "exchange the ports or the serial numbers in the rig file"
                 )
 

@@ -24,7 +24,7 @@ CLASSES = {  # bit of the identifier -> what it stands for
     0x004: "controller",
     0x008: "protocol violation",
     0x010: "transceiver",
-    0x020: "no acknowledgement: nobody else on the bus, or another bit rate",
+    0x020: "no acknowledgement: no other node on the bus, or another bit rate",
     0x040: "bus off",
     0x080: "bus error",
     0x100: "controller restarted",

@@ -84,7 +84,7 @@ class UrControl:
         try:
             answer = child.wait_ready(limit_s)
             if isinstance(answer, Ended):
-                raise DeviceRefused(f"{self.place}: no control: {answer.text}; look at the pendant, then connect again")
+                raise DeviceRefused(f"{self.place}: no control: {answer.text}; check the pendant, then connect again")
         except BaseException:
             child.kill()
             child.release()
@@ -197,7 +197,7 @@ class UrControl:
             case Outcome.SILENT:
                 self._give_up(child)
                 return DeviceStale(
-                    f"{self.place}: the controller has sent nothing new for half a second; look at the pendant, "
+                    f"{self.place}: the controller has sent nothing new for half a second; check the pendant, "
                     "then connect again"
                 )
             case Outcome.EXPIRED:

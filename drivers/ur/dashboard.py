@@ -80,7 +80,7 @@ class UrDashboard:
     def _command(self, line: str, expected: str, timeout_s: float | None = None) -> None:
         (reply,) = self._converse([line], timeout_s, at_once=True)
         if reply != expected:
-            raise DeviceRefused(f'{self._place}: "{line}" is refused: {reply}; look at the pendant')
+            raise DeviceRefused(f'{self._place}: "{line}" is refused: {reply}; check the pendant')
 
     def _converse(self, lines: list[str], timeout_s: float | None = None, *, at_once: bool = False) -> list[str]:
         """`at_once`: the one line is sent before the banner has come, so that a controller which hangs finds it first
@@ -95,7 +95,7 @@ class UrDashboard:
                     replies.send(lines[0])
                 banner = replies.next()
                 if not banner.startswith(BANNER):
-                    raise WireError(f"{self._place}: no dashboard server: it says {banner[:32]!r}; check the address")
+                    raise WireError(f"{self._place}: no dashboard server: it sent {banner[:32]!r}; check the address")
                 return [replies.next()] if at_once else [replies.ask(text) for text in lines]
         except TimeoutError as error:
             raise DeviceStale(

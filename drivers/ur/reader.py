@@ -136,7 +136,7 @@ class UrReader(StreamDevice[socket.socket]):
             if not self._receive(self._left_s(deadline_s)):
                 raise DeviceStale(
                     f"{self.place}: no sample for {timeout_s:.3g} s while the line is open; "
-                    "the controller is hung or its stream is paused: look at the pendant, then connect again"
+                    "the controller is hung or its stream is paused: check the pendant, then connect again"
                 )
 
     # --- the line
@@ -270,7 +270,7 @@ class UrReader(StreamDevice[socket.socket]):
 
     def _refuse(self, message: Message) -> None:
         if isinstance(message, TextMessage) and message.level <= 1:
-            raise DeviceRefused(f"{self.place}: the controller says: {message.text}")
+            raise DeviceRefused(f"{self.place}: the controller reports: {message.text}")
         if isinstance(message, Unknown):
             raise WireError(
                 f"{self.place}: unexpected package of type {message.kind}: {message.payload[:32].hex(' ')}; "

@@ -196,5 +196,5 @@ class SupervisedChild:
             size = self._printed.seek(0, os.SEEK_END)
             self._printed.seek(max(0, size - SHOWN_BYTES))
             text = self._printed.read().decode(errors="replace").strip()
-            return f', saying "{text.splitlines()[-1]}"' if text else ""
+            return f', its last line "{text.splitlines()[-1]}"' if text else ""
         return ""

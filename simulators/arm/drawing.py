@@ -1,4 +1,4 @@
-"""An arm as drawn: the nominal numbers of a rig file, and the fixed parts that follow from them.
+"""A nominal arm: the nominal numbers of a rig file, and the fixed parts that follow from them.
 
 Three notations, each with its own frames (interchange format, [arm]):
     dh         T_i = Rz(q + offset) Tz(d) Tx(a) Rx(alpha)        Denavit and Hartenberg, J. Appl. Mech. 22 (1955) 215

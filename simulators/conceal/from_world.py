@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from simulators.arm.drawing import Drawing, Row
 from simulators.arm.rigid import moved
 from simulators.conceal.rig import DualPsd, Spread, TrueRig
+from simulators.world.errors import WorldError
 from simulators.world.rig import Emulation, WorldRig
 from simulators.world.truth import Truth, arm_of, draw_truth
 
@@ -18,7 +19,12 @@ Floats = NDArray[np.float64]
 
 
 def rig_of_world(rig: WorldRig, truth: Truth, plain: Mapping[str, Any]) -> TrueRig:
-    """Arm, laser and places as they truly are; `plain`: the rig file, which knows the limits of the joints."""
+    """Arm, laser and places as they truly are; `plain`: the rig file, which knows the limits of the joints.
+
+    WorldError for a rig without a fixture: there is no light to work out.
+    """
+    if rig.fixture is None:
+        raise WorldError("rig file: [fixture] is missing; readings of a light cannot be worked out without one")
     second, unit = rig.fixture.psd2_in_psd1, np.array(truth.laser_direction)
     joints = plain["arm"]["joint"]
     return TrueRig(

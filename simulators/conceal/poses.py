@@ -1,4 +1,4 @@
-"""Poses of a session: from which the beam strikes both faces where it is wanted, or anywhere in free space.
+"""Poses of a session: from which the beam strikes both faces where it is wanted, or anywhere over the workspace.
 
 A line through point 1 on the first face and through the mirror image of point 2 strikes both (law of reflection). The
 laser stands on that line, turned about it at random; the arm is solved for on the true rig.

@@ -22,7 +22,7 @@ SEED_OF_GRID = 20260101  # the same unseen poses for every case of one arm
 
 
 def truth_document(case: Case) -> dict[str, Any]:
-    """Defects, geometry, noise, noise-free readings, and poses in free space that nobody measured."""
+    """Defects, geometry, noise, noise-free readings, and poses over the workspace that nobody measured."""
     return {
         "schema": 1,
         "wanted": asdict(case.wanted),

@@ -177,6 +177,6 @@ def _place(true: TrueRig, drawing: Drawing, rng: np.random.Generator) -> Floats:
             return best
     if best_share < 0.01:
         raise ConcealError(
-            f"no place of {PLACE_TRIES} that {drawing.name} can look at from enough sides; take another seed"
+            f"no place of {PLACE_TRIES} that {drawing.name} can see from enough sides; take another seed"
         )
     return best

@@ -15,7 +15,7 @@ from typing import Any
 
 from simulators.faults.fault import DisturbedLight, FaultError, Output, Target
 from simulators.faults.injector import Injector
-from simulators.wire import TICK_S, Bench, SerialPort, TcpPort, Wire
+from simulators.wire import TICK_S, Bench, SerialPort, TcpPort, UdpPort, Wire
 
 UNPLUGGED_S = 0.1  # for how long a disconnected serial device is away; a TCP client may come back at once
 
@@ -113,8 +113,8 @@ def fault_verbs(injectors: Mapping[str, Injector]) -> dict[str, Callable[..., An
     return {"fault.inject": inject, "fault.clear": clear, "fault.list": listed}
 
 
-def _faulty(port: SerialPort | TcpPort, injector: Injector) -> SerialPort | TcpPort:
-    if isinstance(port, SerialPort):
+def _faulty(port: SerialPort | TcpPort | UdpPort, injector: Injector) -> SerialPort | TcpPort | UdpPort:
+    if isinstance(port, SerialPort | UdpPort):
         return replace(port, wire=FaultyWire(port.wire, injector, port.name))
 
     def accept() -> Wire:

@@ -36,7 +36,7 @@ class Joint(Part, frozen=True, kw_only=True):
 
 
 class Arm(msgspec.Struct, frozen=True):
-    """The arm as drawn, a local product of exponentials."""
+    """The nominal arm, a local product of exponentials."""
 
     joint: Annotated[tuple[Joint, ...], msgspec.Meta(min_length=1)]
     model: str
@@ -129,7 +129,7 @@ def read_hand_rig(rig: Mapping[str, Any]) -> HandRig:
     except msgspec.ValidationError as error:
         raise WorldError(f"rig file: {error}; an emulated measuring arm needs [arm] with joints in its form") from error
     if any(joint.sign != 1 or joint.follows for joint in checked.arm.joint):
-        raise WorldError("rig file: an emulated arm counts joints as drawn; emulate a rig without sign and follows")
+        raise WorldError("rig file: an emulated arm has no sign and no follows; emulate a rig without them")
     if checked.arm.model != LOCAL_POE:
         raise WorldError(
             f'rig file: arm.model = "{checked.arm.model}": a hand-held arm is emulated as "{LOCAL_POE}" only'

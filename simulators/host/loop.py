@@ -20,8 +20,8 @@ from typing import Protocol
 
 from simulators.host.line import Log, Report, check_link, log_to_stderr
 from simulators.host.serial_line import SerialLine
-from simulators.host.tcp import Connection, Listener
-from simulators.wire import TICK_S, Bench, SerialPort, TcpPort
+from simulators.host.tcp import Connection, Listener, UdpSender
+from simulators.wire import TICK_S, Bench, SerialPort, TcpPort, UdpPort
 
 STALL_S = 0.050  # wall time; longer than any scheduling delay of a working machine, shorter than a client's time-outs
 
@@ -83,6 +83,7 @@ class Host:
         self._selector = selectors.SelectSelector()
         self._lines: list[SerialLine] = []
         self._watched: set[int] = set()
+        self._senders: list[UdpSender] = []
         self._listeners: dict[str, Listener] = {}
         self._connections: dict[Connection, Listener] = {}
         try:
@@ -135,7 +136,9 @@ class Host:
             line.close()
         for listener in self._listeners.values():
             listener.close()
-        self._lines, self._listeners = [], {}
+        for sender in self._senders:
+            sender.close()
+        self._lines, self._senders, self._listeners = [], [], {}
         self._selector.close()
 
     def _open(self, bench: Bench) -> None:
@@ -148,6 +151,8 @@ class Host:
         for port in bench.ports:
             if isinstance(port, TcpPort):
                 self._open_listener(port)
+            elif isinstance(port, UdpPort):
+                self._senders.append(UdpSender(port, self.faults))
             else:
                 self._lines.append(SerialLine(port, self.faults))
 
@@ -182,6 +187,8 @@ class Host:
             line.plug_when_due()
             line.send_due()
             self._follow(line)
+        for sender in self._senders:
+            sender.send_due()
         for connection in self._connections:
             connection.gather_due()
 

@@ -1,12 +1,13 @@
-"""A listening socket and its clients, each with a wire of its own."""
+"""A listening socket and its clients, each with a wire of its own; and datagrams to one address."""
 
 import errno
 import socket
 from collections.abc import Callable
+from contextlib import suppress
 
 from simulators.host.errors import HostError, PortBusy
 from simulators.host.line import Outbox, Report
-from simulators.wire import TcpPort, Wire
+from simulators.wire import TcpPort, UdpPort, Wire
 
 READ_BYTES = 65536
 BACKLOG = 16  # clients that connect within one tick
@@ -136,3 +137,26 @@ def _explained(port: TcpPort, error: OSError) -> HostError:
     if error.errno == errno.EADDRNOTAVAIL:
         return HostError(f"{where} is no address of this machine; emulate on one of 127.0.0.x")
     return HostError(f"{where} cannot be opened: {error.strerror or error}; take another address")
+
+
+class UdpSender:
+    """Sends datagrams. Nobody need be there: what a network refuses is lost, as on site."""
+
+    def __init__(self, port: UdpPort, report: Report) -> None:
+        self._port, self._report = port, report
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+
+    def send_due(self) -> None:
+        """What became due, as one datagram; called once a tick."""
+        try:
+            data = self._port.wire.due()
+        except Exception as fault:  # a wire at fault must not end the other instruments
+            self._report.fault(self._port.name, fault)
+            return
+        if data:
+            with suppress(OSError):  # refused by a port that nobody has, or no room
+                self._socket.sendto(data, (self._port.host, self._port.port))
+
+    def close(self) -> None:
+        self._socket.close()

@@ -40,7 +40,7 @@ class once(Generic[T]):  # noqa: N801 - reads as a decorator
 
 
 class Readout:
-    """One cycle; made anew every tick."""
+    """One cycle; made again every tick."""
 
     def __init__(
         self, tick: int, arm: ArmController, memory: Memory, runtime: RuntimeState, clock: DeviceClock | None = None

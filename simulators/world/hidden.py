@@ -23,8 +23,10 @@ from simulators.defects import Light, Scene
 from simulators.defects.defect import (
     ChangesSums,
     Defect,
+    DistortsPosition,
     DistortsSpots,
     MovesBase,
+    MovesDevice,
     MovesFixture,
     MovesLink,
     MovesTool,
@@ -50,6 +52,8 @@ class Hidden:
         self._tools = [d for d in defects if isinstance(d, MovesTool)]
         self._fixtures = [d for d in defects if isinstance(d, MovesFixture)]
         self.at_the_light = [d for d in defects if isinstance(d, (DistortsSpots, ChangesSums))]
+        self._devices = [d for d in defects if isinstance(d, MovesDevice)]
+        self._at_the_target = [d for d in defects if isinstance(d, DistortsPosition)]
         self._arm = arm
         self.turn_rad: Floats = np.zeros(arm.n_joints)  # true angle less reading, beside zero and repeatability
         self.fixture: Floats | None = None  # motion of the fixture in its own frame; None: it stands still
@@ -86,6 +90,17 @@ class Hidden:
     def carried(self, pose: Floats) -> Floats:
         """The same of the flange (4, 4); the mount's own motion counts as the flange's."""
         return self._bend @ pose
+
+    def seen_position_m(self, target_m: Floats, device: Floats) -> Floats:
+        """(3,) as a tracker at `device` (4, 4) gives a target (3,) in the base: it may move, and err."""
+        if self.scene is None:
+            return device[:3, :3].T @ (target_m - device[:3, 3])
+        for defect in self._devices:
+            device = device @ defect.device_motion(self.scene)[-1]
+        seen_m = np.tile(device[:3, :3].T @ (target_m - device[:3, 3]), (len(self.scene), 1))
+        for defect in self._at_the_target:
+            seen_m = defect.seen_position_m(seen_m, self.scene)
+        return seen_m[-1]
 
     def _load(self, turning: Floats, flange: Floats, rows: int) -> Load:
         """The load of the moment in every row."""

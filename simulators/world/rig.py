@@ -49,12 +49,13 @@ class Arm(msgspec.Struct, frozen=True):
 
 
 class Tool(msgspec.Struct, frozen=True):
-    """What hangs at the flange: the laser and its holder."""
+    """What hangs at the flange: the laser and its holder, or a tracker's target."""
 
-    laser_origin_m: Vector
-    laser_direction: Vector
+    laser_origin_m: Vector = ZERO
+    laser_direction: Vector = (0.0, 0.0, 1.0)
     mass_kg: Sigma = 0.0
     com_m: Vector = ZERO
+    point_m: Vector = ZERO  # the target
 
 
 class Fixture(msgspec.Struct, frozen=True):
@@ -86,6 +87,10 @@ class Emulation(msgspec.Struct, frozen=True):
     joint_repeatability_rad: Sigma = 0.0
     psd_noise_m: Sigma = 0.0
     laser_power_w: Sigma = 1e-3  # class 2 pointer (IEC 60825-1: at most 1 mW)
+    position_noise_m: Sigma = 0.0  # of a tracker, on each axis
+    target_sigma_m: Sigma = 0.0  # of its target at the flange
+    device_origin_sigma_m: Sigma = 0.0  # of where it stands
+    device_rotation_sigma_rad: Sigma = 0.0
 
 
 class WorldRig(msgspec.Struct, frozen=True):
@@ -93,9 +98,10 @@ class WorldRig(msgspec.Struct, frozen=True):
 
     arm: Arm
     tool: Tool
-    fixture: Fixture
-    placement: Annotated[tuple[Placement, ...], msgspec.Meta(min_length=1)]
+    fixture: Fixture | None = None
+    placement: tuple[Placement, ...] = ()
     emulation: Emulation = Emulation()
+    device: Pose = Pose((2.0, 0.0, 0.5), (0.0, 0.0, 3.0))  # of a rig that does not say where its tracker stands
 
 
 def read_rig(rig: Mapping[str, Any]) -> WorldRig:
@@ -106,8 +112,23 @@ def read_rig(rig: Mapping[str, Any]) -> WorldRig:
         raise WorldError(
             f"rig file: {error}; the emulated world needs [arm], [tool], [fixture], [[placement]]"
         ) from error
+    _refuse_what_is_missing(checked, rig)
     _refuse_what_cannot_be_built(checked)
     return checked
+
+
+def _refuse_what_is_missing(rig: WorldRig, plain: Mapping[str, Any]) -> None:
+    """A light needs a laser, a fixture and its places; only a rig that is measured by a tracker alone has none."""
+    if rig.fixture is None and "tracker" in plain.get("devices", {}):
+        return
+    named = {"[fixture]": rig.fixture is not None, "[[placement]]": bool(rig.placement)}
+    tool = plain.get("tool", {})
+    named |= {f"tool.{key}": key in tool for key in ("laser_origin_m", "laser_direction")}
+    missing = next((name for name, there in named.items() if not there), None)
+    if missing is not None:
+        raise WorldError(
+            f"rig file: {missing} is missing; the emulated world needs [arm], [tool], [fixture], [[placement]]"
+        )
 
 
 def _refuse_what_cannot_be_built(rig: WorldRig) -> None:

@@ -61,6 +61,8 @@ class Truth(msgspec.Struct, frozen=True):
     schema: int = SCHEMA
     parts: tuple[Pose, ...] = ()  # of an arm that is given: n + 1 fixed parts between turns about z, in place of links
     psd2_in_psd1: Pose | None = None  # of a fixture that is given
+    target_m: Vector = (0.0, 0.0, 0.0)  # a tracker's target in the flange frame
+    device: Pose = Pose()  # the tracker in the base frame
 
 
 class Given(msgspec.Struct, frozen=True):
@@ -101,7 +103,8 @@ def draw_truth(rig: WorldRig, seed: int) -> Truth:
     """The truth that belongs to a rig and a seed; the same two always give the same. WorldError for a seed below 0."""
     if seed < 0:
         raise WorldError(f"seed {seed}; give a whole number from 0 on")
-    link, zero, place, laser, encoder = (np.random.default_rng(s) for s in np.random.SeedSequence([seed, 1]).spawn(5))
+    streams = (np.random.default_rng(s) for s in np.random.SeedSequence([seed, 1]).spawn(6))
+    link, zero, place, laser, encoder, tracker = streams
     sigma = rig.emulation
     n = len(rig.arm.joint)
     origin_m, direction = _draw_laser(rig.tool, sigma, laser)
@@ -114,6 +117,8 @@ def draw_truth(rig: WorldRig, seed: int) -> Truth:
         laser_origin_m=origin_m,
         laser_direction=direction,
         placements=tuple(_draw_placement(placement, sigma, place) for placement in rig.placement),
+        target_m=_vector(np.asarray(rig.tool.point_m) + sigma.target_sigma_m * tracker.standard_normal(3)),
+        device=_displaced(rig.device, sigma.device_origin_sigma_m, sigma.device_rotation_sigma_rad, tracker),
     )
 
 
@@ -130,17 +135,18 @@ def _draw_link(joint: Joint, sigma: Emulation, rng: np.random.Generator) -> True
 
 
 def _draw_placement(placement: Placement, sigma: Emulation, rng: np.random.Generator) -> TruePlacement:
-    """The nominal pose with a small pose composed on its right: the fixture is off in its own frame."""
-    shift_m = sigma.placement_origin_sigma_m * rng.standard_normal(3)
-    turn_rad = sigma.placement_rotation_sigma_rad * rng.standard_normal(3)
-    nominal = placement.psd1_in_base
+    shift_m, turn_rad = sigma.placement_origin_sigma_m, sigma.placement_rotation_sigma_rad
+    return TruePlacement(placement.id, _displaced(placement.psd1_in_base, shift_m, turn_rad, rng))
+
+
+def _displaced(nominal: Pose, origin_sigma_m: float, rotation_sigma_rad: float, rng: np.random.Generator) -> Pose:
+    """The nominal pose with a small pose composed on its right: what stands there is off in its own frame."""
+    shift_m = origin_sigma_m * rng.standard_normal(3)
+    turn_rad = rotation_sigma_rad * rng.standard_normal(3)
     turned = Rotation.from_rotvec(nominal.rotation_rad)
-    return TruePlacement(
-        id=placement.id,
-        psd1_in_base=Pose(
-            origin_m=_vector(np.asarray(nominal.origin_m) + turned.apply(shift_m)),
-            rotation_rad=_vector((turned * Rotation.from_rotvec(turn_rad)).as_rotvec()),
-        ),
+    return Pose(
+        origin_m=_vector(np.asarray(nominal.origin_m) + turned.apply(shift_m)),
+        rotation_rad=_vector((turned * Rotation.from_rotvec(turn_rad)).as_rotvec()),
     )
 
 

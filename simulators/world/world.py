@@ -18,6 +18,7 @@ import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from simulators.arm.rigid import moved
 from simulators.defects import Defect
 from simulators.world.body import ArmBody
 from simulators.world.errors import WorldError
@@ -57,7 +58,7 @@ class World:
         rest_degC: Mapping[str, float] | None = None,
     ) -> None:
         """`q_rad`: (n,) readings at power-on, zero when not given. WorldError when their number is wrong."""
-        if truth.psd2_in_psd1 is not None:
+        if truth.psd2_in_psd1 is not None and rig.fixture is not None:
             fixture = msgspec.structs.replace(rig.fixture, psd2_in_psd1=truth.psd2_in_psd1)
             rig = msgspec.structs.replace(rig, fixture=fixture)
         repeat_seed, noise_seed = np.random.SeedSequence([truth.seed, 2]).spawn(2)
@@ -66,15 +67,19 @@ class World:
         start_rad = self._checked(np.zeros(self.n_joints) if q_rad is None else q_rad)
         self._hidden = Hidden(hidden, arm_of(rig, truth)) if hidden else None
         self._body = ArmBody(rig, truth, start_rad, np.random.default_rng(repeat_seed), self._hidden, rest_degC)
-        self._detectors = Photodetectors(
-            rig.fixture.half_size_m, rig.emulation.laser_power_w, rig.emulation.psd_noise_m
+        self._detectors = (
+            None
+            if rig.fixture is None
+            else Photodetectors(rig.fixture.half_size_m, rig.emulation.laser_power_w, rig.emulation.psd_noise_m)
         )
         self._noise = np.random.default_rng(noise_seed)
         self._quantise = quantiser([joint.encoder_counts for joint in rig.arm.joint])
         self._fixture = rig.fixture
         self._places: dict[int, Pose] = {place.id: place.psd1_in_base for place in truth.placements}
-        self._faces_at = {place: place_faces(rig.fixture, pose) for place, pose in self._places.items()}
-        self._placement = truth.placements[0].id
+        self._faces_at: dict[int, tuple[Face, Face]] = {}
+        if rig.fixture is not None:
+            self._faces_at = {place: place_faces(rig.fixture, pose) for place, pose in self._places.items()}
+        self._placement = truth.placements[0].id if self._faces_at else NO_FIXTURE
         self._rate_hz = NOISE_RATE_HZ
         self._steps = 0
         self._felt_step = 0
@@ -189,6 +194,8 @@ class World:
         return sample_a(interpolate(self._knots, self._knots_start_s, times, self._see), self._rate_hz, self._noise)
 
     def _see(self, beam: Ray) -> Floats:
+        if self._detectors is None:
+            raise WorldError("photocurrents: this rig has no [fixture], so that there are no detectors")
         return self._detectors.see(self._spots(beam))
 
     def _spots(self, beam: Ray) -> Spots:
@@ -203,9 +210,17 @@ class World:
         self._body.feel(self.time_s, self._placement)
         if self._placement not in self._faces_at:
             return None
-        if self._hidden is None or self._hidden.fixture is None:
+        if self._hidden is None or self._hidden.fixture is None or self._fixture is None:
             return self._faces_at[self._placement]
         return place_faces(self._fixture, fixture_at(self._places[self._placement], self._hidden.fixture))
+
+    def target_position_m(self) -> Floats:
+        """(3,) of the target in the frame of the tracker, as it would give it without noise."""
+        target = self._body.T_base_flange() @ np.array([*self.truth.target_m, 1.0])
+        device = moved(self.truth.device.origin_m, self.truth.device.rotation_rad)
+        if self._hidden is None:
+            return device[:3, :3].T @ (target[:3] - device[:3, 3])
+        return self._hidden.seen_position_m(target[:3], device)
 
     def T_base_psd1(self) -> Floats | None:
         """Where PSD 1 stands, (4, 4), as whoever looks at the fixture sees it; None without a fixture."""

@@ -16,7 +16,7 @@ from calibeam import asking
 from calibeam.asking import Asking, NotAgreedError
 from calibeam.cli import run
 from calibeam.commands import psd_check
-from calibeam.motion import by_hand
+from calibeam.motion import by_hand, task_by_hand
 from calibeam.sessions.run import OnSite
 
 ROOT = Path(__file__).parents[2]
@@ -31,10 +31,20 @@ ASKS = {
     "calibeam/commands/psd_check.py",
     "calibeam/commands/session.py",
     "calibeam/motion/by_hand.py",
+    "calibeam/motion/task_by_hand.py",
     "calibeam/sessions/keys.py",
     "calibeam/sessions/person.py",
     "calibeam/sessions/run.py",
+    "calibeam/sessions/with_tracker.py",
 }
+TASK = """[transform]
+P = { origin_m = [-0.45, -0.25, 0.25], rotation_rad = [3.1, 0.1, 0.05] }
+[position]
+"at pin" = "T6 = P"
+[[step]]
+do = "move"
+to = "at pin"
+"""
 PROMPTERS = {"input", "rich.prompt", "readline", "getpass", "click"}
 # Processes whose standard input is a pipe of the program that started them.
 FED = {"calibeam/fleet/worker.py", "calibeam/prove/blind.py", "simulators/__main__.py", "simulators/serve.py"}
@@ -73,9 +83,10 @@ def command(monkeypatch, tmp_path) -> Callable[[str], list[str]]:
     """The command line of every command that asks, without any device: what would move the arm says so instead."""
     for name, stand_in in (
         ("streamed_robot", lambda *_: Robot()), ("gate_of", lambda *_: Gate()),
-        ("draw_plan_file", lambda *_: None), ("_said", lambda *_: "plan"),
+        ("draw_plan_file", lambda *_: None), ("said", lambda *_: "plan"),
     ):  # fmt: skip
         monkeypatch.setattr(by_hand, name, stand_in)
+        monkeypatch.setattr(task_by_hand, name, stand_in)
     for step in ("_devices", "_plan"):
         monkeypatch.setattr(OnSite, step, lambda *_: None)
     monkeypatch.setattr(OnSite, "_measure", moves)
@@ -85,9 +96,11 @@ def command(monkeypatch, tmp_path) -> Callable[[str], list[str]]:
     monkeypatch.setattr(psd_check, "_face", lambda *_: None)
     monkeypatch.setattr(psd_check, "collect", lambda psd, face, unit, place_m, ready: moves(ready(1, place_m[0])))
     (tmp_path / "points.csv").write_text("x_m,y_m\n0.001,0\n")
+    (tmp_path / "task.toml").write_text(TASK)
     lines = {
         "move": ["move", str(RIG), "--home"],
         "jog": ["jog", str(RIG), "--axis", "z", "--by-mm", "5"],
+        "task": ["task", "run", str(tmp_path / "task.toml"), "--rig", str(RIG), "--out", str(tmp_path)],
         "camera": ["camera", str(CAMERA_RIG), "--out", str(tmp_path / "camera")],
         "session": ["session", str(RIG), "--out", str(tmp_path / "session")],
         "psd-check": ["psd-check", str(RIG), "--points", str(tmp_path / "points.csv")],
@@ -95,7 +108,7 @@ def command(monkeypatch, tmp_path) -> Callable[[str], list[str]]:
     return lambda name: lines[name]
 
 
-MOVING = ("move", "jog", "camera", "session")
+MOVING = ("move", "jog", "task", "camera", "session")
 
 
 @pytest.mark.parametrize("name", MOVING)

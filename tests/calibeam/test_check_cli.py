@@ -98,4 +98,4 @@ def test_a_recording_is_checked_by_the_same_command(capsys) -> None:
 
 def test_help_has_examples(capsys) -> None:
     assert run(["check", "--help"]) == 0
-    assert "Example: calibeam check" in " ".join(capsys.readouterr().out.split())
+    assert "For example: calibeam check" in " ".join(capsys.readouterr().out.split())

@@ -53,7 +53,7 @@ def test_help_is_good_and_an_unknown_command_is_usage(capsys: pytest.CaptureFixt
 @pytest.mark.parametrize("command", ["demo", "session", "emulate", "check", "identify", "report", "export", "import"])
 def test_every_command_has_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run([command, "--help"]) == 0
-    assert f"Example: calibeam {command}" in " ".join(capsys.readouterr().out.split())
+    assert f"For example: calibeam {command}" in " ".join(capsys.readouterr().out.split())
 
 
 def test_a_misspelt_key_names_line_and_nearest_key(rig_with, session_of) -> None:
@@ -193,3 +193,12 @@ def test_a_file_that_is_no_recording_is_refused(tmp_path: Path, capsys: pytest.C
     path.write_bytes(b"not a recording")
     assert run(["identify", str(path)]) == 1
     assert "x.mcap" in capsys.readouterr().err
+
+
+def test_a_missing_input_is_not_answered_with_another_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    missing = tmp_path / "points.csv"
+    assert run(["psd-check", str(RIG), "--points", str(missing), "--no-wait"]) == 1
+    said = capsys.readouterr().err
+    assert str(missing) in said
+    assert "check the path" in said
+    assert "--out" not in said

@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from acquisition.recording import read
 from calibeam.cli import run
 from calibeam.results.simulator import Simulator
 
+CLIENTS = Path(__file__).parents[2] / ".venv-clients" / "bin"
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples" / "simulators"
 NOISE_M = 20e-6
 SAMPLES = 60
@@ -111,6 +113,19 @@ def test_a_program_of_thirty_lines_is_a_simulation(off, tmp_path):
 
 def test_a_mjcf_is_a_simulation_and_is_asked_by_file(off):
     command = f"{sys.executable} {EXAMPLES / 'mujoco_arm.py'} {EXAMPLES / 'arm.xml'} {{samples}}"
+    answer = Simulator(command).readings(read(off).samples)
+    expected = np.array([arm().reflector_m(q) for q in poses()])
+    assert np.stack([answer[name] for name in ("x_m", "y_m", "z_m")], axis=1) == pytest.approx(expected, abs=1e-12)
+
+
+def test_an_fmu_is_a_simulation_through_fmpy(off, tmp_path):
+    if not CLIENTS.is_dir():
+        pytest.skip("no environment for third-party clients: make clients")
+    for name in ("arm_as_fmu.py", "numpy_arm.py"):
+        shutil.copy(EXAMPLES / name, tmp_path)
+    build = [CLIENTS / "pythonfmu", "build", "-f", "arm_as_fmu.py", "numpy_arm.py", "--no-external-tool"]
+    subprocess.run(build, cwd=tmp_path, check=True, capture_output=True)
+    command = f"{CLIENTS / 'python'} {EXAMPLES / 'fmu_arm.py'} {tmp_path / 'Arm.fmu'} {{samples}}"
     answer = Simulator(command).readings(read(off).samples)
     expected = np.array([arm().reflector_m(q) for q in poses()])
     assert np.stack([answer[name] for name in ("x_m", "y_m", "z_m")], axis=1) == pytest.approx(expected, abs=1e-12)

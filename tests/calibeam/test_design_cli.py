@@ -30,7 +30,7 @@ def test_a_design_says_what_it_promises(tmp_path, capsys):
     options = ["--poses", "20", "--repeats", "2", "--candidates", "6", "--out", str(tmp_path / "plan.toml")]
     assert run(["design", str(ROBOT), *options]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "predicted error in free space (the beam" in said
+    assert "predicted error over the workspace (the beam" in said
     assert "causes that a diagnosis of this plan would find" in said
 
 

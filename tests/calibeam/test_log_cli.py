@@ -306,4 +306,4 @@ def test_what_cannot_be_done_is_told_in_one_sentence(
 @pytest.mark.parametrize("command", [["log", "encoders"], ["recover"], ["export"], ["import"]])
 def test_help_has_an_example(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert run([*command, "--help"]) == 0
-    assert f"Example: calibeam {' '.join(command)}" in " ".join(capsys.readouterr().out.split())
+    assert f"For example: calibeam {' '.join(command)}" in " ".join(capsys.readouterr().out.split())

@@ -113,10 +113,10 @@ def test_a_move_whose_program_was_frozen_is_given_up(rig: Path, tmp_path: Path) 
 @pytest.mark.parametrize(
     ("arguments", "why"),
     [
-        (["move"], "say where to with one of"),
+        (["move"], "give one of"),
         (["move", "--joints-deg", "1", "2"], "2 numbers, but the arm has 6 joints"),
         (["move", "--home", "--speed", "2"], "above 0 and up to 1"),
-        (["jog", "--joint", "1"], "say --joint N --by-deg A"),
+        (["jog", "--joint", "1"], "give --joint N --by-deg A"),
         (["jog", "--axis", "x", "--by-mm", "500"], "at most 100 mm"),
         (["jog", "--joint", "9", "--by-deg", "1"], "joints 1 to 6"),
     ],

@@ -26,6 +26,7 @@ def size(finding, name):
     return finding["parameters"][name]["value"]
 
 
+@pytest.mark.endure  # daily: the healthy devices beside faulty ones below, and streams/test_examine.py
 def test_healthy_devices_are_left_in_peace_and_their_clocks_known_to_a_tenth_of_a_millisecond(tmp_path):
     told, file = diagnosed(tmp_path, Trouble(), Clocks())
     assert told == {}
@@ -47,6 +48,8 @@ def test_a_late_encoder_a_slip_a_drifting_clock_and_lost_frames_in_one_session(t
     assert size(slip, "slip_rad") == pytest.approx(4e-4, abs=1e-5)
     assert slip["from_s"] < 20.0 + 18.0 < slip["to_s"]  # on the clock of the joints
     assert size(told["latency", "time", "spots"], "drift_s_per_s") == pytest.approx(-4e-4, abs=1e-5)
+    clocks = {one["stream"]: one for one in file["streams"]["clocks"]}
+    assert clocks["encoders"]["offset_s"] == pytest.approx(20.0 - 1000.0, abs=1e-4)
     usual = {one["physics"]: one for one in file["streams"]["usual"] if one["stream"] == "spots"}
     assert size(usual["missing-samples"], "samples_count") == 30
     assert size(usual["duplicated-samples"], "samples_count") == 1

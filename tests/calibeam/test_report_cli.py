@@ -27,6 +27,7 @@ d_m = {d}
 lower_rad = -2.9
 upper_rad = 2.9
 """
+pytestmark = pytest.mark.usefixtures("bare_figures")
 TABLE = [(0.0, np.pi / 2, 0.3), (0.4, 0.0, 0.0), (0.1, np.pi / 2, 0.0), (0.0, -np.pi / 2, 0.35), (0.05, 0.0, 0.1)]
 
 

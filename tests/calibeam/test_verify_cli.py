@@ -20,7 +20,7 @@ RIG = load_rig(RIG_FILE)
 
 
 def perfect_model() -> ModelFile:
-    """An arm as drawn: all corrections are zero."""
+    """A nominal arm: all corrections are zero."""
     names = [p.name for p in with_discs(arm_of(RIG), RIG).parameters] + ["tool.x", "tool.y", "tool.z"]
     identity = RigIdentity(RIG.name, rig_sha256(rig_text(RIG_FILE)), rig_text(RIG_FILE))
     return ModelFile(

@@ -1,4 +1,4 @@
-"""The believed rig at one pose agrees with the chain that is fitted, and with a followed ray."""
+"""The assumed rig at one pose agrees with the chain that is fitted, and with a followed ray."""
 
 import msgspec
 import numpy as np
@@ -20,7 +20,7 @@ def rig(request):
 
 @pytest.fixture(params=list(ArmModel), ids=lambda model: model.value)
 def corrected(request, rig, sessions):
-    """A session, its chain of every arm model with some corrections, and the believed rig with the same."""
+    """A session, its chain of every arm model with some corrections, and the assumed rig with the same."""
     session = sessions(31, n=20)
     rig = msgspec.structs.replace(rig, arm=convert(rig.arm, request.param).arm)
     chain = dual_psd_chain(rig, session.placement, session.first_psd)

@@ -30,7 +30,7 @@ def rig():
 
 @pytest.fixture(scope="module")
 def cones(rig):
-    """The tip of an arm as drawn in three cones from many sides, by Newton steps; with noise of the seat."""
+    """The tip of a nominal arm in three cones from many sides, by Newton steps; with noise of the seat."""
     arm, rng = arm_of(rig), np.random.default_rng(4)
     seat = np.repeat(np.arange(3), 60)
     goal = CONES_M[seat] + rng.normal(0.0, NOISE_M, (len(seat), 3))

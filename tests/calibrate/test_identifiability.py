@@ -1,4 +1,4 @@
-"""Rank before numbers: what cannot be told is named, in words."""
+"""Rank before numbers: what cannot be determined is named, in words."""
 
 from dataclasses import dataclass
 

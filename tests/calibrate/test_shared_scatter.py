@@ -17,9 +17,10 @@ from calibrate.identification.session import instruments_for_fit
 
 from .conftest import spot_samples
 
-SEATING_RAD, OWN_RAD, PSD_M, ROWS, DRAWS = 10e-6, 2e-6, 2e-6, 60, 40
+SEATING_RAD, OWN_RAD, PSD_M, ROWS = 10e-6, 2e-6, 2e-6, 60
 SOFT = ("joint2.angle", ("gravity_torque2",), "linear", None, "joint-compliance", "")
 BOTH = ("dual-psd", "encoder-difference")
+DRAWS = pytest.mark.parametrize("draws", [10, pytest.param(40, marks=pytest.mark.endure)])
 HELD = ("link*", "laser*", "psd2*", "placement*")  # known: nothing hides what the joints scatter
 
 
@@ -69,24 +70,26 @@ def away(fit):
     return float(values @ np.linalg.solve(both @ fit.fit.covariance @ both.T, values)), len(both)
 
 
+@DRAWS
 @pytest.mark.parametrize("on_link", [True, False])
-def test_what_both_instruments_see_is_as_far_off_as_its_covariance_says(rig, drawn, on_link):
-    each = [away(fitted(rig, drawn(100 + seed, OWN_RAD, on_link))) for seed in range(DRAWS)]
+def test_what_both_instruments_see_is_as_far_off_as_its_covariance_says(rig, drawn, on_link, draws):
+    each = [away(fitted(rig, drawn(100 + seed, OWN_RAD, on_link))) for seed in range(draws)]
     total, count = sum(square for square, _ in each), sum(n for _, n in each)
     low, high = chi2.ppf([0.005, 0.995], count)
     assert low < total < high
 
 
-def test_a_soft_joint_that_both_see_is_as_far_off_as_its_sigma_says(rig, drawn):
+@DRAWS
+def test_a_soft_joint_that_both_see_is_as_far_off_as_its_sigma_says(rig, drawn, draws):
     squares = []
-    for seed in range(DRAWS):
+    for seed in range(draws):
         session = session_of(rig, drawn(200 + seed, OWN_RAD))
         fit = fit_geometry(session)
         (term,) = (t for t in fit.candidates() if t.key == SOFT)
         with_term = fit.refitted([Accepted(term, np.zeros(1), np.zeros(len(term.inner)))])
         at = len(session.parameters)
         squares.append(with_term.values[at] ** 2 / with_term.covariance[at, at])
-    low, high = chi2.ppf([0.005, 0.995], DRAWS)
+    low, high = chi2.ppf([0.005, 0.995], draws)
     assert low < sum(squares) < high
 
 

@@ -22,6 +22,7 @@ from drivers.psd_daq.codec import PsdDaqCodec, frame
 from drivers.psd_daq.messages import BadFrame, MessageType
 from drivers.psd_kpa101.codec import Kpa101Codec
 from drivers.psd_kpa101.messages import StrayBytes
+from drivers.tracker.codec import BadLine, LineCodec, Units, ascii_lines, json_lines
 from drivers.transports.slcan_bus import BlockSlcanBus
 from simulators.kpa101 import frames as kpa101
 
@@ -80,6 +81,16 @@ LINES = {
     ),
     "slcan": Line(
         SlcanLine, (b"t281400000400\r", b"T1ABCDEF0811223344AABBCCDD\r", b"t70115F\r"), (ValueError, IndexError)
+    ),
+    "ascii-lines": Line(
+        lambda: LineCodec(ascii_lines(("time", "x", "y", "z", "status"), ";", ".", Units(1e-3, 1.0, ("0",)))),
+        (b"1523.2;2104.51832;-310.00417;812.7731;0\r\n", b"1523.3;2104.5;-310;812.8;0;\n", b"7;-1.5e2;+3;.5;0\r"),
+        (BadLine,),
+    ),
+    "json-lines": Line(
+        lambda: LineCodec(json_lines({"x": "p.0", "y": "p.1", "z": "p.2", "time": "t"}, Units(1.0))),
+        (b'{"t": 1.5, "p": [2.1, -0.31, 0.8]}\n', b'{"p":[1,2,3],"t":2,"more":{"a":null}}\r\n'),
+        (BadLine,),
     ),
 }
 

@@ -1,7 +1,7 @@
 """`python -m tests.golden.renew [NAME...]`: freezes what the program answers today. Only where a change is meant.
 
-Names are those of the files in data/expected, without their suffix; without a name all are made anew. The inputs are
-never made anew.
+Names are those of the files in data/expected, without their suffix; without a name all are made again. The inputs are
+never made again.
 """
 
 import json
@@ -76,16 +76,16 @@ def main(names: list[str]) -> int:
     for name in names or (*MADE, "proof"):
         print(name, flush=True)
         if name == "proof":
-            frozen_table().write_text(_readme_table(), encoding="utf-8")
+            frozen_table().write_text(_published_table(), encoding="utf-8")
             continue
         text = json.dumps(MADE[name](), indent=1)
         (answers.DATA / "expected" / f"{name}.json").write_text(text + "\n", encoding="utf-8")
     return 0
 
 
-def _readme_table() -> str:
+def _published_table() -> str:
     """Of the published seed, as `make prove-table` has put it there."""
-    text = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[2] / "docs" / "figures.md").read_text(encoding="utf-8")
     return text.partition("<!-- proof: begin -->\n")[2].partition("<!-- proof: end -->")[0]
 
 

@@ -13,7 +13,6 @@ DAILY = {
     "pose-worn-bearing",
     "spots-and-bar-gear-ratio",
     "spots-nothing",
-    "spots-pincushion-and-bumped-fixture",
     "tracker-soft-joint",
     "wire-gear",
 }

@@ -43,6 +43,9 @@ class World:
     def photocurrents_a(self, times_s: Sequence[float]) -> np.ndarray:
         return np.full((len(times_s), 8), 2e-5)
 
+    def target_position_m(self) -> np.ndarray:
+        return np.array([2.0, -0.3, 0.8])
+
     def link_encoders_rad(self) -> np.ndarray:
         return np.linspace(0.0, 1.0, NODES)
 
@@ -131,6 +134,12 @@ CASES = {
         "modbus",
         tuple(frame + crc16(frame) for frame in (b"\x01" + WRITE, b"\x01\x06\x00\xc8\x00\x01", b"\x01" + READ)),
         {"robot": {"host": None, "port": None, "serial_port": "out/emulated/robot"}},
+    ),
+    "tracker": Case(
+        "ur5e-tracker.toml",
+        "tracker",
+        (b"START\r\n", b"HALT\r", b"MEASURE\n"),
+        {"tracker": {"start": "START", "stop": "HALT", "trigger": "MEASURE"}},
     ),
     "side-channel": Case("ur5e-dual-psd.toml", "control", tuple(json.dumps(each).encode() + b"\n" for each in JSON)),
 }

@@ -1,7 +1,7 @@
 """The printed board on the fixture as a camera sees it: its markers in a picture, and from these where the fixture is.
 
 The arm's zeros are wrong by degrees, so this is where the fixture must be believed to be *for the arm as it stands*:
-right for what is near, and taken anew after every longer way.
+right for what is near, and taken again after every longer way.
 """
 
 from dataclasses import dataclass
@@ -120,7 +120,7 @@ class Sight:
         self._eye, self._model, self._board, self._T_board_psd1 = eye, model, board, inverse(T_psd1_board)
 
     def fixture(self, arm: BelievedArm, q_rad: Floats, T_base_fixture: Floats) -> Floats | None:
-        """T_base_psd1 (4, 4) for the believed arm, which stands at `q_rad` (joint,); `T_base_fixture`: as believed.
+        """T_base_psd1 (4, 4) for the assumed arm, which stands at `q_rad` (joint,); `T_base_fixture`: as believed.
 
         None where the board is not in the picture. DeviceError of the camera.
         """

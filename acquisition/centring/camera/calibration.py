@@ -31,7 +31,9 @@ class CameraStatus(Enum):
 
     CALIBRATED = "lens and mount were found"
     TOO_FEW_VIEWS = f"the board was seen in fewer than {LEAST_VIEWS} views; light it, clear the view, come nearer"
-    TOO_LITTLE_TURN = "the flange turned about one axis only, which does not tell the mount; take views from more sides"
+    TOO_LITTLE_TURN = (
+        "the flange turned about one axis only, which does not determine the camera mount; take views from more sides"
+    )
     POOR_LENS = "the corners do not fit a lens; check the board's side_m and gap_m, its flatness, and the focus"
     INCONSISTENT = "the board is in another place in every view; check that it stands still, and the arm's zeros"
 
@@ -54,7 +56,7 @@ class Calibration:
 
 
 def calibrate_camera(views: Sequence[View], start: CameraModel) -> Calibration:
-    """`start`: the camera as drawn. Never raises for bad views."""
+    """`start`: the nominal camera. Never raises for bad views."""
     if len(views) < LEAST_VIEWS:
         return Calibration(CameraStatus.TOO_FEW_VIEWS)
     if _turn_rad(views) < LEAST_TURN_RAD:

@@ -6,12 +6,16 @@
 "pin" = "Z T6 E = P PG"
 [[teach]]                # transform, at: in the order in which they can be solved
 [[step]]                 # do = "move" | "grasp" | "release" | "read" | "for"
+[hand]                   # output = "standard 0", closed = true: the digital output that GRASP and RELEASE switch
+[belt]                   # m_per_turn, and [belt.encoder] as [devices.encoders] of a rig file, with one encoder
+[read.PART]              # file = "part.toml"; or camera = true: what READ PART reads
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from msgspec import Struct
@@ -22,7 +26,11 @@ from acquisition.motion.task.graph import TaskGraph
 from acquisition.motion.task.program import Step, filled, loops
 from acquisition.motion.task.transforms import Belt, Constant, Equation, Source, Unread, Untaught, parse_equation
 from acquisition.recording.files import parse_toml, read_text
-from acquisition.recording.files.bounds import ZERO, Direction, Few, Line, Name, Rotation, Vector
+from acquisition.recording.files.bounds import ZERO, Direction, Few, FilePath, Line, Metres, Name, Rotation, Vector
+from acquisition.recording.rig.devices import EncodersDevice
+
+# Digital outputs of a UR controller in the order of their bits (RTDE guide, actual_digital_output_bits).
+OUTPUTS = (*(f"standard {n}" for n in range(8)), *(f"configurable {n}" for n in range(8)), "tool 0", "tool 1")
 
 
 class TransformEntry(Struct, frozen=True, forbid_unknown_fields=True):
@@ -42,6 +50,37 @@ class Teach(Struct, frozen=True, forbid_unknown_fields=True):
     at: Name
 
 
+class Hand(Struct, frozen=True, forbid_unknown_fields=True):
+    """A hand that one digital output of the controller closes; `closed` is the level at which it is."""
+
+    output: Literal[*OUTPUTS]  # type: ignore[valid-type]
+    closed: bool = True
+
+    @property
+    def bit(self) -> int:
+        """Of the output in the controller's word of all outputs (RTDE guide, actual_digital_output_bits)."""
+        return OUTPUTS.index(self.output)
+
+
+class BeltEncoder(Struct, frozen=True, forbid_unknown_fields=True):
+    """How far the belt has gone, by one encoder on a bus. `m_per_turn` below 0: it counts against the belt."""
+
+    m_per_turn: Metres
+    encoder: EncodersDevice
+
+
+class ReadSource(Struct, frozen=True, forbid_unknown_fields=True):
+    """Where READ takes a transform from: a TOML file of origin_m and rotation_rad, or the rig's camera.
+
+    The camera gives its board as seen from the flange. With the arm at position `at`, `gives` follows from that.
+    """
+
+    file: FilePath | None = None
+    camera: bool = False
+    at: Name | None = None
+    gives: Name | None = None
+
+
 class TaskEntries(Struct, frozen=True, forbid_unknown_fields=True):
     """The whole file."""
 
@@ -50,15 +89,21 @@ class TaskEntries(Struct, frozen=True, forbid_unknown_fields=True):
     step: Few[Step] = ()
     relation: Few[Line] = ()
     teach: Few[Teach] = ()
+    hand: Hand | None = None
+    belt: BeltEncoder | None = None
+    read: dict[Name, ReadSource] = {}
 
 
 @dataclass(frozen=True)
 class Task:
-    """What is where, and what to do."""
+    """What is where, what to do, and with which devices beside the arm."""
 
     graph: TaskGraph
     program: tuple[Step, ...]
     teach: tuple[Teach, ...] = ()
+    hand: Hand | None = None
+    belt: BeltEncoder | None = None
+    read: Mapping[str, ReadSource] = field(default_factory=dict[str, ReadSource])
 
 
 def read_task(path: Path) -> Task:
@@ -79,7 +124,26 @@ def task_of(entries: TaskEntries) -> Task:
             positions[filled(name, filling)] = parse_equation(filled(text, filling))
     sources = {name: _source(name, entry) for name, entry in entries.transform.items()}
     relations = tuple(parse_equation(text) for text in entries.relation)
-    return Task(TaskGraph(sources, positions, relations), entries.step, entries.teach)
+    graph = TaskGraph(sources, positions, relations)
+    for name, reading in entries.read.items():
+        _check_reading(name, reading, graph)
+    if entries.belt is not None and not entries.belt.m_per_turn:
+        raise TaskError("[belt] m_per_turn = 0: a turn of the encoder moves the belt by no way at all")
+    return Task(graph, entries.step, entries.teach, entries.hand, entries.belt, entries.read)
+
+
+def _check_reading(name: str, reading: ReadSource, graph: TaskGraph) -> None:
+    """TaskError for a reading of nothing, from nowhere or from two places."""
+    if not isinstance(graph.transforms.get(name), Unread):
+        raise TaskError(f"[read.{name}]: {name} is not a transform with unread = true")
+    if (reading.file is None) != reading.camera:
+        raise TaskError(f"[read.{name}]: give it either a file or camera = true")
+    if (reading.at is None) != (reading.gives is None):
+        raise TaskError(f"[read.{name}]: at and gives belong together: with the arm at a position, a transform follows")
+    if reading.at is not None and reading.at not in graph.positions:
+        raise TaskError(f"[read.{name}]: {reading.at} is not among the positions of the task")
+    if reading.gives is not None and not isinstance(graph.transforms.get(reading.gives), Unread):
+        raise TaskError(f"[read.{name}]: {reading.gives} is not a transform with unread = true")
 
 
 def _fillings(text: str, values: Mapping[str, tuple[str | int, ...]]) -> list[dict[str, str | int]]:

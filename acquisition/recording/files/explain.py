@@ -165,7 +165,7 @@ def plain(says: str) -> str:
 def in_metres(value: float, most_m: float) -> str:
     """The remedy for a length beyond a bound: millimetres, where they would make sense of it."""
     if most_m < abs(value) <= MILLIMETRES * most_m:
-        return f"; it looks like millimetres: divide by {MILLIMETRES} ({value / MILLIMETRES:g}), the file is in m"
+        return f"; probably in millimetres: divide by {MILLIMETRES} ({value / MILLIMETRES:g}), the file is in m"
     return "; write it in m"
 
 

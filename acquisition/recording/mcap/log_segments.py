@@ -37,7 +37,7 @@ def segments(folder: Path) -> list[Path]:
     try:
         found = [(int(match[1]), path) for path in folder.iterdir() if (match := _NAME.fullmatch(path.name))]
     except OSError as error:
-        raise RecordingError(f"{folder}: cannot look for segments ({error.strerror}); check the path") from error
+        raise RecordingError(f"{folder}: cannot search for segments ({error.strerror}); check the path") from error
     return [path for _, path in sorted(found)]
 
 

@@ -15,6 +15,8 @@ from acquisition.recording.rig.schema import (
     Placement,
     Pose,
     Rig,
+    Site,
+    SiteInstrument,
     Sphere,
     Tolerance,
 )
@@ -28,6 +30,8 @@ __all__ = [
     "Placement",
     "Pose",
     "Rig",
+    "Site",
+    "SiteInstrument",
     "Sphere",
     "Tolerance",
     "load_rig",

@@ -148,9 +148,56 @@ class RobotDevice(Struct, frozen=True, forbid_unknown_fields=True):
         return self.serial_port is not None or self.serial_number is not None
 
 
+class TrackerDriver(enum.Enum):
+    """How an instrument that measures positions prints them."""
+
+    ASCII_LINES = "ascii-lines"
+    JSON_LINES = "json-lines"
+
+
+class TrackerDevice(Struct, frozen=True, forbid_unknown_fields=True):
+    """A laser tracker or camera that prints the position of its target line by line: docs/tracker.md.
+
+    Over TCP (`host`, `port`: it listens), UDP (it sends to `port` of this machine), or a serial line.
+    """
+
+    driver: TrackerDriver
+    length_unit: Literal["m", "mm", "um", "in"]  # no default: a wrong one is a thousandfold
+    columns: Few[Name] = ()  # of ascii-lines, in order: x, y, z, time, status, temperature, "-" for one to ignore
+    members: Mapping[Name, Name] = {}  # of json-lines: the same names, and the path to each member
+    host: Name | None = None
+    port: Annotated[int, Meta(ge=0, le=65535)] | None = None
+    transport: Literal["tcp", "udp"] = "tcp"
+    serial_port: FilePath | None = None
+    serial_number: Name | None = None  # of the serial adapter's USB plug, in place of serial_port
+    baud: Identity = 115_200
+    rate_hz: Hertz = 100.0  # of its stream, or of the triggers
+    separator: Annotated[str, Meta(min_length=1, max_length=1)] = ","  # " ": any run of blanks
+    decimal: Literal[".", ","] = "."
+    time_unit: Literal["s", "ms", "us"] = "s"
+    good: Few[Name] = ()  # words of the status column that mean a valid reading
+    start: Label = ""  # written once after connecting
+    stop: Label = ""  # and before hanging up
+    trigger: Label = ""  # before every reading; empty: it streams by itself
+
+    @property
+    def is_serial(self) -> bool:
+        return self.serial_port is not None or self.serial_number is not None
+
+
+class OtherDevice(Struct, frozen=True, forbid_unknown_fields=True):
+    """An instrument of a plug-in, recorded beside the others. Its package says which settings it takes."""
+
+    name: Annotated[str, Meta(pattern="^[a-z][a-z0-9_-]{0,31}$")]  # of its stream, and of its temperatures' columns
+    driver: Name  # entry point of the group calibeam.devices
+    settings: Mapping[Name, bool | Whole | Number | Label | Few[bool | Whole | Number | Label]] = {}
+
+
 class Devices(Struct, frozen=True, forbid_unknown_fields=True):
     """How each instrument is reached; one that is not named is not there."""
 
     psd: PsdDevice | None = None
     encoders: EncodersDevice | None = None
     robot: RobotDevice | None = None
+    tracker: TrackerDevice | None = None
+    others: Few[OtherDevice] = field(name="other", default=())

@@ -18,6 +18,8 @@ from acquisition.recording.rig.devices import (
     PsdHead,
     RobotDevice,
     RobotDriver,
+    TrackerDevice,
+    TrackerDriver,
 )
 from acquisition.recording.rig.schema import ArmModel, Joint, Pose, Rig
 
@@ -38,11 +40,15 @@ _POE_KEYS = ("origin_m", "rotation_rad")
 PSD: KeyPath = ("devices", "psd")
 ENCODERS: KeyPath = ("devices", "encoders")
 ROBOT: KeyPath = ("devices", "robot")
+TRACKER: KeyPath = ("devices", "tracker")
 KPA101_MOST_HZ = 400.0  # two units on lines of 115200 baud
 DAQ_ONLY = ("port", "serial_number")
 PAIR_ONLY = ("ports", "serial_numbers", "length_m")
 CIA406_ONLY, DBC_ONLY = ("nodes",), ("dbc", "signals", "units_per_turn")
 FASTEST_POLL_HZ = 500.0
+OWN_NAMES = ("psd", "spots", "encoders", "robot", "tracker", "camera", "can", "control")  # streams and emulators
+SLOWEST_TRACKER_HZ = 5.0  # a stream that pauses longer counts as silent
+TRACKER_COLUMNS = ("x", "y", "z", "time", "status", "temperature")
 SHORTEST = 1e-6  # feels right: no hand writes a direction so short
 
 
@@ -153,11 +159,11 @@ def _placement_faults(rig: Rig) -> Iterator[Fault]:
     if rig.camera is not None and rig.fixture is None:
         yield (
             ("camera", "board"),
-            "[camera.board] says where the board is on the fixture, but there is no [fixture]; add it",
+            "[camera.board] places the board on the fixture, but there is no [fixture]; add it",
         )
     yield from _twice(("placement",), tuple(placement.id for placement in rig.placement_list))
     if rig.placement_list and rig.fixture is None:
-        yield ("placement",), "[[placement]] says where the fixture stood, but there is no [fixture]; add it"
+        yield ("placement",), "[[placement]] places the fixture, but there is no [fixture]; add it"
     known = sorted(rig.placements)
     for index, distance in enumerate(rig.known_distances):
         path = ("known_distance", index)
@@ -181,7 +187,7 @@ def _tolerance_faults(rig: Rig) -> Iterator[Fault]:
         sizes = {key: getattr(tolerance, key) for key in (f"{what}_m", f"{what}_rad")}
         missing = [key for key, value in sizes.items() if value is None]
         if len(missing) == 1:
-            yield ("tolerance",), f"[tolerance] says only half of how well {what} is known: add '{missing[0]}'"
+            yield ("tolerance",), f"[tolerance] gives only one of the two sigmas of {what}: add '{missing[0]}'"
         elif not missing and getattr(rig, owner) is None:
             yield ("tolerance", f"{what}_m"), f"{what}_m is there, but there is no [{owner}] that it is the sigma of"
 
@@ -198,14 +204,28 @@ def _artefact_faults(rig: Rig) -> Iterator[Fault]:
             known = ", ".join(map(str, rig.bars)) or "none"
             yield (*path, "bar"), f"bar = {position.bar} is no [[bar]] of this rig (known: {known}); add or correct it"
         if math.hypot(*position.direction) < SHORTEST:
-            yield (*path, "direction"), f"direction = {list(position.direction)} points nowhere; say how the bar lies"
+            yield (
+                (*path, "direction"),
+                (f"direction = {list(position.direction)} is the zero vector; give the direction of the bar"),
+            )
     if rig.sphere_list and rig.tool.probe_diameter_m is None:
         yield ("tool",), "[[sphere]] is touched from outside: add 'probe_diameter_m', the ball's, to [tool]"
 
 
 def _instrument_faults(rig: Rig) -> Iterator[Fault]:
+    names = [other.name for other in rig.devices.others]
+    for index, name in enumerate(names):
+        if name in OWN_NAMES or name in names[:index]:
+            yield (
+                ("devices", "other", index, "name"),
+                f"name = '{name}' in [[devices.other]] is taken; give every instrument a name of its own",
+            )
     if rig.devices.psd is not None:
         yield from _psd_faults(rig.devices.psd)
+    if rig.devices.tracker is not None:
+        yield from _tracker_faults(rig.devices.tracker)
+        if rig.devices.psd is not None:
+            yield TRACKER, "a session measures with [devices.psd] or with [devices.tracker]; write two rig files"
     if rig.devices.encoders is not None:
         yield from _bus_faults(rig.devices.encoders)
         yield from _encoder_faults(rig.devices.encoders, rig.n_joints)
@@ -229,7 +249,56 @@ def _psd_faults(psd: PsdDevice) -> Iterator[Fault]:
     if pair and psd.head is PsdHead.QUADRANT and psd.spot_radius_m is None:
         yield (
             PSD,
-            "[devices.psd] with head = \"quadrant\" needs 'spot_radius_m': its ratio says nothing of metres alone",
+            "[devices.psd] with head = \"quadrant\" needs 'spot_radius_m': its ratio alone gives no metres",
+        )
+
+
+def _tracker_faults(tracker: TrackerDevice) -> Iterator[Fault]:
+    yield from _tracker_line_faults(tracker)
+    json = tracker.driver is TrackerDriver.JSON_LINES
+    key, other = ("members", "columns") if json else ("columns", "members")
+    if getattr(tracker, other):
+        yield (*TRACKER, other), f"'{other}' does not belong to driver \"{tracker.driver.value}\"; delete it"
+    names = [name for name in getattr(tracker, key) if name != "-"]
+    if unknown := [name for name in names if name not in TRACKER_COLUMNS]:
+        yield (*TRACKER, key), f"'{unknown[0]}' in {key} is not known; there are {', '.join(TRACKER_COLUMNS)}"
+    if missing := [axis for axis in ("x", "y", "z") if axis not in names]:
+        yield (*TRACKER, key) if names else TRACKER, f"{key} has no '{missing[0]}'; name where x, y and z stand"
+    if len(set(names)) != len(names):
+        yield (*TRACKER, key), f"{key} = {names} names one twice; keep one"
+    if ("status" in names) != bool(tracker.good):
+        yield (
+            (*TRACKER, key if "status" in names else "good"),
+            "a status column needs 'good', the words that mean a valid reading, and 'good' a status column",
+        )
+    if not json and tracker.separator in {tracker.decimal, *"+-.eE0123456789"}:
+        yield (
+            (*TRACKER, "separator"),
+            f"separator = '{tracker.separator}' with decimal = '{tracker.decimal}' stands in numbers, too; check both",
+        )
+    if tracker.rate_hz < SLOWEST_TRACKER_HZ:
+        yield (
+            (*TRACKER, "rate_hz"),
+            f"rate_hz = {tracker.rate_hz:g}: a stream below {SLOWEST_TRACKER_HZ:g} Hz counts as silent; have the "
+            "instrument measure continuously",
+        )
+
+
+def _tracker_line_faults(tracker: TrackerDevice) -> Iterator[Fault]:
+    udp = tracker.transport == "udp"
+    where = [tracker.port, tracker.serial_port, tracker.serial_number]
+    if where.count(None) != 2 or (tracker.port is not None and tracker.host is None and not udp):
+        yield (
+            TRACKER,
+            "[devices.tracker] needs either 'host' and 'port', or 'port' with transport = \"udp\", or 'serial_port' or "
+            "'serial_number', and one only",
+        )
+    if tracker.is_serial and (udp or tracker.host is not None):
+        yield TRACKER, "[devices.tracker]: 'host' and 'transport' belong to a network, not to a serial line"
+    if udp and (tracker.trigger or tracker.start or tracker.stop):
+        yield (
+            (*TRACKER, "transport"),
+            'transport = "udp" only receives; an instrument with start, stop or trigger needs TCP or a serial line',
         )
 
 

@@ -6,6 +6,7 @@ not declared here is refused. Vectors are plain tuples: metres, or radians of a 
 
 import enum
 from collections.abc import Mapping
+from datetime import date
 from typing import Annotated, Literal
 
 from msgspec import Meta, Struct, field
@@ -302,6 +303,27 @@ class Live(Struct, frozen=True, forbid_unknown_fields=True):
     stop_without_page_s: SecondsAbove | None = None  # no page answers for so long: as STOP; None: pages come and go
 
 
+class SiteInstrument(Struct, frozen=True, forbid_unknown_fields=True):
+    """One instrument as its own certificate names it."""
+
+    name: Name
+    serial_number: Name | None = None
+    calibrated: date | None = None  # day of its last calibration
+    certificate: Name | None = None  # number of that calibration's certificate
+
+
+class Site(Struct, frozen=True, forbid_unknown_fields=True):
+    """Who measured which robot, where and with what: for the certificate alone, nothing is computed from it.
+
+    The robot's serial number is `[arm] serial_number`.
+    """
+
+    operator: Name | None = None
+    place: Name | None = None
+    robot: Name | None = None  # make and model, as on the maker's plate
+    instruments: Few[SiteInstrument] = field(name="instrument", default=())
+
+
 # Keys of [emulation]; the section belongs to the emulators, which read it themselves from the same file.
 EMULATION_KEYS = (
     "seed",
@@ -337,6 +359,10 @@ EMULATION_KEYS = (
     "artefact_sigma_m",
     "hand_force_n",
     "joint_compliance_rad_nm",
+    "position_noise_m",
+    "target_sigma_m",
+    "device_origin_sigma_m",
+    "device_rotation_sigma_rad",
 )
 
 
@@ -363,6 +389,7 @@ class Rig(Struct, frozen=True, forbid_unknown_fields=True):
     camera: Camera | None = None
     motion: Motion = Motion()
     live: Live = Live()
+    site: Site = Site()
     emulation: Mapping[Name, Number] | None = None
 
     @property

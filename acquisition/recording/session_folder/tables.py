@@ -176,7 +176,7 @@ def _header(names: list[str], file: str) -> list[str]:
     if not names:
         raise SamplesError(f"{file}: the file is empty; it needs a header row with t_s, q1_rad, ...")
     if len(names) == 1 and (";" in names[0] or "\t" in names[0]):
-        raise SamplesError(f"{file} line 1: columns are parted by something else than commas; save as comma-separated")
+        raise SamplesError(f"{file} line 1: columns are not separated by commas; save as comma-separated")
     check_header(names, file)
     return names
 

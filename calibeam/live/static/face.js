@@ -22,11 +22,13 @@ export class FaceView {
     this.trail.push(at_ms, lit ? [face.x_m, face.y_m] : [NaN, NaN]);
   }
 
-  draw(face, expected, half_m, at_ms, live) {
+  // dark_fits: by the model this face is to be dark now.
+  draw(face, expected, half_m, at_ms, live, dark_fits = false) {
     const { surface } = this;
-    this.say(face, half_m, live);
-    if (!surface.begin()) return;
     const half = face?.half_m ?? half_m ?? 0.005;
+    const missed = face?.state === "no light" && !dark_fits;
+    this.say(face, half_m, live, missed);
+    if (!surface.begin()) return;
     const size = Math.min(surface.width, surface.height);
     const scale = (size - 16) / (2 * half);
     const x = (m) => surface.width / 2 + m * scale;
@@ -37,15 +39,15 @@ export class FaceView {
     if (face && face.x_m !== null) this.disc(face, x, y, live);
     if (!live) surface.shout("OLD");
     else if (!face) surface.shout("NO SAMPLE\nsee Devices");
-    else if (face.state === "no light") surface.shout("NO LIGHT");
+    else if (missed) surface.shout("NO LIGHT");
     else if (face.state === "no spot") surface.shout("NO SPOT\nlight beyond the map of the face", 18);
     else if (face.state === "saturated") surface.shout("TOO BRIGHT\nlessen laser or gain", 18);
   }
 
-  say(face, half_m, live) {
-    const words = !live || !face ? "old" : face.state;
+  say(face, half_m, live, missed) {
+    const words = !live || !face ? "old" : face.state === "no light" && !missed ? "none" : face.state;
     const edge = face?.x_m != null && Math.max(Math.abs(face.x_m), Math.abs(face.y_m)) > EDGE * (face.half_m ?? half_m);
-    const text = { old: "✕ no sample", light: edge ? "! near the edge" : "✓ light", saturated: "! saturated", "no light": "✕ no light", "no spot": "! no spot" }[words];
+    const text = { old: "✕ no sample", light: edge ? "! near the edge" : "✓ light", saturated: "! saturated", "no light": "✕ no light", none: "no light expected", "no spot": "! no spot" }[words];
     set(this.state, text);
     const is = edge && words === "light" ? "edge" : words;
     if (this.state.dataset.is !== is) this.state.dataset.is = is;
@@ -58,7 +60,7 @@ export class FaceView {
   grid(half, scale, x, y) {
     const { pen } = this.surface;
     const step = half > 0.012 ? 0.01 : half > 0.004 ? 0.005 : 0.001;
-    pen.fillStyle = "#fff";
+    pen.fillStyle = COLOUR.panel;
     pen.fillRect(x(-half), y(half), 2 * half * scale, 2 * half * scale);
     pen.lineWidth = 1;
     pen.strokeStyle = COLOUR.faint;
@@ -139,10 +141,10 @@ export class FaceView {
     const { pen } = this.surface;
     pen.beginPath();
     pen.arc(x(face.x_m), y(face.y_m), 7, 0, 2 * Math.PI);
-    pen.fillStyle = live ? COLOUR.measured : "#fff";
+    pen.fillStyle = live ? COLOUR.measured : COLOUR.panel;
     pen.fill();
     pen.lineWidth = 2.5;
-    pen.strokeStyle = live ? "#fff" : COLOUR.quiet;
+    pen.strokeStyle = live ? COLOUR.panel : COLOUR.quiet;
     pen.stroke();
   }
 }

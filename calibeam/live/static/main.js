@@ -46,13 +46,23 @@ function told(state) {
   sayLog(state.lines);
   stop.hear(state.stop);
   put(get("beam-says"), newest.rig?.half_m == null ? "" : `${place(state.standing)} On the faces ● is measured, ◇ expected by the model.`);
-  put(get("joints-by"), newest.now?.by ? `last 60 s, read by the ${newest.now.by}` : "");
+  put(get("joints-by"), newest.now?.by ? `last ${Math.round(joints.span_ms(performance.now()) / 1000)} s, read by the ${newest.now.by}` : "");
 }
 
 function place(standing) {
   if (!standing) return "No place of the fixture is near the beam.";
   const beam = newest.now?.beam?.says ?? "";
   return `Fixture at place ${standing.placement}${standing.told ? "" : " (guessed)"}, PSD ${standing.first_psd} first${beam ? `: ${beam}` : ""}.`;
+}
+
+// Whether the model puts no light on a face: the beam leads elsewhere, misses it, or misses the face before it. Where
+// nothing is known of the beam, light is expected.
+function isDark(k, now, state, rig) {
+  if (!now?.beam) return false;
+  const spots = now.beam.spots_m, half = now.faces?.[k]?.half_m ?? rig?.half_m;
+  if (!spots) return true;
+  const onFace = Math.max(Math.abs(spots[2 * k]), Math.abs(spots[2 * k + 1])) <= half;
+  return !onFace || !(now.beam.both || state?.standing?.first_psd === k + 1);
 }
 
 function draw() {
@@ -62,7 +72,7 @@ function draw() {
     waiting = false;
     const { now, state, rig } = newest, live = link === "live", at_ms = performance.now();
     const spots = now?.beam?.spots_m;
-    faces.forEach((face, k) => face.draw(now?.faces?.[k] ?? null, spots?.slice(2 * k, 2 * k + 2), rig?.half_m, at_ms, live));
+    faces.forEach((face, k) => face.draw(now?.faces?.[k] ?? null, spots?.slice(2 * k, 2 * k + 2), rig?.half_m, at_ms, live, isDark(k, now, state, rig)));
     robot.draw(now, state?.standing ?? null, live);
     joints.draw(now?.q_rad, at_ms, live);
   });

@@ -3,7 +3,8 @@
 import { Orbit } from "./orbit.js";
 import { COLOUR, Surface, font } from "./surface.js";
 
-const ROOM = { beam: 0.6, arm: 0.48 }; // from the middle of the picture to its rim, of the diagonal of what is looked at
+const ROOM = { beam: 0.6, arm: 0.51 }; // from the middle of the picture to its rim, of the diagonal of what is looked at
+const THICK = 0.09; // of the reach: links and their shadow about the points
 const VIEWS = { whole: [-0.9, 0.42], top: [0, 1.5], side: [0, 0.02] };
 
 export class RobotView {
@@ -71,12 +72,13 @@ export class RobotView {
     const box = around(this.box ? [...points, ...this.box] : points);
     if (this.box && box.every((corner, end) => corner.every((value, k) => value === this.box[end][k]))) return;
     this.box = box;
-    this.look(box, ROOM.arm);
+    this.look(box, ROOM.arm, THICK * (this.reach_m ?? 1));
   }
 
-  look([low, high], room) {
+  // `margin_m` about the box: what is drawn round its points.
+  look([low, high], room, margin_m = 0) {
     this.orbit.middle = low.map((value, k) => (value + high[k]) / 2);
-    this.orbit.size_m = room * Math.max(0.05, Math.hypot(...high.map((value, k) => value - low[k])));
+    this.orbit.size_m = room * Math.max(0.05, Math.hypot(...high.map((value, k) => value - low[k]))) + margin_m;
   }
 
   names(standing, at) {
@@ -88,7 +90,7 @@ export class RobotView {
       const seen = corners.map(at), right = Math.max(...seen.map((p) => p[0])) + 8;
       const y = seen.reduce((sum, p) => sum + p[1], 0) / 4;
       pen.lineWidth = 4;
-      pen.strokeStyle = "#fff";
+      pen.strokeStyle = COLOUR.panel;
       pen.strokeText(`PSD ${k + 1}`, right, y);
       pen.fillStyle = COLOUR.ink;
       pen.fillText(`PSD ${k + 1}`, right, y);
@@ -127,7 +129,7 @@ export class RobotView {
 
   shadow(points, at) {
     const { pen } = this.surface;
-    pen.strokeStyle = "#10151a1c";
+    pen.strokeStyle = COLOUR.shadow;
     pen.lineCap = pen.lineJoin = "round";
     pen.lineWidth = 0.07 * (this.reach_m ?? 1) * at([0, 0, 0])[3];
     pen.beginPath();
@@ -167,7 +169,7 @@ export class RobotView {
   beam(points, at) {
     const { pen } = this.surface;
     const seen = points.map(at);
-    for (const [width, colour] of [[7, "#ffffffd0"], [3, "#d8001c"]]) {
+    for (const [width, colour] of [[7, COLOUR.halo], [3, COLOUR.beam]]) {
       pen.lineWidth = width;
       pen.strokeStyle = colour;
       pen.lineCap = pen.lineJoin = "round";
@@ -177,7 +179,7 @@ export class RobotView {
       pen.stroke();
     }
     pen.setLineDash([]);
-    pen.fillStyle = "#d8001c";
+    pen.fillStyle = COLOUR.beam;
     if (points.length > 2) for (const [x, y] of seen.slice(1)) { pen.beginPath(); pen.arc(x, y, 4.5, 0, 2 * Math.PI); pen.fill(); }
   }
 }

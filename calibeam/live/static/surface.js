@@ -29,7 +29,7 @@ export class Surface {
     return this.width > 0 && this.height > 0;
   }
 
-  // Words over everything, on white: read in sunlight.
+  // Words over everything, on the page's ground: read in sunlight.
   shout(words, size = 20) {
     const { pen } = this;
     pen.save();
@@ -39,7 +39,7 @@ export class Surface {
     const widest = Math.max(...lines.map((line, k) => { pen.font = font(k ? size * 0.72 : size, 800); return pen.measureText(line).width; }));
     const fit = Math.min(1, (this.width - 24) / widest);
     const step = size * fit * 1.25;
-    pen.fillStyle = "#ffffffe6";
+    pen.fillStyle = COLOUR.halo;
     pen.fillRect(0, this.height / 2 - step * lines.length / 2 - 8, this.width, step * lines.length + 16);
     pen.fillStyle = COLOUR.bad;
     lines.forEach((line, k) => {
@@ -52,8 +52,15 @@ export class Surface {
 
 export const font = (size, weight = 500) => `${weight} ${size}px system-ui, "Segoe UI", Roboto, "Noto Sans", sans-serif`;
 
-// Of live.css; a canvas cannot read it for nothing.
-export const COLOUR = {
-  ink: "#10151a", quiet: "#47505a", line: "#b9bfc6", faint: "#dde1e4", good: "#00614a",
-  warn: "#8a4b00", bad: "#b00020", measured: "#0057a8", model: "#c44500",
-};
+// Of live.css, read again when light and dark change: a canvas cannot read them for nothing.
+const NAMES = ["ink", "quiet", "line", "faint", "good", "warn", "bad", "measured", "model", "panel", "beam", "halo", "shadow"];
+export const COLOUR = {};
+
+function learn() {
+  const style = getComputedStyle(document.documentElement);
+  for (const name of NAMES) COLOUR[name] = style.getPropertyValue(`--${name}`).trim();
+  document.dispatchEvent(new Event("resized"));
+}
+
+learn();
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", learn);

@@ -22,7 +22,7 @@ from calibrate.correct.programs.literal import (
 from calibrate.correct.rotations import VECTOR
 
 LIST = rf"(?P<pose>p?)\[\s*{NUMBER}(?:\s*,\s*{NUMBER})*\s*\]"
-MOVE = re.compile(r"\b(?:movej|movel|movep|servoj|movec)\s*\(\s*(?P<target>[A-Za-z_]\w*|p?\[)")
+MOVE = re.compile(r"\b(?:movej|movel|movep|servoj|movec)\s*\(\s*(?P<target>p?\[|[A-Za-z_]\w*)")
 INLINE = re.compile(rf"\b(?:movej|movel|movep|servoj)\s*\(\s*(?:q\s*=\s*|pose\s*=\s*)?{LIST}")
 ASSIGNED = re.compile(rf"(?P<name>[A-Za-z_]\w*)\s*=\s*{LIST}")
 CIRCLE = re.compile(r"\bmovec\s*\(")

@@ -81,7 +81,7 @@ def beside(simulated: Simulated, pair: Pair, rng: Generator, differing: Sequence
     """DataError where there is too little to compare. `differing`: parameters that are known to differ.
 
     Constants first, all at once; then every effect of the catalogue beside those that are worth their numbers. What an
-    effect explains better is no constant: it is held again, and the search is made anew.
+    effect explains better is no constant: it is held again, and the search is made again.
     """
     T = device_between(simulated, pair)
     samples = corrected_samples(simulated, pair, T)

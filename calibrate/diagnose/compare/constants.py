@@ -51,7 +51,7 @@ class Part:
 
 
 def parts_of(parameters: Sequence[Parameter]) -> tuple[Part, ...]:
-    """All that are free in a session, in the order of its parameters; a device is set up anew and no part."""
+    """All that are free in a session, in the order of its parameters; a device is set up again and no part."""
     groups: dict[tuple[str, str], list[str]] = {}
     for p in parameters:
         found = _place(p.name) if p.free else None

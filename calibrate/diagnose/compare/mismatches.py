@@ -54,7 +54,7 @@ class Side(Enum):
 
 @dataclass(frozen=True)
 class Mismatch:
-    """One difference, measured less simulated. `decides`: False where it is set up anew for every recording."""
+    """One difference, measured less simulated. `decides`: False where it is set up again for every recording."""
 
     level: Level
     where: str

@@ -116,7 +116,7 @@ def _noise(one: Difference, model: Predictor, pair: Pair) -> tuple[Floats | None
     if one.link in JOINTS:
         if one.link == COMMAND:
             return None, "a set-point has none"
-        return np.broadcast_to(np.sqrt(2.0) * joint, one.own.shape), "believed, and one count of the encoders"
+        return np.broadcast_to(np.sqrt(2.0) * joint, one.own.shape), "assumed, and one count of the encoders"
     noise = model.rig.noise
     told = {"spots": noise.psd_m, **{k.name: getattr(noise, k.noise[0].key, None) for k in SENSORS}}
     ends_m = None if noise.seat_m is None else np.sqrt(2.0) * noise.seat_m
@@ -127,11 +127,11 @@ def _noise(one: Difference, model: Predictor, pair: Pair) -> tuple[Floats | None
             return stated, "scatter within the samples"
     if believed is None:
         return None, "unknown"
-    return np.sqrt(2.0) * np.hypot(believed, _through_joints(one, model, pair)), "believed, of reading and joints"
+    return np.sqrt(2.0) * np.hypot(believed, _through_joints(one, model, pair)), "assumed, of reading and joints"
 
 
 def _through_joints(one: Difference, model: Predictor, pair: Pair) -> Floats:
-    """(row, channel) what the joints' believed noise does to a reading, by differences of the model."""
+    """(row, channel) what the joints' assumed noise does to a reading, by differences of the model."""
     joint = _joint_noise(model.rig, pair[0].n_joints)
     explained = next(reading.by_joints for reading in READINGS if reading.link == one.link)
     total = np.zeros(one.own.shape)

@@ -97,9 +97,9 @@ def _unseen(
         if fit.offset_s is None:
             yield f"clock of {name}: {fit.status.value}"
     if "spots" in devices and "spots" not in clocks:
-        yield "clock of spots: no fitted model says where they are during the motion"
+        yield "clock of spots: no fitted model predicts them during the motion"
     if "spots" in devices and windows is None:
-        yield "samples taken unsettled: the recording does not say when each sample was averaged"
+        yield "samples taken unsettled: the recording has no averaging times of the samples"
     yield from (f"following error of joint {f.joint}: it hardly moves" for f in behind if f.behind_s is None)
 
 

@@ -21,7 +21,7 @@ ALARM = 1e-3  # family-wise over all stops
 FRAMES_APART = 3.0  # noise is judged between neighbours; what swings slower than this many samples is no noise
 AGAIN = 0.2  # share of the stops: what swings after one of many is a knock or the servo, not a soft machine
 CLEAR = 0.9  # share of the swing that one joint explains
-RIVAL = 0.05  # of the share: joints within it are not told apart
+RIVAL = 0.05  # of the share: joints within it are not separated
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ class Window:
 
 @dataclass(frozen=True)
 class Unsettled:
-    """Of one sample: still to come (channel,) with sigma, time constant of the settling where it can be told."""
+    """Of one sample: still to come (channel,) with sigma, time constant of the settling where it can be determined."""
 
     outcome: Outcome
     missing: Floats | None = None

@@ -30,7 +30,7 @@ EXPLAINS = {
     "encoder-slip": "A disc, coupling or belt slipped: its reading is off by a constant from then on.",
     "not-settled": "A servo and what it carries approach the target for a while; a sample taken then misses the rest.",
     "ringing": "A part on a spring, set swinging by the stop, swings on and fades.",
-    "frozen-reading": "A device that repeats an old value looks alive, but says nothing new.",
+    "frozen-reading": "A device that repeats an old value seems to work, but measures nothing new.",
     "clock-step": "A clock that is set while it runs divides the stream in two times.",
     "time-backwards": "Samples came out of order, or the clock was set back.",
     "missing-samples": "What a bus or its reader lost; gaps are left as gaps.",

@@ -27,7 +27,7 @@ def finding_page(number: int, finding: FindingRecord, file: DiagnosisFile, chain
     return section(
         f"finding-{number}",
         f"{number}. {finding.says}",
-        finding.explains or "No physics of the catalogue fits it: it is told as what it is, a dependence.",
+        finding.explains or "No physics of the catalogue fits it: only the dependence is reported.",
         panels(*pictures),
         _sizes(finding),
         facts(_proof(finding)),
@@ -76,7 +76,7 @@ def _proof(finding: FindingRecord) -> Iterator[tuple[str, str]]:
         yield "a machine shows at most", f"{significant(factor * finding.plausible_to)}{unit}"
     yield "confidence in the name", f"{finding.confidence:.3f}"
     chance = f"below {significant(SURE, 1)}" if finding.p < SURE else significant(finding.p, 2)
-    yield "chance that noise alone looks like any cause as much", chance
+    yield "chance that noise alone resembles any cause as much", chance
     if finding.bic_gain is not None and finding.held_out_gain is not None:
         yield "information it brings (BIC)", fixed(finding.bic_gain, 1)
         yield "gain on samples held out (2 ln L)", fixed(finding.held_out_gain, 1)

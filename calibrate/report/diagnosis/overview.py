@@ -4,20 +4,20 @@ from collections.abc import Iterator
 
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.report.diagnosis.words import free_space_words, verdict_words
-from calibrate.report.elements import Html, bullets, section, table, tag
+from calibrate.report.elements import Html, bullets, section, table, tag, tile
 from calibrate.report.quantities import DASH, fixed, length, significant
-from calibrate.report.tiles import tile
+from calibrate.report.verdict import Trust
 
 TITLE = "What the model lacks"
-TRUST = {"mismatch": "care", "consistent": "good", "undecidable": "bad"}
+TRUST = {"mismatch": Trust.CARE, "consistent": Trust.GOOD, "undecidable": Trust.NONE}
 SPLITS = {"random": "samples at random", "place": "each place in turn", "last block": "the end of the session"}
 
 
 def overview(file: DiagnosisFile) -> Html:
     """Chapter `diagnosis`."""
     lead = (
-        "Every part of the chain is asked which error of it would explain what geometry cannot, and only what also "
-        "predicts samples that were held out is told."
+        "Every element of the chain is tested for an error that explains what geometry cannot. Only what also "
+        "predicts held-out samples is reported."
     )
     parts = [_verdict(file), _tiles(file)]
     if file.splits:
@@ -33,19 +33,19 @@ def _verdict(file: DiagnosisFile) -> Html:
         )
     if file.next:
         content += [tag("p", tag("b", "What to do")), bullets(file.next)]
-    return tag("div", *content, cls=f"verdict {TRUST[file.verdict]}")
+    return tag("div", *content, cls=f"verdict {TRUST[file.verdict].css}")
 
 
 def _tiles(file: DiagnosisFile) -> Html:
     tiles = [
         tile("Geometry alone", _length(file.rms_before_m), "rms on samples held out"),
         tile("With the physics", _length(file.rms_after_m), "rms on the same samples"),
-        tile("Floor", _length(file.noise_floor_m), file.noise_floor_source or "not known"),
+        tile("Noise floor", _length(file.noise_floor_m), file.noise_floor_source or "not known"),
     ]
     if file.free_space is not None:
         change = file.free_space
-        said = f"{length(change.rms_before_m)} with geometry alone; predicted rms anywhere between these angles"
-        tiles.append(tile("Free space", length(change.rms_after_m), said))
+        said = f"{length(change.rms_before_m)} with geometry alone; predicted rms between these angles"
+        tiles.append(tile("Tool error, frames fitted", length(change.rms_after_m), said))
     return tag("div", *tiles, cls="tiles")
 
 
@@ -69,7 +69,7 @@ def _proof(file: DiagnosisFile) -> Html:
         "readings",
         "geometry alone",
         "with the physics",
-        "floor",
+        "noise floor",
         "removed of the squares",
     )
     return table(head, rows, numeric=range(2, 7), caption="Proof on samples that neither fit has seen")
@@ -77,9 +77,9 @@ def _proof(file: DiagnosisFile) -> Html:
 
 def _fit(file: DiagnosisFile) -> Iterator[Html]:
     if file.rms_after_m is not None and file.noise_floor_m:
-        yield tag("p", f"Explained down to {significant(file.rms_after_m / file.noise_floor_m)} times the floor.")
+        yield tag("p", f"Explained down to {significant(file.rms_after_m / file.noise_floor_m)} times the noise floor.")
     if file.lack_of_fit is None:
-        yield tag("p", "Lack of fit: too few poses were repeated to tell misfit from noise.")
+        yield tag("p", "Lack of fit: too few poses were repeated to separate misfit from noise.")
     else:
         misfit = file.lack_of_fit
         reads = "something repeatable is still unexplained" if misfit.significant else "repeats show nothing more"
@@ -91,7 +91,7 @@ def _fit(file: DiagnosisFile) -> Iterator[Html]:
     if file.noise_wanders:
         yield tag("p", "The noise wanders slowly: causes that grow with time had to beat a wandering chance, too.")
     if file.free_space is not None:
-        yield tag("p", f"Free space: {free_space_words(file.free_space)}.")
+        yield tag("p", f"Tool error: {free_space_words(file.free_space)}.")
 
 
 def _length(value_m: float | None) -> str:

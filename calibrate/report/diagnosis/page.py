@@ -5,7 +5,7 @@ from pathlib import Path
 
 from acquisition.recording import Recording
 from acquisition.recording.rig import Rig
-from calibrate.diagnose.schema import DiagnosisFile
+from calibrate.diagnose.schema import DiagnosisFile, FindingRecord
 from calibrate.errors import DataError
 from calibrate.report.diagnosis import limits, overview
 from calibrate.report.diagnosis.chain_figure import chain_of
@@ -22,15 +22,19 @@ def contents_of(file: DiagnosisFile) -> Mapping[str, str]:
     return {"diagnosis": overview.TITLE, **found, "diagnosis-limits": limits.TITLE}
 
 
-def chapters_of(file: DiagnosisFile, joints: int) -> tuple[Html, ...]:
-    """In the order of `contents_of`; of an arm with so many joints."""
+def chapters_of(file: DiagnosisFile, joints: int, held: Sequence[FindingRecord] = ()) -> tuple[Html, ...]:
+    """In the order of `contents_of`; of an arm with so many joints. `held`: findings that the model holds already."""
     chain = chain_of(joints, tuple(dict.fromkeys(s.instrument for s in file.splits)))
     pages = (finding_page(i, finding, file, chain) for i, finding in enumerate(file.findings, start=1))
-    return (overview.overview(file), *pages, limits.limits(file))
+    return (overview.overview(file), *pages, limits.limits(file, held))
 
 
 def inserted(
-    contents: Mapping[str, str], chapters: Sequence[Html], file: DiagnosisFile | None, rig: Rig
+    contents: Mapping[str, str],
+    chapters: Sequence[Html],
+    file: DiagnosisFile | None,
+    rig: Rig,
+    held: Sequence[FindingRecord] = (),
 ) -> tuple[Mapping[str, str], tuple[Html, ...]]:
     """Contents and chapters of another report with the pages of a diagnosis before the last one; as they are if None.
 
@@ -45,7 +49,7 @@ def inserted(
         )
     *first, last = contents.items()
     whole = dict([*first, *contents_of(file).items(), last])
-    return whole, (*chapters[:-1], *chapters_of(file, len(rig.arm.joints)), chapters[-1])
+    return whole, (*chapters[:-1], *chapters_of(file, len(rig.arm.joints), held), chapters[-1])
 
 
 def write_diagnosis_report(path: Path, recording: Recording, file: DiagnosisFile) -> Path:

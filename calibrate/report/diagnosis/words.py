@@ -12,8 +12,10 @@ from calibrate.diagnose.schema import (
     SplitRecord,
     UnexplainedRecord,
 )
+from calibrate.diagnose.stated_noise import Statement
 from calibrate.report.diagnosis.units import unit_of
 
+ABSENT, WRONG = Statement.ABSENT.value, Statement.WRONG.value
 NOISE = 1.15  # times the floor: some dozen samples held out scatter by so much
 TOLD = ("encoder-eccentricity", "joint-compliance", "backlash")  # in a sentence; all of them stand in the table
 
@@ -21,18 +23,18 @@ TOLD = ("encoder-eccentricity", "joint-compliance", "backlash")  # in a sentence
 def verdict_words(file: DiagnosisFile) -> str:
     """What was found, what is left, and what the answer is worth."""
     if any(not blunder.rows for blunder in file.blunders):
-        return "The file is wrong as a whole: nothing can be said about the arm."
+        return "The file is wrong as a whole: nothing can be determined about the arm."
     match file.verdict:
         case "mismatch" if file.known is not None:
             n = len(file.findings)
             return f"Recording and model differ: {n} change{'s' if n > 1 else ''} found{_how_far(file)}."
         case "consistent" if file.known is not None:
-            return f"Nothing new: recording and model agree to within the noise{_tested(file)}."
+            return f"Nothing new: recording and model agree to within {_noise(file)}{_tested(file)}."
         case "mismatch":
             n = len(file.findings)
-            return f"Recording and model part: {n} cause{'s' if n > 1 else ''} found{_how_far(file)}."
+            return f"Recording and model disagree: {n} cause{'s' if n > 1 else ''} found{_how_far(file)}."
         case "consistent":
-            return f"Recording and model agree: nothing is there beyond the noise{_tested(file)}."
+            return f"Recording and model agree: nothing is there beyond {_noise(file)}{_tested(file)}."
         case _ if file.incomplete and file.unexplained is None:
             stages = ", ".join(one.stage for one in file.incomplete)
             return f"Undecidable: the diagnosis was not completed ({stages})."
@@ -48,10 +50,36 @@ def _how_far(file: DiagnosisFile) -> str:
         return f", but not the whole of it: something{size} stays without a name ({_places(left)})"
     if file.rms_after_m is None or not file.noise_floor_m:
         return ""
-    ratio = file.rms_after_m / file.noise_floor_m
+    ratio = max(_over_the_floor(file), default=file.rms_after_m / file.noise_floor_m)
+    if _unstated(file):
+        return f"; what remains is {ratio:.2g} times the floor, and no noise is stated to compare it with"
     if ratio <= NOISE:
-        return ", and what remains is noise"
+        return f", and what remains is {_noise(file).removeprefix('the ')}"
     return f"; unseen samples are still missed by {ratio:.2g} times the noise"
+
+
+def _over_the_floor(file: DiagnosisFile) -> Iterator[float]:
+    """Error on unseen rows over the floor, in every split."""
+    floors = {f.instrument: f.rms_m for f in file.floors}
+    for split in file.splits:
+        floor_m = floors.get(split.instrument)
+        if floor_m and split.rms_after_m is not None:
+            yield split.rms_after_m / floor_m
+
+
+def _unstated(file: DiagnosisFile) -> bool:
+    """Whether the rig file states no noise at all of what was read."""
+    return bool(file.noise) and all(one.statement == ABSENT for one in file.noise)
+
+
+def _noise(file: DiagnosisFile) -> str:
+    """The noise, and whether it is that of the rig file."""
+    wrong = [one.says for one in file.noise if one.statement == WRONG]
+    if wrong:
+        return f"the noise; the {'; the '.join(wrong)}"
+    if _unstated(file):
+        return "scatter of which no size is stated"
+    return "the noise"
 
 
 def _something(file: DiagnosisFile) -> str:
@@ -71,10 +99,22 @@ def _tested(file: DiagnosisFile) -> str:
         return ""
     kinds = len({one.physics for one in file.smallest})
     shown = [visible_words(one) for one in hardest_to_see(file) if one.physics in TOLD]
-    seen = f"; it would have shown, for instance, {'; '.join(shown)}" if shown else ""
-    lacking = ", ".join(dict.fromkeys(m.physics for m in file.not_recorded))
+    seen = f"; detection limits: {'; '.join(shown)}" if shown else ""
+    lacking = ", ".join(untested_physics(file))
     blind = f". Not tested, for lack of columns: {lacking}" if lacking else ""
     return f". Tested were {kinds} kinds of physics, {len(file.smallest)} places and causes{seen}{blind}"
+
+
+def untested_physics(file: DiagnosisFile) -> tuple[str, ...]:
+    """Kinds of physics of which no form was tested: a kind that another recorded column could show was."""
+    tested = {one.physics for one in file.smallest}
+    return tuple(dict.fromkeys(m.physics for m in file.not_recorded if m.physics not in tested))
+
+
+def confusable_causes(file: DiagnosisFile) -> tuple[tuple[NameRecord, NameRecord, float], ...]:
+    """Pairs that the poses cannot separate, the most alike first; forms of one cause are no pair of causes."""
+    pairs = (pair for pair in file.confusable if (pair[0].physics, pair[0].where) != (pair[1].physics, pair[1].where))
+    return tuple(sorted(pairs, key=lambda pair: -pair[2]))
 
 
 def visible_words(smallest: SmallestRecord) -> str:
@@ -125,8 +165,9 @@ def micrometres(value_m: float | None) -> str:
 def free_space_words(change: FreeSpaceRecord) -> str:
     """One sentence."""
     return (
-        f"predicted error anywhere between the angles of this session: {micrometres(change.rms_before_m)} "
-        f"with geometry alone, {micrometres(change.rms_after_m)} with the physics (rms, {change.poses} poses)"
+        "predicted tool error between the joint angles of this session, base and tool point fitted: "
+        f"{micrometres(change.rms_before_m)} with geometry alone, {micrometres(change.rms_after_m)} with the physics "
+        f"(rms, {change.poses} poses)"
     )
 
 
@@ -144,7 +185,7 @@ def stream_words(file: DiagnosisFile) -> Iterator[str]:
 
 def _clock_words(clock: ClockRecord) -> str:
     if clock.offset_s is None or clock.offset_sigma_s is None:
-        return f"clock of {clock.stream}: not told ({clock.status})"
+        return f"clock of {clock.stream}: not determined ({clock.status})"
     said = f"clock of {clock.stream}: {1e3 * clock.offset_s:.3f} ± {1e3 * clock.offset_sigma_s:.3f} ms"
     if clock.drift is None or clock.drift_sigma is None:
         return said
@@ -155,3 +196,12 @@ def _behind(margin: float) -> str:
     """A rival's margin in words; what rounds to nothing is no margin."""
     words = f"{abs(margin):.1f} BIC"
     return "as good" if words == "0.0 BIC" else f"{words} {'behind' if margin > 0.0 else 'ahead'}"
+
+
+def noise_words(file: DiagnosisFile) -> Iterator[str]:
+    """Every stated noise that is wrong, with what supports it and what opposes it."""
+    for one in file.noise:
+        if one.statement == WRONG:
+            told = [f"for it: {', '.join(one.supports)}"] if one.supports else []
+            told += [f"against it: {', '.join(one.opposes)}"] if one.opposes else []
+            yield "; ".join((one.says, *told))

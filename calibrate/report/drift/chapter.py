@@ -33,10 +33,10 @@ def drift_chapter(drift: Drift) -> Html:
 def _picture(drift: Drift) -> list[Html]:
     room, tool = drift.room, drift.tool
     if room is None or tool is None:
-        return [tag("p", "What it does to the tool is not drawn: no error over the workspace can be told.")]
+        return [tag("p", "The effect on the tool is not drawn: the error over the workspace cannot be determined.")]
     if not drift.found:
         doubt = length(float(np.sqrt(np.mean(tool.sigma_m[room.supported] ** 2))), 2)
-        return [tag("p", f"No change of the tool is drawn: none is beyond chance (doubt of it: {doubt}, one sigma).")]
+        return [tag("p", f"No change of the tool is drawn: none is beyond chance (uncertainty {doubt}, one sigma).")]
     grids = tuple(grid_of(view, room.reach_m) for view in VIEWS)
     clear = room.supported & (tool.moved_m > BEYOND_DOUBT * tool.sigma_m)
     cells = tuple(grid.rms(room.points_m, tool.moved_m, clear) for grid in grids)

@@ -16,7 +16,7 @@ def rig_of(model: ModelFile, label: str) -> Rig:
     """
     if model.rig.text is None:
         raise DataError(
-            f"{label}: the model does not hold its rig file, so nothing says what its corrections are about; "
+            f"{label}: the model does not hold its rig file, so the nominal values of its corrections are unknown; "
             "give the recording, or identify it again"
         )
     return rig_in_model(parse_rig(model.rig.text, f"{label} (rig)"), ArmModel(model.arm_model))

@@ -68,7 +68,7 @@ class Drift:
     now: Calibration
     then: Calibration
     compared: Compared
-    room: Room | None  # None where no error over the workspace can be told
+    room: Room | None  # None where no error over the workspace can be determined
     tool: ToolChange | None  # the same, or nothing to compare
     warnings: tuple[str, ...]
 
@@ -115,13 +115,13 @@ def _more_than_noise(now: Calibration, then: Calibration) -> Iterator[str]:
     if short:
         yield (
             f"The model of {' and of '.join(short)} leaves more than noise, so its sigmas are too small: measuring at "
-            "other poses can alone look like a drift. Compare sessions of the same poses, or find the missing physics "
+            "other poses can alone appear as a drift. Compare sessions of the same poses, or find the missing physics "
             "first (`calibeam diagnose`)."
         )
 
 
 def _lacks_physics(model: ModelFile) -> bool:
-    """By chi-square against the noise as believed, or by repeated poses."""
+    """By chi-square against the noise as assumed, or by repeated poses."""
     all_of_it, repeats = scatter(model), repeated(model)
     by_spots = (model.repeats or {}).get("lack_of_fit_p")  # of the method for spots alone
     return (

@@ -48,7 +48,7 @@ def _rows(one: Calibration) -> Iterator[tuple[str, str]]:
     for proof in proofs(model)[:1]:
         yield f"unseen {proof.instrument} readings, rms distance", length(proof.rms_distance_after_m)
     if model.free_space is not None and model.free_space.pose_p95_m is not None:
-        yield "anywhere, 95 %, predicted", length(model.free_space.pose_p95_m)
+        yield "tool error over the workspace, 95 %, predicted", length(model.free_space.pose_p95_m)
     yield "software", model.software
 
 

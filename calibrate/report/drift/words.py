@@ -16,7 +16,7 @@ def sentence(drift: Drift) -> str:
     """What moved since, by how much and how surely, and what it does to the tool."""
     since, found = f"Since {drift.then.label}", drift.compared
     if not found.changes:
-        return f"{since}: nothing can be said, since no parameter of the arm is determined both then and now."
+        return f"{since}: no comparison, because no parameter of the arm is determined both then and now."
     if not drift.found:
         largest = max(found.changes, key=lambda c: c.sigmas)
         most = f" (most of all {in_plain_words(largest.name)}, {significant(largest.sigmas, 2)} sigma)"
@@ -30,7 +30,7 @@ def sentence(drift: Drift) -> str:
         more = len(clear) - TOLD
         told.append(f"{more} more parameter{'s' if more > 1 else ''} changed")
     if not told and found.together is not None:
-        told = [f"the arm changed, but no single parameter says where (p = {significant(found.together.p, 2)})"]
+        told = [f"the arm changed, but no single parameter shows where (p =  {significant(found.together.p, 2)})"]
     return f"{since}: {', '.join(told)}{_tool(drift)}."
 
 
@@ -55,7 +55,7 @@ def _blind(drift: Drift) -> str:
     if drift.tool is None or drift.room is None:
         return ""
     sigma_m = float(np.sqrt(np.mean(drift.tool.sigma_m[drift.room.supported] ** 2)))
-    return f"; a change of the tool is told to {length(sigma_m, 2)}, one sigma"
+    return f"; a change of the tool is determined to {length(sigma_m, 2)}, one sigma"
 
 
 def _tool(drift: Drift) -> str:

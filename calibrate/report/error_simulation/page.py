@@ -7,12 +7,11 @@ import numpy as np
 from calibrate.error_simulation.linear import ROUNDING_M
 from calibrate.error_simulation.record import SHARE
 from calibrate.error_simulation.simulate import Simulation
-from calibrate.report.elements import Html, figure, section, table, tag
+from calibrate.report.elements import Html, figure, section, table, tag, tile
 from calibrate.report.error_simulation.figures import PICTURES, Picture
 from calibrate.report.page import page, write_page
 from calibrate.report.quantities import angle, length, significant
 from calibrate.report.svg import drawn
-from calibrate.report.tiles import tile
 
 CONTENTS = {"budget": "Budget", "each": "Each error alone", "linear": "Linear and drawn", "ranking": "Ranking",
             "worst": "Worst postures"}  # fmt: skip
@@ -76,7 +75,10 @@ def _linear(s: Simulation) -> Html:
         for i in range(len(s.drawn_at_rad))
     ]
     head = ("pose", "joints", "linear rms", "drawn rms", "95 % below", "worst arm")
-    lead = "Linear propagation is at once and says why; drawn arms know no linearisation and any law."
+    lead = (
+        "Linear propagation is immediate and gives the causes; random arms need no linearisation and take any "
+        "distribution."
+    )
     return section(
         "linear", CONTENTS["linear"], lead, _picture("side-by-side", s), table(head, rows, numeric=range(2, 6))
     )
@@ -118,5 +120,5 @@ def _worst(s: Simulation) -> Html:
     ]
     if not s.worst:
         return section("worst", CONTENTS["worst"], "None of these errors moves the probe in any posture.")
-    lead = "Tops of the error over the joint ranges; postures of the same error are told once."
+    lead = "Tops of the error over the joint ranges; postures of the same error are listed once."
     return section("worst", CONTENTS["worst"], lead, table(("rms", "joints", "probe in the base (m)"), rows))

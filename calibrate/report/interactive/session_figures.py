@@ -75,16 +75,17 @@ def _one_by_one(evidence: SessionEvidence, readings: Readings) -> Plot:
             "name": f"{name}, {state}",
             "hovertemplate": f"sample %{{x}}: %{{y}} {unit}",
             "marker": {"color": TONES[k % len(TONES)], "symbol": SYMBOLS[k % len(SYMBOLS)], "size": 5},
-            "visible": True if state == "identified" else "legendonly",
+            "visible": True if state == "calibrated" else "legendonly",
         }
-        for state, values in (("identified", readings.after), ("as drawn", readings.before))
+        for state, values in (("calibrated", readings.after), ("nominal", readings.before))
         for k, name in enumerate(names)
     ]
     return plane(
         traces,
         "plot-residuals",
         f"residuals of {readings.title} against the number of the sample",
-        f"{readings.title}, expected minus observed, sample by sample. Those of the arm as drawn come with a click on "
+        f"{readings.title}, expected minus observed, sample by sample. A click on the names shows those of the "
+        "nominal arm."
         "their names.",
         "sample",
         f"residual ({unit})",
@@ -95,7 +96,7 @@ def _labels(evidence: SessionEvidence, readings: Readings) -> list[str]:
     q_rad = evidence.recording.samples.joints()[readings.rows[:, 0]]
     errors = zip(readings.error_before, readings.error_after, strict=True)
     return [
-        f"sample {row + 1}<br>as drawn {readings.says(float(b))}, identified {readings.says(float(a))}<br>{posture(q)}"
+        f"sample {row + 1}<br>nominal {readings.says(float(b))}, calibrated {readings.says(float(a))}<br>{posture(q)}"
         for row, q, (b, a) in zip(readings.rows[:, 0].tolist(), q_rad, errors, strict=True)
     ]
 

@@ -92,7 +92,7 @@ def _labels(session: SpotSession) -> list[str]:
     data, errors = session.data, session.readings
     rows = zip(data.placement, data.first_psd, data.q_rad, errors.error_before, errors.error_after, strict=True)
     return [
-        f"pose {i}, place {place}, PSD {first} first<br>as drawn {length(float(b))}, identified {length(float(a))}<br>"
+        f"pose {i}, place {place}, PSD {first} first<br>nominal {length(float(b))}, calibrated {length(float(a))}<br>"
         f"{posture(q)}"
         for i, (place, first, q, b, a) in enumerate(rows, start=1)
     ]

@@ -14,7 +14,7 @@ SHOWN_MM = 1.0  # of the curve: beyond, there are fewer readings than unknowns, 
 
 def curve_figure(made: Design) -> Html:
     """Predicted error by number of poses."""
-    says = "curve of the predicted error in free space over the number of poses"
+    says = "curve of the predicted error over the workspace over the number of poses"
     return drawn("design-curve", says, 6.0, 3.4, lambda figure: paint_curve(figure, made))
 
 
@@ -30,7 +30,7 @@ def paint_curve(figure: Figure, made: Design) -> None:
         axes.annotate("enough", (curve.enough, 1.0), xycoords=("data", "axes fraction"), fontsize=8, va="top")
     values = 1e6 * np.concatenate([curve.chosen_m[shown], curve.random_m[shown]])
     log_axis(axes, "y", [float(values.min()), float(values.max())], lambda y: f"{y:g}")
-    axes.set(xlabel="poses", ylabel="predicted error in free space, rms (µm)")
+    axes.set(xlabel="poses", ylabel="predicted error over the workspace, rms (µm)")
     axes.legend()
 
 

@@ -9,11 +9,10 @@ from calibrate.pose_design.design import Design
 from calibrate.pose_design.places import Places
 from calibrate.pose_design.seen import Seen
 from calibrate.report.diagnosis.words import size_of
-from calibrate.report.elements import Html, bullets, figure, section, table, tag
+from calibrate.report.elements import Html, bullets, figure, section, table, tag, tile
 from calibrate.report.page import page, write_page
 from calibrate.report.pose_design.figures import curve_figure, isolability_figure, joints_figure
 from calibrate.report.quantities import length
-from calibrate.report.tiles import tile
 
 CONTENTS = {"promise": "How many poses", "plan": "The plan", "places": "Places of the fixture", "causes": "Causes"}
 
@@ -38,17 +37,26 @@ def _tiles(made: Design, seen: Seen) -> Html:
     enough = "more than shown" if made.curve.enough is None else str(made.curve.enough)
     return tag(
         "div",
-        tile("Predicted error", length(made.free_space_m), f"rms in free space: {made.information.target}"),
+        tile("Predicted error", length(made.free_space_m), f"rms over the workspace:  {made.information.target}"),
         tile("Random poses", length(made.random_m), "as many, median of draws"),
         tile("Enough", enough, "poses; more of them do little but average noise"),
-        tile("Alike", str(len(seen.confusable)), "pairs of terms that could not be told apart"),
+        tile("Alike", str(len(seen.confusable_causes)), "pairs of causes that could not be separated"),
         cls="tiles",
     )
 
 
 def _promise(made: Design) -> Html:
-    caption = "Predicted rms error in free space. The plan was chosen by exchange, the curve one pose after the other."
+    caption = f"Predicted rms error over the workspace. {of_the_curve(made)}"
     return section("promise", CONTENTS["promise"], "What more poses would bring.", figure(curve_figure(made), caption))
+
+
+def of_the_curve(made: Design) -> str:
+    """Why plan and curve differ at the same number of poses."""
+    return (
+        f"The plan was chosen by exchanging all its poses (criterion {made.asked.criterion}). The curve adds one pose "
+        "after the other (criterion d): quicker, but not as good. The plan may therefore lie below the curve, even "
+        "where the curve has more poses; the curve shows how the error falls, the plan what to expect."
+    )
 
 
 def _plan(made: Design) -> Html:
@@ -81,17 +89,17 @@ def _places(places: Sequence[Places]) -> Html:
 
 def _causes(seen: Seen) -> Html:
     rows = [(one.name.physics, one.name.where, size_of(one.parameter, one.value)) for one in seen.smallest]
-    alike = [f"{_name(a)} and {_name(b)}: R2 {r2:.3f}" for a, b, r2 in seen.confusable]
+    alike = [f"{_name(a)} and {_name(b)}: R2 {r2:.3f}" for a, b, r2 in seen.confusable_causes]
     caption = (
         "Largest share, in percent, of the signal of a cause (row) that any form of another one (column) could "
-        "explain, geometry refitted. From 97 % on the poses cannot tell them apart."
+        "explain, geometry refitted. From 97 % on the poses cannot separate them."
     )
     return section(
         "causes",
         CONTENTS["causes"],
         "What a diagnosis of this plan could find, and what it would confuse.",
         figure(isolability_figure(seen), caption),
-        tag("h3", "Could not be told apart"),
+        tag("h3", "Could not be separated"),
         bullets(alike or ["nothing"]),
         *([tag("h3", "Not shown at all"), bullets([_name(one) for one in seen.invisible])] if seen.invisible else []),
         tag("h3", "Found from this size on, 19 times out of 20"),

@@ -30,7 +30,7 @@ def _left_out(evidence: SessionEvidence) -> Iterator[Html]:
     if blank > 0:
         yield tag("p", f"{blank} rows hold no reading that could be used.")
     if not model.blunders:
-        yield tag("p", "No faulty row was found; every reading took part.")
+        yield tag("p", "No faulty row was found; every reading was used.")
         return
     rows = [(b.kind.lower().replace("_", " "), str(len(b.rows)), b.says) for b in model.blunders]
     yield table(("Fault", "rows", "what"), rows, numeric=(1,), caption="Left out of the fit")

@@ -16,8 +16,8 @@ TITLE = "Errors before and after"
 def errors_chapter(evidence: SessionEvidence) -> Html:
     """All instruments in one table, then each by itself."""
     lead = (
-        "Expected minus observed. As drawn: frames, target and cones where they fit best, the arm nominal. "
-        "Identified: everything fitted. An error is the length of the difference, 3-D for a position."
+        "Expected minus observed. Nominal: the arm nominal; frames, target and cones where they fit best. "
+        "Calibrated: everything fitted. An error is the length of the difference, 3-D for a position."
     )
     rows = [row for readings in evidence.readings for row in _figures(readings)]
     head = ("Reading", "state", "count", "rms distance", "mean", "95 %", "largest")
@@ -27,9 +27,9 @@ def errors_chapter(evidence: SessionEvidence) -> Html:
 
 def _figures(readings: Readings) -> list[tuple[str, ...]]:
     out: list[tuple[str, ...]] = []
-    for state, values in (("as drawn", readings.error_before), ("identified", readings.error_after)):
+    for state, values in (("nominal", readings.error_before), ("calibrated", readings.error_after)):
         numbers = (np.sqrt(np.mean(values**2)), values.mean(), np.percentile(values, 95.0), values.max())
-        name = readings.title if state == "as drawn" else ""
+        name = readings.title if state == "nominal" else ""
         out.append((name, state, str(len(values)), *(readings.says(float(n)) for n in numbers)))
     return out
 
@@ -38,13 +38,12 @@ def _instrument(evidence: SessionEvidence, index: int) -> list[Html]:
     readings = evidence.readings[index]
     found = patterns_of(evidence, index)
     out = [tag("h3", readings.title)]
-    if index > 0:  # those of the first are on the first page
-        out.append(_before_and_after(readings))
+    out.append(_before_and_after(readings))
     out.append(_noise_like(readings))
     if found:
         out += [tag("div", figure(along(readings, found), _caption(found)), cls="wide"), _pattern_table(found)]
     else:
-        out.append(tag("p", "Too few readings to look for patterns along the joints."))
+        out.append(tag("p", "Too few readings to search for patterns along the joints."))
     return out
 
 
@@ -52,7 +51,7 @@ def _before_and_after(readings: Readings) -> Html:
     some = f" {MOST_POINTS} of them are drawn." if len(readings.rows) > MOST_POINTS else ""
     return panels(
         figure(errors(readings), "Every reading, before and after, on a logarithmic axis."),
-        figure(by_sample(readings), f"The same in the order of the file.{some}"),
+        figure(by_sample(readings), f"The same in the order of the file: a drift or a knock would show here.{some}"),
     )
 
 
@@ -94,4 +93,4 @@ def _pattern_table(found: tuple[Pattern, ...]) -> Html:
     ]
     caption = f"Does what remains depend on it (one-way analysis of variance, up to {GROUPS} groups)"
     head = ("Factor", "F", "p", "share of what remains", "reads as")
-    return folded("The same in numbers", table(head, rows, numeric=(1, 2, 3), caption=caption))
+    return folded("The same in numbers", table(head, rows, numeric=(1, 2, 3), caption=caption), on_paper=False)

@@ -8,15 +8,16 @@ from calibrate.default_belief import said_of
 from calibrate.identifiability import WEAK
 from calibrate.identification.session import holds_spots
 from calibrate.model_file import ModelFile, ModelParameter
+from calibrate.observability import WELL_CONDITIONED
 from calibrate.parameters import Parameter
-from calibrate.report.elements import Html, bullets, figure, folded, panels, section, table, tag
-from calibrate.report.observability_table import observability
+from calibrate.report.elements import Html, bullets, figure, folded, halves, join, panels, section, table, tag
 from calibrate.report.quantities import DASH, aligned, decimals_of, fixed, significant
 from calibrate.report.rank_figures import spectrum
 from calibrate.report.reasons import in_plain_words, kind_of, reason_among
 from calibrate.report.session_evidence import SessionEvidence
 
 TITLE = "What was identified, and what was not"
+MOST_LISTED = 12  # parameters without a number: of more, one line a reason, the rest folded
 LEARNED = 0.9  # sigma over drawing tolerance: above, these data taught nothing about the parameter
 
 
@@ -59,7 +60,7 @@ def _combinations(evidence: SessionEvidence) -> Iterator[Html]:
     yield tag("p", f"{model.rank} of {model.free} combinations are seen.")
     yield from _observability(model)
     if not model.unseen:
-        yield tag("p", "Every parameter can be told from every other.")
+        yield tag("p", "Every parameter can be separated from every other.")
         return
     kinds = dict.fromkeys(kind_of(u) for u in model.unseen)
     for kind in kinds:
@@ -73,12 +74,21 @@ def _observability(model: ModelFile) -> Iterator[Html]:
         if model.condition is not None:
             yield tag("p", f"Condition of what is seen: {significant(model.condition)}.")
         return
-    yield from observability(seen)
+    values = (seen.o1, seen.o2, seen.o3, seen.o4, seen.o5, seen.condition)
+    row = tuple(DASH if value is None else significant(value) for value in values)
+    caption = f"Observability of the {seen.parameters} parameters that the data determine"
+    head = (*(f"O{k}" for k in range(1, 6)), "condition")
+    yield table(head, [row], numeric=range(6), caption=caption)
+    if seen.condition is not None and seen.condition > WELL_CONDITIONED:
+        says = (
+            f"A condition above {WELL_CONDITIONED:g} means that other poses would determine some parameters far better."
+        )
+        yield tag("p", says, cls="lead")
 
 
 def _numbers(evidence: SessionEvidence, known: list[ModelParameter]) -> Html:
     if not known:
-        return tag("p", "No single parameter can be told alone; together they predict (model.json: chain).")
+        return tag("p", "No single parameter is determined alone; together they predict (model.json: chain).")
     believed = {p.name: p for p in evidence.parameters}
     drawn = any(p.bootstrap_sigma is not None for p in known)
     head = (
@@ -96,7 +106,7 @@ def _numbers(evidence: SessionEvidence, known: list[ModelParameter]) -> Html:
         (tag("code", p.name), in_plain_words(p.name), value, sigma, *_by_refits(p, drawn), unit, _source(p, believed))
         for p, value, sigma, (_, _, unit) in zip(known, values, sigmas, numbers, strict=True)
     ]
-    return table(head, rows, numeric=(2, 3, 4) if drawn else (2, 3))
+    return halves(table(head, rows, numeric=(2, 3, 4) if drawn else (2, 3)), terse=True)
 
 
 def _number(found: ModelParameter) -> tuple[str, str, str]:
@@ -133,4 +143,13 @@ def _refusals(evidence: SessionEvidence, refused: list[ModelParameter]) -> Html:
         for p in refused
     ]
     listed = table(("Parameter", "what it is", "why there is no number"), rows)
-    return listed if len(rows) <= 12 else folded(f"All {len(rows)}, each with its reason", listed)
+    if len(rows) <= MOST_LISTED:
+        return listed
+    by_reason: dict[str, list[str]] = {}
+    for (_, _, why), p in zip(rows, refused, strict=True):
+        by_reason.setdefault(why, []).append(p.name)
+    summed = [(f"{why[0].upper()}{why[1:]}", ", ".join(names)) for why, names in by_reason.items()]
+    return join(
+        table(("Why there is no number", "parameters"), summed),
+        folded(f"All {len(rows)}, each with its reason", listed, on_paper=False),
+    )

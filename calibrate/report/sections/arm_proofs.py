@@ -15,8 +15,8 @@ from calibrate.sensors.kind import NoiseSource
 from calibrate.uncertainty.chi_square import Alarm
 from calibrate.weighting import JOINT
 
-TITLE = "Proof and doubt"
-NONE = "too small to be told from none"
+TITLE = "Proof and uncertainty"
+NONE = "too small to be separated from none"
 OF_JOINTS = NoiseSource(JOINT, "rad", "joint_rad")
 
 
@@ -57,7 +57,7 @@ def _noise(model: ModelFile, rig: Rig) -> Html:
             rows.append((name, says(believed), source, NONE, ""))
             continue
         rows.append((name, says(believed), source, doubted(found, sigma), fixed(found / believed, 2)))
-    head = ("Noise of", "believed", "by", "found in the residuals", "found / believed")
+    head = ("Noise of", "assumed", "by", "found in the residuals", "found / assumed")
     return table(head, rows, numeric=(1, 3, 4), caption="Noise, one sigma of one coordinate")
 
 
@@ -66,9 +66,9 @@ def _tests(model: ModelFile) -> Iterator[tuple[str, ...]]:
     if found is not None:
         ratio = fixed(found.chi2 / found.dof, 2) if found.dof > 0 else DASH
         said = f"alarm: {found.alarm.value}" if found.alarm is not Alarm.NONE else found.alarm.value
-        yield "chi²/dof, noise as believed", ratio, f"{found.dof} degrees of freedom; {said}"
+        yield "chi²/dof, noise as assumed", ratio, f"{found.dof} degrees of freedom; {said}"
     if repeats is None:
-        yield "Repeats", "none: no pose was repeated, so missing physics cannot be told from noise"
+        yield "Repeats", "none: no pose was repeated, so missing physics cannot be separated from noise"
         return
     yield (
         "Repeats, chi²/dof",

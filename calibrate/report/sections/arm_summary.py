@@ -1,26 +1,33 @@
 """The first page of a session's report: verdict, what to do, figures, joint zeros."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from calibrate.diagnose.schema import DiagnosisFile
+from calibrate.model_file import FreeSpaceRecord
 from calibrate.report.answers import Answers, Number, first_screen
-from calibrate.report.anywhere import anywhere
-from calibrate.report.elements import Html, figure, panels, tag
-from calibrate.report.error_figures import by_sample, errors
+from calibrate.report.elements import Html, figure, tag
 from calibrate.report.model_tests import proofs
 from calibrate.report.quantities import DASH, length, significant
-from calibrate.report.sections.zeros import determined, limits_of_zeros, zeros_part
+from calibrate.report.sections.arm_table import table_part
+from calibrate.report.sections.certificate import certificate, when
+from calibrate.report.sections.zeros import determined, limits_of_zeros
 from calibrate.report.session_evidence import Readings, SessionEvidence
 from calibrate.report.session_verdict import session_verdict
+from calibrate.report.workspace.pictures import tool_maps
 from calibrate.report.workspace.room import Room
 from calibrate.sensors.catalogue import kind_of
+
+ANYWHERE = "Anywhere"
+MOSTLY = 0.9  # of the error of a single pose, by the doubt of the parameters: the rest adds in quadrature
 
 
 def masthead(evidence: SessionEvidence) -> Html:
     """Title, when and with what."""
     recording, model = evidence.recording, evidence.model
-    when = recording.started_utc.partition(".")[0].replace("T", " ")
     seen = ", ".join(kind_of(name).title.lower() for name in model.instruments)
-    said = [f"{when} UTC"] if when else []
+    said = [f"{when(recording)} UTC"] if when(recording) else []
     said += [f"{model.poses} samples", seen, model.software]
     return tag(
         "header",
@@ -30,17 +37,13 @@ def masthead(evidence: SessionEvidence) -> Html:
     )
 
 
-def summary(said: Answers, evidence: SessionEvidence) -> Html:
-    """What a person must know before anything else."""
-    first = evidence.readings[0]
-    pictures = panels(
-        figure(errors(first), "Every reading, before and after, on a logarithmic axis."),
-        figure(by_sample(first), "The same in the order of the file: a drift or a knock would show here."),
-    )
-    return tag("div", first_screen(said), pictures, *zeros_part(evidence), id="summary")
+def summary(said: Answers, evidence: SessionEvidence, room: Room | str) -> Html:
+    """What a person must know before anything else; `room` of session_room."""
+    maps = None if isinstance(room, str) else figure(tool_maps(room), MAPS)
+    return tag("div", first_screen(said, maps), *table_part(evidence), certificate(evidence.recording), id="summary")
 
 
-def answers(evidence: SessionEvidence, room: Room | str) -> Answers:
+def answers(evidence: SessionEvidence, room: Room | str, diagnosis: DiagnosisFile | None = None) -> Answers:
     """How good, whether to trust it, what to do; first of all the error of the tool over the workspace."""
     model, first = evidence.model, evidence.readings[0]
     known = sum(p.value is not None for p in model.parameters)
@@ -52,31 +55,40 @@ def answers(evidence: SessionEvidence, room: Room | str) -> Answers:
         *([determined(evidence)] if limits else []),
         f"rows of the fit: {first.says(_rms(first.error_after))} rms distance",
     )
-    numbers = (*_tool(room), *_errors(evidence), anywhere(model.free_space))
-    return Answers(session_verdict(evidence), numbers, limits, also)
+    numbers = (*_tool(room, diagnosis), *_errors(evidence), _anywhere(model.free_space))
+    return Answers(session_verdict(evidence, diagnosis), numbers, limits, also)
 
 
-def _tool(room: Room | str) -> tuple[Number, Number]:
-    """Over the workspace, where the data support a statement: nominal arm, and calibrated."""
+def _tool(room: Room | str, diagnosis: DiagnosisFile | None) -> Iterator[Number]:
+    """Over the workspace, where the data support a statement: nominal arm, calibrated, and with the physics found.
+
+    What missing physics adds to geometry alone is what the diagnosis predicts: independent of the uncertainty of the
+    geometry, hence added in quadrature.
+    """
     if isinstance(room, str):
-        why = f"not told: {room}"
-        return (
-            Number("tool_nominal", TOOL_NOMINAL, None, "m", DASH, why),
-            Number("tool_calibrated", TOOL_CALIBRATED, None, "m", DASH, why),
-        )
-    nominal, calibrated = _rms(room.drawn_m[room.supported]), _rms(room.found_m[room.supported])
-    where = "rms between the joint angles of the session"
-    return (
-        Number(
-            "tool_nominal", TOOL_NOMINAL, nominal, "m", length(nominal), f"{where}; the base put where it fits best"
-        ),
-        Number(
-            "tool_calibrated", TOOL_CALIBRATED, calibrated, "m", length(calibrated), f"{where}; one sigma, predicted"
-        ),
-    )
+        why = f"is not determined: {room}"
+        yield Number("tool_nominal", NOMINAL, None, "m", DASH, why)
+        yield Number("tool_calibrated", CALIBRATED, None, "m", DASH, why)
+        return
+    nominal, found = _rms(room.drawn_m[room.supported]), _rms(room.found_m[room.supported])
+    missed = _missed_by_geometry(diagnosis)
+    calibrated = float(np.hypot(found, missed))
+    where = "Rms over the poses between the joint angles of the session; calibrated: one sigma, predicted."
+    yield Number("tool_nominal", NOMINAL, nominal, "m", length(nominal), f"{where} The base is put where it fits best.")
+    yield Number("tool_calibrated", CALIBRATED, calibrated, "m", length(calibrated), where)
+    if missed > 0.0:
+        about = f"{where} The physics found by the diagnosis accounts for {length(missed)} of it."
+        yield Number("tool_physics", WITH_PHYSICS, found, "m", length(found), about)
 
 
-TOOL_NOMINAL, TOOL_CALIBRATED = "Tool error, nominal", "Tool error, calibrated"
+def _missed_by_geometry(diagnosis: DiagnosisFile | None) -> float:
+    """In m, rms over the workspace; 0 where no diagnosis says so."""
+    change = None if diagnosis is None or not diagnosis.findings else diagnosis.free_space
+    return 0.0 if change is None else float(np.sqrt(max(change.rms_before_m**2 - change.rms_after_m**2, 0.0)))
+
+
+NOMINAL, CALIBRATED, WITH_PHYSICS = "nominal", "calibrated", "with physics"
+MAPS = "From the side, one scale for both. Hatched: not supported by these poses; circles: poses of the session."
 
 
 def _errors(evidence: SessionEvidence) -> tuple[Number, Number]:
@@ -96,7 +108,7 @@ def _errors(evidence: SessionEvidence) -> tuple[Number, Number]:
             before,
             first.unit,
             first.says(before),
-            f"{on}; arm as the drawing says",
+            f"{on}; nominal arm",
         ),
         Number("now", "Unseen readings, calibrated", after, first.unit, first.says(after), on + gain),
     )
@@ -108,3 +120,14 @@ def _what(readings: Readings) -> str:
 
 def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
+
+
+def _anywhere(room: FreeSpaceRecord | None) -> Number:
+    """What 95 % of all poses between the joint limits stay below, one sigma, as predicted; or why it is not told."""
+    if room is None or room.pose_p95_m is None:
+        why = "not predicted" if room is None else f"not determined: {room.says}"
+        return Number("anywhere", ANYWHERE, None, "m", DASH, why)
+    about = "one sigma of a single pose, in 95 % of the workspace; predicted, as far as the model is right"
+    if room.p95_m is not None and room.p95_m > MOSTLY * room.pose_p95_m:
+        about += "; nearly all of it is what these data leave open of the arm's geometry"
+    return Number("anywhere", ANYWHERE, room.pose_p95_m, "m", length(room.pose_p95_m), about)

@@ -17,7 +17,7 @@ from calibrate.report.session_evidence import SessionEvidence
 TITLE = "Point constraint"
 LEAD = (
     "The method of Deng, Ding, Zhang (Food & Machinery 2019(3)), for comparison: the laser lines of centred poses meet "
-    "in one point of the fixture; only joint zeros are unknown. Links and laser are as drawn."
+    "in one point of the fixture; only joint zeros are unknown. Links and laser are nominal."
 )
 
 

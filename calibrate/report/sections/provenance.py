@@ -28,7 +28,7 @@ def provenance(
         ("rig SHA-256", rig_sha256(recording.rig_text)),
         *((f"note: {name}", text) for name, text in recording.notes.items()),
     ]
-    rig_text = folded("Rig file, as recorded", tag("pre", recording.rig_text))
+    rig_text = folded("Rig file, as recorded", tag("pre", recording.rig_text), on_paper=False)
     return section("provenance", TITLE, "What it takes to do it again.", facts(pairs), rig_text)
 
 

@@ -5,7 +5,7 @@ from calibrate.report.workspace.pictures import Measured, before_and_after
 from calibrate.report.workspace.room import Room
 
 TITLE = "Error over the workspace"
-LEAD = "How far the tool is from where the controller believes it to be, wherever the arm can go."
+LEAD = "How far the tool is from where the controller thinks it is, wherever the arm can go."
 
 
 def workspace(room: Room | str, measured: Measured | None, why_not_measured: str) -> Html:

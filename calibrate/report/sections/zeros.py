@@ -13,6 +13,7 @@ from calibrate.report.workspace.known_arm import whole_covariance
 from calibrate.report.zero_figure import doubts
 from calibrate.sensors import spots
 
+ZEROS = "Joint zeros"
 SMALL_SHARE = 0.5  # measurement under this share of sigma: something else limits the zero
 
 
@@ -36,7 +37,6 @@ def zeros_part(evidence: SessionEvidence) -> Iterator[Html]:
     if not zeros:
         return
     lead = "True joint angle = reading + zero. Sigma is one standard deviation. All other parameters are further down."
-    yield tag("h3", "Joint zeros")
     yield tag("p", lead, cls="lead")
     if spots.KIND.name not in evidence.model.instruments:
         yield table(("Joint", "zero (°)", "± sigma (°)", "± sigma (µrad)"), _rows(evidence, zeros), numeric=(1, 2, 3))
@@ -47,7 +47,8 @@ def zeros_part(evidence: SessionEvidence) -> Iterator[Html]:
     if any(z.sigma_rad is not None for z in zeros):
         caption = (
             "How well each zero is known, on a logarithmic axis. A long line means that measuring more will not help: "
-            "the tolerance of the drawing is the limit, because these data cannot separate the zero from the links."
+            "the assumed tolerance of the links is the limit, because these data cannot separate the zero from the "
+            "links."
         )
         yield figure(doubts(zeros), caption)
 
@@ -60,7 +61,7 @@ def limits_of_zeros(evidence: SessionEvidence) -> Iterator[str]:
     loose = [z for z in zeros if z.value_rad is not None and not limited_by_measurement(z)]
     if loose:
         worst = max(z.sigma_rad or 0.0 for z in loose)
-        limit = "limited by the drawing's tolerance, not by the measurement"
+        limit = "limited by the assumed tolerance of the links, not by the measurement"
         yield f"{_names(loose)}: known to {angle(worst)} only, {limit}."
     for z in zeros:
         if z.value_rad is None:

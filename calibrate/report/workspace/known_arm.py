@@ -1,4 +1,4 @@
-"""An arm as drawn and as identified, with the doubt of the latter: all that a picture of its workspace needs."""
+"""An arm nominal and calibrated, with the doubt of the latter: all that a picture of its workspace needs."""
 
 from dataclasses import dataclass
 
@@ -23,7 +23,7 @@ class KnownArm:
 
     arm: KinematicModel
     parameters: tuple[Parameter, ...]  # of the whole fit; those of the arm are among them by name
-    drawn: Floats  # (param,) arm as drawn, frames and target where they fit best
+    drawn: Floats  # (param,) nominal arm, frames and target where they fit best
     theta: Floats  # (param,) as identified
     covariance: Floats  # (param, param), zero for what was held
     seen: Identifiability
@@ -35,7 +35,7 @@ class KnownArm:
 
 
 def unpredicted(room: FreeSpaceRecord | None) -> str | None:
-    """Why errors over the workspace cannot be told, as the prediction in the model says; None where they can."""
+    """Why errors over the workspace cannot be determined, as the prediction in the model says; None where they can."""
     if room is None:
         return "the model holds no prediction: it has no covariance, or is of an older program"
     if room.status == FreeSpaceStatus.PREDICTED.name:

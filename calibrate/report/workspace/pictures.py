@@ -23,11 +23,12 @@ from calibrate.report.workspace.cell_figure import (
 )
 from calibrate.report.workspace.room import Room
 from calibrate.report.workspace.scale import Steps, steps_for
-from calibrate.report.workspace.sections import VIEWS, Grid, grid_of
+from calibrate.report.workspace.sections import SIDE, VIEWS, Grid, grid_of
 
 Floats = NDArray[np.float64]
 
 WIDTH_IN = 9.9  # of the whole page
+MAPS_IN = 4.8  # of the two maps of the first screen: a panel
 CELL_IN = 0.13  # at most
 LEFT_IN, RIGHT_IN = 0.95, 0.15  # names and numbers of the first axis; half a number
 BETWEEN_IN, VIEWS_IN = 0.25, 0.85  # pictures of one view, views
@@ -59,30 +60,43 @@ def before_and_after(room: Room, measured: Measured | None) -> Html:
     grids = tuple(grid_of(view, room.reach_m) for view in VIEWS)
     rows = {"predicted": _predicted(room, grids)}
     if measured is not None:
-        titles = ("as drawn", "identified")
+        titles = ("nominal", "calibrated")
         values = (measured.drawn_m, measured.found_m)
         rows["measured"] = [Layer(t, (), measured.points_m, v) for t, v in zip(titles, values, strict=True)]
-    says = "predicted error of the target over the workspace, as drawn and identified, from the side and from above"
+    says = "predicted error of the target over the workspace, nominal and calibrated, from the side and from above"
     return pictures("workspace", says, room, grids, rows, "error of the target")
 
 
 def _predicted(room: Room, grids: tuple[Grid, ...]) -> list[Layer]:
-    states = (("as drawn", room.drawn_m), ("identified", room.found_m))
+    states = (("nominal", room.drawn_m), ("calibrated", room.found_m))
     return [
         Layer(title, tuple(grid.rms(room.points_m, values, room.supported) for grid in grids))
         for title, values in states
     ]
 
 
+def tool_maps(room: Room) -> Html:
+    """Nominal and calibrated from the side, on one scale: beside the number of the first screen."""
+    grid = grid_of(SIDE, room.reach_m)
+    says = "error of the tool over the workspace from the side, nominal and calibrated, on one scale"
+    return pictures("tool", says, room, (grid,), {"": _predicted(room, (grid,))}, "error of the tool, rms", MAPS_IN)
+
+
 def pictures(
-    name: str, says: str, room: Room, grids: tuple[Grid, ...], rows: Mapping[str, list[Layer]], scale_says: str
+    name: str,
+    says: str,
+    room: Room,
+    grids: tuple[Grid, ...],
+    rows: Mapping[str, list[Layer]],
+    scale_says: str,
+    width_in: float = WIDTH_IN,
 ) -> Html:
     """Rows of layers by what they are, each layer in every view, with one scale for all."""
     layers = [layer for row in rows.values() for layer in row]
     values = [np.concatenate([c.ravel() for c in layer.cells_m]) for layer in layers if layer.cells_m]
     values += [layer.values_m for layer in layers if layer.values_m is not None]
     steps = steps_for(np.concatenate(values))
-    sheet = Sheet(grids, len(layers) // len(rows), len(rows))
+    sheet = Sheet(grids, len(layers) // len(rows), len(rows), width_in)
 
     def paint(figure: Figure) -> None:
         figure.set_layout_engine("none")
@@ -91,7 +105,9 @@ def pictures(
                 for k, (axes, layer) in enumerate(zip(places, row, strict=True)):
                     _paint(axes, room, grids[view], layer, view, steps)
                     dress(axes, grids[view], layer.title, what if view == 0 else "", first=k == 0)
-        key = f"{scale_says}; hatched: not supported by these poses; circles: poses of the session; +: base"
+        key = scale_says
+        if width_in >= WIDTH_IN:  # else the words stand in the caption alone
+            key += "; hatched: not supported by these poses; circles: poses of the session; +: base"
         scale_bar(figure, sheet.bar(figure), steps, key)
 
     return drawn(name, says, *sheet.size_in, paint)
@@ -113,12 +129,13 @@ class Sheet:
     grids: tuple[Grid, ...]
     layers: int  # in a row
     rows: int
+    width_in: float = WIDTH_IN
 
     @property
     def cell_in(self) -> float:
         """Side of a cell."""
         cells = self.layers * sum(grid.shape[0] for grid in self.grids)
-        return min(CELL_IN, (WIDTH_IN - self._gaps_in) / cells)
+        return min(CELL_IN, (self.width_in - self._gaps_in) / cells)
 
     @property
     def _gaps_in(self) -> float:

@@ -94,7 +94,7 @@ def _variance(known: KnownArm, points_m: Floats, slopes: Floats, rigid: Floats) 
 
 
 def _apart(known: KnownArm, points_m: Floats, q_rad: Floats) -> Floats:
-    """(pose,) distance between the arm as drawn and as identified, best put on each other."""
+    """(pose,) distance between the nominal and the calibrated arm, best put on each other."""
     as_drawn = target_at(known, known.drawn, q_rad)
     linear, shift = frame_between(as_drawn, points_m, np.ones(len(points_m)))
     return np.linalg.norm(as_drawn @ linear.T + shift - points_m, axis=1)

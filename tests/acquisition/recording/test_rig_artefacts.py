@@ -26,7 +26,7 @@ def test_artefacts_are_read_by_id_in_the_order_of_the_file() -> None:
         ("[[seat]]\nid = 2", "[[seat]]\nid = 1", r"id = 1 is used twice in \[\[seat\]\]"),
         ("[[bar]]\nid = 2", "[[bar]]\nid = 1", r"id = 1 is used twice in \[\[bar\]\]"),
         ("[[bar_position]]\nid = 1\nbar = 1", "[[bar_position]]\nid = 1\nbar = 7", r"bar = 7 is no \[\[bar\]\].*1, 2"),
-        ("direction = [0.4, -1.0, 0.0]", "direction = [0, 0, 0]", "points nowhere"),
+        ("direction = [0.4, -1.0, 0.0]", "direction = [0, 0, 0]", "is the zero vector"),
         ("probe_diameter_m = 0.006\n", "", r"add 'probe_diameter_m'.*to \[tool\]"),
         ("diameter_m = 0.025", "diameter_m = 0.0", "expected float >= 1e-09"),
         ("e_uni_per_m = 3e-5", "e_uni_m_m = 3e-5", "unknown key 'e_uni_m_m'"),

@@ -113,7 +113,7 @@ def test_bad_input_is_told_with_row_and_column(parse: Callable[[str], Samples], 
     ("text", "says"),
     [
         ("", "the file is empty"),
-        ("t_s;q1_rad;q2_rad\n0;1;2\n", "line 1: columns are parted by something else than commas"),
+        ("t_s;q1_rad;q2_rad\n0;1;2\n", "line 1: columns are not separated by commas"),
         ('t_s,q1_rad,q2_rad\n0,"1,2\n', "not CSV"),
     ],
 )

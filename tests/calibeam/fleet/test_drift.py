@@ -25,7 +25,7 @@ def series(year, zero_rad, sigma_rad=SIGMA, robot="r", joint=2):
 
 
 def row(robot, date, zero_rad, sigma_rad=SIGMA, drawn_rad=0.0, **fields):
-    known = {"trust": "good", "started_utc": date, "sha256": f"{robot}{date}"} | fields
+    known = {"trust": "yes", "started_utc": date, "sha256": f"{robot}{date}"} | fields
     sha256 = known.pop("sha256")
     zeros = (Zero(1, None, None, "not seen", 0.0), Zero(2, zero_rad, sigma_rad, "determined", drawn_rad))
     path = f"/{robot}/{date}"
@@ -90,7 +90,7 @@ def test_two_dates_copies_and_numbers_of_no_trust_are_no_series():
     rows = [row("r", day, 0.0) for day in ("2025-01-01", "2026-01-01")]
     assert find_drifts(rows).lines == ()
     copy = row("r", "2026-06-01", 0.0, sha256=rows[0].sha256)
-    doubtful = row("r", "2026-07-01", 1.0, trust="bad")
+    doubtful = row("r", "2026-07-01", 1.0, trust="no")
     undated = row("r", "", 1.0)
     assert find_drifts([*rows, copy, doubtful, undated]).lines == ()
     assert [len(s.year) for s in all_series([*rows, copy, doubtful, undated])] == [2]

@@ -21,7 +21,7 @@ OTHER = Cause("link2.tilt", "q2", "harmonic", "axis-wobble", 0.99, 0.8, "…")
 def session(robot, day, zero_rad, found=(), verdict="mismatch"):
     zeros = (Zero(1, None, None, "not seen", 0.0), Zero(2, zero_rad, 2e-5, "determined", 0.0))
     name = f"{robot}/{day}.mcap"
-    known = {"trust": "good", "started_utc": day, "samples": 60, "held_out_after_m": 1e-5, "verdict": verdict}
+    known = {"trust": "yes", "started_utc": day, "samples": 60, "held_out_after_m": 1e-5, "verdict": verdict}
     return Row(
         f"/{name}", name, name, 1, 1, Outcome.IDENTIFIED, "calibeam 1", robot=robot, zeros=zeros, causes=found, **known
     )
@@ -92,5 +92,5 @@ def test_causes_are_counted_by_robots_and_recordings(fleet):
 def test_a_fleet_of_failures_has_its_page():
     lost = [Row(f"/{i}", str(i), "", 1, 1, Outcome.LOST, "c", error="gone") for i in range(LISTED + 5)]
     page = fleet_html(Fleet(tuple(lost)), "nothing")
-    assert "nothing is known of drift" in page
+    assert "drift is not determined" in page
     assert "5 more are in fleet.parquet" in page

@@ -26,7 +26,7 @@ FULL = Row(
     zeros=(Zero(1, None, None, "only in combination", 0.0), Zero(2, 0.1 + 0.2, 1e-6, "determined", -1.5)),
     noise={"position": 2e-5, "joint": 3e-6},
     held_out_after_m=1e-5,
-    trust="good",
+    trust="yes",
     verdict="mismatch",
     causes=(Cause("joint3.angle", "q3", "harmonic", "encoder-eccentricity", 0.99, None, "says"),),
 )
@@ -46,6 +46,12 @@ def test_each_number_is_a_column_with_its_unit(tmp_path):
     assert plain[0]["joint1_zero_status"] == "only in combination"
     assert (plain[0]["noise_position_m"], plain[0]["noise_joint_rad"]) == (2e-5, 3e-6)
     assert plain[1]["joint2_zero_rad"] is None
+
+
+def test_trust_of_an_older_table_is_on_the_scale_of_today(tmp_path):
+    older = [msgspec.structs.replace(FULL, trust=word, path=word) for word in ("good", "care", "bad")]
+    write_rows(tmp_path / "t.parquet", older)
+    assert [row.trust for row in read_rows(tmp_path / "t.parquet")] == ["yes", "with care", "no"]
 
 
 def test_a_table_of_another_program_is_refused(tmp_path):

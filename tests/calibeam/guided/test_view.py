@@ -28,7 +28,7 @@ def shown(what) -> str:
 def test_the_view_says_what_where_which_way_and_how_much_is_covered():
     text = shown(drawn(progress("still, but 80 mm from cone 2", 4.2e-6)))
     assert "3 of 40 readings; cone 2: still, but 80 mm from cone 2" in text
-    assert "repeats to 4.2 um" in text
+    assert "repeats to 4.2 µm" in text
     assert "good" in text  # joint 1 is 6 deg from the wanted posture
     assert "←←←" in text  # joint 2 is 115 deg beyond it
     assert "▪···········" in text

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, ViewportSize, expect, sync_playwright
 
@@ -14,6 +15,7 @@ from calibeam.live.page import LivePage, PageAddress, live_page
 from drivers.clock import SystemClock
 
 DESKTOP: ViewportSize = {"width": 1280, "height": 900}
+WIDE: ViewportSize = {"width": 1440, "height": 800}
 PHONE: ViewportSize = {"width": 360, "height": 740}
 QUIET = (
     "--no-sandbox",
@@ -35,6 +37,37 @@ SPOT = """() => {
   const scale = (Math.min(box.width, box.height) - 16) / 20;
   const x = box.width / 2 + figure(".x") * scale, y = box.height / 2 - figure(".y") * scale;
   return [...canvas.getContext("2d").getImageData(Math.round(x * ratio), Math.round(y * ratio), 1, 1).data].slice(0, 3);
+}"""
+
+AWAY_RAD = np.array([1.2, 0.0, 0.0, 0.0, 0.0, 0.0])  # the beam leads past every face
+
+# No pixel of the outermost ring is as dark as a link or joint; the floor is pale.
+IN_VIEW = """() => {
+  const canvas = document.querySelector("#robot"), pen = canvas.getContext("2d");
+  const {width, height} = canvas;
+  const rims = [[0, 0, width, 2], [0, height - 2, width, 2], [0, 0, 2, height], [width - 2, 0, 2, height]];
+  const dark = (data) => {
+    for (let i = 0; i < data.length; i += 4)
+      if (data[i + 3] > 200 && data[i] + data[i + 1] + data[i + 2] < 330) return true;
+    return false;
+  };
+  return !rims.some((box) => dark(pen.getImageData(...box).data));
+}"""
+
+# Some pixel of the curve's colour in the left half of the first strip.
+LEFT_HALF_OF_STRIP = """() => {
+  const canvas = document.querySelector("#joints"), ratio = canvas.width / canvas.getBoundingClientRect().width;
+  const left = 130 * ratio, wide = (canvas.width - left) / 2;
+  const data = canvas.getContext("2d").getImageData(left, 0, wide, canvas.height / 6).data;
+  for (let i = 0; i < data.length; i += 4) if (data[i + 3] > 200 && data[i] < 40 && data[i + 2] > 130) return true;
+  return false;
+}"""
+
+# A point of PSD 1's face beside its axes.
+GROUND_OF_FACE = """() => {
+  const canvas = document.querySelector("#face-1 canvas");
+  const at = [0.42, 0.58].map((share, k) => Math.round(share * [canvas.width, canvas.height][k]));
+  return [...canvas.getContext("2d").getImageData(...at, 1, 1).data].slice(0, 3);
 }"""
 
 SOONER = "AbortSignal.timeout = ((real) => (ms) => real(ms / 100))(AbortSignal.timeout.bind(AbortSignal))"
@@ -86,7 +119,7 @@ def test_a_click_on_stop_reaches_the_arm(shown: Page, living: LivingRig) -> None
     pressed: list[int] = []
     living.feed.stops_by(lambda: pressed.append(1))
     shown.click("#stop")
-    expect(shown.locator("#stop-says")).to_have_text("✓ the controller was told to stop, and took it")
+    expect(shown.locator("#stop-says")).to_have_text("✓ the controller confirmed the stop command")
     assert pressed == [1]
     shown.focus("#stop")
     shown.keyboard.press("Enter")
@@ -110,6 +143,53 @@ def test_what_is_wrong_is_said_in_words(shown: Page, living: LivingRig) -> None:
         expect(shown.locator("#devices li[data-is=live]")).to_have_count(1)
     finally:
         living.dark, living.silent = set(), set()
+
+
+def test_a_dark_face_is_a_fault_only_where_light_is_expected(shown: Page, living: LivingRig) -> None:
+    aimed = living.posture
+    living.dark, living.posture = {1, 2}, lambda t_s: aimed(t_s) + AWAY_RAD
+    try:
+        for face in ("#face-1", "#face-2"):
+            expect(shown.locator(f"{face} .state")).to_have_text("no light expected")
+    finally:
+        living.posture = aimed
+    try:
+        expect(shown.locator("#face-1 .state")).to_have_text("✕ no light")
+    finally:
+        living.dark = set()
+
+
+def test_the_whole_robot_is_in_the_picture(browser: Browser, living: LivingRig) -> None:
+    """Nothing but floor on the rim of the canvas; in the view of the beam there are links, whose outlines are dark."""
+    with browser.new_context(viewport=WIDE) as context:
+        page = context.new_page()
+        page.goto(living.url)
+        is_live(page)
+        page.click("[data-view=beam]")
+        page.wait_for_function(f"() => !({IN_VIEW})()")
+        page.click("[data-view=whole]")
+        page.wait_for_function(IN_VIEW)
+
+
+def test_strips_are_full_from_the_first_seconds(browser: Browser, living: LivingRig) -> None:
+    with browser.new_context(viewport=DESKTOP) as context:
+        page = context.new_page()
+        page.goto(living.url)
+        is_live(page)
+        page.wait_for_function(LEFT_HALF_OF_STRIP)
+
+
+def test_the_page_is_dark_where_the_system_is(browser: Browser, living: LivingRig) -> None:
+    grounds: list[str] = []
+    for scheme in ("light", "dark"):
+        with browser.new_context(viewport=DESKTOP, color_scheme=scheme) as context:
+            page = context.new_page()
+            page.goto(living.url)
+            is_live(page)
+            grounds.append(page.evaluate("getComputedStyle(document.querySelector('.robot')).backgroundColor"))
+            drawn = page.evaluate(GROUND_OF_FACE)
+            assert sum(drawn) > 600 if scheme == "light" else sum(drawn) < 200
+    assert grounds == ["rgb(255, 255, 255)", "rgb(23, 29, 35)"]
 
 
 def test_a_drag_turns_the_robot(shown: Page) -> None:
@@ -159,7 +239,7 @@ def test_a_stop_that_failed_stays_told_until_one_came_after_it(browser: Browser,
         is_live(page)
         expect(says).to_have_text(failed)
         living.feed.stop.press("a third page")
-        expect(says).to_contain_text("by a third page: the controller was told to stop, and took it")
+        expect(says).to_contain_text("by a third page: the controller confirmed the stop command")
     living.feed.stops_by(None)
 
 

@@ -8,7 +8,7 @@ import pytest
 from acquisition.motion.states import MotionEvent, MotionState, after
 from calibeam.asking import Asking
 from calibeam.interrupts import INTERRUPTS
-from calibeam.motion.by_hand import WORDS, MotionKeys, keys_of
+from calibeam.motion.by_hand import ARRIVED_RAD, WORDS, MotionKeys, ending_words, keys_of
 
 PATIENCE_S = 30.0
 
@@ -107,3 +107,9 @@ def test_the_keyboard_is_left_when_the_held_motion_ends(typist) -> None:
     assert keys._thread is not None
     keys._thread.join(PATIENCE_S)
     assert not keys._thread.is_alive()
+
+
+def test_a_motion_that_was_stopped_has_not_arrived() -> None:
+    assert ending_words(MotionState.DONE, 0.1 * ARRIVED_RAD) == "arrived"
+    assert ending_words(MotionState.DONE, 10.0 * ARRIVED_RAD) == "stopped on request before the end of the plan"
+    assert ending_words(MotionState.ABORTED, 10.0 * ARRIVED_RAD) == MotionState.ABORTED.value

@@ -93,6 +93,10 @@ def write_inputs(folder: Path, run: Run) -> None:
     q = rng.uniform(-2.0, 2.0, (20, len(LINKS)))
     _session(folder / "tracker", q, seen(q + np.array([0.0, 2e-4, 3e-4]), rng))
     _session(folder / "other", q, seen(q, rng))
+    again = np.tile(q[:4], (3, 1))
+    _session(folder / "cycled", again, seen(again, rng))
+    cycles = "".join(f"[[block.pose]]\nq_rad = {one.tolist()}\nrepeat = {k}\n" for k, one in enumerate(q[:4], start=1))
+    (folder / "cycles.toml").write_text(f'schema = 1\nrig = "three-joints"\n[[block]]\n{cycles}', encoding="utf-8")
     turned = np.tile([0.2, -0.9, 0.8], (20, 1))
     for row in range(20):
         turned[row, 1 + row // 10] += -1.2 + 2.4 * (row % 10) / 9.0
@@ -189,6 +193,11 @@ def _ur(folder: Path) -> None:
         (folder / name).write_text(text, encoding="utf-8")
     shutil.copy(RIGS / "encoders-plain.dbc", folder / "encoders.dbc")
     shutil.copy(RIGS / "tasks" / "conveyor.toml", folder / "task.toml")
+    shutil.copy(RIGS / "tasks" / "two-pins.toml", folder / "cell.toml")
+    heads = ",".join(f"q{i}_deg" for i in range(1, 7))
+    at = ("at pin", "before pin", "pin lifted", "in hole 1", "before hole 1", "touching hole 1", "upright in hole 1")
+    rows = [f"{name},{4 * k},-90,90,-90,-90,{k}" for k, name in enumerate((*at, "in hole 2"))]
+    (folder / "taught.csv").write_text("\n".join((f"position,{heads}", *rows, "")), encoding="utf-8")
     errors = (RIGS / "errors" / "arm-cmm.toml").read_text("utf-8").replace("heat.link5", "heat.link2")
     for narrower in FEW_ERRORS:
         errors = errors.replace(*narrower)

@@ -45,7 +45,15 @@ LAZY = (  # loaded by commands when they need them; here once for all
     "calibrate.pose_design.design",
     "calibrate.report.pose_design.page",
     "acquisition.centring.camera.measuring",
+    "calibeam.fleet.table",
+    "simulators.encoders.emulator",
+    "simulators.psd_daq.emulator",
     "simulators.serve",
+    "simulators.ur.emulator",
+    "encodings.cp1252",
+    "encodings.idna",
+    "pyarrow.compute",
+    "pyarrow.dataset",
 )
 
 

@@ -29,10 +29,10 @@ MUTATORS: dict[str, tuple[Mutator, ...]] = {
 REFUSED = {"bad_utf8": ("toml", "json", "csv")}  # what no reader of these kinds may take
 SMALL = "--arms 500 --poses 2"  # of an error simulation
 DAILY, ENDURE = 20, 300
-FEW, FEWER = 8, 4  # daily, of commands that take half a second, or two, of a core on a small valid input
-DAILY_OF = dict.fromkeys(
-    ("diagnose", "compare", "design", "correct", "export-model", "rig", "centre"), FEW
-) | dict.fromkeys(("report", "replay", "reconcile"), FEWER)
+FEW, FEWER, TWO = 6, 4, 2  # daily, where another command has read the format; of commands slow on a valid input
+SLOW = dict.fromkeys(("diagnose", "compare", "design", "simulate-errors", "reconcile", "iso9283"), FEWER) | {
+    "report": TWO,
+}
 
 
 @dataclass(frozen=True)
@@ -54,9 +54,18 @@ class Pair:
 
     @property
     def daily(self) -> int:
-        """Seeds of every day: of the first line of a file and a command; others read it by the same code."""
-        first = next(pair for pair in TABLE if (pair.command, pair.format) == (self.command, self.format))
-        return DAILY_OF.get(self.command, DAILY) if first is self else 0
+        """Seeds of every day: of the first line of a format and a command; others read it by the same code.
+
+        Most of what is wrong with a file is found by its reader, whichever command calls it: the first command that
+        reads a format has many, those after it fewer, which try what each does with what its reader lets pass.
+        """
+        alike = [pair for pair in TABLE if pair.format == self.format]
+        first = next(pair for pair in alike if pair.command == self.command)
+        if first is not self:
+            return 0
+        if alike[0] is self:
+            return FEW if self.command in SLOW else DAILY
+        return SLOW.get(self.command, FEW)
 
     @property
     def format(self) -> str:
@@ -81,12 +90,12 @@ def _of_sessions() -> Iterator[Pair]:
     """Whatever reads a session folder or a recording."""
     for file in ("tracker/samples.csv", "tracker/rig.toml", "columns/samples.parquet", "recording.mcap"):
         what = file if file.endswith(".mcap") else file.partition("/")[0]
+        yield Pair(file, f"check {what}" if "rig" not in file else "check tracker")
         yield Pair(file, f"identify {what} --export urdf --export json")
         yield Pair(file, f"diagnose {what}")
         yield Pair(file, f"report {what}")
         yield Pair(file, f"compare {what} other")
         yield Pair(file, f"export {what} --out made")
-        yield Pair(file, f"check {what}" if "rig" not in file else "check tracker")
         if not file.endswith(".mcap"):
             yield Pair(file, f"import {what} --out made.mcap")
     for folder in ("dual-psd", "cones", "wire"):
@@ -140,6 +149,9 @@ MODELS = (
     Pair("arm.json", "correct arm.json poses.csv --out made.csv"),
     Pair("poses.csv", "correct arm.json poses.csv --out made.csv"),
     Pair("weld.src", "correct arm.json weld.src --out made.src"),
+    Pair("model.json", "iso9283 evaluate cycled --model model.json --out made.json"),
+    Pair("cycled/samples.csv", "iso9283 evaluate cycled --model model.json --frame fit --out made.json"),
+    Pair("cycled/rig.toml", "iso9283 evaluate cycled/samples.csv --rig cycled/rig.toml --out made.json"),
     Pair("model.json", "export-model model.json --to urdf --out made.urdf"),
     Pair("physics.json", "export-model physics.json --to mjcf --out made.xml"),
     Pair("model.json", "replay tracker --model model.json --out made.mcap"),
@@ -160,6 +172,7 @@ RIGS = (
     Pair("dh.csv", "rig new --from-dh dh.csv --out made.toml"),
     Pair("rig.toml", "log encoders rig.toml --out made --for-s 0"),
     Pair("rig.toml", "design rig.toml --poses 8 --repeats 0 --candidates 4"),
+    Pair("rig.toml", "iso9283 plan rig.toml --cycles 2 --centre-m 0.5 0 0.3 --edge-m 0.2 --out made.toml"),
     Pair("rig.toml", "move rig.toml --home --dry-run"),
     Pair("rig.toml", "jog rig.toml --axis z --by-mm 1 --dry-run"),
     Pair("rig.toml", "motion --rig rig.toml --out points.csv"),
@@ -176,9 +189,13 @@ RIGS = (
     Pair("guided/rig.toml", f"simulate-errors guided/rig.toml --only joint2.* {SMALL}"),
 )
 PLANS = (
+    Pair("cycles.toml", "iso9283 evaluate cycled --plan cycles.toml --out made.json"),
     Pair("plan.toml", "session rig.toml --plan plan.toml --out made --yes"),
     Pair("fit.toml", "identify tracker --plan fit.toml"),
     Pair("task.toml", "move rig.toml --task task.toml --position bin --dry-run"),
+    Pair("cell.toml", "task run cell.toml --rig rig.toml --dry-run"),
+    Pair("cell.toml", "task teach cell.toml --rig rig.toml --poses taught.csv --out made.toml"),
+    Pair("taught.csv", "task teach cell.toml --rig rig.toml --poses taught.csv --out made.toml"),
     Pair("errors.toml", f"simulate-errors tracker/rig.toml --errors errors.toml {SMALL}"),
 )
 DEVICES = (

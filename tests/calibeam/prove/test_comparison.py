@@ -83,7 +83,7 @@ def test_a_diagnosis_that_finds_nothing_gains_nothing(
 @pytest.mark.parametrize(
     ("family", "mechanism"),
     [
-        ("tracker", "wrong-gear-ratio"),
+        pytest.param("tracker", "wrong-gear-ratio", marks=pytest.mark.endure),  # seconds
         ("tracker", "coupled-wrist"),
         ("tracker", "unsettled"),
         ("dual-psd", "psd-gain"),

@@ -1,4 +1,4 @@
-"""Error in free space: blind to where the frame stands, not to the shape of the arm."""
+"""Error over the workspace: blind to where the frame stands, not to the shape of the arm."""
 
 import numpy as np
 import pytest

@@ -23,7 +23,7 @@ RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
 
 
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize("mechanism", ["soft-joint", "encoder-eccentricity"])
+@pytest.mark.parametrize("mechanism", ["soft-joint", pytest.param("encoder-eccentricity", marks=pytest.mark.endure)])
 def test_the_spots_of_a_session_are_those_of_the_fast_path_within_noise(mechanism: str, tmp_path: Path) -> None:
     rig, clock = load_rig(RIG), SystemClock()
     assert rig.fixture is not None

@@ -4,8 +4,9 @@ from collections.abc import Callable
 
 import pytest
 
-from calibeam.prove.published import BEGIN, END, table_of, with_table
+from calibeam.prove.published import BEGIN, END, table_of, wanted_words, with_table
 from calibeam.prove.record import SCHEMA, CaseScore, DefectScore, ProofFile
+from calibeam.prove.tally import ProofFigure
 from calibrate.errors import DataError
 
 Case = Callable[..., CaseScore]
@@ -44,10 +45,29 @@ def test_development_is_not_for_the_public(proof: Callable[..., ProofFile]) -> N
 
 def test_the_table_goes_between_its_marks_and_nothing_else_changes() -> None:
     text = f"before\n{BEGIN}\nold\n{END}\nafter\n"
-    assert with_table(text, "new\n", "README.md") == f"before\n{BEGIN}\nnew\n{END}\nafter\n"
+    assert with_table(text, "new\n", "figures.md") == f"before\n{BEGIN}\nnew\n{END}\nafter\n"
     assert with_table(with_table(text, "new\n", ""), "newer\n", "") == f"before\n{BEGIN}\nnewer\n{END}\nafter\n"
 
 
 def test_a_text_without_marks_is_refused() -> None:
-    with pytest.raises(DataError, match=r"README.md: no lines <!-- proof: begin -->"):
-        with_table("no marks", "new\n", "README.md")
+    with pytest.raises(DataError, match=r"figures.md: no lines <!-- proof: begin -->"):
+        with_table("no marks", "new\n", "figures.md")
+
+
+@pytest.mark.parametrize(
+    ("said", "wanted", "missed"),
+    [
+        ("6 % (1-27, n 17)", "<= 6 %", False),
+        ("11 % (4-28, n 27)", "<= 5 %", True),
+        ("89 % (72-96, n 27)", ">= 90 %", True),
+        ("5 % (1-25, n 19)", "none", True),
+        ("100 % (80-100, n 19)", "all", False),
+        ("87 % (81-91, n 167)", "93 - 97 %", True),
+        ("1.04, 1.16 (n 91)", "<= 1.05, 1.15", True),
+        ("1, 0.9 (n 16)", ">= 0.97, 0.85", False),
+        ("0.387, 1.05 (n 117)", "", False),
+        ("3.62, 7.9 (n 222)", "<= 5", False),
+    ],
+)
+def test_a_target_that_is_missed_is_marked_as_such(said: str, wanted: str, missed: bool) -> None:
+    assert wanted_words(ProofFigure("", said, wanted)).endswith("**missed**") is missed

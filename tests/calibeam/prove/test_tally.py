@@ -63,7 +63,7 @@ def test_a_name_that_is_believed_is_not_said_to_be_unknown(case: Case, found: Fo
     outside = found(physics="unknown", named=False)
     for said, share_said in (((), "100\u00a0% "), ((_said(),), "0\u00a0% ")):
         table = {f.label: f.said for f in figures([case((outside,), said, kind="outside", unexplained=True)])}
-        assert table["outside: said to be unknown"].startswith(share_said)
+        assert table["outside: reported as unknown"].startswith(share_said)
 
 
 def test_a_confident_name_for_what_no_catalogue_lists_is_a_fault(case: Case, found: Found) -> None:

@@ -1,4 +1,4 @@
-"""Samples of the shipped rig as drawn, made up without a world: the believed spots, and noise as believed."""
+"""Samples of the shipped nominal rig, made up without a world: the believed spots, and noise as assumed."""
 
 from pathlib import Path
 

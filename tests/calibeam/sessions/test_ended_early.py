@@ -6,7 +6,7 @@ import pytest
 
 from acquisition.errors import StoppedError
 from acquisition.recording import RecordingError
-from calibeam.devices.recorder import kept
+from calibeam.devices.recorder import Earlier, kept
 from calibeam.outcome import PartialResult
 from drivers.errors import DeviceLost
 
@@ -69,7 +69,9 @@ def test_whatever_ends_it_the_arm_is_told_to_stop_first(why) -> None:
 def test_a_stop_that_cannot_be_delivered_is_said_and_the_samples_are_saved_all_the_same() -> None:
     trouble = Trouble(stop=[DeviceLost("robot: no way to the controller")])
     told = ended(trouble, StoppedError("the session was aborted"))
-    assert "the arm could not be told to stop (robot: no way to the controller); see that it stands" in told
+    assert (
+        "the stop command to the arm failed (robot: no way to the controller); check that the arm stands still" in told
+    )
     assert trouble.done == ["event", "flush"]
 
 
@@ -83,3 +85,16 @@ def test_what_ends_well_is_left_alone() -> None:
     trouble = Trouble()
     assert kept(trouble, trouble, trouble, trouble, lambda: 5) == 5
     assert trouble.done == []
+
+
+def test_the_samples_of_the_whole_session_are_counted() -> None:
+    trouble = Trouble()
+    with pytest.raises(PartialResult) as told:
+        kept(trouble, trouble, trouble, trouble, _aborted, Earlier(Path("session-1"), 35))
+    assert "42 samples are kept in session-1 (7 of them in recording.mcap); `calibeam identify session-1`" in str(
+        told.value
+    )
+
+
+def _aborted() -> None:
+    raise StoppedError("the session was aborted")

@@ -36,7 +36,7 @@ def test_the_promised_number_of_poses_brings_it_under_the_goal(rig, ahead, sampl
     assert early.more is not None
     later = forecast(rig, samples[: 20 + early.more], ahead.after(20 + early.more), GOAL_M)
     assert later.now_m == pytest.approx(GOAL_M, rel=0.25)  # the noise is known better by then
-    assert f"{early.more} more poses bring it under 10 um" in early.says
+    assert f"{early.more} more poses bring it under 10 µm" in early.says
 
 
 def test_a_goal_that_the_plan_does_not_reach_is_said(rig, ahead, samples) -> None:

@@ -90,7 +90,7 @@ def reporter(rig, clock, heard) -> StatusReporter:
         (RunState.BREAKING, "STOPPING THE ARM", "a abort    h halt"),
         (RunState.PAUSED, "PAUSED, THE ARM STANDS", "r go on    s finish here    a abort    h halt"),
         (RunState.ABORTING, "ABORTING", "h halt"),
-        (RunState.HALTED, "HALTED, THE ARM IS HELD", "h say the stop again"),
+        (RunState.HALTED, "HALTED, THE ARM IS HELD", "h repeat the stop"),
         (RunState.ABORTED, "ABORTED, THE ARM STANDS", ""),
     ],
 )
@@ -99,7 +99,7 @@ def test_the_view_says_in_capitals_what_goes_on_and_which_keys_serve(state, larg
     assert large in text
     assert keys in text
     assert "3 of 78   18 min left" in text
-    assert "34 um; 12 more poses bring it under 20 um" in text
+    assert "34 µm; 12 more poses bring it under 20 µm" in text
 
 
 def test_the_view_fits_a_terminal_of_eighty_columns(reporter, samples) -> None:
@@ -188,8 +188,8 @@ def test_every_sample_and_everything_left_out_stands_in_the_log(reporter, heard,
     journal.sample(samples[0])
     journal.event("skipped", {"placement": 1, "why": "no light, or saturated, when read"})
     journal.event("sample", {"pose": {}})
-    assert heard.lines[1][0].startswith("pose 1 of 78: place 1, PSD 1 first, settled in 0.10 s; spots (")
-    assert heard.lines[2] == ("pose left out at place 1: no light, or saturated, when read", True)
+    assert heard.lines[1][0].startswith("pose 1 of 78: station 1, PSD 1 first, settled in 0.10 s; spots (")
+    assert heard.lines[2] == ("pose left out at station 1: no light, or saturated, when read", True)
     assert len(heard.lines) == 3
 
 

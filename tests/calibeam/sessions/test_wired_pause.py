@@ -79,7 +79,7 @@ def test_a_word_typed_ahead_leaves_the_arm_where_it_stands(arguments, tmp_path, 
     assert "nothing was moved: the answer was 'no'" in capsys.readouterr().err
     np.testing.assert_allclose(reported_rad(tmp_path / "rig.toml"), before_rad, atol=1e-5)
     assert parts(tmp_path / "out") == []
-    assert "MEASURE" not in (tmp_path / "out" / "session.log").read_text()
+    assert "MEASUREMENT" not in (tmp_path / "out" / "session.log").read_text()
 
 
 def reported_rad(rig_file: Path) -> np.ndarray:
@@ -101,7 +101,7 @@ def test_paused_resumed_and_gone_on_with(arguments, tmp_path, capsys, monkeypatc
     code = run(arguments)
     said = log.read_text()
     assert code == 0, capsys.readouterr().err
-    order = ["6  DEVICES", "6  PLAN", "6  ARM", "6  MEASURE", "paused, the arm stands"]
+    order = ["6  DEVICE CHECK", "6  PLAN PREVIEW", "6  CONFIRMATION", "6  MEASUREMENT", "paused, the arm stands"]
     assert sorted(map(said.index, order)) == [said.index(words) for words in order]
     assert said.count(" measuring") == 2
     assert f"pose {POSES} of {POSES}" in said

@@ -45,8 +45,7 @@ def test_a_joint_counted_the_other_way_round_is_named(scene, joint):
     assert f"column q{joint}_rad" in found.says
 
 
-@pytest.mark.parametrize("joint", range(2, 7))
-@pytest.mark.parametrize("quarters", [1, 2, -1])
+@pytest.mark.parametrize(("joint", "quarters"), [(2, 1), (3, 2), (4, -1), (5, 1), (6, 2), (2, -1)])
 def test_a_zero_beside_by_quarters_of_a_turn_is_named_with_what_to_add(scene, joint, quarters):
     found = judged(turned(scene.q_rad, joint, quarters * np.pi / 2), scene.position_m)
     assert f"q{joint}_rad" in found.says

@@ -90,3 +90,37 @@ def test_bad_rows_in_a_line_are_not_a_session_of_their_own(scene):
     scene.position_m[40:50] += rng.normal(0.0, 0.05, (10, 3))
     assert rows_of_another_session(scene.shots()) == ()
     assert len(bad_rows(scene.shots())) == 10
+
+
+def of_the_arm(scene, spot, times):
+    """An arm that errs by 3 mm about one posture, which it takes again and again; misfit and rows of it."""
+    rng = np.random.default_rng(spot)
+    rows = np.array(times)
+    scene.q_rad[rows] = scene.q_rad[spot] + 0.02 * rng.standard_normal((len(rows), 6))
+    scene.position_m[rows] = scene.expect(scene.q_rad[rows]) + np.array([0.002, -0.002, 0.001])
+    return rows
+
+
+def test_rows_whose_neighbours_in_posture_err_alike_at_other_times_are_no_fault(scene):
+    of_the_arm(scene, 17, (5, 30, 52, 77, 101))
+    assert bad_rows(scene.shots()) == ()
+    scene.position_m[90] += [0.004, -0.007, 0.005]
+    assert [b.rows for b in bad_rows(scene.shots())] == [(90,)]
+
+
+def test_one_bad_row_beside_good_ones_in_its_posture_is_a_fault(scene):
+    rows = of_the_arm(scene, 17, (5, 30, 52, 77, 101))
+    scene.position_m[rows[1:]] = scene.expect(scene.q_rad[rows[1:]])
+    assert [b.rows for b in bad_rows(scene.shots())] == [(5,)]
+
+
+def test_a_block_that_errs_as_its_postures_do_at_other_times_is_no_other_session(scene):
+    """The arm visits one corner for 20 rows, and again, row by row, later."""
+    first, again = np.arange(20, 40), np.arange(60, 120, 3)
+    scene.q_rad[again] = scene.q_rad[first] + 0.01
+    for rows in (first, again):
+        scene.position_m[rows] = scene.expect(scene.q_rad[rows]) + np.array([0.002, 0.0, 0.001])
+    assert rows_of_another_session(scene.shots()) == ()
+    scene.position_m[again] = scene.expect(scene.q_rad[again])
+    (found,) = rows_of_another_session(scene.shots())
+    assert found.rows == tuple(range(20, 40))

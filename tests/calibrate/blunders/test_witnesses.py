@@ -51,8 +51,7 @@ def test_a_healthy_session_is_strained_by_the_arm_alone_and_nothing_is_said(scen
     assert wrong_convention(flange, [one]) is None
 
 
-@pytest.mark.parametrize("witness", WITNESSES)
-@pytest.mark.parametrize("joint", [2, 3, 4, 5])
+@pytest.mark.parametrize(("witness", "joint"), [(w, 2 + (i + k) % 4) for i, w in enumerate(WITNESSES) for k in (0, 2)])
 def test_every_instrument_names_a_joint_counted_the_other_way_round(scene, witness, joint):
     q = scene.q_rad * np.where(np.arange(6) == joint - 1, -1.0, 1.0)
     found = wrong_convention(flange, [witness(scene, q)])
@@ -110,6 +109,7 @@ def _seated(table, cones, rng):
     return np.concatenate([q[60 * k : 60 * k + 60][good[60 * k : 60 * k + 60]][:25] for k in range(3)])
 
 
+@pytest.mark.endure  # daily, of two mistakes at once: signs and a zero, test_joint_signs.py
 def test_a_mirrored_axis_and_a_zero_off_are_both_named(scene):
     scene.position_m[:, 1] *= -1.0
     q = scene.q_rad + np.array([0, 0, np.pi / 2, 0, 0, 0])

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.recording.rig import parse_rig
-from calibeam.commands.correct import MotionInverse
+from calibeam.motion.motion_inverse import MotionInverse
 from calibrate.arms.rig_arm import RigArm
 from calibrate.model_file import Covariance, ModelFile, RigIdentity
 

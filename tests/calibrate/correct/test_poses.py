@@ -80,7 +80,7 @@ def test_without_a_known_side_the_sigma_holds_the_whole_play():
 
 def correct_of_two(known, q, side):
     from acquisition.recording.rig import parse_rig
-    from calibeam.commands.correct import MotionInverse
+    from calibeam.motion.motion_inverse import MotionInverse
     from calibrate.arms.rig_arm import RigArm
 
     rig = RigArm.of_rig(parse_rig(known.rig.text, "rig.toml"))

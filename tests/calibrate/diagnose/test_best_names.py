@@ -1,4 +1,4 @@
-"""Names that data cannot tell apart: the simplest one; names that they can: the better one."""
+"""Names that data cannot separate: the simplest one; names that they can: the better one."""
 
 from dataclasses import replace
 

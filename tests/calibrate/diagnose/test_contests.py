@@ -69,7 +69,11 @@ def poses_like(recording, measured, rest, rng):
 
 @pytest.mark.parametrize(
     ("seed", "kind", "physics"),
-    [(35, "worn-bearing", "axis-wobble"), (34, "soft-joint", "joint-compliance"), (43, "psd-gain", "psd-gain")],
+    [
+        pytest.param(35, "worn-bearing", "axis-wobble", marks=pytest.mark.endure),
+        (34, "soft-joint", "joint-compliance"),
+        pytest.param(43, "psd-gain", "psd-gain", marks=pytest.mark.endure),
+    ],
 )
 def test_twenty_chosen_poses_part_truth_and_rival_more_than_random_ones(seed, kind, physics, tmp_path):
     wanted = {"family": "dual-psd", "seed": seed, "defects": (kind,), "enr": 0.6, "samples": 300}

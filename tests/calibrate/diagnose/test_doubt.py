@@ -140,7 +140,7 @@ def test_nothing_hidden_is_consistent(world):
 
 
 def test_next_poses_separate_better_than_random_ones():
-    """A sine against a line: only the ends of the sweep tell them apart."""
+    """A sine against a line: only the ends of the sweep separate them."""
     rng = np.random.default_rng(11)
     q = rng.uniform(-0.5, 0.5, 100)
     offered = np.linspace(-2.0, 2.0, 81)

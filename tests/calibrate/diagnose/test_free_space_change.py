@@ -1,4 +1,4 @@
-"""What a cause does in free space, and how well that is known."""
+"""What a cause does over the workspace, and how well that is known."""
 
 import numpy as np
 

@@ -25,6 +25,7 @@ CASES = {
     "second-encoder-eccentricity": ("link", 5),
     "second-encoder-slip": ("link", 6),
 }
+DAILY = ("slack-drive", "second-encoder-eccentricity")  # of either side; a soft joint: the report by its model
 
 
 def diagnosed(folder, **wanted):
@@ -34,7 +35,9 @@ def diagnosed(folder, **wanted):
 
 
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize("mechanism", CASES)
+@pytest.mark.parametrize(
+    "mechanism", [pytest.param(name, marks=() if name in DAILY else pytest.mark.endure) for name in CASES]
+)
 def test_a_fault_of_machine_like_size_is_found_between_the_encoders(mechanism, tmp_path):
     side, seed = CASES[mechanism]
     physics = diagnosed(tmp_path, seed=seed, defects=(mechanism,), encoders=side, side_stated=True)
@@ -48,7 +51,7 @@ def test_a_fault_of_machine_like_size_is_found_between_the_encoders(mechanism, t
 
 
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize(("side", "seed"), [("link", 2), ("motor", 10)])
+@pytest.mark.parametrize(("side", "seed"), [pytest.param("link", 2, marks=pytest.mark.endure), ("motor", 10)])
 def test_arbitrary_zeros_of_second_encoders_are_no_mismatch(side, seed, tmp_path):
     physics = diagnosed(tmp_path, seed=seed, encoders=side)
     assert physics.diagnosis.verdict is Verdict.CONSISTENT
@@ -61,6 +64,9 @@ def test_a_report_by_the_model_takes_effects_out_of_both_encoders(tmp_path):
     recording_of(tmp_path, family="tracker", samples=120, arm="ur5", **case)
     folder, model, page = (str(tmp_path / name) for name in ("recording", "model.json", "report.html"))
     assert run(["diagnose", folder, "--out", str(tmp_path / "diagnosis.json"), "--model-out", model]) == 0
+    (hidden,) = json.loads((tmp_path / "sealed" / "truth.json").read_text())["defects"]
+    (found, *_) = json.loads((tmp_path / "diagnosis.json").read_text())["findings"]
+    assert (found["where"], found["physics"]) == (hidden["port"], hidden["physics"])
     assert "encoder-difference" in json.loads(Path(model).read_text())["instruments"]
     assert run(["report", folder, "--model", model, "--out", page]) == 0
     evidence = session_evidence(read(Path(folder)), read_model(Path(model)))

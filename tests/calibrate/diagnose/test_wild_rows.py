@@ -1,4 +1,4 @@
-"""Single wild rows are blunders before physics; whatever lasts, or has all sizes, is left to physics."""
+"""Single outlying rows are blunders before physics; whatever lasts, or has all sizes, is left to physics."""
 
 import numpy as np
 import pytest

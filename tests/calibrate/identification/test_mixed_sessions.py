@@ -1,5 +1,7 @@
 """Dual PSD, tracker and wire in one table of samples: one arm, proved for each instrument in its own unit."""
 
+from functools import cache
+
 import msgspec
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ from calibrate.identification.identify import identify
 from calibrate.predict import Predictor, predict
 from calibrate.uncertainty.chi_square import Alarm
 
-from .conftest import SHIFT, TOOL, TURN
+from .conftest import SHIFT, TOOL, TURN, Session
 
 SPOTS = ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")
 DUAL_PSD, POSITION = "dual-psd", "position"
@@ -46,11 +48,28 @@ def behind(values, missing):
     return np.concatenate([np.asarray(values, dtype=float), np.full(missing, np.nan)])
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
+def session(ur5e_truth):
+    return Session(ur5e_truth(np.random.default_rng(5), zero_max=5e-3))
+
+
+@pytest.fixture(scope="module")
 def mixed(rig, session, sessions):
     noise = msgspec.structs.replace(rig.noise, position_m=POSITION_M, wire_m=WIRE_M, joint_rad=JOINT_RAD)
     lit = sessions(61, n=90, truth=session.truth)
     return msgspec.structs.replace(rig, noise=noise), mixed_table(session, lit)
+
+
+@pytest.fixture(scope="module")
+def identified(mixed):
+    """The answer by some of the instruments, all where none is named, proved on unseen rows or not; made once each."""
+
+    @cache
+    def answer(*names, proved=False):
+        plan = FitPlan(schema=1, instruments=names)
+        return run(*mixed, plan=plan) if proved else run(*mixed, plan=plan, held_out_share=0.0)
+
+    return answer
 
 
 def true_corrections(rig, truth):
@@ -62,9 +81,9 @@ def true_corrections(rig, truth):
     return links | zeros | {f"tool.{a}": v for a, v in zip("xyz", TOOL - rig.tool.point_m, strict=True)}
 
 
-def test_what_is_said_of_the_arm_is_true(mixed, session):
-    rig, samples = mixed
-    result = run(rig, samples)
+def test_what_is_said_of_the_arm_is_true(mixed, identified, session):
+    rig, _ = mixed
+    result = identified(proved=True)
     assert [i.name for i in result.instruments] == ["dual-psd", "position", "wire"]
     assert [i.observations for i in result.instruments] == [90, 60, 60]
     assert (result.status, result.blunders) == (Status.RANK_DEFICIENT, ())
@@ -78,18 +97,15 @@ def test_what_is_said_of_the_arm_is_true(mixed, session):
     assert not {"joint1.zero", "joint6.zero", "tool.x"} & set(told)  # all that is at the flange turns with joint 6
 
 
-def test_all_instruments_together_know_a_link_better_than_each_alone(mixed):
-    rig, samples = mixed
-    plans = [FitPlan(schema=1, instruments=names) for names in ((), (DUAL_PSD,), (POSITION,))]
-    together, *alone = (run(rig, samples, plan=plan, held_out_share=0.0) for plan in plans)
+def test_all_instruments_together_know_a_link_better_than_each_alone(identified):
+    together, *alone = (identified(*names) for names in ((), (DUAL_PSD,), (POSITION,)))
     sigma = [next(e.sigma for e in one.estimates if e.name == "link2.length") for one in (together, *alone)]
     assert sigma[0] < min(sigma[1:])
     assert [[i.name for i in one.instruments] for one in alone] == [["dual-psd"], ["position"]]
 
 
-def test_every_instrument_is_proved_in_its_own_unit_by_every_split(mixed):
-    rig, samples = mixed
-    result = run(rig, samples)
+def test_every_instrument_is_proved_in_its_own_unit_by_every_split(identified):
+    result = identified(proved=True)
     assert result.evidence.proven.unproven == ()
     by = {(u.split, u.name): u for u in result.held_out}
     splits = ("random 20% of the rows", "each of 3 places in turn", "last 20% of the session")
@@ -104,9 +120,9 @@ def test_every_instrument_is_proved_in_its_own_unit_by_every_split(mixed):
     assert [by[splits[2], "wire"].observations, (splits[2], "dual-psd") in by] == [42, False]
 
 
-def test_the_model_predicts_what_each_instrument_reads(mixed):
+def test_the_model_predicts_what_each_instrument_reads(mixed, identified):
     rig, samples = mixed
-    result = run(rig, samples, held_out_share=0.0)
+    result = identified()
     values = {p.name: float(v) for p, v in zip(result.parameters, result.theta, strict=True)}
     names = tuple(i.name for i in result.instruments)
     predicted = predict(Predictor(rig, values, result.about, names), samples)
@@ -152,10 +168,8 @@ def test_refits_to_drawn_rows_of_all_instruments_agree_with_the_covariance(mixed
     assert 0.6 < np.median(ratio) < 1.6
 
 
-def test_error_anywhere_needs_to_know_where_the_target_is_and_then_has_a_number(mixed):
-    rig, samples = mixed
-    plans = [FitPlan(schema=1, instruments=names) for names in ((), (DUAL_PSD,))]
-    whole, spots = (run(rig, samples, plan=plan, held_out_share=0.0).evidence.free_space for plan in plans)
+def test_error_anywhere_needs_to_know_where_the_target_is_and_then_has_a_number(identified):
+    whole, spots = (identified(*names).evidence.free_space for names in ((), (DUAL_PSD,)))
     assert 0.0 < whole.geometry.rms_m < whole.geometry.max_m < 2e-4
     assert whole.pose.rms_m > whole.geometry.rms_m
     assert spots.geometry.rms_m is None  # no spot says where around axis 6 the target point is

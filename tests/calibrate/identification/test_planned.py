@@ -76,7 +76,7 @@ def test_dog_leg_gives_the_same_answer_and_a_loss_one_within_the_doubt(tracked):
     assert max(abs(huber[n].value - e.value) / e.sigma for n, e in plain.items()) > 0.01
 
 
-@pytest.mark.parametrize("loss", [LossName.CAUCHY, LossName.STUDENT_T])
+@pytest.mark.parametrize("loss", [LossName.CAUCHY, pytest.param(LossName.STUDENT_T, marks=pytest.mark.endure)])
 def test_a_loss_that_forgives_predicts_as_well(tracked, fresh, loss):
     assert error_m(tracked, run(tracked, loss=loss), fresh) < 0.8 * NOISE_M
 

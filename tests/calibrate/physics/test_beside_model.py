@@ -167,7 +167,8 @@ def test_a_plan_beside_a_model_is_made_or_says_why_not(soft, capsys):
     arguments = ["diagnose", str(recording), "--model", str(folder / "model.json")]
     assert run([*arguments, "--out", str(folder / "planned.json"), "--plan-out", str(plan)]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "poses that tell the rivals apart" in said if plan.exists() else "no finding has a rival" in said
+    expected = "poses that separate the alternative" if plan.exists() else "no finding has an alternative"
+    assert expected in said
 
 
 def test_a_known_structure_is_refitted_to_another_recording(soft, capsys):

@@ -105,6 +105,9 @@ def test_a_diagnosis_of_the_plan_could_find_causes_and_says_which_it_confuses(ri
     assert {"backlash", "encoder-eccentricity", "joint-compliance", "laser-warm-up"} <= physics
     assert all(one.value > 0.0 for one in seen.smallest)
     assert all(r2 >= 0.97 for _, _, r2 in seen.confusable)
+    causes = [{(a.physics, a.where), (b.physics, b.where)} for a, b, _ in seen.confusable_causes]
+    assert all(len(pair) == 2 for pair in causes)
+    assert len({frozenset(pair) for pair in causes}) == len(causes) <= len(seen.confusable)
 
 
 def test_known_distances_between_places_never_harm(rig):

@@ -3,6 +3,7 @@
 One browser for all, since starting it is what takes time.
 """
 
+import re
 import shutil
 
 import pytest
@@ -12,7 +13,9 @@ from calibrate.report.interactive.chapter import interactive_chapter
 from calibrate.report.interactive.session_figures import session_figures
 from calibrate.report.page import page
 from calibrate.report.session_evidence import session_evidence
+from tests.support.overlaps import OVERLAPS
 
+MOST_PAGES = 8
 SOFTWARE_GL = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
@@ -62,3 +65,41 @@ def test_the_interactive_report_is_drawn_from_the_file_alone(tab, wire_and_posit
     opened.wait_for_selector("#plot-residuals .scatterlayer .trace", state="attached")
     assert asked == [path.as_uri()]
     assert wrong == []
+
+
+@pytest.mark.parametrize("which", ["spots_html", "session_html"])
+def test_labels_do_not_overlap_and_no_page_scrolls_sideways(browser, request, tmp_path, which):
+    path = tmp_path / "report.html"
+    path.write_text(request.getfixturevalue(which), encoding="utf-8")
+    for width, scheme in ((1440, "light"), (390, "dark")):
+        opened = browser.new_page(viewport={"width": width, "height": 844}, color_scheme=scheme)
+        opened.goto(path.as_uri())
+        opened.evaluate("document.querySelectorAll('details').forEach(d => d.open = true)")
+        assert opened.evaluate("document.documentElement.scrollWidth") == width
+        assert opened.evaluate(OVERLAPS) == []
+        opened.close()
+
+
+def test_paper_and_ink_change_with_the_scheme(browser, tmp_path, spots_html):
+    path = tmp_path / "report.html"
+    path.write_text(spots_html, encoding="utf-8")
+    shown = {}
+    for scheme in ("light", "dark"):
+        opened = browser.new_page(color_scheme=scheme)
+        opened.goto(path.as_uri())
+        read = "() => ['color', 'backgroundColor'].map(p => getComputedStyle(document.querySelector('main'))[p])"
+        shown[scheme] = opened.evaluate(read)
+        opened.close()
+    assert shown["light"] == shown["dark"][::-1] or set(shown["light"]).isdisjoint(shown["dark"])
+    assert shown["dark"][0] != shown["dark"][1]
+
+
+def test_a_printed_report_has_at_most_eight_pages(browser, tmp_path, spots_html):
+    path = tmp_path / "report.html"
+    path.write_text(spots_html, encoding="utf-8")
+    opened = browser.new_page()
+    opened.goto(path.as_uri())
+    printed = opened.pdf(prefer_css_page_size=True)
+    opened.close()
+    counts = [int(n) for n in re.findall(rb"/Count (\d+)", printed)]
+    assert 2 <= max(counts) <= MOST_PAGES

@@ -56,5 +56,5 @@ def test_only_the_scripts_of_the_page_itself_may_run(page):
 
 
 def test_every_pose_can_be_asked_for_its_joints_and_errors(known, page):
-    labels = re.findall(r"sample (\d+)<br>as drawn [^\"]*identified [^\"]*<br>J1 [^\"]*J6 ", page)
+    labels = re.findall(r"sample (\d+)<br>nominal [^\"]*calibrated [^\"]*<br>J1 [^\"]*J6 ", page)
     assert {int(n) for n in labels} == set(range(1, known.model.poses + 1))

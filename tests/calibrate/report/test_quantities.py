@@ -67,3 +67,8 @@ def test_a_column_lines_up_at_the_decimal_point() -> None:
         "0.7977",
         f"12{DIGIT_SPACE * 4}{POINT_SPACE}",
     ]
+
+
+def test_what_rounds_to_zero_has_no_sign():
+    assert fixed(-1e-9, 2) == "0.00"
+    assert fixed(-0.006, 2) == "−0.01"

@@ -14,7 +14,7 @@ from calibrate.report.reasons import in_plain_words
         ("seat2.z", "where cone 2 is (z)"),
         ("seat x, y", "where the cones are (x, y)"),
         ("tool.z", "where the target sits on the flange (z)"),
-        ("placement3.roll", "where fixture place 3 is (roll)"),
+        ("placement3.roll", "where fixture station 3 is (roll)"),
         ("gravity.joint2", "gravity.joint2"),
     ],
 )

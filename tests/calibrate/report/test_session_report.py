@@ -80,7 +80,7 @@ def test_every_instrument_has_its_errors_before_and_after(page, wire_and_positio
     text = text_of(page)
     for readings in evidence.readings:
         assert len(readings.rows) == 40
-        assert f"{readings.title} as drawn 40" in text
+        assert f"{readings.title} nominal 40" in text
     first = evidence.readings[0]
     model = wire_and_positions[1]
     assert np.sqrt(np.mean(first.error_after**2)) == pytest.approx(model.rms_distance_after_m, rel=1e-9)

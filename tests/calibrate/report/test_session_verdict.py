@@ -29,7 +29,7 @@ def test_a_healthy_session_is_trusted_and_said_in_one_sentence(healthy):
     assert (judged.trust, judged.reasons) == (Trust.GOOD, ())
     proof = healthy.model.proofs[0]
     assert f"{1e6 * proof.rms_distance_after_m:.1f}" in judged.sentence
-    assert "Trust it" in judged.sentence
+    assert "What remains is noise" in judged.sentence
     assert judged.advice
 
 
@@ -42,7 +42,7 @@ def test_physics_that_the_model_lacks_is_seen_along_its_joint(arm_session):
     said = " ".join(judged.reasons)
     assert judged.trust is Trust.CARE
     assert "follows J2" in said
-    assert "times the noise that was believed" in said
+    assert "times the assumed noise" in said
     assert any("missing physics" in do for do in judged.advice)
 
 
@@ -57,7 +57,7 @@ def test_unseen_rows_far_beyond_the_noise_call_for_care(healthy):
     far = tuple(msgspec.structs.replace(p, chi_after=4.0, chi_predicted=3.0) for p in healthy.model.proofs)
     judged = session_verdict(changed(healthy, proofs=far))
     assert judged.trust is Trust.CARE
-    assert "3.00 times what noise and sigmas say" in judged.reasons[0]
+    assert "3.00 times what noise and sigmas predict" in judged.reasons[0]
 
 
 def test_unseen_rows_that_lie_elsewhere_are_judged_by_what_the_others_leave_open(healthy):
@@ -91,7 +91,7 @@ def test_without_a_proof_the_sentence_says_what_it_was_fitted_to(healthy):
 def test_the_one_noisy_source_of_several_is_named(healthy):
     noise = healthy.model.noise | {"wire_believed": 1e-5, "wire": 1e-4, "wire_sigma": 1e-5}
     judged = session_verdict(changed(healthy, noise=noise))
-    assert "The noise of wire is 10.0 times what was believed." in judged.reasons
+    assert "The noise of wire is 10.0 times the assumed one." in judged.reasons
 
 
 def test_a_recording_that_was_cut_short_calls_for_care(healthy):

@@ -90,7 +90,7 @@ def test_all_chapters_are_there_and_the_point_constraint_only_where_it_is_asked_
         "Spots on the faces",
         "Laser centring",
         "Errors before and after",
-        "Proof and doubt",
+        "Proof and uncertainty",
         "The data",
         "Provenance",
     ):
@@ -99,7 +99,7 @@ def test_all_chapters_are_there_and_the_point_constraint_only_where_it_is_asked_
     assert page.count("<svg") >= 9
 
 
-def test_the_point_constraint_stands_beside_the_fit_where_the_plan_names_it(recorded, spots) -> None:
+def test_the_point_constraint_stands_beside_the_fit_where_the_plan_names_it(recorded, spots, bare_figures) -> None:
     planned = Planned(parse_plan(PLAN, "fit.toml"), PLAN)
     found = identify_session(recorded, planned)
     assert found.point_constraints is not None
@@ -123,8 +123,8 @@ def test_noise_that_did_not_settle_and_noise_that_cannot_be_told_from_none_are_s
     noise = {**spots.model.noise, "settled": False, "joint_at_zero": True}
     known = replace(spots, model=msgspec.structs.replace(spots.model, noise=noise))
     assert any("did not settle" in reason for reason in session_verdict(known).reasons)
-    assert "too small to be told from none" in text_of(proofs_chapter(known))
-    assert "too small to be told from none" not in text_of(proofs_chapter(spots))
+    assert "too small to be separated from none" in text_of(proofs_chapter(known))
+    assert "too small to be separated from none" not in text_of(proofs_chapter(spots))
 
 
 def test_a_recording_without_centring_and_origin_says_so(spots) -> None:

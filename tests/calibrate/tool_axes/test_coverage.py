@@ -22,9 +22,8 @@ from tests.calibrate.tool_axes.drawn_arms import (
 WITHIN_95 = 1.96
 
 
-@pytest.mark.parametrize("table", [UR5, OBLIQUE], ids=["ur5", "oblique"])
-def test_the_error_of_arms_of_the_prior_is_as_large_as_stated(table):
-    z = whitened_errors(table, ArmErrors(), (5, 6), range(40))
+def test_the_error_of_arms_of_the_prior_is_as_large_as_stated():  # UR5 and the rest: below
+    z = whitened_errors(OBLIQUE, ArmErrors(), (5, 6), range(40))
     assert len(z) >= 38
     assert np.mean(np.abs(z) < WITHIN_95) >= 0.90  # of 120; a share of 0.95 falls below once in 120 times
     assert 0.8 < np.sqrt(np.mean(z**2)) < 1.2
@@ -41,7 +40,7 @@ def test_93_of_100_components_of_200_arms_are_within_95_percent(table, errors, j
     assert 0.85 < np.sqrt(np.mean(z**2)) < 1.15
 
 
-@pytest.mark.parametrize("table", [UR5, OBLIQUE], ids=["ur5", "oblique"])
+@pytest.mark.parametrize("table", [UR5, pytest.param(OBLIQUE, marks=pytest.mark.endure)], ids=["ur5", "oblique"])
 def test_without_options_arms_with_zeros_of_3_mrad_are_covered(table):
     z = whitened_errors(table, ZEROS_ONLY, (4, 5, 6), range(30), assumed=ArmErrors())
     assert np.mean(np.abs(z) < WITHIN_95) >= 0.95

@@ -66,7 +66,7 @@ def test_it_does_not_matter_which_member_of_an_unseen_combination_is_held(fitted
 def test_poses_that_leave_something_open_get_no_number(fitted):
     one = fitted(61, poses=60)
     fixed = one.problem.q_rad.copy()
-    fixed[:, 4] = 0.3  # joint 5 never moves: its zero and the links around it cannot be told
+    fixed[:, 4] = 0.3  # joint 5 never moves: its zero and the links around it cannot be determined
     everything = replace(one.problem, q_rad=fixed, parameters=one.problem.chain.parameters)
     wide = tuple(replace(p, prior=np.inf) for p in everything.parameters)
     seen = analyse(everything.jacobian(np.zeros(len(wide))), wide)

@@ -101,7 +101,7 @@ def test_error_frames_are_kept_and_recorded_and_the_stream_goes_on(memory):
     assert block.values["bus_errors"][-1] == 2
     assert [str(fault) for fault in memory.encoders.bus_faults] == [
         "protocol violation",
-        "no acknowledgement: nobody else on the bus, or another bit rate",
+        "no acknowledgement: no other node on the bus, or another bit rate",
     ]
 
 

@@ -115,7 +115,7 @@ def test_a_unit_that_is_unplugged_is_lost(in_memory):
 def test_exchanged_units_are_refused(in_memory):
     one, two = in_memory.lines
     named = tuple(Head(FaceKind.PIN_CUSHION, LENGTH_M, serial_number=n) for n in ("69250002", "69250001"))
-    with pytest.raises(DeviceRefused, match="unit 1 is 69250001, the rig says 69250002; exchange"):
+    with pytest.raises(DeviceRefused, match="unit 1 is 69250001, the rig file has 69250002; exchange"):
         Kpa101Pair((lambda: one, lambda: two), named, clock=in_memory.clock).connect()
     same = tuple(Head(FaceKind.PIN_CUSHION, LENGTH_M) for _ in range(2))
     with pytest.raises(DeviceRefused, match="both ports lead to unit 69250001"):

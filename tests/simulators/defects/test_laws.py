@@ -61,7 +61,7 @@ def name(value: object) -> str:
 def session(kind: type[Defect], instrument: str) -> Case:
     family = FAMILY[instrument]
     places = 4 if family == "cones" else 2
-    return conceal(Wanted(family, seed=4, defects=(kind.KIND,), samples=90, places=places))
+    return conceal(Wanted(family, seed=4, defects=(kind.KIND,), samples=45, places=places))
 
 
 def seen(case: Case, defects: list[Defect]) -> np.ndarray:

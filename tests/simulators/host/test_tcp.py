@@ -120,6 +120,7 @@ def test_slow_reader_loses_whole_packages(stage, echo, connect):
         site.given[0].output = b"%06d" % number + b"." * 993 + b"\n"
         on.turns()
     site.given[0].output = b"last\n"
+    client.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)  # or what the kernel keeps comes in drips
     on.until(lambda: client.read().endswith(b"\n") and drained(on))
     packages = client.received.split(b"\n")[:-1]
     assert {len(package) for package in packages} <= {999, 4}

@@ -16,15 +16,19 @@ from calibrate.diagnose.schema import (
     FreeSpaceRecord,
     LackOfFitRecord,
     NameRecord,
+    NoiseRecord,
     NotRecorded,
     RejectedRecord,
     RigRecord,
     RivalRecord,
     SizeRecord,
+    SmallestRecord,
     SplitRecord,
     UnexplainedRecord,
 )
 from calibrate.errors import DataError
+from calibrate.model_file import ModelParameter
+from calibrate.report.diagnosis.beyond_model import beyond_model
 from calibrate.report.diagnosis.chain_figure import chain_figure, chain_of
 from calibrate.report.diagnosis.finding_page import interval_words, size_words
 from calibrate.report.diagnosis.page import chapters_of, contents_of, inserted
@@ -154,3 +158,75 @@ def test_pages_go_before_the_last_chapter_of_another_report():
 def test_a_diagnosis_of_another_rig_is_refused():
     with pytest.raises(DataError, match="of rig 'irb', the recording of 'other'"):
         inserted({}, [], FILE, SimpleNamespace(name="other"))
+
+
+def noise(statement, times):
+    words = f"noise of the spots is {times} × the stated value" if statement == "wrong" else ""
+    stated = None if times is None else 1e-6
+    return NoiseRecord("dual-psd", "", "m", stated, 2.1e-6, times, None, statement, words)
+
+
+def test_noise_is_said_only_where_it_is_stated_and_what_is_wrong_with_the_statement():
+    quiet = msgspec.structs.replace(FILE, unexplained=None, verdict="consistent", findings=())
+    wrong = msgspec.structs.replace(quiet, noise=(noise("wrong", 2.1),))
+    assert "2.1 × the stated value" in verdict_words(wrong)
+    unstated = msgspec.structs.replace(quiet, noise=(noise("absent", None),))
+    assert "beyond the noise" not in verdict_words(unstated)
+    found = msgspec.structs.replace(FILE, unexplained=None, noise=(noise("absent", None),))
+    assert "remains is noise" not in verdict_words(found)
+
+
+def test_every_split_is_compared_with_the_noise():
+    last = SplitRecord("last block", "dual-psd", 12, 0, 4.1e-5, 6.3e-6, 0.9, 0.99)
+    told = msgspec.structs.replace(FILE, unexplained=None, splits=(*FILE.splits, last))
+    assert "missed by 3 times the noise" in verdict_words(told)
+
+
+SMALLEST = SmallestRecord(
+    "joint3.angle", "payload_torque3", "linear", None, "payload-compliance", "compliance_rad_nm", 1e-6
+)
+
+
+def test_a_cause_is_never_both_tested_and_not_tested():
+    """Another recorded column can show physics of which one column is missing."""
+    consistent = msgspec.structs.replace(FILE, verdict="consistent", findings=(), unexplained=None)
+    both = msgspec.structs.replace(consistent, smallest=(SMALLEST,))
+    assert "Not tested, for lack of columns: payload-compliance" not in verdict_words(both)
+    page = "".join(chapters_of(both, 6))
+    assert "Not tested: columns that are missing" not in page
+    assert "payload_kg" in page
+    other = msgspec.structs.replace(SMALLEST, physics="joint-compliance")
+    neither = msgspec.structs.replace(consistent, smallest=(other,))
+    assert "Not tested, for lack of columns: payload-compliance" in verdict_words(neither)
+    assert "Not tested: columns that are missing" in "".join(chapters_of(neither, 6))
+
+
+def test_no_cause_is_confused_with_itself():
+    third, fourth = (NameRecord("joint3.angle", "q3", "harmonic", n, "encoder-harmonic") for n in (3, 4))
+    file = msgspec.structs.replace(FILE, confusable=((third, fourth, 0.99),))
+    assert "Cannot be separated" not in "".join(chapters_of(file, 6))
+    assert "Cannot be separated with these poses: 1 pair of causes" in "".join(chapters_of(FILE, 6))
+
+
+def with_parameters(model, names):
+    found = tuple(ModelParameter(name, "rad", 1e-4, 1e-5, None) for name in names)
+    return msgspec.structs.replace(model, parameters=found)
+
+
+def test_discs_that_the_calibrated_arm_holds_are_no_findings_about_it(spots):
+    file = msgspec.structs.replace(FILE, unexplained=None)
+    discs = with_parameters(spots.model, ["joint3.disc_sine", "joint3.disc_cosine"])
+    left, held = beyond_model(file, discs)
+    assert (left.verdict, left.findings, held) == ("consistent", (), file.findings)
+    page = "".join(chapters_of(left, 6, held))
+    assert "part of the calibrated arm already" in page
+    assert "Recording and model agree" in page
+    half = with_parameters(spots.model, ["joint3.disc_sine", "joint2.disc_sine", "joint2.disc_cosine"])
+    assert beyond_model(file, half) == (file, ())
+
+
+def test_what_else_was_found_still_differs(spots):
+    discs = with_parameters(spots.model, ["joint3.disc_sine", "joint3.disc_cosine"])
+    soft = msgspec.structs.replace(FINDING, where="joint2.angle", physics="joint-compliance")
+    left, held = beyond_model(msgspec.structs.replace(FILE, findings=(FINDING, soft)), discs)
+    assert (left.verdict, left.findings, held) == ("mismatch", (soft,), (FINDING,))

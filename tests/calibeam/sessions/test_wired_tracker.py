@@ -1,0 +1,82 @@
+"""A tracker over real wires: a session is recorded and identified, and every way in which it can end early."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+from scipy.spatial.transform import Rotation
+
+from acquisition.recording import RecordingWriter, read
+from acquisition.recording.rig import load_rig, rig_text
+from acquisition.session.tracked import TrackedOptions
+from calibeam.devices.site import connected_tracker, tracker_addresses_of
+from calibeam.emulation import Emulation
+from calibeam.outcome import PartialResult
+from calibeam.printing.progress import progress_bar
+from calibeam.sessions.with_tracker import drawn_plan, nominal_target, record_tracked
+from drivers.clock import SystemClock
+from simulators.world.truth import read_truth
+
+RIG_FILE = Path(__file__).parents[3] / "rigs" / "ur5e-tracker.toml"
+RIG = load_rig(RIG_FILE)
+PACE = 8.0
+PLAN = drawn_plan(RIG, 4, 1)
+OPTIONS = TrackedOptions(dwell_s=0.2)
+
+
+def session(tmp_path: Path, emulation: Emulation, after: int = 0, trouble=lambda: None):
+    clock, count, quiet, rig = SystemClock(), [0], Console(quiet=True), RIG
+    with (
+        RecordingWriter(tmp_path / "r.mcap", rig_text=rig_text(RIG_FILE), software="test", clock=clock) as writer,
+        connected_tracker(rig, tracker_addresses_of(rig, emulation.address, PACE), writer, clock) as bench,
+    ):
+        plain = writer.sample
+
+        def counted(*sample) -> None:
+            plain(*sample)
+            count[0] += 1
+            if count[0] == after:
+                trouble()
+
+        writer.sample = counted
+        return record_tracked(bench, rig, writer, PLAN, clock, progress_bar(quiet), OPTIONS)
+
+
+def test_a_session_has_the_positions_that_are_true(tmp_path: Path) -> None:
+    with Emulation(RIG_FILE, seed=5, time_scale=PACE, truth=tmp_path / "truth.json") as emulation:
+        summary = session(tmp_path, emulation)
+    recording = read(tmp_path / "r.mcap")
+    samples = recording.samples
+    assert recording.complete
+    assert set(recording.streams) == {"tracker", "robot"}
+    assert len(samples) == len(summary.samples) == 6
+    assert samples.integers("repeat", 0).tolist()[:3] == [1, 1, 1]
+    seen_m = np.column_stack([samples.column(name) for name in ("x_m", "y_m", "z_m")])
+    # Three readings of one pose differ by noise (15 um over 20 samples) and repeatability (3 urad at 0.8 m).
+    assert np.ptp(seen_m[:3], axis=0).max() < 5e-5
+    # Seen from where the tracker truly is, they lie where the nominal arm has them, but for its errors: zeros within
+    # 8 mrad, of which 20 mm come at a reach of 0.9 m.
+    truth = read_truth(tmp_path / "truth.json")
+    in_base_m = Rotation.from_rotvec(truth.device.rotation_rad).apply(seen_m) + truth.device.origin_m
+    assert np.linalg.norm(in_base_m - nominal_target(RIG)(samples.joints()), axis=1).max() < 0.02
+    q = samples.joints()
+    assert np.abs(q - np.column_stack([samples.column(f"cmd{k}_rad") for k in range(1, 7)])).max() < 1e-4
+
+
+def test_a_tracker_that_falls_silent_stops_the_arm_and_is_named(tmp_path: Path) -> None:
+    with Emulation(RIG_FILE, seed=5, time_scale=PACE) as emulation:
+        with pytest.raises(PartialResult, match=r"tracker: no (line|sample).*2 samples are kept"):
+            session(tmp_path, emulation, 2, lambda: emulation.ask("tracker.silence"))
+        assert emulation.ask("robot.standing")
+    recording = read(tmp_path / "r.mcap")
+    assert not recording.complete
+    assert any(event.kind == "device failed" for event in recording.events)
+
+
+@pytest.mark.endure  # 8 s; of the driver alone: tests/drivers/tracker/test_device.py
+def test_a_closed_connection_is_told(tmp_path: Path) -> None:
+    says = r"tracker: 127.0.0.1:\d+: the instrument closed the connection.*1 samples are kept"
+    with Emulation(RIG_FILE, seed=5, time_scale=PACE) as emulation, pytest.raises(PartialResult, match=says):
+        session(tmp_path, emulation, 1, lambda: emulation.inject("tracker", "disconnect", count=1))
+    assert len(read(tmp_path / "r.mcap").samples) == 1
