@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
-from acquisition.recording.samples import POSITION
+from acquisition.recording.samples import POSITION, TARGET
 from calibrate.alignment import Alignment
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.model import KinematicModel
@@ -25,8 +25,8 @@ from calibrate.read_samples import Angles
 from calibrate.rigid import inverse
 from calibrate.sample_table import SampleTable
 from calibrate.sensors.catalogue import SENSORS, used_with
-from calibrate.sensors.kind import Trait
-from calibrate.weighting import Weighting
+from calibrate.sensors.kind import SensorKind, Trait
+from calibrate.weighting import Measured, Weighting
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -62,6 +62,7 @@ def instruments_of(
     table = SampleTable(samples, rig, arm_of(rig) if arm is None else arm, angles, framed, points)
     built = [(kind, kind.build(table)) for kind in kinds]
     measured = tuple(found for _, found in built if found is not None)
+    _refuse_targets(samples, rig, tuple((kind, found) for kind, found in built if found is not None))
     if all(Trait.BETWEEN_ENCODERS in kind.traits for kind, found in built if found is not None):
         raise DataError(
             "samples: no row holds an observation; columns of one are psd1_x_m ... with placement and first_psd, "
@@ -72,6 +73,21 @@ def instruments_of(
     used = np.unique(np.concatenate([instrument.sample_rows.ravel() for instrument in measured]))
     unused = np.setdiff1d(np.arange(len(samples)), used)
     return Instruments(weighting, _start(table, weighting), table.alignment, unused)
+
+
+def _refuse_targets(samples: Samples, rig: Rig, built: tuple[tuple[SensorKind, Measured], ...]) -> None:
+    """DataError where rows name targets to an instrument that knows the tool's point only."""
+    named = samples.integers(TARGET, 0)
+    for kind, found in built:
+        if Trait.TARGET in kind.traits and Trait.SEVERAL_TARGETS not in kind.traits:
+            theirs = named[found.sample_rows]
+            if not rig.targets and len(np.unique(theirs[theirs > 0])) < 2:
+                continue
+            for row in found.sample_rows[theirs.any(axis=1)][:1, 0].tolist():
+                raise DataError(
+                    f"samples row {row + 1}: target {named[row]}, but {kind.noun} are read at [tool] point_m only; "
+                    "empty the cell, or give positions of the targets"
+                )
 
 
 def _start(table: SampleTable, weighting: Weighting) -> Floats:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
-from acquisition.recording.samples import POSITION
+from acquisition.recording.samples import POSITION, TARGET
 from calibrate.alignment import Alignment, align, align_with_tool
 from calibrate.arms.model import KinematicModel
 from calibrate.errors import DataError
@@ -19,7 +19,7 @@ from calibrate.problem import Problem
 from calibrate.read_samples import Angles
 from calibrate.rigid import transform
 from calibrate.sensors.device import Device
-from calibrate.sensors.target import UNKNOWN_PLAUSIBLE_M, Target
+from calibrate.sensors.target import UNKNOWN_PLAUSIBLE_M, Target, Targets, targets_of
 from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
@@ -73,6 +73,11 @@ class SampleTable:
         rows = self.filled(*POSITION)
         if len(rows) == 0:
             return None, None
+        several = self.targets(rows)
+        if several is not None:
+            shifts = start_values(several.parameters)
+            tips = several.in_base(shifts, self.T_base_flange[rows])
+            return (align(tips, self.position_m[rows]) if self.framed else None), None
         point = self.rig.tool.point_m
         if point is not None:
             tips = Target(np.array(point)).in_base(np.zeros(3), self.T_base_flange)
@@ -105,6 +110,19 @@ class SampleTable:
             if found_m is not None:
                 return Target(found_m, UNKNOWN_PLAUSIBLE_M)
         raise DataError(f"rig {self.rig.name}: wire and bar rows need tool.point_m, the target in the flange frame")
+
+    def targets(self, rows: Indices) -> Targets | None:
+        """Those that the samples name at these rows; None where they name none, and the tool's point is meant.
+
+        DataError for several that the rig does not have: one point for all of them would be their scatter.
+        """
+        named = self.samples.integers(TARGET, 0)[rows]
+        if not self.rig.targets:
+            if len(seen := sorted(set(named.tolist()) - {0})) > 1:
+                told = ", ".join(map(str, seen))
+                raise DataError(f"samples: targets {told}, but rig {self.rig.name} has no [[target]]; add one for each")
+            return None
+        return targets_of(self.rig, named) if named.any() else None
 
     @cached_property
     def tips_m(self) -> Floats:

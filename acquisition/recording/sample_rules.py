@@ -18,6 +18,7 @@ from acquisition.recording.samples import (
     ORIENTATION,
     POSITION,
     SPOTS,
+    TARGET,
     Cell,
     Kind,
     Samples,
@@ -161,10 +162,25 @@ def _table_faults(table: Table, rig: Rig) -> Iterator[Fault]:
             )
     yield from _among(table, "placement", tuple(rig.placements), "a [[placement]] of the rig")
     yield from _among(table, "first_psd", (1, 2), "a detector")
+    if rig.targets:
+        yield from _target_faults(table, rig)
     for name in table:
         if name.startswith("approach") and joint_of(name) is not None:
             yield from _among(table, name, (-1, 0, 1), "a direction")
     yield from _bar_faults(table, rig)
+
+
+def _target_faults(table: Table, rig: Rig) -> Iterator[Fault]:
+    if TARGET not in table:
+        return
+    named = table[TARGET]
+    yield from _first(named % 1.0 > 0.0, TARGET, "the value is not a whole number; give the id of a [[target]]")
+    yield from _among(table, TARGET, tuple(rig.targets), "a [[target]] of the rig")
+    if POSITION[0] in table:
+        seen = ~np.isnan(table[POSITION[0]])
+        lacking = seen & np.isnan(named)
+        if lacking.any() and not lacking[seen].all():
+            yield from _first(lacking, TARGET, "the value is missing, though other positions name theirs; say which")
 
 
 def _bar_faults(table: Table, rig: Rig) -> Iterator[Fault]:

@@ -30,6 +30,7 @@ ORIENTATION = ("rx_rad", "ry_rad", "rz_rad")  # beside a position: a full pose
 WIRE = "wire_m"
 SEAT = "seat"
 BAR, BAR_END = "bar", "bar_end"
+TARGET = "target"  # which [[target]] of the rig a row is of
 COMPLETE_PER_JOINT = (("q", "_rad"), ("cmd", "_rad"), ("enc", "_rad"))  # one column for every joint, or none
 
 _INTEGERS = re.compile(r"placement|first_psd|seat|bar|repeat|approach[1-9][0-9]*")

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
+from acquisition.recording.samples import TARGET
 from calibrate.blunders.finding import BlunderKind
 
 Floats = NDArray[np.float64]
@@ -82,6 +83,15 @@ def filled(samples: Samples, *names: str) -> Rows:
 def stacked(samples: Samples, names: tuple[str, ...]) -> Floats:
     """(row, column)"""
     return np.stack([samples.column(name) for name in names], axis=1)
+
+
+def by_target(rig: Rig, samples: Samples, rows: Rows) -> tuple[tuple[Rows, Floats | None], ...]:
+    """These rows target by target, each with its point (3,) as drawn in the flange frame; None: nobody says it."""
+    named = samples.integers(TARGET, 0)[rows]
+    if not rig.targets:
+        return ((rows, drawn_point_m(rig)),)
+    points = {0: drawn_point_m(rig)} | {k: np.array(target.point_m) for k, target in rig.targets.items()}
+    return tuple((rows[named == k], points.get(k)) for k in sorted(set(named.tolist())))
 
 
 def drawn_point_m(rig: Rig) -> Floats | None:

@@ -20,6 +20,7 @@ from calibrate.blunders.other_session import sessions_apart
 from calibrate.blunders.rough_fit import frame_between, rough_fit
 from calibrate.blunders.same_posture import err_alike, postures
 from calibrate.blunders.shots import Shots
+from calibrate.blunders.witness import by_target
 from calibrate.diagnose.session import Session, session_of
 from calibrate.diagnose.wild_rows import FEWEST_ROWS, alone, behind_gap, lasting
 from calibrate.effects.moved import LIMIT
@@ -94,14 +95,21 @@ def _joined(rig: Rig, samples: Samples) -> list[Blunder]:
     rows = np.flatnonzero(np.isfinite(positions[:, 0]))
     arm = arm_of(rig)
     flange = arm.flange(start_values(arm.parameters), samples.joints()[rows])
-    point = None if rig.tool.point_m is None else np.array(rig.tool.point_m)
-    found = sessions_apart(flange, positions[rows], point, rows)
+    out: list[Blunder] = []
+    for theirs, point in by_target(rig, samples, rows):
+        out += _joined_among(flange[np.searchsorted(rows, theirs)], positions[theirs], point, theirs)
+    return out
+
+
+def _joined_among(flange: Floats, positions: Floats, point: Floats | None, rows: NDArray[np.intp]) -> list[Blunder]:
+    """Of one target: flange poses (row, 4, 4) as drawn, positions (row, 3) of these rows, its point (3,)."""
+    found = sessions_apart(flange, positions, point, rows)
     if not found:
         return []
-    rough = rough_fit(flange, positions[rows], np.zeros(3) if point is None else point)
+    rough = rough_fit(flange, positions, np.zeros(3) if point is None else point)
     tips = flange[:, :3, :3] @ rough.point_m + flange[:, :3, 3]
     expected = tips @ rough.linear.T + rough.shift_m
-    return [b for b in found if _elsewhere(expected, positions[rows], np.isin(rows, b.rows))]
+    return [b for b in found if _elsewhere(expected, positions, np.isin(rows, b.rows))]
 
 
 def _elsewhere(expected: Floats, observed: Floats, block: NDArray[np.bool_]) -> bool:

@@ -20,7 +20,7 @@ MOVED_RAD = 1e-4  # a joint that went less far has not moved: two readings of on
 SMOOTHING = 0.01  # of the samples, at least 3: thermometers are noisy, what they measure is slow
 NAMED = {
     *(name for kind in SENSORS for name in (*kind.columns, *kind.further)),
-    *("t_s", "placement", "first_psd", "psd1_sum_v", "psd2_sum_v", "repeat"),
+    *("t_s", "target", "placement", "first_psd", "psd1_sum_v", "psd2_sum_v", "repeat"),
     *("payload_kg", "payload_com_x_m", "payload_com_y_m", "payload_com_z_m"),
 }
 

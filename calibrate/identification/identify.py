@@ -24,6 +24,7 @@ from calibrate.blunders.left_alone import left_alone
 from calibrate.blunders.limits import rows_beyond_limits
 from calibrate.blunders.other_session import sessions_apart
 from calibrate.blunders.spot_signs import mirrored_axes
+from calibrate.blunders.witness import by_target
 from calibrate.blunders.witnesses import witnesses_of
 from calibrate.errors import DataError
 from calibrate.estimator import Estimator
@@ -142,7 +143,13 @@ def _sessions_apart(rig: Rig, samples: Samples) -> tuple[Blunder, ...]:
     if POSITION[0] not in samples:
         return ()
     rows, positions = _positions(samples)
-    return sessions_apart(_drawn_flange(rig)(samples.joints()[rows]), positions, _point(rig), rows)
+    flange = _drawn_flange(rig)(samples.joints()[rows])
+    return tuple(
+        blunder
+        for theirs, point in by_target(rig, samples, rows)
+        for own in [np.searchsorted(rows, theirs)]
+        for blunder in sessions_apart(flange[own], positions[own], point, theirs)
+    )
 
 
 def _instruments_without(rig: Rig, samples: Samples, blunders: tuple[Blunder, ...], plan: FitPlan) -> Instruments:
@@ -160,10 +167,6 @@ def _positions(samples: Samples) -> tuple[NDArray[np.intp], Floats]:
     positions = np.stack([samples.column(c) for c in POSITION], axis=1)
     rows = np.flatnonzero(np.isfinite(positions[:, 0]))
     return rows, positions[rows]
-
-
-def _point(rig: Rig) -> Floats | None:
-    return None if rig.tool.point_m is None else np.array(rig.tool.point_m)
 
 
 def _drawn_flange(rig: Rig) -> Callable[[Floats], Floats]:

@@ -34,6 +34,7 @@ class Trait(Enum):
 
     LIGHT = "the laser's beam on the two faces of a fixture"
     TARGET = "observes a target on the flange"
+    SEVERAL_TARGETS = "each reading may be of another target on the flange"
     DEVICE = "a measuring device beside the arm: its frame may drift, its readings may be out of scale"
     IN_SPACE = "its first three readings are the target's position in the device's frame"
     ANGLE_ENCODERS = "turns about an upright and a level axis, each with an encoder"

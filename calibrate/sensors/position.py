@@ -9,20 +9,20 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
-from acquisition.recording.samples import ORIENTATION, POSITION
+from acquisition.recording.samples import ORIENTATION, POSITION, TARGET
 from calibrate.blunders.finding import BlunderKind
 from calibrate.blunders.other_session import rows_of_another_session
 from calibrate.blunders.rough_fit import rough_fit
-from calibrate.blunders.witness import Otherwise, Strain, Witness, drawn_point_m, filled, stacked, thinned
+from calibrate.blunders.witness import Otherwise, Strain, Witness, by_target, filled, stacked, thinned
 from calibrate.chain import Chain
 from calibrate.errors import DataError
 from calibrate.parameters import Parameter
 from calibrate.rigid import transform
 from calibrate.sample_table import SampleTable
 from calibrate.sensors.device import Device
-from calibrate.sensors.kind import Columns, Found, NoiseSource, SensorKind, Trait
+from calibrate.sensors.kind import Columns, Found, Frame, NoiseSource, SensorKind, Trait
 from calibrate.sensors.model import About, Usage
-from calibrate.sensors.target import Target, point_by_twist
+from calibrate.sensors.target import TARGETS, Target, Targets, point_by_twist, targets_of
 from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
@@ -33,9 +33,9 @@ NOISE = NoiseSource("position", "m", "position_m")
 
 @dataclass(frozen=True)
 class Position(Usage):
-    """Observed at a pose: x, y, z of the target in the device's frame. Parameters: target 3, device 6."""
+    """Observed at a pose: x, y, z of the target in the device's frame. Parameters: 3 of each target, device 6."""
 
-    target: Target
+    target: Target | Targets
     device: Device
 
     unit = "m"
@@ -51,20 +51,29 @@ class Position(Usage):
         return replace(self, target=self.target.placed(about), device=self.device.placed(about))
 
     def select(self, rows: NDArray[np.intp]) -> Self:
-        return self
+        return replace(self, target=self.target.select(rows))
 
     def expect(self, phi: Floats, T_base_flange: Floats) -> Floats:
-        T = self.device.T_base_device_at(phi[3:])
-        return (self.target.in_base(phi[:3], T_base_flange) - T[:3, 3]) @ T[:3, :3]
+        own, device = self._split(phi)
+        T = self.device.T_base_device_at(device)
+        return (self.target.in_base(own, T_base_flange) - T[:3, 3]) @ T[:3, :3]
 
     def by_twist(self, phi: Floats, T_base_flange: Floats) -> Floats:
-        R_device_base = self.device.T_base_device_at(phi[3:])[:3, :3].T
-        return R_device_base @ point_by_twist(self.target.in_base(phi[:3], T_base_flange))
+        own, device = self._split(phi)
+        R_device_base = self.device.T_base_device_at(device)[:3, :3].T
+        return R_device_base @ point_by_twist(self.target.in_base(own, T_base_flange))
 
     def by_parameter(self, phi: Floats, T_base_flange: Floats) -> Floats:
-        R_device_base = self.device.T_base_device_at(phi[3:])[:3, :3].T
-        by_device = self.device.seen_by_parameter(phi[3:], self.target.in_base(phi[:3], T_base_flange))
-        return np.concatenate([R_device_base @ T_base_flange[:, :3, :3], by_device], axis=-1)
+        own, device = self._split(phi)
+        R_device_base = self.device.T_base_device_at(device)[:3, :3].T
+        by_device = self.device.seen_by_parameter(device, self.target.in_base(own, T_base_flange))
+        by_target = self.target.by_correction(R_device_base @ T_base_flange[:, :3, :3])
+        return np.concatenate([by_target, by_device], axis=-1)
+
+    def _split(self, phi: Floats) -> tuple[Floats, Floats]:
+        """Values of the targets and of the device."""
+        n = len(self.target.parameters)
+        return phi[:n], phi[n:]
 
 
 SAID_COLUMNS = "columns x_m, y_m, z_m"
@@ -141,7 +150,19 @@ def device_of(found: Found) -> Floats:
 def predicted_positions(found: Found, T_base_flange: Floats, samples: Samples) -> Columns:
     """The target in the device's frame."""
     T = device_of(found)
-    return dict(zip(POSITION, ((found.tip_at(T_base_flange) - T[:3, 3]) @ T[:3, :3]).T, strict=True))
+    return dict(zip(POSITION, ((_seen_at(found, T_base_flange, samples) - T[:3, 3]) @ T[:3, :3]).T, strict=True))
+
+
+def _seen_at(found: Found, T_base_flange: Floats, samples: Samples) -> Floats:
+    """(row, 3) the target of each row in the base: NaN in a row that names none where others do."""
+    named = samples.integers(TARGET, 0)
+    if not found.rig.targets or not named.any():
+        return found.tip_at(T_base_flange)
+    out = np.full((len(named), 3), np.nan)
+    rows = np.flatnonzero(named)
+    several = targets_of(found.rig, named[rows]).placed(found.about)
+    out[rows] = several.in_base(found.values_of(several.parameters), T_base_flange[rows])
+    return out
 
 
 def _build(table: SampleTable) -> Measured | None:
@@ -149,15 +170,18 @@ def _build(table: SampleTable) -> Measured | None:
     if len(rows) == 0:
         return None
     own = {NOISE.name: np.full((len(rows), 3), position_sigma_m(table.rig))}
-    chain = Chain(table.arm, Position(table.target, table.device()))
+    chain = Chain(table.arm, Position(table.targets(rows) or table.target, table.device()))
     return table.measured(KIND.name, chain, rows, table.position_m[rows], own)
 
 
 def _witness(rig: Rig, samples: Samples, q_rad: Floats) -> Witness | None:
-    rows = thinned(filled(samples, *POSITION))
+    """Of several targets the one that was read most: the witness knows one point."""
+    each = by_target(rig, samples, filled(samples, *POSITION))
+    rows, point_m = max(each, key=lambda found: len(found[0]), default=(np.zeros(0, dtype=np.intp), None))
+    rows = thinned(rows)
     if len(rows) < FEWEST_POSES:
         return None
-    return PositionWitness(q_rad[rows], stacked(samples, POSITION)[rows], drawn_point_m(rig))
+    return PositionWitness(q_rad[rows], stacked(samples, POSITION)[rows], point_m)
 
 
 KIND = SensorKind(
@@ -166,7 +190,8 @@ KIND = SensorKind(
     title="Measured positions",
     noun="positions",
     noise=(NOISE,),
-    traits=frozenset({Trait.TARGET, Trait.DEVICE, Trait.IN_SPACE, Trait.ANGLE_ENCODERS}),
+    traits=frozenset({Trait.TARGET, Trait.SEVERAL_TARGETS, Trait.DEVICE, Trait.IN_SPACE, Trait.ANGLE_ENCODERS}),
+    frames=(Frame(TARGETS, "target", "where the targets sit on the flange", "where target"),),
     reads=POSITION,
     asks=POSITION,
     build=_build,

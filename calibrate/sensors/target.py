@@ -6,15 +6,19 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording.rig import Rig
 from calibrate.parameters import Parameter
 from calibrate.rigid import cross_matrix
 from calibrate.sensors.model import About
+from calibrate.sensors.shared_points import SharedPoints
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 POINT_PLAUSIBLE_M = 5e-3  # a bracket or stylus fitted by hand, against the drawing
 UNKNOWN_PLAUSIBLE_M = 0.2  # nobody says where the target sits: somewhere about the flange
 N_PARAMETERS = 3
+TARGETS = "target"  # parameters of several are target<id>.x, ...
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,52 @@ class Target:
     def in_base(self, tool: Floats, T_base_flange: Floats) -> Floats:
         """(pose, 3) the target in the base for corrections (3,) and flange poses (pose, 4, 4)."""
         return T_base_flange[:, :3, :3] @ (self.point_m + tool) + T_base_flange[:, :3, 3]
+
+    def by_correction(self, R_flange: Floats) -> Floats:
+        """(pose, k, 3) derivative, by the corrections, of what turns with the flange as R_flange (pose, k, 3)."""
+        return R_flange
+
+    def select(self, rows: NDArray[np.intp]) -> Self:
+        """The same at some of the poses."""
+        return self
+
+
+@dataclass(frozen=True)
+class Targets:
+    """Several points in the flange frame, one at a pose; parameters are corrections to each, point by point."""
+
+    points: SharedPoints  # target -> (3,) in the flange
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return self.points.parameters
+
+    def about(self) -> About:
+        """Points in the flange that the corrections start from."""
+        return self.points.about()
+
+    def placed(self, about: About) -> Self:
+        """The same where a model's corrections start from."""
+        return replace(self, points=self.points.placed(about))
+
+    def in_base(self, shifts: Floats, T_base_flange: Floats) -> Floats:
+        """(pose, 3) each pose's target in the base for corrections (3 target,) and flange poses (pose, 4, 4)."""
+        at = self.points.at_poses_m(shifts)
+        return np.einsum("nij,nj->ni", T_base_flange[:, :3, :3], at) + T_base_flange[:, :3, 3]
+
+    def by_correction(self, R_flange: Floats) -> Floats:
+        """(pose, k, 3 target) derivative by the corrections; R_flange (pose, k, 3) as above."""
+        return self.points.by_shift(R_flange)
+
+    def select(self, rows: NDArray[np.intp]) -> Self:
+        """The same at some of the poses."""
+        return replace(self, points=self.points.select(rows))
+
+
+def targets_of(rig: Rig, target: Ints) -> Targets:
+    """The [[target]] of each pose (pose,), as drawn. DataError for one that the rig does not have."""
+    points = {k: np.array(t.point_m) for k, t in rig.targets.items()}
+    return Targets(SharedPoints(TARGETS, points, target, POINT_PLAUSIBLE_M))
 
 
 def point_by_twist(point_m: Floats) -> Floats:

@@ -193,6 +193,7 @@ def _tolerance_faults(rig: Rig) -> Iterator[Fault]:
 
 
 def _artefact_faults(rig: Rig) -> Iterator[Fault]:
+    yield from _twice(("target",), tuple(target.id for target in rig.target_list))
     yield from _twice(("bar",), tuple(bar.id for bar in rig.bar_list))
     yield from _twice(("bar_position",), tuple(position.id for position in rig.bar_position_list))
     yield from _twice(("seat",), tuple(seat.id for seat in rig.seat_list))

@@ -136,6 +136,13 @@ class Tool(Struct, frozen=True, forbid_unknown_fields=True):
     probe_diameter_m: PartSizeOrNone | None = None  # of the ball whose centre is `point_m`
 
 
+class Target(Struct, frozen=True, forbid_unknown_fields=True):
+    """One of several targets (reflectors) on the flange: where it sits in the flange frame."""
+
+    id: Identity
+    point_m: ArmVector
+
+
 class Fixture(Struct, frozen=True, forbid_unknown_fields=True):
     """Two square detectors that see each other."""
 
@@ -366,6 +373,7 @@ class Rig(Struct, frozen=True, forbid_unknown_fields=True):
     name: Name
     arm: Arm
     tool: Tool = Tool()
+    target_list: Few[Target] = field(name="target", default=())
     fixture: Fixture | None = None
     placement_list: Few[Placement] = field(name="placement", default=())
     device: Pose | None = None  # measuring device of position and wire observations, in the base frame
@@ -397,6 +405,11 @@ class Rig(Struct, frozen=True, forbid_unknown_fields=True):
     def bars(self) -> Mapping[int, Bar]:
         """By id, in the order of the file."""
         return {bar.id: bar for bar in self.bar_list}
+
+    @property
+    def targets(self) -> Mapping[int, Target]:
+        """By id, in the order of the file."""
+        return {target.id: target for target in self.target_list}
 
     @property
     def seats(self) -> Mapping[int, Seat]:
