@@ -19,7 +19,7 @@ from calibrate.problem import Problem
 from calibrate.read_samples import Angles
 from calibrate.rigid import transform
 from calibrate.sensors.device import Device
-from calibrate.sensors.target import UNKNOWN_PLAUSIBLE_M, Target, Targets, targets_of
+from calibrate.sensors.target import UNKNOWN_PLAUSIBLE_M, SeveralTargets, Target, targets_of
 from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
@@ -111,7 +111,7 @@ class SampleTable:
                 return Target(found_m, UNKNOWN_PLAUSIBLE_M)
         raise DataError(f"rig {self.rig.name}: wire and bar rows need tool.point_m, the target in the flange frame")
 
-    def targets(self, rows: Indices) -> Targets | None:
+    def targets(self, rows: Indices) -> SeveralTargets | None:
         """Those that the samples name at these rows; None where they name none, and the tool's point is meant.
 
         DataError for several that the rig does not have: one point for all of them would be their scatter.

@@ -180,7 +180,9 @@ def _target_faults(table: Table, rig: Rig) -> Iterator[Fault]:
         seen = ~np.isnan(table[POSITION[0]])
         lacking = seen & np.isnan(named)
         if lacking.any() and not lacking[seen].all():
-            yield from _first(lacking, TARGET, "the value is missing, though other positions name theirs; say which")
+            yield from _first(
+                lacking, TARGET, "the value is missing, though other positions name theirs; name it here, too"
+            )
 
 
 def _bar_faults(table: Table, rig: Rig) -> Iterator[Fault]:

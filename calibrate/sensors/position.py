@@ -22,7 +22,7 @@ from calibrate.sample_table import SampleTable
 from calibrate.sensors.device import Device
 from calibrate.sensors.kind import Columns, Found, Frame, NoiseSource, SensorKind, Trait
 from calibrate.sensors.model import About, Usage
-from calibrate.sensors.target import TARGETS, Target, Targets, point_by_twist, targets_of
+from calibrate.sensors.target import TARGETS, SeveralTargets, Target, point_by_twist, targets_of
 from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
@@ -35,7 +35,7 @@ NOISE = NoiseSource("position", "m", "position_m")
 class Position(Usage):
     """Observed at a pose: x, y, z of the target in the device's frame. Parameters: 3 of each target, device 6."""
 
-    target: Target | Targets
+    target: Target | SeveralTargets
     device: Device
 
     unit = "m"

@@ -56,7 +56,7 @@ class Target:
 
 
 @dataclass(frozen=True)
-class Targets:
+class SeveralTargets:
     """Several points in the flange frame, one at a pose; parameters are corrections to each, point by point."""
 
     points: SharedPoints  # target -> (3,) in the flange
@@ -87,10 +87,10 @@ class Targets:
         return replace(self, points=self.points.select(rows))
 
 
-def targets_of(rig: Rig, target: Ints) -> Targets:
+def targets_of(rig: Rig, target: Ints) -> SeveralTargets:
     """The [[target]] of each pose (pose,), as drawn. DataError for one that the rig does not have."""
     points = {k: np.array(t.point_m) for k, t in rig.targets.items()}
-    return Targets(SharedPoints(TARGETS, points, target, POINT_PLAUSIBLE_M))
+    return SeveralTargets(SharedPoints(TARGETS, points, target, POINT_PLAUSIBLE_M))
 
 
 def point_by_twist(point_m: Floats) -> Floats:

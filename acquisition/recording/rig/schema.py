@@ -136,7 +136,7 @@ class Tool(Struct, frozen=True, forbid_unknown_fields=True):
     probe_diameter_m: PartSizeOrNone | None = None  # of the ball whose centre is `point_m`
 
 
-class Target(Struct, frozen=True, forbid_unknown_fields=True):
+class FlangeTarget(Struct, frozen=True, forbid_unknown_fields=True):
     """One of several targets (reflectors) on the flange: where it sits in the flange frame."""
 
     id: Identity
@@ -373,7 +373,7 @@ class Rig(Struct, frozen=True, forbid_unknown_fields=True):
     name: Name
     arm: Arm
     tool: Tool = Tool()
-    target_list: Few[Target] = field(name="target", default=())
+    target_list: Few[FlangeTarget] = field(name="target", default=())
     fixture: Fixture | None = None
     placement_list: Few[Placement] = field(name="placement", default=())
     device: Pose | None = None  # measuring device of position and wire observations, in the base frame
@@ -407,7 +407,7 @@ class Rig(Struct, frozen=True, forbid_unknown_fields=True):
         return {bar.id: bar for bar in self.bar_list}
 
     @property
-    def targets(self) -> Mapping[int, Target]:
+    def targets(self) -> Mapping[int, FlangeTarget]:
         """By id, in the order of the file."""
         return {target.id: target for target in self.target_list}
 

@@ -6,7 +6,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from acquisition.recording.errors import SamplesError
-from acquisition.recording.rig.schema import Target
+from acquisition.recording.rig.schema import FlangeTarget
 from acquisition.recording.sample_rules import checked_samples
 from calibrate.errors import DataError
 from calibrate.identification.identify import identify
@@ -17,7 +17,7 @@ from .conftest import SHIFT, TOOL, TURN, changed, table
 
 NOISE_M = 2e-5
 TRUE_M = {1: TOOL, 2: np.array([-0.071, 0.043, 0.061]), 7: np.array([0.012, -0.084, 0.072])}
-DRAWN = tuple(Target(k, tuple(np.round(point, 2).tolist())) for k, point in TRUE_M.items())
+DRAWN = tuple(FlangeTarget(k, tuple(np.round(point, 2).tolist())) for k, point in TRUE_M.items())
 N = 90
 
 
@@ -85,7 +85,11 @@ def test_a_wire_that_names_a_target_is_refused(several, drawn):
 
 @pytest.mark.parametrize(
     ("cell", "says"),
-    [(3.0, r"3 is not a \[\[target\]\] of the rig"), (1.5, "not a whole number"), (None, "name theirs; say which")],
+    [
+        (3.0, r"3 is not a \[\[target\]\] of the rig"),
+        (1.5, "not a whole number"),
+        (None, "name theirs; name it here, too"),
+    ],
 )
 def test_a_row_that_names_no_target_of_the_rig_is_refused(several, drawn, cell, says):
     cells = {name: drawn.columns[name].tolist() for name in drawn.names}
