@@ -35,6 +35,6 @@ def said_of(rig: Rig) -> str | None:
     """One line for a person about what a fit to spots of this rig believes unasked; None where the rig states it."""
     if rig.tolerance is not None:
         return None
-    links = f"links assumed to ±  {1e3 * WIDE.length_sigma_m:g} mm, {1e3 * WIDE.angle_sigma_rad:g} mrad"
+    links = f"links assumed to ± {1e3 * WIDE.length_sigma_m:g} mm, {1e3 * WIDE.angle_sigma_rad:g} mrad"
     pair = f"PSD 2 in PSD 1 to ± {1e3 * PAIR.length_sigma_m:g} mm, {1e3 * PAIR.angle_sigma_rad:g} mrad"
     return f"no [tolerance]: {links}, {pair}; what only this assumption determines gets no number"

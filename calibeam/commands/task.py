@@ -47,7 +47,7 @@ def task_command(
     out
         teach: the taught task file, TASK-taught.toml if not given. run: folder for the drawings of the plans, out/task.
     poses
-        teach: recorded poses instead of placing the arm now, a CSV of `position` and `q1_deg` or `q1_rad` onwards.
+        teach: recorded poses instead of placing the arm now, a CSV of `at` and `q1_deg` or `q1_rad` onwards.
     model
         The model.json of an identification, for its corrected kinematics; else the rig file's.
     speed

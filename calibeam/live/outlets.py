@@ -14,9 +14,15 @@ from math import isfinite
 from typing import Any, Protocol
 
 from acquisition.errors import AcquisitionError
-from acquisition.recording.mcap.layout import VIEW_TOPIC, Field, FieldType, MessageType, log_ns, message_type, packed
-from acquisition.recording.mcap.write_thread import VIEW_S
-from acquisition.recording.recording import Channel, scalar_names
+from acquisition.recording.mcap.layout import (
+    VIEW_S,
+    VIEW_TOPIC,
+    MessageType,
+    element_names,
+    log_ns,
+    packed,
+    view_type,
+)
 from acquisition.recording.samples import SPOTS
 from acquisition.wires.psd_view import PsdView, psd_window
 from calibeam.devices.site import VIEWED
@@ -53,7 +59,7 @@ class LiveViews:
         for name in VIEWED.get(device, ()):
             if name in block.values:
                 newest = block.values[name][-1]
-                names = scalar_names(Channel(name, "", newest.shape))
+                names = element_names(name, newest.shape)
                 values |= dict(zip(names, map(float, newest.reshape(-1)), strict=True))
         self._send(device, values)
         view = self._spots() if device == "psd" else None
@@ -62,8 +68,7 @@ class LiveViews:
             self._send("spots", {"host_s": host_s} | dict(zip(SPOTS, map(float, spots_m), strict=True)))
 
     def _send(self, stream: str, values: dict[str, float]) -> None:
-        fields = tuple(Field(name, FieldType.DOUBLE) for name in values)
-        kind = message_type(f"{stream.replace('-', '_')}_view", fields)
+        kind = view_type(stream, tuple(values))
         for outlet in self._outlets:
             outlet.view(VIEW_TOPIC + stream, kind, values)
 

@@ -100,9 +100,11 @@ def recorded_poses(path: Path, n_joints: int) -> dict[str, Floats]:
                 raise TaskError(
                     f"{path}, line {number}: joint {joint} is {text!r}; give it as q{joint}_deg or q{joint}_rad"
                 ) from None
-        name = (row.get("position") or "").strip()
+        name = (row.get("at") or "").strip()
         if not name or not np.isfinite(values).all():
-            raise TaskError(f"{path}, line {number}: a row is a position and {n_joints} finite joint readings")
+            raise TaskError(
+                f"{path}, line {number}: a row is a position in column 'at' and {n_joints} finite joint readings"
+            )
         found[name] = np.array(values)
     return found
 

@@ -1,13 +1,12 @@
 """When a look may begin: what the PSD box's clock shows once the arm stands, or later, never earlier."""
 
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 import pytest
 
-from acquisition.wires.bench import LATENESS_S, Pumps, Speeds, WiredBench
-from acquisition.wires.streams import Pump, Supervisor
-from drivers.clock import SystemClock
+from acquisition.wires.bench import LATENESS_S, device_time
+from acquisition.wires.streams import Pump
 from drivers.device import Block
 
 FRAME_S = 0.01  # of device time
@@ -28,21 +27,14 @@ class Arrived:
         return [block for block in self._blocks if block.host_s[-1] > after_host_s]
 
 
-def bench(box: Arrived, hurry: float) -> WiredBench:
-    never: Any = None
-    pump = cast(Pump, box)
-    supervisor = Supervisor(lambda: None, SystemClock())
-    return WiredBench(never, Pumps(pump, pump), never, Speeds(1.0, 1.0), supervisor, SystemClock(), never, hurry)
-
-
 @pytest.mark.parametrize("hurry", [1.0, 8.0])
 def test_a_device_that_keeps_its_pace_is_known_to_the_lateness_of_its_frames(hurry: float) -> None:
     box = Arrived(pace=hurry)
-    assert bench(box, hurry)._psd_time(box.host_s) == pytest.approx(box.now_device_s, abs=1e-3 * hurry + 1e-6)
+    assert device_time(cast(Pump, box), box.host_s, hurry) == pytest.approx(box.now_device_s, abs=1e-3 * hurry + 1e-6)
 
 
 @pytest.mark.parametrize("hurry", [2.0, 8.0])
 def test_an_emulator_that_falls_behind_is_waited_for_as_long_as_it_lost_in_two_of_its_seconds(hurry: float) -> None:
     box = Arrived(pace=0.8 * hurry)
-    ahead_s = bench(box, hurry)._psd_time(box.host_s) - box.now_device_s
+    ahead_s = device_time(cast(Pump, box), box.host_s, hurry) - box.now_device_s
     assert 0.0 < ahead_s < 0.25 * LATENESS_S

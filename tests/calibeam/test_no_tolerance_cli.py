@@ -27,7 +27,7 @@ def test_such_a_folder_is_identified_predicted_and_reported(folder, tmp_path, ca
     model, page = tmp_path / "model.json", tmp_path / "report.html"
     assert run(["identify", str(folder), "--out", str(model)]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "no [tolerance]: links assumed to ±  5 mm, 10 mrad, PSD 2 in PSD 1 to ± 1 mm, 5 mrad" in said
+    assert "no [tolerance]: links assumed to ± 5 mm, 10 mrad, PSD 2 in PSD 1 to ± 1 mm, 5 mrad" in said
     found = read_model(model)
     assert found.rms_distance_after_m < 5e-6
     told = {p.name: p.undetermined for p in found.parameters}

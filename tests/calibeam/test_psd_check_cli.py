@@ -102,7 +102,7 @@ def test_a_rig_with_the_wrong_sign_is_corrected(bench, places, tmp_path, monkeyp
     assert "first, then measure the map again" in " ".join(error.split())
     assert not made.exists()
     assert "unit 1: x_signs -1, the rig file has 1: correct x_signs" in text
-    assert "the rig says 40: correct sum_full_scale_v" in text
+    assert "the rig file has 40: correct sum_full_scale_v" in text
 
 
 @pytest.mark.parametrize(

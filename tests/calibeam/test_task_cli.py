@@ -141,7 +141,7 @@ def test_a_task_is_taught_run_and_gripped(rig: Path, belt: str, tmp_path: Path, 
     poses = tmp_path / "poses.csv"
     with poses.open("w", newline="") as sink:
         rows = csv.writer(sink)
-        rows.writerow(["position", *(f"q{i}_rad" for i in range(1, 7))])
+        rows.writerow(["at", *(f"q{i}_rad" for i in range(1, 7))])
         rows.writerow(["at pin", *solver.nearest(truth.solve("at pin", "T6"), HOME_RAD)])
     assert run(["task", "teach", str(file), "--rig", str(rig), "--poses", str(poses), "--out", str(taught)]) == 0
     np.testing.assert_allclose(read_task(taught).graph.value("P"), PIN, atol=1e-6)

@@ -15,6 +15,7 @@ LATER = (
     "calibrate.export.not_carried",  # of a model with effects
     "calibrate.physics",
     "calibrate.error_simulation",
+    "calibrate.iso9283",
     "calibrate.pose_design",
     "calibrate.tool_axes",
     "calibrate.verification",

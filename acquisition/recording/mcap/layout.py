@@ -16,6 +16,8 @@ from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from google.protobuf.descriptor_pb2 import FieldDescriptorProto
 from google.protobuf.message import Message
 
+from acquisition.recording.recording import Channel, scalar_names
+
 
 class FieldType(enum.Enum):
     """What one field holds; the values are protobuf's own."""
@@ -106,6 +108,7 @@ PROFILE = "calibeam"
 
 STREAM_TOPIC = "stream/"  # + name of the stream: batches of samples
 VIEW_TOPIC = "view/"  # + name of the stream: single samples for viewers
+VIEW_S = 0.05  # 20 Hz: as fast as an eye follows a curve
 SAMPLES_TOPIC = "samples"
 EVENTS_TOPIC = "events"
 GAPS_TOPIC = "gaps"
@@ -125,6 +128,16 @@ def checksum(values: Mapping[str, str]) -> str:
     """Of a metadata record: CRC-32 of "key=value" and a line feed each, sorted by key, UTF-8."""
     text = "".join(f"{key}={value}\n" for key, value in sorted(values.items()) if key != CHECKSUM)
     return f"{zlib.crc32(text.encode()):08x}"
+
+
+def view_type(stream: str, names: tuple[str, ...]) -> MessageType:
+    """The message of a stream's view: one number a name, `host_s` among them."""
+    return message_type(f"{stream.replace('-', '_')}_view", tuple(Field(name, FieldType.DOUBLE) for name in names))
+
+
+def element_names(name: str, shape: tuple[int, ...]) -> tuple[str, ...]:
+    """Names in a view of the elements of a channel."""
+    return scalar_names(Channel(name, "", shape))
 
 
 def log_ns(host_s: float) -> int:

@@ -28,6 +28,7 @@ from acquisition.recording.mcap.layout import (
     END_METADATA,
     SAMPLES_TOPIC,
     STREAM_TOPIC,
+    VIEW_S,
     VIEW_TOPIC,
     Field,
     FieldType,
@@ -36,13 +37,13 @@ from acquisition.recording.mcap.layout import (
     log_ns,
     message_type,
     packed,
+    view_type,
 )
 from acquisition.recording.mcap.mcap_file import McapFile
 from acquisition.recording.recording import Channel, scalar_names
 from acquisition.recording.samples import Cell, Floats, Kind, kind_of
 
 BATCH = 100  # samples a message: a tenth of the time and of the size of single ones, measured with this library
-VIEW_S = 0.05  # 20 Hz: as fast as an eye follows a curve
 
 _CLOCKS = (("host_s", FieldType.DOUBLE), ("device_s", FieldType.DOUBLE), ("sequence", FieldType.INT64))
 
@@ -97,7 +98,7 @@ class StreamEncoder:
         self._batch = file.topic(STREAM_TOPIC + self._name, batch, {"channels": channels_json(self._channels)}), batch
         if self._viewed:
             names = ("host_s", *(name for channel in self._viewed for name in scalar_names(channel)))
-            view = message_type(f"{identifier}_view", tuple(Field(name, FieldType.DOUBLE) for name in names))
+            view = view_type(self._name, names)
             self._view = file.topic(VIEW_TOPIC + self._name, view, {}), view
 
     def _emit_batch(self, file: McapFile, piece: Piece, rows: slice) -> None:

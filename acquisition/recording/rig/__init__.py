@@ -15,8 +15,6 @@ from acquisition.recording.rig.schema import (
     Placement,
     Pose,
     Rig,
-    Site,
-    SiteInstrument,
     Sphere,
     Tolerance,
 )
@@ -30,8 +28,6 @@ __all__ = [
     "Placement",
     "Pose",
     "Rig",
-    "Site",
-    "SiteInstrument",
     "Sphere",
     "Tolerance",
     "load_rig",

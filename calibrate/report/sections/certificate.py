@@ -1,7 +1,7 @@
 """What makes the report a certificate: which robot, who, where, with what; blank lines in print for what is absent."""
 
 from acquisition.recording import Recording
-from acquisition.recording.rig import SiteInstrument
+from acquisition.recording.rig.schema import SiteInstrument
 from calibrate.report.elements import Html, section, tag
 
 TITLE = "Certificate"

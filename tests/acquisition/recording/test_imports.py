@@ -32,6 +32,7 @@ DOORS = {  # single modules that are open beside the faces: vocabularies, and wh
             "can_log",
             "device_clock",
             "files.bounds",
+            "mcap.layout",
             "pose_plan",
             "rig.devices",
             "rig.schema",

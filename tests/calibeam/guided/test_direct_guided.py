@@ -109,7 +109,7 @@ def test_cones_alone_say_that_the_size_of_the_arm_is_only_believed(taken) -> Non
     _, summary, _ = taken
     cones = tuple(one for one in summary.readings if isinstance(one.target, Cone))
     found = identify(RIG, samples_of(cones, 6), rng=np.random.default_rng(1), held_out_share=0.0)
-    assert any("cones alone show no length" in alarm for alarm in found.alarms)
+    assert any("cones alone determine no length" in alarm for alarm in found.alarms)
 
 
 def test_a_reading_off_its_cone_is_doubted_once_the_arm_is_known(taken) -> None:

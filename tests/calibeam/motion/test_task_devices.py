@@ -134,11 +134,11 @@ def test_outputs_that_are_not_there_are_refused() -> None:
 
 def test_recorded_poses_by_position_in_either_unit(tmp_path: Path) -> None:
     file = tmp_path / "poses.csv"
-    file.write_text("position,q1_deg,q2_rad\nat pin,90,0.5\nin hole 1,-45,1.0\n")
+    file.write_text("at,q1_deg,q2_rad\nat pin,90,0.5\nin hole 1,-45,1.0\n")
     np.testing.assert_allclose(recorded_poses(file, 2)["at pin"], [math.pi / 2, 0.5])
-    file.write_text("position,q1_deg,q2_rad\nat pin,ninety,0.5\n")
+    file.write_text("at,q1_deg,q2_rad\nat pin,ninety,0.5\n")
     with pytest.raises(TaskError, match=r"poses\.csv, line 2: joint 1 is 'ninety'"):
         recorded_poses(file, 2)
-    file.write_text("position,q1_deg,q2_rad\n,1,nan\n")
+    file.write_text("at,q1_deg,q2_rad\n,1,nan\n")
     with pytest.raises(TaskError, match="2 finite joint readings"):
         recorded_poses(file, 2)

@@ -197,7 +197,7 @@ def _ur(folder: Path) -> None:
     heads = ",".join(f"q{i}_deg" for i in range(1, 7))
     at = ("at pin", "before pin", "pin lifted", "in hole 1", "before hole 1", "touching hole 1", "upright in hole 1")
     rows = [f"{name},{4 * k},-90,90,-90,-90,{k}" for k, name in enumerate((*at, "in hole 2"))]
-    (folder / "taught.csv").write_text("\n".join((f"position,{heads}", *rows, "")), encoding="utf-8")
+    (folder / "taught.csv").write_text("\n".join((f"at,{heads}", *rows, "")), encoding="utf-8")
     errors = (RIGS / "errors" / "arm-cmm.toml").read_text("utf-8").replace("heat.link5", "heat.link2")
     for narrower in FEW_ERRORS:
         errors = errors.replace(*narrower)

@@ -30,7 +30,7 @@ def test_every_kind_of_case_has_its_sentence(case: Case, found: Found) -> None:
     single, nothing, outside, gain, wrong = map(_plain, summary(cases))
     assert "2 single causes" in single
     assert "located 100 % (34-100), named 50 %" in single
-    assert nothing == "2 sessions with nothing wrong: something was said in 50 % (9-91)."
+    assert nothing == "2 sessions with nothing wrong: something was reported in 50 % (9-91)."
     assert "1 mechanisms of no catalogue: located 100 %" in outside
     assert "removes 0.98 (median)" in gain
     assert wrong.startswith("2 of 5 cases")

@@ -88,4 +88,4 @@ def test_a_value_that_the_data_do_not_tell_has_no_sigma_that_pretends_it(world):
 
 
 def test_a_size_without_a_sigma_is_not_told_in_words_or_file():
-    assert "not told" in plain("shift_x_m", Size(1e-5, np.inf))
+    assert "not determined" in plain("shift_x_m", Size(1e-5, np.inf))

@@ -10,7 +10,8 @@ import msgspec
 import pytest
 
 from acquisition.recording.errors import RecordingError
-from acquisition.recording.rig import Site, SiteInstrument, load_rig, parse_rig, rig_text
+from acquisition.recording.rig import load_rig, parse_rig, rig_text
+from acquisition.recording.rig.schema import Site, SiteInstrument
 from calibrate.model_file import ModelParameter
 from calibrate.report.elements import Html
 from calibrate.report.page import page

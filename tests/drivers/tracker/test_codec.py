@@ -85,8 +85,8 @@ def test_json_that_is_refused(line, says) -> None:
         (("x", "y", "z", "azimuth"), ",", ".", (), "'azimuth' is not known"),
         (("x", "y", "z", "status"), ",", ".", (), "needs 'good'"),
         (("x", "y", "z"), ",", ".", ("0",), "'good' a status column"),
-        (("x", "y", "z"), ",", ",", (), "cannot be told apart"),
-        (("x", "y", "z"), "-", ".", (), "cannot be told apart"),
+        (("x", "y", "z"), ",", ",", (), "cannot be distinguished"),
+        (("x", "y", "z"), "-", ".", (), "cannot be distinguished"),
         (("x", "y", "z"), ", ", ".", (), "give one character"),
     ],
 )
