@@ -19,12 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
+from acquisition.errors import InterruptedMotionError
 from acquisition.motion.cell import Cell
 from acquisition.motion.gate import Gate
 from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.paths.segments import Segment
 from acquisition.motion.plan import Plan
-from acquisition.motion.states import MotionState
+from acquisition.motion.states import OVER, MotionState
 from acquisition.recording.rig import Rig
 from calibeam.asking import YES, Asking, at_terminal, someone
 from calibeam.interrupts import INTERRUPTS
@@ -43,9 +44,14 @@ class MotionKeys:
     def __init__(self, gate: Gate, asking: Asking | None, out: TextIO) -> None:
         self._gate, self._asking, self._out = gate, asking, out
         self._thread: threading.Thread | None = None
+        self._between = False
 
     def interrupted(self) -> None:
-        """Ctrl-C."""
+        """Ctrl-C; where nothing is under way, the next motion ends before it begins (`beside`)."""
+        if self._gate.state in OVER:
+            self._between = True
+            print("\nnothing moves now, and nothing will: the program ends", file=self._out, flush=True)
+            return
         if self._held():
             self._gate.abort()
             return
@@ -61,7 +67,18 @@ class MotionKeys:
 
     def ended(self) -> None:
         """The process shall end."""
+        self._between = self._between or self._gate.state in OVER
         self._gate.abort()
+
+    def beside(self, watch: Callable[[], None]) -> Callable[[], None]:
+        """`watch`, and InterruptedMotionError in a motion that begins after a key or signal came while none did."""
+
+        def both() -> None:
+            watch()
+            if self._between:
+                raise InterruptedMotionError("stopped by hand while nothing moved; the arm stands, the program ends")
+
+        return both
 
     def word(self, text: str) -> None:
         """One line of the keyboard."""
@@ -165,8 +182,8 @@ def move_by_hand(rig: Rig, model: Path | None, asked: Asked, agreement: Agreemen
 
 def _drive(gate: Gate, made: Plan, joints: Callable[[], Floats], watch: Callable[[], None], console: Console) -> Floats:
     now_rad = joints()
-    with keys_of(gate):
-        followed = gate.run(made, now_rad, watch=watch)
+    with keys_of(gate) as keys:
+        followed = gate.run(made, now_rad, watch=keys.beside(watch))
     end_rad = joints()
     off = float(np.max(np.abs(end_rad - made.q_rad[-1])))
     console.print(

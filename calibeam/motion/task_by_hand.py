@@ -7,13 +7,14 @@ import csv
 import math
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
-from acquisition.errors import TaskError
+from acquisition.errors import RefusedMotionError, TaskError
 from acquisition.motion.following import Followed
 from acquisition.motion.plan import Plan
 from acquisition.motion.run_task import Around, next_sweep, run_task
@@ -31,6 +32,7 @@ from calibeam.motion.task_devices import beside
 from drivers.clock import SystemClock
 
 Floats = NDArray[np.float64]
+MOVED_RAD = 1e-3  # as the gate allows between a plan and its motion
 Placed = Callable[[str], Floats]  # from a position's name to the readings (joint,) of the arm placed there
 
 
@@ -125,29 +127,47 @@ def run_by_hand(
         raise TaskError(f"{file}: the program lacks {len(lacking)} things, listed above; nothing was moved")
     asking = None if yes or dry else someone(at_terminal(), "whether the arm may move", YES)
     clock, solver = SystemClock(), solver_of(rig, model)
-    plans: list[Path] = []
-
-    def planned(made: Plan) -> None:
-        plans.append(out / f"plan-{len(plans) + 1}.svg")
-        draw_plan_file(made, cell_of(rig), plans[-1])
-        console.print(said(made, plans[-1]), soft_wrap=True)
-        if asking is not None and len(plans) == 1:
-            asking.may_move()
-
     with streamed_robot(rig, clock) as robot:
         gate = gate_of(rig, solver, robot.arm, clock, speed)
+        plans = _Plans(rig, out, console)
+        segments, count = next_sweep(task.graph, tuple(unrolled(task.program)))
+        if segments:
+            first = gate.plan(robot.joints(), segments)
+            plans.show(first)
+            plans.agreed = first
         if dry:
-            segments, count = next_sweep(task.graph, tuple(unrolled(task.program)))
-            if segments:
-                planned(gate.plan(robot.joints(), segments))
             console.print(_unplanned(task, count), soft_wrap=True)
             return
-        with beside(task, file.parent, rig, robot, clock) as devices:
-            watch = robot.supervisor.check
-            around = Around(robot.joints, devices.read, devices.act, devices.belt, watch, planned)
-            with keys_of(gate):
-                ran = run_task(gate, task, around)
+        if asking is not None:
+            asking.may_move()
+        with beside(task, file.parent, rig, robot, clock) as devices, keys_of(gate) as keys:
+            watch = keys.beside(robot.supervisor.check)
+            around = Around(robot.joints, devices.read, devices.act, devices.belt, watch, plans.show)
+            ran = run_task(gate, task, around)
     console.print(_ran([followed for _, followed in ran.sweeps]), soft_wrap=True)
+
+
+@dataclass
+class _Plans:
+    """Draws and prints each motion before it is made; the first is shown before the question, then planned again."""
+
+    rig: Rig
+    out: Path
+    console: Console
+    agreed: Plan | None = None  # shown already, and not made yet
+    _count: int = 0
+
+    def show(self, made: Plan) -> None:
+        """RefusedMotionError where the arm was moved since the plan that was agreed to."""
+        agreed, self.agreed = self.agreed, None
+        if agreed is not None:
+            if np.max(np.abs(made.start_rad - agreed.start_rad)) > MOVED_RAD:
+                raise RefusedMotionError("the arm was moved after its plan was shown; nothing was moved: run it again")
+            return
+        self._count += 1
+        file = self.out / f"plan-{self._count}.svg"
+        draw_plan_file(made, cell_of(self.rig), file)
+        self.console.print(said(made, file), soft_wrap=True)
 
 
 def _unplanned(task: Task, count: int) -> str:

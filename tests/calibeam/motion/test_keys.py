@@ -5,6 +5,7 @@ import signal
 
 import pytest
 
+from acquisition.errors import InterruptedMotionError
 from acquisition.motion.states import MotionEvent, MotionState, after
 from calibeam.asking import Asking
 from calibeam.interrupts import INTERRUPTS
@@ -52,6 +53,27 @@ def test_ctrl_c_pauses_then_holds_then_gives_up() -> None:
     assert gate.told == ["pause", "hold", "abort"]
     assert "resting at the next place within 0.7 s; Ctrl-C again brakes now" in out.getvalue()
     assert "at rest within 0.4 s; Ctrl-C again gives the motion up" in out.getvalue()
+
+
+@pytest.mark.parametrize("state", [MotionState.IDLE, MotionState.DONE])
+@pytest.mark.parametrize("key", ["interrupted", "ended"])
+def test_a_key_while_nothing_moves_ends_the_next_motion_before_it_begins(state: MotionState, key: str) -> None:
+    gate, watched = Told(state), list[str]()
+    keys = MotionKeys(gate, None, io.StringIO())  # type: ignore[arg-type]
+    watch = keys.beside(lambda: watched.append("looked"))
+    watch()
+    getattr(keys, key)()
+    gate.state = MotionState.MOVING  # the next motion of a program
+    with pytest.raises(InterruptedMotionError, match="while nothing moved"):
+        watch()
+    assert watched == ["looked", "looked"]
+
+
+@pytest.mark.parametrize("key", ["interrupted", "ended"])
+def test_a_key_in_a_motion_is_left_to_the_gate_that_brakes_it(key: str) -> None:
+    keys = MotionKeys(Told(MotionState.MOVING), None, io.StringIO())  # type: ignore[arg-type]
+    getattr(keys, key)()
+    keys.beside(lambda: None)()
 
 
 @pytest.mark.parametrize(("word", "told"), [("r\n", "resume"), ("Stop", "stop"), ("a", "abort"), ("h", "halt")])

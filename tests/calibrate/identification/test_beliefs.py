@@ -112,5 +112,5 @@ def test_a_plan_that_states_a_belief_makes_it_one(silent, bent):
 
 def test_a_person_is_told_what_is_believed_unasked(rig, silent):
     assert said_of(rig) is None
-    assert "no [tolerance]: links assumed to ±  5 mm, 10 mrad, PSD 2 in PSD 1 to ± 1 mm, 5 mrad" in said_of(silent)
+    assert "no [tolerance]: links assumed to ± 5 mm, 10 mrad, PSD 2 in PSD 1 to ± 1 mm, 5 mrad" in said_of(silent)
     assert (PAIR.length_sigma_m, PAIR.angle_sigma_rad) == (1e-3, 5e-3)
