@@ -148,7 +148,7 @@ def figures() -> tuple[Figure, ...]:
 
 TODAY = {
     "files": 927,
-    "lines": 110_366,
+    "lines": 110_372,
     "longest_function": 54,
     "one_importer": 45,
     "classes": 38,

@@ -151,8 +151,14 @@ class Session:
         """The same command again; every joint comes the way it came the first time, or the opposite way."""
         self._say(Phase.REPEAT, block)
         way = -sample.approach if again == 1 else sample.approach
-        self._navigator.move(sample.look.cmd_rad + self._options.opposite_rad * way)
-        self._navigator.move(sample.look.cmd_rad)
+        try:
+            self._navigator.move(sample.look.cmd_rad + self._options.opposite_rad * way)
+            self._navigator.move(sample.look.cmd_rad)
+        except UnreachableError as why:  # the pose was had, but not every way to it is free
+            self._journal.event("skipped", {"placement": visit.placement, "why": str(why)})
+            self._skipped += 1
+            self._total -= 1
+            return
         self._record(visit, visit.key(again), centred=sample.centred)
 
     def _record(self, visit: Visit, key: PoseKey, *, centred: bool) -> Sample | None:

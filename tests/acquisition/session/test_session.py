@@ -10,9 +10,9 @@ import pytest
 from acquisition.bench import Look
 from acquisition.centring.navigator import GLANCE_S
 from acquisition.centring.strategies import CentringBy, CentringChoice
-from acquisition.errors import NoLightError
+from acquisition.errors import NoLightError, RefusedMotionError
 from acquisition.session.plan import PlanOptions, blocks
-from acquisition.session.records import Sample
+from acquisition.session.records import Phase, Sample
 from acquisition.session.session import Session, Summary
 from calibeam.learner import FittedLearner
 from drivers.errors import DeviceRefused
@@ -197,6 +197,37 @@ def test_a_protective_stop_in_mid_session_keeps_what_was_taken(rig, bench_of) ->
     with pytest.raises(DeviceRefused):
         session.run(tuple(rig.placements))
     assert len(kept.samples) > 5
+
+
+def test_a_repeat_whose_way_is_not_free_is_left_out_and_the_session_goes_on(rig, bench_of) -> None:
+    class Boxed:
+        """Refuses the way to the first repeat."""
+
+        def __init__(self, bench) -> None:
+            self._bench, self.refused, self.refusing = bench, 0, False
+
+        def move(self, q_rad) -> None:
+            if self.refusing and not self.refused:
+                self.refused += 1
+                raise RefusedMotionError("the tool would come within 59 mm of the keep-out box 'table'")
+            self._bench.move(q_rad)
+
+        def __getattr__(self, name):
+            return getattr(self._bench, name)
+
+    bench, kept = Boxed(bench_of(2)), Kept()
+
+    def tell(now) -> None:
+        bench.refusing = now.phase is Phase.REPEAT
+
+    session = Session(bench, FittedLearner(rig), kept, SMALL, np.array(rig.motion.home_rad), tell=tell)
+    summary = session.run((1,))
+    assert bench.refused == 1
+    assert summary.skipped == 1
+    assert [detail["why"] for kind, detail in kept.events if kind == "skipped"] == [
+        "the tool would come within 59 mm of the keep-out box 'table'"
+    ]
+    assert sum(sample.repeat is not None for sample in summary.samples) > 0
 
 
 def test_the_plan_takes_the_four_poses_of_the_source_at_every_place() -> None:
