@@ -20,7 +20,7 @@ from calibrate.parameters import Parameter
 from calibrate.sensors.catalogue import kind_of, names_with
 from calibrate.sensors.kind import Trait
 from calibrate.uncertainty.bootstrap import Bootstrap
-from calibrate.uncertainty.chi_square import Alarm, RepeatNoise, StatedNoise
+from calibrate.uncertainty.fit_statistics import Alarm, RepeatNoise, StatedNoise
 from calibrate.uncertainty.free_space import FreeSpaceError, Scatter
 
 Floats = NDArray[np.float64]

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import nan, sqrt
 
 from calibrate.model_file import Fields, ModelFile, UnseenRows
-from calibrate.uncertainty.chi_square import Alarm
+from calibrate.uncertainty.fit_statistics import Alarm
 
 
 @dataclass(frozen=True)

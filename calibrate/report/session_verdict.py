@@ -14,7 +14,7 @@ from calibrate.report.quantities import significant
 from calibrate.report.session_evidence import SessionEvidence
 from calibrate.report.verdict import AGAIN, MORE_POSES, NOISIER, UNCHECKED, WORSE_UNSEEN, Doubt, Trust, Verdict
 from calibrate.sensors.catalogue import kind_of
-from calibrate.uncertainty.chi_square import Alarm
+from calibrate.uncertainty.fit_statistics import Alarm
 from calibrate.uncertainty.redundancy import checks_nothing
 
 MANY_LEFT_OUT = 0.05  # of the rows: beyond, it is worth asking what went wrong while measuring

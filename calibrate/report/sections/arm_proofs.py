@@ -12,7 +12,7 @@ from calibrate.report.session_evidence import SessionEvidence
 from calibrate.report.unseen_table import unseen_rows
 from calibrate.sensors.catalogue import SOURCES
 from calibrate.sensors.kind import NoiseSource
-from calibrate.uncertainty.chi_square import Alarm
+from calibrate.uncertainty.fit_statistics import Alarm
 from calibrate.weighting import JOINT
 
 TITLE = "Proof and uncertainty"

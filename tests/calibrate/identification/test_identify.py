@@ -10,7 +10,7 @@ from calibrate.errors import DataError
 from calibrate.fit import Status
 from calibrate.identification.identify import identify
 from calibrate.predict import Predictor, predict
-from calibrate.uncertainty.chi_square import Alarm
+from calibrate.uncertainty.fit_statistics import Alarm
 
 from .conftest import BAR_M, table
 

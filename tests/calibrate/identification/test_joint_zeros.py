@@ -11,7 +11,7 @@ from calibrate.identification.estimates import conditional_sigma
 from calibrate.identification.identify import identify
 from calibrate.identification.rounds import coarse_start, settled_fit
 from calibrate.identification.session import instruments_for_fit
-from calibrate.uncertainty.chi_square import Alarm
+from calibrate.uncertainty.fit_statistics import Alarm
 
 from ..conftest import spot_samples
 

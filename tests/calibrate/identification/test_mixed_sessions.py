@@ -13,7 +13,7 @@ from calibrate.fit import Status
 from calibrate.fit_plan import FitPlan
 from calibrate.identification.identify import identify
 from calibrate.predict import Predictor, predict
-from calibrate.uncertainty.chi_square import Alarm
+from calibrate.uncertainty.fit_statistics import Alarm
 
 from .conftest import SHIFT, TOOL, TURN, Session
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibrate.uncertainty.chi_square import ALARM_P, Alarm, against_repeats, against_stated
+from calibrate.uncertainty.fit_statistics import ALARM_P, Alarm, against_repeats, against_stated
 
 
 def test_noise_as_stated_is_no_alarm(fitted):
