@@ -18,8 +18,8 @@ from calibrate.joint_problem import JointProblem
 from calibrate.observability import Observability, observability
 from calibrate.redundant import reduced
 from calibrate.sensors.catalogue import LENGTHS
-from calibrate.uncertainty.bootstrap import Bootstrap, bootstrap
 from calibrate.uncertainty.free_space import Scatter, Workspace, free_space_error
+from calibrate.uncertainty.held_out import Bootstrap, bootstrap
 from calibrate.weighting import JOINT
 
 Floats = NDArray[np.float64]

@@ -10,7 +10,7 @@ from calibrate.identification.estimates import Estimate
 from calibrate.identification.result import Evidence, FreeSpace
 from calibrate.model_file import BootstrapRecord, FreeSpaceRecord, ModelParameter, ObservabilityRecord, UnseenRows
 from calibrate.observability import Observability
-from calibrate.uncertainty.bootstrap import Bootstrap
+from calibrate.uncertainty.held_out import Bootstrap
 
 REACH_95 = 1.959963984540054  # of a normal law: half of a 95 % interval in sigmas
 

@@ -28,8 +28,7 @@ from calibrate.identification.session import NEGLIGIBLE_RAD, about_of
 from calibrate.parameters import Parameter, hold, plausible_sizes, priors, start_values, without_assumed
 from calibrate.problem import LeastSquares
 from calibrate.solvers.linear import triangle_of
-from calibrate.uncertainty.fit_statistics import RepeatNoise, against_repeats, against_stated
-from calibrate.uncertainty.likelihood import minus_2_log_likelihood
+from calibrate.uncertainty.fit_statistics import RepeatNoise, against_repeats, against_stated, minus_2_log_likelihood
 from calibrate.unseen_along import analyse_along, points_along
 from calibrate.weighting import JOINT
 

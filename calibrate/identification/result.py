@@ -19,9 +19,9 @@ from calibrate.observability import Observability
 from calibrate.parameters import Parameter
 from calibrate.sensors.catalogue import kind_of, names_with
 from calibrate.sensors.kind import Trait
-from calibrate.uncertainty.bootstrap import Bootstrap
 from calibrate.uncertainty.fit_statistics import Alarm, RepeatNoise, StatedNoise
 from calibrate.uncertainty.free_space import FreeSpaceError, Scatter
+from calibrate.uncertainty.held_out import Bootstrap
 
 Floats = NDArray[np.float64]
 

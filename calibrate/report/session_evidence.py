@@ -17,7 +17,7 @@ from calibrate.problem import Problem
 from calibrate.report.as_modelled import noise_of, values_of, weighting_of
 from calibrate.report.quantities import angle, length
 from calibrate.sensors.catalogue import kind_of
-from calibrate.uncertainty.redundancy import spare_readings
+from calibrate.uncertainty.fit_statistics import spare_readings
 from calibrate.weighting import Weighting
 
 Floats = NDArray[np.float64]

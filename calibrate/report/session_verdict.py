@@ -14,8 +14,7 @@ from calibrate.report.quantities import significant
 from calibrate.report.session_evidence import SessionEvidence
 from calibrate.report.verdict import AGAIN, MORE_POSES, NOISIER, UNCHECKED, WORSE_UNSEEN, Doubt, Trust, Verdict
 from calibrate.sensors.catalogue import kind_of
-from calibrate.uncertainty.fit_statistics import Alarm
-from calibrate.uncertainty.redundancy import checks_nothing
+from calibrate.uncertainty.fit_statistics import Alarm, checks_nothing
 
 MANY_LEFT_OUT = 0.05  # of the rows: beyond, it is worth asking what went wrong while measuring
 NO_BETTER = 0.95  # of the error as drawn on unseen rows: above, the identification has gained nothing

@@ -13,7 +13,7 @@ from calibrate.identification.identify import identify, without_blunders
 from calibrate.identification.record import record_of
 from calibrate.identification.rounds import settled_fit
 from calibrate.model_file import RigIdentity, read_model, write_model
-from calibrate.uncertainty.likelihood import minus_2_log_likelihood
+from calibrate.uncertainty.fit_statistics import minus_2_log_likelihood
 
 from .conftest import table
 

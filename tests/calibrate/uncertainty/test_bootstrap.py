@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calibrate.uncertainty.bootstrap import bootstrap
+from calibrate.uncertainty.held_out import bootstrap
 
 
 def share(one, drawn):

@@ -7,7 +7,7 @@ import pytest
 
 from calibrate.fit import solve
 from calibrate.parameters import Parameter
-from calibrate.uncertainty.redundancy import checks_nothing, spare_readings
+from calibrate.uncertainty.fit_statistics import checks_nothing, spare_readings
 
 
 @dataclass(frozen=True)
