@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.verification.figure import Figure, Source
-from calibrate.verification.iso10360_12 import worst_of
-from calibrate.verification.measured import Measured
+from calibrate.verification.measured_lengths import Measured
 from calibrate.verification.sphere import fitted_sphere
+from calibrate.verification.standards import worst_of
 
 Floats = NDArray[np.float64]
 STANDARD = "ASME B89.4.22-2004"

@@ -11,11 +11,11 @@ from acquisition.recording.rig import Arm, Rig, parse_rig
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
 from calibrate.predict import Predictor
-from calibrate.verification import b89_4_22, iso10360_12
+from calibrate.verification import b89_4_22, standards
 from calibrate.verification.figure import Figure, Judgement
-from calibrate.verification.measured import Measured, measured
+from calibrate.verification.measured_lengths import Measured, measured
 
-STANDARDS: tuple[Callable[[Measured], tuple[Figure, ...]], ...] = (iso10360_12.figures, b89_4_22.figures)
+STANDARDS: tuple[Callable[[Measured], tuple[Figure, ...]], ...] = (standards.figures, b89_4_22.figures)
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def verify(recording: Recording, model: ModelFile) -> Verification:
     """DataError where the recording holds nothing to verify by, or the model is of another arm or of these readings."""
     refuse_wrong_model(recording, model)
     found = measured(recording.samples, recording.rig, Predictor.of(model))
-    iso10360_12.refuse_without_probe(found)
+    standards.refuse_without_probe(found)
     figures = tuple(f for figures in STANDARDS for f in figures(found))
     return Verification(figures, len(recording.samples), found.left_out)
 

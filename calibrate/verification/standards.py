@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from calibrate.errors import DataError
 from calibrate.verification.figure import Figure, Source, judged
-from calibrate.verification.measured import Measured
+from calibrate.verification.measured_lengths import Measured
 from calibrate.verification.sphere import LEAST, Sphere, enclosing_diameter_m, fitted_sphere
 
 Floats = NDArray[np.float64]
