@@ -14,8 +14,7 @@ from calibeam.outcome import CheckFailed
 from calibeam.software import SOFTWARE
 from calibrate.report.quantities import DASH, length
 from calibrate.report.verification_page import SAYS, write_verification_page
-from calibrate.verification.file import verification_file, write_verification
-from calibrate.verification.verify import Verification, verify
+from calibrate.verification.verify import Verification, verification_file, verify, write_verification
 
 
 def verify_command(

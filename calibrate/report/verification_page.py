@@ -13,7 +13,7 @@ from calibrate.report.sections import provenance
 from calibrate.report.svg import drawn
 from calibrate.report.tones import PLACES, Tone
 from calibrate.report.verdict import Trust
-from calibrate.verification.figure import Figure, Judgement
+from calibrate.verification.measured_lengths import Figure, Judgement
 from calibrate.verification.verify import Verification
 
 CONTENTS = {"figures": "Figures of the standards", "measurements": "Measurements", "provenance": provenance.TITLE}

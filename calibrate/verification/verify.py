@@ -1,21 +1,28 @@
-"""Verification of an identified arm: the figures of both standards from a recording that the fit has not seen.
+"""Verification of an identified arm: the figures of both standards from a recording that the fit has not used.
 
-Whether a model may be judged by a recording: it has to be of this arm, and made of other readings.
+A recording is refused where it is of another arm, or where the model was made of its readings. verification.json holds
+the result, version 1 (docs/formats.md).
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import msgspec
 
 from acquisition.recording import Recording, readings_sha256
 from acquisition.recording.rig import Arm, Rig, parse_rig
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
 from calibrate.predict import Predictor
-from calibrate.verification import b89_4_22, standards
-from calibrate.verification.figure import Figure, Judgement
-from calibrate.verification.measured_lengths import Measured, measured
+from calibrate.verification import standards
+from calibrate.verification.measured_lengths import Figure, Judgement, Measured, measured
 
-STANDARDS: tuple[Callable[[Measured], tuple[Figure, ...]], ...] = (standards.figures, b89_4_22.figures)
+STANDARDS: tuple[Callable[[Measured], tuple[Figure, ...]], ...] = (
+    standards.iso10360_12_figures,
+    standards.b89_4_22_figures,
+)
 
 
 @dataclass(frozen=True)
@@ -103,3 +110,93 @@ def _parts(arm: Arm) -> list[tuple[object, ...]]:
     """What is drawn of every joint; its range and its masses may be told better later."""
     drawn = ("a_m", "alpha_rad", "d_m", "theta_offset_rad", "origin_m", "rotation_rad")
     return [tuple(getattr(joint, name, None) for name in drawn) for joint in arm.joints]
+
+
+SCHEMA = 1
+
+
+class OneMeasurement(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One of those behind a figure."""
+
+    says: str
+    value_m: float
+    permitted_m: float | None
+
+
+class FigureRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One figure of a standard."""
+
+    symbol: str
+    says: str
+    standard: str
+    section: str
+    formula: str
+    value_m: float | None
+    permitted_m: float | None
+    judgement: str
+    taken: int
+    asked: int
+    complete: bool
+    each: tuple[OneMeasurement, ...]
+    also_m: dict[str, float]
+
+
+class VerificationFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Content of verification.json."""
+
+    schema: Literal[1]
+    kind: Literal["calibeam-verification"]
+    software: str
+    rig: str
+    recording: str
+    model: str
+    samples: int
+    conforms: bool | None  # None: nothing was judged
+    says: str
+    figures: tuple[FigureRecord, ...]
+    left_out: tuple[str, ...] = ()
+
+
+def verification_file(found: Verification, *, rig: str, recording: str, model: str, software: str) -> VerificationFile:
+    """The record to write."""
+    conforms = not found.failed if found.judged else None
+    figures = tuple(_record(figure) for figure in found.figures)
+    return VerificationFile(
+        SCHEMA,
+        "calibeam-verification",
+        software,
+        rig,
+        recording,
+        model,
+        found.samples,
+        conforms,
+        found.sentence,
+        figures,
+        found.left_out,
+    )
+
+
+def _record(figure: Figure) -> FigureRecord:
+    return FigureRecord(
+        figure.symbol,
+        figure.says,
+        figure.source.standard,
+        figure.source.section,
+        figure.source.formula,
+        figure.value,
+        figure.permitted,
+        figure.judgement.name,
+        figure.taken,
+        figure.asked,
+        figure.complete,
+        tuple(OneMeasurement(*one) for one in figure.each),
+        dict(figure.also),
+    )
+
+
+def write_verification(path: Path, file: VerificationFile) -> None:
+    """Whole or not at all. OSError where the folder cannot be written."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(path.name + ".partial")
+    partial.write_bytes(msgspec.json.format(msgspec.json.encode(file), indent=1) + b"\n")
+    partial.replace(path)

@@ -10,9 +10,8 @@ from acquisition.recording import Samples
 from acquisition.recording.rig import load_rig
 from acquisition.recording.rig.schema import PermissibleErrors
 from calibrate.errors import DataError
-from calibrate.verification import b89_4_22, standards
-from calibrate.verification.figure import Judgement
-from calibrate.verification.measured_lengths import Length, Measured, measured
+from calibrate.verification import standards
+from calibrate.verification.measured_lengths import Judgement, Length, Measured, measured
 from calibrate.verification.verify import Verification
 
 RIG = load_rig(Path(__file__).parents[3] / "rigs" / "arm-cmm-reference.toml")
@@ -36,7 +35,7 @@ def by_symbol(figures):
 
 def test_size_is_the_diameter_less_the_probes_and_the_calibrated():
     touches = {(1, 0): ball(25, 0.025_004), (2, 0): ball(25, 0.024_990)}
-    found = by_symbol(standards.figures(holding(touches=touches)))["P_Size"]
+    found = by_symbol(standards.iso10360_12_figures(holding(touches=touches)))["P_Size"]
     assert found.value == pytest.approx(-10e-6, abs=1e-10)
     assert [value for _, value, _ in found.each] == pytest.approx([4e-6, -10e-6], abs=1e-10)
     assert found.judgement is Judgement.CONFORMS
@@ -46,27 +45,27 @@ def test_size_is_the_diameter_less_the_probes_and_the_calibrated():
 def test_form_is_the_span_of_distances_from_the_middle():
     middle, high, low = np.zeros(3), ball(12, 0.025, middle=(0, 0, 0)), ball(12, 0.025_020, middle=(0, 0, 0), seed=2)
     touches = middle + np.concatenate([high, -high, low, -low])  # opposite touches alike: the middle stays
-    found = by_symbol(standards.figures(holding(touches={(1, 0): touches})))["P_Form"]
+    found = by_symbol(standards.iso10360_12_figures(holding(touches={(1, 0): touches})))["P_Form"]
     assert found.value == pytest.approx(10e-6, rel=1e-3)
     assert not found.complete
 
 
 def test_location_is_the_ball_round_five_middles():
     touches = {(1, k): ball(5, 0.025, seed=k) + SHIFTS[k - 1] for k in range(1, 6)}
-    found = by_symbol(standards.figures(holding(touches=touches)))["L_Dia"]
+    found = by_symbol(standards.iso10360_12_figures(holding(touches=touches)))["L_Dia"]
     assert found.value == pytest.approx(5e-6, rel=1e-6)
     assert found.taken == found.asked == 5
 
 
 def test_a_seat_is_judged_by_the_ball_round_its_places():
-    found = by_symbol(standards.figures(holding(seats={1: SHIFTS})))["L_Dia at a seat"]
+    found = by_symbol(standards.iso10360_12_figures(holding(seats={1: SHIFTS})))["L_Dia at a seat"]
     assert found.value == pytest.approx(5e-6, rel=1e-6)
 
 
 def test_a_length_is_judged_by_what_is_permitted_at_its_size():
     mpe = PermissibleErrors(e_uni_m=10e-6, e_uni_per_m=20e-6)
     lengths = [Length(1, 1, 0.6, 0.600_021), Length(2, 2, 0.35, 0.350_018)]
-    found = by_symbol(standards.figures(holding(lengths=lengths, mpe=mpe)))["E_Uni"]
+    found = by_symbol(standards.iso10360_12_figures(holding(lengths=lengths, mpe=mpe)))["E_Uni"]
     assert [limit for _, _, limit in found.each] == pytest.approx([22e-6, 17e-6])
     assert found.value == pytest.approx(18e-6)
     assert found.judgement is Judgement.FAILS
@@ -74,14 +73,14 @@ def test_a_length_is_judged_by_what_is_permitted_at_its_size():
 
 def test_scatter_at_a_seat_is_twice_its_standard_deviation():
     places = np.array([[1e-6, 0, 0], [-1e-6, 0, 0], [0, 1e-6, 0], [0, -1e-6, 0]])
-    found = by_symbol(b89_4_22.figures(holding(seats={1: places})))["single point (2 s)"]
+    found = by_symbol(standards.b89_4_22_figures(holding(seats={1: places})))["single point (2 s)"]
     assert found.value == pytest.approx(2.0 * np.sqrt(4.0 / 3.0) * 1e-6)
     assert found.also == (("largest distance from the mean", pytest.approx(1e-6)),)
 
 
 def test_volumetric_names_the_largest_the_range_and_twice_the_rms():
     lengths = [Length(1, k, 0.6, 0.6 + error) for k, error in enumerate((3e-6, -4e-6, 0.0), start=1)]
-    found = by_symbol(b89_4_22.figures(holding(lengths=lengths)))["volumetric"]
+    found = by_symbol(standards.b89_4_22_figures(holding(lengths=lengths)))["volumetric"]
     assert found.value == pytest.approx(-4e-6)
     assert [value for _, value in found.also] == pytest.approx([7e-6, 2.0 * np.sqrt(25.0 / 3.0) * 1e-6])
     assert (found.taken, found.asked) == (3, 20)
@@ -89,13 +88,13 @@ def test_volumetric_names_the_largest_the_range_and_twice_the_rms():
 
 def test_the_effective_diameter_takes_nine_points_and_its_own_series():
     touches = {(1, 0): ball(25, 0.026), (1, 6): ball(9, 0.025_003), (1, 7): ball(9, 0.025_001)}
-    found = by_symbol(b89_4_22.figures(holding(touches=touches)))["effective diameter"]
+    found = by_symbol(standards.b89_4_22_figures(holding(touches=touches)))["effective diameter"]
     assert found.value == pytest.approx(3e-6, abs=1e-10)
     assert not found.complete
 
 
 def test_without_a_limit_nothing_is_judged_and_without_data_nothing_is_told():
-    figures = standards.figures(holding(seats={1: SHIFTS}, mpe=PermissibleErrors()))
+    figures = standards.iso10360_12_figures(holding(seats={1: SHIFTS}, mpe=PermissibleErrors()))
     judgements = {figure.symbol: figure.judgement for figure in figures}
     assert judgements["L_Dia at a seat"] is Judgement.NOT_STATED
     assert judgements["E_Uni"] is Judgement.NOT_MEASURED
@@ -105,7 +104,7 @@ def test_without_a_limit_nothing_is_judged_and_without_data_nothing_is_told():
 def test_the_sentence_names_what_fails():
     mpe = PermissibleErrors(single_point_m=1e-9, volumetric_m=1.0)
     held = holding(seats={1: SHIFTS}, lengths=[Length(1, 1, 0.6, 0.6)], mpe=mpe)
-    found = Verification(b89_4_22.figures(held), 7)
+    found = Verification(standards.b89_4_22_figures(held), 7)
     assert found.sentence.startswith("Does not conform: single point (2 s)")
     assert len(found.judged) == 2
 
@@ -159,8 +158,8 @@ def test_a_flat_series_of_touches_is_left_out_and_said_and_the_others_count():
     assert found.left_out == (
         "sphere 2, series 0 left out: the touches lie in one plane and show no sphere; touch it all round",
     )
-    assert by_symbol(standards.figures(found))["P_Size"].taken == 1
-    assert "left out" in Verification(standards.figures(found), 50, found.left_out).sentence
+    assert by_symbol(standards.iso10360_12_figures(found))["P_Size"].taken == 1
+    assert "left out" in Verification(standards.iso10360_12_figures(found), 50, found.left_out).sentence
 
 
 def test_a_recording_without_artefacts_is_refused():

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import minimize
 
 from calibrate.errors import DataError
-from calibrate.verification.sphere import enclosing_diameter_m, fitted_sphere
+from calibrate.verification.measured_lengths import enclosing_diameter_m, fitted_sphere
 
 
 def directions(count, seed=1):
