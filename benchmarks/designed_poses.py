@@ -29,11 +29,10 @@ from calibeam.prove.unseen import LaserBeam
 from calibeam.results.identification import Planned, identify_session
 from calibrate.believed_arm import believed_arm
 from calibrate.fit_plan import FitPlan
-from calibrate.pose_design.candidates import Candidates
-from calibrate.pose_design.criteria import CRITERIA
+from calibrate.pose_design.candidates import Candidates, blocks_of, plan_of, taken
 from calibrate.pose_design.design import Asked, design
+from calibrate.pose_design.exchange import CRITERIA
 from calibrate.pose_design.information import Information, information_of
-from calibrate.pose_design.plan_of import blocks_of, plan_of, taken
 from drivers.clock import SystemClock
 from simulators.world.truth import Truth
 from tests.support.direct_bench import direct_bench

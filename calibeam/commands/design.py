@@ -76,9 +76,8 @@ def design_command(
     """
     from calibeam.motion.reachable_poses import candidates_of
     from calibeam.printing.design import print_design
-    from calibrate.pose_design.design import Asked, design
+    from calibrate.pose_design.design import Asked, design, record_of
     from calibrate.pose_design.information import information_of
-    from calibrate.pose_design.record import record_of
     from calibrate.pose_design.seen import seen_by
 
     loaded, rng, console = load_rig(rig), np.random.default_rng(seed), Console()

@@ -33,8 +33,7 @@ from calibrate.identification.rounds import Fitted, coarse_start, settled_fit
 from calibrate.identification.session import instruments_for_fit
 from calibrate.parameters import Parameter, index_of, priors, start_values
 from calibrate.pose_design.candidates import Candidates
-from calibrate.pose_design.information import NO_OPINION, Information
-from calibrate.pose_design.target import target_of
+from calibrate.pose_design.information import NO_OPINION, Information, target_of
 from calibrate.read_samples import SIGMA_COLUMNS
 from calibrate.uncertainty.free_space import FELT_M
 from calibrate.variance import VarianceFactors

@@ -20,8 +20,7 @@ from calibrate.diagnose.isolability import Isolability, isolability
 from calibrate.diagnose.session import session_of
 from calibrate.diagnose.smallest_visible import Smallest, smallest_visible
 from calibrate.dual_psd_rig import believed_noise
-from calibrate.pose_design.candidates import Candidates
-from calibrate.pose_design.plan_of import Taken
+from calibrate.pose_design.candidates import Candidates, Taken
 from calibrate.sensors.position import POSITION_BELIEVED_M
 
 Floats = NDArray[np.float64]

@@ -5,8 +5,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from calibrate.pose_design.criteria import CRITERIA, Determinant, FreeSpace
-from calibrate.pose_design.exchange import choose, exchange, one_by_one
+from calibrate.pose_design.exchange import CRITERIA, Determinant, FreeSpace, choose, exchange, one_by_one
 
 EXACT = ("free-space", "d")
 

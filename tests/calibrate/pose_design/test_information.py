@@ -8,7 +8,7 @@ import pytest
 from calibrate.arms.catalogue import arm_of
 from calibrate.believed_arm import believed_arm
 from calibrate.identification.session import instruments_for_fit
-from calibrate.pose_design.target import ALONG_M, POSES, target_of
+from calibrate.pose_design.information import ALONG_M, POSES, target_of
 
 LENGTH = ("link2.length", "link3.twist", "joint4.zero", "laser.tilt_u", "laser.shift_v")
 
