@@ -1,8 +1,10 @@
-"""A circle in space through measured points, with its doubt: least squares of what sticks out of plane and radius.
+"""Circles of a target while one joint turns: the rows where only one turns, the fit, and the pair that places a flange.
 
-The joint's readings take no part but for the sense of turning, so gear and encoder errors do not bend the axis.
+The circle is the least-squares fit of the distances out of its plane and from its radius. The joint's readings give
+only the sense of turning, so gear and encoder errors do not bend the axis.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -145,3 +147,121 @@ class _Points:
     @cached_property
     def _raw_normal(self) -> Floats:
         return self.start.normal
+
+
+STILL_RAD = 2e-4  # a standing axis scatters by its repeatability, 1e-5 rad class; a deliberate step is far more
+FEWEST = 5  # rows: a circle has 6 unknowns and 2 equations a point, which leaves 4 to tell its noise
+SHORTEST_RAD = 0.35  # 20 deg of arc: below, centre and radius trade against each other
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Consecutive rows over which one joint turns and all others stand."""
+
+    joint: int  # counted from 1
+    rows: NDArray[np.intp]
+
+    def held(self, q_rad: Floats) -> Floats:
+        """(joint,) mean readings over the segment."""
+        return q_rad[self.rows].mean(axis=0)
+
+    def span_rad(self, q_rad: Floats) -> float:
+        """How far the joint turns."""
+        return float(np.ptp(q_rad[self.rows, self.joint - 1]))
+
+
+def single_axis_segments(q_rad: Floats) -> tuple[Segment, ...]:
+    """The longest runs of rows (row, joint) in which one joint alone moves, in order; neighbours may share a row."""
+    return tuple(run for run in _runs(q_rad) if _usable(run, q_rad))
+
+
+def too_short(q_rad: Floats) -> tuple[Segment, ...]:
+    """Runs in which one joint alone moves, but over too few rows or too short an arc for a circle."""
+    return tuple(run for run in _runs(q_rad) if not _usable(run, q_rad))
+
+
+def _usable(run: Segment, q_rad: Floats) -> bool:
+    return len(run.rows) >= FEWEST and run.span_rad(q_rad) >= SHORTEST_RAD
+
+
+def _runs(q_rad: Floats) -> tuple[Segment, ...]:
+    """Every run of at least three rows in which one joint moves, the longest at each place."""
+    found: list[Segment] = []
+    first = 0
+    while first < len(q_rad) - 1:
+        best = max((_run(q_rad, first, joint) for joint in range(q_rad.shape[1])), key=lambda run: len(run.rows))
+        if len(best.rows) > 2 and best.span_rad(q_rad) > STILL_RAD:
+            found.append(best)
+            first = int(best.rows[-1])
+        else:
+            first += 1
+    return tuple(found)
+
+
+def _run(q_rad: Floats, first: int, joint: int) -> Segment:
+    others = np.delete(q_rad[first:] - q_rad[first], joint, axis=1)
+    moved = np.any(np.abs(others) > STILL_RAD, axis=1)
+    end = first + int(np.argmax(moved)) if moved.any() else len(q_rad)
+    return Segment(joint + 1, np.arange(first, end))
+
+
+@dataclass(frozen=True)
+class AxisFound:
+    """One joint's axis in the device's frame."""
+
+    segment: Segment
+    circle: Circle
+
+
+def wrist(axes: Sequence[AxisFound], q_rad: Floats, row_of: Callable[[int], int]) -> tuple[AxisFound, AxisFound]:
+    """Rotations of the last two joints, taken with the joints before them at the same readings.
+
+    `row_of` says which row of the file, from 1, a row of `q_rad` is. DataError where they are missing or bad.
+    """
+    n = q_rad.shape[1]
+    apart: list[str] = []
+    for last in (a for a in axes if a.segment.joint == n):
+        for before in (a for a in axes if a.segment.joint == n - 1):
+            between = np.abs(last.segment.held(q_rad) - before.segment.held(q_rad))[: n - 2]
+            if np.all(between <= STILL_RAD):
+                _refuse_bad(before, row_of)
+                _refuse_bad(last, row_of)
+                return before, last
+            joint = int(np.argmax(between)) + 1
+            apart.append(
+                f"joint {joint} stands {np.degrees(between[joint - 1]):.2g} deg apart between "
+                f"{rows_said(before.segment, row_of)} and {rows_said(last.segment, row_of)}"
+            )
+    raise DataError(
+        f"tool by single axes: rotations of joint {n - 1} alone and {n} alone are needed, joints 1 to {n - 2} at "
+        f"the same readings; {_what_there_is(axes, q_rad, row_of, apart)}"
+    )
+
+
+def rows_said(segment: Segment, row_of: Callable[[int], int]) -> str:
+    """'rows 12-26'."""
+    return f"rows {row_of(int(segment.rows[0]))}-{row_of(int(segment.rows[-1]))}"
+
+
+def _what_there_is(axes: Sequence[AxisFound], q_rad: Floats, row_of: Callable[[int], int], apart: Sequence[str]) -> str:
+    """What was found instead, and which of it nearly would have done."""
+    if apart:
+        return "; ".join(apart)
+    turned = ", ".join(f"{a.segment.joint} ({rows_said(a.segment, row_of)})" for a in axes) or "none"
+    n = q_rad.shape[1]
+    short = [
+        f"joint {s.joint} alone turns only {np.degrees(s.span_rad(q_rad)):.3g} deg in {len(s.rows)} rows "
+        f"({rows_said(s, row_of)})"
+        for s in too_short(q_rad)
+        if s.joint in (n - 1, n)
+    ]
+    needed = f"; {np.degrees(SHORTEST_RAD):.0f} deg and {FEWEST} rows are needed" if short else ""
+    return "; ".join([f"found single rotations of joint {turned}", *short]) + needed
+
+
+def _refuse_bad(axis: AxisFound, row_of: Callable[[int], int]) -> None:
+    if axis.circle.status is not Status.CONVERGED:
+        raise DataError(
+            f"circle of joint {axis.segment.joint}, {rows_said(axis.segment, row_of)}: {axis.circle.status.value}; "
+            "turn farther"
+        )

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from calibrate.model_file import RigIdentity
 from calibrate.tool_axes.arm_prior import ArmErrors
-from calibrate.tool_axes.flange_seen import FlangeSeen
-from calibrate.tool_axes.orientation import Orientation
+from calibrate.tool_axes.circle import AxisFound
+from calibrate.tool_axes.orientation import FlangeSeen, Orientation
 from calibrate.tool_axes.tool import TargetFound, ToolCalibration
-from calibrate.tool_axes.wrist import AxisFound
 
 Floats = NDArray[np.float64]
 Numbers = tuple[float, ...]

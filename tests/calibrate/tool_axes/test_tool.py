@@ -10,7 +10,7 @@ from calibrate.arms.catalogue import arm_of
 from calibrate.errors import DataError
 from calibrate.fit import Status
 from calibrate.tool_axes.arm_prior import assumed_prior
-from calibrate.tool_axes.segments import single_axis_segments
+from calibrate.tool_axes.circle import single_axis_segments
 from calibrate.tool_axes.tool import calibrate_tool
 from calibrate.tool_axes.wrist_fit import TargetRows
 
