@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from calibrate.arms.compiled import PER_PART, perturbed_points
-from calibrate.error_simulation.law import Law
 from calibrate.error_simulation.machine import Machine
 from calibrate.error_simulation.source import Source
+from calibrate.error_simulation.sources import Law
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

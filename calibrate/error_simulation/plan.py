@@ -21,7 +21,7 @@ from acquisition.recording.files.bounds import (
     Radians,
     RadiansOrNone,
 )
-from calibrate.error_simulation.law import Law
+from calibrate.error_simulation.sources import Law
 from calibrate.errors import DataError
 
 SUFFIX = {"m": "_m", "rad": "_rad", "K": "_k"}

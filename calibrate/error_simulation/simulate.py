@@ -16,8 +16,8 @@ from scipy.optimize import minimize
 from calibrate.error_simulation.linear import ROUNDING_M, Linear, propagate
 from calibrate.error_simulation.machine import Machine
 from calibrate.error_simulation.monte_carlo import Drawn, draw_arms
+from calibrate.error_simulation.sensitivity import SobolIndices, indices_of
 from calibrate.error_simulation.single import Single, each_alone
-from calibrate.error_simulation.sobol import SobolIndices, indices_of
 from calibrate.error_simulation.source import Source
 
 Floats = NDArray[np.float64]

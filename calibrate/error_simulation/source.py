@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.error_simulation.law import Law
+from calibrate.error_simulation.sources import Law
 
 Floats = NDArray[np.float64]
 

@@ -9,11 +9,11 @@ from collections.abc import Iterable, Iterator
 from fnmatch import fnmatchcase
 
 from acquisition.recording.rig import Rig
-from calibrate.error_simulation.kinds import ANGLES, LENGTHS, Possible, half_step_rad, possible
-from calibrate.error_simulation.law import Law
+from calibrate.error_simulation.error_plan import ANGLES, LENGTHS, Possible, half_step_rad, possible
 from calibrate.error_simulation.machine import Machine
 from calibrate.error_simulation.plan import NOTHING_STATED, ErrorPlan, SourceEntry
 from calibrate.error_simulation.source import Source, Term
+from calibrate.error_simulation.sources import Law
 from calibrate.errors import DataError
 
 HEAT = "K"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from calibrate.error_simulation.law import Law
+from calibrate.error_simulation.sources import Law
 from calibrate.errors import DataError
 
 LAWS = [

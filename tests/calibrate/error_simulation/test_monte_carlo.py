@@ -7,8 +7,8 @@ import pytest
 
 from calibrate.error_simulation.linear import propagate
 from calibrate.error_simulation.monte_carlo import CHUNK, draw_arms
+from calibrate.error_simulation.sensitivity import indices_of
 from calibrate.error_simulation.simulate import worst_postures
-from calibrate.error_simulation.sobol import indices_of
 
 
 def test_drawn_arms_agree_with_linear_propagation_where_errors_are_small(machine, poses, every):
