@@ -18,7 +18,7 @@ from acquisition.recording.session_folder.stream_tables import StreamsAbout
 from calibeam.fleet.row import Row
 from calibeam.motion.task_devices import PartFile
 from calibrate.diagnose.schema import DiagnosisFile
-from calibrate.error_simulation.plan import ErrorPlan
+from calibrate.error_simulation.error_plan import ErrorPlan
 from calibrate.fit_plan import FitPlan
 from calibrate.model_file import ModelFile
 

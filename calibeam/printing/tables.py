@@ -6,8 +6,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from calibrate.error_simulation.record import SHARE
-from calibrate.error_simulation.simulate import Simulation
+from calibrate.error_simulation.simulate import SHARE, Simulation
 from calibrate.report.quantities import DASH, angle, decimals_of, fixed, length, significant
 from calibrate.tool_axes.tool_file import ArmErrorsRecord, AxisRecord, TargetRecord, ToolFile
 

@@ -1,19 +1,108 @@
-"""The kinds of sources: which there are at links, at joints and of heat, what they do, and in which unit.
+"""The errors of an arm: `errors.toml` (docs/error-simulation.md), kinds of errors, and the priors of the rig file.
 
-A new kind is one line here. Link i is the fixed part in front of joint i + 1, the last link that behind all joints.
-Encoder eccentricity: a disc off its shaft by e at radius r reads e / r sin(q + f) too much; graduation: order k of the
-disc's division. Runout: the axis itself moves on a circle (radial), to and fro (axial), or on a cone (wobble).
-Sources: Slocum, Precision Machine Design, 1992, ch. 2.3 and 7 (axis of rotation errors: radial, axial, tilt); mission
-of Huang Kui et al. (six errors a link, angle errors of the joints).
+A new kind is one line of the table of kinds. Link i is the fixed part in front of joint i + 1, the last link that
+behind all joints. Encoder eccentricity: a disc off its shaft by e at radius r reads e / r sin(q + f) too much;
+graduation: order k of the disc's division. Runout: the axis itself moves on a circle (radial), to and fro (axial), or
+on a cone (wobble). Sources: Slocum, Precision Machine Design, 1992, ch. 2.3 and 7 (axis of rotation errors: radial,
+axial, tilt); Huang Kui et al. (six errors a link, angle errors of the joints).
+
+Priors: [tolerance] of every link (length_m, angle_rad) and joint zero (angle_rad), joint_rad of [noise] for a reading,
+encoder_counts of a joint as its quantisation. Eccentricity, graduation, runout and heat only as the plan states them.
 """
 
-from collections.abc import Callable, Iterator
+import difflib
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Literal
 
 import numpy as np
+from msgspec import Struct
 
+from acquisition.recording.files import KeyPath, parse_toml, read_text, shown
+from acquisition.recording.files.bounds import (
+    Expansion,
+    Few,
+    Kelvin,
+    KelvinOrNone,
+    Metres,
+    MetresOrNone,
+    Name,
+    Number,
+    Order,
+    PerJoint,
+    Radians,
+    RadiansOrNone,
+)
+from acquisition.recording.rig import Rig
 from calibrate.error_simulation.machine import Machine, slot
-from calibrate.error_simulation.source import Term, Wave
+from calibrate.error_simulation.sources import Law, Source, Term, Wave
+from calibrate.errors import DataError
+
+SUFFIX = {"m": "_m", "rad": "_rad", "K": "_k"}
+
+
+class SourceEntry(Struct, frozen=True, forbid_unknown_fields=True):
+    """One [[source]]: names or shell patterns of them, a law, its size in the unit of the source."""
+
+    what: Few[Name]
+    law: Name = "normal"
+    shape: PerJoint[Number] = ()
+    scale_m: MetresOrNone | None = None
+    scale_rad: RadiansOrNone | None = None
+    scale_k: KelvinOrNone | None = None
+    loc_m: Metres | None = None
+    loc_rad: Radians | None = None
+    loc_k: Kelvin | None = None
+    order: Order | None = None  # of waves, cycles a turn
+
+    def law_in(self, unit: str) -> Law:
+        """Its law for sources of a unit. DataError where the size is not in this unit."""
+        suffix = SUFFIX[unit]
+        scale, loc = getattr(self, f"scale{suffix}"), getattr(self, f"loc{suffix}")
+        if scale is None:
+            raise DataError(
+                f"source {shown(', '.join(self.what))}: no scale{suffix}, but this error is in {unit}; give it"
+            )
+        return Law(self.law, scale, loc or 0.0, self.shape)
+
+
+class ErrorPlan(Struct, frozen=True, forbid_unknown_fields=True):
+    """A whole file; a later entry wins over an earlier one."""
+
+    schema: Literal[1]
+    source: Few[SourceEntry]
+    expansion_per_k: Expansion | None = None  # of the links' material; heat needs it
+    believed: bool = True  # whether what the rig file believes stands beside it
+
+
+NOTHING_STATED = ErrorPlan(schema=1, source=())
+
+
+def read_error_plan(path: Path) -> ErrorPlan:
+    """The plan of a file. DataError naming file, line, key, value and remedy."""
+    file = parse_toml(read_text(path, "error plan", DataError), str(path), DataError)
+    plan = file.checked(ErrorPlan)
+    for place, says in _contradictions(plan):
+        raise file.error(place, says)
+    return plan
+
+
+def _contradictions(plan: ErrorPlan) -> Iterator[tuple[KeyPath, str]]:
+    for i, entry in enumerate(plan.source):
+        stated = [s for s in SUFFIX.values() if getattr(entry, f"scale{s}") is not None]
+        if len(stated) != 1:
+            yield ("source", i), "a source wants one of scale_m, scale_rad, scale_k; give the one of its unit"
+            continue
+        for suffix in SUFFIX.values():
+            if suffix != stated[0] and getattr(entry, f"loc{suffix}") is not None:
+                yield ("source", i, f"loc{suffix}"), f"loc{suffix} beside scale{stated[0]}; give loc{stated[0]}"
+        try:
+            entry.law_in(next(unit for unit, s in SUFFIX.items() if s == stated[0]))
+        except DataError as error:
+            yield ("source", i), str(error)
+
 
 ANGLE = 6  # component of a joint's angle
 LENGTHS, ANGLES = "link lengths", "link angles"
@@ -115,3 +204,78 @@ def possible(machine: Machine) -> Iterator[Possible]:
 def half_step_rad(counts: int) -> float:
     """Largest rounding of an encoder with so many counts a turn."""
     return float(np.pi / counts)
+
+
+HEAT = "K"
+
+
+def sources_of(
+    machine: Machine,
+    rig: Rig,
+    plan: ErrorPlan = NOTHING_STATED,
+    only: tuple[str, ...] = (),
+    *,
+    identified: bool = False,
+) -> tuple[Source, ...]:
+    """Of `only` these patterns, where there are any. `identified`: links and zeros are no longer off as drawn.
+
+    DataError where a pattern matches nothing, where heat has no expansion, and where no source is left.
+    """
+    every = {p.name: p for p in possible(machine)}
+    laws = dict(_believed(rig, every.values(), identified=identified)) if plan.believed else {}
+    orders: dict[str, float | None] = {}
+    for entry in plan.source:
+        for one in _matching(entry, every):
+            laws[one.name] = entry.law_in(one.kind.unit)
+            orders[one.name] = entry.order
+    chosen = [name for name in every if name in laws and laws[name].square > 0.0 and _asked(name, only)]
+    if not chosen:
+        raise DataError(
+            f"rig {rig.name}: no error to simulate; state [tolerance], [noise] joint_rad or encoder_counts in the rig, "
+            "give --errors, or widen --only"
+        )
+    return tuple(_source(machine, every[name], laws[name], orders.get(name), plan) for name in chosen)
+
+
+def _source(machine: Machine, one: Possible, law: Law, order: float | None, plan: ErrorPlan) -> Source:
+    if order is not None and not one.kind.ordered:
+        raise DataError(f"source {one.name}: it has no order; leave order = {order:g} out")
+    terms = one.terms(machine, order)
+    if one.kind.unit == HEAT:
+        if plan.expansion_per_k is None:
+            raise DataError(f"source {one.name}: heat needs expansion_per_k of the links' material; state it")
+        terms = tuple(Term(t.slot, t.weight * plan.expansion_per_k) for t in terms)
+    return Source(one.name, one.kind.group, one.kind.unit, law, terms)
+
+
+def _believed(rig: Rig, every: Iterable[Possible], *, identified: bool) -> Iterator[tuple[str, Law]]:
+    for one in every:
+        law = _belief(rig, one, identified=identified)
+        if law is not None:
+            yield one.name, law
+
+
+def _belief(rig: Rig, one: Possible, *, identified: bool) -> Law | None:
+    tolerance, group, word = rig.tolerance, one.kind.group, one.kind.word
+    if tolerance is not None and not identified and (group in (LENGTHS, ANGLES) or word == "zero"):
+        return Law("normal", tolerance.length_m if group == LENGTHS else tolerance.angle_rad)
+    if word == "noise" and rig.noise.joint_rad is not None:
+        return Law("normal", rig.noise.joint_rad)
+    counts = rig.arm.joints[one.index].encoder_counts if word == "quantisation" else None
+    return None if counts is None else Law("uniform", half_step_rad(counts))
+
+
+def _matching(entry: SourceEntry, every: dict[str, Possible]) -> list[Possible]:
+    out: list[Possible] = []
+    for pattern in entry.what:
+        found = [one for name, one in every.items() if fnmatchcase(name, pattern)]
+        if not found:
+            near = difflib.get_close_matches(pattern, every, n=1)
+            hint = f"did you mean '{near[0]}'?" if near else f"there are {', '.join(every)}"
+            raise DataError(f"error plan: no source of this arm matches '{pattern}'; {hint}")
+        out.extend(found)
+    return out
+
+
+def _asked(name: str, only: tuple[str, ...]) -> bool:
+    return not only or any(fnmatchcase(name, pattern) for pattern in only)

@@ -1,21 +1,28 @@
-"""The arm whose errors are simulated: fixed parts with turns between them, and the probe behind the last one.
+"""The arm whose errors are simulated, and the effect of drawn errors on its probe at a pose.
 
-Any serial arm is one (calibrate/arms/serial.py), so that a robot's D-H table and the local product of exponentials of
-an arm CMM are perturbed in the same way: six errors behind every fixed part, one at every joint angle. Source: Huang
-Kui et al., error simulation of a flexible arm coordinate measuring machine, eq. 1 to 3.
+Fixed parts with turns between them, and the probe behind the last one. Any serial arm is one
+(calibrate/arms/serial.py), so that a robot's D-H table and the local product of exponentials of an arm CMM are
+perturbed in the same way: six errors behind every fixed part, one at every joint angle. Source: Huang Kui et al., error
+simulation of a flexible arm coordinate measuring machine, eq. 1 to 3.
+
+Slot 7 i + c (c = 0 ... 5) perturbs part i by a shift and a rotation vector in the frame behind it, slot 7 i + 6 adds to
+the angle of joint i + 1 (calibrate/arms/compiled.py). A column is what is drawn of an arm; at a pose a slot is a sum of
+columns by weights. A phased source has two columns, size times cosine and size times sine of its phase.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from acquisition.recording.rig import ArmModel, Rig, parse_rig
-from calibrate.arms.compiled import PER_PART
+from calibrate.arms.compiled import PER_PART, perturbed_points
 from calibrate.arms.rig_arm import RigArm
 from calibrate.converted_rig import rig_in_model
+from calibrate.error_simulation.sources import Law, Source
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
 from calibrate.rigid import cross
@@ -71,3 +78,94 @@ def identified_machine(model: ModelFile) -> tuple[Machine, Rig]:
     rig = parse_rig(model.rig.text, f"rig.toml in the model of {model.rig.name}")
     rig = rig_in_model(rig, ArmModel(model.arm_model))
     return machine_of(rig, model.chain, model.about.get("tool")), rig
+
+
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Columns:
+    """`of_source` (source, 2): the column of each source's value, or of its cosine and its sine; -1 for none."""
+
+    laws: tuple[Law, ...]  # of each source
+    of_source: Ints
+
+    @property
+    def count(self) -> int:
+        return int(np.count_nonzero(self.of_source >= 0))
+
+    def draw(self, rng: np.random.Generator, arms: int) -> Floats:
+        """(column, arm)"""
+        out = np.empty((self.count, arms))
+        for law, (own, other) in zip(self.laws, self.of_source.tolist(), strict=True):
+            out[own] = law.draw(rng, arms)
+            if other >= 0:
+                half = np.tan(np.pi * rng.random(arms))  # of a phase anywhere in a turn; several times faster than sin
+                share = out[own] / (1.0 + half * half)
+                out[other] = 2.0 * half * share
+                out[own] = (1.0 - half * half) * share
+        return out
+
+
+@dataclass(frozen=True)
+class ArmAtPoses:
+    """The nominal arm at some poses, and the weights of columns in slots there."""
+
+    fixed: Floats  # (joint + 1, 4, 4)
+    angle_rad: Floats  # (pose, joint), offsets added
+    point_m: Floats  # (3,) of the probe behind the last part
+    slots: Ints  # (term,)
+    columns: Ints  # (term,)
+    weights: Floats  # (pose, term)
+
+    @property
+    def moved(self) -> NDArray[np.bool_]:
+        """(part,) whether any term perturbs it, other than by the joint behind it."""
+        out = np.zeros(len(self.fixed), dtype=np.bool_)
+        out[self.slots[self.slots % PER_PART < PER_PART - 1] // PER_PART] = True
+        return out
+
+    def probes_m(self, pose: int, columns: Floats) -> Floats:
+        """(3, arm) in the base, for columns (column, arm)."""
+        places = self.slots, self.columns
+        weights = csr_array((self.weights[pose], places), shape=(PER_PART * len(self.fixed), len(columns)))
+        return perturbed_points(self.fixed, self.angle_rad[pose], self.point_m, self.moved, weights @ columns)
+
+    def nominal_m(self) -> Floats:
+        """(pose, 3) where the probe is without any error, by the same loops."""
+        nothing = np.zeros((int(self.columns.max(initial=0)) + 1, 1))
+        return np.stack([self.probes_m(pose, nothing)[:, 0] for pose in range(len(self.angle_rad))])
+
+
+def columns_of(sources: Sequence[Source]) -> Columns:
+    """Values in the order of the sources, then the second columns of phased ones."""
+    of_source = np.full((len(sources), 2), -1)
+    of_source[:, 0] = np.arange(len(sources))
+    phased = [i for i, source in enumerate(sources) if source.phased]
+    of_source[phased, 1] = len(sources) + np.arange(len(phased))
+    return Columns(tuple(source.law for source in sources), of_source)
+
+
+def arm_at(machine: Machine, sources: Sequence[Source], columns: Columns, q_rad: Floats) -> ArmAtPoses:
+    """The machine at readings (pose, joint), with every term of every source."""
+    slots, index, weights = list[int](), list[int](), list[Floats]()
+    for source, own in zip(sources, columns.of_source.tolist(), strict=True):
+        for term in source.terms:
+            for column, weight in zip(own, term.weights(q_rad).T, strict=True):
+                if column >= 0:
+                    slots.append(term.slot)
+                    index.append(column)
+                    weights.append(weight)
+    return ArmAtPoses(
+        machine.fixed,
+        machine.angles_rad(q_rad),
+        machine.point_m,
+        np.array(slots, dtype=np.int64),
+        np.array(index, dtype=np.int64),
+        np.ascontiguousarray(np.stack(weights, axis=1)),
+    )
+
+
+def probe_errors(arm: ArmAtPoses, pose: int, columns: Floats, nominal_m: Floats) -> Floats:
+    """(arm, 3) m of given columns (arm, column), at one of the poses."""
+    return (arm.probes_m(pose, np.ascontiguousarray(columns.T)) - nominal_m[:, None]).T

@@ -12,9 +12,8 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.error_simulation.columns import ArmAtPoses, Columns, arm_at, columns_of
-from calibrate.error_simulation.machine import Machine
-from calibrate.error_simulation.source import Source
+from calibrate.error_simulation.machine import ArmAtPoses, Columns, Machine, arm_at, columns_of
+from calibrate.error_simulation.sources import Source
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

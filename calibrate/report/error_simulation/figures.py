@@ -8,10 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from calibrate.error_simulation.linear import ROUNDING_M
 from calibrate.error_simulation.monte_carlo import BINS
+from calibrate.error_simulation.sensitivity import ROUNDING_M, Single
 from calibrate.error_simulation.simulate import Simulation
-from calibrate.error_simulation.single import Single
 from calibrate.report.svg import log_axis
 from calibrate.report.tones import PLACES, Tone
 

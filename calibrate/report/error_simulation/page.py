@@ -4,9 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from calibrate.error_simulation.linear import ROUNDING_M
-from calibrate.error_simulation.record import SHARE
-from calibrate.error_simulation.simulate import Simulation
+from calibrate.error_simulation.sensitivity import ROUNDING_M
+from calibrate.error_simulation.simulate import SHARE, Simulation
 from calibrate.report.elements import Html, figure, section, table, tag, tile
 from calibrate.report.error_simulation.figures import PICTURES, Picture
 from calibrate.report.page import page, write_page

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig import load_rig
+from calibrate.error_simulation.error_plan import ErrorPlan, SourceEntry, sources_of
 from calibrate.error_simulation.machine import machine_of
-from calibrate.error_simulation.plan import ErrorPlan, SourceEntry
-from calibrate.error_simulation.stated import sources_of
 
 RIGS = Path(__file__).parents[3] / "rigs"
 

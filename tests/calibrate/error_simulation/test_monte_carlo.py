@@ -5,9 +5,8 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from calibrate.error_simulation.linear import propagate
 from calibrate.error_simulation.monte_carlo import CHUNK, draw_arms
-from calibrate.error_simulation.sensitivity import indices_of
+from calibrate.error_simulation.sensitivity import indices_of, propagate
 from calibrate.error_simulation.simulate import worst_postures
 
 

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from calibrate.error_simulation.columns import arm_at, columns_of, probe_errors
-from calibrate.error_simulation.linear import propagate
-from calibrate.error_simulation.single import alone
+from calibrate.error_simulation.machine import arm_at, columns_of, probe_errors
+from calibrate.error_simulation.sensitivity import alone, propagate
 
 
 def errors(machine, sources, q_rad, values):

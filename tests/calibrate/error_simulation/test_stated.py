@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig import load_rig
+from calibrate.error_simulation.error_plan import ErrorPlan, SourceEntry, read_error_plan, sources_of
 from calibrate.error_simulation.machine import machine_of
-from calibrate.error_simulation.plan import ErrorPlan, SourceEntry, read_error_plan
-from calibrate.error_simulation.stated import sources_of
 from calibrate.errors import DataError
 
 from .conftest import RIGS
