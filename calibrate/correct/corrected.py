@@ -18,9 +18,8 @@ from acquisition.recording import Samples
 from acquisition.recording.rig import parse_rig
 from calibrate.arms.rig_arm import RigArm
 from calibrate.model_file import ModelFile
-from calibrate.physics.conditions import BY_JOINT
-from calibrate.physics.own_frame import POSTURES, SEED, mean_motion
-from calibrate.physics.predicting import flange_with_physics, placed
+from calibrate.physics.applied import BY_JOINT
+from calibrate.physics.predicting import POSTURES, SEED, flange_with_physics, mean_motion, placed
 from calibrate.predict import Predictor
 from calibrate.rigid import inverse
 

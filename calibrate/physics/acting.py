@@ -1,6 +1,6 @@
 """Effects of a model at rows that it has not seen: what each adds at its port, and what its coefficients do there.
 
-New rows stand behind those of the session that the effects were found in (calibrate/physics/conditions.py), so that
+New rows stand behind those of the session that the effects were found in (calibrate/physics/applied.py), so that
 means, knots and largest torques are those of the session, and a coefficient keeps its meaning.
 """
 

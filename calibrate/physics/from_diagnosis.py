@@ -46,7 +46,7 @@ from calibrate.model_file import (
 )
 from calibrate.parameters import Parameter, plausible_sizes, priors, without_assumed
 from calibrate.physics.acting import drivers_under, listed, range_of
-from calibrate.physics.conditions import kept_conditions, needed_columns, recorded_conditions
+from calibrate.physics.applied import kept_conditions, needed_columns, recorded_conditions
 from calibrate.physics.records import Effect, EffectCurve, EffectParameter, SessionRecord
 from calibrate.predict import Predictor
 from calibrate.sensors.catalogue import kind_of

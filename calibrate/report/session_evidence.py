@@ -109,7 +109,7 @@ def session_evidence(recording: Recording, model: ModelFile) -> SessionEvidence:
     weighting = weighting_of(recording, model)
     theta = values_of(weighting, model)
     if model.effects:
-        from calibrate.physics.taken_out import without_effects  # all effects: identify finds none, and starts sooner
+        from calibrate.physics.applied import without_effects  # all effects: identify finds none, and starts sooner
 
         weighting = without_effects(weighting, theta, recording.samples, model)
     problem = weighting.problem(theta, noise_of(weighting, model))

@@ -5,7 +5,7 @@ from numpy.testing import assert_allclose
 
 from acquisition.recording import Samples
 from calibrate.export.not_carried import _drawn  # pyright: ignore[reportPrivateUsage]
-from calibrate.physics.conditions import against, completed
+from calibrate.physics.applied import against, completed
 
 BEHIND_RAD = 90e-6  # of the recorded commands
 rng = np.random.default_rng(4)

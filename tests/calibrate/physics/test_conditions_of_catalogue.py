@@ -22,7 +22,7 @@ from calibrate.effects.catalogue import holds_of, terms_of
 from calibrate.effects.second_encoders import SECOND
 from calibrate.effects.term import Shape
 from calibrate.model_file import Covariance
-from calibrate.physics.conditions import needed_columns, recorded_conditions
+from calibrate.physics.applied import needed_columns, recorded_conditions
 from calibrate.physics.from_diagnosis import model_of_fit
 from calibrate.physics.predicting import predict_with_physics
 from calibrate.physics.records import Effect, SessionRecord
