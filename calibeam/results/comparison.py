@@ -40,8 +40,7 @@ from calibrate.diagnose.schema import DiagnosisFile, SizeRecord
 from calibrate.diagnose.streams.from_recording import streams_of
 from calibrate.diagnose.streams.recorded import devices_of
 from calibrate.diagnose.to_file import file_of
-from calibrate.effects.term import Size
-from calibrate.effects.words import plain
+from calibrate.effects.term import Size, plain
 from calibrate.errors import DataError
 from calibrate.identification.identify import wrong_file
 from calibrate.model_file import ModelFile

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from calibrate.diagnose.session import Session
-from calibrate.effects.conditions import conditions_of, temperatures_of, uncoupled_samples
-from calibrate.effects.drivers import Drivers, Readout
+from calibrate.effects.drivers import Drivers, Readout, conditions_of, temperatures_of, uncoupled_samples
 from calibrate.sensors.model import Standing, Used
 from calibrate.weighting import Measured
 

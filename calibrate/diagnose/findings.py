@@ -27,8 +27,7 @@ from calibrate.diagnose.rivals import Rival, confidences
 from calibrate.diagnose.score import Removed, gain_of, orthonormal, removed
 from calibrate.diagnose.searching import Search
 from calibrate.diagnose.stated_sizes import sizes_of
-from calibrate.effects.term import Size, Term
-from calibrate.effects.words import plain
+from calibrate.effects.term import Size, Term, plain
 
 Floats = NDArray[np.float64]
 

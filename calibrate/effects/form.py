@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.ports import Place, Port
-from calibrate.effects.term import Size, Term
-from calibrate.effects.words import plain
+from calibrate.effects.term import Size, Term, plain
 
 Floats = NDArray[np.float64]
 Functions = Callable[[Drivers, Floats], Floats]  # (pose, m) or (pose, width, m) for inner values (inner,)

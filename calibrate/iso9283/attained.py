@@ -19,7 +19,7 @@ from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION
 from calibrate.arms.rig_arm import RigArm
 from calibrate.correct.corrected import Arms, Options
-from calibrate.effects.conditions import moves_of
+from calibrate.effects.drivers import moves_of
 from calibrate.errors import DataError
 from calibrate.iso9283.performance import AttainedPoses, PoseTest, performance_of
 from calibrate.model_file import ModelFile

@@ -21,8 +21,7 @@ from calibrate.diagnose.extended import alike, rearranged
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.ported import perturbed_frames
 from calibrate.effects.catalogue import EFFECTS
-from calibrate.effects.conditions import temperatures_of
-from calibrate.effects.drivers import Drivers, Readout
+from calibrate.effects.drivers import Drivers, Readout, temperatures_of
 from calibrate.effects.form import Form
 from calibrate.effects.gravity import likely_torque_nm
 from calibrate.effects.ports import Perturbation, Place, Port

@@ -17,8 +17,7 @@ from acquisition.recording import Samples
 from acquisition.recording.samples import SEAT, required
 from calibrate.diagnose.augmented import encoder_channels
 from calibrate.diagnose.ported import look
-from calibrate.effects.conditions import moves_of, temperatures_of
-from calibrate.effects.drivers import Drivers
+from calibrate.effects.drivers import Drivers, moves_of, temperatures_of
 from calibrate.effects.ports import Perturbation, Port
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile

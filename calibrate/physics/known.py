@@ -23,8 +23,7 @@ from calibrate.diagnose.from_recording import Diagnosed
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.schema import ChangedRecord, DiagnosisFile, FindingRecord, KnownRecord
 from calibrate.diagnose.session import Session, session_of
-from calibrate.effects.conditions import moves_of
-from calibrate.effects.drivers import Drivers
+from calibrate.effects.drivers import Drivers, moves_of
 from calibrate.effects.since_model import RECORDING
 from calibrate.effects.term import Shape
 from calibrate.errors import DataError

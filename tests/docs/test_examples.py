@@ -15,7 +15,7 @@ from calibeam.cli import run
 from calibeam.results.diagnosis import diagnose_to_file
 from calibrate.diagnose import to_file
 from calibrate.effects import catalogue
-from calibrate.effects.words import UNITS
+from calibrate.effects.term import UNITS
 from calibrate.model_file import read_model
 from drivers.errors import DeviceLost, DeviceStale, WireError
 from drivers.transports.serial_port import SerialAddress, open_serial

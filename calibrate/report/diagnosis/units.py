@@ -1,6 +1,6 @@
 """The unit of a parameter as a person reads it, from the unit in its name and its size."""
 
-from calibrate.effects.words import UNITS
+from calibrate.effects.term import UNITS
 from calibrate.report.quantities import TIED
 
 # Of streams, beside those of the catalogue; the first ending that fits is taken.

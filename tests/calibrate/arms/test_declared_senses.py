@@ -11,7 +11,7 @@ from calibrate.arms.belief import FREE
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.convert import convert, corrected_parts, flange_of_parts
 from calibrate.arms.rig_arm import RigArm
-from calibrate.effects.conditions import conditions_of, uncoupled_samples
+from calibrate.effects.drivers import conditions_of, uncoupled_samples
 from calibrate.effects.loads import stated_masses
 
 RNG = np.random.default_rng(8)

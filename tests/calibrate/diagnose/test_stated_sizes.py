@@ -10,8 +10,7 @@ from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.session import session_of
 from calibrate.diagnose.stated_sizes import sandwich, sizes_of
 from calibrate.effects.loads import states_masses
-from calibrate.effects.term import Size
-from calibrate.effects.words import plain
+from calibrate.effects.term import Size, plain
 
 from .concealed import recording_of
 

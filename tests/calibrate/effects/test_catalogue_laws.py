@@ -10,8 +10,7 @@ import pytest
 from calibrate.diagnose.visible import grid_of, sight_of
 from calibrate.effects.catalogue import EFFECTS, missing_of, terms_of
 from calibrate.effects.ports import Place
-from calibrate.effects.term import Shape
-from calibrate.effects.words import UNITS
+from calibrate.effects.term import UNITS, Shape
 
 from .conftest import full_session
 

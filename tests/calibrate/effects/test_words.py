@@ -2,8 +2,7 @@
 
 import pytest
 
-from calibrate.effects.term import Size
-from calibrate.effects.words import plain
+from calibrate.effects.term import Size, plain
 
 
 @pytest.mark.parametrize(
