@@ -10,8 +10,8 @@ from calibrate.report.drift.parameters import FAMILY, Change, Compared
 from calibrate.report.drift.then_and_now import both, findings
 from calibrate.report.drift.words import sentence
 from calibrate.report.elements import Html, bullets, figure, folded, section, table, tag
+from calibrate.report.not_determined import in_plain_words
 from calibrate.report.quantities import aligned, decimals_of, fixed, length, significant
-from calibrate.report.reasons import in_plain_words
 from calibrate.report.workspace.pictures import Layer, pictures
 from calibrate.report.workspace.sections import VIEWS, grid_of
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from calibrate.report.drift.drift import Drift
 from calibrate.report.drift.parameters import Change
+from calibrate.report.not_determined import in_plain_words
 from calibrate.report.quantities import decimals_of, fixed, length, significant
-from calibrate.report.reasons import in_plain_words
 
 TOLD = 3  # changes in the sentence; all of them stand in the table
 

@@ -11,8 +11,8 @@ from math import degrees
 from acquisition.recording.rig import ArmModel, Joint, Rig
 from calibrate.model_file import ModelParameter
 from calibrate.report.elements import Html, folded, halves, table, tag
+from calibrate.report.not_determined import reason_among
 from calibrate.report.quantities import decimals_of, fixed
-from calibrate.report.reasons import reason_among
 from calibrate.report.session_evidence import SessionEvidence
 
 LEAD = (

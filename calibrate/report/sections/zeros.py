@@ -6,8 +6,8 @@ from math import degrees
 from calibrate.default_belief import links_of
 from calibrate.identification.estimates import Estimate, JointZero, joint_zeros
 from calibrate.report.elements import Html, figure, table, tag
+from calibrate.report.not_determined import reason_among
 from calibrate.report.quantities import DASH, aligned, angle, decimals_of, fixed, significant
-from calibrate.report.reasons import reason_among
 from calibrate.report.session_evidence import SessionEvidence
 from calibrate.report.workspace.known_arm import whole_covariance
 from calibrate.report.zero_figure import doubts
