@@ -8,8 +8,7 @@ from calibeam.fleet.figures import over_time, who_shares
 from calibeam.fleet.row import Row
 from calibeam.fleet.summary import Fleet, drift_words, method_words, shared_words
 from calibeam.software import SOFTWARE
-from calibrate.report.elements import Html, bullets, figure, folded, join, section, table, tag, tile
-from calibrate.report.page import page, write_page
+from calibrate.report.elements import Html, bullets, figure, folded, join, page, section, table, tag, tile, write_page
 from calibrate.report.quantities import DASH, angle, doubted_angle, fixed, length, significant
 
 PANELS = 12  # robots with a picture: those that drift first

@@ -18,9 +18,8 @@ from calibrate.identification.result import Evidence, FreeSpace, Identification,
 from calibrate.model_file import ModelFile, ModelParameter
 from calibrate.observability import Observability
 from calibrate.physics.records import Effect
-from calibrate.report.answers import Answers
 from calibrate.report.quantities import angle, length
-from calibrate.report.verdict import Trust, Verdict
+from calibrate.report.verdict import Answers, Trust, Verdict
 from calibrate.sensors import spots
 from calibrate.sensors.catalogue import SENSORS, thousandth_of
 

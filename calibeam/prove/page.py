@@ -27,8 +27,7 @@ from calibeam.prove.tally import (
     rivals,
     share,
 )
-from calibrate.report.elements import Html, bullets, figure, folded, section, table, tag
-from calibrate.report.page import page, write_page
+from calibrate.report.elements import Html, bullets, figure, folded, page, section, table, tag, write_page
 from calibrate.report.quantities import DASH, length
 from calibrate.report.svg import drawn
 from calibrate.report.tones import Tone

@@ -29,8 +29,7 @@ from calibrate.diagnose.session import session_of
 from calibrate.errors import DataError
 from calibrate.report.diagnosis.page import write_diagnosis_report
 from calibrate.report.diagnosis.words import verdict_words
-from calibrate.report.elements import Html, bullets, figure, section, table, tag
-from calibrate.report.page import page, write_page
+from calibrate.report.elements import Html, bullets, figure, page, section, table, tag, write_page
 from calibrate.report.quantities import DASH, angle, length
 from calibrate.report.svg import drawn
 from calibrate.report.tones import Tone

@@ -1,7 +1,21 @@
-"""HTML from Python: everything that is not already HTML is escaped, so that nothing from a file can slip in."""
+"""HTML from Python, the page that every report shares, and the chapter that traces a result.
 
+Everything that is not already HTML is escaped, so that no text of a file becomes markup. A page is one file that needs
+nothing else, on a screen, a phone or on paper. A result is traced by versions, seeds and the rig file, verbatim.
+"""
+
+import base64
+import hashlib
 import html
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path
+
+from acquisition.recording import Recording
+from acquisition.recording.rig import rig_sha256
+from calibrate.errors import DataError
+from calibrate.report.quantities import significant
 
 VOID = frozenset({"meta", "br", "hr", "link", "col"})  # https://html.spec.whatwg.org/#void-elements
 
@@ -101,3 +115,96 @@ def halves(*children: str, terse: bool = False) -> Html:
 def tile(name: str, value: str, says: str) -> Html:
     """A number that is to be seen first: name, number, and one line about it."""
     return tag("div", tag("span", name, cls="name"), tag("b", value), tag("span", says), cls="tile")
+
+
+# The browser itself refuses anything from outside: https://www.w3.org/TR/CSP3/
+POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+
+
+def page(
+    title: str,
+    masthead: Html,
+    contents: Mapping[str, str],
+    chapters: Sequence[Html],
+    software: str,
+    *,
+    scripts: bool = False,
+    running: str = "",
+) -> Html:
+    """The whole document; `contents` are headings by the anchor of their chapter. `scripts`: those of chapters may run.
+
+    `running` stands at the head of every printed page, the title where it is empty.
+
+    Each script is allowed by its own hash, so that still nothing runs that a file slipped in.
+    """
+    style = Html(files("calibrate.report").joinpath("report.css").read_text(encoding="utf-8"))
+    head = tag(
+        "head",
+        tag("meta", charset="utf-8"),
+        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        tag("meta", http_equiv="Content-Security-Policy", content=POLICY + _allowed(chapters) if scripts else POLICY),
+        tag("title", title),
+        tag("style", style, _running(running or title)),
+    )
+    links = (tag("a", heading, href=f"#{anchor}") for anchor, heading in contents.items())
+    nav = tag("nav", *links, aria_label="Contents")
+    footer = tag("footer", f"Written by {software}. This file needs no network and no other file.")
+    body = tag("body", tag("main", masthead, nav, *chapters, footer))
+    return join(Html("<!doctype html>\n"), tag("html", head, body, lang="en"), Html("\n"))
+
+
+def _running(text: str) -> Html:
+    """The line at the head of printed pages: a CSS string with all but letters and digits escaped."""
+    quoted = "".join(c if c.isascii() and c.isalnum() else f"\\{ord(c):06x}" for c in text)
+    return Html(f'@page {{ @top-left {{ content: "{quoted}"; font: 8pt sans-serif; color: #4b5763; }} }}')
+
+
+def _allowed(chapters: Sequence[Html]) -> str:
+    """The part of the policy for the scripts of these chapters; pictures that they make of themselves may be saved."""
+    found = [script for chapter in chapters for script in re.findall(r"<script>(.*?)</script>", chapter, re.DOTALL)]
+    digests = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in found)
+    listed = " ".join(f"'sha256-{digest}'" for digest in digests)
+    return f"; script-src {listed}; img-src data: blob:"
+
+
+def write_page(path: Path | str, text: str) -> Path:
+    """Over what may be there; returns the path. DataError where it cannot be written."""
+    try:
+        Path(path).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise DataError(f"{path}: the report cannot be written ({error.strerror}); give another place") from error
+    return Path(path)
+
+
+PROVENANCE_TITLE = "Provenance"
+
+
+def provenance(
+    recording: Recording, used: int, used_because: str, identified_by: str, extra: Sequence[tuple[str, str]] = ()
+) -> Html:
+    """Everything needed to do it again; `used` samples, and why these: "300, of which 290 with both spots"."""
+    samples = recording.samples
+    span_s = float(samples.column("t_s").max() - samples.column("t_s").min()) if len(samples) else 0.0
+    pairs = [
+        ("recording", recording.path.name),
+        ("state", _state(recording)),
+        ("settled samples", f"{len(samples)}, of which {used} {used_because}, over {significant(span_s)} s"),
+        ("started (UTC)", recording.started_utc or "not stated"),
+        ("recorded by", _by(recording)),
+        ("identified by", identified_by),
+        *extra,
+        ("rig", recording.rig.name),
+        ("rig SHA-256", rig_sha256(recording.rig_text)),
+        *((f"note: {name}", text) for name, text in recording.notes.items()),
+    ]
+    rig_text = folded("Rig file, as recorded", tag("pre", recording.rig_text), on_paper=False)
+    return section("provenance", PROVENANCE_TITLE, "What it takes to do it again.", facts(pairs), rig_text)
+
+
+def _state(recording: Recording) -> str:
+    return "complete" if recording.complete else "cut short or damaged"
+
+
+def _by(recording: Recording) -> str:
+    software = recording.software or "not stated"
+    return f"{software} on {recording.host}" if recording.host else software

@@ -4,18 +4,17 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from calibrate.diagnose.schema import DiagnosisFile
-from calibrate.report.answers import Answers
+from calibrate.report import elements
 from calibrate.report.diagnosis.beyond_model import beyond_model
 from calibrate.report.diagnosis.page import inserted
 from calibrate.report.drift.chapter import TITLE as DRIFT
 from calibrate.report.drift.chapter import drift_chapter
 from calibrate.report.drift.drift import Drift
 from calibrate.report.drift.words import sentence
-from calibrate.report.elements import Html, section, tag
+from calibrate.report.elements import Html, page, section, tag
 from calibrate.report.interactive.chapter import TITLE as INTERACTIVE
 from calibrate.report.interactive.chapter import interactive_chapter
 from calibrate.report.interactive.session_figures import session_figures
-from calibrate.report.page import page
 from calibrate.report.sections import (
     arm_data,
     arm_errors,
@@ -24,7 +23,6 @@ from calibrate.report.sections import (
     arm_summary,
     centring,
     point,
-    provenance,
     rig,
     spots,
     workspace,
@@ -34,6 +32,7 @@ from calibrate.report.sections.zeros import ZEROS, zeros_part
 from calibrate.report.session_evidence import SessionEvidence
 from calibrate.report.session_workspace import NOT_IN_SPACE, session_arm, session_measured, session_room
 from calibrate.report.spot_session import spot_session
+from calibrate.report.verdict import Answers
 from calibrate.report.workspace.room import Room
 
 
@@ -97,8 +96,8 @@ def _chapters(
         yield "zeros", (ZEROS, tag("div", section("zeros", ZEROS, "", *zeros), cls="no-print"))
     yield "parameters", (arm_parameters.TITLE, arm_parameters.parameters_chapter(known))
     yield "data", (arm_data.TITLE, arm_data.data_chapter(known))
-    made = provenance.provenance(recording, model.poses, "took part in the fit", model.software)
-    yield "provenance", (provenance.TITLE, made)
+    made = elements.provenance(recording, model.poses, "took part in the fit", model.software)
+    yield "provenance", (elements.PROVENANCE_TITLE, made)
 
 
 def _chapters_of_spots(known: SessionEvidence) -> Iterator[tuple[str, tuple[str, Html]]]:

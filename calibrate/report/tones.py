@@ -1,11 +1,16 @@
 """Colours of the figures: matplotlib draws in stand-ins, the page puts in its own, so that light and dark both read.
 
 The six colours of the placements are those of Okabe and Ito (Color Universal Design, 2008), which colour-blind readers
-tell apart; on dark paper lighter ones of the same hues stand for them (report.css).
+distinguish; on dark paper lighter ones of the same hues replace them (report.css). The key of placements is one line of
+the page.
 """
 
+from collections.abc import Sequence
 from enum import Enum
 from typing import Literal
+
+from calibrate.report.elements import Html, tag
+from calibrate.report.quantities import TIED
 
 Fill = Literal["none", "full", "left", "right", "bottom", "top"]
 
@@ -49,3 +54,26 @@ def fill_of(number: int) -> Fill:
 def tone_of(number: int) -> Tone:
     """The colour of the n-th placement, from 0; they come round again after six."""
     return PLACES[number % len(PLACES)]
+
+
+OPPOSITE = {"left": "right", "right": "left", "bottom": "top", "top": "bottom"}
+
+
+def patch(number: int, name: str) -> Html:
+    """Colour and fill of the marks of the n-th placement, from 0, in front of a name."""
+    colour, fill = tone_of(number).css, fill_of(number)
+    paint = {"none": "none", "full": colour}.get(
+        fill, f"linear-gradient(to {OPPOSITE.get(fill, fill)}, {colour} 50%, transparent 50%)"
+    )
+    key = tag("span", "", cls="key", style=f"background: {paint}; border-color: {colour}")
+    return tag("span", key, name, cls="place")
+
+
+def place_name(place: int) -> str:
+    """'place 3', on one line."""
+    return f"place{TIED}{place}"
+
+
+def colour_key(places: Sequence[int]) -> Html:
+    """All placements with their colours."""
+    return tag("p", *(patch(i, place_name(place)) for i, place in enumerate(places)), cls="keys")

@@ -6,17 +6,20 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from acquisition.recording import Recording
-from calibrate.report.elements import Html, bullets, figure, panels, section, table, tag, tile
-from calibrate.report.page import page, write_page
+from calibrate.report import elements
+from calibrate.report.elements import Html, bullets, figure, page, panels, section, table, tag, tile, write_page
 from calibrate.report.quantities import DASH, fixed, length, significant
-from calibrate.report.sections import provenance
 from calibrate.report.svg import drawn
 from calibrate.report.tones import PLACES, Tone
 from calibrate.report.verdict import Trust
 from calibrate.verification.measured_lengths import Figure, Judgement
 from calibrate.verification.verify import Verification
 
-CONTENTS = {"figures": "Figures of the standards", "measurements": "Measurements", "provenance": provenance.TITLE}
+CONTENTS = {
+    "figures": "Figures of the standards",
+    "measurements": "Measurements",
+    "provenance": elements.PROVENANCE_TITLE,
+}
 SAYS = {
     Judgement.CONFORMS: "conforms",
     Judgement.FAILS: "DOES NOT CONFORM",
@@ -36,7 +39,7 @@ def verification_html(recording: Recording, found: Verification, software: str) 
         _summary(found),
         _figures(found),
         _measurements(found),
-        provenance.provenance(recording, found.samples, "were read", software),
+        elements.provenance(recording, found.samples, "were read", software),
     )
     return page(f"Verification of {recording.rig.name}", _masthead(recording, found), CONTENTS, chapters, software)
 

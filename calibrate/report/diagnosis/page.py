@@ -10,10 +10,8 @@ from calibrate.errors import DataError
 from calibrate.report.diagnosis import limits, overview
 from calibrate.report.diagnosis.chain_figure import chain_of
 from calibrate.report.diagnosis.finding_page import finding_page, title_of
-from calibrate.report.elements import Html, tag
-from calibrate.report.page import page, write_page
-from calibrate.report.sections.provenance import TITLE as PROVENANCE
-from calibrate.report.sections.provenance import provenance
+from calibrate.report.elements import PROVENANCE_TITLE as PROVENANCE
+from calibrate.report.elements import Html, page, provenance, tag, write_page
 
 
 def contents_of(file: DiagnosisFile) -> Mapping[str, str]:

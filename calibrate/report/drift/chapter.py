@@ -4,7 +4,6 @@ from math import degrees
 
 import numpy as np
 
-from calibrate.report.answers import coded
 from calibrate.report.drift.drift import Drift
 from calibrate.report.drift.parameters import FAMILY, Change, Compared
 from calibrate.report.drift.then_and_now import both, findings
@@ -12,6 +11,7 @@ from calibrate.report.drift.words import sentence
 from calibrate.report.elements import Html, bullets, figure, folded, section, table, tag
 from calibrate.report.not_determined import in_plain_words
 from calibrate.report.quantities import aligned, decimals_of, fixed, length, significant
+from calibrate.report.verdict import coded
 from calibrate.report.workspace.pictures import Layer, pictures
 from calibrate.report.workspace.sections import VIEWS, grid_of
 

@@ -6,9 +6,8 @@ import numpy as np
 
 from calibrate.error_simulation.sensitivity import ROUNDING_M
 from calibrate.error_simulation.simulate import SHARE, Simulation
-from calibrate.report.elements import Html, figure, section, table, tag, tile
+from calibrate.report.elements import Html, figure, page, section, table, tag, tile, write_page
 from calibrate.report.error_simulation.figures import PICTURES, Picture
-from calibrate.report.page import page, write_page
 from calibrate.report.quantities import angle, length, significant
 from calibrate.report.svg import drawn
 

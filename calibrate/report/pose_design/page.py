@@ -9,8 +9,7 @@ from calibrate.pose_design.design import Design
 from calibrate.pose_design.places import Places
 from calibrate.pose_design.seen import Seen
 from calibrate.report.diagnosis.words import size_of
-from calibrate.report.elements import Html, bullets, figure, section, table, tag, tile
-from calibrate.report.page import page, write_page
+from calibrate.report.elements import Html, bullets, figure, page, section, table, tag, tile, write_page
 from calibrate.report.pose_design.figures import curve_figure, isolability_figure, joints_figure
 from calibrate.report.quantities import length
 

@@ -11,9 +11,8 @@ from calibrate.model_file import ModelFile, ModelParameter
 from calibrate.observability import WELL_CONDITIONED
 from calibrate.parameters import Parameter
 from calibrate.report.elements import Html, bullets, figure, folded, halves, join, panels, section, table, tag
-from calibrate.report.not_determined import in_plain_words, kind_of, reason_among
+from calibrate.report.not_determined import in_plain_words, kind_of, reason_among, spectrum
 from calibrate.report.quantities import DASH, aligned, decimals_of, fixed, significant
-from calibrate.report.rank_figures import spectrum
 from calibrate.report.session_evidence import SessionEvidence
 
 TITLE = "What was identified, and what was not"

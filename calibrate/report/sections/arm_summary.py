@@ -6,7 +6,6 @@ import numpy as np
 
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.model_file import FreeSpaceRecord
-from calibrate.report.answers import Answers, Number, first_screen
 from calibrate.report.elements import Html, figure, tag
 from calibrate.report.model_tests import proofs
 from calibrate.report.quantities import DASH, length, significant
@@ -15,6 +14,7 @@ from calibrate.report.sections.certificate import certificate, when
 from calibrate.report.sections.zeros import determined, limits_of_zeros
 from calibrate.report.session_evidence import Readings, SessionEvidence
 from calibrate.report.session_verdict import session_verdict
+from calibrate.report.verdict import Answers, Number, first_screen
 from calibrate.report.workspace.pictures import tool_maps
 from calibrate.report.workspace.room import Room
 from calibrate.sensors.catalogue import kind_of

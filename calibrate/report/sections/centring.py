@@ -7,10 +7,10 @@ import numpy as np
 
 from calibrate.report.centring_figures import courses, step_counts
 from calibrate.report.centring_traces import Trace, Traces, traces_of
-from calibrate.report.colour_key import colour_key
 from calibrate.report.elements import Html, figure, panels, section, table, tag
 from calibrate.report.quantities import stated
 from calibrate.report.spot_session import SpotSession
+from calibrate.report.tones import colour_key
 
 TITLE = "Laser centring"
 PICTURED = 3  # tolerances, the finest first; all are in the table

@@ -8,9 +8,8 @@ from calibrate.identification.estimates import JointZero
 from calibrate.identification.planned import rig_as_planned
 from calibrate.identification.point_constraint import PointConstraintResult, point_constraints
 from calibrate.report.elements import Html, bullets, figure, panels, section, table, tag
-from calibrate.report.not_determined import in_plain_words, plain_reason
+from calibrate.report.not_determined import in_plain_words, plain_reason, spectrum
 from calibrate.report.quantities import decimals_of, fixed, length, significant
-from calibrate.report.rank_figures import spectrum
 from calibrate.report.sections.zeros import zeros_of
 from calibrate.report.session_evidence import SessionEvidence
 

@@ -3,12 +3,12 @@
 import numpy as np
 
 from calibrate.errors import DataError
-from calibrate.report.colour_key import patch, place_name
 from calibrate.report.elements import Html, figure, panels, section, table, tag
 from calibrate.report.reflection_figure import reflection
 from calibrate.report.rig_figures import from_above, oblique
 from calibrate.report.rig_scene import fitted_rig, scene
 from calibrate.report.spot_session import SpotSession
+from calibrate.report.tones import patch, place_name
 
 TITLE = "The rig"
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from calibrate.report.colour_key import colour_key
 from calibrate.report.elements import Html, figure, panels, section
 from calibrate.report.spot_session import SpotSession
 from calibrate.report.spots_figure import face
+from calibrate.report.tones import colour_key
 
 TITLE = "Spots on the faces"
 

@@ -13,8 +13,7 @@ from acquisition.recording.errors import RecordingError
 from acquisition.recording.rig import load_rig, parse_rig, rig_text
 from acquisition.recording.rig.schema import Site, SiteInstrument
 from calibrate.model_file import ModelParameter
-from calibrate.report.elements import Html
-from calibrate.report.page import page
+from calibrate.report.elements import Html, page
 from calibrate.report.sections.arm_table import arm_numbers
 from calibrate.report.sections.certificate import certificate
 

@@ -8,9 +8,9 @@ import pytest
 
 import calibrate.report
 from calibrate.report.elements import Html
+from calibrate.report.elements import page as shell
 from calibrate.report.interactive.chapter import interactive_chapter
 from calibrate.report.interactive.session_figures import session_figures
-from calibrate.report.page import page as shell
 from calibrate.report.session_evidence import session_evidence
 
 REPORT = Path(calibrate.report.__file__).parent

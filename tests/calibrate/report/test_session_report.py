@@ -9,7 +9,7 @@ import pytest
 
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
-from calibrate.report.page import write_page
+from calibrate.report.elements import write_page
 from calibrate.report.sections.arm_data import data_chapter
 from calibrate.report.sections.arm_errors import errors_chapter
 from calibrate.report.sections.arm_parameters import parameters_chapter
