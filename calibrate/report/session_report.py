@@ -18,13 +18,13 @@ from calibrate.report.interactive.session_figures import session_figures
 from calibrate.report.sections import (
     arm_data,
     arm_errors,
-    arm_parameters,
-    arm_proofs,
-    arm_summary,
     centring,
+    parameter_tables,
     point,
-    rig,
+    proofs,
+    rig_and_spots,
     spots,
+    summary,
     workspace,
 )
 from calibrate.report.sections.certificate import when
@@ -56,8 +56,8 @@ def session_page(
         recording.rig,
         held,
     )
-    first = arm_summary.summary(session_answers(known, drift, room, diagnosis), known, room)
-    title, head = f"The arm {recording.rig.name}", arm_summary.masthead(known)
+    first = summary.summary(session_answers(known, drift, room, diagnosis), known, room)
+    title, head = f"The arm {recording.rig.name}", summary.masthead(known)
     running = " · ".join(
         part for part in (recording.rig.name, recording.rig.arm.serial_number, when(recording)) if part
     )
@@ -72,7 +72,7 @@ def session_answers(
 ) -> Answers:
     """The first screen; `room` of session_room, computed where it is not given."""
     diagnosis = None if diagnosis is None else beyond_model(diagnosis, known.model)[0]
-    answers = arm_summary.answers(known, session_room(known) if room is None else room, diagnosis)
+    answers = summary.answers(known, session_room(known) if room is None else room, diagnosis)
     return answers if drift is None else replace(answers, drift=sentence(drift), warnings=drift.warnings)
 
 
@@ -90,11 +90,11 @@ def _chapters(
         yield "interactive", (INTERACTIVE, interactive_chapter(session_figures(known)))
     yield from _chapters_of_spots(known)
     yield "errors", (arm_errors.TITLE, arm_errors.errors_chapter(known))
-    yield "proofs", (arm_proofs.TITLE, arm_proofs.proofs_chapter(known))
+    yield "proofs", (proofs.TITLE, proofs.proofs_chapter(known))
     zeros = tuple(zeros_part(known))
     if zeros:
         yield "zeros", (ZEROS, tag("div", section("zeros", ZEROS, "", *zeros), cls="no-print"))
-    yield "parameters", (arm_parameters.TITLE, arm_parameters.parameters_chapter(known))
+    yield "parameters", (parameter_tables.TITLE, parameter_tables.parameters_chapter(known))
     yield "data", (arm_data.TITLE, arm_data.data_chapter(known))
     made = elements.provenance(recording, model.poses, "took part in the fit", model.software)
     yield "provenance", (elements.PROVENANCE_TITLE, made)
@@ -105,7 +105,7 @@ def _chapters_of_spots(known: SessionEvidence) -> Iterator[tuple[str, tuple[str,
     session = spot_session(known)
     if session is None:
         return
-    yield "rig", (rig.TITLE, rig.rig(session))
+    yield "rig", (rig_and_spots.TITLE, rig_and_spots.rig(session))
     yield "spots", (spots.TITLE, spots.spots(session))
     yield "centring", (centring.TITLE, centring.centring(session))
     if point.asked_for(known):

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from calibrate.report.elements import Html, section, table, tag
-from calibrate.report.recording_tables import EXTRAS, coverage, findings, recorded, streams
+from calibrate.report.sections.recorded_data import EXTRAS, coverage, findings, recorded, streams
 from calibrate.report.session_evidence import SessionEvidence
 
 TITLE = "The data"

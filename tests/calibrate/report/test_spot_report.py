@@ -12,8 +12,8 @@ from calibeam.results.identification import Planned, identify_session, session_m
 from calibrate.fit import Status
 from calibrate.fit_plan import parse_plan
 from calibrate.report.elements import provenance
-from calibrate.report.sections.arm_proofs import proofs_chapter
 from calibrate.report.sections.centring import centring
+from calibrate.report.sections.proofs import proofs_chapter
 from calibrate.report.sections.zeros import limited_by_measurement, zeros_of
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_report import session_answers, session_page
