@@ -1,6 +1,4 @@
-"""Why a parameter was not determined, in the words of a person beside the robot, and the singular values with their
-gap.
-"""
+"""Why a parameter was not determined, in plain words, and the figure of the singular values with their gap."""
 
 from collections.abc import Sequence
 from typing import Protocol

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from calibrate.believed import BelievedRig
 from calibrate.dual_psd_rig import fixture_of
 from calibrate.observations import Observations
-from calibrate.report.spot_session import SpotSession
+from calibrate.report.session_evidence import SpotSession
 from calibrate.rigid import pose_offset
 from calibrate.sensors.dual_psd import AXES
 

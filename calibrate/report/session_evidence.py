@@ -1,26 +1,103 @@
-"""What the chapters of a session's report share: every reading before and after the fit, from recording and model."""
+"""What the chapters of a session's report share: every reading before and after the fit, from recording and model.
 
+The instruments of a recording are taken as model.json knows them: its rows, its frames and points, its noise, its
+values. The spots of a session are for the chapters on rig, faces and centring.
+"""
+
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording
+from acquisition.recording.rig import Rig
 from calibrate.arms.model import KinematicModel
+from calibrate.dual_psd_rig import dual_psd_chain
 from calibrate.errors import DataError
 from calibrate.fit import solve
+from calibrate.fit_plan import DEFAULT, parse_plan
+from calibrate.identification.planned import rig_as_planned, samples_as_planned
+from calibrate.identification.session import instruments_for_fit, standing_at
 from calibrate.joint_problem import JointProblem
 from calibrate.model_file import ModelFile
-from calibrate.parameters import Parameter
+from calibrate.observations import Observations
+from calibrate.parameters import Parameter, index_of, start_values
 from calibrate.problem import Problem
-from calibrate.report.as_modelled import noise_of, values_of, weighting_of
+from calibrate.read_samples import observations
 from calibrate.report.quantities import angle, length
+from calibrate.sensors import spots
 from calibrate.sensors.catalogue import kind_of
 from calibrate.uncertainty.fit_statistics import spare_readings
-from calibrate.weighting import Weighting
+from calibrate.variance import VarianceFactors, as_believed
+from calibrate.weighting import Measured, Weighting
 
 Floats = NDArray[np.float64]
+About = Mapping[str, tuple[float, ...]]
+
+
+def weighting_of(recording: Recording, model: ModelFile) -> Weighting:
+    """What was fitted: rows that no blunder names, about the frames that the corrections are about.
+
+    DataError where recording and model do not belong together.
+    """
+    samples = recording.samples
+    bad = {row - 1 for blunder in model.blunders for row in blunder.rows}
+    kept = np.array([row for row in range(len(samples)) if row not in bad], dtype=np.intp)
+    if len(bad) > len(samples) - len(kept):
+        raise _strangers(recording, f"it leaves out row {max(bad) + 1}, but there are {len(samples)}")
+    plan = DEFAULT if model.plan is None else parse_plan(model.plan, "fit plan in the model")
+    if model.session is not None:  # a diagnosis uses second encoders without being asked to
+        plan = structs.replace(plan, instruments=model.instruments)
+    rig, some = rig_as_planned(recording.rig, plan), samples_as_planned(samples.take(kept), plan)
+    found = standing_at(instruments_for_fit(rig, some, plan).weighting, kept)
+    names = tuple(m.name for m in found.measured)
+    if names != model.instruments:
+        raise _strangers(recording, f"it was fitted to {', '.join(model.instruments)}, here are {', '.join(names)}")
+    weighting = replace(found, measured=tuple(_placed(m, model.about) for m in found.measured))
+    rows = len(np.unique(np.concatenate([m.sample_rows.ravel() for m in weighting.measured])))
+    if rows != model.poses:
+        raise _strangers(recording, f"it is of {model.poses} samples, here are {rows}")
+    names_here = {p.name for p in weighting.parameters}
+    unlike = names_here ^ set(model.chain) if model.session is None else set(model.chain) - names_here
+    if unlike:
+        raise _strangers(recording, f"one of them alone has the parameters {', '.join(sorted(unlike)[:4])}")
+    return weighting
+
+
+def values_of(weighting: Weighting, model: ModelFile) -> Floats:
+    """(param,) the model's values."""
+    out = start_values(weighting.parameters)
+    for name, column in index_of(weighting.parameters).items():
+        out[column] = model.chain.get(name, out[column])  # a diagnosis holds what it names as effects: encoder discs
+    return out
+
+
+def noise_of(weighting: Weighting, model: ModelFile) -> VarianceFactors:
+    """Sizes of noise as the model found them, over those believed."""
+    size = np.zeros(len(weighting.sources))
+    for i, source in enumerate(weighting.sources):
+        found, believed = model.noise.get(source), model.noise.get(f"{source}_believed")
+        if isinstance(found, float) and isinstance(believed, float) and found > 0.0 and believed > 0.0:
+            size[i] = 2.0 * np.log(found / believed)
+    return replace(as_believed(len(size)), log_variance=size)
+
+
+def _placed(measured: Measured, about: About) -> Measured:
+    """The instrument with its target, device and seats where the model's corrections start from."""
+    problem = measured.problem
+    return replace(measured, problem=replace(problem, chain=problem.chain.placed(about)))
+
+
+def _strangers(recording: Recording, why: str) -> DataError:
+    return DataError(
+        f"report: the model does not belong to {recording.path.name}: {why}; "
+        "give the model of this recording, or identify it again"
+    )
+
+
 Indices = NDArray[np.intp]
 
 SAME = 1e-3  # of the rms in the model: beyond, the readings are not those that were fitted
@@ -149,4 +226,38 @@ def _readings(
     return tuple(
         Readings(measured.name, q.name, q.unit, rows, old[:, q.part], new[:, q.part], whitened[:, q.part])
         for q in every
+    )
+
+
+@dataclass(frozen=True)
+class SpotSession:
+    """Poses with both spots, and what the fit corrects of the rig."""
+
+    recording: Recording
+    rig: Rig  # its arm in the model of the fit plan
+    data: Observations
+    readings: Readings  # of the same poses, in the same order
+    corrections: dict[str, float]  # of arm, laser and fixture, by parameter name
+
+    @property
+    def places(self) -> tuple[int, ...]:
+        """Placements that have poses, rising."""
+        return tuple(sorted(set(self.data.placement.tolist())))
+
+
+def spot_session(evidence: SessionEvidence) -> SpotSession | None:
+    """None for a session without spots of the dual PSD."""
+    readings = next((r for r in evidence.readings if r.instrument == spots.KIND.name), None)
+    if readings is None:
+        return None
+    recording, model = evidence.recording, evidence.model
+    rig = rig_as_planned(recording.rig, DEFAULT if model.plan is None else parse_plan(model.plan, "fit plan"))
+    ids = np.array(sorted(rig.placements), dtype=np.int64)
+    known = {p.name for p in dual_psd_chain(rig, ids, np.ones_like(ids)).parameters}
+    return SpotSession(
+        recording,
+        rig,
+        observations(recording.samples.take(readings.rows[:, 0])),
+        readings,
+        {name: value for name, value in model.chain.items() if name in known},
     )

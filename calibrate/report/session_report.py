@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from calibrate.diagnose.schema import DiagnosisFile
-from calibrate.report import elements
+from calibrate.report import elements, session_workspace
 from calibrate.report.diagnosis.beyond_model import beyond_model
 from calibrate.report.diagnosis.page import inserted
 from calibrate.report.drift.chapter import TITLE as DRIFT
@@ -16,22 +16,19 @@ from calibrate.report.interactive.chapter import TITLE as INTERACTIVE
 from calibrate.report.interactive.chapter import interactive_chapter
 from calibrate.report.interactive.session_figures import session_figures
 from calibrate.report.sections import (
-    arm_data,
     arm_errors,
     centring,
     parameter_tables,
-    point,
     proofs,
+    recorded_data,
     rig_and_spots,
-    spots,
     summary,
-    workspace,
+    zeros,
 )
-from calibrate.report.sections.certificate import when
+from calibrate.report.sections.summary import when
 from calibrate.report.sections.zeros import ZEROS, zeros_part
-from calibrate.report.session_evidence import SessionEvidence
+from calibrate.report.session_evidence import SessionEvidence, spot_session
 from calibrate.report.session_workspace import NOT_IN_SPACE, session_arm, session_measured, session_room
-from calibrate.report.spot_session import spot_session
 from calibrate.report.verdict import Answers
 from calibrate.report.workspace.room import Room
 
@@ -85,17 +82,17 @@ def _chapters(
         yield "drift", (DRIFT, drift_chapter(drift))
     arm = session_arm(known)
     measured = None if isinstance(arm, str) else session_measured(known, arm)
-    yield "workspace", (workspace.TITLE, workspace.workspace(room, measured, NOT_IN_SPACE))
+    yield "workspace", (session_workspace.WORKSPACE_TITLE, session_workspace.workspace(room, measured, NOT_IN_SPACE))
     if interactive:
         yield "interactive", (INTERACTIVE, interactive_chapter(session_figures(known)))
     yield from _chapters_of_spots(known)
     yield "errors", (arm_errors.TITLE, arm_errors.errors_chapter(known))
     yield "proofs", (proofs.TITLE, proofs.proofs_chapter(known))
-    zeros = tuple(zeros_part(known))
-    if zeros:
-        yield "zeros", (ZEROS, tag("div", section("zeros", ZEROS, "", *zeros), cls="no-print"))
+    zero_parts = tuple(zeros_part(known))
+    if zero_parts:
+        yield "zeros", (ZEROS, tag("div", section("zeros", ZEROS, "", *zero_parts), cls="no-print"))
     yield "parameters", (parameter_tables.TITLE, parameter_tables.parameters_chapter(known))
-    yield "data", (arm_data.TITLE, arm_data.data_chapter(known))
+    yield "data", (recorded_data.TITLE, recorded_data.data_chapter(known))
     made = elements.provenance(recording, model.poses, "took part in the fit", model.software)
     yield "provenance", (elements.PROVENANCE_TITLE, made)
 
@@ -105,8 +102,8 @@ def _chapters_of_spots(known: SessionEvidence) -> Iterator[tuple[str, tuple[str,
     session = spot_session(known)
     if session is None:
         return
-    yield "rig", (rig_and_spots.TITLE, rig_and_spots.rig(session))
-    yield "spots", (spots.TITLE, spots.spots(session))
+    yield "rig", (rig_and_spots.RIG_TITLE, rig_and_spots.rig(session))
+    yield "spots", (rig_and_spots.SPOTS_TITLE, rig_and_spots.spots(session))
     yield "centring", (centring.TITLE, centring.centring(session))
-    if point.asked_for(known):
-        yield "point", (point.TITLE, point.point(known))
+    if zeros.asked_for(known):
+        yield "point", (zeros.POINT_TITLE, zeros.point(known))

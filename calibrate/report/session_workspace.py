@@ -1,9 +1,9 @@
-"""What the pictures of the workspace need, from the evidence of a session of any instruments.
+"""The chapter on the error over the workspace, from the evidence of a session of any instruments.
 
-What each observation is missed by when the fit is made without it, without fitting again.
-With whitened residual r and derivative J of one observation and the posterior covariance C of the parameters,
-r / (1 - J C J') is its error in the fit of all others: exact for a linear model, to first order for this one.
-Source: Cook, Weisberg, Residuals and Influence in Regression, 1982, ch. 2.2 and, for several rows at once, ch. 3.6.
+The error of each observation in a fit without it is computed without fitting again. With whitened residual r and
+derivative J of one observation and the posterior covariance C of the parameters, r / (1 - J C J') is its error in the
+fit of all others: exact for a linear model, to first order for this one. Source: Cook, Weisberg, Residuals and
+Influence in Regression, 1982, ch. 2.2 and, for several rows at once, ch. 3.6.
 """
 
 import numpy as np
@@ -13,9 +13,10 @@ from calibrate.arms.rig_arm import limits_of
 from calibrate.joint_problem import JointProblem
 from calibrate.parameters import without_assumed
 from calibrate.problem import Problem
+from calibrate.report.elements import Html, figure, section, tag
 from calibrate.report.session_evidence import SessionEvidence
 from calibrate.report.workspace.known_arm import KnownArm, scatter_of, unpredicted, whole_covariance
-from calibrate.report.workspace.pictures import Measured
+from calibrate.report.workspace.pictures import Measured, before_and_after
 from calibrate.report.workspace.room import Room, room_of, target_at
 from calibrate.sensors.catalogue import names_with
 from calibrate.sensors.kind import Trait
@@ -95,3 +96,30 @@ def deleted_misfit(problem: JointProblem, index: int, theta: Floats, covariance:
     whitened = np.linalg.solve(rest[told], residual[..., None])
     out[told] = np.linalg.solve(block.whitener[told], whitened)[..., 0]
     return out
+
+
+WORKSPACE_TITLE = "Error over the workspace"
+LEAD = "How far the tool is from where the controller thinks it is, wherever the arm can go."
+
+
+def workspace(room: Room | str, measured: Measured | None, why_not_measured: str) -> Html:
+    """Pictures; or why there are none. `why_not_measured` is told where `measured` is None."""
+    if isinstance(room, str):
+        return section("workspace", WORKSPACE_TITLE, LEAD, tag("p", f"Not drawn: {room}."))
+    share = float(room.supported.mean())
+    caption = (
+        "Left from the side, all directions together (radius: from the base's z axis); right from above, all heights "
+        "together. Darker is worse: rms over the poses that bring the target there, one scale for all pictures. "
+        "Hatched: the arm gets there, but only with a joint beyond the angles of the session, or where the prediction "
+        "leans on the data harder than at the poses of it. Predicted: one sigma by the covariance of the fit and the "
+        "scatter of a single pose, as far as the model is right; where base and device stand is left out."
+    )
+    told = (
+        "Measured: distance of each reading from what is expected; for the identified arm each pose is expected from "
+        "all other poses. Where measured is worse than predicted, the model lacks something there."
+        if measured is not None
+        else why_not_measured
+    )
+    pictures = tag("div", figure(before_and_after(room, measured), f"{caption} {told}"), cls="wide")
+    within = f"Of the poses between the joint angles of the session, {share:.0%} are supported."
+    return section("workspace", WORKSPACE_TITLE, LEAD, pictures, tag("p", within))

@@ -1,5 +1,4 @@
-"""The verdict of a report: a degree of trust, reasons for care, advice, and the thresholds; and the first screen made
-of it.
+"""The verdict of a report (a degree of trust, reasons for care, advice) with its thresholds, and the first screen.
 
 The first screen answers how good the robot is now, whether to trust that, and what to do; then the numbers. Colour only
 repeats a mark and a word.

@@ -21,8 +21,7 @@ from calibrate.report.interactive.plots import (
     space,
 )
 from calibrate.report.interactive.spot_figures import spots_in_space
-from calibrate.report.session_evidence import Readings, SessionEvidence
-from calibrate.report.spot_session import spot_session
+from calibrate.report.session_evidence import Readings, SessionEvidence, spot_session
 
 Floats = NDArray[np.float64]
 

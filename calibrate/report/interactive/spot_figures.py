@@ -20,7 +20,7 @@ from calibrate.report.interactive.plots import (
 )
 from calibrate.report.quantities import length
 from calibrate.report.rig_scene import FittedRig, Scene, fitted_rig, scene
-from calibrate.report.spot_session import SpotSession
+from calibrate.report.session_evidence import SpotSession
 
 Floats = NDArray[np.float64]
 

@@ -3,12 +3,10 @@
 import numpy as np
 
 from calibrate.report.elements import Html, figure, folded, panels, section, table, tag
-from calibrate.report.error_figures import MOST_POINTS, along, by_sample, errors
-from calibrate.report.patterns import GROUPS, Pattern
+from calibrate.report.error_figures import MOST_POINTS, along, by_sample, errors, histogram, quantiles
 from calibrate.report.quantities import fixed, significant
-from calibrate.report.residual_figures import histogram, quantiles
 from calibrate.report.session_evidence import Readings, SessionEvidence
-from calibrate.report.session_verdict import patterns_of
+from calibrate.report.session_verdict import GROUPS, Pattern, patterns_of
 
 TITLE = "Errors before and after"
 

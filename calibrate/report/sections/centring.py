@@ -1,16 +1,139 @@
-"""The chapter on how the spots were brought to where they were wanted."""
+"""The chapter on centring: runs of the servo from the events of the recording, error against step, number of steps."""
 
+import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
-from calibrate.report.centring_figures import courses, step_counts
-from calibrate.report.centring_traces import Trace, Traces, traces_of
+from acquisition.recording import Event
 from calibrate.report.elements import Html, figure, panels, section, table, tag
-from calibrate.report.quantities import stated
-from calibrate.report.spot_session import SpotSession
-from calibrate.report.tones import colour_key
+from calibrate.report.quantities import length, stated
+from calibrate.report.session_evidence import SpotSession
+from calibrate.report.svg import drawn, log_axis
+from calibrate.report.tones import Tone, colour_key, place_mark, tone_of
+
+Floats = NDArray[np.float64]
+
+KIND = "centring"
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One run of the centring servo, from first look to last."""
+
+    placement: int
+    first_psd: int
+    strategy: str
+    status: str
+    tolerance_m: float
+    error_m: Floats  # (look,) largest of the four distances from the target; NaN where a face was dark
+    probes: int  # of the steps, those that only measure
+
+    @property
+    def steps(self) -> int:
+        """Motions after the first look."""
+        return max(0, len(self.error_m) - 1)
+
+
+@dataclass(frozen=True)
+class Traces:
+    """All runs of a session."""
+
+    runs: tuple[Trace, ...]
+    unreadable: int  # centring events that do not hold what a run is made of
+
+    def by_tolerance(self) -> dict[float, tuple[Trace, ...]]:
+        """Runs that wanted the same, the finest first."""
+        wanted = sorted({run.tolerance_m for run in self.runs})
+        return {tolerance: tuple(r for r in self.runs if r.tolerance_m == tolerance) for tolerance in wanted}
+
+
+def traces_of(events: Iterable[Event]) -> Traces:
+    """Never fails: what cannot be read is counted."""
+    found = [_trace(event.detail) for event in events if event.kind == KIND]
+    return Traces(tuple(t for t in found if t is not None), sum(t is None for t in found))
+
+
+def _trace(detail: Mapping[str, Any]) -> Trace | None:
+    try:
+        spots = np.array(
+            [[math.nan if v is None else float(v) for v in look] for look in detail["spots_m"]], dtype=np.float64
+        ).reshape(-1, 4)
+        target = np.array(detail["target_m"], dtype=np.float64).reshape(4)
+        tolerance_m = float(detail["tolerance_m"])
+        if not (np.all(np.isfinite(target)) and 0.0 < tolerance_m < math.inf):
+            return None
+        return Trace(
+            int(detail["placement"]),
+            int(detail["first_psd"]),
+            str(detail["strategy"]),
+            str(detail["status"]),
+            tolerance_m,
+            np.abs(spots - target).max(axis=1) if len(spots) else np.empty(0),
+            sum(purpose == "probe" for purpose in detail["purpose"]),
+        )
+    except (KeyError, TypeError, ValueError):
+        return None
+
+
+FLOOR_M = 1e-8  # an error of exactly zero has no place on a log axis
+DRAWN = 120  # traces in one picture; of more, every n-th
+
+
+def courses(runs: Sequence[Trace], tolerance_m: float, places: Sequence[int], name: str) -> Html:
+    """Error against step, one line a run, colour by placement."""
+    says = f"error of {len(runs)} centring runs against the step"
+    return drawn(name, says, 4.6, 2.9, lambda figure: _paint_courses(figure, runs, tolerance_m, places))
+
+
+def step_counts(runs: Sequence[Trace], tolerance_m: float, name: str) -> Html:
+    """How many runs took how many steps."""
+    says = f"histogram of the steps of {len(runs)} centring runs to {stated(tolerance_m)}"
+    return drawn(name, says, 4.6, 2.9, lambda figure: _paint_counts(figure, runs))
+
+
+def _paint_courses(figure: Figure, runs: Sequence[Trace], tolerance_m: float, places: Sequence[int]) -> None:
+    axes = figure.add_subplot()
+    for run in runs[:: -(-len(runs) // DRAWN)]:
+        number = places.index(run.placement) if run.placement in places else None
+        tone, mark = (Tone.SOFT, {}) if number is None else (tone_of(number), place_mark(number))
+        shown = np.maximum(run.error_m, FLOOR_M)
+        axes.plot(shown, "o-", color=tone.value, lw=1.0, ms=3.4, alpha=0.6, **mark)  # pyright: ignore[reportArgumentType]
+    axes.axhline(tolerance_m, color=Tone.INK.value, lw=1.2, linestyle=(0, (4, 3)))
+    axes.annotate(
+        f"wanted: {stated(tolerance_m)}",
+        (1.0, tolerance_m),
+        xycoords=("axes fraction", "data"),
+        xytext=(0, 4),
+        textcoords="offset points",
+        ha="right",
+        fontsize=10,
+    )
+    seen = np.concatenate([[tolerance_m], *(run.error_m[np.isfinite(run.error_m)] for run in runs)])
+    log_axis(axes, "y", np.maximum(seen, FLOOR_M).tolist(), lambda value: length(value, 1))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set(xlabel="step", title="Largest distance of a spot from its target")
+
+
+def _paint_counts(figure: Figure, runs: Sequence[Trace]) -> None:
+    axes = figure.add_subplot()
+    steps = np.array([run.steps for run in runs])
+    counts = np.bincount(steps)
+    bars = axes.bar(np.arange(len(counts)), counts, width=0.72, color=Tone.SOFT.value)
+    axes.bar_label(bars, labels=[str(c) if c else "" for c in counts], padding=2, fontsize=10)
+    axes.margins(y=0.12)
+    axes.grid(visible=False)
+    axes.spines["left"].set_visible(False)
+    axes.set_yticks([])
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set(xlabel="steps", title="Runs that took so many steps", xlim=(-0.6, max(len(counts), 6) - 0.4))
+
 
 TITLE = "Laser centring"
 PICTURED = 3  # tolerances, the finest first; all are in the table

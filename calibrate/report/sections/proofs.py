@@ -1,19 +1,91 @@
-"""The chapter on doubt: unseen rows, chi-square, noise, repeats."""
+"""The chapter on uncertainty: unseen rows, the error expected over the workspace, chi-square, noise, repeats."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from acquisition.recording.rig import Rig
-from calibrate.model_file import ModelFile
-from calibrate.report.elements import Html, section, table, tag
-from calibrate.report.free_space_table import free_space
+from calibrate.model_file import FreeSpaceRecord, ModelFile, UnseenRows
+from calibrate.report.elements import Html, bullets, section, table, tag
 from calibrate.report.model_tests import proofs, repeated, scatter
 from calibrate.report.quantities import DASH, angle, doubted_angle, doubted_length, fixed, length, significant
 from calibrate.report.session_evidence import SessionEvidence
-from calibrate.report.unseen_table import unseen_rows
-from calibrate.sensors.catalogue import SOURCES
+from calibrate.sensors.catalogue import SOURCES, kind_of
 from calibrate.sensors.kind import NoiseSource
 from calibrate.uncertainty.fit_statistics import Alarm
 from calibrate.weighting import JOINT
+
+
+def free_space(found: FreeSpaceRecord | None) -> list[Html]:
+    """A table; the reason where there is no prediction; nothing of a model from before there was one."""
+    if found is None:
+        return []
+    if found.rms_m is None:
+        return [
+            tag("p", tag("b", "Tool error over the workspace: "), f"none is stated: {found.says}."),
+            *_because(found),
+        ]
+    rows = [
+        (
+            "identified geometry alone",
+            *_three(found.rms_m, found.p95_m, found.max_m),
+            "what a better fit could still win",
+        ),
+        ("a single pose", *_three(found.pose_rms_m, found.pose_p95_m, found.pose_max_m), f"with {found.scatter}"),
+    ]
+    caption = f"Predicted error of the target, one sigma, {found.poses} poses drawn evenly between the joint limits"
+    head = ("Error of", "rms", "95 %", "largest", "holds")
+    note = (
+        "As far as the model is right: what it lacks is not in these figures, but it is in those of unseen rows. "
+        "Where base and device stand is no error of the arm and is left out."
+    )
+    return [table(head, rows, numeric=(1, 2, 3), caption=caption), tag("p", note, cls="lead"), *_guessed(found)]
+
+
+def _three(*values_m: float | None) -> tuple[str, ...]:
+    return tuple(DASH if value is None else length(value) for value in values_m)
+
+
+def _because(found: FreeSpaceRecord) -> list[Html]:
+    return [bullets(found.undetermined)] if found.undetermined else []
+
+
+def _guessed(found: FreeSpaceRecord) -> list[Html]:
+    if not found.guessed:
+        return []
+    listed = "; ".join(found.guessed)
+    return [tag("p", f"Known no better than their plausible size, and counted as that: {listed}.")]
+
+
+def unseen_rows(found: Sequence[UnseenRows], unproven: Sequence[str]) -> list[Html]:
+    """A table, or a sentence where nothing was kept out; then why a split proves nothing."""
+    reasons = [tag("p", f"No proof by {why}.") for why in unproven]
+    if not found:
+        return [tag("p", "No rows were kept out of the fit: too few, or it was not asked for."), *reasons]
+    head = (
+        "Left out",
+        "reading",
+        "count",
+        "nominal, rms distance",
+        "identified, rms distance",
+        "over the noise",
+        "over noise and sigmas",
+    )
+    caption = "Rows that the fit has not seen, predicted from the others"
+    return [table(head, (_proof(p) for p in found), numeric=(2, 3, 4, 5, 6), caption=caption), *reasons]
+
+
+def _proof(proof: UnseenRows) -> tuple[str, ...]:
+    kind = kind_of(proof.instrument)
+    says = angle if kind.quantities[0].unit == "rad" else length
+    return (
+        proof.split,
+        kind.title,
+        str(proof.observations),
+        says(proof.rms_distance_before_m),
+        says(proof.rms_distance_after_m),
+        fixed(proof.chi_after, 2),
+        DASH if proof.chi_predicted is None else fixed(proof.chi_predicted, 2),
+    )
+
 
 TITLE = "Proof and uncertainty"
 NONE = "too small to be separated from none"

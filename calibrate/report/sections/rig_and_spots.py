@@ -1,23 +1,85 @@
-"""The chapter that shows the rig."""
+"""The chapters that show the rig, and where the light fell on each face."""
+
+from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
 from calibrate.errors import DataError
+from calibrate.observations import Observations
 from calibrate.report.elements import Html, figure, panels, section, table, tag
 from calibrate.report.reflection_figure import reflection
 from calibrate.report.rig_figures import from_above, oblique
 from calibrate.report.rig_scene import fitted_rig, scene
-from calibrate.report.spot_session import SpotSession
-from calibrate.report.tones import patch, place_name
+from calibrate.report.session_evidence import SpotSession
+from calibrate.report.svg import drawn
+from calibrate.report.tones import Tone, colour_key, patch, place_mark, place_name
 
-TITLE = "The rig"
+Floats = NDArray[np.float64]
+
+
+def face(data: Observations, psd: int, half_size_m: float, places: Sequence[int]) -> Html:
+    """One face as the beam sees it from its front; circle: struck directly, triangle: by reflection."""
+    says = f"spots on the face of PSD {psd}"
+    return drawn(f"spots-{psd}", says, 3.5, 3.65, lambda figure: _paint(figure, data, psd, half_size_m, places))
+
+
+def _paint(figure: Figure, data: Observations, psd: int, half_size_m: float, places: Sequence[int]) -> None:
+    axes = figure.add_subplot()
+    axes.set_aspect("equal")
+    half_mm = half_size_m * 1e3
+    axes.add_patch(Rectangle((-half_mm, -half_mm), 2 * half_mm, 2 * half_mm, fill=False, ec=Tone.INK.value, lw=1.4))
+    axes.axhline(0.0, color=Tone.SOFT.value, lw=0.6)
+    axes.axvline(0.0, color=Tone.SOFT.value, lw=0.6)
+    spots_mm = data.spots_m[:, 2 * psd - 2 : 2 * psd] * 1e3
+    for number, place in enumerate(places):
+        for direct, marker in ((True, "o"), (False, "^")):
+            rows = (data.placement == place) & ((data.first_psd == psd) == direct)
+            style = place_mark(number)
+            axes.plot(*spots_mm[rows].T, marker, ms=5.5, mew=1.3, clip_on=False, **style)  # pyright: ignore[reportArgumentType]
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+    axes.set(xlim=(-1.06 * half_mm, 1.06 * half_mm), ylim=(-1.06 * half_mm, 1.06 * half_mm))
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 5, 10]))
+    axes.set(xlabel="x (mm)", ylabel="y (mm)", title=f"PSD {psd}")
+
+
+SPOTS_TITLE = "Spots on the faces"
+
+
+def spots(session: SpotSession) -> Html:
+    """Both faces, and how much of them was used."""
+    fixture = session.rig.fixture
+    if fixture is None:
+        return section("spots", SPOTS_TITLE, "The rig has no fixture.")
+    half_m, data = fixture.half_size_m, session.data
+    lead = (
+        "Every settled sample. Circles: the face was struck directly; triangles: by light that the other face reflects."
+    )
+    figures = [
+        figure(face(data, psd, half_m, session.places), _reach(data.spots_m[:, 2 * psd - 2 : 2 * psd], half_m))
+        for psd in (1, 2)
+    ]
+    return section("spots", SPOTS_TITLE, lead, colour_key(session.places), panels(*figures))
+
+
+def _reach(spots_m: np.ndarray, half_m: float) -> str:
+    x, y = np.ptp(spots_m, axis=0) / (2.0 * half_m)
+    return f"Spots cover {x:.0%} of the face in x and {y:.0%} in y; the square is the face, {2e3 * half_m:g} mm wide."
+
+
+RIG_TITLE = "The rig"
 
 
 def rig(session: SpotSession) -> Html:
     """Drawings with beam and reflection, and how many poses each place has."""
     source = "the recording and the fit" if session.corrections else "the recording and the rig file, for want of a fit"
     lead = f"Drawn from {source}: true proportions, real poses, beams that end on the observed spots."
-    return section("rig", TITLE, lead, *_drawings(session))
+    return section("rig", RIG_TITLE, lead, *_drawings(session))
 
 
 def _drawings(session: SpotSession) -> list[Html]:

@@ -1,17 +1,66 @@
-"""The table of joint zeros, and what limits each of them."""
+"""The table of joint zeros with what limits each of them, and the point constraint where the fit plan asked for it."""
 
 from collections.abc import Iterator, Sequence
-from math import degrees
+from math import degrees, hypot
+
+from matplotlib.figure import Figure
 
 from calibrate.default_belief import links_of
+from calibrate.fit_plan import BesideName, parse_plan
 from calibrate.identification.estimates import Estimate, JointZero, joint_zeros
-from calibrate.report.elements import Html, figure, table, tag
-from calibrate.report.not_determined import reason_among
-from calibrate.report.quantities import DASH, aligned, angle, decimals_of, fixed, significant
+from calibrate.identification.planned import rig_as_planned
+from calibrate.identification.point_constraint import PointConstraintResult, point_constraints
+from calibrate.report.elements import Html, bullets, figure, panels, section, table, tag
+from calibrate.report.not_determined import in_plain_words, plain_reason, reason_among, spectrum
+from calibrate.report.quantities import DASH, aligned, angle, decimals_of, fixed, length, significant
 from calibrate.report.session_evidence import SessionEvidence
+from calibrate.report.svg import drawn, log_axis
+from calibrate.report.tones import Tone
 from calibrate.report.workspace.known_arm import whole_covariance
-from calibrate.report.zero_figure import doubts
 from calibrate.sensors import spots
+
+ROW_IN = 0.3
+
+
+def zero_uncertainties(zeros: Sequence[JointZero]) -> Html:
+    """Sigma of every determined zero, and what the measurement alone leaves of it."""
+    says = "sigma of each joint zero on a logarithmic axis, in all and of the measurement alone"
+    return drawn("zero-doubts", says, 4.8, 1.0 + ROW_IN * len(zeros), lambda figure: _paint_doubts(figure, zeros))
+
+
+def _paint_doubts(figure: Figure, zeros: Sequence[JointZero]) -> None:
+    axes = figure.add_subplot()
+    alone, total = ("measurement alone", "in all") if zeros else (None, None)
+    for row, zero in enumerate(zeros):
+        if zero.sigma_rad is None:
+            continue
+        least = zero.measurement_sigma_rad or zero.sigma_rad
+        axes.plot([least, zero.sigma_rad], [row, row], color=Tone.SOFT.value, lw=1.6, zorder=1)
+        paper = {"mfc": Tone.PAPER.value, "mec": Tone.PLACE_1.value, "mew": 1.6}
+        axes.plot(least, row, "o", ms=6.5, label=alone, **paper)  # pyright: ignore[reportArgumentType]
+        axes.plot(zero.sigma_rad, row, "o", ms=7, color=Tone.PLACE_1.value, label=total)
+        alone = total = None
+    for row, zero in enumerate(zeros):
+        if zero.sigma_rad is None:
+            axes.annotate(
+                "not determined",
+                (0.01, row),
+                xycoords=("axes fraction", "data"),
+                va="center",
+                fontsize=10,
+                color=Tone.SOFT.value,
+            )
+    axes.set_yticks(range(len(zeros)), [f"J{z.joint}" for z in zeros])
+    axes.tick_params(axis="y", length=0, colors=Tone.INK.value)
+    axes.set_ylim(len(zeros) - 0.5, -0.5)
+    axes.spines["left"].set_visible(False)
+    axes.grid(visible=False, axis="y")
+    sizes = [s for z in zeros for s in (z.sigma_rad, z.measurement_sigma_rad) if s]
+    log_axis(axes, "x", sizes, lambda value: angle(value, 1))
+    axes.set_title("One sigma of each zero")
+    if any(z.sigma_rad is not None for z in zeros):
+        axes.legend(loc="upper right", bbox_to_anchor=(1.0, -0.16), ncols=2, borderaxespad=0.0)
+
 
 ZEROS = "Joint zeros"
 SMALL_SHARE = 0.5  # measurement under this share of sigma: something else limits the zero
@@ -50,7 +99,7 @@ def zeros_part(evidence: SessionEvidence) -> Iterator[Html]:
             "the assumed tolerance of the links is the limit, because these data cannot separate the zero from the "
             "links."
         )
-        yield figure(doubts(zeros), caption)
+        yield figure(zero_uncertainties(zeros), caption)
 
 
 def limits_of_zeros(evidence: SessionEvidence) -> Iterator[str]:
@@ -113,3 +162,77 @@ def _names(zeros: Sequence[JointZero]) -> str:
 
 def _reason(zero: JointZero, evidence: SessionEvidence) -> str:
     return reason_among(f"joint{zero.joint}.zero", evidence.model.unseen, zero.why)
+
+
+POINT_TITLE = "Point constraint"
+LEAD = (
+    "The method of Deng, Ding, Zhang (Food & Machinery 2019(3)), for comparison: the laser lines of centred poses meet "
+    "in one point of the fixture; only joint zeros are unknown. Links and laser are nominal."
+)
+
+
+def asked_for(evidence: SessionEvidence) -> bool:
+    """Whether the plan of the model names this method."""
+    plan = evidence.model.plan
+    return plan is not None and parse_plan(plan, "fit plan in the model").method is BesideName.POINT_CONSTRAINT
+
+
+def point(evidence: SessionEvidence) -> Html:
+    """Both forms, each with its rank and its zeros beside those of the fit."""
+    recording, plan = evidence.recording, parse_plan(evidence.model.plan or "", "fit plan in the model")
+    found = point_constraints(rig_as_planned(recording.rig, plan), recording.samples.take(evidence.rows))
+    full = zeros_of(evidence)
+    return section(
+        "point",
+        POINT_TITLE,
+        LEAD,
+        tag("h3", f"Four poses at place {found.placement}, as published"),
+        *_one(found.four_poses, full, "four"),
+        tag("h3", f"All {found.poses} centred poses at place {found.placement}"),
+        *_one(found.all_poses, full, "all"),
+    )
+
+
+def _one(result: PointConstraintResult, full: Sequence[JointZero], name: str) -> Iterator[Html]:
+    seen = result.identifiability
+    caption = "Singular values of the point constraint: few poses see few combinations."
+    drawing = figure(spectrum(seen.singular_values, seen.rank, f"point-{name}", with_drawing=False), caption)
+    words = [tag("h3", f"Rank {seen.rank} of {seen.n_free} zeros")]
+    if seen.combinations:
+        words.append(bullets(in_plain_words(c.words) for c in seen.combinations))
+    yield panels(drawing, tag("div", *words))
+    yield tag(
+        "p",
+        f"The lines miss their common point by {length(result.rms_distance_before_m)} rms distance before the fit, by "
+        f"{length(result.rms_distance_after_m)} after it. Fit: {result.status.value}.",
+    )
+    yield _beside(result, full)
+
+
+def _beside(result: PointConstraintResult, full: Sequence[JointZero]) -> Html:
+    others = {z.joint: z for z in full}
+    rows: list[tuple[str, ...]] = []
+    for zero in result.zeros:
+        if zero.value_rad is None or zero.sigma_rad is None:
+            reason = plain_reason(f"joint{zero.joint}.zero", result.identifiability, zero.why)
+            rows.append((f"J{zero.joint}", f"not determined: {reason}"))
+            continue
+        digits = decimals_of(degrees(zero.sigma_rad))
+        value, sigma = fixed(degrees(zero.value_rad), digits), fixed(degrees(zero.sigma_rad), digits)
+        rows.append((f"J{zero.joint}", value, sigma, *_difference(zero, others.get(zero.joint))))
+    head = ("Joint", "zero (°)", "± sigma (°)", "by the fit (°)", "difference (°)", "in sigma of both")
+    return table(head, rows, numeric=(1, 2, 3, 4, 5))
+
+
+def _difference(zero: JointZero, other: JointZero | None) -> tuple[str, ...]:
+    if other is None or other.value_rad is None or other.sigma_rad is None:
+        return ("not determined there",)
+    value, sigma = zero.value_rad or 0.0, zero.sigma_rad or 0.0
+    apart = value - other.value_rad
+    both = hypot(sigma, other.sigma_rad)
+    in_sigma = significant(abs(apart) / both, 2) if both > 0.0 else ""
+    return (
+        fixed(degrees(other.value_rad), decimals_of(degrees(other.sigma_rad))),
+        fixed(degrees(apart), decimals_of(degrees(both))),
+        in_sigma,
+    )

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from acquisition.recording import Event
-from calibrate.report.centring_traces import traces_of
+from calibrate.report.sections.centring import traces_of
 
 
 def run(**changed: Any) -> Event:

@@ -14,8 +14,8 @@ from acquisition.recording.rig import load_rig, parse_rig, rig_text
 from acquisition.recording.rig.schema import Site, SiteInstrument
 from calibrate.model_file import ModelParameter
 from calibrate.report.elements import Html, page
-from calibrate.report.sections.arm_table import arm_numbers
-from calibrate.report.sections.certificate import certificate
+from calibrate.report.sections.parameter_tables import arm_numbers
+from calibrate.report.sections.summary import certificate
 
 RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
 SITE = """

@@ -5,8 +5,7 @@ import pytest
 
 from calibrate.believed import BelievedRig
 from calibrate.report.rig_scene import FittedRig, Scene, fitted_rig, scene
-from calibrate.report.session_evidence import SessionEvidence
-from calibrate.report.spot_session import SpotSession, spot_session
+from calibrate.report.session_evidence import SessionEvidence, SpotSession, spot_session
 
 # The drawn beam ends on observed spots, the computed one does not know them: they differ by the noise (some um) over
 # the distance of the faces (0.08 m).

@@ -10,10 +10,10 @@ import pytest
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
 from calibrate.report.elements import write_page
-from calibrate.report.sections.arm_data import data_chapter
 from calibrate.report.sections.arm_errors import errors_chapter
 from calibrate.report.sections.parameter_tables import parameters_chapter
 from calibrate.report.sections.proofs import proofs_chapter
+from calibrate.report.sections.recorded_data import data_chapter
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_report import session_answers
 from calibrate.report.session_workspace import session_arm

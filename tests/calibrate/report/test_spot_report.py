@@ -15,10 +15,9 @@ from calibrate.report.elements import provenance
 from calibrate.report.sections.centring import centring
 from calibrate.report.sections.proofs import proofs_chapter
 from calibrate.report.sections.zeros import limited_by_measurement, zeros_of
-from calibrate.report.session_evidence import session_evidence
+from calibrate.report.session_evidence import session_evidence, spot_session
 from calibrate.report.session_report import session_answers, session_page
 from calibrate.report.session_verdict import session_verdict
-from calibrate.report.spot_session import spot_session
 from calibrate.report.verdict import Trust
 
 PLAN = 'schema = 1\nmethod = "point-constraint"\nshare = 0\n'

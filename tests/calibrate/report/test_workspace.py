@@ -9,9 +9,8 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from calibrate.fit import solve
-from calibrate.report.sections.workspace import workspace
 from calibrate.report.session_evidence import session_evidence
-from calibrate.report.session_workspace import deleted_misfit, session_arm, session_measured
+from calibrate.report.session_workspace import deleted_misfit, session_arm, session_measured, workspace
 from calibrate.report.workspace.cell_figure import paint_measured, paint_poses
 from calibrate.report.workspace.room import room_of
 from calibrate.report.workspace.scale import steps_for

@@ -22,7 +22,7 @@ SPELLED = {
     "calibeam/simulation/mechanism_by_hand.py": "instruments that a mechanism acts on: words of the simulators",
     "calibeam/simulation/of_instruments.py": "what a curve is added to: a word of the simulators",
     "calibrate/report/session_report.py": "id of a chapter on the page",
-    "calibrate/report/sections/point.py": "id of a chapter on the page",
+    "calibrate/report/sections/zeros.py": "id of a chapter on the page",
 }
 # Why a file may test for a sensor's class.
 TESTED: dict[str, str] = {}
