@@ -96,7 +96,7 @@ def design_command(
         seen = seen_by(loaded, offered, made.taken, rng)
         spread = _places(loaded, poses, places, rng, progress) if places else ()
     if report is not None:
-        from calibrate.report.pose_design.page import write_page_of
+        from calibrate.report.pose_design_page import write_page_of
 
         write_page_of(report, loaded, made, seen, spread, SOFTWARE)
     if json_:

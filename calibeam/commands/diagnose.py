@@ -14,7 +14,7 @@ from calibeam.results.identification import naming_source
 from calibrate.diagnose.file import write_diagnosis
 from calibrate.model_file import read_model, write_model
 from calibrate.physics.from_diagnosis import model_of_diagnosis
-from calibrate.report.diagnosis.page import write_diagnosis_report
+from calibrate.report.diagnosis.diagnosis_page import write_diagnosis_report
 
 
 def diagnose_command(

@@ -15,7 +15,7 @@ from calibeam.results.identification import identify_and_judge, naming_source
 from calibeam.results.session_results import write_recording_report
 from calibrate.diagnose.file import read_diagnosis
 from calibrate.model_file import read_model
-from calibrate.report.drift.drift import Calibration
+from calibrate.report.drift.two_calibrations import Calibration
 from calibrate.report.verdict import Answers
 
 MODEL, DIAGNOSIS = "model.json", "diagnosis.json"  # as sessions name them

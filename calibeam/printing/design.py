@@ -13,7 +13,7 @@ from calibrate.pose_design.design import Design
 from calibrate.pose_design.places import Places
 from calibrate.pose_design.seen import Seen
 from calibrate.report.diagnosis.words import size_of
-from calibrate.report.pose_design.page import of_the_curve
+from calibrate.report.pose_design_page import of_the_curve
 from calibrate.report.quantities import length
 
 MATTERS_M = 1e-7  # of what no pose shows: below, the target does not feel it

@@ -27,7 +27,7 @@ from calibrate.diagnose.folds import splits_of
 from calibrate.diagnose.schema import CurveRecord, DiagnosisFile
 from calibrate.diagnose.session import session_of
 from calibrate.errors import DataError
-from calibrate.report.diagnosis.page import write_diagnosis_report
+from calibrate.report.diagnosis.diagnosis_page import write_diagnosis_report
 from calibrate.report.diagnosis.words import verdict_words
 from calibrate.report.elements import Html, bullets, figure, page, section, table, tag, write_page
 from calibrate.report.quantities import DASH, angle, length

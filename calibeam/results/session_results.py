@@ -19,7 +19,7 @@ from calibrate.errors import DataError
 from calibrate.identification.result import Identification
 from calibrate.model_file import ModelFile, write_model
 from calibrate.physics.from_diagnosis import model_of_diagnosis
-from calibrate.report.drift.drift import Calibration, drift_of
+from calibrate.report.drift.two_calibrations import Calibration, drift_of
 from calibrate.report.elements import write_page
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_report import session_answers, session_page

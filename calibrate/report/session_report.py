@@ -6,10 +6,10 @@ from dataclasses import replace
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.report import elements, session_workspace
 from calibrate.report.diagnosis.beyond_model import beyond_model
-from calibrate.report.diagnosis.page import inserted
-from calibrate.report.drift.chapter import TITLE as DRIFT
-from calibrate.report.drift.chapter import drift_chapter
-from calibrate.report.drift.drift import Drift
+from calibrate.report.diagnosis.diagnosis_page import inserted
+from calibrate.report.drift.drift_chapter import TITLE as DRIFT
+from calibrate.report.drift.drift_chapter import drift_chapter
+from calibrate.report.drift.two_calibrations import Drift
 from calibrate.report.drift.words import sentence
 from calibrate.report.elements import Html, page, section, tag
 from calibrate.report.interactive.chapter import TITLE as INTERACTIVE
@@ -30,7 +30,7 @@ from calibrate.report.sections.zeros import ZEROS, zeros_part
 from calibrate.report.session_evidence import SessionEvidence, spot_session
 from calibrate.report.session_workspace import NOT_IN_SPACE, session_arm, session_measured, session_room
 from calibrate.report.verdict import Answers
-from calibrate.report.workspace.room import Room
+from calibrate.report.workspace.workspace_errors import Room
 
 
 def session_page(

@@ -6,7 +6,7 @@ import numpy as np
 
 from calibrate.diagnose.schema import DiagnosisFile, FindingRecord
 from calibrate.model_file import ModelFile
-from calibrate.report.drift.drift import Calibration, Drift
+from calibrate.report.drift.two_calibrations import Calibration, Drift
 from calibrate.report.elements import Html, table, tag
 from calibrate.report.model_tests import proofs
 from calibrate.report.quantities import DASH, angle, fixed, length, significant

@@ -4,8 +4,8 @@ from math import degrees
 
 import numpy as np
 
-from calibrate.report.drift.drift import Drift
 from calibrate.report.drift.parameters import Change
+from calibrate.report.drift.two_calibrations import Drift
 from calibrate.report.not_determined import in_plain_words
 from calibrate.report.quantities import decimals_of, fixed, length, significant
 

@@ -7,7 +7,7 @@ import numpy as np
 from calibrate.error_simulation.sensitivity import ROUNDING_M
 from calibrate.error_simulation.simulate import SHARE, Simulation
 from calibrate.report.elements import Html, figure, page, section, table, tag, tile, write_page
-from calibrate.report.error_simulation.figures import PICTURES, Picture
+from calibrate.report.error_simulation_page import PICTURES, Picture
 from calibrate.report.quantities import angle, length, significant
 from calibrate.report.svg import drawn
 

@@ -20,7 +20,7 @@ from calibrate.report.session_evidence import Readings, SessionEvidence
 from calibrate.report.session_verdict import session_verdict
 from calibrate.report.verdict import Answers, Number, first_screen
 from calibrate.report.workspace.pictures import tool_maps
-from calibrate.report.workspace.room import Room
+from calibrate.report.workspace.workspace_errors import Room
 from calibrate.sensors.catalogue import kind_of
 
 TITLE = "Certificate"

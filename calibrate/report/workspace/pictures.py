@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from calibrate.report.elements import Html
 from calibrate.report.svg import drawn
-from calibrate.report.workspace.cell_figure import (
+from calibrate.report.workspace.cells import (
     dress,
     paint_cells,
     paint_measured,
@@ -21,9 +21,9 @@ from calibrate.report.workspace.cell_figure import (
     paint_unsupported,
     scale_bar,
 )
-from calibrate.report.workspace.room import Room
 from calibrate.report.workspace.scale import Steps, steps_for
 from calibrate.report.workspace.sections import SIDE, VIEWS, Grid, grid_of
+from calibrate.report.workspace.workspace_errors import Room
 
 Floats = NDArray[np.float64]
 

@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from calibrate.fit import solve
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_workspace import deleted_misfit, session_arm, session_measured, workspace
-from calibrate.report.workspace.cell_figure import paint_measured, paint_poses
-from calibrate.report.workspace.room import room_of
+from calibrate.report.workspace.cells import paint_measured, paint_poses
 from calibrate.report.workspace.scale import steps_for
 from calibrate.report.workspace.sections import ABOVE, SIDE, Grid, grid_of
+from calibrate.report.workspace.workspace_errors import room_of
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,7 @@ from calibrate.report.drift.parameters import Change, Compared, compared, doubt_
 from calibrate.report.model_tests import repeated, scatter
 from calibrate.report.verdict import UNLIKELY
 from calibrate.report.workspace.known_arm import KnownArm
-from calibrate.report.workspace.room import Room, room_of, target_at
+from calibrate.report.workspace.workspace_errors import Room, room_of, target_at
 from calibrate.uncertainty.fit_statistics import Alarm
 from calibrate.uncertainty.free_space import target_by_parameter
 

@@ -4,9 +4,9 @@ from math import degrees
 
 import numpy as np
 
-from calibrate.report.drift.drift import Drift
 from calibrate.report.drift.parameters import FAMILY, Change, Compared
 from calibrate.report.drift.then_and_now import both, findings
+from calibrate.report.drift.two_calibrations import Drift
 from calibrate.report.drift.words import sentence
 from calibrate.report.elements import Html, bullets, figure, folded, section, table, tag
 from calibrate.report.not_determined import in_plain_words
