@@ -94,8 +94,7 @@ def write_simulation(folder: Path, simulation: "Simulation") -> tuple[Path, ...]
     """errors.json, errors.html, and every figure as an SVG of its own. DataError, OSError where that cannot be."""
     from calibeam.motion.figures import write_figure  # matplotlib takes a second to load
     from calibrate.error_simulation.simulate import write_record
-    from calibrate.report.error_simulation.page import write_page_of
-    from calibrate.report.error_simulation_page import PICTURES
+    from calibrate.report.error_simulation_page import PICTURES, write_page_of
 
     folder.mkdir(parents=True, exist_ok=True)
     write_record(folder / "errors.json", simulation, SOFTWARE)

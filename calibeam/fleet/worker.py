@@ -31,7 +31,7 @@ from calibrate.errors import DataError
 from calibrate.model_file import Fields, ModelFile
 from calibrate.parameters import values_by_name
 from calibrate.predict import Predictor
-from calibrate.report.drift.drawing import drawn_values
+from calibrate.report.drift.two_calibrations import drawn_values
 
 IMPORTED = "imported_from"  # note of a recording that was made of a session folder: its start is that of the import
 OF_NOISE = ("_believed", "_sigma", "_believed_rad", "_believed_m", "_sigma_rad", "_sigma_m")

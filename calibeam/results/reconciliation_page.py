@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from calibeam.results.reconciliation import Reconciled, ReconcileFile, RowRecord, UnseenRecord
 from calibeam.software import SOFTWARE
-from calibrate.report.diagnosis.chain_figure import chain_figure, chain_of
+from calibrate.report.diagnosis.finding_page import chain_figure, chain_of
 from calibrate.report.elements import Html, bullets, figure, page, panels, section, table, tag, tile, write_page
 from calibrate.report.quantities import length
 from calibrate.report.svg import drawn, log_axis

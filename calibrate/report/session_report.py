@@ -5,15 +5,13 @@ from dataclasses import replace
 
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.report import elements, session_workspace
-from calibrate.report.diagnosis.beyond_model import beyond_model
-from calibrate.report.diagnosis.diagnosis_page import inserted
+from calibrate.report.diagnosis.diagnosis_page import beyond_model, inserted
 from calibrate.report.drift.drift_chapter import TITLE as DRIFT
-from calibrate.report.drift.drift_chapter import drift_chapter
+from calibrate.report.drift.drift_chapter import drift_chapter, sentence
 from calibrate.report.drift.two_calibrations import Drift
-from calibrate.report.drift.words import sentence
 from calibrate.report.elements import Html, page, section, tag
-from calibrate.report.interactive.chapter import TITLE as INTERACTIVE
-from calibrate.report.interactive.chapter import interactive_chapter
+from calibrate.report.interactive.plots import INTERACTIVE_TITLE as INTERACTIVE
+from calibrate.report.interactive.plots import interactive_chapter
 from calibrate.report.interactive.session_figures import session_figures
 from calibrate.report.sections import (
     arm_errors,

@@ -15,9 +15,16 @@ from calibrate.parameters import without_assumed
 from calibrate.problem import Problem
 from calibrate.report.elements import Html, figure, section, tag
 from calibrate.report.session_evidence import SessionEvidence
-from calibrate.report.workspace.known_arm import KnownArm, scatter_of, unpredicted, whole_covariance
 from calibrate.report.workspace.pictures import Measured, before_and_after
-from calibrate.report.workspace.workspace_errors import Room, room_of, target_at
+from calibrate.report.workspace.workspace_errors import (
+    KnownArm,
+    Room,
+    room_of,
+    scatter_of,
+    target_at,
+    unpredicted,
+    whole_covariance,
+)
 from calibrate.sensors.catalogue import names_with
 from calibrate.sensors.kind import Trait
 from calibrate.unseen_along import analyse_along

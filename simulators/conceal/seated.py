@@ -9,8 +9,8 @@ from simulators.arm.kinematics import forward, jacobian, reach_point, within_lim
 from simulators.conceal.chain import balanced, said_rad
 from simulators.conceal.readings import tip_m
 from simulators.conceal.rig import Artefacts, TrueRig
-from simulators.defects import Scene
-from simulators.defects.defect import Defect, MovesSeat
+from simulators.defects import Defect, Scene
+from simulators.defects.defect import MovesSeat
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from simulators.conceal.chain import balanced, true_shaft_rad
 from simulators.conceal.rig import TrueRig
 from simulators.conceal.wanted import ConcealError, Side
-from simulators.defects import Scene, Site, UnsuitedError
-from simulators.defects.defect import Defect, TurnsJoint, with_size
+from simulators.defects import Defect, Scene, Site, UnsuitedError
+from simulators.defects.defect import TurnsJoint, with_size
 from simulators.defects.drive import SlackDrive, SoftJoint
 from simulators.defects.encoder import RADIUS_M, EccentricDisc, SecondDisc, SecondSlip
 

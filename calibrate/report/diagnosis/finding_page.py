@@ -1,14 +1,163 @@
-"""One finding, one page: sentence, picture, place, size, proof, rivals, what to do."""
+"""One finding, one page: sentence, figure, place in the chain, size, proof, alternative explanations, what to do."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
-from calibrate.diagnose.schema import DiagnosisFile, FindingRecord, RivalRecord, SizeRecord
-from calibrate.report.diagnosis.chain_figure import Link, chain_figure
-from calibrate.report.diagnosis.pulled_figure import pulled_figure
-from calibrate.report.diagnosis.units import unit_of
-from calibrate.report.diagnosis.words import place_words
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyBboxPatch
+from numpy.typing import NDArray
+
+from calibrate.diagnose.schema import CurveRecord, DiagnosisFile, FindingRecord, RivalRecord, SizeRecord
+from calibrate.report.diagnosis.words import place_words, unit_of
 from calibrate.report.elements import Html, facts, figure, panels, section, table, tag
+from calibrate.report.error_figures import thinned
 from calibrate.report.quantities import DASH, TIED, decimals_of, fixed, significant
+from calibrate.report.svg import drawn
+from calibrate.report.tones import Tone
+from calibrate.sensors.catalogue import kind_of
+from calibrate.sensors.kind import Trait
+
+
+@dataclass(frozen=True)
+class Link:
+    """A part of the chain; `ports` are the beginnings of the ports that sit in it."""
+
+    name: str
+    ports: tuple[str, ...]
+
+
+def chain_of(joints: int, instruments: Sequence[str]) -> tuple[Link, ...]:
+    """From the base to the readings of the instruments that were there."""
+    out = [Link("clock", ("time",)), Link("base", ("base.",))]
+    for i in range(1, joints + 1):
+        out += [Link(f"J{i}", (f"joint{i}.",)), Link(f"link {i}", (f"link{i}.",))]
+    out.append(Link("tool", ("tool.", "laser.")))
+    traits = {trait for name in instruments for trait in kind_of(name).traits}
+    if Trait.LIGHT in traits:
+        out += [Link("fixture", ("fixture.",)), Link("PSD 1", ("psd1.",)), Link("PSD 2", ("psd2.",))]
+    if Trait.CONES in traits:
+        out.append(Link("cone", ("seat.",)))
+    if Trait.DEVICE in traits:
+        out.append(Link("device", ("device.",)))
+    return tuple(out)
+
+
+def chain_figure(name: str, where: str, chain: Sequence[Link]) -> Html:
+    """With the link of the port `where` marked."""
+    says = f"the chain from base to reading, {where} marked"
+    rows = -(-len(chain) // _per_row(len(chain)))
+    return drawn(f"chain-{name}", says, 4.8, 0.25 + 0.62 * rows, lambda figure: _paint_chain(figure, where, chain))
+
+
+def _per_row(links: int) -> int:
+    return -(-links // (-(-links // 6)))
+
+
+def _paint_chain(figure: Figure, where: str, chain: Sequence[Link]) -> None:
+    axes = figure.add_subplot()
+    axes.set_axis_off()
+    per_row = _per_row(len(chain))
+    for at, link in enumerate(chain):
+        row, column = divmod(at, per_row)
+        marked = any(where.startswith(port) for port in link.ports)
+        _box(axes, column, -row, link.name, where.partition(".")[2] if marked else None)
+        if at + 1 < len(chain):
+            last = column == per_row - 1
+            start, end = ((column + 0.44, -row), (column + 0.56, -row)) if not last else ((column, -row - 0.3), None)
+            if end is not None:
+                axes.plot([start[0], end[0]], [start[1], end[1]], color=Tone.SOFT.value, lw=1.2)
+    rows = -(-len(chain) // per_row)
+    axes.set(xlim=(-0.55, per_row - 0.45), ylim=(-rows + 0.5, 0.5))
+
+
+def _box(axes: Axes, x: float, y: float, name: str, port: str | None) -> None:
+    edge, width = (Tone.BEAM.value, 2.2) if port is not None else (Tone.SOFT.value, 0.8)
+    shape = FancyBboxPatch(
+        (x - 0.41, y - 0.26), 0.82, 0.52, boxstyle="round,pad=0.02,rounding_size=0.08", fc="none", ec=edge, lw=width
+    )
+    axes.add_patch(shape)
+    colour = Tone.BEAM.value if port is not None else Tone.INK.value
+    axes.text(x, y + (0.09 if port else 0.0), name, ha="center", va="center", fontsize=10, color=colour)
+    if port:
+        axes.text(x, y - 0.12, port, ha="center", va="center", fontsize=10, color=colour)
+
+
+Floats = NDArray[np.float64]
+
+SHOWN = (0.5, 99.5)  # percentiles of the residual on the axis: where a port is hardly felt, points fly far
+ROOM = 1.6  # times what is shown
+LINE_LEVELS = 6  # different driver values: below, the curve is a few levels and drawn as points
+
+
+def pulled_figure(name: str, curve: CurveRecord, *, single: bool) -> Html:
+    """`single`: the cause depends on the drawn driver alone, so that its curve is a line."""
+    says = f"residual without this cause, pulled back to its place, against {curve.driver}, with the fitted curve"
+    return drawn(f"pulled-{name}", says, 4.8, 3.3, lambda figure: _paint_curve(figure, curve, single=single))
+
+
+def _paint_curve(figure: Figure, curve: CurveRecord, *, single: bool) -> None:
+    axes = figure.add_subplot()
+    x, y, fitted = (np.array(values, dtype=np.float64) for values in (curve.values, curve.residual, curve.fitted))
+    scale, unit = _unit(curve.unit, float(np.nanmax(np.abs(fitted), initial=0.0)))
+    turn, axis = _axis(curve.driver, x)
+    shown = thinned(len(x))
+    axes.axhline(0.0, color=Tone.SOFT.value, lw=0.8)
+    axes.plot(
+        turn * x[shown], scale * y[shown], "o", ms=2.6, mew=0, color=Tone.PLACE_1.value, alpha=0.5, label="samples"
+    )
+    order = np.argsort(x, kind="stable")
+    style = "-" if single and len(np.unique(x)) >= LINE_LEVELS and _is_curve(x[order], fitted[order]) else "o"
+    axes.plot(
+        turn * x[order], scale * fitted[order], style, ms=3.0, mew=0, lw=2.0, color=Tone.BEAM.value, label="fitted"
+    )
+    reach = _reach(scale * y, scale * fitted)
+    axes.set(xlabel=axis, ylabel=f"residual there ({unit})", ylim=(-reach, reach))
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, 1.12), ncols=2, borderaxespad=0.0)
+
+
+def _is_curve(x: Floats, fitted: Floats) -> bool:
+    """Whether neighbours have nearly the same value: a hidden driver would make it a cloud."""
+    span = float(np.ptp(fitted))
+    return span > 0.0 and float(np.median(np.abs(np.diff(fitted)))) < 0.1 * span and len(x) > 1
+
+
+def _reach(y: Floats, fitted: Floats) -> float:
+    known = y[np.isfinite(y)]
+    most = float(np.max(np.abs(fitted), initial=0.0))
+    if len(known):
+        most = max(most, float(np.max(np.abs(np.percentile(known, SHOWN)))) / ROOM)
+    return ROOM * max(most, 1e-12)
+
+
+def _unit(unit: str, reach: float) -> tuple[float, str]:
+    sizes = {"m": ((1e3, "mm"), (1e6, "µm")), "rad": ((1e3, "mrad"), (1e6, "µrad"))}[unit]
+    return sizes[0] if reach * sizes[0][0] >= 1.0 else sizes[1]
+
+
+def _axis(driver: str, x: Floats) -> tuple[float, str]:
+    """Factor and label."""
+    stem = driver.rstrip("0123456789")
+    number = driver[len(stem) :]
+    known = {
+        "q": (np.degrees(1.0), f"joint {number} (°)"),
+        "t": (1.0 / 60.0, "time (min)"),
+        "gravity_torque": (1.0, f"gravity torque on joint {number} (Nm)"),
+        "overturning_moment": (1.0, "overturning moment (Nm)"),
+        "last_move": (np.degrees(1.0), f"last move of joint {number} (°)"),
+        "qd": (np.degrees(1.0), f"speed of joint {number} (°/s)"),
+        "cmd_minus_q": (np.degrees(1.0), f"command less reading, joint {number} (°)"),
+        "approach": (1.0, f"way joint {number} came"),
+        "spot": (1e3, f"distance of the spot from the middle of PSD {number} (mm)"),
+        "incidence": (np.degrees(1.0), f"angle of the beam on PSD {number} (°)"),
+        "payload": (1.0, "payload (kg)"),
+        "reading": (1.0, "reading (m)"),
+    }
+    if stem.startswith("temp_"):
+        return 1.0, f"temperature, {driver.removeprefix('temp_')} (°C)"
+    return known.get(stem, (1.0, driver))
+
 
 TWO_SIDED = 1.96  # sigmas of 95 %
 SURE = 1e-6  # probability below which only its smallness is told

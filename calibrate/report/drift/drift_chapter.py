@@ -1,19 +1,149 @@
-"""The chapter that compares a calibration with an earlier one of the same arm."""
+"""The chapter that compares a calibration with an earlier one of the same arm: its sentence, its tables, its maps."""
 
+from collections.abc import Iterator
 from math import degrees
 
 import numpy as np
 
-from calibrate.report.drift.parameters import FAMILY, Change, Compared
-from calibrate.report.drift.then_and_now import both, findings
-from calibrate.report.drift.two_calibrations import Drift
-from calibrate.report.drift.words import sentence
+from calibrate.diagnose.schema import DiagnosisFile, FindingRecord
+from calibrate.model_file import ModelFile
+from calibrate.report.drift.two_calibrations import FAMILY, Calibration, Change, Compared, Drift
 from calibrate.report.elements import Html, bullets, figure, folded, section, table, tag
+from calibrate.report.model_tests import proofs
 from calibrate.report.not_determined import in_plain_words
-from calibrate.report.quantities import aligned, decimals_of, fixed, length, significant
+from calibrate.report.quantities import DASH, aligned, angle, decimals_of, fixed, length, significant
 from calibrate.report.verdict import coded
+from calibrate.report.workspace.cells import VIEWS, grid_of
 from calibrate.report.workspace.pictures import Layer, pictures
-from calibrate.report.workspace.sections import VIEWS, grid_of
+
+TOLD = 3  # changes in the sentence; all of them stand in the table
+
+
+def sentence(drift: Drift) -> str:
+    """What moved since, by how much and how surely, and what it does to the tool."""
+    since, found = f"Since {drift.then.label}", drift.compared
+    if not found.changes:
+        return f"{since}: no comparison, because no parameter of the arm is determined both then and now."
+    if not drift.found:
+        largest = max(found.changes, key=lambda c: c.sigmas)
+        most = f" (most of all {in_plain_words(largest.name)}, {significant(largest.sigmas, 2)} sigma)"
+        return (
+            f"{since}: no drift shows. None of {len(found.changes)} parameters changed by more than chance gives"
+            f"{most if largest.sigmas > 0.0 else ''}{_blind(drift)}."
+        )
+    clear = found.significant
+    told = [moved(change) for change in clear[:TOLD]]
+    if len(clear) > TOLD:
+        more = len(clear) - TOLD
+        told.append(f"{more} more parameter{'s' if more > 1 else ''} changed")
+    if not told and found.together is not None:
+        told = [f"the arm changed, but no single parameter shows where (p =  {significant(found.together.p, 2)})"]
+    return f"{since}: {', '.join(told)}{_tool(drift)}."
+
+
+def moved(change: Change) -> str:
+    """'joint 3 moved by 0.021° (7 sigma)'."""
+    owner, _, what = change.name.partition(".")
+    times = f"({significant(change.sigmas, 2)} sigma)"
+    if what == "zero":
+        return f"joint {owner.removeprefix('joint')} moved by {size(change)} {times}"
+    return f"{in_plain_words(change.name)} changed by {size(change)} {times}"
+
+
+def size(change: Change) -> str:
+    """Degrees for angles, a fitting unit for lengths, with the digits that the doubt leaves."""
+    if change.unit == "rad":
+        return f"{fixed(abs(degrees(change.change)), decimals_of(degrees(change.sigma)))}°"
+    return length(abs(change.change))
+
+
+def _blind(drift: Drift) -> str:
+    """How much of a change would not have been seen."""
+    if drift.tool is None or drift.room is None:
+        return ""
+    sigma_m = float(np.sqrt(np.mean(drift.tool.sigma_m[drift.room.supported] ** 2)))
+    return f"; a change of the tool is determined to {length(sigma_m, 2)}, one sigma"
+
+
+def _tool(drift: Drift) -> str:
+    return "" if drift.tool is None else f"; tool error up to {length(drift.tool.largest_m, 2)}"
+
+
+ANGULAR = ("joint", "orientation", "joint_rad")
+BELIEVED = "_believed"
+
+
+def both(drift: Drift) -> Html:
+    """Coverage, noise and proofs."""
+    now, then = dict(_rows(drift.now)), dict(_rows(drift.then))
+    names = dict.fromkeys((*now, *then))
+    rows = [(name, then.get(name, DASH), now.get(name, DASH)) for name in names]
+    return table(("", drift.then.label, "now"), rows, numeric=(1, 2), caption="Coverage, noise and proof, then and now")
+
+
+def findings(drift: Drift) -> Html:
+    """Causes that a diagnosis named then and now."""
+    then, now = drift.then.diagnosis, drift.now.diagnosis
+    missing = [label for label, file in (("then", then), ("now", now)) if file is None]
+    if then is None or now is None:
+        why = f"there is no diagnosis of {' and of '.join(missing)} here"
+        return tag("p", f"Findings of a diagnosis are not compared: {why}.")
+    keys = dict.fromkeys((*_by_cause(then), *_by_cause(now)))
+    if not keys:
+        return tag("p", "No diagnosis, neither then nor now, found physics that the model lacks.")
+    rows = [(_state(k, then, now), _says(k, then), _says(k, now)) for k in keys]
+    return table(("Finding", drift.then.label, "now"), rows, caption="What diagnoses found that geometry lacks")
+
+
+def _rows(one: Calibration) -> Iterator[tuple[str, str]]:
+    model = one.model
+    yield "samples", str(model.poses)
+    yield from _ranges(one)
+    yield "combinations seen", f"{model.rank} of {model.free}"
+    if model.observability is not None:
+        yield "observability O1", significant(model.observability.o1)
+    yield from _noise(model)
+    for proof in proofs(model)[:1]:
+        yield f"unseen {proof.instrument} readings, rms distance", length(proof.rms_distance_after_m)
+    if model.free_space is not None and model.free_space.pose_p95_m is not None:
+        yield "tool error over the workspace, 95 %, predicted", length(model.free_space.pose_p95_m)
+    yield "software", model.software
+
+
+def _ranges(one: Calibration) -> Iterator[tuple[str, str]]:
+    """What the joints went through; a model alone does not say."""
+    if one.recording is None or len(one.recording.samples) == 0:
+        return
+    spans = np.degrees(np.ptp(one.recording.samples.joints(), axis=0))
+    yield "joints went through", ", ".join(f"{fixed(float(s), 0)}°" for s in spans)
+
+
+def _noise(model: ModelFile) -> Iterator[tuple[str, str]]:
+    for name in (n for n in model.noise if n.endswith(BELIEVED)):
+        source = name.removesuffix(BELIEVED)
+        found = model.noise.get(source)
+        if isinstance(found, float):
+            yield f"noise of {source}", angle(found) if source in ANGULAR else length(found)
+    for source, says in (("joint_rad", angle), ("psd_m", length)):  # of the method for spots alone
+        found = model.noise.get(source)
+        if isinstance(found, float):
+            yield f"noise of {source.partition('_')[0]}", says(found)
+
+
+def _by_cause(file: DiagnosisFile) -> dict[tuple[str, str], FindingRecord]:
+    return {(f.where, f.physics): f for f in file.findings}
+
+
+def _says(key: tuple[str, str], file: DiagnosisFile) -> str:
+    finding = _by_cause(file).get(key)
+    return DASH if finding is None else finding.says
+
+
+def _state(key: tuple[str, str], then: DiagnosisFile, now: DiagnosisFile) -> str:
+    if key not in _by_cause(then):
+        return "new"
+    return "in both" if key in _by_cause(now) else "gone"
+
 
 TITLE = "What has changed"
 BEYOND_DOUBT = 2.0  # sigma of the change of the tool, below which a cell is not drawn

@@ -1,12 +1,18 @@
-"""Figures that can be turned, as Plotly reads them: plain data, so that nothing of it is loaded before it is wanted."""
+"""The chapter of figures that can be turned, and their plots as Plotly reads them: no network and no other file.
+
+Plots are plain data, so that Plotly is loaded only where it is needed.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import degrees
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
+
+from calibrate.report.elements import Html, section, tag
 
 Floats = NDArray[np.float64]
 Trace = Mapping[str, Any]
@@ -77,3 +83,36 @@ def numbers(values: Floats) -> list[float | None]:
 def posture(q_rad: Floats) -> str:
     """Joint angles of one pose for a label: 'J1 10.00°, J2 …'."""
     return ", ".join(f"J{i} {degrees(q):.2f}°" for i, q in enumerate(q_rad.tolist(), start=1))
+
+
+INTERACTIVE_TITLE = "To turn and to ask"
+LEAD = "Drag to turn, scroll to come nearer, point at a mark for its numbers, click on a name to hide it."
+CONFIG = {"displaylogo": False, "responsive": True, "showSendToCloud": False}
+
+
+def interactive_chapter(plots: Sequence[Plot]) -> Html:
+    """Every plot with its caption, the library once in front of them."""
+    return section(
+        "interactive", INTERACTIVE_TITLE, LEAD, _script(_library()), *(part for p in plots for part in _plot(p))
+    )
+
+
+def _library() -> str:
+    """Five megabytes: read only when they are asked for."""
+    from plotly.offline import get_plotlyjs
+
+    return str(get_plotlyjs())
+
+
+def _plot(plot: Plot) -> tuple[Html, Html]:
+    content = (plot.name, plot.traces, plot.layout, CONFIG)
+    told = ", ".join(msgspec.json.encode(part).decode() for part in content)
+    drawing = tag("div", "", id=plot.name, cls="plot", role="img", aria_label=plot.says)
+    return tag("figure", drawing, tag("figcaption", plot.caption)), _script(f"Plotly.newPlot({told});")
+
+
+def _script(text: str) -> Html:
+    """JavaScript that the parser of HTML does not end early: https://html.spec.whatwg.org/#restrictions-for-contents-of-script-elements."""
+    for begins in ("</script", "<script", "<!--"):
+        text = text.replace(begins, f"\\x3c{begins[1:]}")
+    return tag("script", Html(text))

@@ -16,7 +16,7 @@ from calibrate.report.quantities import DASH, aligned, angle, decimals_of, fixed
 from calibrate.report.session_evidence import SessionEvidence
 from calibrate.report.svg import drawn, log_axis
 from calibrate.report.tones import Tone
-from calibrate.report.workspace.known_arm import whole_covariance
+from calibrate.report.workspace.workspace_errors import whole_covariance
 from calibrate.sensors import spots
 
 ROW_IN = 0.3

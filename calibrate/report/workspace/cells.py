@@ -1,9 +1,17 @@
-"""How cells of a view are painted: one path a colour, hatching where nothing is known, poses as points."""
+"""Two views of the workspace cut into cells, from the side (distance from axis z of the base, height) and from above.
 
+Cells are drawn as one path a colour, hatched where nothing is known, with poses as points. Lengths are steps in colours
+that darken evenly, so that they also read in grey and to colour-blind eyes: cividis, Nunez, Anderton, Renslow, PLOS ONE
+13(7), 2018.
+"""
+
+from dataclasses import dataclass
+
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.colors import BoundaryNorm, ListedColormap, to_hex
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
@@ -12,11 +20,118 @@ from numpy.typing import NDArray
 
 from calibrate.report.quantities import length
 from calibrate.report.tones import Tone
-from calibrate.report.workspace.scale import Steps
-from calibrate.report.workspace.sections import Grid
 
 Floats = NDArray[np.float64]
+
+COARSE = (1.0, 2.0, 5.0)  # of a decade
+FINE = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
+AT_MOST = 12  # steps: with more of the fine ones the coarse ones are taken
+LEAST = 0.05  # quantile of the values below which steps would only serve single points
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Bounds (step + 1,) in m and a colour for each step between two of them."""
+
+    bounds_m: tuple[float, ...]
+    colours: tuple[str, ...]
+    open_below: bool = False  # whether smaller values count to the first step
+
+    def of(self, values_m: Floats) -> NDArray[np.intp]:
+        """Number of the step of each value; what is outside counts to the first or last. -1 where not finite."""
+        step = np.clip(np.searchsorted(self.bounds_m, values_m, side="right") - 1, 0, len(self.colours) - 1)
+        return np.where(np.isfinite(values_m), step, -1)
+
+
+def steps_for(values_m: Floats) -> Steps:
+    """Round steps over all finite values but the very smallest; those that a page can show: the largest."""
+    finite = values_m[np.isfinite(values_m) & (values_m > 0.0)]
+    low, high = (float(np.quantile(finite, LEAST)), float(np.max(finite))) if len(finite) else (1e-6, 1e-5)
+    bounds = _between(low, high, FINE)
+    if len(bounds) > AT_MOST + 1:
+        bounds = _between(low, high, COARSE)[-AT_MOST - 1 :]
+    ramp = mpl.colormaps["cividis"](np.linspace(1.0, 0.0, len(bounds) - 1))
+    below = bool(np.any(finite < bounds[0]))
+    return Steps(tuple(bounds), tuple(to_hex(colour) for colour in ramp), below)
+
+
+def _between(low: float, high: float, marks: tuple[float, ...]) -> list[float]:
+    """Round numbers, the first at most `low`, the last at least `high`, two at least."""
+    first, last = int(np.floor(np.log10(low))), int(np.floor(np.log10(high))) + 1
+    listed = [float(f"{m:g}e{d}") for d in range(first, last + 1) for m in marks]
+    begin = max(i for i, mark in enumerate(listed) if mark <= low * (1.0 + 1e-12))
+    end = min(i for i, mark in enumerate(listed) if mark >= high and i > begin)
+    return listed[begin : end + 1]
+
+
 Bools = NDArray[np.bool_]
+
+ACROSS = 24  # cells over the width of the view from above
+
+
+@dataclass(frozen=True)
+class View:
+    """How points become two coordinates."""
+
+    name: str
+    title: str
+    across: str
+    up: str
+
+    def flat(self, points_m: Floats) -> Floats:
+        """(point, 2) m."""
+        if self.name == "side":
+            return np.stack([np.hypot(points_m[:, 0], points_m[:, 1]), points_m[:, 2]], axis=1)
+        return points_m[:, :2]
+
+
+SIDE = View("side", "from the side", "radius (m)", "height z (m)")
+ABOVE = View("above", "from above", "x (m)", "y (m)")
+VIEWS = (SIDE, ABOVE)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Square cells of one view, that hold everything the arm can reach."""
+
+    view: View
+    cell_m: float
+    first: tuple[int, int]  # cell of the lower left corner, counted from the base
+    shape: tuple[int, int]  # (across, up)
+
+    @property
+    def box_m(self) -> tuple[float, float, float, float]:
+        """Left, right, bottom, top."""
+        (i, j), (n, m), c = self.first, self.shape, self.cell_m
+        return i * c, (i + n) * c, j * c, (j + m) * c
+
+    def cells(self, points_m: Floats) -> NDArray[np.intp]:
+        """(point,) number of the cell."""
+        at = np.floor(self.view.flat(points_m) / self.cell_m).astype(np.intp) - np.array(self.first)
+        at = np.clip(at, 0, np.array(self.shape) - 1)
+        return at[:, 0] * self.shape[1] + at[:, 1]
+
+    def rms(self, points_m: Floats, values: Floats, chosen: Bools) -> Floats:
+        """(across, up) root mean square of the values (point,) of the chosen points; NaN where there is none."""
+        at, n = self.cells(points_m[chosen]), self.shape[0] * self.shape[1]
+        count = np.bincount(at, minlength=n)
+        square = np.bincount(at, weights=values[chosen] ** 2, minlength=n)
+        with np.errstate(invalid="ignore"):
+            return np.sqrt(square / np.where(count == 0, np.nan, count)).reshape(self.shape)
+
+    def reached(self, points_m: Floats) -> Bools:
+        """(across, up) whether any point is in the cell."""
+        n = self.shape[0] * self.shape[1]
+        return (np.bincount(self.cells(points_m), minlength=n) > 0).reshape(self.shape)
+
+
+def grid_of(view: View, reach_m: Floats) -> Grid:
+    """Cells of one size in both views, round everything that can be reached (point, 3)."""
+    cell_m = float(np.ptp(reach_m[:, :2], axis=0).max()) / ACROSS
+    at = np.floor(view.flat(reach_m) / cell_m).astype(int)
+    low, high = at.min(axis=0), at.max(axis=0)
+    return Grid(view, cell_m, (int(low[0]), int(low[1])), (int(high[0] - low[0] + 1), int(high[1] - low[1] + 1)))
+
 
 HATCH = "////"
 LABEL_IN = 0.68  # of the scale, for "≤ 300 µm" and a gap

@@ -14,15 +14,19 @@ from numpy.typing import NDArray
 from calibrate.report.elements import Html
 from calibrate.report.svg import drawn
 from calibrate.report.workspace.cells import (
+    SIDE,
+    VIEWS,
+    Grid,
+    Steps,
     dress,
+    grid_of,
     paint_cells,
     paint_measured,
     paint_poses,
     paint_unsupported,
     scale_bar,
+    steps_for,
 )
-from calibrate.report.workspace.scale import Steps, steps_for
-from calibrate.report.workspace.sections import SIDE, VIEWS, Grid, grid_of
 from calibrate.report.workspace.workspace_errors import Room
 
 Floats = NDArray[np.float64]

@@ -1,11 +1,12 @@
-"""Errors of the target over the workspace, as drawn and as identified, where the data support a statement.
+"""Errors of the target over the workspace, nominal and calibrated, where the data support a statement.
 
-The error as drawn is the distance between both arms, the best rigid motion between them left out, with the doubt of
-the identified one; as identified it is that doubt alone, J C J' (law of propagation, JCGM 100:2008, 5.1.2), with the
-scatter of a single pose. A pose is supported where no joint is beyond the angles that it had in the session, and
-where the prediction leans on the data no harder than at the poses of the session: beyond the largest leverage of the
-data lies hidden extrapolation (Montgomery, Peck, Vining, Introduction to Linear Regression Analysis, 5th ed. 2012,
-ch. 3.8). The outermost hundredth of the session at either end does not count: a lone pose far off supports nothing.
+The nominal error is the distance between both arms, the best rigid motion between them left out, with the uncertainty
+of the calibrated one; the calibrated error is that uncertainty alone, J C J' (law of propagation, JCGM 100:2008,
+5.1.2), with the scatter of a single pose. A pose is supported where no joint is beyond the angles that it had in the
+session, and where the prediction leans on the data no harder than at the poses of the session: beyond the largest
+leverage of the data lies hidden extrapolation (Montgomery, Peck, Vining, Introduction to Linear Regression Analysis,
+5th ed. 2012, ch. 3.8). The outermost hundredth of the session at either end does not count: a lone pose far off
+supports nothing.
 """
 
 from dataclasses import dataclass
@@ -14,13 +15,69 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from calibrate.arms.model import KinematicModel
 from calibrate.blunders.rough_fit import frame_between
-from calibrate.parameters import index_of
-from calibrate.report.workspace.known_arm import KnownArm
+from calibrate.identifiability import Identifiability
+from calibrate.model_file import Covariance, Fields, FreeSpaceRecord
+from calibrate.parameters import Parameter, index_of
 from calibrate.rigid import cross_matrix
-from calibrate.uncertainty.free_space import target_by_parameter, variance_of_scatter
+from calibrate.sensors.catalogue import LENGTHS
+from calibrate.uncertainty.free_space import FreeSpaceStatus, Scatter, target_by_parameter, variance_of_scatter
 
 Floats = NDArray[np.float64]
+
+JOINT = "joint"
+
+
+@dataclass(frozen=True)
+class KnownArm:
+    """A `Valued` (uncertainty/free_space.py) whose values are those that were found."""
+
+    arm: KinematicModel
+    parameters: tuple[Parameter, ...]  # of the whole fit; those of the arm are among them by name
+    drawn: Floats  # (param,) nominal arm, frames and target where they fit best
+    theta: Floats  # (param,) as identified
+    covariance: Floats  # (param, param), zero for what was held
+    seen: Identifiability
+    scatter: Scatter  # of a single pose
+    point_m: Floats  # (3,) the target in the flange frame, that the corrections of tool are about
+    lower_rad: Floats  # (joint,) limits
+    upper_rad: Floats
+    q_rad: Floats  # (row, joint) of the samples that took part
+
+
+def unpredicted(room: FreeSpaceRecord | None) -> str | None:
+    """Why errors over the workspace cannot be determined, as the prediction in the model says; None where they can."""
+    if room is None:
+        return "the model holds no prediction: it has no covariance, or is of an older program"
+    if room.status == FreeSpaceStatus.PREDICTED.name:
+        return None
+    return f"{room.says} ({'; '.join(room.undetermined)})" if room.undetermined else room.says
+
+
+def scatter_of(noise: Fields) -> Scatter:
+    """Of a single pose, from the noise found: of the joints, else of the instrument, in which that of the arm is."""
+    found = {name: value for name, value in noise.items() if isinstance(value, float)}
+    if JOINT in found:
+        return Scatter(joint_rad=found[JOINT])
+    return Scatter(target_m=max(found.get(source, 0.0) for source in LENGTHS))
+
+
+def whole_covariance(record: Covariance | None, parameters: tuple[Parameter, ...]) -> Floats:
+    """(param, param) the covariance of a model.json among all parameters; NaN where there is none.
+
+    What the file holds of effects is left out: these are parameters of the geometry.
+    """
+    if record is None:
+        return np.full((len(parameters), len(parameters)), np.nan)
+    column = index_of(parameters)
+    out = np.zeros((len(parameters), len(parameters)))
+    known = [k for k, name in enumerate(record.names) if name in column]
+    own = [column[record.names[k]] for k in known]
+    out[np.ix_(own, own)] = np.array(record.rows)[np.ix_(known, known)]
+    return out
+
+
 Bools = NDArray[np.bool_]
 
 POSES_LOG2 = 12  # drawn within the angles of the session: some eight a cell

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from calibrate.errors import DataError
-from calibrate.report.drift.drift_chapter import drift_chapter
+from calibrate.report.drift.drift_chapter import drift_chapter, sentence
 from calibrate.report.drift.two_calibrations import Calibration, drift_of
-from calibrate.report.drift.words import sentence
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_report import session_answers
 from calibrate.report.session_workspace import session_arm

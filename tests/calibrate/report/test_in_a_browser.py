@@ -9,7 +9,7 @@ import shutil
 import pytest
 
 from calibrate.report.elements import Html, page
-from calibrate.report.interactive.chapter import interactive_chapter
+from calibrate.report.interactive.plots import interactive_chapter
 from calibrate.report.interactive.session_figures import session_figures
 from calibrate.report.session_evidence import session_evidence
 from tests.support.overlaps import OVERLAPS

@@ -9,7 +9,7 @@ import pytest
 import calibrate.report
 from calibrate.report.elements import Html
 from calibrate.report.elements import page as shell
-from calibrate.report.interactive.chapter import interactive_chapter
+from calibrate.report.interactive.plots import interactive_chapter
 from calibrate.report.interactive.session_figures import session_figures
 from calibrate.report.session_evidence import session_evidence
 
@@ -32,7 +32,7 @@ def page(known):
 def test_the_library_is_imported_by_the_function_that_needs_it_and_nowhere_else():
     named = [path for path in REPORT.rglob("*.py") if "plotly" in path.read_text(encoding="utf-8").lower()]
     importing = {path.name for path in named for node in ast.walk(parsed(path)) if imports_plotly(node)}
-    assert importing == {"chapter.py"}
+    assert importing == {"plots.py"}
     assert not any(imports_plotly(node) for path in named for node in parsed(path).body)
 
 

@@ -11,9 +11,7 @@ from matplotlib.figure import Figure
 from calibrate.fit import solve
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_workspace import deleted_misfit, session_arm, session_measured, workspace
-from calibrate.report.workspace.cells import paint_measured, paint_poses
-from calibrate.report.workspace.scale import steps_for
-from calibrate.report.workspace.sections import ABOVE, SIDE, Grid, grid_of
+from calibrate.report.workspace.cells import ABOVE, SIDE, Grid, grid_of, paint_measured, paint_poses, steps_for
 from calibrate.report.workspace.workspace_errors import room_of
 
 

@@ -28,10 +28,8 @@ from calibrate.diagnose.schema import (
 )
 from calibrate.errors import DataError
 from calibrate.model_file import ModelParameter
-from calibrate.report.diagnosis.beyond_model import beyond_model
-from calibrate.report.diagnosis.chain_figure import chain_figure, chain_of
-from calibrate.report.diagnosis.diagnosis_page import chapters_of, contents_of, inserted
-from calibrate.report.diagnosis.finding_page import interval_words, size_words
+from calibrate.report.diagnosis.diagnosis_page import beyond_model, chapters_of, contents_of, inserted
+from calibrate.report.diagnosis.finding_page import chain_figure, chain_of, interval_words, size_words
 from calibrate.report.diagnosis.words import verdict_words
 
 Q = np.linspace(-1.5, 1.5, 60)
