@@ -31,10 +31,10 @@ from calibeam.worker_processes import in_workers
 from calibrate.diagnose.streams.sample_times import sample_windows
 from drivers.clock import SystemClock
 from drivers.errors import DeviceError
-from simulators.conceal.belief import rig_document
 from simulators.conceal.case import Case, conceal
+from simulators.conceal.case_files import truth_document
 from simulators.conceal.on_wire import Taken, Wired, draw_wired, taken_case
-from simulators.conceal.reveal import truth_document
+from simulators.conceal.rig_file import rig_document
 from simulators.conceal.toml_text import toml_text
 from simulators.conceal.wanted import ConcealError, Wanted
 from simulators.conceal.write import columns, csv_text

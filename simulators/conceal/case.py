@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.conceal.belief import Belief, believe
+from simulators.conceal.effect_over_noise import measure_distances, scale_of
 from simulators.conceal.hide import Hidden, choose, columns_of, hide, site_of, spares
 from simulators.conceal.observe import Observed, observe
 from simulators.conceal.plan import Timetable, draw_habits, draw_timetable
 from simulators.conceal.rig import ENCODER_RAD, TrueRig
+from simulators.conceal.rig_file import Belief, believe
 from simulators.conceal.rigs import DrawnRig, draw_rig
-from simulators.conceal.scale import measure_distances, scale_of
 from simulators.conceal.seated import shaken_rad
 from simulators.conceal.second_encoders import at_the_flange, machine_like, over_noise, second_readings_rad
 from simulators.conceal.wanted import Wanted, draw_noise

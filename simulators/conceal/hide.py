@@ -7,10 +7,10 @@ import numpy as np
 
 from simulators.arm.kinematics import forward
 from simulators.arm.statics import weigh
+from simulators.conceal.effect_over_noise import INVISIBLE, Scale
 from simulators.conceal.plan import Timetable
 from simulators.conceal.rig import Artefacts, DualPsd
 from simulators.conceal.rigs import DrawnRig
-from simulators.conceal.scale import INVISIBLE, Scale
 from simulators.conceal.wanted import INSTRUMENT, ConcealError, Wanted
 from simulators.defects import MECHANISMS, Defect, Site, UnsuitedError
 

@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.conceal.belief import Belief, believe, rig_document
 from simulators.conceal.case import Case
+from simulators.conceal.effect_over_noise import INVISIBLE, measure_distances, scale_of
 from simulators.conceal.from_world import drawing_of, nominal_truth, rig_of_world, spread_of
 from simulators.conceal.hide import Hidden, columns_of, hide, site_of
 from simulators.conceal.observe import Observed, observe
 from simulators.conceal.plan import Habits, Timetable, draw_timetable
 from simulators.conceal.rig import TrueRig
+from simulators.conceal.rig_file import Belief, believe, rig_document
 from simulators.conceal.rigs import DrawnRig
-from simulators.conceal.scale import INVISIBLE, measure_distances, scale_of
 from simulators.conceal.wanted import ConcealError, Wanted
 from simulators.defects import MECHANISMS, Defect, Scene, Site
 from simulators.world.exposure import temperatures

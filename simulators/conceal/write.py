@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.conceal.belief import rig_document
 from simulators.conceal.case import Case
-from simulators.conceal.reveal import truth_document
+from simulators.conceal.case_files import truth_document
 from simulators.conceal.rig import Artefacts
+from simulators.conceal.rig_file import rig_document
 from simulators.conceal.toml_text import toml_text
 from simulators.defects import Scene
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from simulators.arm.rigid import turned
 from simulators.arm.statics import Load
 from simulators.conceal.case import Case
+from simulators.conceal.case_files import at_start
 from simulators.conceal.observe import observe
-from simulators.conceal.reveal import at_start
 from simulators.conceal.rig import DualPsd, TrueRig
 from simulators.defects import Scene
 from simulators.streams.course import STAND_S, Course, course

@@ -9,11 +9,11 @@ import numpy as np
 
 from acquisition.recording import read
 from simulators.arm.rigid import inverse, turned
-from simulators.conceal.belief import rig_document
 from simulators.conceal.case import conceal
 from simulators.conceal.chain import stand
 from simulators.conceal.observe import observe
 from simulators.conceal.rig import Artefacts
+from simulators.conceal.rig_file import rig_document
 from simulators.conceal.seated import postures, shaken_rad
 from simulators.conceal.toml_text import toml_text
 from simulators.conceal.wanted import Wanted

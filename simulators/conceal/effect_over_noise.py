@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.arm.kinematics import forward, jacobian
-from simulators.conceal.belief import KnownDistance
 from simulators.conceal.geometry import Absorber
 from simulators.conceal.observe import Observed, observe
 from simulators.conceal.plan import Timetable
 from simulators.conceal.rig import ENCODER_RAD, Artefacts, DualPsd, TrueRig
+from simulators.conceal.rig_file import KnownDistance
 from simulators.conceal.rigs import BAR_SIGMA_M, DrawnRig
 from simulators.conceal.seated import seated_tip_m
 from simulators.defects.defect import AnyDefect, Defect, size_of, with_size
