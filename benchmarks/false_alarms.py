@@ -19,8 +19,8 @@ from calibrate.diagnose.fitted import fit_geometry
 from calibrate.diagnose.session import session_of
 from calibrate.effects.catalogue import missing_of
 from simulators.conceal.case import conceal
+from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import KINDS, ConcealError, Family, Kind, Wanted
-from simulators.conceal.write import write_case
 
 SESSIONS = 200  # of each noise
 FIRST_SEED = 20_000

@@ -14,8 +14,8 @@ import numpy as np
 from acquisition.recording import RecordingWriter
 from acquisition.recording.session_folder import read_folder
 from simulators.conceal.case import Case, conceal
+from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted
-from simulators.conceal.write import write_case
 
 DATES = ("2025-11-03", "2026-02-11", "2026-05-20", "2026-08-30")
 AXES = ("x_m", "y_m", "z_m")

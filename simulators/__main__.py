@@ -4,7 +4,7 @@ import json
 import sys
 from pathlib import Path
 
-from simulators.host.errors import HostError
+from simulators.errors import HostError
 from simulators.serve import ServeOptions, serve
 from simulators.world.errors import WorldError
 

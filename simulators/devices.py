@@ -11,11 +11,11 @@ from dataclasses import dataclass, field, replace
 from importlib.metadata import entry_points
 from typing import Any
 
-from simulators.faults.fault import DisturbedLight
+from simulators.errors import HostError
+from simulators.faults.device_faults import DisturbedLight
 from simulators.faults.faulty_wire import with_faults
 from simulators.faults.injector import Injector
 from simulators.hand.world import HandWorld
-from simulators.host.errors import HostError
 from simulators.host.loop import Host
 from simulators.wire import Bench, SerialPort, TcpPort, UdpPort
 from simulators.world.world import World

@@ -17,10 +17,9 @@ from scipy.spatial.transform import Rotation
 from simulators.arm.kinematics import Arm
 from simulators.arm.rigid import inverse
 from simulators.arm.statics import weigh
-from simulators.conceal.chain import Stance, stand, true_shaft_rad
-from simulators.conceal.readings import length_m, position_m, spots
+from simulators.conceal.observe import readings_at
+from simulators.conceal.readings import Stance, length_m, position_m, spots, stand, true_shaft_rad
 from simulators.conceal.rig import Device, DualPsd, TrueRig
-from simulators.conceal.seated import readings_at
 from simulators.defects import Defect, Scene
 from simulators.defects.defect import MovesDevice, ReadsAngle, TurnsJoint
 

@@ -25,8 +25,8 @@ from simulators.devices import (
     with_robot_on,
     without_links,
 )
+from simulators.errors import HostError, PortBusy
 from simulators.faults.faulty_wire import fault_verbs
-from simulators.host.errors import HostError, PortBusy
 from simulators.host.loop import Host
 from simulators.host.side_channel import Control, side_channel
 from simulators.wire import Bench

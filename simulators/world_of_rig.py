@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from simulators.defects import Defect
+from simulators.hand.hand_rig import write_hand_truth
 from simulators.hand.rig import is_hand_held, read_hand_rig
-from simulators.hand.truth import write_hand_truth
 from simulators.hand.world import HandWorld
 from simulators.world.errors import WorldError
 from simulators.world.rig import read_rig

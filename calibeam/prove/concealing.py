@@ -32,17 +32,15 @@ from calibrate.diagnose.streams.sample_times import sample_windows
 from drivers.clock import SystemClock
 from drivers.errors import DeviceError
 from simulators.conceal.case import Case, conceal
-from simulators.conceal.case_files import truth_document
+from simulators.conceal.case_files import columns, csv_text, truth_document
 from simulators.conceal.on_wire import Taken, Wired, draw_wired, taken_case
-from simulators.conceal.rig_file import rig_document
-from simulators.conceal.toml_text import toml_text
+from simulators.conceal.rig_file import rig_document, toml_text
 from simulators.conceal.wanted import ConcealError, Wanted
-from simulators.conceal.write import columns, csv_text
 from simulators.defects import written
 from simulators.process import Emulators
 from simulators.streams.devices import HOST_S
 from simulators.streams.faults import FAULTS, Fault
-from simulators.streams.session import StreamedSession, streamed
+from simulators.streams.stream_session import StreamedSession, streamed
 
 HEALTHY = 0.25  # share of the cases with streams in which nothing is wrong
 UNITS = {"target_q_rad": "rad", "actual_q_rad": "rad", "position_rad": "rad", "photocurrent_a": "A"}

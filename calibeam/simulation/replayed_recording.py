@@ -24,8 +24,8 @@ from calibrate.predict import Predictor
 from calibrate.sensors.camera import PLACE, TURN
 from calibrate.sensors.encoder_difference import differences
 from calibrate.sensors.full_pose import predicted_turns
+from simulators.conceal.observe import shaken_rad
 from simulators.conceal.rig import Device, TrueRig
-from simulators.conceal.seated import shaken_rad
 from simulators.defects import Scene
 from simulators.defects.detector import StrayLight
 from simulators.replayed import Readings, Rigged, replayed

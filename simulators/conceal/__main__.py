@@ -9,8 +9,8 @@ import sys
 from pathlib import Path
 
 from simulators.conceal.case import conceal
+from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import FAMILIES, KINDS, ConcealError, Wanted
-from simulators.conceal.write import write_case
 from simulators.defects import MECHANISMS
 
 

@@ -1,32 +1,106 @@
 """A concealed session on the whole wire path: what is drawn before the emulators start, and the truth afterwards.
 
-The arm, its places and its deviations are those of an emulated world. Sizes are set on a session drawn in its stead,
-for which poses a real one will take is not known before; what the effect truly was is worked out afterwards.
+The arm, its stations and its deviations are those of an emulated world, in the terms of this package. Sizes are set on
+a session drawn in its stead, for which poses a real one will take is not known before; the true effect is computed
+afterwards.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.conceal.case import Case
+from simulators.arm.drawing import Drawing, Row
+from simulators.arm.rigid import moved
+from simulators.conceal.case import Case, HiddenMechanism, columns_of, hide, site_of
 from simulators.conceal.effect_over_noise import INVISIBLE, measure_distances, scale_of
-from simulators.conceal.from_world import drawing_of, nominal_truth, rig_of_world, spread_of
-from simulators.conceal.hide import Hidden, columns_of, hide, site_of
 from simulators.conceal.observe import Observed, observe
 from simulators.conceal.plan import Habits, Timetable, draw_timetable
-from simulators.conceal.rig import TrueRig
+from simulators.conceal.rig import DualPsd, Spread, TrueRig
 from simulators.conceal.rig_file import Belief, believe, rig_document
 from simulators.conceal.rigs import DrawnRig
 from simulators.conceal.wanted import ConcealError, Wanted
 from simulators.defects import MECHANISMS, Defect, Scene, Site
+from simulators.world.errors import WorldError
 from simulators.world.exposure import temperatures
-from simulators.world.rig import WorldRig, read_rig
-from simulators.world.truth import draw_truth
+from simulators.world.rig import Emulation, WorldRig, read_rig
+from simulators.world.truth import Truth, arm_of, draw_truth
 
 Floats = NDArray[np.float64]
+
+
+def rig_of_world(rig: WorldRig, truth: Truth, plain: Mapping[str, Any]) -> TrueRig:
+    """Arm, laser and places as they truly are; `plain`: the rig file, which knows the limits of the joints.
+
+    WorldError for a rig without a fixture: there is no light to work out.
+    """
+    if rig.fixture is None:
+        raise WorldError("rig file: [fixture] is missing; readings of a light cannot be worked out without one")
+    second, unit = rig.fixture.psd2_in_psd1, np.array(truth.laser_direction)
+    joints = plain["arm"]["joint"]
+    return TrueRig(
+        arm=replace(
+            arm_of(rig, truth),
+            lower_rad=np.array([joint["lower_rad"] for joint in joints]),
+            upper_rad=np.array([joint["upper_rad"] for joint in joints]),
+        ),
+        tool_point_m=np.zeros(3),
+        instrument=DualPsd(
+            laser_origin_m=np.array(truth.laser_origin_m),
+            laser_direction=unit / np.linalg.norm(unit),
+            half_size_m=rig.fixture.half_size_m,
+            psd2_in_psd1=moved(second.origin_m, second.rotation_rad),
+            places=np.stack([moved(p.psd1_in_base.origin_m, p.psd1_in_base.rotation_rad) for p in truth.placements]),
+        ),
+    )
+
+
+def nominal_truth(rig: WorldRig) -> Truth:
+    """What the rig file says, and nothing off."""
+    return draw_truth(msgspec.structs.replace(rig, emulation=Emulation()), 0)
+
+
+def drawing_of(plain: Mapping[str, Any], rng: np.random.Generator) -> Drawing:
+    """The arm of a rig file; of one in seven nobody knows the masses."""
+    joints, flange = plain["arm"]["joint"], plain["arm"].get("flange", {})
+    weighed = rng.random() >= 0.15
+    return Drawing(
+        name=plain["name"],
+        model="dh",
+        rows=tuple(Row(j["a_m"], j["alpha_rad"], j["d_m"], j.get("theta_offset_rad", 0.0)) for j in joints),
+        fixed=(),
+        flange=(tuple(flange.get("origin_m", (0.0,) * 3)), tuple(flange.get("rotation_rad", (0.0,) * 3))),
+        lower_rad=tuple(j["lower_rad"] for j in joints),
+        upper_rad=tuple(j["upper_rad"] for j in joints),
+        mass_kg=tuple(j["mass_kg"] for j in joints) if weighed else (),
+        com_m=tuple((j["com_m"][0], j["com_m"][1], j["com_m"][2]) for j in joints) if weighed else (),
+        gear_ratio=tuple(j["gear_ratio"] for j in joints),
+        reach_m=sum(float(np.hypot(j["a_m"], j["d_m"])) for j in joints),
+    )
+
+
+def spread_of(rig: WorldRig) -> Spread:
+    """What [emulation] draws; PSD 2 stands in PSD 1 as drawn, and masses are what they are."""
+    of = rig.emulation
+    return Spread(
+        length_m=of.length_sigma_m,
+        angle_rad=of.angle_sigma_rad,
+        zero_rad=of.joint_zero_max_rad / np.sqrt(3.0),
+        tool_m=of.laser_origin_sigma_m,
+        laser_rad=of.laser_direction_sigma_rad,
+        place_m=of.placement_origin_sigma_m,
+        place_rad=of.placement_rotation_sigma_rad,
+        psd2_m=1e-6,
+        psd2_rad=1e-6,
+        device_m=0.0,
+        device_rad=0.0,
+        mass=0.0,
+    )
+
+
 RECORDED = frozenset({"approach", "qd", "psd1_sum_v", "psd2_sum_v"})  # of what a name may need
 A_SAMPLE_S = 5.0  # of emulated time: go there, settle, read, now and then search the light
 APPROACH_RAD = 0.035  # the last move to a sample was longer than any play
@@ -43,7 +117,7 @@ class Wired:
     drawn: DrawnRig
     belief: Belief
     sigma_m: float
-    hidden: Sequence[Hidden]
+    hidden: Sequence[HiddenMechanism]
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +148,7 @@ def draw_wired(wanted: Wanted, plain: Mapping[str, Any]) -> Wired:
     table = draw_timetable(wanted, true, Habits(change_s=0.0), plan_rng)
     sigma_m = _sigma_m(rig, true, table, plan_rng)
     distances = measure_distances(true, plan_rng)
-    hidden: list[Hidden] = []
+    hidden: list[HiddenMechanism] = []
     if wanted.defects:
         scale = scale_of(drawn, table, _watch(true, table), sigma_m, distances)
         site = _on_site(site_of(wanted, drawn, table), wanted)
@@ -93,7 +167,7 @@ def taken_case(wired: Wired, taken: Taken) -> Case:
     hidden = list(wired.hidden)
     if defects:
         scale = scale_of(drawn, world, watch, wired.sigma_m, wired.belief.distances)
-        hidden = [Hidden(_in_session(d, taken.power_on_s), scale.enr([d]), scale.raw([d])) for d in defects]
+        hidden = [HiddenMechanism(_in_session(d, taken.power_on_s), scale.enr([d]), scale.raw([d])) for d in defects]
     return Case(
         wired.wanted,
         drawn,
@@ -115,9 +189,9 @@ def taken_case(wired: Wired, taken: Taken) -> Case:
 def _one(
     wanted: Wanted,
     site: Site,
-    hidden_of: Callable[[type[Defect], np.random.Generator], list[Hidden]],
+    hidden_of: Callable[[type[Defect], np.random.Generator], list[HiddenMechanism]],
     rng: np.random.Generator,
-) -> Hidden:
+) -> HiddenMechanism:
     """The mechanism asked for, or any that such a session can show and its columns can name."""
     possible = [kind for kind in MECHANISMS if site.instrument in kind.INSTRUMENTS and not kind.HABIT]
     outside = wanted.defects == ("outside",)

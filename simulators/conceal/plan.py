@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from simulators.conceal.observe import seated_plan
 from simulators.conceal.poses import free_poses, shots
 from simulators.conceal.rig import Artefacts, DualPsd, TrueRig
-from simulators.conceal.seated import seated_plan
 from simulators.conceal.wanted import ConcealError, Wanted
 from simulators.defects import Defect, Scene
 

@@ -44,7 +44,7 @@ def _directions(rows: int, channels: int, rng: np.random.Generator) -> Floats:
 
 Family = Literal["dual-psd", "tracker", "cones", "wire"]
 FAMILIES: tuple[Family, ...] = get_args(Family)
-Side = Literal["link", "motor", "beside"]  # of second encoders: simulators/conceal/second_encoders.py
+Side = Literal["link", "motor", "beside"]  # of second encoders: simulators/conceal/observe.py
 SIDES: tuple[Side, ...] = get_args(Side)
 INSTRUMENT = {"dual-psd": "dual-psd", "tracker": "position", "cones": "seat", "wire": "wire"}
 

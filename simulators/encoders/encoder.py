@@ -7,7 +7,7 @@ whether the position rises with it. Scaling and preset as in CiA 406 (3.2), 6000
 import math
 from collections.abc import Callable
 
-from simulators.encoders.dictionary import AbortCode, NodeDictionary, SdoAbort
+from simulators.encoders.object_dictionary import AbortCode, NodeDictionary, SdoAbort
 
 UNITS_PER_TURN = 1 << 20
 TURNS = 1 << 12

@@ -13,9 +13,9 @@ from collections.abc import Callable
 from enum import IntEnum
 
 from simulators.encoders.bus import CanFrame
-from simulators.encoders.dictionary import AbortCode, NodeDictionary, SdoAbort
 from simulators.encoders.encoder import AbsoluteEncoder
-from simulators.encoders.pdo import TIMER_SLACK_S, TransmitPdo
+from simulators.encoders.object_dictionary import AbortCode, NodeDictionary, SdoAbort
+from simulators.encoders.sdo_pdo import TIMER_SLACK_S, TransmitPdo
 from simulators.encoders.sdo_server import SdoServer
 
 HISTORY = 8

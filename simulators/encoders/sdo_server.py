@@ -7,7 +7,7 @@ do), the time-out of a transfer that a client left half done (the next initiate 
 import struct
 from dataclasses import dataclass
 
-from simulators.encoders.dictionary import AbortCode, NodeDictionary, SdoAbort
+from simulators.encoders.object_dictionary import AbortCode, NodeDictionary, SdoAbort
 
 SEGMENT_BYTES = 7
 LONGEST_DOWNLOAD = 256  # bytes; nothing in the dictionary is longer

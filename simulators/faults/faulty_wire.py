@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from simulators.faults.fault import DisturbedLight, FaultError, Output, Target
+from simulators.faults.device_faults import DisturbedLight, FaultError, Output, Target
 from simulators.faults.injector import Injector
 from simulators.wire import TICK_S, Bench, SerialPort, TcpPort, UdpPort, Wire
 

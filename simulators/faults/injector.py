@@ -6,7 +6,7 @@ What it does not imitate: faults on the way to the device; requests always arriv
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from simulators.faults.fault import STATE_FAULTS, Fault, FaultError, Output, Setting, Target
+from simulators.faults.device_faults import STATE_FAULTS, Fault, FaultError, Output, Setting, Target
 from simulators.faults.line_faults import LINE_FAULTS
 
 LINE_KINDS = {kind.name: kind for kind in LINE_FAULTS}

@@ -6,7 +6,7 @@ An output is what a device sends in one go: at least one frame, reply or line of
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from simulators.faults.fault import MOST_JUNK_BYTES, Fault, Output, Setting, Target
+from simulators.faults.device_faults import MOST_JUNK_BYTES, Fault, Output, Setting, Target
 from simulators.wire import TICK_S
 
 Strike = Callable[[Output, Fault, Target], bool]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.hand.arm import TrueArm
+from simulators.hand.held_arm import TrueArm
 from simulators.hand.rig import Emulation
 
 Floats = NDArray[np.float64]

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.hand.arm import TrueArm
 from simulators.hand.hand import Ball, Hand
+from simulators.hand.hand_rig import HandTruth, draw_hand_truth
+from simulators.hand.held_arm import TrueArm
 from simulators.hand.rig import HandRig, read_hand_rig
-from simulators.hand.truth import HandTruth, draw_hand_truth
 from simulators.world.errors import WorldError
 
 Floats = NDArray[np.float64]

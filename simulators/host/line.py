@@ -14,7 +14,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from simulators.host.errors import HostError
+from simulators.errors import HostError
 
 Log = Callable[[str], None]
 

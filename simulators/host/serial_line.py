@@ -10,7 +10,7 @@ import tty
 from collections.abc import Callable
 from pathlib import Path
 
-from simulators.host.errors import HostError
+from simulators.errors import HostError
 from simulators.host.line import Outbox, Report, make_link, remove_link
 from simulators.wire import SerialPort
 

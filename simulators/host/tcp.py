@@ -5,7 +5,7 @@ import socket
 from collections.abc import Callable
 from contextlib import suppress
 
-from simulators.host.errors import HostError, PortBusy
+from simulators.errors import HostError, PortBusy
 from simulators.host.line import Outbox, Report
 from simulators.wire import TcpPort, UdpPort, Wire
 

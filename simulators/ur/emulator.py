@@ -14,9 +14,9 @@ from typing import Any, Protocol
 
 from simulators.faults.device_clock import DeviceClock
 from simulators.ur.control_script import ControlScript
+from simulators.ur.controller_kinematics import NominalArm
 from simulators.ur.dashboard_server import Dashboard
 from simulators.ur.dynamics import ArmWorld, Carried, Obstacle
-from simulators.ur.kinematics import NominalArm
 from simulators.ur.motion import ArmController, MoveRefused
 from simulators.ur.program import Program, ProgramRunner
 from simulators.ur.readout import Readout

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from simulators.ur.controller_kinematics import NominalArm
 from simulators.ur.dynamics import ArmWorld, Carried, Dynamics, Joints
-from simulators.ur.kinematics import NominalArm
 from simulators.ur.moves import Floats, Generator, JointMove, Leg, LineMove, PathBlocked, PathMove, SetPoint, standing
 from simulators.ur.poses import IDENTITY, Frame
 from simulators.ur.states import Power, SafetyMode

@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.ur.kinematics import NominalArm
+from simulators.ur.controller_kinematics import NominalArm
 from simulators.ur.poses import Frame, partway, twist_to
 
 Floats = NDArray[np.float64]

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from simulators.ur.kinematics import NominalArm
+from simulators.ur.controller_kinematics import NominalArm
 from simulators.ur.moves import Floats, PathBlocked, SetPoint, follow, standing
 from simulators.ur.poses import Frame
 

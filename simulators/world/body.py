@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 
 from simulators.wire import TICK_S
 from simulators.world.exposure import Exposure
-from simulators.world.hidden import Hidden
 from simulators.world.model import STEP_S, build_mjcf, torque_limits_nm
+from simulators.world.moving_mechanisms import Hidden
 from simulators.world.optics import Ray
 from simulators.world.rig import WorldRig
 from simulators.world.servo import Engine, Servo

@@ -23,8 +23,8 @@ from simulators.defects import Defect
 from simulators.world.body import ArmBody
 from simulators.world.errors import WorldError
 from simulators.world.exposure import joint_temperature_degC, psd_temperature_degC
-from simulators.world.hidden import Hidden, fixture_at, seen
 from simulators.world.model import STEP_S
+from simulators.world.moving_mechanisms import Hidden, fixture_at, seen
 from simulators.world.optics import DARK, Face, Ray, Spots, place_faces, trace
 from simulators.world.photocurrent import EDGE_S, ELECTRODES, NOISE_RATE_HZ, Knot, Photodetectors, interpolate, sample_a
 from simulators.world.rig import Pose, WorldRig, read_rig

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from simulators.conceal.case import conceal
+from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted
-from simulators.conceal.write import write_case
 
 ROOT = Path(__file__).parents[2]
 RIG = ROOT / "rigs" / "ur5e-dual-psd.toml"

@@ -13,8 +13,8 @@ from acquisition.recording.session_folder import write_csv
 from benchmarks.stream_cases import servo_scene
 from calibeam.cli import run
 from simulators.conceal.case import conceal
+from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted
-from simulators.conceal.write import write_case
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
 NOISE_M = 2e-6

@@ -7,8 +7,8 @@ import pytest
 
 from calibeam.cli import run
 from simulators.conceal.case import conceal
+from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted
-from simulators.conceal.write import write_case
 
 
 @pytest.fixture(scope="module")

@@ -11,8 +11,8 @@ from benchmarks.stream_cases import servo_scene
 from benchmarks.stream_devices import devices_of_scene
 from calibeam.cli import run
 from simulators.conceal.case import conceal
+from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted
-from simulators.conceal.write import write_case
 
 LATE_S = 4e-3
 CHANNELS = {"command": "target_q_rad", "joints": "actual_q_rad", "encoders": "position_rad"}

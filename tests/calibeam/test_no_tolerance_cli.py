@@ -9,8 +9,8 @@ from calibeam.cli import run
 from calibeam.devices.site import check_session
 from calibrate.model_file import read_model
 from simulators.conceal.case import conceal
+from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted
-from simulators.conceal.write import write_case
 
 
 @pytest.fixture(scope="module")

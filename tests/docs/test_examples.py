@@ -20,8 +20,8 @@ from calibrate.model_file import read_model
 from drivers.errors import DeviceLost, DeviceStale, WireError
 from drivers.transports.serial_port import SerialAddress, open_serial
 from simulators.conceal.case import conceal
+from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted
-from simulators.conceal.write import write_case
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 GIVE_RAD = 3e-4  # of joint 2 for 1 MPa, arm level

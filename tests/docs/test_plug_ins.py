@@ -18,7 +18,7 @@ from calibrate.plug_ins import DEVICES, EFFECTS, loaded, plug_ins
 from drivers.clock import SystemClock
 from drivers.errors import DeviceRefused
 from simulators.devices import plug_in_bench
-from simulators.host.errors import HostError
+from simulators.errors import HostError
 from simulators.host.loop import Host
 
 ROOT = Path(__file__).parents[2]

@@ -20,7 +20,7 @@ from calibeam.guided.recorded import BelievedGuidedArm, encoder_address, record_
 from calibeam.guided.run import PersonGuide
 from calibeam.outcome import PartialResult
 from drivers.clock import SystemClock
-from simulators.hand.truth import read_hand_truth
+from simulators.hand.hand_rig import read_hand_truth
 
 RIG_FILE = Path(__file__).parents[3] / "rigs" / "arm-cmm-reference.toml"
 RIG = load_rig(RIG_FILE)

@@ -32,8 +32,8 @@ from calibrate.arms.eccentric import with_discs
 from calibrate.model_file import ModelFile, RigIdentity, write_model
 from drivers.psd_error_map import ErrorMap
 from simulators.conceal.case import conceal
+from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Family, Wanted
-from simulators.conceal.write import write_case
 
 Floats = NDArray[np.float64]
 Run = Callable[[list[str]], int]

@@ -23,9 +23,8 @@ from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.diagnose.session import session_of
 from calibrate.diagnose.stated_sizes import sizes_of
 from simulators.conceal.case import conceal
-from simulators.conceal.case_files import truth_document
+from simulators.conceal.case_files import truth_document, write_case
 from simulators.conceal.wanted import Family, Wanted
-from simulators.conceal.write import write_case
 
 WANTED = Wanted("tracker", seed=41, defects=("encoder-eccentricity",), enr=3.0, samples=200)
 

@@ -27,8 +27,7 @@ from calibrate.predict import Predictor, readings
 from calibrate.sensors.camera import PLACE, TURN
 from calibrate.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 from simulators.conceal.case import conceal
-from simulators.conceal.rig_file import rig_document
-from simulators.conceal.toml_text import toml_text
+from simulators.conceal.rig_file import rig_document, toml_text
 from simulators.conceal.wanted import FAMILIES, Family, Wanted
 from simulators.defects import Scene
 from simulators.replayed import Readings, Rigged, Sited, replayed

@@ -14,12 +14,10 @@ from scipy.spatial.transform import Rotation
 from calibeam.cli import run
 from simulators.arm.kinematics import forward
 from simulators.conceal.case import conceal
-from simulators.conceal.case_files import at_start
-from simulators.conceal.chain import stand
+from simulators.conceal.case_files import at_start, write_case
 from simulators.conceal.poses import free_poses
-from simulators.conceal.readings import tip_m
+from simulators.conceal.readings import stand, tip_m
 from simulators.conceal.wanted import Wanted
-from simulators.conceal.write import write_case
 
 HIDDEN = ("soft-joint", "slack-drive", "encoder-eccentricity")
 POSES = 200

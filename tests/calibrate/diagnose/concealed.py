@@ -2,8 +2,8 @@
 
 from acquisition.recording import read
 from simulators.conceal.case import conceal
+from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted
-from simulators.conceal.write import write_case
 
 
 def recording_of(folder, **wanted):

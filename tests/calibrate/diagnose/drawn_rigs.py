@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from simulators.conceal.toml_text import toml_text
-from simulators.conceal.write import csv_text
+from simulators.conceal.case_files import csv_text
+from simulators.conceal.rig_file import toml_text
 
 Floats = NDArray[np.float64]
 

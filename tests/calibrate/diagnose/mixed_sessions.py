@@ -10,14 +10,12 @@ import numpy as np
 from acquisition.recording import read
 from simulators.arm.rigid import inverse, turned
 from simulators.conceal.case import conceal
-from simulators.conceal.chain import stand
-from simulators.conceal.observe import observe
+from simulators.conceal.case_files import columns, csv_text
+from simulators.conceal.observe import observe, postures, shaken_rad
+from simulators.conceal.readings import stand
 from simulators.conceal.rig import Artefacts
-from simulators.conceal.rig_file import rig_document
-from simulators.conceal.seated import postures, shaken_rad
-from simulators.conceal.toml_text import toml_text
+from simulators.conceal.rig_file import rig_document, toml_text
 from simulators.conceal.wanted import Wanted
-from simulators.conceal.write import columns, csv_text
 
 TURN_RAD = 2e-5  # one sigma of a 6-D target's orientation
 CONTACT_M = 8e-6

@@ -13,8 +13,8 @@ from calibrate.diagnose.session import session_of
 from calibrate.diagnose.stated_noise import MORE, Statement, close_pairs, neighbours, noise_found
 from calibrate.effects.term import Missing
 from simulators.conceal.case import conceal
+from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted
-from simulators.conceal.write import write_case
 
 SPEED = Missing("qd", "qd1_rad_s ...", "latency")
 SESSION = {"family": "tracker", "arm": "irb120", "samples": 120}

@@ -13,8 +13,8 @@ from calibrate.diagnose.fitted import Fitted, fit_geometry
 from calibrate.diagnose.session import session_of
 from calibrate.effects.drivers import Drivers
 from simulators.conceal.case import conceal
+from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import FAMILIES, Family, Wanted
-from simulators.conceal.write import write_case
 
 SEED, SAMPLES = 5, 120
 JOINTS = 6

@@ -8,8 +8,8 @@ import numpy as np
 
 from calibeam.cli import run
 from simulators.conceal.case import conceal
+from simulators.conceal.case_files import columns, write_case
 from simulators.conceal.wanted import Wanted
-from simulators.conceal.write import columns, write_case
 
 OBSERVED = {
     "dual-psd": ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m"),

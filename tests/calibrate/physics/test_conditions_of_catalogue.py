@@ -27,8 +27,8 @@ from calibrate.physics.from_diagnosis import model_of_fit
 from calibrate.physics.predicting import predict_with_physics
 from calibrate.physics.records import Effect, SessionRecord
 from simulators.conceal.case import conceal
+from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import FAMILIES, Wanted
-from simulators.conceal.write import write_case
 
 from ..effects.conftest import SAMPLES, SEED, with_every_driver
 

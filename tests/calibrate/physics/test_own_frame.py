@@ -16,8 +16,8 @@ from calibrate.physics.from_diagnosis import model_of_fit
 from calibrate.rigid import transform
 from simulators.arm.kinematics import forward
 from simulators.conceal.case import conceal
+from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted
-from simulators.conceal.write import write_case
 
 NORMAL_95 = 1.959964
 POSTURES, JUDGED = 400, 40

@@ -9,7 +9,7 @@ import pytest
 
 from simulators.arm.drawing import Drawing, fixed_parts, turning_com_m
 from simulators.arm.kinematics import Arm
-from simulators.conceal.arms import IRB120
+from simulators.conceal.rigs import IRB120
 from simulators.defects import Scene
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simulators.arm.kinematics import Arm, forward
-from simulators.conceal.chain import balanced
+from simulators.conceal.readings import balanced
 from simulators.defects import Scene
 from simulators.defects.base import SoftPedestal
 from simulators.defects.drive import SoftJoint

@@ -10,9 +10,9 @@ import pytest
 from acquisition.recording.session_folder import read_folder
 from simulators.conceal.__main__ import main
 from simulators.conceal.case import Case, conceal
-from simulators.conceal.seated import seated_tip_m
+from simulators.conceal.case_files import write_case
+from simulators.conceal.observe import seated_tip_m
 from simulators.conceal.wanted import FAMILIES, KINDS, ConcealError, Family, Wanted, draw_noise
-from simulators.conceal.write import write_case
 
 SMALL = {"samples": 100, "places": 3}
 

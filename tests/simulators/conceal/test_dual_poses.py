@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from simulators.arm.drawing import origin_and_rotation
-from simulators.conceal.chain import stand
 from simulators.conceal.poses import EDGE, shots
-from simulators.conceal.readings import spots
+from simulators.conceal.readings import spots, stand
 from simulators.conceal.rig import DualPsd
 from simulators.conceal.rigs import draw_rig
 from simulators.conceal.wanted import Wanted

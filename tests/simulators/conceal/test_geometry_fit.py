@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from simulators.conceal.case import Case, conceal
-from simulators.conceal.effect_over_noise import in_sigmas
-from simulators.conceal.geometry import list_deviations
+from simulators.conceal.effect_over_noise import in_sigmas, list_deviations
 from simulators.conceal.observe import observe
 from simulators.conceal.rig import TrueRig
 from simulators.conceal.wanted import Family, Wanted

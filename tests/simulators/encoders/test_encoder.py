@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simulators.encoders.dictionary import NodeDictionary, SdoAbort
 from simulators.encoders.encoder import AbsoluteEncoder
+from simulators.encoders.object_dictionary import NodeDictionary, SdoAbort
 
 TURN = 1 << 20
 RANGE = 1 << 32

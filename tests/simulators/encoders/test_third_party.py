@@ -9,8 +9,8 @@ import can
 import canopen
 import pytest
 
-from simulators.encoders.dictionary import EDS_PATH
 from simulators.encoders.node import EncoderNode
+from simulators.encoders.object_dictionary import EDS_PATH
 from tests.simulators.encoders.virtual_bus import NodesOnBus
 
 WAIT_S = 5.0

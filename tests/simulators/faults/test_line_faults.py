@@ -2,7 +2,7 @@
 
 import pytest
 
-from simulators.faults.fault import FaultError, Target
+from simulators.faults.device_faults import FaultError, Target
 from simulators.faults.faulty_wire import FaultyWire
 from simulators.faults.injector import Injector
 from simulators.faults.line_faults import LINE_FAULTS

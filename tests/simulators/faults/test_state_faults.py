@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from simulators.faults.device_clock import DeviceClock
-from simulators.faults.fault import DisturbedLight, Target
+from simulators.faults.device_faults import DisturbedLight, Target
 from simulators.faults.injector import Injector
 from simulators.wire import TICK_S
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from simulators.hand.hand import CannotReachError
+from simulators.hand.hand_rig import read_hand_truth, write_hand_truth
 from simulators.hand.rig import is_hand_held
-from simulators.hand.truth import read_hand_truth, write_hand_truth
 from simulators.hand.world import HandWorld
 from simulators.world.errors import WorldError
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import serial
 
-from simulators.host.errors import HostError
+from simulators.errors import HostError
 from simulators.wire import SerialPort
 
 

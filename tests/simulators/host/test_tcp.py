@@ -5,7 +5,7 @@ import socket
 
 import pytest
 
-from simulators.host.errors import HostError, PortBusy
+from simulators.errors import HostError, PortBusy
 from simulators.wire import TICK_S, TcpPort
 
 

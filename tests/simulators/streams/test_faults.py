@@ -17,7 +17,7 @@ from simulators.streams.faults import (
     SlippingEncoder,
     SwingingFoot,
 )
-from simulators.streams.session import StreamedSession, streamed
+from simulators.streams.stream_session import StreamedSession, streamed
 
 PORTS = {"time", "base.pose", *(f"joint{i}.angle" for i in range(1, 7))}
 PHYSICS = {"latency", "reading-lag", "encoder-slip", "not-settled", "ringing"}

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from simulators.ur.controller_kinematics import NominalArm
 from simulators.ur.emulator import UrController, arm_controller
-from simulators.ur.kinematics import NominalArm
 from simulators.ur.registers import Memory
 from simulators.wire import TICK_S
 

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from simulators.ur.kinematics import NominalArm, tool_speed
+from simulators.ur.controller_kinematics import NominalArm, tool_speed
 from simulators.ur.poses import IDENTITY, compose, frame_of, invert, partway, pose_of, rotation_vector, twist_to
 
 TOOL = frame_of((0.01, -0.02, 0.15, 0.3, -0.2, 0.5))

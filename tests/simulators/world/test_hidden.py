@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simulators.conceal.from_world import rig_of_world
 from simulators.conceal.observe import observe
+from simulators.conceal.on_wire import rig_of_world
 from simulators.conceal.poses import shots
 from simulators.conceal.rig import TrueRig
 from simulators.defects import MECHANISMS, Defect, Scene, Site, WrittenError, defects_of, written

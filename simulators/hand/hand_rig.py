@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 SCHEMA = 1
 KIND = "hand-held-arm"
 LINES = 256  # groups of graduation lines a turn: a head looks at some hundred lines at a time and averages them
-CYCLES = (-3, -2, -1, 2, 3)  # error motions of an axis a turn, see simulators/hand/arm.py
+CYCLES = (-3, -2, -1, 2, 3)  # error motions of an axis a turn, see simulators/hand/held_arm.py
 AXIAL_CYCLES = (1, 2, 3)
 
 

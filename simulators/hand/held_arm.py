@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from simulators.arm.kinematics import Arm, Frames, forward, jacobian
 from simulators.arm.rigid import moved
 from simulators.defects.encoder import RADIUS_M
+from simulators.hand.hand_rig import HandTruth, TrueAxis, TrueRunout
 from simulators.hand.rig import HandRig
-from simulators.hand.truth import HandTruth, TrueAxis, TrueRunout
 
 Floats = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ transmission type 0, sending on a change of value (types 254 and 255 follow thei
 from functools import partial
 
 from simulators.encoders.bus import CanFrame
-from simulators.encoders.dictionary import AbortCode, NodeDictionary, SdoAbort
+from simulators.encoders.object_dictionary import AbortCode, NodeDictionary, SdoAbort
 
 INVALID = 1 << 31
 EXTENDED_ID = 1 << 29
