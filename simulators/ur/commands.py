@@ -10,9 +10,9 @@ Source of numbers and registers: the control script of ur_rtde 1.6.5, `process_c
 from collections.abc import Callable
 from typing import Protocol
 
+from simulators.ur.controller_kinematics import IDENTITY, compose, frame_of, pose_of, rotate
 from simulators.ur.motion import ArmController, MoveRefused
 from simulators.ur.moves import Floats, Leg
-from simulators.ur.poses import IDENTITY, compose, frame_of, pose_of, rotate
 from simulators.ur.program import Wait
 from simulators.ur.registers import Memory
 from simulators.wire import TICK_S

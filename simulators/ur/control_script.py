@@ -14,8 +14,7 @@ from simulators.ur.motion import ArmController, MoveRefused
 from simulators.ur.moves import Floats, Leg
 from simulators.ur.program import Wait
 from simulators.ur.registers import Memory
-from simulators.ur.script_program import leg_of
-from simulators.ur.script_text import ScriptRefused, UploadedControl
+from simulators.ur.script_program import ScriptRefused, UploadedControl, leg_of
 from simulators.wire import TICK_S
 
 READY, DONE = 1, 2

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 from simulators.ur.motion import ArmController, MoveRefused
 from simulators.ur.program import Program, ProgramRunner
-from simulators.ur.script_text import ScriptRefused
+from simulators.ur.script_program import ScriptRefused
 from simulators.ur.states import RobotMode, RuntimeState, SafetyMode
 
 BANNER = b"Connected: Universal Robots Dashboard Server\n"

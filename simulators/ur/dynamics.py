@@ -13,8 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simulators.ur.controller_kinematics import NominalArm
-from simulators.ur.poses import IDENTITY, Frame, Pose, Vector, rotate
+from simulators.ur.controller_kinematics import IDENTITY, Frame, NominalArm, Pose, Vector, rotate
 from simulators.ur.registers import Installation
 
 Floats = NDArray[np.float64]

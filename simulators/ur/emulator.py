@@ -22,10 +22,14 @@ from simulators.ur.program import Program, ProgramRunner
 from simulators.ur.readout import Readout
 from simulators.ur.registers import Installation, Memory
 from simulators.ur.rtde_server import RtdeServer
-from simulators.ur.script_port import ScriptWire
-from simulators.ur.script_program import LineProgram
-from simulators.ur.script_text import ScriptRefused, is_control_program, read_control_program, read_lines
-from simulators.ur.state_streams import primary_stream, realtime_stream
+from simulators.ur.script_program import (
+    LineProgram,
+    ScriptRefused,
+    is_control_program,
+    read_control_program,
+    read_lines,
+)
+from simulators.ur.state_streams import ScriptWire, primary_stream, realtime_stream
 from simulators.wire import Bench, TcpPort, Wire
 
 RTDE_PORT, DASHBOARD_PORT, SCRIPT_PORTS = 30004, 29999, (30001, 30002, 30003)

@@ -14,12 +14,24 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from simulators.ur.controller_kinematics import NominalArm
+from simulators.ur.controller_kinematics import IDENTITY, Frame, NominalArm
 from simulators.ur.dynamics import ArmWorld, Carried, Dynamics, Joints
-from simulators.ur.moves import Floats, Generator, JointMove, Leg, LineMove, PathBlocked, PathMove, SetPoint, standing
-from simulators.ur.poses import IDENTITY, Frame
+from simulators.ur.moves import (
+    Floats,
+    Generator,
+    JointMove,
+    JointServo,
+    JointSpeed,
+    JointStop,
+    Leg,
+    LineMove,
+    PathBlocked,
+    PathMove,
+    SetPoint,
+    ToolSpeed,
+    standing,
+)
 from simulators.ur.states import Power, SafetyMode
-from simulators.ur.streams import JointServo, JointSpeed, JointStop, ToolSpeed
 from simulators.wire import TICK_S
 
 SPEED_LIMIT_RAD_S = math.pi  # UR5e user manual, technical specification: 180 deg/s on every joint

@@ -4,11 +4,21 @@ from collections.abc import Callable
 from typing import Any, Generic, TypeVar, overload
 
 from simulators.faults.device_clock import DeviceClock
-from simulators.ur.controller_kinematics import Axis, tool_speed
+from simulators.ur.controller_kinematics import (
+    IDENTITY,
+    Axis,
+    Frame,
+    Pose,
+    Vector,
+    compose,
+    invert,
+    pose_of,
+    rotate,
+    tool_speed,
+)
 from simulators.ur.dynamics import Joints
 from simulators.ur.motion import ArmController
 from simulators.ur.moves import SetPoint
-from simulators.ur.poses import IDENTITY, Frame, Pose, Vector, compose, invert, pose_of, rotate
 from simulators.ur.registers import Memory
 from simulators.ur.states import JOINT_MODES, SAFETY_BITS, JointMode, RobotMode, RobotStatus, RuntimeState
 from simulators.wire import TICK_S

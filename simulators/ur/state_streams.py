@@ -1,8 +1,9 @@
-"""What the controller streams on 30001, 30002 (10 Hz) and 30003 (500 Hz), where it also takes programs.
+"""The ports 30001, 30002 (10 Hz) and 30003 (500 Hz): the controller streams its state, and takes URScript text.
 
-Emulated are the values that RTDE has, too; all others are the constants of simulators/ur/fields.py. Every robot
-state holds all its sub-packages. 30001 also reports programs that were refused or ended in an error. What is not
-imitated: the safety sub-package (10, for the manufacturer's own use), key, label, pop-up and text messages.
+Emulated are the values that RTDE has, too; all others are the constants of simulators/ur/fields.py. Every robot state
+holds all its sub-packages. 30001 also reports programs that were refused or ended in an error. What is not imitated:
+the safety sub-package (10, for the manufacturer's own use), key, label, pop-up and text messages.
+
 Source: Universal Robots, "Client Interfaces, primary and secondary" and "real-time client interface", versions 5.10 to
 5.23, which agree in what is sent here.
 """
@@ -14,6 +15,52 @@ from simulators.ur.motion import ACCELERATION_LIMIT_RAD_S2, SPEED_LIMIT_RAD_S
 from simulators.ur.program import ProgramRunner
 from simulators.ur.readout import Readout
 from simulators.ur.states import JointMode, RobotMode, RuntimeState, SafetyMode
+
+MAX_TEXT_BYTES = 1 << 20  # a control script has 42 kB; what grows beyond this is no script
+
+
+class ScriptWire:
+    """One client's connection. A program is complete with a line `end` at column 0, a bare call with its line."""
+
+    def __init__(self, run: Callable[[str], None], stream: Callable[[], bytes] = bytes) -> None:
+        """`run` gets each complete program or line; it never raises. `stream`: what is to be sent this cycle."""
+        self._run, self._stream = run, stream
+        self.closing = False
+        self._line = bytearray()
+        self._program: list[str] = []
+        self._size = 0
+
+    def handle(self, data: bytes) -> bytes:
+        *lines, rest = (bytes(self._line) + data).split(b"\n")
+        self._line = bytearray(rest)
+        self._size += len(data)
+        for line in lines:
+            self._take(line.decode("utf-8", errors="replace").rstrip("\r"))
+        if self._size > MAX_TEXT_BYTES:
+            self._forget()
+        return b""
+
+    def due(self) -> bytes:
+        return self._stream()
+
+    def _take(self, line: str) -> None:
+        if self._program:
+            self._program.append(line)
+            if line == "end":
+                self._run("\n".join(self._program))
+                self._forget()
+        elif line.startswith("def "):
+            self._program = [line]
+        elif line.strip():
+            self._run(line.strip())
+            self._size = len(self._line)
+
+    def _forget(self) -> None:
+        self._program.clear()
+        if self._size > MAX_TEXT_BYTES:
+            self._line.clear()
+        self._size = len(self._line)
+
 
 ROBOT_MESSAGE, ROBOT_STATE = 20, 16
 VERSION_MESSAGE, RUNTIME_EXCEPTION = 3, 10

@@ -15,8 +15,7 @@ import pytest
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale
 from drivers.ur.control import UrControl
 from drivers.ur.reader import UrReader
-from simulators.ur.controller_kinematics import NominalArm
-from simulators.ur.poses import pose_of
+from simulators.ur.controller_kinematics import NominalArm, pose_of
 
 HOME = np.array([0.0, -1.5, 1.5, -1.5, -1.5, 0.0])
 FAR = HOME + np.array([2.5, 0.0, 0.0, 0.0, 0.0, 0.0])

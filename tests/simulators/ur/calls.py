@@ -11,8 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from simulators.ur.controller_kinematics import NominalArm
-from simulators.ur.poses import IDENTITY, frame_of, pose_of
+from simulators.ur.controller_kinematics import IDENTITY, NominalArm, frame_of, pose_of
 from simulators.world.model import ARMATURE_KG_M2, build_mjcf
 from simulators.world.rig import read_rig
 from simulators.world.truth import draw_truth

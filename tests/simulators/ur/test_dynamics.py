@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from simulators.ur.controller_kinematics import IDENTITY, compose, frame_of, invert, rotate
 from simulators.ur.dynamics import Carried, Dynamics, Obstacle
 from simulators.ur.emulator import Safety
-from simulators.ur.poses import IDENTITY, compose, frame_of, invert, rotate
 from simulators.ur.registers import Installation
 from simulators.ur.states import RuntimeState, SafetyMode
 from tests.simulators.ur.conftest import START_RAD

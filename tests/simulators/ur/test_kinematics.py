@@ -4,8 +4,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from simulators.ur.controller_kinematics import NominalArm, tool_speed
-from simulators.ur.poses import IDENTITY, compose, frame_of, invert, partway, pose_of, rotation_vector, twist_to
+from simulators.ur.controller_kinematics import (
+    IDENTITY,
+    NominalArm,
+    compose,
+    frame_of,
+    invert,
+    partway,
+    pose_of,
+    rotation_vector,
+    tool_speed,
+    twist_to,
+)
 
 TOOL = frame_of((0.01, -0.02, 0.15, 0.3, -0.2, 0.5))
 vectors = st.tuples(*[st.floats(-3.0, 3.0)] * 3)

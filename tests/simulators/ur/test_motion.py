@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
+from simulators.ur.controller_kinematics import frame_of, pose_of
 from simulators.ur.emulator import arm_controller
 from simulators.ur.motion import MoveRefused
-from simulators.ur.poses import frame_of, pose_of
 from simulators.ur.states import RobotMode, SafetyMode
 from simulators.wire import TICK_S
 from simulators.world.world import World

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simulators.ur.script_port import ScriptWire
-from simulators.ur.script_text import KNOWN_CALLS, Call, PoseLiteral, ScriptRefused, read_lines
+from simulators.ur.script_program import KNOWN_CALLS, Call, PoseLiteral, ScriptRefused, read_lines
+from simulators.ur.state_streams import ScriptWire
 from simulators.ur.states import RuntimeState
 
 START = np.array([0.0, -1.5, 1.5, -1.5, -1.5, 0.0])
