@@ -18,11 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import simulators.serve
-import simulators.world_of_rig
 from acquisition.recording.rig import plain_rig, rig_text
 from simulators.world.model import STEP_S
-from simulators.world.optics import Ray
-from simulators.world.photocurrent import Knot, interpolate, sample_a
+from simulators.world.optics import Knot, Ray, interpolate, sample_a
 from simulators.world.world import World
 
 Floats = NDArray[np.float64]
@@ -116,8 +114,8 @@ def _about_z(beam: Ray, angle_rad: float) -> Ray:
 def main(rig: Path, trouble: str, seed: int, time_scale: float) -> None:
     """Serves until standard input closes."""
     DisturbedWorld.trouble = Trouble(**json.loads(trouble))
-    assert hasattr(simulators.world_of_rig, "World")  # the one place in which a server's world is made
-    simulators.world_of_rig.World = DisturbedWorld
+    assert hasattr(simulators.serve, "World")  # the one place in which a server's world is made
+    simulators.serve.World = DisturbedWorld
     options = simulators.serve.ServeOptions(
         robot_host="auto", seed=seed, time_scale=time_scale, links=False, end_with_stdin=True
     )

@@ -33,7 +33,7 @@ from calibrate.identification.record import record_of
 from calibrate.identification.result import Identification
 from calibrate.model_file import RigIdentity
 from calibrate.predict import Predictor
-from simulators.hand.hand import CannotReachError
+from simulators.hand.held_arm import CannotReachError
 from simulators.hand.world import HandWorld
 
 Floats = NDArray[np.float64]

@@ -23,8 +23,7 @@ from calibeam.prove.seal import BrokenSealError
 from calibrate.errors import DataError
 from drivers.errors import DeviceError
 from simulators.conceal.wanted import ConcealError
-from simulators.errors import HostError
-from simulators.world.errors import WorldError
+from simulators.errors import HostError, WorldError
 
 # What is told in one sentence instead of a traceback: everything that is about the user's world, not about our code.
 TOLD = (

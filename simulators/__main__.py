@@ -4,9 +4,8 @@ import json
 import sys
 from pathlib import Path
 
-from simulators.errors import HostError
+from simulators.errors import HostError, WorldError
 from simulators.serve import ServeOptions, serve
-from simulators.world.errors import WorldError
 
 
 def main() -> int:

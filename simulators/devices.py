@@ -13,8 +13,7 @@ from typing import Any
 
 from simulators.errors import HostError
 from simulators.faults.device_faults import DisturbedLight
-from simulators.faults.faulty_wire import with_faults
-from simulators.faults.injector import Injector
+from simulators.faults.injector import Injector, with_faults
 from simulators.hand.world import HandWorld
 from simulators.host.loop import Host
 from simulators.wire import Bench, SerialPort, TcpPort, UdpPort

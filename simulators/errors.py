@@ -1,8 +1,12 @@
-"""Why the emulators cannot listen; every message names the port, the address and the remedy.
+"""What the emulators refuse, each with a message that names the port, the value or the file, and the remedy.
 
-HostError
-`-- PortBusy        another program listens there already
+HostError: why the emulators cannot listen; PortBusy, where another program listens there already. WorldError: a rig
+that cannot be built, an unknown station, a set-point without sense.
 """
+
+
+class WorldError(ValueError):
+    """The message names the thing, the value and the remedy."""
 
 
 class HostError(Exception):

@@ -1,7 +1,8 @@
 """The seams between a world, its instruments and the process that carries their bytes.
 
-An instrument is advanced by emulated time and never reads a clock. A wire is one client's connection to an
-instrument: bytes in, bytes out, no I/O. The host loop (simulators/host) owns sockets and pseudo-terminals.
+An instrument is advanced by emulated time and never reads a clock of the host; a device's clock is the world's while
+the device is healthy. A wire is one client's connection to an instrument: bytes in, bytes out, no I/O. The host loop
+(simulators/host) owns sockets and pseudo-terminals.
 
 Each tick of TICK_S emulated seconds runs in this order:
     instrument.before_step(t)      the controller sets its next set-point, ...
@@ -10,11 +11,32 @@ Each tick of TICK_S emulated seconds runs in this order:
     wire.due()                     what each open connection has to send now
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from simulators.faults.device_clock import DeviceClock
+
+class DeviceClock:
+    """What a device puts into its time stamps. Emulated time goes in, and is not touched itself.
+
+    Several disturbances add up; each is mended by itself.
+    """
+
+    def __init__(self) -> None:
+        self._wrong: dict[Hashable, tuple[float, float, float]] = {}  # whose -> step (s), drift, since when (s)
+
+    def tells(self, t_s: float) -> float:
+        """The stamp of something that happens at `t_s`, in seconds."""
+        return t_s + sum(step_s + drift * (t_s - since_s) for step_s, drift, since_s in self._wrong.values())
+
+    def disturb(self, whose: Hashable, step_s: float, drift: float, t_s: float) -> None:
+        """From `t_s` on it is `step_s` farther ahead and gains `drift` more, seconds in a second."""
+        self._wrong[whose] = step_s, drift, t_s
+
+    def mend(self, whose: Hashable) -> None:
+        """As if that one had not been."""
+        self._wrong.pop(whose, None)
+
 
 TICK_S = 0.002  # one cycle of an e-Series controller, 500 Hz (reference: RTDE guide)
 
@@ -25,7 +47,7 @@ class Wire(Protocol):
     A wire may have an attribute `closing`. Once it is true and all bytes are sent, the host closes a TCP connection
     (dashboard `quit`, a controller that drops its clients); a serial port is unplugged for as long as it is true.
     A wire that raises loses its connection. For fault injection it may have `damaged` and `refusal`: see
-    simulators/faults/faulty_wire.py.
+    simulators/faults/injector.py.
     """
 
     def handle(self, data: bytes) -> bytes:

@@ -13,7 +13,7 @@ from acquisition.guided.guide import GuidedProgress, Request
 from acquisition.guided.reading import BarEnd, Cone, Target
 from acquisition.guided.stillness import Window
 from calibeam.emulation import EmulationError
-from simulators.hand.hand import CannotReachError
+from simulators.hand.held_arm import CannotReachError
 from simulators.hand.world import HandWorld
 
 Floats = NDArray[np.float64]
@@ -65,7 +65,7 @@ def wish(target: Target, posture_rad: Floats) -> Mapping[str, Any]:
 
 
 Ask = Callable[..., Any]  # verb, arguments by name
-CANNOT = "cannot put the probe"  # how simulators/hand/hand.py says that the arm has no such posture
+CANNOT = "cannot put the probe"  # how simulators/hand/held_arm.py says that the arm has no such posture
 
 
 class EmulatedHand:

@@ -39,7 +39,7 @@ from simulators.conceal.wanted import ConcealError, Wanted
 from simulators.defects import written
 from simulators.process import Emulators
 from simulators.streams.devices import HOST_S
-from simulators.streams.faults import FAULTS, Fault
+from simulators.streams.faults import FAULTS, StreamFault
 from simulators.streams.stream_session import StreamedSession, streamed
 
 HEALTHY = 0.25  # share of the cases with streams in which nothing is wrong
@@ -53,7 +53,7 @@ class _HostTime:
         return HOST_S
 
 
-def conceal_streams(case: Case, mechanism: str | None, path: Path) -> tuple[Fault, ...]:
+def conceal_streams(case: Case, mechanism: str | None, path: Path) -> tuple[StreamFault, ...]:
     """Draws a fault, or none, and writes the recording; returns what is wrong with it."""
     rng = np.random.default_rng([case.wanted.seed, 21])
     among = [kind for kind in FAULTS if mechanism in (None, kind.KIND)]
@@ -65,7 +65,7 @@ def conceal_streams(case: Case, mechanism: str | None, path: Path) -> tuple[Faul
     return () if fault is None else (fault,)
 
 
-def fault_records(faults: tuple[Fault, ...]) -> list[dict[str, Any]]:
+def fault_records(faults: tuple[StreamFault, ...]) -> list[dict[str, Any]]:
     """For the truth, in the words that a mechanism of the chain has there."""
     return [
         {

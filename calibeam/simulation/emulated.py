@@ -18,7 +18,7 @@ from simulators.defects import Defect
 from simulators.defects.defect import as_vector
 from simulators.defects.found_curve import FoundCurve
 from simulators.replayed import Sited
-from simulators.world.exposure import temperatures
+from simulators.world.moving_mechanisms import temperatures
 from simulators.world.rig import Pose
 from simulators.world.truth import Given, TruePlacement
 

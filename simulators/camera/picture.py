@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.camera.true_camera import BoardDrawing, TrueCamera
-from simulators.world.errors import WorldError
+from simulators.errors import WorldError
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from simulators.world.errors import WorldError
+from simulators.errors import WorldError
 from simulators.world.rig import Pose, Positive, Sigma
 
 Floats = NDArray[np.float64]

@@ -24,8 +24,8 @@ from simulators.conceal.rig_file import Belief, believe, rig_document
 from simulators.conceal.rigs import DrawnRig
 from simulators.conceal.wanted import ConcealError, Wanted
 from simulators.defects import MECHANISMS, Defect, Scene, Site
-from simulators.world.errors import WorldError
-from simulators.world.exposure import temperatures
+from simulators.errors import WorldError
+from simulators.world.moving_mechanisms import temperatures
 from simulators.world.rig import Emulation, WorldRig, read_rig
 from simulators.world.truth import Truth, arm_of, draw_truth
 

@@ -1,9 +1,13 @@
-"""What an emulated measuring arm truly is: drawn once from the seed, frozen, written only outside of any recording.
+"""The part of a rig file that a hand-held measuring arm is emulated from, and what that arm truly is.
 
+Links, encoders, cones, bars, spheres. Keys that are not of this world are not read. A missing deviation is zero, as a
+perfect arm would have it. The truth is drawn once from the seed, frozen, and written only outside of any recording.
 Every kind of deviation has a random stream of its own: switching one off leaves the others as they were.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Annotated, Any
 
 import msgspec
 import numpy as np
@@ -11,8 +15,138 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from simulators.arm.rigid import moved
-from simulators.hand.rig import Emulation, HandRig, Part, Vector
-from simulators.world.errors import WorldError
+from simulators.errors import WorldError
+
+Vector = tuple[float, float, float]
+Sigma = Annotated[float, msgspec.Meta(ge=0.0)]
+Positive = Annotated[float, msgspec.Meta(gt=0.0)]
+Share = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
+Identity = Annotated[int, msgspec.Meta(ge=1)]
+ZERO: Vector = (0.0, 0.0, 0.0)
+LOCAL_POE = "local-poe"
+
+
+class Part(msgspec.Struct, frozen=True):
+    """The fixed part in front of a joint, or behind the last one: origin and rotation vector."""
+
+    origin_m: Vector = ZERO
+    rotation_rad: Vector = ZERO
+
+
+class MeasuringJoint(Part, frozen=True, kw_only=True):
+    """A fixed part and the range of the joint behind it."""
+
+    lower_rad: float
+    upper_rad: float
+    sign: int = 1
+    follows: Mapping[str, float] | None = None
+
+
+class MeasuringArm(msgspec.Struct, frozen=True):
+    """The nominal arm, a local product of exponentials."""
+
+    joint: Annotated[tuple[MeasuringJoint, ...], msgspec.Meta(min_length=1)]
+    model: str
+    flange: Part = Part()
+
+
+class ProbeTool(msgspec.Struct, frozen=True):
+    """The probe's ball."""
+
+    point_m: Vector = ZERO
+    probe_diameter_m: Sigma = 0.0
+
+
+class Seat(msgspec.Struct, frozen=True):
+    """A cone, about where it stands."""
+
+    id: Identity
+    origin_m: Vector
+
+
+class Bar(msgspec.Struct, frozen=True):
+    """A calibrated length."""
+
+    id: Identity
+    length_m: Positive
+
+
+class BarPosition(msgspec.Struct, frozen=True):
+    """A bar set up in one way."""
+
+    id: Identity
+    bar: Identity
+    middle_m: Vector
+    direction: Vector
+
+
+class Sphere(msgspec.Struct, frozen=True):
+    """A calibrated sphere, about where it stands."""
+
+    id: Identity
+    origin_m: Vector
+    diameter_m: Positive
+
+
+class HandEmulation(msgspec.Struct, frozen=True):
+    """How far the truth lies from the drawing, one sigma each, and what the hand is like."""
+
+    seed: Annotated[int, msgspec.Meta(ge=0)] = 0
+    time_scale: Positive = 1.0
+    length_sigma_m: Sigma = 0.0
+    angle_sigma_rad: Sigma = 0.0
+    joint_zero_max_rad: Sigma = 0.0
+    artefact_sigma_m: Sigma = 0.0  # of where cones, bars and spheres truly stand
+    disc_eccentricity_m: Sigma = 0.0  # of each of both coordinates of a disc's centre
+    graduation_rad: Sigma = 0.0  # of the angle that a group of lines shows
+    encoder_noise_rad: Sigma = 0.0  # of one reading
+    axis_wobble_rad: Sigma = 0.0  # lean of a turning axis
+    radial_runout_m: Sigma = 0.0  # of a turning axis sideways
+    axial_runout_m: Sigma = 0.0  # of a turning axis along itself
+    contact_m: Sigma = 0.0  # of the ball in its seat, each time it is put there
+    tremor_rad: Sigma = 0.0  # of the hand, as the joints show it
+    slip_share: Share = 0.0  # of the times that the ball sits askew or slips while it is read
+    hand_force_n: Sigma = 0.0  # along the probe
+    joint_compliance_rad_nm: Sigma = 0.0
+
+
+class HandRig(msgspec.Struct, frozen=True):
+    """Everything that this world wants to know, as believed; the deviations come on top."""
+
+    arm: MeasuringArm
+    tool: ProbeTool = ProbeTool()
+    seat: tuple[Seat, ...] = ()
+    bar: tuple[Bar, ...] = ()
+    bar_position: tuple[BarPosition, ...] = ()
+    sphere: tuple[Sphere, ...] = ()
+    emulation: HandEmulation = HandEmulation()
+
+
+def is_hand_held(rig: Mapping[str, Any]) -> bool:
+    """Whether a rig as `tomllib` gives it is one that a person's hand moves: artefacts to probe, encoders, no robot."""
+    devices = rig.get("devices", {})
+    probed = any(rig.get(section) for section in ("seat", "bar_position", "sphere"))
+    return probed and "encoders" in devices and not {"robot", "psd"} & set(devices)
+
+
+def read_hand_rig(rig: Mapping[str, Any]) -> HandRig:
+    """What this world wants of a rig as `tomllib` gives it. WorldError naming the key, or what cannot be emulated."""
+    try:
+        checked = msgspec.convert(dict(rig), type=HandRig)
+    except msgspec.ValidationError as error:
+        raise WorldError(f"rig file: {error}; an emulated measuring arm needs [arm] with joints in its form") from error
+    if any(joint.sign != 1 or joint.follows for joint in checked.arm.joint):
+        raise WorldError("rig file: an emulated arm has no sign and no follows; emulate a rig without them")
+    if checked.arm.model != LOCAL_POE:
+        raise WorldError(
+            f'rig file: arm.model = "{checked.arm.model}": a hand-held arm is emulated as "{LOCAL_POE}" only'
+        )
+    lengths = {bar.id for bar in checked.bar}
+    for position in checked.bar_position:
+        if position.bar not in lengths:
+            raise WorldError(f"rig file: bar position {position.id} holds bar {position.bar}, which is no [[bar]]")
+    return checked
+
 
 Floats = NDArray[np.float64]
 SCHEMA = 1
@@ -106,7 +240,7 @@ def draw_hand_truth(rig: HandRig, seed: int) -> HandTruth:
     )
 
 
-def _made(drawn: Part, sigma: Emulation, rng: np.random.Generator) -> Part:
+def _made(drawn: Part, sigma: HandEmulation, rng: np.random.Generator) -> Part:
     """The drawn part with a small motion behind it: six errors a link."""
     nominal = moved(np.array(drawn.origin_m), np.array(drawn.rotation_rad))
     off = moved(sigma.length_sigma_m * rng.standard_normal(3), sigma.angle_sigma_rad * rng.standard_normal(3))
@@ -114,18 +248,18 @@ def _made(drawn: Part, sigma: Emulation, rng: np.random.Generator) -> Part:
     return Part(vector(true[:3, 3]), vector(Rotation.from_matrix(true[:3, :3]).as_rotvec()))
 
 
-def _disc(sigma: Emulation, rng: np.random.Generator) -> TrueDisc:
+def _disc(sigma: HandEmulation, rng: np.random.Generator) -> TrueDisc:
     x_m, y_m = sigma.disc_eccentricity_m * rng.standard_normal(2)
     lines_rad = sigma.graduation_rad * rng.standard_normal(LINES)
     return TrueDisc(float(np.hypot(x_m, y_m)), float(np.arctan2(y_m, x_m)), tuple(lines_rad.tolist()))
 
 
-def _axis(sigma: Emulation, rng: np.random.Generator) -> TrueAxis:
+def _axis(sigma: HandEmulation, rng: np.random.Generator) -> TrueAxis:
     lean_rad = abs(sigma.axis_wobble_rad * rng.standard_normal())
     return TrueAxis(float(lean_rad), int(rng.choice(CYCLES)), float(rng.uniform(-np.pi, np.pi)))
 
 
-def _runout(sigma: Emulation, rng: np.random.Generator) -> TrueRunout:
+def _runout(sigma: HandEmulation, rng: np.random.Generator) -> TrueRunout:
     radial_m, axial_m = (abs(float(x)) for x in rng.standard_normal(2))
     radial_rad, axial_rad = (float(x) for x in rng.uniform(-np.pi, np.pi, 2))
     radial_cycles, axial_cycles = int(rng.choice(CYCLES)), int(rng.choice(AXIAL_CYCLES))
@@ -139,7 +273,7 @@ def _runout(sigma: Emulation, rng: np.random.Generator) -> TrueRunout:
     )
 
 
-def _off(believed_m: Vector, sigma: Emulation, rng: np.random.Generator) -> Vector:
+def _off(believed_m: Vector, sigma: HandEmulation, rng: np.random.Generator) -> Vector:
     return vector(np.array(believed_m) + sigma.artefact_sigma_m * rng.standard_normal(3))
 
 

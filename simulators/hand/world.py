@@ -13,11 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.hand.hand import Ball, Hand
-from simulators.hand.hand_rig import HandTruth, draw_hand_truth
-from simulators.hand.held_arm import TrueArm
-from simulators.hand.rig import HandRig, read_hand_rig
-from simulators.world.errors import WorldError
+from simulators.errors import WorldError
+from simulators.hand.hand_rig import HandRig, HandTruth, draw_hand_truth, read_hand_rig
+from simulators.hand.held_arm import Ball, Hand, TrueArm
 
 Floats = NDArray[np.float64]
 

@@ -8,10 +8,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.faults.device_clock import DeviceClock
 from simulators.psd_daq import frames
 from simulators.psd_daq.frames import Kind, Refusal, Request
 from simulators.psd_daq.line import TransmitLine
+from simulators.wire import DeviceClock
 
 MIN_RATE_HZ, MAX_RATE_HZ = 100, 4000
 MAX_SAMPLES = 32  # in one frame

@@ -20,7 +20,7 @@ SETTLED_S = 0.06  # after a stop, from which the size of a swing counts
 
 
 @dataclass(frozen=True)
-class Fault(Mechanism):
+class StreamFault(Mechanism):
     """One hidden fault; `PHYSICS` as in docs/formats.md, findings in streams."""
 
     @property
@@ -77,7 +77,7 @@ class HurriesReading(Protocol):
 
 
 @dataclass(frozen=True)
-class LateStamps(Fault):
+class LateStamps(StreamFault):
     """Encoders that read, wait `by_s` and then stamp: an interrupt that is served late, a queue on the bus."""
 
     by_s: float
@@ -108,7 +108,7 @@ class LateStamps(Fault):
 
 
 @dataclass(frozen=True)
-class LaggingEncoder(Fault):
+class LaggingEncoder(StreamFault):
     """Encoder behind a filter of its own: a first-order lag of `time_constant_s` between shaft and reading."""
 
     joint: int
@@ -139,7 +139,7 @@ class LaggingEncoder(Fault):
 
 
 @dataclass(frozen=True)
-class SlippingEncoder(Fault):
+class SlippingEncoder(StreamFault):
     """Encoder whose coupling slips once, on its way: it reads `slip_rad` more after `share` of the session."""
 
     joint: int
@@ -168,7 +168,7 @@ class SlippingEncoder(Fault):
 
 
 @dataclass(frozen=True)
-class EarlyReading(Fault):
+class EarlyReading(StreamFault):
     """Samples taken before the arm stands: the outputs creep to their goal, and the program does not wait for it.
 
     `left` of each move is still to go at its stop, with one time constant; read `after_s`.
@@ -220,7 +220,7 @@ class EarlyReading(Fault):
 
 
 @dataclass(frozen=True)
-class SwingingFoot(Fault):
+class SwingingFoot(StreamFault):
     """Foot on a spring: the arm's braking sets it swinging, by `turn_rad` rms just after the stops.
 
     x'' + 2 z w x' + w^2 x = -a (a mass on a spring that is shaken; any text on vibration).
@@ -261,4 +261,4 @@ class SwingingFoot(Fault):
         return scale * swing[:, np.newaxis] * np.asarray(self.about)
 
 
-FAULTS: tuple[type[Fault], ...] = (LateStamps, LaggingEncoder, SlippingEncoder, EarlyReading, SwingingFoot)
+FAULTS: tuple[type[StreamFault], ...] = (LateStamps, LaggingEncoder, SlippingEncoder, EarlyReading, SwingingFoot)

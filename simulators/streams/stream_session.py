@@ -22,7 +22,7 @@ from simulators.streams.devices import (
     sample_times,
     second_encoders,
 )
-from simulators.streams.faults import Fault, HurriesReading, MovesOutput, ReadsEncoders, StampsLate, SwaysBase
+from simulators.streams.faults import HurriesReading, MovesOutput, ReadsEncoders, StampsLate, StreamFault, SwaysBase
 
 Floats = NDArray[np.float64]
 WAIT_S, READ_S = 0.35, 0.2  # of a patient program: from the stop to the reading, and its length
@@ -49,7 +49,7 @@ class _Sway:
         return turned(self.turn_rad)
 
 
-def streamed(case: Case, fault: Fault | None, rng: np.random.Generator) -> StreamedSession:
+def streamed(case: Case, fault: StreamFault | None, rng: np.random.Generator) -> StreamedSession:
     """Of a session with a dual-PSD fixture; the samples are those of the case."""
     way = course(case.posture_rad)
     robot_s, encoder_s, psd_s = (sample_times(d, float(way.time_s[-1]), rng) for d in ("robot", "encoders", "psd"))
@@ -72,7 +72,7 @@ def streamed(case: Case, fault: Fault | None, rng: np.random.Generator) -> Strea
     return StreamedSession(streams, window_s.mean(axis=1), streams["psd"].clock.own(window_s))
 
 
-def _currents(case: Case, way: Course, fault: Fault | None, time_s: Floats, rng: np.random.Generator) -> Floats:
+def _currents(case: Case, way: Course, fault: StreamFault | None, time_s: Floats, rng: np.random.Generator) -> Floats:
     """(row, 8): spots of the fixture that stood there at the next stop."""
     fixture = case.drawn.true.instrument
     if not isinstance(fixture, DualPsd):

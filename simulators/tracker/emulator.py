@@ -14,8 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.faults.device_clock import DeviceClock
-from simulators.wire import Bench, SerialPort, TcpPort, UdpPort, Wire
+from simulators.wire import Bench, DeviceClock, SerialPort, TcpPort, UdpPort, Wire
 
 Floats = NDArray[np.float64]
 PER_M = {"m": 1.0, "mm": 1e3, "um": 1e6, "in": 1.0 / 0.0254}

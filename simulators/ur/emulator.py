@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, Protocol
 
-from simulators.faults.device_clock import DeviceClock
 from simulators.ur.control_script import ControlScript
 from simulators.ur.controller_kinematics import NominalArm
 from simulators.ur.dashboard_server import Dashboard
@@ -30,7 +29,7 @@ from simulators.ur.script_program import (
     read_lines,
 )
 from simulators.ur.state_streams import ScriptWire, primary_stream, realtime_stream
-from simulators.wire import Bench, TcpPort, Wire
+from simulators.wire import Bench, DeviceClock, TcpPort, Wire
 
 RTDE_PORT, DASHBOARD_PORT, SCRIPT_PORTS = 30004, 29999, (30001, 30002, 30003)
 PRIMARY_PORT, REALTIME_PORT = 30001, 30003

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar, overload
 
-from simulators.faults.device_clock import DeviceClock
 from simulators.ur.controller_kinematics import (
     IDENTITY,
     Axis,
@@ -21,7 +20,7 @@ from simulators.ur.motion import ArmController
 from simulators.ur.moves import SetPoint
 from simulators.ur.registers import Memory
 from simulators.ur.states import JOINT_MODES, SAFETY_BITS, JointMode, RobotMode, RobotStatus, RuntimeState
-from simulators.wire import TICK_S
+from simulators.wire import TICK_S, DeviceClock
 
 TORQUE_PER_CURRENT_NM_A = (11.7, 11.7, 11.7, 7.0, 7.0, 7.0)
 # at the joint: gear 101 x motor constants of the size 3 and size 1 joints, about; only the ratio of joints matters here

@@ -25,9 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.wire import TICK_S
-from simulators.world.exposure import Exposure
 from simulators.world.model import STEP_S, build_mjcf, torque_limits_nm
-from simulators.world.moving_mechanisms import Hidden
+from simulators.world.moving_mechanisms import Exposure, MovingMechanisms
 from simulators.world.optics import Ray
 from simulators.world.rig import WorldRig
 from simulators.world.servo import Engine, Servo
@@ -129,7 +128,7 @@ class ArmBody:
         truth: Truth,
         q_rad: Floats,
         rng: np.random.Generator,
-        hidden: Hidden | None = None,
+        hidden: MovingMechanisms | None = None,
         rest_degC: Mapping[str, float] | None = None,
     ) -> None:
         n = len(truth.links)

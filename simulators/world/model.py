@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 import msgspec
 
-from simulators.world.rig import Arm, Joint, Pose, Tool, Vector, WorldRig
+from simulators.world.rig import ArmOfRig, Joint, Pose, Tool, Vector, WorldRig
 from simulators.world.truth import TrueLink, Truth, arm_of
 
 STEP_S = 0.001  # physics step; an e-Series joint controller closes its position loop at about this rate
@@ -107,7 +107,7 @@ def _add_inertia(frame: ElementTree.Element, mass_kg: float, com_m: Vector, reac
     )
 
 
-def torque_limits_nm(arm: Arm, tool: Tool) -> tuple[float, ...]:
+def torque_limits_nm(arm: ArmOfRig, tool: Tool) -> tuple[float, ...]:
     """What each drive can give, (n,): above an upper bound of its static load, all that follows stretched out level."""
     g_m_s2 = math.sqrt(sum(component * component for component in arm.gravity_m_s2))
     distal_kg = tool.mass_kg

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import msgspec
 
-from simulators.world.errors import WorldError
+from simulators.errors import WorldError
 
 Vector = tuple[float, float, float]
 Sigma = Annotated[float, msgspec.Meta(ge=0.0)]
@@ -38,7 +38,7 @@ class Joint(msgspec.Struct, frozen=True):
     follows: Mapping[str, float] | None = None
 
 
-class Arm(msgspec.Struct, frozen=True):
+class ArmOfRig(msgspec.Struct, frozen=True):
     """The arm as drawn."""
 
     joint: Annotated[tuple[Joint, ...], msgspec.Meta(min_length=1)]
@@ -96,7 +96,7 @@ class Emulation(msgspec.Struct, frozen=True):
 class WorldRig(msgspec.Struct, frozen=True):
     """Everything the world wants to know, as believed; the deviations come on top."""
 
-    arm: Arm
+    arm: ArmOfRig
     tool: Tool
     fixture: Fixture | None = None
     placement: tuple[Placement, ...] = ()

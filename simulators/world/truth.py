@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from simulators.arm.kinematics import Arm
 from simulators.arm.rigid import moved, shifted, turned
-from simulators.world.errors import WorldError
+from simulators.errors import WorldError
 from simulators.world.rig import Emulation, Joint, Placement, Pose, Tool, Vector, WorldRig, read_rig
 
 Floats = NDArray[np.float64]

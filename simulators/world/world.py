@@ -20,13 +20,31 @@ from numpy.typing import ArrayLike, NDArray
 
 from simulators.arm.rigid import moved
 from simulators.defects import Defect
+from simulators.errors import WorldError
 from simulators.world.body import ArmBody
-from simulators.world.errors import WorldError
-from simulators.world.exposure import joint_temperature_degC, psd_temperature_degC
 from simulators.world.model import STEP_S
-from simulators.world.moving_mechanisms import Hidden, fixture_at, seen
-from simulators.world.optics import DARK, Face, Ray, Spots, place_faces, trace
-from simulators.world.photocurrent import EDGE_S, ELECTRODES, NOISE_RATE_HZ, Knot, Photodetectors, interpolate, sample_a
+from simulators.world.moving_mechanisms import (
+    MovingMechanisms,
+    fixture_at,
+    joint_temperature_degC,
+    psd_temperature_degC,
+    seen,
+)
+from simulators.world.optics import (
+    DARK,
+    EDGE_S,
+    ELECTRODES,
+    NOISE_RATE_HZ,
+    Face,
+    Knot,
+    Photodetectors,
+    Ray,
+    Spots,
+    interpolate,
+    place_faces,
+    sample_a,
+    trace,
+)
 from simulators.world.rig import Pose, WorldRig, read_rig
 from simulators.world.truth import Given, Truth, arm_of, draw_truth, given_truth
 
@@ -65,7 +83,7 @@ class World:
         self.truth = truth
         self.n_joints = len(truth.links)
         start_rad = self._checked(np.zeros(self.n_joints) if q_rad is None else q_rad)
-        self._hidden = Hidden(hidden, arm_of(rig, truth)) if hidden else None
+        self._hidden = MovingMechanisms(hidden, arm_of(rig, truth)) if hidden else None
         self._body = ArmBody(rig, truth, start_rad, np.random.default_rng(repeat_seed), self._hidden, rest_degC)
         self._detectors = (
             None

@@ -19,8 +19,7 @@ from drivers.errors import DeviceLost, DeviceRefused, DeviceStale, WireError
 from drivers.tracker.codec import LineRefusedError
 from drivers.tracker.device import LineTracker
 from drivers.transports.socket_line import UdpReceiver
-from simulators.faults.faulty_wire import with_faults
-from simulators.faults.injector import Injector
+from simulators.faults.injector import Injector, with_faults
 from simulators.host.loop import Host
 from simulators.tracker.emulator import build
 from simulators.wire import TcpPort, UdpPort

@@ -11,7 +11,7 @@ from simulators.camera.emulator import NetworkCamera
 from simulators.camera.http_wire import LONGEST_REQUEST_BYTES, HttpWire
 from simulators.camera.picture import Renderer
 from simulators.camera.true_camera import CameraDeviations, camera_drawing, draw_camera
-from simulators.world.errors import WorldError
+from simulators.errors import WorldError
 
 RIG = tomllib.loads((Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd-camera.toml").read_text())
 GET = b"GET %s HTTP/1.1\r\nHost: camera\r\n\r\n"

@@ -2,10 +2,8 @@
 
 import pytest
 
-from simulators.faults.device_faults import FaultError, Target
-from simulators.faults.faulty_wire import FaultyWire
-from simulators.faults.injector import Injector
-from simulators.faults.line_faults import LINE_FAULTS
+from simulators.faults.device_faults import LINE_FAULTS, FaultError, Target
+from simulators.faults.injector import FaultyWire, Injector
 from simulators.wire import TICK_S
 
 

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from simulators.faults.device_clock import DeviceClock
 from simulators.faults.device_faults import DisturbedLight, Target
 from simulators.faults.injector import Injector
-from simulators.wire import TICK_S
+from simulators.wire import TICK_S, DeviceClock
 
 
 class Lit:

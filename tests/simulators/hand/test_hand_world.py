@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simulators.hand.hand import CannotReachError
-from simulators.hand.hand_rig import read_hand_truth, write_hand_truth
-from simulators.hand.rig import is_hand_held
+from simulators.errors import WorldError
+from simulators.hand.hand_rig import is_hand_held, read_hand_truth, write_hand_truth
+from simulators.hand.held_arm import CannotReachError
 from simulators.hand.world import HandWorld
-from simulators.world.errors import WorldError
 
 RIG = Path(__file__).parents[3] / "rigs" / "arm-cmm-reference.toml"
 QUIET = {"seed": 3}

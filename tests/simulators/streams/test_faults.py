@@ -11,10 +11,10 @@ from simulators.streams.devices import DARK_A, EPOCH_S, HOST_S, photocurrents_a
 from simulators.streams.faults import (
     FAULTS,
     EarlyReading,
-    Fault,
     LaggingEncoder,
     LateStamps,
     SlippingEncoder,
+    StreamFault,
     SwingingFoot,
 )
 from simulators.streams.stream_session import StreamedSession, streamed
@@ -35,7 +35,7 @@ def with_fault(case: Case) -> Stream:
 
 
 @pytest.mark.parametrize("kind", FAULTS, ids=lambda kind: kind.KIND)
-def test_it_speaks_the_words_of_the_format(kind: type[Fault]) -> None:
+def test_it_speaks_the_words_of_the_format(kind: type[StreamFault]) -> None:
     for seed in range(5):
         fault = kind.draw(np.random.default_rng(seed), 6)
         assert fault.port in PORTS

@@ -12,7 +12,7 @@ from simulators.conceal.on_wire import rig_of_world
 from simulators.conceal.poses import shots
 from simulators.conceal.rig import TrueRig
 from simulators.defects import MECHANISMS, Defect, Scene, Site, WrittenError, defects_of, written
-from simulators.world.exposure import temperatures
+from simulators.world.moving_mechanisms import temperatures
 from simulators.world.rig import read_rig
 from simulators.world.truth import draw_truth
 from simulators.world.world import World

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from simulators.world.optics import DARK, Spot, Spots
-from simulators.world.photocurrent import DARK_NOISE_A, SATURATION_A, Photodetectors, sample_a
+from simulators.world.optics import DARK, DARK_NOISE_A, SATURATION_A, Photodetectors, Spot, Spots, sample_a
 
 HALF_M = 0.010
 

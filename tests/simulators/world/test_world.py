@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from simulators.world.errors import WorldError
+from simulators.errors import WorldError
 from simulators.world.truth import read_truth, truth_of, write_truth
 from simulators.world.world import World
 
