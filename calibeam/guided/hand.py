@@ -17,7 +17,7 @@ from simulators.hand.held_arm import CannotReachError
 from simulators.hand.world import HandWorld
 
 Floats = NDArray[np.float64]
-COUNTS = 1 << 20  # of simulators/encoders/encoder.py
+COUNTS = 1 << 20  # of simulators/encoders/object_dictionary.py
 
 
 class DirectHand:

@@ -38,9 +38,8 @@ from simulators.conceal.rig_file import rig_document, toml_text
 from simulators.conceal.wanted import ConcealError, Wanted
 from simulators.defects import written
 from simulators.process import Emulators
-from simulators.streams.devices import HOST_S
 from simulators.streams.faults import FAULTS, StreamFault
-from simulators.streams.stream_session import StreamedSession, streamed
+from simulators.streams.stream_session import HOST_S, StreamedSession, streamed
 
 HEALTHY = 0.25  # share of the cases with streams in which nothing is wrong
 UNITS = {"target_q_rad": "rad", "actual_q_rad": "rad", "position_rad": "rad", "photocurrent_a": "A"}

@@ -14,9 +14,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.encoders.bus import CanBus, CanFrame, Node
+from simulators.encoders.bus import CanBus, CanFrame, Node, SlcanAdapter
 from simulators.encoders.node import EncoderNode
-from simulators.encoders.slcan import SlcanAdapter
 from simulators.wire import Bench, SerialPort
 
 FIRST_ID = 0x100

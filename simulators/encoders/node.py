@@ -13,10 +13,8 @@ from collections.abc import Callable
 from enum import IntEnum
 
 from simulators.encoders.bus import CanFrame
-from simulators.encoders.encoder import AbsoluteEncoder
-from simulators.encoders.object_dictionary import AbortCode, NodeDictionary, SdoAbort
-from simulators.encoders.sdo_pdo import TIMER_SLACK_S, TransmitPdo
-from simulators.encoders.sdo_server import SdoServer
+from simulators.encoders.object_dictionary import AbortCode, AbsoluteEncoder, NodeDictionary, SdoAbort
+from simulators.encoders.sdo_pdo import TIMER_SLACK_S, SdoServer, TransmitPdo
 
 HISTORY = 8
 POSITION_ERROR_CODE = 0x7320

@@ -1,19 +1,106 @@
 """Two KPA101 on ports of their own, one for each face of the fixture, with the verbs of the side channel.
 
-The KPA101 itself: one detector's three signals as counts, its settings, the requests it obeys.
+A KPA101 holds one detector's three signals as counts, its settings, and the requests it obeys. Messages have six bytes
+of header, little endian: identifier; two parameters, or the number of data bytes; destination, with bit 7 when data
+follow; source. Source: Thorlabs, APT communications protocol, generic system and quad control messages.
 """
 
 import struct
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.kpa101 import frames
-from simulators.kpa101.frames import Id, Request
-from simulators.psd_daq.line import TransmitLine
+from simulators.psd_daq.frames import TransmitLine
 from simulators.wire import Bench, SerialPort
+
+HOST, GENERIC_USB_UNIT = 0x01, 0x50
+DATA_FOLLOWS = 0x80
+HEADER_BYTES = 6
+LONGEST_DATA = 64  # no request is longer; a longer one is noise
+
+
+class Id(IntEnum):
+    """Messages by name."""
+
+    BLINK = 0x0223
+    REQ_INFO = 0x0005
+    GET_INFO = 0x0006
+    START_UPDATES = 0x0011
+    STOP_UPDATES = 0x0012
+    RICH_RESPONSE = 0x0081
+    QUAD_SET = 0x0870
+    QUAD_REQ = 0x0871
+    QUAD_GET = 0x0872
+    REQ_STATUS = 0x0880
+    GET_STATUS = 0x0881
+    ACK_STATUS = 0x0882
+
+
+@dataclass(frozen=True)
+class AptRequest:
+    """A message for the unit; `data` is empty for a short one, whose parameters are `first` and `second`."""
+
+    id: int
+    first: int = 0
+    second: int = 0
+    data: bytes = b""
+
+
+class AptRequestReader:
+    """Collects bytes; what is not addressed to a USB unit by a host is skipped byte by byte."""
+
+    def __init__(self) -> None:
+        self._bytes = bytearray()
+
+    def feed(self, data: bytes) -> list[AptRequest]:
+        requests: list[AptRequest] = []
+        for byte in data:
+            self._bytes.append(byte)
+            request = self._front()
+            if request is not None:
+                requests.append(request)
+        return requests
+
+    def _front(self) -> AptRequest | None:
+        while len(self._bytes) >= HEADER_BYTES:
+            number, length, destination, source = struct.unpack_from("<HHBB", self._bytes)
+            long = bool(destination & DATA_FOLLOWS)
+            if destination & ~DATA_FOLLOWS != GENERIC_USB_UNIT or source != HOST or (long and length > LONGEST_DATA):
+                del self._bytes[0]
+                continue
+            end = HEADER_BYTES + (length if long else 0)
+            if len(self._bytes) < end:
+                return None
+            data = bytes(self._bytes[HEADER_BYTES:end])
+            del self._bytes[:end]
+            return AptRequest(number, data=data) if long else AptRequest(number, length & 0xFF, length >> 8)
+        return None
+
+
+def message(number: Id, data: bytes) -> bytes:
+    return struct.pack("<HHBB", number, len(data), HOST | DATA_FOLLOWS, GENERIC_USB_UNIT) + data
+
+
+def info(serial_number: int, model: str, firmware: tuple[int, int, int]) -> bytes:
+    """84 bytes: serial number, model, type, firmware (minor, interim, major), notes, versions, state, channels."""
+    major, interim, minor = firmware
+    head = struct.pack("<I8sHBBBx", serial_number, model.encode(), 16, minor, interim, major)
+    notes = b"emulated".ljust(60, b"\0")
+    return message(Id.GET_INFO, head + notes + struct.pack("<HHH", 1, 0, 1))
+
+
+def part(number: int, body: bytes) -> bytes:
+    """An answer to REQ of sub-message `number`."""
+    return message(Id.QUAD_GET, struct.pack("<H", number) + body)
+
+
+def refusal(request: int, code: int, words: str) -> bytes:
+    return message(Id.RICH_RESPONSE, struct.pack("<HH64s", request, code, words.encode()[:63]))
+
 
 MODEL, FIRMWARE = "KPA101", (1, 0, 7)
 PID, READINGS, OUTPUTS, MODE, DISPLAY, MANUAL = 1, 3, 5, 7, 8, 0x0D
@@ -63,7 +150,7 @@ class Kpa101Unit:
         self._unacknowledged = 0
         world.psd_rate(NOISE_RATE_HZ)
 
-    def obey(self, request: Request) -> None:
+    def obey(self, request: AptRequest) -> None:
         answer = self._answer(request)
         if answer:
             self._say(answer)
@@ -84,10 +171,10 @@ class Kpa101Unit:
 
     # --- requests
 
-    def _answer(self, request: Request) -> bytes:
+    def _answer(self, request: AptRequest) -> bytes:
         match request.id:
             case Id.REQ_INFO:
-                return frames.info(self._serial_number, MODEL, FIRMWARE)
+                return info(self._serial_number, MODEL, FIRMWARE)
             case Id.QUAD_REQ:
                 return self._tell(request.first)
             case Id.QUAD_SET:
@@ -106,23 +193,23 @@ class Kpa101Unit:
 
     def _tell(self, number: int) -> bytes:
         if number == READINGS:
-            return frames.part(READINGS, self._readings())
+            return part(READINGS, self._readings())
         if number == MODE:
-            return frames.part(MODE, struct.pack("<H", self._mode))
+            return part(MODE, struct.pack("<H", self._mode))
         if number in self._settings:
-            return frames.part(number, self._settings[number])
-        return frames.refusal(Id.QUAD_REQ, 1, f"no sub-message {number}")
+            return part(number, self._settings[number])
+        return refusal(Id.QUAD_REQ, 1, f"no sub-message {number}")
 
     def _set(self, data: bytes) -> bytes:
         number, body = int.from_bytes(data[:2], "little"), data[2:]
         if len(body) != BODY_BYTES.get(number):
-            return frames.refusal(Id.QUAD_SET, 2, f"sub-message {number} of {len(body)} bytes")
+            return refusal(Id.QUAD_SET, 2, f"sub-message {number} of {len(body)} bytes")
         if number != MODE:
             self._settings[number] = body
             return b""
         (mode,) = struct.unpack("<H", body)
         if mode not in STATUS_BITS:
-            return frames.refusal(Id.QUAD_SET, 3, f"mode {mode}; 1 to 4 are possible")
+            return refusal(Id.QUAD_SET, 3, f"mode {mode}; 1 to 4 are possible")
         self._mode = mode
         return b""
 
@@ -147,7 +234,7 @@ class Kpa101Unit:
         return x, y, _clipped(0.5 * (left + right + bottom + top) / self.sum_volts * 65535.0, 0, 65535)
 
     def _status(self) -> bytes:
-        return frames.message(Id.GET_STATUS, self._readings() + struct.pack("<I", STATUS_BITS[self._mode]))
+        return message(Id.GET_STATUS, self._readings() + struct.pack("<I", STATUS_BITS[self._mode]))
 
     def _say(self, message: bytes) -> None:
         if not self.silent:
@@ -159,7 +246,7 @@ class Kpa101Wire:
 
     def __init__(self, unit: Kpa101Unit, now_s: Callable[[], float]) -> None:
         self._unit, self._now_s = unit, now_s
-        self._reader = frames.RequestReader()
+        self._reader = AptRequestReader()
 
     def handle(self, data: bytes) -> bytes:
         for request in self._reader.feed(data):
@@ -171,8 +258,8 @@ class Kpa101Wire:
 
     def refusal(self, request: bytes) -> bytes | None:
         """For injected faults: the rich response to the first request of these bytes."""
-        found = frames.RequestReader().feed(request)
-        return frames.refusal(found[0].id, 9, "injected refusal") if found else None
+        found = AptRequestReader().feed(request)
+        return refusal(found[0].id, 9, "injected refusal") if found else None
 
 
 def _clipped(value: float, low: int, high: int) -> int:

@@ -16,7 +16,7 @@ HOLDING, INPUT = "holding", "input"
 Listener = Callable[[int, int], None]  # address, word
 
 
-class Memory:
+class RegisterMemory:
     """Two tables of 16-bit registers; an address that the map does not cover does not exist."""
 
     def __init__(self) -> None:
@@ -57,7 +57,7 @@ TURN_RAD = 2.0 * math.pi
 
 
 @dataclass(frozen=True)
-class Entry:
+class RegisterEntry:
     """A quantity's place and coding."""
 
     name: str
@@ -92,7 +92,7 @@ class Entry:
 class RegisterMap:
     """All entries of a rig, over a memory."""
 
-    def __init__(self, device: Mapping[str, Any], memory: Memory, written_by_clients: Sequence[str]) -> None:
+    def __init__(self, device: Mapping[str, Any], memory: RegisterMemory, written_by_clients: Sequence[str]) -> None:
         self.entries = {entry.name: entry for entry in map(_entry, device.get("register", ()))}
         self._memory = memory
         self._bridge(int(device.get("read_across", 0)))
@@ -131,8 +131,8 @@ class RegisterMap:
                 self._memory.define(table, range(end, first))
 
 
-def _entry(raw: Mapping[str, Any]) -> Entry:
-    return Entry(
+def _entry(raw: Mapping[str, Any]) -> RegisterEntry:
+    return RegisterEntry(
         name=str(raw["name"]),
         table=str(raw.get("table", HOLDING)),
         address=int(raw["address"]),

@@ -19,7 +19,7 @@ import struct
 from collections.abc import Callable
 from enum import IntEnum
 
-from simulators.modbus.register_map import HOLDING, INPUT, Memory
+from simulators.modbus.register_map import HOLDING, INPUT, RegisterMemory
 
 MOST_READ, MOST_WRITTEN = 125, 123
 
@@ -33,7 +33,7 @@ class Function(IntEnum):
     WRITE_MANY = 16
 
 
-class Refusal(IntEnum):
+class ModbusRefusal(IntEnum):
     """Exception codes."""
 
     ILLEGAL_FUNCTION = 1
@@ -42,7 +42,7 @@ class Refusal(IntEnum):
     DEVICE_FAILURE = 4
 
 
-def answer(request: bytes, memory: Memory) -> bytes:
+def answer(request: bytes, memory: RegisterMemory) -> bytes:
     """The response PDU to a request PDU of at least one byte; both begin with the function code."""
     try:
         match request[0]:
@@ -55,37 +55,37 @@ def answer(request: bytes, memory: Memory) -> bytes:
             case Function.WRITE_MANY:
                 return _write_many(request, memory)
             case _:
-                return refused(request, Refusal.ILLEGAL_FUNCTION)
+                return refused(request, ModbusRefusal.ILLEGAL_FUNCTION)
     except struct.error:
-        return refused(request, Refusal.ILLEGAL_VALUE)
+        return refused(request, ModbusRefusal.ILLEGAL_VALUE)
 
 
-def refused(request: bytes, code: Refusal) -> bytes:
+def refused(request: bytes, code: ModbusRefusal) -> bytes:
     """An exception response."""
     return bytes((request[0] | 0x80, code))
 
 
-def _read(request: bytes, memory: Memory, table: str) -> bytes:
+def _read(request: bytes, memory: RegisterMemory, table: str) -> bytes:
     address, count = struct.unpack(">HH", request[1:])
     if not 1 <= count <= MOST_READ:
-        return refused(request, Refusal.ILLEGAL_VALUE)
+        return refused(request, ModbusRefusal.ILLEGAL_VALUE)
     words = memory.get(table, address, count)
     if words is None:
-        return refused(request, Refusal.ILLEGAL_ADDRESS)
+        return refused(request, ModbusRefusal.ILLEGAL_ADDRESS)
     return struct.pack(f">BB{count}H", request[0], 2 * count, *words)
 
 
-def _write_one(request: bytes, memory: Memory) -> bytes:
+def _write_one(request: bytes, memory: RegisterMemory) -> bytes:
     address, word = struct.unpack(">HH", request[1:])
-    return request if memory.write(address, [word]) else refused(request, Refusal.ILLEGAL_ADDRESS)
+    return request if memory.write(address, [word]) else refused(request, ModbusRefusal.ILLEGAL_ADDRESS)
 
 
-def _write_many(request: bytes, memory: Memory) -> bytes:
+def _write_many(request: bytes, memory: RegisterMemory) -> bytes:
     address, count, size = struct.unpack_from(">HHB", request, 1)
     if not 1 <= count <= MOST_WRITTEN or size != 2 * count:
-        return refused(request, Refusal.ILLEGAL_VALUE)
+        return refused(request, ModbusRefusal.ILLEGAL_VALUE)
     words = struct.unpack(f">{count}H", request[6:])
-    return request[:5] if memory.write(address, words) else refused(request, Refusal.ILLEGAL_ADDRESS)
+    return request[:5] if memory.write(address, words) else refused(request, ModbusRefusal.ILLEGAL_ADDRESS)
 
 
 SHORTEST = 8  # unit, function, two words, checksum: also the length of all requests but one
@@ -95,7 +95,7 @@ PATIENCE_TICKS = 25  # 50 ms: a frame of 256 bytes at 115200 baud takes 22 ms
 class RtuWire:
     """Bytes in, bytes out."""
 
-    def __init__(self, memory: Memory, unit: int, silent: Callable[[], bool]) -> None:
+    def __init__(self, memory: RegisterMemory, unit: int, silent: Callable[[], bool]) -> None:
         self._memory, self._unit, self._silent = memory, unit, silent
         self._pending = b""
         self._waited = 0
@@ -119,7 +119,7 @@ class RtuWire:
         """For injected faults: device failure."""
         if len(request) < SHORTEST or request[0] != self._unit:
             return None
-        return _rtu_framed(self._unit, refused(request[1:], Refusal.DEVICE_FAILURE))
+        return _rtu_framed(self._unit, refused(request[1:], ModbusRefusal.DEVICE_FAILURE))
 
     def _next(self) -> bytes | None:
         """The next whole request without its checksum; bytes before it that are none are dropped."""
@@ -162,7 +162,7 @@ LONGEST_PDU = 253
 class TcpWire:
     """Requests may be pipelined. What is no Modbus ends the connection."""
 
-    def __init__(self, memory: Memory, silent: Callable[[], bool]) -> None:
+    def __init__(self, memory: RegisterMemory, silent: Callable[[], bool]) -> None:
         self._memory, self._silent = memory, silent
         self._pending = b""
         self.closing = False
@@ -187,7 +187,7 @@ class TcpWire:
         """For injected faults: device failure."""
         if len(request) <= MBAP.size:
             return None
-        return _tcp_framed(request[: MBAP.size], refused(request[MBAP.size :], Refusal.DEVICE_FAILURE))
+        return _tcp_framed(request[: MBAP.size], refused(request[MBAP.size :], ModbusRefusal.DEVICE_FAILURE))
 
     def _next(self) -> tuple[bytes, bytes] | None:
         """Header and PDU of the next whole request; None while there is none."""

@@ -24,7 +24,7 @@ from drivers.psd_kpa101.codec import Kpa101Codec
 from drivers.psd_kpa101.messages import StrayBytes
 from drivers.tracker.codec import BadLine, LineCodec, Units, ascii_lines, json_lines
 from drivers.transports.slcan_bus import BlockSlcanBus
-from simulators.kpa101 import frames as kpa101
+from simulators.kpa101 import emulator as kpa101
 
 ROOT = Path(__file__).parents[2]
 MOST_KEPT = 4096  # bytes that a codec may hold back

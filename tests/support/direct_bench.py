@@ -21,7 +21,7 @@ from acquisition.wires.bench import SettleRule, stretch_to_average
 from acquisition.wires.psd_view import NO_LIGHT, PsdView, PsdWindow
 from drivers.psd_faces import Face, FaceKind
 from simulators.camera.emulator import Eye
-from simulators.camera.true_camera import TrueCamera
+from simulators.camera.picture import TrueCamera
 from simulators.wire import TICK_S
 from simulators.world.world import World
 

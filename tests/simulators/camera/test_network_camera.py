@@ -7,10 +7,8 @@ import cv2
 import numpy as np
 import pytest
 
-from simulators.camera.emulator import NetworkCamera
-from simulators.camera.http_wire import LONGEST_REQUEST_BYTES, HttpWire
-from simulators.camera.picture import Renderer
-from simulators.camera.true_camera import CameraDeviations, camera_drawing, draw_camera
+from simulators.camera.emulator import LONGEST_REQUEST_BYTES, HttpWire, NetworkCamera
+from simulators.camera.picture import CameraDeviations, Renderer, camera_drawing, draw_camera
 from simulators.errors import WorldError
 
 RIG = tomllib.loads((Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd-camera.toml").read_text())

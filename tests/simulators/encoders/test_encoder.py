@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simulators.encoders.encoder import AbsoluteEncoder
-from simulators.encoders.object_dictionary import NodeDictionary, SdoAbort
+from simulators.encoders.object_dictionary import AbsoluteEncoder, NodeDictionary, SdoAbort
 
 TURN = 1 << 20
 RANGE = 1 << 32

@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simulators.encoders.bus import CanBus, CanFrame, bus_bits
+from simulators.encoders.bus import CanBus, CanFrame, as_line, bus_bits, from_line
 from simulators.encoders.node import EncoderNode
-from simulators.encoders.slcan import as_line, from_line
 from simulators.wire import TICK_S
 
 DOCUMENT = Path(__file__).parents[3] / "docs/protocols/encoders.md"

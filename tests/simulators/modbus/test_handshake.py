@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from simulators.modbus.emulator import build
-from simulators.modbus.plc import SILENCE_LIMIT_S, Reason, State
+from simulators.modbus.emulator import SILENCE_LIMIT_S, Reason, State, build
 from simulators.wire import TICK_S
 from tests.simulators.modbus.conftest import FollowingWorld
 

@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from simulators.modbus.register_map import HOLDING, INPUT, Memory
+from simulators.modbus.register_map import HOLDING, INPUT, RegisterMemory
 from simulators.modbus.server import PATIENCE_TICKS, RtuWire, TcpWire, checksum
 
 # Modbus Application Protocol V1.1b3, sections 6.3, 6.6 and 6.12: their examples, with the registers they read
@@ -16,8 +16,8 @@ WRITE_MANY_ANSWER = bytes.fromhex("10 0001 0002")
 
 
 @pytest.fixture
-def memory() -> Memory:
-    memory = Memory()
+def memory() -> RegisterMemory:
+    memory = RegisterMemory()
     memory.define(HOLDING, range(0x6B, 0x6E))
     memory.define(HOLDING, range(1, 3), writable=True)
     memory.define(INPUT, [8])

@@ -7,7 +7,6 @@ import pytest
 
 from simulators.conceal.case import Case, conceal
 from simulators.conceal.wanted import Wanted
-from simulators.streams.devices import DARK_A, EPOCH_S, HOST_S, photocurrents_a
 from simulators.streams.faults import (
     FAULTS,
     EarlyReading,
@@ -17,7 +16,7 @@ from simulators.streams.faults import (
     StreamFault,
     SwingingFoot,
 )
-from simulators.streams.stream_session import StreamedSession, streamed
+from simulators.streams.stream_session import DARK_A, EPOCH_S, HOST_S, StreamedSession, photocurrents_a, streamed
 
 PORTS = {"time", "base.pose", *(f"joint{i}.angle" for i in range(1, 7))}
 PHYSICS = {"latency", "reading-lag", "encoder-slip", "not-settled", "ringing"}
