@@ -23,7 +23,7 @@ from drivers.device import Block, Device
 from drivers.errors import DeviceRefused
 from drivers.psd_daq.messages import FaceIdentity
 from drivers.psd_faces import FaceKind, layer_mismatch
-from drivers.transports.can_interfaces import OpenBus, bus_opener
+from drivers.transports.can_bus import OpenBus, bus_opener
 from drivers.transports.can_tap import Tap, tapped
 
 LEAST_RATE = 0.9  # of the rate asked for; below this samples are lost or the device cannot keep up

@@ -31,8 +31,8 @@ from drivers.cia406.health import NodeWatch
 from drivers.clock import Clock
 from drivers.device import Block, Channel, StreamDevice
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale
+from drivers.transports.can_bus import OpenBus, opened, received
 from drivers.transports.can_faults import BusFault, BusFaults, lost_as_device_lost, shut_down
-from drivers.transports.can_interfaces import OpenBus, opened, received
 
 MAX_SYNC_HZ = 1000.0  # six encoders fill half of a bus of 1 Mbit/s
 SILENT_S = 0.5  # a node that answers no SYNC for so long is gone

@@ -5,7 +5,7 @@ from typing import Any
 
 import can
 
-from drivers.transports.can_interfaces import OpenBus, received
+from drivers.transports.can_bus import OpenBus, received
 
 Tap = Callable[[Sequence[can.Message], bool], None]  # frames, in order; True when this side sent them
 

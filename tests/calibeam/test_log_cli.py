@@ -30,7 +30,7 @@ from drivers.cia406.device import Cia406Encoders
 from drivers.clock import SystemClock
 from drivers.device import Block, Channel
 from drivers.errors import DeviceRefused, DeviceStale
-from drivers.transports.can_interfaces import bus_opener
+from drivers.transports.can_bus import bus_opener
 from simulators.encoders.emulator import build
 from simulators.host.loop import Host
 

@@ -13,7 +13,7 @@ import pytest
 from drivers.can_dbc.description import joint_signals
 from drivers.can_dbc.device import CanDbcEncoders
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale
-from drivers.transports.can_interfaces import bus_opener
+from drivers.transports.can_bus import bus_opener
 from simulators.encoders.emulator import build
 from simulators.host.loop import Host
 

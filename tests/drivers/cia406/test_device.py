@@ -10,7 +10,7 @@ import pytest
 from drivers.cia406.cycle import HOLD_S
 from drivers.cia406.device import Cia406Encoders
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale
-from drivers.transports.can_interfaces import bus_opener
+from drivers.transports.can_bus import bus_opener
 from simulators.encoders.bus import CanFrame
 
 NODES = [1, 2, 3, 4, 5, 6]

@@ -21,7 +21,7 @@ from drivers.psd_daq.device import BAUD, PsdDaq
 from drivers.psd_faces import FaceKind
 from drivers.psd_kpa101.pair import BAUD as KPA101_BAUD
 from drivers.psd_kpa101.pair import Head, Kpa101Pair
-from drivers.transports.can_interfaces import bus_opener
+from drivers.transports.can_bus import bus_opener
 from drivers.transports.serial_port import SerialAddress, open_serial
 from simulators.encoders.emulator import build as build_encoders
 from simulators.kpa101.emulator import build as build_kpa101

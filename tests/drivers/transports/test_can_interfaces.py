@@ -8,7 +8,7 @@ import can
 import pytest
 
 from drivers.errors import DeviceLost
-from drivers.transports.can_interfaces import MOST_AT_ONCE, bus_opener, interfaces, opened, received
+from drivers.transports.can_bus import MOST_AT_ONCE, bus_opener, interfaces, opened, received
 
 
 @pytest.mark.parametrize("interface", [name for name in interfaces() if name != "udp_multicast"])
