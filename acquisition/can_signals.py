@@ -16,7 +16,7 @@ from acquisition.recording.can_frames import Frame, FrameFlag, frames_of, is_fra
 from acquisition.recording.foreign import Sheet
 from acquisition.recording.rig.devices import EncoderDriver, EncodersDevice
 from drivers.can_dbc.description import JointSignal, joint_signals
-from drivers.cia406.angle import SPEED_LIMIT_RAD_S, ContinuousAngle
+from drivers.cia406.codec import SPEED_LIMIT_RAD_S, ContinuousAngle
 
 STREAM, CHANNEL = "encoders", "position_rad"
 Row = tuple[float, tuple[float, ...]]

@@ -19,8 +19,7 @@ from acquisition.recording.can_frames import DATA, STREAM
 from acquisition.recording.rig import rig_text
 from acquisition.wires.frame_log import FrameLog
 from drivers.clock import SystemClock
-from drivers.transports.can_bus import bus_opener
-from drivers.transports.can_tap import tapped
+from drivers.transports.can_bus import bus_opener, tapped
 
 RATE_HZ = 10_000.0
 ON_VIRTUAL, THROUGH_SLCAN = 1_000_000, 20_000

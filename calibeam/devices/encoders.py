@@ -23,8 +23,7 @@ from drivers.device import Block, Device
 from drivers.errors import DeviceRefused
 from drivers.psd_daq.messages import FaceIdentity
 from drivers.psd_faces import FaceKind, layer_mismatch
-from drivers.transports.can_bus import OpenBus, bus_opener
-from drivers.transports.can_tap import Tap, tapped
+from drivers.transports.can_bus import OpenBus, Tap, bus_opener, tapped
 
 LEAST_RATE = 0.9  # of the rate asked for; below this samples are lost or the device cannot keep up
 LAYERS = 0.02  # between the sums of a duo-lateral face, one photocurrent; feels right: a healthy one has per mille

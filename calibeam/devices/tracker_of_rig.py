@@ -11,8 +11,7 @@ from drivers.errors import DeviceRefused
 from drivers.tracker.codec import LENGTH_UNITS, TIME_UNITS, Parse, Units, ascii_lines, json_lines
 from drivers.tracker.device import Dialogue, LineTracker
 from drivers.transports.serial_port import SerialAddress, open_serial
-from drivers.transports.socket_line import TcpLine, UdpReceiver
-from drivers.transports.transport import Transport
+from drivers.transports.transport import TcpLine, Transport, UdpReceiver
 
 VIEWED = ("position_m", "good")  # channels that viewers show at once
 EVERYWHERE = "0.0.0.0"  # noqa: S104 - where datagrams are awaited when the rig file names no address of this machine

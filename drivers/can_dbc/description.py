@@ -11,7 +11,7 @@ from pathlib import Path
 import cantools
 from cantools.database.can import Database, Message, Signal
 
-from drivers.cia406.angle import Scale
+from drivers.cia406.codec import Scale
 from drivers.errors import DeviceRefused
 
 SHOWN = 120  # characters of what a file holds, in an error

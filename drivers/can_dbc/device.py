@@ -12,12 +12,11 @@ import can
 import numpy as np
 
 from drivers.can_dbc.description import JointSignal
-from drivers.cia406.angle import SPEED_LIMIT_RAD_S, ContinuousAngle
+from drivers.cia406.codec import SPEED_LIMIT_RAD_S, ContinuousAngle
 from drivers.clock import Clock
 from drivers.device import Block, Channel, StreamDevice
 from drivers.errors import DeviceStale
-from drivers.transports.can_bus import OpenBus, opened
-from drivers.transports.can_faults import BusFaults, lost_as_device_lost, shut_down
+from drivers.transports.can_bus import BusFaults, OpenBus, lost_as_device_lost, opened, shut_down
 
 SILENT_S = 0.5  # an encoder that sends nothing for so long is gone
 BATCH_S = 0.02  # rows gathered in one block; more only delays a reader

@@ -1,12 +1,14 @@
-"""CAN frames of an encoder to values, without I/O: mapped PDOs, emergencies, heartbeats.
+"""CAN frames of an encoder to values, without I/O: mapped PDOs, emergencies, heartbeats; counts to a continuous angle.
 
 First the objects of CiA 301 and CiA 406 that the driver uses, by their place in the dictionary.
 """
 
+import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
+from typing import NamedTuple
 
 DEVICE_TYPE = 0x1000
 ERROR_REGISTER = 0x1001
@@ -129,3 +131,145 @@ def heartbeat_state(data: bytes) -> NmtState | None:
         return None
     known = {state.value: state for state in NmtState}
     return known.get(data[0] & 0x7F, known.get(data[0]))
+
+
+SPEED_LIMIT_RAD_S = (
+    100.0  # 16 turns a second: no arm joint turns so fast, even in an emulation run at ten times the pace
+)
+READINGS_OF_A_SLIP = 3  # a glitch on the line or in the disc is gone with the next reading
+SLIPS_KEPT = 256
+TIME_SCATTER_S = 0.002  # host times of SYNCs against the latching; measured: below 1 ms, busy host 2 ms
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What the encoder says of its counts."""
+
+    units_per_turn: float  # of CiA 406 a whole number
+    range_units: int  # the position wraps here
+    rises_counter_clockwise: bool
+
+    @property
+    def unit_rad(self) -> float:
+        """Angle of one count, counter-clockwise positive."""
+        return math.copysign(math.tau / self.units_per_turn, 1.0 if self.rises_counter_clockwise else -1.0)
+
+    @property
+    def multi_turn(self) -> bool:
+        """The position tells turns apart."""
+        return self.range_units > self.units_per_turn
+
+
+def scale_of(operating: int, units_per_turn: int, range_units: int, resolution: int, turns: int) -> Scale:
+    """Scale from 6000h, 6001h, 6002h, 6501h, 6502h. ValueError for a scale that cannot be."""
+    scaled = bool(operating & Operating.SCALING)
+    units = units_per_turn if scaled else resolution
+    total = range_units if scaled else resolution * turns
+    if units < 1 or total < units:
+        raise ValueError(f"{units} units a turn and a range of {total} units")
+    return Scale(units, total, bool(operating & Operating.COUNTER_CLOCKWISE))
+
+
+@dataclass(frozen=True)
+class Slip:
+    """The position moved without motion, and stayed: a coupling that slipped, a preset, a turn lost."""
+
+    time_s: float
+    size_rad: float
+
+
+class ContinuousAngle:
+    """Unwraps one encoder's position. The first reading lies within half the range of zero.
+
+    Step = ((new - old + R/2) mod R) - R/2, R the range in units. A step is motion when it is no faster than the speed
+    limit (over j at least: a busy host takes in one go what came one after the other) and, where an acceleration limit
+    is given, no farther from the last speed v than a dt^2 + 2 |v| j allows, j the scatter of the host's times. Any
+    other is NaN. When READINGS_OF_A_SLIP of them in a row agree with each other the position has slipped: it is told
+    from there on, and the slip is kept.
+    """
+
+    def __init__(
+        self,
+        scale: Scale,
+        speed_limit_rad_s: float = SPEED_LIMIT_RAD_S,
+        acceleration_limit_rad_s2: float = math.inf,
+    ) -> None:
+        self.jumps = 0
+        self.wraps = 0
+        self.slips: tuple[Slip, ...] = ()
+        self.slip_rad = 0.0  # all slips together
+        self._range, self._half = scale.range_units, scale.range_units // 2
+        self._unit_rad, self._size_rad = scale.unit_rad, abs(scale.unit_rad)
+        self._speed_limit_rad_s = speed_limit_rad_s
+        self._acceleration_limit_rad_s2 = acceleration_limit_rad_s2
+        self._last: _Reading | None = None
+        self._doubted: list[_Reading] = []
+
+    def follow(self, position: int, time_s: float) -> float:
+        """Angle in rad for a position read at `time_s`, or NaN."""
+        last = self._last
+        if last is None:
+            self._last = _Reading(self._step(position, 0), time_s, math.nan)
+            return self._last.units * self._unit_rad
+        if self._doubted:
+            before = self._doubted[-1]
+            reading = self._next(before, position, time_s)
+            if self._is_motion(reading, before):
+                return self._doubt(reading, last)
+            self._doubted.clear()
+        reading = self._next(last, position, time_s)
+        if self._is_motion(reading, last):
+            return self._accept(reading)
+        return self._doubt(_Reading(reading.units, time_s, last.rate), last)
+
+    def _doubt(self, reading: "_Reading", last: "_Reading") -> float:
+        """NaN, or the angle after a slip when enough readings agree."""
+        self.jumps += 1
+        self._doubted.append(reading)
+        if len(self._doubted) < READINGS_OF_A_SLIP:
+            return math.nan
+        return self._slipped(last, self._doubted[0], reading)
+
+    def _slipped(self, last: "_Reading", first: "_Reading", reading: "_Reading") -> float:
+        rate = 0.0 if math.isnan(last.rate) else last.rate
+        unmoved = last.units + rate * (first.time_s - last.time_s)
+        slip = Slip(first.time_s, (first.units - unmoved) * self._unit_rad)
+        self.slips = (*self.slips, slip)[-SLIPS_KEPT:]
+        self.slip_rad += slip.size_rad
+        return self._accept(reading)
+
+    def _accept(self, reading: "_Reading") -> float:
+        last = self._last
+        if last is not None:
+            self.wraps += abs(reading.units // self._range - last.units // self._range)
+        self._last = reading
+        self._doubted.clear()
+        return reading.units * self._unit_rad
+
+    def _next(self, before: "_Reading", position: int, time_s: float) -> "_Reading":
+        step = self._step(position, before.units)
+        elapsed_s = time_s - before.time_s
+        return _Reading(before.units + step, time_s, step / elapsed_s if elapsed_s > 0.0 else before.rate)
+
+    def _is_motion(self, reading: "_Reading", before: "_Reading") -> bool:
+        unit_rad = self._size_rad
+        elapsed_s = reading.time_s - before.time_s
+        step = reading.units - before.units
+        if abs(step) * unit_rad > self._speed_limit_rad_s * max(elapsed_s, TIME_SCATTER_S) + unit_rad:
+            return False
+        if math.isinf(self._acceleration_limit_rad_s2) or math.isnan(before.rate):
+            return True
+        off_rad = abs(step - before.rate * elapsed_s) * unit_rad
+        scatter_rad = 2.0 * abs(before.rate) * unit_rad * TIME_SCATTER_S
+        return off_rad <= self._acceleration_limit_rad_s2 * elapsed_s**2 + scatter_rad + 2.0 * unit_rad
+
+    def _step(self, position: int, old: int) -> int:
+        return (position - old + self._half) % self._range - self._half
+
+
+class _Reading(NamedTuple):  # and no dataclass: thousands a second are made of these
+    """A position made continuous, and how fast it was moving then, in units a second; NaN: not known yet."""
+
+    units: int
+    time_s: float
+    rate: float

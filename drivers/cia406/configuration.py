@@ -13,8 +13,7 @@ import can
 import canopen
 
 from drivers.cia406 import codec
-from drivers.cia406.angle import Scale, scale_of
-from drivers.cia406.codec import MappedObject, Operating, mapped_object
+from drivers.cia406.codec import MappedObject, Operating, Scale, mapped_object, scale_of
 from drivers.errors import DeviceRefused, DeviceStale
 
 SEND_LIMIT_S = 0.5  # an adapter that takes no frame for so long has stopped

@@ -10,8 +10,7 @@ import can
 import canopen
 
 from drivers.cia406 import codec
-from drivers.cia406.angle import SPEED_LIMIT_RAD_S, ContinuousAngle, Slip
-from drivers.cia406.codec import Emergency, MappedNumber, mapped_number
+from drivers.cia406.codec import SPEED_LIMIT_RAD_S, ContinuousAngle, Emergency, MappedNumber, Slip, mapped_number
 from drivers.cia406.configuration import (
     HEARTBEAT_MS,
     NMT_PRE_OPERATIONAL,
@@ -31,8 +30,7 @@ from drivers.cia406.health import NodeWatch
 from drivers.clock import Clock
 from drivers.device import Block, Channel, StreamDevice
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale
-from drivers.transports.can_bus import OpenBus, opened, received
-from drivers.transports.can_faults import BusFault, BusFaults, lost_as_device_lost, shut_down
+from drivers.transports.can_bus import BusFault, BusFaults, OpenBus, lost_as_device_lost, opened, received, shut_down
 
 MAX_SYNC_HZ = 1000.0  # six encoders fill half of a bus of 1 Mbit/s
 SILENT_S = 0.5  # a node that answers no SYNC for so long is gone

@@ -24,7 +24,7 @@ from calibeam.cli import run
 from calibeam.devices import encoder_log
 from calibeam.devices.encoder_log import EncoderLog, LogState
 from calibeam.devices.encoders import names_of
-from drivers.cia406.angle import Scale
+from drivers.cia406.codec import Scale
 from drivers.cia406.configuration import EncoderIdentity
 from drivers.cia406.device import Cia406Encoders
 from drivers.clock import SystemClock

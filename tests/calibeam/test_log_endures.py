@@ -20,7 +20,7 @@ from calibeam.devices import encoder_log
 from calibeam.devices.encoder_log import LOOK_S, EncoderLog, LogState
 from drivers.device import Block, Channel
 from drivers.errors import DeviceStale
-from drivers.transports.can_tap import Tap
+from drivers.transports.can_bus import Tap
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
 ROWS = 20  # between two looks of the log

@@ -9,7 +9,7 @@ from calibeam.devices.others import DeviceKind
 from drivers.clock import Clock
 from drivers.device import Block, Channel, StreamDevice
 from drivers.errors import DeviceStale, WireError
-from drivers.transports.socket_line import TcpLine
+from drivers.transports.transport import TcpLine
 
 LONGEST = 64  # bytes of a line
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.cia406.angle import ContinuousAngle, Scale, Slip, scale_of
+from drivers.cia406.codec import ContinuousAngle, Scale, Slip, scale_of
 
 TURN, RANGE = 1 << 20, 1 << 32
 MULTI_TURN = Scale(TURN, RANGE, True)

@@ -18,7 +18,7 @@ from drivers.clock import SystemClock
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale, WireError
 from drivers.tracker.codec import LineRefusedError
 from drivers.tracker.device import LineTracker
-from drivers.transports.socket_line import UdpReceiver
+from drivers.transports.transport import UdpReceiver
 from simulators.faults.injector import Injector, with_faults
 from simulators.host.loop import Host
 from simulators.tracker.emulator import build

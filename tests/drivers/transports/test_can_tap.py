@@ -2,7 +2,7 @@
 
 import can
 
-from drivers.transports.can_tap import TappedBus, tapped
+from drivers.transports.can_bus import TappedBus, tapped
 
 
 def test_every_frame_is_shown_and_passed_on() -> None:
