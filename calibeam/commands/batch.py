@@ -69,7 +69,7 @@ def batch_command(
         Print counts, drifts, shared causes and failures on one line, and nothing else.
 
     """
-    from calibeam.fleet.page import write_fleet_page
+    from calibeam.fleet.fleet_page import write_fleet_page
     from calibeam.fleet.run import RunOptions, run
     from calibeam.fleet.summary import Fleet
     from calibeam.printing.fleet import (  # with joblib, Arrow, matplotlib: only where they are wanted

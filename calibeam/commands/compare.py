@@ -6,7 +6,7 @@ import msgspec
 from rich.console import Console
 
 from acquisition.recording import Recording, read
-from calibeam.printing.comparison import print_comparison
+from calibeam.printing.comparison_lines import print_comparison
 from calibeam.results.comparison import compare, write_comparison
 from calibeam.results.identification import naming_source
 from calibeam.results.simulator import TIMEOUT_S, Simulator, simulated_by

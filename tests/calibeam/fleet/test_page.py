@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from calibeam.fleet.page import LISTED, fleet_html
+from calibeam.fleet.fleet_page import LISTED, fleet_html
 from calibeam.fleet.row import Cause, Outcome, Row, Zero
 from calibeam.fleet.run import RunResult
 from calibeam.fleet.summary import Fleet, causes, shared_words

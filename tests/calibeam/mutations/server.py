@@ -32,7 +32,7 @@ FILE_BYTES = 1 << 30  # the largest file that a run may write
 LAZY = (  # loaded by commands when they need them; here once for all
     "calibeam.results.session_results",
     "calibrate.report.error_simulation_page",
-    "calibeam.fleet.page",
+    "calibeam.fleet.fleet_page",
     "calibeam.fleet.run",
     "calibeam.live.devices",
     "calibeam.live.page",
