@@ -12,8 +12,8 @@ import numpy as np
 
 from benchmarks.fleet_sessions import Robot, write_fleet
 from calibeam.fleet.drift import FAMILY, Series, find_drifts_in
+from calibeam.fleet.recordings import Engine, Workers
 from calibeam.fleet.run import RunOptions, run
-from calibeam.fleet.settings import Engine, Workers
 
 FILES = (12, 24, 48)
 SAMPLES = 40  # the least that is still identified: what is measured is the spreading

@@ -8,7 +8,7 @@ import msgspec
 from cyclopts import Parameter, validators
 from rich.console import Console
 
-from calibeam.fleet.settings import PAGE, TABLE, Engine, Workers
+from calibeam.fleet.recordings import PAGE, TABLE, Engine, Workers
 from calibeam.outcome import PartialResult
 from calibeam.printing.progress import progress_bar
 from calibrate.errors import DataError

@@ -7,7 +7,7 @@ from rich.console import Console
 
 from acquisition.recording import Recording, read
 from acquisition.recording.rig import rig_text
-from calibeam.printing.reconciliation import print_reconciliation
+from calibeam.printing.comparison_lines import print_reconciliation
 from calibeam.results.comparison import write_comparison
 from calibeam.results.identification import naming_source
 from calibeam.results.reconciliation import Reconciled, reconcile

@@ -17,8 +17,8 @@ from typing import Any
 from joblib import Parallel, delayed, parallel_config
 from joblib.externals.loky.backend import resource_tracker as loky_tracker
 
+from calibeam.fleet.recordings import Engine, Workers
 from calibeam.fleet.row import Order, Row
-from calibeam.fleet.settings import Engine, Workers
 from calibeam.fleet.supervised import START_S, end_child, run_in_child
 from calibeam.worker_processes import without_ctrl_c
 from calibrate.errors import DataError

@@ -1,13 +1,38 @@
-"""Which recordings lie below a folder: MCAP files, one or all of a session, session folders; what tells a change."""
+"""Which recordings lie below a folder (MCAP files, session folders), and what shows that one changed.
+
+Also the settings of a run over a fleet: its workers, and the names of the files that it writes.
+"""
 
 import hashlib
 import os
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import date
+from enum import Enum
 from pathlib import Path
 
 from calibrate.errors import DataError
+
+
+class Engine(Enum):
+    """Joblib's names for where the work is done."""
+
+    LOKY = "loky"
+    DASK = "dask"
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Which workers, how many of our own (one a core), and where a cluster's scheduler listens."""
+
+    engine: Engine = Engine.LOKY
+    jobs: int = field(default_factory=lambda: os.cpu_count() or 1)
+    scheduler: str | None = None
+
+
+TABLE, PAGE = "fleet.parquet", "fleet.html"
+JOURNAL = "fleet.rows.jsonl"  # rows of a run that is not over, or was killed
+
 
 MCAP = ".mcap"
 RIG, SAMPLES = "rig.toml", ("samples.csv", "samples.parquet")

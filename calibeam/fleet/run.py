@@ -11,9 +11,8 @@ from pathlib import Path
 import msgspec
 
 from calibeam.fleet.engine import run_orders
-from calibeam.fleet.recordings import Found, content_sha256, find_recordings, parts_of
+from calibeam.fleet.recordings import Found, Workers, content_sha256, find_recordings, parts_of
 from calibeam.fleet.row import CHILD, Order, Outcome, Row, Task
-from calibeam.fleet.settings import Workers
 from calibeam.fleet.table import Journal
 from calibeam.outcome import interruption
 from calibeam.software import SOFTWARE

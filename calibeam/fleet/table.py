@@ -16,8 +16,8 @@ import pyarrow.parquet as pq
 from acquisition.recording import RecordingError
 from acquisition.recording.files import shown
 from calibeam.devices.recorder import uninterrupted
+from calibeam.fleet.recordings import JOURNAL, TABLE
 from calibeam.fleet.row import Row
-from calibeam.fleet.settings import JOURNAL, TABLE
 
 VERSION = b"2"
 OLDER_TRUST = {"good": "yes", "care": "with care", "bad": "no"}  # as tables of before December 2026 have it

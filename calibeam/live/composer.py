@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.rig import Rig
-from calibeam.live.health import Watch, asked_rates
-from calibeam.live.latest import DeviceReadings, Latest
+from calibeam.live.health import DeviceReadings, Latest, Watch, asked_rates
 from calibeam.live.messages import (
     FaceNow,
     Job,
@@ -16,13 +15,14 @@ from calibeam.live.messages import (
     Picture,
     PictureMessage,
     RigMessage,
+    Scene,
+    SceneFixture,
     StateMessage,
     StopMessage,
     TroubleMessage,
     faces_now,
     measured_m,
 )
-from calibeam.live.scene import Scene, SceneFixture
 from calibeam.software import SOFTWARE
 
 Floats = NDArray[np.float64]

@@ -16,14 +16,12 @@ import uvicorn
 
 from acquisition.errors import AcquisitionError
 from acquisition.recording.rig import Rig
-from calibeam.live.access import LOOPBACK_NAMES, Rules, is_loopback
-from calibeam.live.app import live_app
+from calibeam.live.app import LOOPBACK_NAMES, Rules, is_loopback, live_app
 from calibeam.live.composer import Composer
-from calibeam.live.latest import Latest
+from calibeam.live.health import Latest
 from calibeam.live.limits import ACCEPTED_AT_ONCE, LimitedHttp, LimitedServer, LimitedWebSocket, Limits
 from calibeam.live.messages import Job
-from calibeam.live.stopping import watched_pages
-from calibeam.live.viewers import Viewers
+from calibeam.live.stopping import Viewers, watched_pages
 from drivers.clock import Clock
 
 TOKEN_BYTES = 18  # 24 characters of an address; guessed at a thousand a second, it takes longer than the universe

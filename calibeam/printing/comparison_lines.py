@@ -1,6 +1,6 @@
-"""A comparison in a terminal: the verdict, then every difference from the outside in, then what remains."""
+"""A comparison and a reconciliation in a terminal: the verdict, the differences, what was left out, what remains."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from rich.console import Console
 from rich.table import Table
@@ -14,8 +14,10 @@ from calibeam.results.comparison import (
     ReadingRecord,
     StreamRecord,
 )
+from calibeam.results.reconciliation import ReconcileFile
+from calibrate.report.quantities import length
 
-MOST = 14  # differences in a terminal; all of them stand in the file
+MOST_DIFFERENCES = 14  # differences in a terminal; all of them stand in the file
 FEW = 3  # alternatives of one
 
 
@@ -47,7 +49,7 @@ def _print_details(console: Console, file: ComparisonFile) -> None:
 def _differences(found: tuple[DifferenceRecord, ...]) -> Iterator[str]:
     deciding = [one for one in found if one.decides]
     anew = [one for one in found if not one.decides]
-    for number, one in enumerate(deciding[:MOST], start=1):
+    for number, one in enumerate(deciding[:MOST_DIFFERENCES], start=1):
         yield f"{number}. {one.says}"
         if one.alternatives:
             listed = ", ".join(f"{a.physics} at {a.where}" for a in one.alternatives[:FEW])
@@ -55,11 +57,11 @@ def _differences(found: tuple[DifferenceRecord, ...]) -> Iterator[str]:
             yield f"   alternative: {listed}{more}"
         for name, value in one.simulated.items():
             yield f"   in the simulation: {name} {value:.6g}"
-    if len(deciding) > MOST:
-        yield f"{len(deciding) - MOST} more differences stand in the file"
+    if len(deciding) > MOST_DIFFERENCES:
+        yield f"{len(deciding) - MOST_DIFFERENCES} more differences stand in the file"
     if anew:
         yield "set up or stated otherwise, no mismatch:"
-        yield from (f"   {one.says}" for one in anew[:MOST])
+        yield from (f"   {one.says}" for one in anew[:MOST_DIFFERENCES])
 
 
 def _readings(readings: tuple[ReadingRecord, ...]) -> Table:
@@ -118,3 +120,38 @@ def _streams(streams: tuple[StreamRecord, ...]) -> Table:
 
 def _size(value: float, unit: str) -> str:
     return SAYS[unit](value)
+
+
+MOST_LINES = 5  # lines of a list, cut at the width of the terminal; all of them stand whole in the file
+
+
+def print_reconciliation(console: Console, file: ReconcileFile) -> None:
+    """At most 25 lines at usual widths."""
+    console.print(f"[bold]{file.verdict}[/bold]: {file.says}", highlight=False)
+    for one in file.unseen:
+        parts = (
+            f"{what} {length(value)} ({over:.3g} of the noise)"
+            for what, value, over in (
+                ("before", one.before_m, one.before),
+                ("after geometry", one.geometry_m, one.geometry),
+                ("after physics", one.after_m, one.after),
+            )
+        )
+        _say(console, f"{one.instrument}, {one.rows} unseen rows, rms: " + ", ".join(parts))
+    _list(console, "left out of the simulation:", [one.says for one in file.left_out])
+    _list(console, "what remains:", file.remains)
+    _list(console, "what to do next:", file.next if file.remains else ())
+
+
+def _list(console: Console, title: str, lines: Sequence[str]) -> None:
+    if not lines:
+        return
+    _say(console, title)
+    for line in lines[:MOST_LINES]:
+        console.print(f"  {line}", highlight=False, markup=False, no_wrap=True, overflow="ellipsis")
+    if len(lines) > MOST_LINES:
+        _say(console, f"  {len(lines) - MOST_LINES} more stand in reconcile.json")
+
+
+def _say(console: Console, line: str) -> None:
+    console.print(line, highlight=False, markup=False)

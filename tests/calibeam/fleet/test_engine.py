@@ -6,9 +6,8 @@ from dataclasses import replace
 import pytest
 
 from calibeam.fleet.engine import LOST, run_orders
-from calibeam.fleet.recordings import find_recordings
+from calibeam.fleet.recordings import Engine, Workers, find_recordings
 from calibeam.fleet.row import Order, Outcome, Row, Task
-from calibeam.fleet.settings import Engine, Workers
 from calibrate.errors import DataError
 
 NAMES = [f"{letter}.mcap" for letter in "abcdefgh"]

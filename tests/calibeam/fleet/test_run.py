@@ -4,9 +4,9 @@ import msgspec
 import pytest
 
 from calibeam.fleet import run as module
+from calibeam.fleet.recordings import Workers
 from calibeam.fleet.row import Outcome
 from calibeam.fleet.run import RunOptions, run
-from calibeam.fleet.settings import Workers
 from calibeam.fleet.table import read_rows
 
 ONE = Workers(jobs=1)  # in this process: who reads is a process of its own all the same

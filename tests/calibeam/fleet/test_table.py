@@ -5,8 +5,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from acquisition.recording import RecordingError
+from calibeam.fleet.recordings import JOURNAL
 from calibeam.fleet.row import Cause, Outcome, Row, Zero
-from calibeam.fleet.settings import JOURNAL
 from calibeam.fleet.table import Journal, read_rows, write_rows
 
 FULL = Row(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.live_feed import LivingRig
-from calibeam.live.latest import Latest
+from calibeam.live.health import Latest
 from calibeam.live.page import PageAddress
 from drivers.device import Block
 

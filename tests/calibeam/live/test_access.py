@@ -7,7 +7,7 @@ import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from calibeam.live.access import is_loopback
+from calibeam.live.app import is_loopback
 from calibeam.live.page import LivePage, PageAddress, live_page
 from drivers.clock import SystemClock
 

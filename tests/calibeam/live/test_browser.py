@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Browser, Page, ViewportSize, expect, sync_playwright
 
 from benchmarks.live_feed import LivingRig
-from calibeam.live.latest import Latest
+from calibeam.live.health import Latest
 from calibeam.live.page import LivePage, PageAddress, live_page
 from drivers.clock import SystemClock
 

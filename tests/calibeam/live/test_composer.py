@@ -10,7 +10,7 @@ from msgspec import structs
 from acquisition.recording.rig import Placement, Pose, load_rig
 from calibeam.live.composer import Composer
 from calibeam.live.feed import Progress
-from calibeam.live.latest import Latest
+from calibeam.live.health import Latest
 from calibrate.believed import BelievedRig
 from drivers.device import Block
 

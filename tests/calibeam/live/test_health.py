@@ -2,8 +2,7 @@
 
 import pytest
 
-from calibeam.live.health import Watch, asked_rates
-from calibeam.live.latest import DeviceReadings
+from calibeam.live.health import DeviceReadings, Watch, asked_rates
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import threading
 
 from acquisition.wires.streams import Supervisor
 from calibeam.live.feed import SILENT, Progress
-from calibeam.live.latest import LINES, Latest
+from calibeam.live.health import LINES, Latest
 from drivers.errors import DeviceLost
 
 

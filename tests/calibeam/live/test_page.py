@@ -12,9 +12,9 @@ from websockets.sync.client import ClientConnection, connect
 from acquisition.recording.rig import Rig
 from acquisition.recording.rig.schema import Live
 from benchmarks.live_feed import LivingRig
-from calibeam.live.latest import Latest
+from calibeam.live.health import Latest
 from calibeam.live.page import LivePage, PageAddress, PageError, live_page
-from calibeam.live.viewers import ON_THE_WAY
+from calibeam.live.stopping import ON_THE_WAY
 from drivers.clock import SystemClock
 
 ANY_PORT = PageAddress(port=0)

@@ -8,7 +8,7 @@ import pytest
 
 from calibeam.live.app import Pulse
 from calibeam.live.composer import Composer
-from calibeam.live.viewers import Viewer, Viewers
+from calibeam.live.stopping import Viewer, Viewers
 
 
 @pytest.mark.parametrize(("broken", "whole"), [("state", "now"), ("now", "state")])

@@ -4,8 +4,7 @@ import threading
 
 import pytest
 
-from calibeam.live.stopping import Stop, overdue, watched_pages
-from calibeam.live.viewers import Viewers
+from calibeam.live.stopping import Stop, Viewers, overdue, watched_pages
 from drivers.errors import DeviceLost
 
 

@@ -2,7 +2,7 @@
 
 import asyncio
 
-from calibeam.live.viewers import Viewer, Viewers
+from calibeam.live.stopping import Viewer, Viewers
 
 
 def test_what_was_not_sent_is_replaced_by_what_is_newer() -> None:
