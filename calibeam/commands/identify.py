@@ -113,7 +113,7 @@ def _identify(
 
 
 def _refit(console: Console, recording: Path, known: ModelFile, out: Path, export: tuple[ExportForm, ...]) -> None:
-    from calibrate.physics.known import refit  # a third of a second of imports that few runs need
+    from calibrate.physics.beside_known import refit  # a third of a second of imports that few runs need
 
     source = read(recording)
     found = refit(known, source)

@@ -23,7 +23,8 @@ from calibrate.diagnose.streams.to_file import with_streams
 from calibrate.diagnose.to_file import file_of
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
-from calibrate.physics.known import beside_known, known_before, only_new
+from calibrate.physics.beside_known import beside_known, only_new
+from calibrate.physics.known import known_before
 from calibrate.sensors.catalogue import unused_columns
 
 SEED = 1  # of nulls, splits and bootstraps: the same recording always gives the same diagnosis

@@ -1,28 +1,21 @@
-"""A recording beside a known model: the start of its diagnosis, the changes it shows, and the model fitted to it again.
+"""What a known model contributes to a recording before a diagnosis: where the diagnosis begins.
 
 On the recording that the model was made from, its structure is fitted again (its covariance is of these very readings,
 and would count them twice). On any other one its values enter with their covariance as a prior, except for what belongs
 to a session: where the device stands, and effects that hold for that session only.
-
-Refitted: geometry and effects of the known model take new values from another recording; nothing is searched for.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from msgspec import structs
 from numpy.typing import NDArray
 
-from acquisition.recording import Recording, Samples, readings_sha256
+from acquisition.recording import Samples, readings_sha256
 from calibrate.diagnose.assumed import Assumed, Stated
-from calibrate.diagnose.blunders_first import blunders_first
-from calibrate.diagnose.diagnosis import Verdict
 from calibrate.diagnose.fitted import Fitted, fit_from_model, fit_geometry, given
-from calibrate.diagnose.from_recording import Diagnosed
 from calibrate.diagnose.linearised import Accepted
-from calibrate.diagnose.schema import ChangedRecord, DiagnosisFile, FindingRecord, KnownRecord
-from calibrate.diagnose.session import Session, session_of
+from calibrate.diagnose.session import Session
 from calibrate.effects.drivers import Drivers, moves_of
 from calibrate.effects.since_model import RECORDING
 from calibrate.effects.term import Shape
@@ -32,7 +25,6 @@ from calibrate.model_file import Covariance, ModelFile
 from calibrate.parameters import plausible_sizes
 from calibrate.physics.acting import Acting, listed
 from calibrate.physics.applied import BY_JOINT, effects_at
-from calibrate.physics.from_diagnosis import model_of_fit
 from calibrate.physics.records import Effect
 from calibrate.predict import Predictor
 from calibrate.sensors import seat
@@ -192,101 +184,3 @@ def _with_moves(samples: Samples) -> Samples:
     derived = {"last_move": moves, "approach": direction}
     columns = {BY_JOINT[k].format(i + 1): v[:, i] for k, v in derived.items() for i in range(samples.n_joints)}
     return Samples(columns | dict(samples.columns), samples.n_joints)
-
-
-PARAMETER = {  # of a constant that has changed -> the parameter of model.json
-    "zero_rad": "zero",
-    "length_m": "length",
-    "offset_m": "offset",
-    "twist_rad": "twist",
-    "tilt_rad": "tilt",
-}
-
-
-def only_new(found: Diagnosed) -> Diagnosed:
-    """On the model's own recording what it could not name was there before: it is no news."""
-    if found.physics is None or found.physics.diagnosis.findings:
-        return found
-    said = replace(found.physics.diagnosis, unexplained=(), verdict=Verdict.CONSISTENT)
-    return replace(found, physics=replace(found.physics, diagnosis=said))
-
-
-def beside_known(file: DiagnosisFile, known: Known) -> DiagnosisFile:
-    """The record with `known` and `changed`."""
-    entered = known.effects
-    left = tuple(e.name for e in known.model.effects if e not in entered and not e.after)
-    told = KnownRecord(known.same_recording, tuple(e.name for e in entered), left)
-    changed = tuple(c for finding in file.findings for c in _changed(finding, known))
-    return structs.replace(file, known=told, changed=changed)
-
-
-def _changed(finding: FindingRecord, known: Known) -> tuple[ChangedRecord, ...]:
-    """Empty for physics that the model does not hold: that is new, not changed."""
-    effect = _effect_of(finding, known.effects)
-    if effect is None and finding.depends_on != RECORDING:
-        return ()
-    out: list[ChangedRecord] = []
-    for name, size in finding.parameters.items():
-        if size.value is None or size.sigma is None:
-            continue
-        place = finding.where.split(".")[0]
-        if effect is not None:
-            was = effect.parameters.get(name)
-            out.append(
-                ChangedRecord(f"{effect.name}.{name}", None if was is None else was.value, size.value, size.sigma)
-            )
-            continue
-        own = f"{place}.{PARAMETER.get(name, name)}"
-        out.append(ChangedRecord(own, known.model.chain.get(own), size.value, size.sigma))
-    return tuple(out)
-
-
-def _effect_of(finding: FindingRecord, effects: tuple[Effect, ...]) -> Effect | None:
-    """The known effect of the same physics at the same place by the same drivers."""
-    same = (finding.where, finding.physics, finding.depends_on, finding.order)
-    return next((e for e in effects if (e.where, e.physics, e.depends_on, e.order) == same), None)
-
-
-REFITTED = "geometry and effects of a known model fitted together to this recording"
-
-
-@dataclass(frozen=True)
-class Refitted:
-    """The record to write, and a sentence for each effect that could not be refitted."""
-
-    model: ModelFile
-    notes: tuple[str, ...]
-
-
-def refit(known: ModelFile, recording: Recording) -> Refitted:
-    """Effects that hold for the known model's session only are left out of any other recording.
-
-    DataError where the recording is wrong as a whole, or holds nothing to fit.
-    """
-    cleared = blunders_first(recording.rig, recording.samples)
-    if cleared.whole_file:
-        raise DataError("; besides, ".join(b.says for b in cleared.blunders if b.whole_file))
-    session = session_of(recording.rig, cleared.samples)
-    entering = Known(known, known.readings_sha256 == readings_sha256(recording.samples)).effects
-    used, notes = _possible(tuple(e for e in entering if not e.after), fit_geometry(session).drivers)
-    notes += [f"left out, true of its own session only: {e.name}" for e in known.effects if e not in entering]
-    before, fit = with_structure(used, session)
-    model = model_of_fit(fit, before, cleared, recording, REFITTED)
-    effects = [
-        structs.replace(now, physics=was.physics, listed=was.listed)
-        for was, now in zip(used, model.effects, strict=False)  # what they leave behind stands after them
-    ]
-    return Refitted(structs.replace(model, effects=(*effects, *model.effects[len(effects) :])), tuple(notes))
-
-
-def _possible(effects: tuple[Effect, ...], drivers: Drivers) -> tuple[tuple[Effect, ...], list[str]]:
-    """Those that this recording can size, and a sentence for each other one."""
-    used, notes = list[Effect](), list[str]()
-    for effect in effects:
-        try:
-            term_of(effect, drivers)
-        except DataError as why:
-            notes.append(f"not refitted: {why}")
-        else:
-            used.append(effect)
-    return tuple(used), notes
