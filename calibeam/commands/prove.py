@@ -9,7 +9,7 @@ from cyclopts import Parameter
 from rich.console import Console
 
 from calibeam.printing.proof import print_proof, print_real
-from calibeam.prove.loop import prove_loop
+from calibeam.prove.loop import prove_loop, summary
 from calibeam.prove.prove import Plan, ending_early, fresh, prove
 from calibeam.prove.real import prove_real, write_real_page
 from calibeam.prove.scenario import DEVELOPMENT, KINDS, Kind, Mix
@@ -78,7 +78,7 @@ def prove_command(
         A folder with session folders of real recordings: these are diagnosed, and what is hidden of them inferred.
     loop
         Reconcile each case with the simulation of its rig file instead: how far off it is on unseen rows, before, after
-        geometry and after physics. Takes --cases, --seed, --jobs and --out, and no other option.
+        geometry and after physics. Takes --cases, --wire, --seed, --jobs and --out, and no other option.
     publish
         Refuse what no published table may be made of.
     json
@@ -90,7 +90,7 @@ def prove_command(
         _real(console, real, out, jobs)
         return
     if loop:
-        _loop(console, out, cases, DEVELOPED_SEED if seed is None else seed, jobs, json=json)
+        _loop(console, out, (cases, wire), DEVELOPED_SEED if seed is None else seed, jobs, json=json)
         return
     seed = seed if seed is not None else PUBLISHED_SEED if publish else DEVELOPED_SEED
     mix = Mix(kind, family, enr, mechanism)
@@ -112,13 +112,14 @@ def prove_command(
         print(out / "proof.json")
 
 
-def _loop(console: Console, out: Path, cases: int, seed: int, jobs: int, *, json: bool) -> None:
-    if cases < 1 or jobs < 1:
-        raise DataError(f"--cases {cases} --jobs {jobs}: cases, jobs 1 or more")
-    file = prove_loop(out, cases, seed, jobs, lambda word: _tell(console, word))
-    failed = [one for one in file.cases if one.failure]
-    _tell(console, f"{len(failed)} of {len(file.cases)} cases failed")
-    for one in failed:
+def _loop(console: Console, out: Path, counts: tuple[int, int], seed: int, jobs: int, *, json: bool) -> None:
+    cases, wired = counts
+    if cases < 0 or wired < 0 or cases + wired < 1 or jobs < 1:
+        raise DataError(f"--cases {cases} --wire {wired} --jobs {jobs}: one case or more, jobs 1 or more")
+    file = prove_loop(out, cases, wired, seed, jobs, lambda word: _tell(console, word))
+    for line in summary(file.cases):
+        _tell(console, line)
+    for one in (one for one in file.cases if one.failure):
         _tell(console, f"{one.name}: {one.failure}")
     _tell(console, f"table: {out / 'loop.md'}")
     if json:

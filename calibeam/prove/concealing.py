@@ -218,7 +218,7 @@ def _drawn(order: _Order) -> tuple[Scenario, Case, int]:
             if order.wired:
                 # what a session over wires needs, devices' libraries and all, is a second of each process that has none
 
-                drawn = wired_scenario(order.seed, order.number, attempt)
+                drawn = wired_scenario(order.mix, order.seed, order.number, attempt)
                 return drawn, conceal_on_wires(drawn.wanted, order.layout.recorded(drawn.name)), attempt
             drawn = scenario(order.mix, order.seed, order.number, attempt)
             return drawn, conceal(drawn.wanted), attempt

@@ -14,7 +14,9 @@ from functools import partial
 from pathlib import Path
 
 import msgspec
+import numpy as np
 
+from acquisition.recording import read
 from calibeam.prove.concealing import Concealed, conceal_cases, publish
 from calibeam.prove.diagnosing import bare_environment
 from calibeam.prove.prove import Tell, ending_early, fresh
@@ -27,9 +29,12 @@ from calibrate.diagnose.file import read_diagnosis
 from calibrate.diagnose.schema import DiagnosisFile
 from simulators.conceal.wanted import Family
 
-KINDS: tuple[Kind, ...] = ("one", "three", "outside", "none")
+SHARES: dict[Kind, float] = {"one": 0.35, "three": 0.25, "encoders": 0.2, "outside": 0.1, "none": 0.1}
 FAMILIES: tuple[Family, ...] = ("dual-psd", "tracker", "wire")  # cones read no length
-HEAD = ("case", "kind", "family", "hidden", "found", "before", "after geometry", "after physics", "verdict", "failure")
+HEAD = (
+    *("case", "kind", "family", "recorded", "hidden", "found"),
+    *("before", "after geometry", "after physics", "verdict", "failure"),
+)
 
 
 class LoopCase(msgspec.Struct, frozen=True):
@@ -38,6 +43,7 @@ class LoopCase(msgspec.Struct, frozen=True):
     name: str
     kind: str
     family: str
+    path: str  # in process or on wires
     hidden: tuple[str, ...]  # physics at port
     found: tuple[str, ...]
     before: float | None
@@ -58,33 +64,40 @@ class LoopFile(msgspec.Struct, frozen=True):
     cases: tuple[LoopCase, ...]
 
 
-def prove_loop(out: Path, cases: int, seed: int, jobs: int, tell: Tell) -> LoopFile:
-    """Everything; loop.json and loop.md in `out`. DataError where it holds something; PartialResult by Ctrl-C."""
-    layout = fresh(out)
+def prove_loop(out: Path, cases: int, wired: int, seed: int, jobs: int, tell: Tell) -> LoopFile:
+    """Everything; loop.json and loop.md in `out`. `wired`: further cases, recorded over emulated wires.
+
+    DataError where `out` holds something; PartialResult by Ctrl-C.
+    """
+    total = cases + wired
+    layout, mix = fresh(out), Mix(tuple(SHARES), FAMILIES, shares=SHARES)
     with ending_early(out, tell, "the keys of its seals are never written") as count:
-        with closing(conceal_cases(layout, Mix(KINDS, FAMILIES), seed, cases, jobs)) as coming:
+        with closing(conceal_cases(layout, mix, seed, cases, jobs, wired)) as coming:
             concealed = sorted(coming, key=lambda one: one.scenario.name)
         published = publish(layout, concealed)
-        tell(f"SHA-256 of {layout.hashes.name}, which seals all {cases} cases: {published}")
+        tell(f"SHA-256 of {layout.hashes.name}, which seals all {total} cases: {published}")
         errors: list[str] = []
         names = [one.scenario.name for one in concealed]
         with ThreadPoolExecutor(jobs) as pool:
             for error in pool.map(partial(_reconciled, layout), names):
                 errors.append(error)
-                count(f"reconciled {len(errors)} of {cases}")
+                count(f"reconciled {len(errors)} of {total}")
         told = [_told(layout, one, error) for one, error in zip(concealed, errors, strict=True)]
     told.sort(key=lambda one: (not one.failure, one.name))
     file = LoopFile(1, "calibeam-loop", SOFTWARE, seed, published, tuple(told))
     (out / "loop.json").write_bytes(msgspec.json.format(msgspec.json.encode(file), indent=1) + b"\n")
-    (out / "loop.md").write_text(table_text(file.cases), encoding="utf-8")
+    text = "".join(f"{line}\n" for line in summary(file.cases)) + "\n" + table_text(file.cases)
+    (out / "loop.md").write_text(text, encoding="utf-8")
     return file
 
 
 def _reconciled(layout: Layout, name: str) -> str:
     """What went wrong; empty where nothing did."""
     recording = layout.recording(name).absolute()
-    words = ["reconcile", str(recording), "--simulation", str(recording / "rig.toml")]
     layout.answers.mkdir(parents=True, exist_ok=True)
+    rig = layout.answers.absolute() / f"{name}-rig.toml"
+    rig.write_text(read(recording).rig_text, encoding="utf-8")
+    words = ["reconcile", str(recording), "--simulation", str(rig)]
     done = subprocess.run(  # noqa: S603 - our own interpreter and our own command
         [sys.executable, "-m", "calibeam", *words, "--out", str(layout.answer(name).absolute())],
         capture_output=True,
@@ -98,19 +111,19 @@ def _reconciled(layout: Layout, name: str) -> str:
 
 def _told(layout: Layout, one: Concealed, error: str) -> LoopCase:
     """With the seal open."""
-    name, wanted = one.scenario.name, one.scenario.wanted
+    name, kind, family, path = one.scenario.name, one.scenario.kind, one.scenario.wanted.family, one.scenario.path
     truth = truth_of(open_seal(layout.seal(name).read_bytes(), one.key, one.sha256))
     hidden = tuple(f"{d.physics} at {d.port}" for d in truth.defects)
     folder = layout.answer(name)
     if error:
-        return LoopCase(name, one.scenario.kind, wanted.family, hidden, (), None, None, None, "", error)
+        return LoopCase(name, kind, family, path, hidden, (), None, None, None, "", error)
     file = msgspec.json.decode((folder / "reconcile.json").read_bytes(), type=ReconcileFile)
     diagnosis = read_diagnosis(folder / "diagnosis.json")
     found = tuple(f"{f.physics} at {f.where}" for f in diagnosis.findings)
     worst = max(file.unseen, key=lambda u: u.after)
     failure = "; ".join(_failures(truth, diagnosis, worst.after))
     far = worst.before, worst.geometry, worst.after
-    return LoopCase(name, one.scenario.kind, wanted.family, hidden, found, *far, file.verdict, failure)
+    return LoopCase(name, kind, family, path, hidden, found, *far, file.verdict, failure)
 
 
 def _failures(truth: Truth, diagnosis: DiagnosisFile, after: float) -> list[str]:
@@ -124,6 +137,28 @@ def _failures(truth: Truth, diagnosis: DiagnosisFile, after: float) -> list[str]
     return out
 
 
+def summary(cases: Sequence[LoopCase]) -> list[str]:
+    """Sentences: how far simulation and recording are apart at the end, and whether the verdicts hold."""
+    ended = [one for one in cases if one.after is not None]
+    groups = {"a cause of no catalogue": [c for c in ended if c.kind == "outside"]}
+    groups = {"everything else": [c for c in ended if c.kind != "outside"], **groups}
+    out = [f"{len(cases)} cases, {len(ended)} reconciled, {sum(not c.failure for c in cases)} without a failure"]
+    for what, group in groups.items():
+        if group:
+            far = np.array([c.after for c in group], dtype=np.float64)
+            out.append(
+                f"{what} ({len(group)}): after physics {np.median(far):.3f} times the noise in the median, "
+                f"{np.quantile(far, 0.9):.3f} in nine of ten, {far.max():.3f} at most"
+            )
+    early = sum(c.verdict == "agree" and c.after is not None and c.after > AGREES for c in ended)
+    quiet = [c for c in ended if not c.hidden]
+    out.append(
+        f"agree is said of {sum(c.verdict == 'agree' for c in ended)}, of {early} above {AGREES} times the noise"
+    )
+    out.append(f"nothing hidden ({len(quiet)}): nothing found in {sum(not c.found for c in quiet)}")
+    return out
+
+
 def table_text(cases: Sequence[LoopCase]) -> str:
     """A Markdown table in the order given."""
     rows = [
@@ -131,6 +166,7 @@ def table_text(cases: Sequence[LoopCase]) -> str:
             one.name,
             one.kind,
             one.family,
+            one.path,
             ", ".join(one.hidden) or "nothing",
             ", ".join(one.found) or "nothing",
             *("-" if value is None else f"{value:.3g}" for value in (one.before, one.geometry, one.after)),

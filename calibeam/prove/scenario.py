@@ -5,8 +5,8 @@ names something would shine there.
 """
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal, TypeVar, get_args
 
 import numpy as np
@@ -72,6 +72,12 @@ class Mix:
     families: Sequence[Family] = FAMILIES
     enr: tuple[float, float] | None = None  # None: as each kind has it
     mechanism: str | None = None  # one by name, for kinds with one effect
+    shares: Mapping[Kind, float] = field(default_factory=lambda: SHARES)
+
+    def defects(self, kind: Kind) -> tuple[str, ...]:
+        """Mechanisms to hide in a case: the one by name where the kind has one effect."""
+        one = self.mechanism is not None and DEFECTS[kind] == ("any",)
+        return (self.mechanism,) if one and self.mechanism is not None else DEFECTS[kind]
 
 
 @dataclass(frozen=True)
@@ -87,16 +93,15 @@ class Scenario:
 def scenario(mix: Mix, seed: int, number: int, attempt: int) -> Scenario:
     """Case `number` of a proof. An attempt of a case that could not be drawn keeps its kind, family and size."""
     rng = np.random.default_rng([seed, number])
-    kind = _one_of(mix.kinds, [SHARES[k] for k in mix.kinds], rng)
+    kind = _one_of(mix.kinds, [mix.shares[k] for k in mix.kinds], rng)
     families = _able(mix.families, kind)
     family = _one_of(families, [FAMILY_SHARES[f] for f in families], rng)
     low, high = mix.enr or ENR_OF.get(kind, ENR)
-    named = mix.mechanism is not None and DEFECTS[kind] == ("any",)
     few, most = STREAMED_SAMPLES if kind == "streams" else SAMPLES
     wanted = Wanted(
         family=family,
         seed=_seed(seed, number, attempt),
-        defects=(mix.mechanism,) if named and mix.mechanism is not None else DEFECTS[kind],
+        defects=mix.defects(kind),
         enr=float(np.exp(rng.uniform(np.log(low), np.log(high)))),
         samples=MANY_SAMPLES if kind == "eighteen" else int(rng.integers(few, most + 1)),
         places=max(PLACES) if kind == "eighteen" else int(rng.choice(PLACES)),
@@ -108,7 +113,7 @@ def scenario(mix: Mix, seed: int, number: int, attempt: int) -> Scenario:
     return Scenario(f"case-{number:04d}", kind, wanted)
 
 
-def wired_scenario(seed: int, number: int, attempt: int) -> Scenario:
+def wired_scenario(mix: Mix, seed: int, number: int, attempt: int) -> Scenario:
     """Case `number` of a proof that goes over the wires."""
     rng = np.random.default_rng([seed, number])
     kind = WIRED[number % len(WIRED)]
@@ -116,7 +121,7 @@ def wired_scenario(seed: int, number: int, attempt: int) -> Scenario:
     wanted = Wanted(
         family="dual-psd",
         seed=_seed(seed, number, attempt),
-        defects=DEFECTS[kind],
+        defects=mix.defects(kind),
         enr=float(np.exp(rng.uniform(np.log(low), np.log(high)))),
         samples=WIRED_SAMPLES,
         places=WIRED_PLACES,

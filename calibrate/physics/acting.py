@@ -139,14 +139,22 @@ def _term(effect: Effect, terms: Sequence[Term], drivers: Drivers) -> Term:
 
 
 def _port_of(effect: Effect, drivers: Drivers) -> Port:
-    """Where a curve acts: any port of the catalogue has one place, whatever acts there, but for a second encoder."""
+    """Where a curve acts. A tilt of link 1 in front of its joint and one behind it have the same name, so that a file
+    without `place` says where only if one port has that name.
+    """
     if effect.variant == SECOND:
         return Port(effect.where, Place.READING, instrument=ENCODER_DIFFERENCE)
-    for e in EFFECTS:
-        for term in e.terms(drivers):
-            if term.port.where == effect.where:
-                return term.port
-    raise DataError(f"effect {effect.name}: nothing can act at {effect.where} in this session; diagnose it again")
+    ports = {t.port for e in EFFECTS for t in e.terms(drivers) if t.port.where == effect.where}
+    ports = {p for p in ports if not p.past_encoders and _is_at(effect, p)}
+    if len(ports) == 1:
+        return ports.pop()
+    why = "several places have this name" if ports else "nothing can act there in this session"
+    raise DataError(f"effect {effect.name} at {effect.where}: {why}; diagnose the recording again")
+
+
+def _is_at(effect: Effect, port: Port) -> bool:
+    of_frame = port.place is not Place.FRAME or effect.frame == port.index
+    return not effect.place or (port.place.value == effect.place and of_frame)
 
 
 def _accepted(effect: Effect, term: Term) -> Accepted:

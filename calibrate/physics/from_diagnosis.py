@@ -25,7 +25,7 @@ from calibrate.diagnose.noise_of_fit import freedom
 from calibrate.diagnose.stated_sizes import sizes_of
 from calibrate.effects.catalogue import holds_of
 from calibrate.effects.drivers import Drivers
-from calibrate.effects.ports import Perturbation
+from calibrate.effects.ports import Perturbation, Place
 from calibrate.effects.second_encoders import SECOND
 from calibrate.effects.term import Shape, Size
 from calibrate.errors import DataError
@@ -286,6 +286,8 @@ def _effect(
         confidence=None if finding is None else finding.confidence,
         listed="" if physics == term.physics else term.physics,
         curve=_curve(a, drivers, own) if term.open and len(own) == m else None,
+        place=term.port.place.value if isinstance(term, Curve) else "",
+        frame=term.port.index if isinstance(term, Curve) and term.port.place is Place.FRAME else None,
         component=term.component if isinstance(term, Curve) else None,
         waves=term.waves if isinstance(term, Curve) else None,
     )

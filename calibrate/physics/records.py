@@ -61,7 +61,9 @@ class Effect(Record, frozen=True):
     says: Label = ""
     listed: Label = ""  # its physics in the catalogue, where `physics` is unknown although its form has a name
     curve: EffectCurve | None = None
-    component: Component | None = None  # of the port, of an unknown cause that is a curve
+    place: Label = ""  # of the port, of an unknown cause that is a curve: a Place; two ports may share `where`
+    frame: Component | None = None  # B_i that moves, where `place` is a frame
+    component: Component | None = None  # of that port
     waves: Waves | None = None
     after: Label = ""  # name of the effect of the session that left this behind, from the end of that session on
 

@@ -5,22 +5,33 @@ import json
 import pytest
 
 from calibeam.cli import run
-from calibeam.prove.loop import HEAD, LoopCase, table_text
+from calibeam.prove.loop import HEAD, LoopCase, summary, table_text
 
-GOOD = LoopCase("case-0001", "none", "tracker", (), (), 3.0, 1.0, 1.0, "agree", "")
-BAD = LoopCase("case-0000", "one", "wire", ("backlash at joint1.angle",), (), None, None, None, "", "a | b")
+GOOD = LoopCase("case-0001", "none", "tracker", "in process", (), (), 3.0, 1.0, 1.0, "agree", "")
+HIDDEN = ("backlash at joint1.angle",)
+BAD = LoopCase("case-0000", "one", "wire", "on wires", HIDDEN, (), None, None, None, "", "a | b")
 
 
 def test_the_table_has_every_column_of_every_case():
     head, rule, *rows = table_text((BAD, GOOD)).splitlines()
     assert {line.count("|") for line in (head, rule, *rows)} == {len(HEAD) + 1}
-    assert rows[0].startswith("| case-0000 | one | wire | backlash at joint1.angle | nothing | - | - | - | - | a / b |")
+    assert rows[0].startswith("| case-0000 | one | wire | on wires | backlash at joint1.angle | nothing | - | - |")
+    assert rows[0].endswith("| - | - | a / b |")
     assert rows[1].endswith("| nothing | nothing | 3 | 1 | 1 | agree | none |")
+
+
+def test_the_summary_counts_what_ended_and_what_was_said_too_early():
+    far = LoopCase("case-0002", "one", "wire", "in process", HIDDEN, HIDDEN, 9.0, 2.0, 1.5, "agree", "1.5 times")
+    text = "\n".join(summary((BAD, GOOD, far)))
+    assert "3 cases, 2 reconciled, 1 without a failure" in text
+    assert "1.250 times the noise in the median" in text
+    assert "agree is said of 2, of 1 above 1.3 times the noise" in text
+    assert "nothing hidden (1): nothing found in 1" in text
 
 
 def test_no_cases_are_refused(tmp_path, capsys):
     assert run(["prove", "--loop", "--cases", "0", "--out", str(tmp_path / "out")]) == 1
-    assert "cases, jobs 1 or more" in capsys.readouterr().err
+    assert "one case or more" in capsys.readouterr().err
 
 
 @pytest.mark.endure
