@@ -28,8 +28,8 @@ from calibrate.physics.from_diagnosis import model_of_fit
 from calibrate.physics.predicting import predict_with_physics
 from calibrate.sensors.catalogue import BY_NAME
 from simulators.conceal.case import conceal
+from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted
-from simulators.conceal.write import write_case
 
 WAVES, PLAIN = 3, 1e-6  # m or rad, within the noise, and far above rounding
 
