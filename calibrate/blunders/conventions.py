@@ -8,6 +8,7 @@ are tried where one leaves a gross strain. What the readings cannot separate fro
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +16,12 @@ from numpy.typing import NDArray
 from calibrate.blunders import coupling, degrees, offsets, signs
 from calibrate.blunders.finding import Blunder, BlunderKind
 from calibrate.blunders.hypothesis import Hypothesis
+from calibrate.blunders.least_distance import median
 from calibrate.blunders.witness import Otherwise, Strain, Witness
 
 Floats = NDArray[np.float64]
 Flange = Callable[[Floats], Floats]
+_Trial = tuple[Hypothesis, ...]  # by which the angles are read, one after the other
 
 KNOWN = (degrees.hypotheses, signs.hypotheses, offsets.hypotheses, coupling.hypotheses)
 
@@ -26,6 +29,7 @@ GAIN = 4.0  # by which the strain must fall
 RIVAL = 1.5  # times the winner's strain: as good an explanation
 NOTHING_M = 2e-5  # no instrument says less: perfect data must not tell conventions apart by their rounding
 GROSS = 0.05  # of the reach: more than joint zeros 2 deg off explain, so that something else is wrong, or two things
+SIDE_BY_SIDE = 16  # trials evaluated at once: a hundred poses of so many stay in the processor's cache
 CARRIED_M = 0.3  # from the flange, along each of its axes: a beam's usual travel, a long probe
 NAMED = 3  # other explanations in a message; the rest is counted
 
@@ -41,7 +45,7 @@ class _Account:
     @property
     def gross(self) -> bool:
         """Whether more than an arm beside its drawing is left; one that would hardly move satisfies cones, too."""
-        return self.strain.typical_m > GROSS * self.reach_m
+        return bool(self.strain.typical_m > GROSS * self.reach_m)
 
     @property
     def reflected(self) -> bool:
@@ -92,67 +96,77 @@ def wrong_convention(flange: Flange, witnesses: Sequence[Witness]) -> Blunder | 
     return _named(found, tried, before)
 
 
-def strain_of(flange: Flange, witnesses: Sequence[Witness]) -> Strain:
-    """Of all instruments together, the file being right as it is written."""
-    return _Search(flange, tuple(witnesses)).account(witnesses).strain
-
-
 @dataclass(frozen=True)
 class _Search:
     flange: Flange
     witnesses: tuple[Witness, ...]
 
-    def account(
-        self, witnesses: Sequence[Witness], *hypotheses: Hypothesis, besides: tuple[Otherwise, ...] = ()
-    ) -> _Account:
-        """Of all instruments together, their angles read by these conventions one after the other."""
-        strain, reach_m = Strain(0.0, 0.0), 0.0
-        for witness in witnesses:
-            q = witness.q_rad
+    def account(self, witnesses: Sequence[Witness], besides: tuple[Otherwise, ...] = ()) -> _Account:
+        """Of all instruments together, their angles as written."""
+        (account,) = self.accounts(witnesses, [()], besides)
+        return account
+
+    def accounts(
+        self, witnesses: Sequence[Witness], trials: Sequence[_Trial], besides: tuple[Otherwise, ...] = ()
+    ) -> Iterator[_Account]:
+        """Of all instruments together for every trial, their angles read by its conventions one after the other."""
+        for first in range(0, len(trials), SIDE_BY_SIDE):
+            some = trials[first : first + SIDE_BY_SIDE]
+            strain, reach_m = Strain(np.zeros(len(some)), np.zeros(len(some))), np.zeros(len(some))
+            for witness in witnesses:
+                T_base_flange = self._poses(witness.q_rad, some)
+                strain = strain + witness.strain(T_base_flange)
+                reach_m = np.maximum(reach_m, _reach_m(T_base_flange))
+            for case, hypotheses in enumerate(some):
+                yield _Account((*hypotheses, *besides), strain.of_case(case), float(reach_m[case]))
+
+    def _poses(self, q_rad: Floats, trials: Sequence[_Trial]) -> Floats:
+        """(trial, pose, 4, 4) of the flange."""
+        read: list[Floats] = []
+        for hypotheses in trials:
+            q = q_rad
             for hypothesis in hypotheses:
                 q = hypothesis.angles(q)
-            T_base_flange = self.flange(q)
-            strain = strain + witness.strain(T_base_flange)
-            reach_m = max(reach_m, _reach_m(T_base_flange))
-        return _Account((*hypotheses, *besides), strain, reach_m)
+            read.append(q)
+        return self.flange(np.concatenate(read)).reshape(len(trials), len(q_rad), 4, 4)
 
     def singles(self, before: _Account) -> Iterator[_Account]:
         """One mistake; several joint signs are one where the file as written is far off, or its mirror image fits."""
         mirrored = False
         for other, witnesses in _of_readings(self.witnesses):
-            account = self.account(witnesses, besides=(other,))
+            account = self.account(witnesses, (other,))
             mirrored |= account.reflected and _explains(account, before)
             yield account
-        for hypothesis in self._of_angles():
-            yield self.account(self.witnesses, hypothesis)
+        trials = [(hypothesis,) for hypothesis in self._of_angles()]
         if before.gross or mirrored:
-            for hypothesis in signs.sets(self._joints):
-                yield self.account(self.witnesses, hypothesis)
+            trials += [(hypothesis,) for hypothesis in signs.sets(self._joints)]
+        yield from self.accounts(self.witnesses, trials)
 
     def doubles(self, before: _Account) -> Iterator[_Account]:
         """Degrees are undone first, then signs, then zeros, then couplings."""
         del before
         angles = list(self._of_angles())
-        for i, first in enumerate(angles):
-            for second in angles[i + 1 :]:
-                if (first.kind, first.column) != (second.kind, second.column) and not (first.signs and second.signs):
-                    yield self.account(self.witnesses, first, second)
+        pairs = [
+            (first, second)
+            for first, second in combinations(angles, 2)
+            if (first.kind, first.column) != (second.kind, second.column) and not (first.signs and second.signs)
+        ]
+        yield from self.accounts(self.witnesses, pairs)
         for other, witnesses in _of_readings(self.witnesses):
-            for hypothesis in angles:
-                yield self.account(witnesses, hypothesis, besides=(other,))
+            yield from self.accounts(witnesses, [(hypothesis,) for hypothesis in angles], (other,))
             for second, both in _of_readings(witnesses):
                 if second.kind is not other.kind:
-                    yield self.account(both, besides=(other, second))
+                    yield self.account(both, (other, second))
 
     def unreflected(self, account: _Account) -> Iterator[_Account]:
         """What this account says, with one sign or several in place of its reflection."""
-        angles = [one for one in account.said if isinstance(one, Hypothesis)]
+        angles = tuple(one for one in account.said if isinstance(one, Hypothesis))
         kept = [one for one in account.said if isinstance(one, Otherwise) and not _mirrors(one)]
         witnesses = self.witnesses
         for wanted in kept:
             witnesses = next(w for other, w in _of_readings(witnesses) if _same(other, wanted))
-        for hypothesis in (*signs.hypotheses(self._joints), *signs.sets(self._joints)):
-            yield self.account(witnesses, *angles, hypothesis, besides=tuple(kept))
+        turned = (*signs.hypotheses(self._joints), *signs.sets(self._joints))
+        yield from self.accounts(witnesses, [(*angles, hypothesis) for hypothesis in turned], tuple(kept))
 
     @property
     def _joints(self) -> int:
@@ -177,25 +191,30 @@ def _same(one: Otherwise, other: Otherwise) -> bool:
     return (one.kind, one.column) == (other.kind, other.column)
 
 
-def _reach_m(T_base_flange: Floats) -> float:
-    """How far what the flange carries usually is from the middle of where it goes: turning on the spot counts, too."""
-    carried = T_base_flange[:, None, :3, 3] + CARRIED_M * np.swapaxes(T_base_flange[:, :3, :3], 1, 2)
-    return float(np.median(np.linalg.norm(carried - np.median(carried, axis=0), axis=2)))
+def _reach_m(T_base_flange: Floats) -> Floats:
+    """How far what the flange carries usually is from the middle of where it goes: turning on the spot counts, too.
+
+    (trial,) of poses (trial, pose, 4, 4).
+    """
+    carried = T_base_flange[..., None, :3, 3] + CARRIED_M * np.swapaxes(T_base_flange[..., :3, :3], -1, -2)
+    away = np.linalg.norm(carried - np.median(carried, axis=1, keepdims=True), axis=-1)
+    return median(away.reshape(len(away), -1))
 
 
 def _compared(account: _Account) -> float:
-    return account.strain.compared_m
+    """To a nanometre: of two that leave the same, the earlier is taken, whatever way the processor rounds."""
+    return round(float(account.strain.compared_m), 9)
 
 
 def _explains(account: _Account, known: _Account) -> bool:
     """Whether a fraction is left of the distance, or of it with what drawn things must move, which never grows."""
     after, before = account.strain, known.strain
     falls = _ratio(before.compared_m, after.compared_m), _ratio(before.typical_m, after.typical_m)
-    return max(falls) > GAIN and after.compared_m < before.compared_m
+    return max(falls) > GAIN and bool(after.compared_m < before.compared_m)
 
 
-def _ratio(before_m: float, after_m: float) -> float:
-    return (before_m + NOTHING_M) / (after_m + NOTHING_M)
+def _ratio(before_m: Floats, after_m: Floats) -> float:
+    return float((before_m + NOTHING_M) / (after_m + NOTHING_M))
 
 
 def _as_good(account: _Account, best: _Account) -> bool:
@@ -210,7 +229,7 @@ def _fits_as_well(account: _Account, best: _Account) -> bool:
 
 def _simplest(best: _Account, accounts: list[_Account]) -> _Account:
     """Of those that explain as much the one with the fewest mistakes: the sign of a joint that nobody sees is none."""
-    return min((a for a in accounts if _as_good(a, best)), key=lambda a: (a.mistakes, a.strain.compared_m))
+    return min((a for a in accounts if _as_good(a, best)), key=lambda a: (a.mistakes, _compared(a)))
 
 
 def _signs_first(search: _Search, found: _Account, tried: list[_Account]) -> tuple[_Account, list[_Account]]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.blunders.least_distance import weights
+from calibrate.blunders.least_distance import median, weights
 
 Floats = NDArray[np.float64]
 
@@ -21,37 +21,50 @@ TURNS = 25  # of frame and target in turn; compared are factors, not digits
 class RoughFit:
     """Where the device stands and the target sits, if everything else is as drawn."""
 
-    linear: Floats  # (3, 3) base to device, determinant +1, or -1 where mirrored
-    shift_m: Floats  # (3,)
-    point_m: Floats  # (3,) target in the flange frame
-    distance_m: Floats  # (pose,) measured from expected
-    typical_m: float  # median of these
+    linear: Floats  # (..., 3, 3) base to device, determinant +1, or -1 where mirrored
+    shift_m: Floats  # (..., 3)
+    point_m: Floats  # (..., 3) target in the flange frame
+    distance_m: Floats  # (..., pose) measured from expected
+    typical_m: Floats  # (...) median of these
 
 
 def rough_fit(T_base_flange: Floats, position_m: Floats, point_m: Floats, *, mirrored: bool = False) -> RoughFit:
-    """Best frame and target for flange poses (pose, 4, 4) and positions (pose, 3); `point_m` (3,) is the start."""
-    R, t = T_base_flange[:, :3, :3], T_base_flange[:, :3, 3]
-    weight = np.ones(len(t))
-    linear, shift, distance = np.eye(3), np.zeros(3), np.zeros(len(t))
+    """Best frame and target for flange poses (..., pose, 4, 4) and positions (pose, 3); `point_m` (3,) is the start."""
+    R, t = T_base_flange[..., :3, :3], T_base_flange[..., :3, 3]
+    weight, distance = np.ones(t.shape[:-1]), np.zeros(t.shape[:-1])
+    linear, shift = np.eye(3), np.zeros(3)
+    tip = R @ point_m + t
     for _ in range(TURNS):
-        tip = R @ point_m + t
         linear, shift = frame_between(tip, position_m, weight, mirrored=mirrored)
-        in_base = (position_m - shift) @ linear
-        point_m = np.average(np.einsum("nji,nj->ni", R, in_base - t), axis=0, weights=weight)
-        distance = np.linalg.norm(R @ point_m + t - in_base, axis=1)
+        in_base = (position_m - shift[..., None, :]) @ linear
+        in_flange = ((in_base - t)[..., None, :] @ R)[..., 0, :]
+        point_m = averaged(in_flange, weight)
+        tip = (R @ point_m[..., None, :, None])[..., 0] + t
+        distance = np.linalg.norm(tip - in_base, axis=-1)
         weight = weights(distance)
-    return RoughFit(linear, shift, point_m, distance, float(np.median(distance)))
+    return RoughFit(linear, shift, point_m, distance, median(distance))
+
+
+def averaged(points_m: Floats, weight: Floats) -> Floats:
+    """(..., 3) of points (..., point, 3) by weights (..., point)."""
+    share = weight / weight.sum(axis=-1, keepdims=True)
+    return np.asarray((share[..., None, :] @ points_m)[..., 0, :])
 
 
 def frame_between(a_m: Floats, b_m: Floats, weight: Floats, *, mirrored: bool = False) -> tuple[Floats, Floats]:
-    """(linear (3, 3), shift (3,)) with linear @ a + shift nearest to b, both (point, 3), weights (point,)."""
-    middle_a, middle_b = np.average(a_m, axis=0, weights=weight), np.average(b_m, axis=0, weights=weight)
-    linear = turn_between(a_m - middle_a, b_m - middle_b, weight, mirrored=mirrored)
-    return linear, middle_b - linear @ middle_a
+    """(linear (..., 3, 3), shift (..., 3)) with linear @ a + shift nearest to b, both (..., point, 3), by weights."""
+    middle_a, middle_b = averaged(a_m, weight), averaged(b_m, weight)
+    linear = turn_between(a_m - middle_a[..., None, :], b_m - middle_b[..., None, :], weight, mirrored=mirrored)
+    return linear, middle_b - (linear @ middle_a[..., None])[..., 0]
 
 
 def turn_between(a: Floats, b: Floats, weight: Floats, *, mirrored: bool = False) -> Floats:
-    """(3, 3) linear with linear @ a nearest to b, both (vector, 3), weights (vector,)."""
-    U, _, Vt = np.linalg.svd((b * weight[:, None]).T @ a)
-    sign = np.sign(np.linalg.det(U @ Vt)) * (-1.0 if mirrored else 1.0)
-    return np.asarray((U * [1.0, 1.0, sign]) @ Vt, dtype=np.float64)
+    """(..., 3, 3) linear with linear @ a nearest to b, both (..., vector, 3), weights (..., vector)."""
+    return nearest_turn(np.swapaxes(b * weight[..., None], -1, -2) @ a, mirrored=mirrored)
+
+
+def nearest_turn(matrix: Floats, *, mirrored: bool = False) -> Floats:
+    """The rotation, or reflection, (..., 3, 3) nearest to matrices (..., 3, 3)."""
+    U, _, Vt = np.linalg.svd(matrix)
+    U[..., 2] *= (np.sign(np.linalg.det(U @ Vt)) * (-1.0 if mirrored else 1.0))[..., None]
+    return np.asarray(U @ Vt, dtype=np.float64)

@@ -25,17 +25,24 @@ TRUST = 0.1  # of what is drawn: a target may be 10 mm off where the readings ar
 
 @dataclass(frozen=True)
 class Strain:
-    """Median distance between arm and readings, and by how much drawn things had to move for it; both in m."""
+    """Median distance between arm and readings, and by how much drawn things had to move for it; both in m.
 
-    typical_m: float
-    moved_m: float
+    Of many cases side by side these are (case,).
+    """
+
+    typical_m: Floats
+    moved_m: Floats
 
     def __add__(self, other: "Strain") -> "Strain":
         """Of two instruments together."""
         return Strain(self.typical_m + other.typical_m, self.moved_m + other.moved_m)
 
+    def of_case(self, case: int) -> "Strain":
+        """Of one case of many."""
+        return Strain(self.typical_m[case], self.moved_m[case])
+
     @property
-    def compared_m(self) -> float:
+    def compared_m(self) -> Floats:
         """What the better of two explanations has less of."""
         return self.typical_m + TRUST * self.moved_m
 
@@ -49,7 +56,7 @@ class Witness(Protocol):
         ...
 
     def strain(self, T_base_flange: Floats) -> Strain:
-        """For flange poses (pose, 4, 4) of the nominal arm."""
+        """For flange poses (..., pose, 4, 4) of the nominal arm: one case, or many side by side, each for itself."""
         ...
 
     def otherwise(self) -> "Iterator[Otherwise]":

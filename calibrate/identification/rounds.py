@@ -66,6 +66,11 @@ def settled_fit(
     return replace(fitted, steps=steps)
 
 
+def first_fit(weighting: Weighting, start: Floats) -> Floats:
+    """(param,) of one round from `start` (param,), the noise as believed: enough to compare misfits by factors."""
+    return _round(weighting, weighting.believed, start, FAR_START, Redundant.REMOVED).fit.theta
+
+
 def coarse_start(weighting: Weighting, start: Floats) -> Floats:
     """(param,) large errors without small ones to hide in: what a prior speaks of stays at `start` (param,).
 

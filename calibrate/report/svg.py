@@ -8,6 +8,7 @@ from typing import Literal
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
 
@@ -66,7 +67,7 @@ def drawn(name: str, says: str, width_in: float, height_in: float, paint: Callab
         figure = Figure(figsize=(width_in, height_in), layout="constrained")
         paint(figure)
         text = io.StringIO()
-        figure.savefig(text, format="svg")
+        FigureCanvasSVG(figure).print_svg(text)  # not savefig, which lays out and draws everything once more before
     return inlined(text.getvalue(), name, says)
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import BAR, BAR_END
-from calibrate.blunders.least_distance import least_distance
+from calibrate.blunders.least_distance import least_distance, median
 from calibrate.blunders.witness import Otherwise, Strain, Witness, drawn_point_m, filled, thinned
 from calibrate.errors import DataError
 from calibrate.sample_table import SampleTable
@@ -34,17 +34,19 @@ class BarWitness:
     point_m: Floats | None  # (3,) target as drawn in the flange frame
 
     def strain(self, T_base_flange: Floats) -> Strain:
-        a, b = np.split(T_base_flange, 2)
-        turns, apart = b[:, :3, :3] - a[:, :3, :3], b[:, :3, 3] - a[:, :3, 3]
+        a, b = np.split(T_base_flange, 2, axis=-3)
+        turns, apart = b[..., :3, :3] - a[..., :3, :3], b[..., :3, 3] - a[..., :3, 3]
         drawn = np.zeros(3) if self.point_m is None else self.point_m
 
         def rows(shift: Floats) -> tuple[Floats, Floats]:
-            span = turns @ (drawn + shift) + apart
-            length = np.maximum(np.linalg.norm(span, axis=1), 1e-9)
-            return length - self.length_m, np.einsum("ni,nij->nj", span / length[:, None], turns)
+            span = (turns @ (drawn + shift)[..., None, :, None])[..., 0] + apart
+            length = np.maximum(np.linalg.norm(span, axis=-1), 1e-9)
+            along = span / length[..., None]
+            return length - self.length_m, (along[..., None, :] @ turns)[..., 0, :]
 
-        shift, distance = least_distance(rows, np.zeros(3))
-        return Strain(float(np.median(distance)), 0.0 if self.point_m is None else float(np.linalg.norm(shift)))
+        shift, distance = least_distance(rows, np.zeros((*apart.shape[:-2], 3)))
+        moved = np.linalg.norm(shift, axis=-1)
+        return Strain(median(distance), 0.0 * moved if self.point_m is None else moved)
 
     def otherwise(self) -> Iterator[Otherwise]:
         """The length stands in the rig, not in the samples."""

@@ -17,8 +17,8 @@ from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION
 from calibrate.blunders.finding import BlunderKind
-from calibrate.blunders.least_distance import weights
-from calibrate.blunders.rough_fit import turn_between
+from calibrate.blunders.least_distance import median, weights
+from calibrate.blunders.rough_fit import nearest_turn, turn_between
 from calibrate.blunders.witness import Otherwise, Strain, Witness, filled, stacked, thinned
 from calibrate.chain import Chain
 from calibrate.parameters import Parameter
@@ -137,16 +137,20 @@ class OrientationWitness:
 
     def strain(self, T_base_flange: Floats) -> Strain:
         """A and X as mean rotations in turn, from the start that the turns between poses give."""
-        flange, seen = T_base_flange[:, :3, :3], Rotation.from_rotvec(self.rotation_rad).as_matrix()
-        device = turn_between(_steps(flange), _steps(seen), np.ones(len(seen) - 1))  # their axes differ by A
-        weight, angle = np.ones(len(seen)), np.zeros(len(seen))
+        flange, seen = T_base_flange[..., :3, :3], Rotation.from_rotvec(self.rotation_rad).as_matrix()
+        cases = flange.shape[:-3]
+        device = turn_between(_steps(flange), _steps(seen), np.ones((*cases, len(seen) - 1)))  # their axes differ by A
+        weight, angle = np.ones(flange.shape[:-2]), np.zeros(flange.shape[:-2])
         for _ in range(ROUNDS):
-            mount = _nearest(np.einsum("n,nji,njk->ik", weight, device @ flange, seen))
-            device = _nearest(np.einsum("n,nij,nkj->ik", weight, seen, flange @ mount))
-            apart = np.linalg.norm(device @ flange @ mount - seen, axis=(1, 2))
+            turned = device[..., None, :, :] @ flange
+            mount = nearest_turn(_products(turned, weight[..., None, None] * seen))
+            carried = flange @ mount[..., None, :, :]
+            device = nearest_turn(_products(_transposed(weight[..., None, None] * seen), _transposed(carried)))
+            apart = np.linalg.norm(device[..., None, :, :] @ carried - seen, axis=(-2, -1))
             angle = 2.0 * np.arcsin(np.minimum(apart / np.sqrt(8.0), 1.0))
             weight = weights(angle)
-        return Strain(LEVER_M * float(np.median(angle)), 0.0)
+        typical = LEVER_M * median(angle)
+        return Strain(typical, 0.0 * typical)
 
     def otherwise(self) -> Iterator[Otherwise]:
         """As `written_otherwise`."""
@@ -180,14 +184,22 @@ class OrientationWitness:
 
 
 def _steps(R: Floats) -> Floats:
-    """(pose - 1, 3) rotation vectors from each of these (pose, 3, 3) to the next."""
-    return Rotation.from_matrix(R[1:] @ np.swapaxes(R[:-1], 1, 2)).as_rotvec()
+    """(..., pose - 1, 3) rotation vectors from each of these (..., pose, 3, 3) to the next."""
+    steps = R[..., 1:, :, :] @ _transposed(R[..., :-1, :, :])
+    return Rotation.from_matrix(steps.reshape(-1, 3, 3)).as_rotvec().reshape(steps.shape[:-1])
 
 
-def _nearest(matrix: Floats) -> Floats:
-    """The rotation (3, 3) nearest to a weighted sum of rotations: their mean (Moakher, SIAM J. Matrix Anal. 24)."""
-    U, _, Vt = np.linalg.svd(matrix)
-    return np.asarray(U @ np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))]) @ Vt, dtype=np.float64)
+def _transposed(R: Floats) -> Floats:
+    return np.swapaxes(R, -1, -2)
+
+
+def _products(a: Floats, b: Floats) -> Floats:
+    """(..., 3, 3) sum of a transposed times b over poses (..., pose, 3, 3): the rotation nearest to it is their mean.
+
+    Source: Moakher, SIAM J. Matrix Anal. 24, 2002.
+    """
+    flat = (*a.shape[:-3], -1, 3)
+    return _transposed(a.reshape(flat)) @ b.reshape(flat)
 
 
 def mounted(T_base_flange: Floats, R_base_device: Floats, rotation_rad: Floats) -> Floats:

@@ -95,7 +95,8 @@ class PositionWitness:
         drawn = self.point_m
         start = np.zeros(3) if drawn is None else drawn
         found = rough_fit(T_base_flange, self.position_m, start, mirrored=self.mirrored)
-        return Strain(found.typical_m, 0.0 if drawn is None else float(np.linalg.norm(found.point_m - drawn)))
+        moved = np.linalg.norm(found.point_m - start, axis=-1)
+        return Strain(found.typical_m, 0.0 * moved if drawn is None else moved)
 
     def otherwise(self) -> Iterator[Otherwise]:
         """As `written_otherwise`."""

@@ -15,7 +15,7 @@ from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import BAR, SEAT
 from calibrate.alignment import pivot
-from calibrate.blunders.least_distance import weights
+from calibrate.blunders.least_distance import damped, median, weights
 from calibrate.blunders.witness import Otherwise, Strain, Witness, drawn_point_m, filled
 from calibrate.chain import Chain
 from calibrate.errors import DataError
@@ -110,23 +110,23 @@ class SeatWitness:
 
     def strain(self, T_base_flange: Floats) -> Strain:
         """Target by linear least squares with every seat at the weighted mean of its tips."""
-        R, t = T_base_flange[:, :3, :3], T_base_flange[:, :3, 3]
+        R, t = T_base_flange[..., :3, :3], T_base_flange[..., :3, 3]
         drawn = np.zeros(3) if self.point_m is None else self.point_m
+        tips, flat = R @ drawn + t, R.reshape(*t.shape[:-1], 9)
         _, of_seat = np.unique(self.seat, return_inverse=True)
         member = (of_seat == np.arange(of_seat.max() + 1)[:, None]).astype(float)  # (seat, row)
-        weight, shift, distance = np.ones(len(t)), np.zeros(3), np.zeros(len(t))
+        weight, shift, distance = np.ones(t.shape[:-1]), np.zeros(3), np.zeros(t.shape[:-1])
         for _ in range(TURNS):
-            share = member * weight
-            share /= share.sum(axis=1, keepdims=True)
-            turns = R - np.tensordot(share, R, axes=1)[of_seat]
-            away = R @ drawn + t
-            away = away - (share @ away)[of_seat]
-            normal = np.einsum("n,nki,nkj->ij", weight, turns, turns)
-            normal += DAMPING * (np.trace(normal) / 3.0 + 1e-300) * np.eye(3)
-            shift = -np.linalg.solve(normal, np.einsum("n,nki,nk->i", weight, turns, away))
-            distance = np.linalg.norm(away + turns @ shift, axis=1)
+            share = member * weight[..., None, :]
+            share /= share.sum(axis=-1, keepdims=True)
+            turns = (flat - (share @ flat)[..., of_seat, :]).reshape(*t.shape[:-2], -1, 3)  # (..., 3 row, 3)
+            away = (tips - (share @ tips)[..., of_seat, :]).reshape(*t.shape[:-2], -1, 1)
+            weighed = np.swapaxes(np.repeat(weight, 3, axis=-1)[..., None] * turns, -1, -2)
+            shift = -np.linalg.solve(damped(weighed @ turns, DAMPING), weighed @ away)
+            distance = np.linalg.norm((away + turns @ shift).reshape(t.shape), axis=-1)
             weight = weights(distance)
-        return Strain(float(np.median(distance)), 0.0 if self.point_m is None else float(np.linalg.norm(shift)))
+        moved = np.linalg.norm(shift, axis=(-2, -1))
+        return Strain(median(distance), 0.0 * moved if self.point_m is None else moved)
 
     def otherwise(self) -> Iterator[Otherwise]:
         """A cone has no reading that could be written otherwise."""

@@ -17,7 +17,7 @@ from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import SPOTS
 from calibrate.blunders.finding import BlunderKind
-from calibrate.blunders.least_distance import weights
+from calibrate.blunders.least_distance import median, weights
 from calibrate.blunders.rough_fit import turn_between
 from calibrate.blunders.witness import Otherwise, Strain, Witness, filled, stacked, thinned
 from calibrate.chain import Chain
@@ -58,16 +58,18 @@ class SpotsWitness:
     direction: Floats  # (3,) unit
 
     def strain(self, T_base_flange: Floats) -> Strain:
-        beam = T_base_flange[:, :3, :3] @ self.direction
-        origin = T_base_flange[:, :3, :3] @ self.origin_m + T_base_flange[:, :3, 3]
+        beam = T_base_flange[..., :3, :3] @ self.direction
+        origin = T_base_flange[..., :3, :3] @ self.origin_m + T_base_flange[..., :3, 3]
         near, far = self._line()
-        distance, moved = np.zeros(len(beam)), []
+        distance, moved = np.zeros(beam.shape[:-1]), []
         for place in np.unique(self.placement):
             rows = self.placement == place
-            found = _placed(near[rows], far[rows], origin[rows], beam[rows], self.T_base_psd1[int(place)])
-            distance[rows] = found[0]
-            moved.append(found[1])
-        return Strain(float(np.median(distance)), float(np.median(moved)))
+            believed = self.T_base_psd1[int(place)]
+            distance[..., rows], shift_m = _placed(
+                near[rows], far[rows], origin[..., rows, :], beam[..., rows, :], believed
+            )
+            moved.append(shift_m)
+        return Strain(median(distance), median(np.stack(moved, axis=-1)))
 
     def otherwise(self) -> Iterator[Otherwise]:
         """Detectors exchanged in the order of the light, and millimetres. Mirrored axes: spot_signs.py."""
@@ -98,29 +100,35 @@ class SpotsWitness:
         return near, far - 2.0 * np.sum((far - near) * normal, axis=1, keepdims=True) * normal
 
 
-def _placed(near: Floats, far: Floats, origin: Floats, beam: Floats, believed: Floats) -> tuple[Floats, float]:
-    """(distance (pose,), moved m) of one fixture: mean distance of both points of each line from the laser's line."""
-    weight, distance = np.ones(len(near)), np.zeros(len(near))
+def _placed(near: Floats, far: Floats, origin: Floats, beam: Floats, believed: Floats) -> tuple[Floats, Floats]:
+    """(distance (..., pose), moved (...) in m) of one fixture, its lines (pose, 3), the laser's (..., pose, 3).
+
+    A distance is the mean of those of both points of a line from the laser's line.
+    """
+    weight, distance = np.ones(beam.shape[:-1]), np.zeros(beam.shape[:-1])
     turn, shift = believed[:3, :3], believed[:3, 3]
     along = far - near
     along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
-    points = np.concatenate([near, far])
+    points, own = np.stack([near, far]), believed[:3, 3]
+    origins, beams = origin[..., None, :, :], beam[..., None, :, :]
     for _ in range(TURNS):
         turn = turn_between(along, beam, weight)
-        gap = _across(origin - (points @ turn.T).reshape(2, -1, 3), beam)
-        normal = 2.0 * (weight.sum() * np.eye(3) - beam.T @ (weight[:, None] * beam))
-        ridge = DAMPING * np.trace(normal) / 3.0
-        pull = weight @ (gap[0] + gap[1])
-        shift = np.linalg.solve(normal + ridge * np.eye(3), pull + ridge * believed[:3, 3])
-        off = _across(shift, beam) - gap
-        distance = np.sqrt(np.einsum("kni,kni->kn", off, off)).mean(axis=0)
+        gap = _across(origins - points @ np.swapaxes(turn, -1, -2)[..., None, :, :], beams)
+        weighed = np.swapaxes(weight[..., None] * beam, -1, -2)
+        normal = 2.0 * (weight.sum(axis=-1)[..., None, None] * np.eye(3) - weighed @ beam)
+        ridge = DAMPING * np.trace(normal, axis1=-2, axis2=-1)[..., None] / 3.0
+        pull = (weight[..., None, :] @ gap.sum(axis=-3))[..., 0, :]
+        damped = normal + ridge[..., None] * np.eye(3)
+        shift = np.linalg.solve(damped, (pull + ridge * own)[..., None])[..., 0]
+        off = _across(shift[..., None, :], beam)[..., None, :, :] - gap
+        distance = np.linalg.norm(off, axis=-1).mean(axis=-2)
         weight = weights(distance)
-    turned = float(Rotation.from_matrix(turn @ believed[:3, :3].T).magnitude())
-    return distance, float(np.linalg.norm(shift - believed[:3, 3])) + LEVER_M * turned
+    turned = Rotation.from_matrix((turn @ believed[:3, :3].T).reshape(-1, 3, 3)).magnitude()
+    return distance, np.linalg.norm(shift - own, axis=-1) + LEVER_M * turned.reshape(turn.shape[:-2])
 
 
 def _across(vector: Floats, beam: Floats) -> Floats:
-    """(..., pose, 3) part of vectors, broadcast, across unit beams (pose, 3)."""
+    """(..., pose, 3) part of vectors, broadcast, across unit beams (..., pose, 3)."""
     return vector - np.einsum("...i,...i->...", vector, beam)[..., None] * beam
 
 

@@ -12,7 +12,7 @@ from acquisition.recording.rig import Rig
 from acquisition.recording.samples import WIRE as COLUMN
 from calibrate.alignment import trilaterate
 from calibrate.blunders.finding import BlunderKind
-from calibrate.blunders.least_distance import least_distance
+from calibrate.blunders.least_distance import least_distance, median
 from calibrate.blunders.witness import Otherwise, Strain, Witness, drawn_point_m, filled, thinned
 from calibrate.chain import Chain
 from calibrate.errors import DataError
@@ -89,20 +89,24 @@ class WireWitness:
     drum_m: Floats | None  # (3,) as the rig says, in the base
 
     def strain(self, T_base_flange: Floats) -> Strain:
-        R, t = T_base_flange[:, :3, :3], T_base_flange[:, :3, 3]
+        R, t = T_base_flange[..., :3, :3], T_base_flange[..., :3, 3]
         drawn = np.zeros(3) if self.point_m is None else self.point_m
 
         def rows(x: Floats) -> tuple[Floats, Floats]:
-            span = R @ (drawn + x[:3]) + t - x[3:]
-            length = np.maximum(np.linalg.norm(span, axis=1), 1e-9)
-            along = span / length[:, None]
-            return length - self.length_m, np.concatenate([np.einsum("ni,nij->nj", along, R), -along], axis=1)
+            span = (R @ (drawn + x[..., :3])[..., None, :, None])[..., 0] + t - x[..., None, 3:]
+            length = np.maximum(np.linalg.norm(span, axis=-1), 1e-9)
+            along = span / length[..., None]
+            return length - self.length_m, np.concatenate([(along[..., None, :] @ R)[..., 0, :], -along], axis=-1)
 
-        tips = R @ drawn + t
-        starts = [_trilaterated(tips, self.length_m), *([] if self.drum_m is None else [self.drum_m])]
-        ends = [least_distance(rows, np.concatenate([np.zeros(3), drum])) for drum in starts]
-        x, distance = min(ends, key=lambda end: float(np.sum(end[1])))
-        return Strain(float(np.median(distance)), 0.0 if self.point_m is None else float(np.linalg.norm(x[:3])))
+        drum = _trilaterated(R @ drawn + t, self.length_m)
+        x, distance = least_distance(rows, np.concatenate([np.zeros_like(drum), drum], axis=-1))
+        if self.drum_m is not None:
+            drum = np.broadcast_to(self.drum_m, drum.shape)
+            instead, left = least_distance(rows, np.concatenate([np.zeros_like(drum), drum], axis=-1))
+            better = np.sum(left, axis=-1, keepdims=True) < np.sum(distance, axis=-1, keepdims=True)
+            x, distance = np.where(better, instead, x), np.where(better, left, distance)
+        moved = np.linalg.norm(x[..., :3], axis=-1)
+        return Strain(median(distance), 0.0 * moved if self.point_m is None else moved)
 
     def otherwise(self) -> Iterator[Otherwise]:
         """Millimetres."""
@@ -112,11 +116,12 @@ class WireWitness:
 
 
 def _trilaterated(points_m: Floats, lengths_m: Floats) -> Floats:
-    """(3,) as calibrate.alignment.trilaterate, but an answer for every hypothesis, also of points in a plane."""
-    p = points_m - points_m.mean(axis=0)
-    square = np.sum(p**2, axis=1) - lengths_m**2
-    origin = np.linalg.lstsq(2.0 * p, square - square.mean(), rcond=1e-6)[0]
-    return np.asarray(origin + points_m.mean(axis=0), dtype=np.float64)
+    """(..., 3) as calibrate.alignment.trilaterate, but an answer for every hypothesis, also of points in a plane."""
+    middle = points_m.mean(axis=-2)
+    p = points_m - middle[..., None, :]
+    square = np.sum(p**2, axis=-1) - lengths_m**2
+    square -= square.mean(axis=-1, keepdims=True)
+    return np.asarray((np.linalg.pinv(2.0 * p, rcond=1e-6) @ square[..., None])[..., 0] + middle, dtype=np.float64)
 
 
 def _build(table: SampleTable) -> Measured | None:
