@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from calibeam.cli import run
-
-from .pairs import Pair, device, laser, link, place, seat, tool, unchanged, zero
+from tests.support.pairs import Pair, device, laser, link, place, seat, tool, unchanged, zero
 
 MOVED_M = np.array([80e-6, -60e-6, 50e-6])
 ELSEWHERE = device(np.array([1e-3, 2e-3, -1e-3]), np.array([1e-3, 0.0, 2e-3]))

@@ -12,8 +12,7 @@ from calibeam.cli import run
 from simulators.arm.rigid import moved, shifted
 from simulators.conceal.observe import observe
 from simulators.conceal.rig import TrueRig
-
-from .halves import OBSERVED, written_halves
+from tests.support.halves import OBSERVED, written_halves
 
 Change = Callable[[TrueRig], TrueRig]
 WANTED = {  # enough rows for both halves
