@@ -8,6 +8,7 @@ from pathlib import Path
 
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
 from benchmarks import (
+    beside_model,
     blunders,
     can_frames,
     centring,
@@ -89,6 +90,12 @@ def run_zeros() -> None:
 def run_coverage() -> None:
     print("95 % intervals over 1,000 sessions of concealed truths, tracker and dual PSD in turn")
     print("\n".join(coverage.lines(coverage.run(RIG))))
+
+
+def run_beside_model(seeds: range | None = None) -> None:
+    print("beside a known model: its own recording, an unchanged later one, and one after a change drawn at random")
+    for row in beside_model.lines(seeds or range(beside_model.FIRST_SEED, beside_model.FIRST_SEED + 10)):
+        print(row, flush=True)
 
 
 def run_blunders() -> None:
@@ -243,6 +250,7 @@ BENCHMARKS: dict[str, Callable[[], None]] = {
     "inverse": run_inverse,
     "zeros": run_zeros,
     "coverage": run_coverage,
+    "beside_model": run_beside_model,
     "blunders": run_blunders,
     "speed": run_speed,
     "false_alarms": run_false_alarms,
@@ -270,6 +278,7 @@ BENCHMARKS: dict[str, Callable[[], None]] = {
 
 
 SEEDED: dict[str, Callable[[range], None]] = {
+    "beside_model": run_beside_model,
     "designed_poses": run_designed_poses,
     "measuring-arm": run_measuring_arm,
     "measuring-arm-bearings": run_perfect_bearings,

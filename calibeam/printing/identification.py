@@ -130,7 +130,7 @@ def _brief(result: Identification) -> Iterator[str]:
         yield f"tool over the workspace, one sigma: {rms} rms, {most} at most"
     listed = parameter_records(result.estimates, result.identifiability, result.evidence.bootstrap)
     known = [(p.name, p.value, p.sigma) for p in listed if p.value is not None and p.sigma is not None]
-    zeros = [one for one in known if one[0].endswith(ZERO)]
+    zeros = [one for one in known if _of_joint(one[0])]
     for name, zero_rad, sigma_rad in zeros:
         yield (
             f"  J{name.removeprefix('joint').removesuffix(ZERO)} zero {np.degrees(zero_rad):+10.5f} deg "
@@ -173,11 +173,16 @@ def _print_details(console: Console, result: Identification, *, of_spots: bool) 
     if of_spots:
         _print_zeros(console, result.zeros)
     listed = parameter_records(result.estimates, seen, result.evidence.bootstrap)
-    _print_parameters(console, tuple(p for p in listed if not (of_spots and p.name.endswith(".zero"))))
+    _print_parameters(console, tuple(p for p in listed if not (of_spots and _of_joint(p.name))))
     if result.point_constraints is not None:
         _print_point_constraints(console, result.point_constraints)
     for line in (*_figures(result), *evidence_lines(result.evidence)):
         console.print(line, highlight=False, markup=False)
+
+
+def _of_joint(name: str) -> bool:
+    """Whether it is the zero of a joint; second encoders have zeros of their own."""
+    return name.startswith("joint") and name.endswith(ZERO)
 
 
 def _print_parameters(console: Console, parameters: tuple[ModelParameter, ...]) -> None:

@@ -99,8 +99,8 @@ def _diagnosed(
     found = diagnose_samples(recording.rig, recording.samples, rng, known.begin, begun=begun)
     if known.same_recording:
         found = only_new(found)  # what its streams show is no part of a model, and not new either
-        return found, beside_known(file_of(found, recording), known)
-    return found, _with_streams(beside_known(file_of(found, recording), known), recording, found)
+        return found, beside_known(file_of(found, recording), known, found)
+    return found, _with_streams(beside_known(file_of(found, recording), known, found), recording, found)
 
 
 def _with_streams(file: DiagnosisFile, recording: Recording, found: Diagnosed) -> DiagnosisFile:

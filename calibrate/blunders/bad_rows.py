@@ -54,7 +54,8 @@ def _named(shots: Shots, i: int, misfit: Floats, scale: float) -> Blunder:
         what = f"reads {best.written:.9g} where the other rows give about {best.meant:.6g} {best.unit}"
         return Blunder(BlunderKind.WRONG_VALUE, rows, best.column, what, "correct the cell, or remove the row")
     away = float(np.linalg.norm(misfit * shots.sigma))
-    what = f"{1e3 * away:.3g} mm away from what all other rows predict ({np.linalg.norm(misfit) / scale:.0f} sigma)"
+    unit = "mrad" if _unit(shots.columns[0]) == "rad" else "mm"
+    what = f"{1e3 * away:.3g} {unit} away from what all other rows predict ({np.linalg.norm(misfit) / scale:.0f} sigma)"
     return Blunder(BlunderKind.BAD_SHOT, rows, ", ".join(shots.columns), what, "measure it again, or remove the row")
 
 
@@ -63,9 +64,14 @@ def _readings(shots: Shots, i: int, misfit: Floats) -> list[_Suspect]:
     written = shots.observed[i]
     meant = written + misfit * shots.sigma
     return [
-        _Suspect(column, float(written[c]), float(meant[c]), "m", float(np.linalg.norm(np.delete(misfit, c))))
+        _Suspect(column, float(written[c]), float(meant[c]), _unit(column), float(np.linalg.norm(np.delete(misfit, c))))
         for c, column in enumerate(shots.columns)
     ]
+
+
+def _unit(column: str) -> str:
+    """Of a reading, by the name of its column."""
+    return "rad" if column.endswith("_rad") else "m"
 
 
 def _angles(shots: Shots, i: int) -> list[_Suspect]:

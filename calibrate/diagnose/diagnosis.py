@@ -81,6 +81,7 @@ class Finding:
     says: str
     rivals: tuple[RivalName, ...]
     pulled: Pulled | None
+    variant: str = ""  # of its term: which station or cone of several
 
 
 @dataclass(frozen=True)

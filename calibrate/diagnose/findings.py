@@ -129,6 +129,7 @@ def _finding(at: Search, i: int, rivals: Sequence[Rival], predicts: float) -> Fi
             if not own or (r.term.order, r.term.depends_on) != (a.term.order, a.term.depends_on)
         ),
         pulled=pulled_back(bench, a),
+        variant=a.term.variant,
     )
 
 

@@ -38,11 +38,10 @@ def motion(
     width: int = 6,
     variant: str = "",
     open_family: bool = False,
-    told: bool = True,
 ) -> Term:
     """Shift and turn by a law of drivers, about the middle of what the arm reached (turns and shifts stay apart).
 
-    `among` (pose, 1) is one where the thing that moved was in use; `told`: the sentence names a driver but time.
+    `among` (pose, 1) is one where the thing that moved was in use.
     """
     per = "_per_k" if driver.startswith("temp_") and not open_family else ""
     names = tuple(name + per for name in SIX[:width])
@@ -71,7 +70,7 @@ def motion(
         limit=LIMIT,
         sentence=f"{what} moved by {sizes[0]} in x, y, z of the base"
         + (f" and turned by {sizes[1]}" if width == 6 else "")
-        + (f" with {driver}" if told and driver != "t" else ""),
+        + (f" with {driver}" if driver != "t" else ""),
     )
 
 

@@ -11,30 +11,41 @@ from numpy.typing import NDArray
 
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.form import Form, at_joint
-from calibrate.effects.moved import SIX, in_use, motion
+from calibrate.effects.moved import SIX
 from calibrate.effects.ports import Place, Port
-from calibrate.effects.term import Shape, Term
-from calibrate.effects.time_laws import Law
+from calibrate.effects.term import Shape
 from calibrate.sensors import seat, spots
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
+AROUND = Place.SURROUNDINGS
 RECORDING = "recording"  # the driver: one value a recording
+LASER = ("shift_u_m", "shift_v_m", "tilt_u_rad", "tilt_v_rad")  # of calibrate/sensors/laser.py
 LIMIT_RAD, LIMIT_M = 5e-2, 2e-2  # beyond, something was put together anew
 
 
-def changes(drivers: Drivers) -> tuple[Term, ...]:
+def changes(drivers: Drivers) -> tuple[Form, ...]:
     """Zeros, links, tool, and whatever stands around the arm."""
     joints, standing = range(1, drivers.n_joints + 1), tuple(_standing(drivers))
     links = (term for i in joints for term in _link(drivers, i))
     return (*(_zero(i, drivers.n_joints) for i in joints), *links, *_tool(drivers), *standing)
 
 
-def _constant(port: Port, physics: str, names: tuple[str, ...], columns: Floats, sentence: str) -> Form:
-    """`columns` (width, m) of the port."""
+def _constant(
+    port: Port,
+    physics: str,
+    names: tuple[str, ...],
+    columns: Floats,
+    sentence: str,
+    among: Flags | None = None,
+    variant: str = "",
+) -> Form:
+    """`columns` (width, m) of the port, at the rows `among` (pose,) or at all."""
 
     def function(drivers: Drivers, inner: Floats) -> Floats:
-        return np.broadcast_to(columns, (len(drivers.q_rad), *columns.shape)).copy()
+        rows = np.ones(len(drivers.q_rad)) if among is None else among.astype(np.float64)
+        return rows[:, None, None] * columns
 
     limit = max(LIMIT_RAD if name.endswith("_rad") else LIMIT_M for name in names)
     return Form(
@@ -42,6 +53,7 @@ def _constant(port: Port, physics: str, names: tuple[str, ...], columns: Floats,
         (RECORDING,),
         Shape.CONSTANT,
         physics,
+        variant=variant,
         function=function,
         names=names,
         limit=limit,
@@ -82,30 +94,54 @@ def _tool(drivers: Drivers) -> Iterator[Form]:
             port, "tool-moved", SIX[:3], np.eye(6)[:, :3], f"The tool moved by {told} in x, y, z of the flange"
         )
     if laser:
-        turned = ", ".join(f"{{{name}}}" for name in SIX[3:])
-        port = Port("laser.direction", Place.FRAME, drivers.n_joints)
-        sentence = f"The laser moved by {told} and turned by {turned} in x, y, z of the flange"
-        yield _constant(port, "laser-moved", SIX, np.eye(6), sentence)
+        yield _laser(drivers)
 
 
-def _standing(drivers: Drivers) -> Iterator[Term]:
-    """Base, each station of the fixture, each cone."""
+def _laser(drivers: Drivers) -> Form:
+    """By the four numbers of its line that a model has: nothing shows how far it slid along its beam or turned about
+    it, and numbers of which one is invisible are all without a size.
+    """
+    mount = spots.laser_of(drivers.rig)
+    shifts = [np.concatenate([axis, np.zeros(3)]) for axis in (mount.u, mount.v)]
+    # A turn about v tilts the beam towards u, one about -u towards v; the origin stays where it is.
+    tilts = [np.concatenate([-np.cross(axis, mount.origin_m), axis]) for axis in (mount.v, -mount.u)]
+    return _constant(
+        Port("laser.direction", Place.FRAME, drivers.n_joints),
+        "laser-moved",
+        LASER,
+        np.stack([*shifts, *tilts], axis=1),
+        "The laser moved by {shift_u_m}, {shift_v_m} and turned by {tilt_u_rad}, {tilt_v_rad} across its beam",
+    )
 
-    def whole(drivers: Drivers, inner: Floats) -> Floats:
-        return np.ones((len(drivers.q_rad), 1))
 
-    yield motion("base.pose", "base-moved", RECORDING, Shape.CONSTANT, whole, "The base", told=False)
-    for kind, where, physics, width, what, one in (
-        (spots.KIND, "fixture.pose", "fixture-moved", 6, "The fixture at station", "place"),
-        (seat.KIND, "seat.position", "seat-moved", 3, "Seat", seat.POINTS),
-    ):
-        readout = drivers.readouts.get(kind.name)
-        if readout is None or readout.place is None:
-            continue
+def _standing(drivers: Drivers) -> Iterator[Form]:
+    """All that stands around the arm, as one body about the middle of what the arm reached; each station of the fixture
+    about its own origin, as the rig file has it; each cone.
+    """
+    shifts, turns = (", ".join(f"{{{name}}}" for name in SIX[k : k + 3]) for k in (0, 3))
+    moved = f"moved by {shifts} in x, y, z of the base"
+    middle = drivers.frames[:, -1, :3, 3].mean(axis=0)
+    both = f"{moved} and turned by {turns}"
+    yield _constant(Port("base.pose", AROUND), "base-moved", SIX, _about(middle), f"The base {both}")
+    for place, rows in _used(drivers, spots.KIND.name):
+        T = spots.fixture_of(drivers.rig).T_base_psd1[place]
+        port, what = Port("fixture.pose", AROUND), f"The fixture at station {place}"
+        yield _constant(port, "fixture-moved", SIX, _about(T[:3, 3]), f"{what} {both}", rows, f"place {place}")
+    for cone, rows in _used(drivers, seat.KIND.name):
+        port, variant = Port("seat.position", AROUND), f"{seat.POINTS} {cone}"
+        yield _constant(port, "seat-moved", SIX[:3], np.eye(6)[:, :3], f"Seat {cone} {moved}", rows, variant)
+
+
+def _about(point_m: Floats) -> Floats:
+    """(6, 6) base twists of three shifts, and of three turns about a point."""
+    columns = np.eye(6)
+    columns[:3, 3:] = np.cross(point_m, np.eye(3)).T
+    return columns
+
+
+def _used(drivers: Drivers, instrument: str) -> Iterator[tuple[int, Flags]]:
+    """Each station or cone, and the rows (pose,) at which the instrument was there."""
+    readout = drivers.readouts.get(instrument)
+    if readout is not None and readout.place is not None:
         for place in np.unique(readout.place[readout.seen]).tolist():
-            there: Law = in_use(readout.seen & (readout.place == place))
-            variant = f"{one} {place}"
-            what_moved = f"{what} {place}"
-            yield motion(
-                where, physics, RECORDING, Shape.CONSTANT, whole, what_moved, (), there, width, variant, told=False
-            )
+            yield place, readout.seen & (readout.place == place)

@@ -15,20 +15,21 @@ from calibrate.diagnose.from_recording import Diagnosed
 from calibrate.diagnose.schema import ChangedRecord, DiagnosisFile, FindingRecord, KnownRecord
 from calibrate.diagnose.session import session_of
 from calibrate.effects.drivers import Drivers
+from calibrate.effects.moved import SIX
 from calibrate.effects.since_model import RECORDING
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
 from calibrate.physics.from_diagnosis import model_of_fit
 from calibrate.physics.known import Known, term_of, with_structure
 from calibrate.physics.records import Effect
+from calibrate.sensors import seat
 
-PARAMETER = {  # of a constant that has changed -> the parameter of model.json
-    "zero_rad": "zero",
-    "length_m": "length",
-    "offset_m": "offset",
-    "twist_rad": "twist",
-    "tilt_rad": "tilt",
+OWNER = {  # first part of a place -> of the parameters of model.json, with the number of the station or cone
+    "fixture": "placement",
+    "seat": seat.POINTS,
 }
+AXES = {"shift_x_m": "x", "shift_y_m": "y", "shift_z_m": "z"}  # of a point
+POINTS = ("tool.point", "seat.position")
 
 
 def only_new(found: Diagnosed) -> Diagnosed:
@@ -39,16 +40,18 @@ def only_new(found: Diagnosed) -> Diagnosed:
     return replace(found, physics=replace(found.physics, diagnosis=said))
 
 
-def beside_known(file: DiagnosisFile, known: Known) -> DiagnosisFile:
-    """The record with `known` and `changed`."""
+def beside_known(file: DiagnosisFile, known: Known, found: Diagnosed) -> DiagnosisFile:
+    """The record with `known` and `changed`; `file` is of `found`."""
     entered = known.effects
     left = tuple(e.name for e in known.model.effects if e not in entered and not e.after)
     told = KnownRecord(known.same_recording, tuple(e.name for e in entered), left)
-    changed = tuple(c for finding in file.findings for c in _changed(finding, known))
+    findings = () if found.physics is None else found.physics.diagnosis.findings
+    each = zip(file.findings, findings, strict=True)
+    changed = tuple(c for record, finding in each for c in _changed(record, finding.variant, known))
     return structs.replace(file, known=told, changed=changed)
 
 
-def _changed(finding: FindingRecord, known: Known) -> tuple[ChangedRecord, ...]:
+def _changed(finding: FindingRecord, variant: str, known: Known) -> tuple[ChangedRecord, ...]:
     """Empty for physics that the model does not hold: that is new, not changed."""
     effect = _effect_of(finding, known.effects)
     if effect is None and finding.depends_on != RECORDING:
@@ -57,16 +60,25 @@ def _changed(finding: FindingRecord, known: Known) -> tuple[ChangedRecord, ...]:
     for name, size in finding.parameters.items():
         if size.value is None or size.sigma is None:
             continue
-        place = finding.where.split(".")[0]
-        if effect is not None:
-            was = effect.parameters.get(name)
-            out.append(
-                ChangedRecord(f"{effect.name}.{name}", None if was is None else was.value, size.value, size.sigma)
-            )
-            continue
-        own = f"{place}.{PARAMETER.get(name, name)}"
-        out.append(ChangedRecord(own, known.model.chain.get(own), size.value, size.sigma))
+        if effect is None:
+            own = _own_name(finding.where, variant, name)
+            was = known.model.chain.get(own)
+        else:
+            own, before = f"{effect.name}.{name}", effect.parameters.get(name)
+            was = None if before is None else before.value
+        out.append(ChangedRecord(own, was, size.value, size.sigma))
     return tuple(out)
+
+
+def _own_name(where: str, variant: str, name: str) -> str:
+    """Of the parameter of model.json that a constant is the change of, where it has one: "joint3.zero", "seat2.x"."""
+    place, _, _ = where.partition(".")
+    number = variant.rpartition(" ")[2]
+    owner = f"{OWNER.get(place, place)}{number}"
+    if where in POINTS:
+        return f"{owner}.{AXES[name]}"
+    plain = name.removesuffix("_m").removesuffix("_rad")
+    return f"{owner}.{name if name in SIX else plain}"
 
 
 def _effect_of(finding: FindingRecord, effects: tuple[Effect, ...]) -> Effect | None:

@@ -25,7 +25,7 @@ def test_the_summary_counts_what_ended_and_what_was_said_too_early():
     text = "\n".join(summary((BAD, GOOD, far)))
     assert "3 cases, 2 reconciled, 1 without a failure" in text
     assert "1.250 times the noise in the median" in text
-    assert "agree is said of 2, of 1 above 1.3 times the noise" in text
+    assert "verdict agree: 2, of these 1 above 1.3 times the noise" in text
     assert "nothing hidden (1): nothing found in 1" in text
 
 

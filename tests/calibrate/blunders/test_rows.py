@@ -1,5 +1,7 @@
 """Bad rows are found and named by row, column and cause; honest rows never."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -54,6 +56,16 @@ def test_a_bad_shot_is_said_with_its_distance(scene):
     (found,) = bad_rows(scene.shots())
     assert (found.kind, found.rows) == (BlunderKind.BAD_SHOT, (12,))
     assert float(found.what.split(" mm")[0]) == pytest.approx(np.sqrt(90.0), abs=0.1)
+
+
+def test_readings_in_radians_are_said_in_radians(scene):
+    scene.position_m[30, 1] += 0.02
+    (typed,) = bad_rows(replace(scene.shots(), columns=("enc1_rad", "enc2_rad", "enc3_rad")))
+    assert typed.column == "enc2_rad"
+    assert typed.what.endswith(" rad")
+    scene.position_m[30] += [0.004, -0.007, 0.005]
+    (bad,) = bad_rows(replace(scene.shots(), columns=("enc1_rad", "enc2_rad", "enc3_rad")))
+    assert " mrad away" in bad.what
 
 
 def test_several_bad_rows_are_each_named(scene):

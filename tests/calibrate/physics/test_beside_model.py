@@ -23,9 +23,8 @@ from calibrate.diagnose.score import scores
 from calibrate.diagnose.session import session_of
 from calibrate.model_file import read_model
 from calibrate.physics.known import known_before
-
-from .halves import written_halves
-from .pairs import Pair, all_at_once, device, tool
+from tests.support.halves import written_halves
+from tests.support.pairs import Pair, all_at_once, device, tool
 
 JOINT, MOVED_RAD = 5, 2e-4
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from .halves import OBSERVED, diagnosed_and_predicted, inside_95, judged, written_halves
+from tests.support.halves import OBSERVED, diagnosed_and_predicted, inside_95, judged, written_halves
 
 FIRST = 3000  # seeds by which nothing was chosen while this was made
 SESSIONS = 12  # of each family

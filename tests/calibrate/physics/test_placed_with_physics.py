@@ -12,8 +12,7 @@ from calibeam.cli import run
 from calibeam.notebook import Model
 from calibrate.model_file import read_model
 from calibrate.predict import Predictor
-
-from .halves import diagnosed_and_predicted, numbers, table_of, written_halves
+from tests.support.halves import diagnosed_and_predicted, numbers, table_of, written_halves
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,7 @@ import pytest
 
 from calibeam.cli import run
 from calibrate.model_file import read_model
-
-from .halves import OBSERVED, diagnosed_and_predicted, inside_95, judged, numbers, table_of, written_halves
+from tests.support.halves import OBSERVED, diagnosed_and_predicted, inside_95, judged, numbers, table_of, written_halves
 
 
 @pytest.fixture(scope="module")

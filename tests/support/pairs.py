@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from calibeam.cli import run
-from simulators.arm.rigid import moved, shifted
+from simulators.arm.rigid import moved, shifted, turned_about
 from simulators.conceal.observe import observe
-from simulators.conceal.rig import TrueRig
+from simulators.conceal.rig import DualPsd, TrueRig
+from tests.support.halves import OBSERVED, written_halves
 
-from .halves import OBSERVED, written_halves
-
+ZERO = np.zeros(3)
 Change = Callable[[TrueRig], TrueRig]
 WANTED = {  # enough rows for both halves
     "dual-psd": {"samples": 400},
@@ -61,9 +61,10 @@ def instrument(**fields: Callable[[np.ndarray], np.ndarray]) -> Change:
     return change
 
 
-def place(k: int, by_m: np.ndarray) -> Change:
-    """Fixture at its place k, along the axes of the base."""
-    return instrument(places=lambda T: np.stack([shifted(by_m) @ P if i == k - 1 else P for i, P in enumerate(T)]))
+def place(k: int, by_m: np.ndarray, about_rad: np.ndarray = ZERO, point_m: np.ndarray = ZERO) -> Change:
+    """Fixture at its place k, along the axes of the base, and turned about a point of the base."""
+    motion = shifted(by_m) @ turned_about(point_m, about_rad)
+    return instrument(places=lambda T: np.stack([motion @ P if i == k - 1 else P for i, P in enumerate(T)]))
 
 
 def seat(k: int, by_m: np.ndarray) -> Change:
@@ -77,6 +78,21 @@ def laser(by_m: np.ndarray, about_rad: np.ndarray) -> Change:
         laser_origin_m=lambda x: T[:3, :3] @ x + T[:3, 3],
         laser_direction=lambda d: T[:3, :3] @ d,
     )
+
+
+def laser_line(believed: DualPsd, own: DualPsd) -> np.ndarray:
+    """(4,) shifts and tilts of a laser's line about the believed one, across it: numbers of `laser.…` in a model.
+
+    Where the line crosses the plane of the believed origin; axis u is the flange axis most across the believed beam.
+    """
+    d = believed.laser_direction / np.linalg.norm(believed.laser_direction)
+    axis = np.eye(3)[int(np.argmin(np.abs(d)))]
+    u = (axis - (axis @ d) * d) / np.linalg.norm(axis - (axis @ d) * d)
+    v = np.cross(d, u)
+    along = own.laser_direction / (own.laser_direction @ d)
+    away = own.laser_origin_m - believed.laser_origin_m
+    away = away - (away @ d) * along
+    return np.array([away @ u, away @ v, along @ u, along @ v])
 
 
 def device(by_m: np.ndarray, about_rad: np.ndarray) -> Change:
