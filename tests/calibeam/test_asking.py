@@ -12,15 +12,19 @@ import numpy as np
 import pytest
 
 from acquisition.errors import AcquisitionError
+from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan, write_pose_plan
 from calibeam import asking
 from calibeam.asking import Asking, NotAgreedError
 from calibeam.cli import run
-from calibeam.commands import psd_check
+from calibeam.commands import centre, psd_check
 from calibeam.motion import by_hand, task_by_hand
+from calibeam.sessions import with_tracker
 from calibeam.sessions.run import OnSite
 
 ROOT = Path(__file__).parents[2]
-RIG, CAMERA_RIG = ROOT / "rigs" / "ur5e-dual-psd.toml", ROOT / "rigs" / "ur5e-dual-psd-camera.toml"
+RIG, CAMERA_RIG, TRACKER_RIG = (
+    ROOT / "rigs" / f"ur5e-{name}.toml" for name in ("dual-psd", "dual-psd-camera", "tracker")
+)
 CUE, PLACE_CUE = "Type go to move, no to leave it: ", "ENTER to go on, q to end: "
 PRODUCT = ("acquisition", "calibeam", "calibrate", "drivers", "simulators")
 # Every module that asks, or hands on who is asked.
@@ -91,6 +95,10 @@ def command(monkeypatch, tmp_path) -> Callable[[str], list[str]]:
         monkeypatch.setattr(OnSite, step, lambda *_: None)
     monkeypatch.setattr(OnSite, "_measure", moves)
     monkeypatch.setattr("calibeam.devices.camera.open_camera", moves)
+    monkeypatch.setattr(centre, "connected", moves)
+    monkeypatch.setattr(with_tracker, "_check", lambda *_: None)
+    monkeypatch.setattr(with_tracker, "connected_tracker", moves)
+    write_pose_plan(tmp_path / "plan.toml", PosePlan(1, "ur5e-tracker", (PlannedBlock((PlannedPose((0.0,) * 6),)),)))
     psd = SimpleNamespace(connect=lambda: None, close=lambda: None)
     monkeypatch.setattr(psd_check, "psd_driver", lambda *_: psd)
     monkeypatch.setattr(psd_check, "_face", lambda *_: None)
@@ -103,12 +111,21 @@ def command(monkeypatch, tmp_path) -> Callable[[str], list[str]]:
         "task": ["task", "run", str(tmp_path / "task.toml"), "--rig", str(RIG), "--out", str(tmp_path)],
         "camera": ["camera", str(CAMERA_RIG), "--out", str(tmp_path / "camera")],
         "session": ["session", str(RIG), "--out", str(tmp_path / "session")],
+        "centre": ["centre", str(RIG), "--out", str(tmp_path / "centre.mcap")],
+        "tracker session": [
+            "session",
+            str(TRACKER_RIG),
+            "--plan",
+            str(tmp_path / "plan.toml"),
+            "--out",
+            str(tmp_path / "tracked"),
+        ],
         "psd-check": ["psd-check", str(RIG), "--points", str(tmp_path / "points.csv")],
     }
     return lambda name: lines[name]
 
 
-MOVING = ("move", "jog", "task", "camera", "session")
+MOVING = ("move", "jog", "task", "camera", "session", "centre", "tracker session")
 
 
 @pytest.mark.parametrize("name", MOVING)
