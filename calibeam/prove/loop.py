@@ -152,9 +152,8 @@ def summary(cases: Sequence[LoopCase]) -> list[str]:
             )
     early = sum(c.verdict == "agree" and c.after is not None and c.after > AGREES for c in ended)
     quiet = [c for c in ended if not c.hidden]
-    out.append(
-        f"agree is said of {sum(c.verdict == 'agree' for c in ended)}, of {early} above {AGREES} times the noise"
-    )
+    agree = sum(c.verdict == "agree" for c in ended)
+    out.append(f"verdict agree: {agree}, of these {early} above {AGREES} times the noise")
     out.append(f"nothing hidden ({len(quiet)}): nothing found in {sum(not c.found for c in quiet)}")
     return out
 

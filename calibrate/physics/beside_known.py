@@ -26,10 +26,10 @@ from calibrate.sensors import seat
 
 OWNER = {  # first part of a place -> of the parameters of model.json, with the number of the station or cone
     "fixture": "placement",
-    "seat": seat.POINTS,
+    seat.KIND.name: seat.POINTS,
 }
 AXES = {"shift_x_m": "x", "shift_y_m": "y", "shift_z_m": "z"}  # of a point
-POINTS = ("tool.point", "seat.position")
+POINTS = ("tool.point", f"{seat.KIND.name}.position")
 
 
 def only_new(found: Diagnosed) -> Diagnosed:
