@@ -25,6 +25,7 @@ from calibrate.diagnose.compare.corrected import (
     Simulated,
     compared_session,
     corrected_samples,
+    of_both,
     predictor_of,
     without_known,
 )
@@ -132,7 +133,7 @@ def beside_structure(simulated: Simulated, pair: Pair, rng: Generator, structure
 
 def _asked(simulated: Simulated, samples: Samples, rng: Generator, freed: Sequence[Part]) -> Diagnosed:
     names = frozenset(name for part in freed for name in part.names)
-    return diagnose_samples(simulated.rig, samples, rng, lambda session: begin(simulated, session, names))
+    return diagnose_samples(of_both(simulated.rig), samples, rng, lambda session: begin(simulated, session, names))
 
 
 def _worth(simulated: Simulated, session: Session, freed: tuple[Part, ...], sure: tuple[Part, ...]) -> tuple[Part, ...]:

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -69,6 +70,15 @@ class Simulated:
         """Parameter -> correction."""
         session = self.fitted.session
         return {p.name: float(v) for p, v in zip(session.parameters, self.fitted.geometry, strict=True)}
+
+
+def of_both(rig: Rig) -> Rig:
+    """The rig with the noise that a difference of two such sessions has; the joints are those of one of them.
+
+    A simulation without noise has less: what is stated is an upper limit.
+    """
+    read = {name: getattr(rig.noise, name) for name in ("psd_m", "position_m", "wire_m")}
+    return structs.replace(rig, noise=structs.replace(rig.noise, **{k: v * np.sqrt(2.0) for k, v in read.items() if v}))
 
 
 def simulated_of(rig: Rig, samples: Samples) -> Simulated:

@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 from scipy.spatial.transform import Rotation
 
+from acquisition.recording.samples import POSITION
 from calibeam.results.comparison import compare
 from calibrate.diagnose.compare.chain import differences, of_rig
 from calibrate.diagnose.compare.corrected import corrected_samples, simulated_of
@@ -119,3 +121,19 @@ def test_an_end_of_a_bar_whose_other_end_is_missing_has_no_partner(probed):
     said = compare(probed, replace(probed, samples=fewer), diagnosed=False)
     assert sorted(said.only_measured_t_s) == sorted(samples.column("t_s")[[a, b]].tolist())
     assert said.matched == len(samples) - 2
+
+
+def test_a_noise_stated_far_too_small_is_a_wrong_statement_of_both_sides_and_no_mismatch(tmp_path):
+    """7.5 times too small: a difference of two sessions scatters by 10.6 times, more than statements are wrong by."""
+    drawn = recording_of(tmp_path, family="tracker", seed=3, samples=80)
+    rig = structs.replace(drawn.rig, noise=structs.replace(drawn.rig.noise, position_m=1e-6))
+    one, two = (
+        shifted(
+            replace(drawn, rig=rig),
+            {n: drawn.samples.column(n) + np.random.default_rng(seed).normal(0.0, 7.5e-6, 80) for n in POSITION},
+        )
+        for seed in (1, 2)
+    )
+    (noise,) = compare(one, two).diagnosis.noise
+    assert noise.statement == "wrong"
+    assert noise.stated == pytest.approx(np.sqrt(2.0) * 1e-6)
