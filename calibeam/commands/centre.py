@@ -14,7 +14,7 @@ from acquisition.recording.rig import Rig, load_rig, rig_text
 from calibeam.asking import YES, at_terminal, someone
 from calibeam.devices.recorder import RecordingJournal, new_recording
 from calibeam.devices.site import addresses_of, check_session, connected
-from calibeam.outcome import CheckFailed
+from calibeam.outcome import CheckFailed, PartialResult, interruption
 from drivers.clock import SystemClock
 
 if TYPE_CHECKING:
@@ -86,19 +86,22 @@ def centre_command(
     from calibeam.learner import FittedLearner
 
     out.parent.mkdir(parents=True, exist_ok=True)
-    with (
-        new_recording(out, rig_text(rig), clock, {"purpose": "centring"}) as writer,
-        connected(loaded, addresses_of(loaded, hurry=time_scale), writer, clock, lambda _: None) as bench,
-    ):
-        standing_rad = bench.look(SETTLE_S).q_rad
-        journal = RecordingJournal(writer, clock)
-        navigator = Navigator(bench, FittedLearner(loaded), journal, standing_rad, 1, centring=choice)
-        if aim:
-            navigator.move(np.array(loaded.motion.home_rad))
-            navigator.find(place, first, 0.0)
-        target = BeamTarget(first, spots_m, FINDING_STAND_OFF_M, 0.0)
-        limits = Limits(tolerance_m=tolerance_um * 1e-6, step_rad=loaded.motion.step_limit_rad)
-        run = navigator.centre_here(place, target, limits)
+    try:
+        with (
+            new_recording(out, rig_text(rig), clock, {"purpose": "centring"}) as writer,
+            connected(loaded, addresses_of(loaded, hurry=time_scale), writer, clock, lambda _: None) as bench,
+        ):
+            standing_rad = bench.look(SETTLE_S).q_rad
+            journal = RecordingJournal(writer, clock)
+            navigator = Navigator(bench, FittedLearner(loaded), journal, standing_rad, 1, centring=choice)
+            if aim:
+                navigator.move(np.array(loaded.motion.home_rad))
+                navigator.find(place, first, 0.0)
+            target = BeamTarget(first, spots_m, FINDING_STAND_OFF_M, 0.0)
+            limits = Limits(tolerance_m=tolerance_um * 1e-6, step_rad=loaded.motion.step_limit_rad)
+            run = navigator.centre_here(place, target, limits)
+    except KeyboardInterrupt as why:
+        raise PartialResult(f"{interruption(why)}; the arm stands, the steps until then are in {out}") from why
     _print_run(console, run)
     console.print(f"recording: {out}", soft_wrap=True, markup=False)
     if run.status.name != "CENTRED":

@@ -8,6 +8,7 @@ import pytest
 
 from acquisition.recording import read
 from calibeam.cli import run
+from calibeam.commands import centre
 from calibeam.emulation import Emulation
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
@@ -53,3 +54,16 @@ def test_what_makes_no_sense_is_refused_before_any_line_is_opened(tmp_path: Path
     assert run(["centre", str(RIG), "--out", str(tmp_path / "x.mcap"), "--yes", *more]) == 1
     assert says in capsys.readouterr().err
     assert not (tmp_path / "x.mcap").exists()
+
+
+def test_ctrl_c_ends_it_with_what_was_recorded(tmp_path: Path, capsys, monkeypatch) -> None:
+    def pressed(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(centre, "connected", pressed)
+    out = tmp_path / "x.mcap"
+    assert run(["centre", str(RIG), "--out", str(out), "--yes"]) == 3
+    assert f"stopped: Ctrl-C; the arm stands, the steps until then are in {out}" in " ".join(
+        capsys.readouterr().err.split()
+    )
+    assert not read(out).events
