@@ -1,7 +1,7 @@
 """The result of a diagnosis: frozen records with the words of docs/formats.md, nothing without its doubt."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -82,6 +82,11 @@ class Finding:
     rivals: tuple[RivalName, ...]
     pulled: Pulled | None
     variant: str = ""  # of its term: which station or cone of several
+
+    def believed(self, share: float) -> "Finding":
+        """As sure by a share: what its name loses goes to no name, hence its alternatives lose as much."""
+        less = tuple(replace(r, confidence=share * r.confidence) for r in self.rivals)
+        return replace(self, confidence=share * self.confidence, rivals=less)
 
 
 @dataclass(frozen=True)

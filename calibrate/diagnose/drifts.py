@@ -5,7 +5,6 @@ not know it. The name of such a drift has a rival that this record cannot hold.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from calibrate.diagnose.causes import is_slow_cause
 from calibrate.diagnose.diagnosis import UNKNOWN, Finding, Named, Unexplained
@@ -37,7 +36,7 @@ def doubtful(finding: Finding) -> Finding:
     """A drift whose name is not final."""
     if finding.name.physics == UNKNOWN:
         return finding
-    return replace(finding, confidence=min(finding.confidence, NOT_FINAL))
+    return finding.believed(NOT_FINAL / max(finding.confidence, NOT_FINAL))
 
 
 def untold(finding: Finding, lacking: Sequence[Missing]) -> Unexplained:

@@ -57,7 +57,7 @@ def findings_of(
     taken = {i for group in unnamed for i in group}
     names = [_finding(at, i, rivals[i], float(predicts[i])) for i in range(len(accepted)) if i not in taken]
     unknown = [unknown_cause(at, group, predicts) for group in unnamed]
-    names = [f if final and _final(f, unknown) else replace(f, confidence=NOT_FINAL * f.confidence) for f in names]
+    names = [f if final and _final(f, unknown) else f.believed(NOT_FINAL) for f in names]
     explained = max(sum(f.share for f in (*names, *unknown)), 1e-300)
     found = [replace(f, share=f.share / explained) for f in (*_no_leftovers(names, unknown), *unknown)]
     return tuple(sorted(found, key=lambda f: -f.share))
@@ -124,7 +124,7 @@ def _finding(at: Search, i: int, rivals: Sequence[Rival], predicts: float) -> Fi
         predicts=predicts,
         says=a.term.says(sizes),
         rivals=tuple(
-            _rival(bench, a, r, float(b))
+            _rival(bench, a, r, float(b) * (1.0 - p))
             for r, b, own in zip(rivals, belief[1:], same[1:], strict=True)
             if not own or (r.term.order, r.term.depends_on) != (a.term.order, a.term.depends_on)
         ),

@@ -34,6 +34,9 @@ def ended(seed, most_rows, folder):
     said = json.loads(out.read_text(encoding="utf-8"))
     assert said["incomplete"] == [], f"seed {seed}"
     assert said["verdict"] in {verdict.value for verdict in Verdict}, f"seed {seed}"
+    for finding in said["findings"]:
+        others = [rival["confidence"] for rival in finding["rivals"]]
+        assert finding["confidence"] + sum(others) <= 1.0 + 1e-9, f"seed {seed}: {finding['says']}"
     return said["verdict"]
 
 
