@@ -323,6 +323,9 @@ def _notes(asked: _Asked) -> Iterator[str]:
     if asked.beside is not None:
         for name in asked.beside.simulated.uncorrected:
             yield f"{kind_of(name).noun}: what the simulation's own readings miss its geometry by is not taken out"
+        for part in asked.beside.blind:
+            joint = part.where.removesuffix(".angle").removeprefix("joint")
+            yield f"the target lies on the axis of joint {joint}: whether its zero differs cannot be determined"
 
 
 def _readings(before: Fitted, after: Fitted, file: DiagnosisFile) -> Iterator[ReadingRecord]:

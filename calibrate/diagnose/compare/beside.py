@@ -20,7 +20,17 @@ from acquisition.recording.samples import ORIENTATION, POSITION
 from calibrate.diagnose.assumed import Assumed
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.compare.chain import Pair, columns_of
-from calibrate.diagnose.compare.constants import AXES, TURNS, Part, Quadratic, alternatives, fewest, outermost, parts_of
+from calibrate.diagnose.compare.constants import (
+    AXES,
+    TURNS,
+    Part,
+    Quadratic,
+    alternatives,
+    blind_zeros,
+    fewest,
+    outermost,
+    parts_of,
+)
 from calibrate.diagnose.compare.corrected import (
     Simulated,
     compared_session,
@@ -76,6 +86,7 @@ class Beside:
     constants: tuple[Constant, ...]
     device: Constant | None  # None: no device, or it stands where it stood
     T_simulated_measured: Floats  # (4, 4) the measuring device of the one recording in that of the other
+    blind: tuple[Part, ...] = ()  # zeros that these readings do not show
 
 
 def beside(simulated: Simulated, pair: Pair, rng: Generator, differing: Sequence[str] = ()) -> Beside:
@@ -89,13 +100,16 @@ def beside(simulated: Simulated, pair: Pair, rng: Generator, differing: Sequence
     session = compared_session(simulated.rig, samples)
     every = parts_of(session.parameters)
     whole = begin(simulated, session, frozenset(name for part in every for name in part.names))
+    if blind := tuple(p for p in blind_zeros(whole, every) if not set(p.names) & set(differing)):
+        every = tuple(part for part in every if part not in blind)
+        whole = begin(simulated, session, frozenset(name for part in every for name in part.names))
     quadratic = Quadratic.of(whole, _values(simulated, session), every)
     sure = tuple(part for part in every if set(part.names) & set(differing))
     freed = _worth(simulated, session, tuple(dict.fromkeys((*sure, *outermost(quadratic, fewest(quadratic))))), sure)
     found = _asked(simulated, samples, rng, freed)
     for _ in range(ROUNDS):
         if found.physics is None:
-            return Beside(simulated, found, (), None, T)
+            return Beside(simulated, found, (), None, T, blind)
         kept = _still(simulated, found.physics.model, freed, sure)
         more = tuple(part for part in _named_constants(found, every) if part not in kept)
         if kept == freed and not more:
@@ -103,14 +117,14 @@ def beside(simulated: Simulated, pair: Pair, rng: Generator, differing: Sequence
         freed = (*kept, *more)
         found = _asked(simulated, samples, rng, freed)
     if found.physics is None:
-        return Beside(simulated, found, (), None, T)
+        return Beside(simulated, found, (), None, T, blind)
     model, others = found.physics.model, alternatives(quadratic, freed)
     covariance = _covariance(model)
     constants = tuple(_constant(simulated, model, covariance, part, others[part]) for part in freed)
     at, here = device_of(predictor_of(model.session, model.geometry)), device_of(simulated.model)
     if at is None or here is None:
-        return Beside(simulated, found, constants, None, T)
-    return Beside(simulated, found, constants, _device(here, at, model, covariance), inverse(here) @ at)
+        return Beside(simulated, found, constants, None, T, blind)
+    return Beside(simulated, found, constants, _device(here, at, model, covariance), inverse(here) @ at, blind)
 
 
 def beside_structure(simulated: Simulated, pair: Pair, rng: Generator, structure: ModelFile) -> Beside:

@@ -35,6 +35,9 @@ FRAMES = {
 }
 TIED = 2.0  # of BIC: no more than a bare mention (Kass, Raftery 1995)
 RIVAL = 6.0  # of BIC: strong evidence against what is farther off (Kass, Raftery 1995)
+BLIND = (
+    2e-3  # of the largest lever of a joint: a millimetre or two, about which other errors of the arm count as a turn
+)
 
 
 @dataclass(frozen=True)
@@ -113,6 +116,17 @@ class Quadratic:
         away, covariance = self.away - gain @ self.away[at], C - gain @ C[at]
         away[at], covariance[at], covariance[:, at] = 0.0, 0.0, 0.0
         return Quadratic(tuple(one for one in self.parts if one[0] != part), away, covariance, self.rows)
+
+
+def blind_zeros(fitted: Fitted, parts: Sequence[Part]) -> tuple[Part, ...]:
+    """Zeros that next to no reading follows, such as that of joint 6 where the target lies on its axis.
+
+    Their lever is what the fit of the other constants leaves there: a size over it is no angle of the joint.
+    """
+    free = [p.name for p in fitted.problem.parameters if p.free]
+    felt = np.linalg.norm(fitted.rows.geometry[fitted.rows.data], axis=0)
+    lever = {part: float(felt[free.index(part.names[0])]) for part in parts if part.physics == ZERO}
+    return tuple(part for part, size in lever.items() if size < BLIND * max(lever.values()))
 
 
 def fewest(whole: Quadratic) -> tuple[Part, ...]:

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording.samples import POSITION
 from calibeam.results.comparison import compare
+from calibrate.arms.rig_arm import RigArm
 from calibrate.diagnose.compare.chain import differences, of_rig
 from calibrate.diagnose.compare.corrected import corrected_samples, simulated_of
 from calibrate.diagnose.compare.seated import lengths_of
@@ -137,3 +138,20 @@ def test_a_noise_stated_far_too_small_is_a_wrong_statement_of_both_sides_and_no_
     (noise,) = compare(one, two).diagnosis.noise
     assert noise.statement == "wrong"
     assert noise.stated == pytest.approx(np.sqrt(2.0) * 1e-6)
+
+
+def test_of_a_joint_on_whose_axis_the_target_lies_no_zero_is_told(tmp_path):
+    """The target stands a tenth of a millimetre off its axis, which a turn of the joint could explain."""
+    drawn = recording_of(tmp_path, family="tracker", seed=3, samples=80)
+    rig = structs.replace(drawn.rig, tool=structs.replace(drawn.rig.tool, point_m=(0.0, 0.0, 0.1)))
+    arm = RigArm.of_rig(rig)
+    flange = arm.frames(drawn.samples.joints())[:, -1]
+
+    def seen(point_m):
+        at = flange[:, :3, :3] @ np.array(point_m) + flange[:, :3, 3]
+        noise = np.random.default_rng(5).normal(0.0, 1e-5, at.shape)
+        return shifted(replace(drawn, rig=rig), dict(zip(POSITION, (at + noise).T, strict=True)))
+
+    said = compare(seen((1e-4, 1e-4, 0.1)), seen((0.0, 1e-4, 0.1)))
+    assert not [one for one in said.differences if one.where == "joint6.angle"]
+    assert "the target lies on the axis of joint 6: whether its zero differs cannot be determined" in said.notes
