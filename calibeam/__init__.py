@@ -6,6 +6,8 @@ In a notebook: `calibeam.open("recording.mcap")`, `calibeam.session("rig.toml", 
 
 import importlib
 import os
+from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -51,10 +53,28 @@ _PLACES = {
 }
 
 
+FOLDERS = ("drivers", "acquisition", "calibrate", "simulators")  # installed beside this package (decision 0039)
+
+
+def check_folders() -> None:
+    """ImportError where a package of somebody else comes before one of ours on the path."""
+    here = Path(__file__).resolve().parents[1]
+    for name in FOLDERS:
+        found = find_spec(name)
+        place = None if found is None or found.origin is None else Path(found.origin).resolve().parents[1]
+        if place != here:
+            raise ImportError(
+                f"{name} is found in {place or 'no installed package'}, not beside calibeam in {here}: another package "
+                "of that name comes first on the Python path; start from another folder, or install calibeam into "
+                "an environment of its own (pipx install)"
+            )
+
+
 def __getattr__(name: str) -> object:
     """The name, from its module, loaded only now: the command line starts without what a notebook needs."""
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    check_folders()
     module, inner = _PLACES[name]
     return getattr(importlib.import_module(module), inner)
 

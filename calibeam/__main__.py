@@ -1,10 +1,17 @@
 """The console command, also as `python -m calibeam`: it hears Ctrl-C before the libraries are loaded."""
 
+import sys
+
+from calibeam import check_folders
 from calibeam.interrupts import INTERRUPTS
 
 
 def main() -> None:
     """Loads the command line, which takes up to a second, and runs it."""
+    try:
+        check_folders()
+    except ImportError as another:
+        sys.exit(f"error: {another}")
     INTERRUPTS.load()
     from calibeam.cli import main as run
 
