@@ -22,6 +22,7 @@ Flags = NDArray[np.bool_]
 AROUND = Place.SURROUNDINGS
 RECORDING = "recording"  # the driver: one value a recording
 LASER = ("shift_u_m", "shift_v_m", "tilt_u_rad", "tilt_v_rad")  # of calibrate/sensors/laser.py
+SAME = 1.0 - 1e-6  # cosine between two twists (m, rad) that are one
 LIMIT_RAD, LIMIT_M = 5e-2, 2e-2  # beyond, something was put together anew
 
 
@@ -70,16 +71,20 @@ def _zero(joint: int, n_joints: int) -> Form:
 
 def _link(drivers: Drivers, i: int) -> Iterator[Form]:
     """Along and about the x axis behind joint i, along the axis of the joint, and across both: as Denavit and
-    Hartenberg count them, the last one after Hayati.
+    Hartenberg count them, the last one after Hayati. A tilt about the axis of the joint is no candidate: it is the
+    zero of the joint under another name.
     """
     before, behind = drivers.frames[0, i - 1], drivers.frames[0, i]
     along = behind[:3, :3].T @ before[:3, 2]
+    turn = np.concatenate([np.cross(behind[:3, :3].T @ (before[:3, 3] - behind[:3, 3]), along), along])
     for what, name, twist in (
         ("length", "length_m", [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
         ("offset", "offset_m", [*along.tolist(), 0.0, 0.0, 0.0]),
         ("twist", "twist_rad", [0.0, 0.0, 0.0, 1.0, 0.0, 0.0]),
         ("tilt", "tilt_rad", [0.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
     ):
+        if abs(turn @ twist) > SAME * float(np.linalg.norm(turn)):
+            continue
         port = Port(f"link{i}.{what}", Place.FRAME, i)
         sentence = f"Link {i} changed: {what} by {{{name}}}"
         yield _constant(port, "link-changed", (name,), np.array(twist)[:, None], sentence)

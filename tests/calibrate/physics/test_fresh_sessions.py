@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.support.halves import OBSERVED, diagnosed_and_predicted, inside_95, judged, written_halves
+from simulators.conceal.seated import seated_tip_m
+from tests.support.halves import diagnosed_and_predicted, inside_95, judged, written_halves
 
 FIRST = 3000  # seeds by which nothing was chosen while this was made
 SESSIONS = 12  # of each family
@@ -12,7 +13,7 @@ SESSIONS = 12  # of each family
 def ratio_and_share(folder, family, seed, samples):
     """Rms of the residuals on unseen rows over the noise that was really added, and the share inside 95 %.
 
-    Of cones, whose noise is in the encoders, over the noise that the fit found.
+    The noise of cones is in the encoders: it is what it moves at the probe.
     """
     recording, unseen, case, rows = written_halves(
         folder, family=family, seed=seed, defects=("any",), enr=2.0, samples=samples
@@ -20,7 +21,9 @@ def ratio_and_share(folder, family, seed, samples):
     model, table = diagnosed_and_predicted(folder, recording, unseen)
     residual, sigma = judged(model, table, family)
     if family == "cones":
-        noise = np.array([model["noise"][name] for name in OBSERVED[family]])
+        rig = case.drawn.true
+        tips_m = [seated_tip_m(rig, q_rad)[rows] for q_rad in (case.reading_rad, case.exact.reading_rad)]
+        noise = tips_m[0] - tips_m[1]
     else:
         noise = (case.values_m - case.exact.values_m)[rows]
     return float(np.sqrt(np.nanmean(residual**2) / np.mean(noise**2))), inside_95(residual, sigma)
