@@ -142,7 +142,7 @@ def summary(cases: Sequence[LoopCase]) -> list[str]:
     ended = [one for one in cases if one.after is not None]
     groups = {"a cause of no catalogue": [c for c in ended if c.kind == "outside"]}
     groups = {"everything else": [c for c in ended if c.kind != "outside"], **groups}
-    out = [f"{len(cases)} cases, {len(ended)} reconciled, {sum(not c.failure for c in cases)} without a failure"]
+    out = [f"cases: {len(cases)}, {len(ended)} reconciled, {sum(not c.failure for c in cases)} without a failure"]
     for what, group in groups.items():
         if group:
             far = np.array([c.after for c in group], dtype=np.float64)

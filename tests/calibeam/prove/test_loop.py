@@ -23,7 +23,7 @@ def test_the_table_has_every_column_of_every_case():
 def test_the_summary_counts_what_ended_and_what_was_said_too_early():
     far = LoopCase("case-0002", "one", "wire", "in process", HIDDEN, HIDDEN, 9.0, 2.0, 1.5, "agree", "1.5 times")
     text = "\n".join(summary((BAD, GOOD, far)))
-    assert "3 cases, 2 reconciled, 1 without a failure" in text
+    assert "cases: 3, 2 reconciled, 1 without a failure" in text
     assert "1.250 times the noise in the median" in text
     assert "verdict agree: 2, of these 1 above 1.3 times the noise" in text
     assert "nothing hidden (1): nothing found in 1" in text

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from simulators.conceal.seated import seated_tip_m
 
+from simulators.conceal.observe import seated_tip_m
 from tests.support.halves import diagnosed_and_predicted, inside_95, judged, written_halves
 
 FIRST = 3000  # seeds by which nothing was chosen while this was made
