@@ -38,6 +38,7 @@ Floats = NDArray[np.float64]
 TURNS = 3  # drivers follow the frames that the effects have moved; each turn leaves a thousandth of a change
 STEP = 1e-3  # of an inner value, for its difference quotient
 SAME = 1e-6  # of a basis: then the exact formula has the same meaning as in the session
+UNIFORM = np.sqrt(3.0)  # half the width of a uniform law over its standard deviation
 CARRIED = 0.05  # of an effect's size: more may not be lost where its columns are chosen anew (diagnose/extended.py)
 
 
@@ -62,6 +63,7 @@ class Acting:
     by_value: Floats  # (row, width, coefficients and smooth inner values)
     outside: NDArray[np.bool_]  # (row,) beyond the recorded range: an unknown cause ends at what was last recorded
     spread: Floats  # (width, width) of the amount over the session: doubt where it is not known
+    undated: Floats  # (row, width) one sigma between the recorded rows that a step lies between: before it or after?
 
     @property
     def port(self) -> Port:
@@ -180,7 +182,27 @@ def _acting(carried: Carried, old: Drivers, new: Drivers, was: Floats) -> Acting
             parts.append(_by_inner(carried, old, new, j, STEP * (spec.upper - spec.lower))[..., None])
     amount = basis @ carried.accepted.coefficients if exact is None else exact
     spread = np.cov(was, rowvar=False).reshape(2 * (was.shape[1],))
-    return Acting(carried, amount, np.concatenate(parts, axis=-1), outside, spread)
+    undated = _undated(carried, old, new, basis @ carried.accepted.coefficients)
+    return Acting(carried, amount, np.concatenate(parts, axis=-1), outside, spread, undated)
+
+
+def _undated(carried: Carried, old: Drivers, new: Drivers, amount: Floats) -> Floats:
+    """(asked, width) of a step that may have been at any time, all alike, between two recorded rows.
+
+    A row at t there is wrong by the whole step with the probability that its time is on the other side of t.
+    """
+    a, t, out = carried.accepted, new.t_s[len(old.q_rad) :], np.zeros_like(amount)
+    for j, spec in enumerate(a.term.inner):
+        dated = carried.record.parameters.get(spec.name)
+        if not spec.discrete or dated is None or not dated.sigma:
+            continue
+        half = UNIFORM * dated.sigma
+        for end in (-half, half):
+            inner = a.inner.copy()
+            inner[j] += end * (1.0 - 1e-9)
+            wrong = np.clip((t - a.inner[j] - end) / -np.copysign(2.0 * half, end), 0.0, 1.0)
+            out += np.sqrt(wrong)[:, None] * (_basis(carried, old, new, inner)[0] @ a.coefficients - amount)
+    return out
 
 
 def _amount(carried: Carried, old: Drivers) -> Floats:

@@ -187,12 +187,13 @@ def effects_at(model: ModelFile, predictor: Predictor, samples: Samples, same_se
     by = nothing
     for one in found:
         by = by.plus(one.port, one.amount)
-    doubts = list(_of_range(found))
+    doubts = [*_of_range(found), *((one.port, one.undated) for one in found if np.any(one.undated))]
+    notes = (*notes, *(_between(one) for one in found if np.any(one.undated)))
     for name, rows in filled.missing.items():
         felt = _of_missing(name, rows, carried, found, predictor, recorded, filled)
         doubts += [(one.port, off) for one, off in felt]
         notes = (*notes, *_lacks(name, rows, [one.carried.record.name for one, _ in felt]))
-    outside = _outside(carried, predictor, both, len(recorded), filled)
+    outside = _outside(carried, found, predictor, both, len(recorded))
     return Applied(by, found, tuple(doubts), outside, notes)
 
 
@@ -263,25 +264,36 @@ def _of_range(found: Sequence[Acting]) -> list[tuple[Port, Floats]]:
 
 
 def _outside(
-    carried: Sequence[Carried], predictor: Predictor, both: Samples, first: int, filled: Completed
+    carried: Sequence[Carried], found: Sequence[Acting], predictor: Predictor, both: Samples, first: int
 ) -> tuple[str, ...]:
-    """Names of drivers that are beyond their recorded range, one text a row."""
+    """Names of drivers that are beyond their recorded range, or in the gap of it that hides a step; one text a row."""
     drivers = drivers_under(predictor, both, Perturbation.none(len(both), both.n_joints))
     known: dict[str, tuple[float, float]] = {}
     for c in carried:
         known |= dict(c.record.range)
-    beyond: Mapping[str, Bools] = {
+    beyond: dict[str, Bools] = {
         name: _beyond(values[first:], *known[name])
         for name, values in ((name, range_of(drivers, name)) for name in known)
         if values is not None
     }
-    rows = range(len(filled.samples))
+    for one in found:
+        for name in one.carried.drivers if np.any(one.undated) else ():
+            beyond[name] = np.any(one.undated, axis=1) | beyond.get(name, False)
+    rows = range(len(both) - first)
     return tuple(",".join(name for name, where in beyond.items() if where[row]) for row in rows)
 
 
 def _beyond(values: Floats, low: float, high: float) -> Bools:
     slack = BEYOND * max(high - low, 1e-12)
     return np.asarray((values < low - slack) | (values > high + slack), dtype=np.bool_)
+
+
+def _between(one: Acting) -> str:
+    rows = int(np.any(one.undated, axis=1).sum())
+    return (
+        f"{rows} of {len(one.undated)} rows lie between the recorded rows where {one.carried.record.name} stepped: "
+        "before or after it, nobody saw; sigma widened"
+    )
 
 
 def _lacks(column: str, rows: Bools, effects: Sequence[str]) -> tuple[str, ...]:

@@ -81,6 +81,28 @@ def test_rows_beyond_the_recorded_range_name_the_driver(slipped):
     assert set(table_of(out)["outside"]) == {"t"}
 
 
+def test_between_the_rows_where_it_stepped_both_are_possible(slipped, capsys):
+    """Just behind the last row before it the step is unlikely to have been; in the middle of the gap sigma is most."""
+    folder, unseen, model, _, _, _ = slipped
+    dated = model["effects"][0]["parameters"]["time_s"]
+    gap_s = np.sqrt(12.0) * dated["sigma"]
+    first_s = dated["value"] - gap_s / 2.0
+    header, row, *_ = unseen.read_text().splitlines()
+    times_s = first_s + gap_s * np.array([-0.1, 0.1, 0.499, 0.501, 0.9, 1.1])
+    asked, out = folder / "gap.csv", folder / "gap-predicted.csv"
+    asked.write_text("\n".join([header, *(",".join([repr(t), *row.split(",")[1:]]) for t in times_s.tolist())]) + "\n")
+    assert run(["predict", str(folder / "model.json"), str(asked), "--out", str(out), "--same-session"]) == 0
+    assert f"4 of 6 rows lie between the recorded rows where {model['effects'][0]['name']} stepped" in (
+        capsys.readouterr().out
+    )
+    predicted = table_of(out)
+    assert predicted["outside"] == ["", "t", "t", "t", "t", ""]
+    read, sigma = ([numbers(predicted[f"{k}{c}"]) for c in OBSERVED["tracker"]] for k in ("", "s_"))
+    step = np.linalg.norm(np.array(read)[:, -1] - np.array(read)[:, 0])
+    more = np.sqrt(np.maximum(np.sum(np.square(sigma), axis=0) - np.sum(np.square(sigma), axis=0)[0], 0.0)) / step
+    assert np.allclose(more[1:5], np.sqrt([0.1, 0.5, 0.5, 0.1]), rtol=0.05)
+
+
 def test_a_command_for_geometry_names_what_it_leaves_out(slipped, capsys):
     folder, _, model, _, _, _ = slipped
     run(["verify", str(folder / "recording"), "--model", str(folder / "model.json"), "--out", str(folder / "v.json")])
