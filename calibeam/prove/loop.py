@@ -22,6 +22,7 @@ from calibeam.prove.diagnosing import bare_environment
 from calibeam.prove.prove import Tell, ending_early, fresh
 from calibeam.prove.record import Truth, truth_of
 from calibeam.prove.scenario import Kind, Mix
+from calibeam.prove.scoring import noise_m
 from calibeam.prove.seal import Layout, open_seal
 from calibeam.results.reconciliation import AGREES, ReconcileFile
 from calibeam.software import SOFTWARE
@@ -33,12 +34,14 @@ SHARES: dict[Kind, float] = {"one": 0.35, "three": 0.25, "encoders": 0.2, "outsi
 FAMILIES: tuple[Family, ...] = ("dual-psd", "tracker", "wire")  # cones read no length
 HEAD = (
     *("case", "kind", "family", "recorded", "hidden", "found"),
-    *("before", "after geometry", "after physics", "verdict", "failure"),
+    *("before", "after geometry", "after physics", "by its own noise", "verdict", "failure"),
 )
 
 
 class LoopCase(msgspec.Struct, frozen=True):
-    """One case; numbers are rms over noise on unseen rows, of the instrument that is worst at the end."""
+    """One case; numbers are rms over noise on unseen rows. The noise is what was really added to these very rows, which
+    the seal holds; `said` is `after` with the noise that the reconciliation itself works with.
+    """
 
     name: str
     kind: str
@@ -49,6 +52,7 @@ class LoopCase(msgspec.Struct, frozen=True):
     before: float | None
     geometry: float | None
     after: float | None
+    said: float | None
     verdict: str
     failure: str  # empty: none
 
@@ -116,13 +120,15 @@ def _told(layout: Layout, one: Concealed, error: str) -> LoopCase:
     hidden = tuple(f"{d.physics} at {d.port}" for d in truth.defects)
     folder = layout.answer(name)
     if error:
-        return LoopCase(name, kind, family, path, hidden, (), None, None, None, "", error)
+        return LoopCase(name, kind, family, path, hidden, (), None, None, None, None, "", error)
     file = msgspec.json.decode((folder / "reconcile.json").read_bytes(), type=ReconcileFile)
     diagnosis = read_diagnosis(folder / "diagnosis.json")
     found = tuple(f"{f.physics} at {f.where}" for f in diagnosis.findings)
     worst = max(file.unseen, key=lambda u: u.after)
-    failure = "; ".join(_failures(truth, diagnosis, worst.after))
-    far = worst.before, worst.geometry, worst.after
+    noise = noise_m(read(layout.recording(name)).samples, truth, family)
+    added_m = float(np.sqrt(np.nanmean(noise[list(file.unseen_rows)] ** 2)))
+    far = worst.before_m / added_m, worst.geometry_m / added_m, worst.after_m / added_m, worst.after
+    failure = "; ".join(_failures(truth, diagnosis, worst.after_m / added_m))
     return LoopCase(name, kind, family, path, hidden, found, *far, file.verdict, failure)
 
 
@@ -168,7 +174,7 @@ def table_text(cases: Sequence[LoopCase]) -> str:
             one.path,
             ", ".join(one.hidden) or "nothing",
             ", ".join(one.found) or "nothing",
-            *("-" if value is None else f"{value:.3g}" for value in (one.before, one.geometry, one.after)),
+            *("-" if value is None else f"{value:.3g}" for value in (one.before, one.geometry, one.after, one.said)),
             one.verdict or "-",
             one.failure.replace("|", "/") or "none",
         )

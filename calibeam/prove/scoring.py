@@ -76,12 +76,17 @@ CHANNELS: dict[str, tuple[str, ...]] = {"dual-psd": SPOTS, "tracker": POSITION, 
 WILD = 6.0  # sigmas: rows that every side of the comparison leaves out
 
 
+def noise_m(samples: Samples, truth: Truth, family: str) -> Floats:
+    """(sample, channel) what was really added to the readings of one of CHANNELS."""
+    recorded = np.stack([samples.column(name) for name in CHANNELS[family]], axis=1)
+    return np.asarray(recorded - np.array(truth.exact.values_m), dtype=np.float64)
+
+
 def floor_m(samples: Samples, truth: Truth, family: str) -> float | None:
-    """Rms over all readings but wild ones, m. None for cones: their noise is in the encoders."""
+    """Rms of the noise over all readings but wild ones, m. None for cones: their noise is in the encoders."""
     if family not in CHANNELS:
         return None
-    recorded = np.stack([samples.column(name) for name in CHANNELS[family]], axis=1)
-    noise: Floats = recorded - np.array(truth.exact.values_m)
+    noise = noise_m(samples, truth, family)
     size = np.max(np.abs(noise), axis=1)
     middle = float(np.median(np.abs(noise))) / 0.6745
     return float(np.sqrt(np.mean(noise[size <= WILD * middle] ** 2)))
