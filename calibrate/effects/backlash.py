@@ -4,7 +4,7 @@ import numpy as np
 
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.form import Floats, Form, at_joint
-from calibrate.effects.gravity import likely_torque_nm, loaded
+from calibrate.effects.gravity import likely_torque_nm, loaded, upright
 from calibrate.effects.kind import Kind
 from calibrate.effects.term import Inner, Missing, Shape, Term
 from calibrate.effects.time_laws import varies
@@ -19,9 +19,14 @@ def _terms(drivers: Drivers) -> tuple[Term, ...]:
         if drivers.approach is not None and varies(drivers.approach[:, joint - 1]):
             out.append(_by_friction(drivers, joint, drivers.approach))
         torque = likely_torque_nm(drivers, joint)
-        if torque.min() < 0.0 < torque.max():
+        if torque.min() < 0.0 < torque.max() and not upright(drivers, joint):
             out.append(_by_gravity(drivers, joint))
     return tuple(out)
+
+
+def _has_room(coefficients: Floats, inner: Floats) -> bool:
+    """Flanks do not overlap: a joint that is ahead of where it came from has no play."""
+    return bool(coefficients[0] >= 0.0)
 
 
 def _by_friction(drivers: Drivers, joint: int, approach: Floats) -> Term:
@@ -42,6 +47,7 @@ def _by_friction(drivers: Drivers, joint: int, approach: Floats) -> Term:
         limit=LIMIT_RAD,
         sentence=f"Joint {joint} stops {{play_rad}} apart, depending on which way it came: slack in the drive",
         directions=direction,
+        believable=_has_room,
     )
 
 
@@ -67,7 +73,9 @@ def _by_gravity(drivers: Drivers, joint: int) -> Term:
         sentence=f"Joint {joint} hangs {{play_rad}} from flank to flank, by the sign of its load: slack in the drive",
         directions=direction,
         # A flank that the largest load of the session hardly turns over to is no flank: that is a spring.
-        believable=lambda coefficients, inner: unit * inner[0] < STRAIGHT * largest,
+        believable=lambda coefficients, inner: (
+            _has_room(coefficients, inner) and bool(unit * inner[0] < STRAIGHT * largest)
+        ),
     )
 
 

@@ -29,6 +29,7 @@ class Form(Term):
     names: tuple[str, ...] = field(kw_only=True)
     limit: float = field(kw_only=True)
     sentence: str = field(kw_only=True)  # with {name} for sizes, in the units of `names`
+    reversed_sentence: str = field(kw_only=True, default="")  # where the first size is below zero, of its opposite
     directions: Floats | None = field(kw_only=True, default=None)  # (width, d); None: the function has its own
     polar: bool = field(kw_only=True, default=False)  # coefficients are (sine, cosine): amplitude and phase are told
     exact: Exact | None = field(kw_only=True, default=None)  # where `function` is the first order only
@@ -60,7 +61,11 @@ class Form(Term):
         return bool(np.max(np.abs(coefficients), initial=0.0) <= max(self.limit, NOISE_ALLOWS * noise_rad))
 
     def says(self, sizes: Mapping[str, Size]) -> str:
-        return self.sentence.format(**{name: plain(name, size) for name, size in sizes.items()})
+        sentence, (first, *_) = self.sentence, self.names
+        if self.reversed_sentence and first in sizes and sizes[first].value < 0.0:
+            sentence = self.reversed_sentence
+            sizes = {**sizes, first: Size(-sizes[first].value, sizes[first].sigma)}
+        return sentence.format(**{name: plain(name, size) for name, size in sizes.items()})
 
 
 def at_joint(joint: int, n_joints: int) -> tuple[Port, Floats]:

@@ -85,10 +85,13 @@ def gravity_in_flange(drivers: Drivers) -> Floats:
 
 def turning_joints(drivers: Drivers) -> str:
     """Joints, joined by commas, that turn the flange against gravity: "q2,q3,q4,q5"."""
-    axes = drivers.frames[:, :-1, :3, 2]
-    across = np.linalg.norm(np.cross(axes, drivers.gravity_m_s2), axis=2).max(axis=0)
-    upright = across < UPRIGHT * max(float(np.linalg.norm(drivers.gravity_m_s2)), 1e-9)
-    return ",".join(f"q{joint}" for joint, idle in enumerate(upright.tolist(), start=1) if not idle)
+    return ",".join(f"q{joint}" for joint in range(1, drivers.n_joints + 1) if not upright(drivers, joint))
+
+
+def upright(drivers: Drivers, joint: int) -> bool:
+    """Whether the axis of a joint (from 1) stays along gravity, whose moment about it is but that of a tilted foot."""
+    across = np.linalg.norm(np.cross(drivers.frames[:, joint - 1, :3, 2], drivers.gravity_m_s2), axis=1)
+    return bool(across.max() < UPRIGHT * max(float(np.linalg.norm(drivers.gravity_m_s2)), 1e-9))
 
 
 def point_of(drivers: Drivers, frame: int, point_m: tuple[float, float, float]) -> Floats:

@@ -26,7 +26,8 @@ def _of_last_move(drivers: Drivers, joint: int) -> Term:
     def function(drivers: Drivers, inner: Floats) -> Floats:
         return -drivers.last_move_rad[:, joint - 1 : joint]
 
-    return _term(drivers, joint, f"last_move{joint}", "of its last move", function)
+    short, ahead = f"Joint {joint} stops short by", f"The reading of joint {joint} is behind the joint by"
+    return _term(drivers, joint, f"last_move{joint}", (short, ahead), "of its last move", function)
 
 
 def _of_command(drivers: Drivers, joint: int) -> Term:
@@ -34,10 +35,12 @@ def _of_command(drivers: Drivers, joint: int) -> Term:
         apart = drivers.cmd_minus_q_rad
         return np.zeros((len(drivers.q_rad), 1)) if apart is None else apart[:, joint - 1 : joint]
 
-    return _term(drivers, joint, f"cmd_minus_q{joint}", "of what it was still asked to go", function)
+    behind, short = f"The reading of joint {joint} is behind the joint by", f"Joint {joint} is behind its reading by"
+    return _term(drivers, joint, f"cmd_minus_q{joint}", (behind, short), "of what it was still asked to go", function)
 
 
-def _term(drivers: Drivers, joint: int, driver: str, words: str, function: Functions) -> Term:
+def _term(drivers: Drivers, joint: int, driver: str, begins: tuple[str, str], ends: str, function: Functions) -> Term:
+    """`begins` of the sentence for a share above and below zero."""
     port, direction = at_joint(joint, drivers.n_joints)
     return Form(
         port,
@@ -47,7 +50,8 @@ def _term(drivers: Drivers, joint: int, driver: str, words: str, function: Funct
         function=function,
         names=("lag_share",),
         limit=LIMIT,
-        sentence=f"Joint {joint} lags by {{lag_share}} {words}",
+        sentence=f"{begins[0]} {{lag_share}} {ends}",
+        reversed_sentence=f"{begins[1]} {{lag_share}} {ends}",
         directions=direction,
     )
 
