@@ -6,9 +6,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.diagnose.curve import unit
 from calibrate.diagnose.linearised import Accepted, State
 from calibrate.diagnose.score import Removed, Scores, orthonormal, removed, scores
-from calibrate.diagnose.visible import VISIBLE, Menu, Sight, beyond, menu_of, sight_of
+from calibrate.diagnose.visible import VISIBLE, Menu, Sight, beyond, blind, menu_of, sight_of
+from calibrate.effects.form import at_joint
 from calibrate.effects.term import Term
 
 Floats = NDArray[np.float64]
@@ -27,16 +29,29 @@ class Bench:
         return sight_of(self.state.rows) if self.given is None else self.given.sight
 
     @cached_property
+    def blind(self) -> frozenset[str]:
+        """Ports of joints that next to no reading follows: nothing can be found there, whatever its size."""
+        n = self.state.drivers.n_joints
+        angles = [unit(at_joint(joint, n)[0], joint - 1) for joint in range(1, n + 1)]
+        felt = {one.port.where: float(np.linalg.norm(self.state.columns(one, np.zeros(0)))) for one in angles}
+        return frozenset(blind(felt))
+
+    @cached_property
+    def candidates(self) -> tuple[Term, ...]:
+        """All terms that could be seen at their place."""
+        return tuple(term for term in self.state.candidates() if term.port.where not in self.blind)
+
+    @cached_property
     def menu(self) -> Menu:
         """Closed terms: those that name physics."""
         if self.given is not None:
             return self.given
-        return self.menu_of(tuple(term for term in self.state.candidates() if not term.open))
+        return self.menu_of(tuple(term for term in self.candidates if not term.open))
 
     @cached_property
     def open_menu(self) -> Menu:
         """Open families of the catalogue: they compete, but name nothing."""
-        return self.menu_of(tuple(term for term in self.state.candidates() if term.open))
+        return self.menu_of(tuple(term for term in self.candidates if term.open))
 
     @cached_property
     def scores(self) -> Scores:

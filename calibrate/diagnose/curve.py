@@ -73,6 +73,19 @@ def curve(port: Port, component: int, names: tuple[str, ...], waves: int) -> Cur
     return Curve(port, names, shape, UNKNOWN, slow=slow, open=True, component=component, waves=waves)
 
 
+@dataclass(frozen=True)
+class Unit(Curve):
+    """Constant one at a component: its column is the sensitivity of all rows."""
+
+    def basis(self, drivers: Drivers, inner: Floats) -> Floats:
+        return at_component(self.port, self.component, np.ones((len(drivers.t_s), 1)), drivers)
+
+
+def unit(port: Port, component: int) -> Unit:
+    """At a component of a port."""
+    return Unit(port, (), Shape.CONSTANT, UNKNOWN, component=component)
+
+
 def features(causes: list[Floats], waves: int) -> Floats:
     """(pose, waves ** driver) sines on the box around -1 ... 1."""
     order = np.arange(1, waves + 1)

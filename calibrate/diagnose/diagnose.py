@@ -75,7 +75,7 @@ def _without_proof(found: Doubted, missing: Sequence[Missing]) -> Diagnosis:
         rejected=(),
         invisible=(),
         missing=tuple(missing),
-        next=(*found.next, *to_measure(found.findings)),
+        next=(*found.next, *to_measure(found.findings), *(to_see(where) for where in sorted(found.at.bench.blind))),
         model=found.at.state,
     )
 
@@ -86,7 +86,8 @@ def _wanders(at: Search, rng: Generator) -> bool:
 
 def _not_there(at: Search) -> tuple[tuple[Rejected, ...], tuple[Named, ...]]:
     """Rejected causes, and those that these poses do not show."""
-    return _rejected(at), tuple(dict.fromkeys(named(term) for term in at.bench.menu.invisible))
+    blind = [t for t in at.state.candidates() if t.port.where in at.bench.blind and not t.open]
+    return _rejected(at), tuple(dict.fromkeys(named(term) for term in (*at.bench.menu.invisible, *blind)))
 
 
 def _rejected(at: Search) -> tuple[Rejected, ...]:
@@ -104,6 +105,14 @@ def _rejected(at: Search) -> tuple[Rejected, ...]:
             why = "not beyond what searching through noise finds"
         best[term.physics] = Rejected(named(term), gain, why)
     return tuple(best.values())
+
+
+def to_see(where: str) -> str:
+    """What shows a joint that next to no reading follows."""
+    return (
+        f"{where} is blind: next to no reading follows this joint, so that nothing in it can be found or excluded; put "
+        "the target off its axis"
+    )
 
 
 def to_measure(findings: Sequence[Finding]) -> tuple[str, ...]:

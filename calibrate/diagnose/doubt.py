@@ -33,7 +33,7 @@ from calibrate.diagnose.hidden_levers import TIME
 from calibrate.diagnose.lack_of_fit import LackOfFit, lack_of_fit
 from calibrate.diagnose.linearised import Accepted, State
 from calibrate.diagnose.pruning import without
-from calibrate.diagnose.rivals import Rival, rivals_of
+from calibrate.diagnose.rivals import Rival, price, rivals_of
 from calibrate.diagnose.score import gain_of
 from calibrate.diagnose.search import search
 from calibrate.diagnose.searching import BETTER, Search
@@ -41,7 +41,7 @@ from calibrate.diagnose.stages import Stage, Stages
 from calibrate.diagnose.time_left import TimeLeft, time_left
 from calibrate.diagnose.unknown import with_unknowns
 from calibrate.diagnose.unrecorded import Unrecorded, unrecorded
-from calibrate.effects.term import Missing, Term
+from calibrate.effects.term import Missing
 
 SPEED = "qd"
 MOTION = ("approach", "last_move")
@@ -51,7 +51,6 @@ SEVERAL = 3  # joints: one clock is simpler than slack in each
 # 3.2.
 TIED = 2.0
 ROUNDS = 6
-WARMTH = "temp_"
 
 Rivals = tuple[tuple[Rival, ...], ...]
 
@@ -211,14 +210,14 @@ def _exchanged(at: Search, rivals: Rivals) -> Search | None:
     """With the first name exchanged that has a better one; None if there is none."""
     for i, (own, mine) in enumerate(zip(at.state.accepted, rivals, strict=True)):
         class_ = [(0.0, own), *((r.margin, r.accepted) for r in mine if r.refitted and r.plausible)]
-        class_ = [(margin + _price(at.bench, a.term), a) for margin, a in class_]
+        class_ = [(margin + price(at.bench, a.term), a) for margin, a in class_]
         least = min(margin for margin, _ in class_)
         near = [c for c in class_ if c[0] <= least + TIED]
         best = min(near, key=lambda c: (len(c[1].term.depends_on), c[1].term.order or 1, *_rank(at, c, least, own)))[1]
         if best is own:
             continue
         bench = Bench(at.state.refitted([best if j == i else a for j, a in enumerate(at.state.accepted)]))
-        dearer = _price(at.bench, best.term) - _price(at.bench, own.term)
+        dearer = price(at.bench, best.term) - price(at.bench, own.term)
         if bench.bic + dearer <= at.bench.bic + TIED:
             return replace(at.at(bench), p=at.p | {best.term.key: at.p.get(own.term.key, 0.0)})
     return None
@@ -230,17 +229,6 @@ def _rank(at: Search, candidate: tuple[float, Accepted], least: float, own: Acce
     if margin <= least + BETTER:
         return least, at.bench.menu.place_of(accepted.term)
     return (margin - BETTER if accepted is own else margin), 0
-
-
-def _price(bench: Bench, term: Term) -> float:
-    """BIC of having picked a thermometer: the one at the place itself is free, any other one of many.
-
-    Source: extended BIC, Chen, Chen, Biometrika 95(3), 2008, gamma = 1.
-    """
-    driver, where = term.depends_on[0], term.port.where
-    if not driver.startswith(WARMTH) or where.startswith(driver.removeprefix(WARMTH) + "."):
-        return 0.0
-    return 2.0 * float(np.log(max(len(bench.state.drivers.temperatures_degC), 1)))
 
 
 def predicts(bench: Bench, rng: Generator) -> Floats:

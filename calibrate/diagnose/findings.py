@@ -33,6 +33,7 @@ Floats = NDArray[np.float64]
 
 NOT_FINAL = 0.5  # of the confidence in a name that may be the rest of something else
 ALIKE = 1e-6  # sine between what two names can make of the readings
+FAINT = 0.05  # a name that is less likely is none
 LEFTOVER = 0.1  # of what an unknown cause explains: a curve may leave so much of a law that it only resembles
 
 SEVERAL = 3  # two may share a joint
@@ -55,12 +56,21 @@ def findings_of(
     accepted = at.state.accepted
     unnamed = _unnamed(at)
     taken = {i for group in unnamed for i in group}
-    names = [_finding(at, i, rivals[i], float(predicts[i])) for i in range(len(accepted)) if i not in taken]
+    closed = [i for i in range(len(accepted)) if i not in taken]
+    names = [_finding(at, i, rivals[i], float(predicts[i])) for i in closed]
     unknown = [unknown_cause(at, group, predicts) for group in unnamed]
     names = [f if final and _final(f, unknown) else f.believed(NOT_FINAL) for f in names]
+    names = [f if f.confidence >= FAINT else _unsure(at, i, f, predicts) for i, f in zip(closed, names, strict=True)]
     explained = max(sum(f.share for f in (*names, *unknown)), 1e-300)
     found = [replace(f, share=f.share / explained) for f in (*_no_leftovers(names, unknown), *unknown)]
     return tuple(sorted(found, key=lambda f: -f.share))
+
+
+def _unsure(at: Search, i: int, finding: Finding, predicts: Floats) -> Finding:
+    """The unknown cause in the place of a name that nobody believes, which stays among what it could be."""
+    found = unknown_cause(at, (i,), predicts)
+    own = RivalName(finding.name, finding.confidence, 0.0, refitted=True)
+    return replace(found, rivals=(own, *finding.rivals), variant=finding.variant)
 
 
 def bare_findings(at: Search) -> tuple[Finding, ...]:
@@ -108,7 +118,7 @@ def _final(finding: Finding, unknown: Sequence[Finding]) -> bool:
 def _finding(at: Search, i: int, rivals: Sequence[Rival], predicts: float) -> Finding:
     """Its share as a square, not divided by that of all."""
     bench, a = at.bench, at.state.accepted[i]
-    belief = confidences(rivals)
+    belief = confidences(bench, a.term, rivals)
     same = np.array(
         [True, *(r.term.port.where == a.term.port.where and r.term.physics == a.term.physics for r in rivals)]
     )

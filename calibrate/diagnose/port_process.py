@@ -16,11 +16,9 @@ from scipy.sparse import csr_matrix
 
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.causes import acts_at, causes_of
-from calibrate.diagnose.curve import UNKNOWN, Curve, at_component, curve, features, frequencies
+from calibrate.diagnose.curve import Curve, curve, features, frequencies, unit
 from calibrate.diagnose.score import Removed
-from calibrate.effects.drivers import Drivers
 from calibrate.effects.ports import Port
-from calibrate.effects.term import Shape
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -175,7 +173,7 @@ class _Felt:
 
 def lever(bench: Bench, port: Port, component: int) -> Floats:
     """(row,) derivative of the expected rows by one component of a port."""
-    return bench.state.columns(_Unit(port, (), Shape.CONSTANT, UNKNOWN, component=component), np.zeros(0))[:, 0]
+    return bench.state.columns(unit(port, component), np.zeros(0))[:, 0]
 
 
 def places_of(bench: Bench) -> tuple[tuple[Port, int], ...]:
@@ -185,7 +183,7 @@ def places_of(bench: Bench) -> tuple[tuple[Port, int], ...]:
     """
     found: dict[tuple[Port, int], tuple[Port, int]] = {}
     drivers = bench.state.drivers
-    for term in {(t.port, t.physics): t for t in bench.state.candidates()}.values():
+    for term in {(t.port, t.physics): t for t in bench.candidates}.values():
         inner = np.array([spec.grid[len(spec.grid) // 2] for spec in term.inner])
         where = term.port.where
         if where == TIME or term.port.past_encoders or (where.startswith("link") and not where.endswith(".tilt")):
@@ -194,14 +192,6 @@ def places_of(bench: Bench) -> tuple[tuple[Port, int], ...]:
         for component in np.flatnonzero(acts):
             found.setdefault((term.port, int(component)), (term.port, int(component)))
     return tuple(found.values())
-
-
-@dataclass(frozen=True)
-class _Unit(Curve):
-    """Constant one at a component: its column is the sensitivity of all rows."""
-
-    def basis(self, drivers: Drivers, inner: Floats) -> Floats:
-        return at_component(self.port, self.component, np.ones((len(drivers.t_s), 1)), drivers)
 
 
 def _may_pair(names: tuple[str, ...]) -> bool:

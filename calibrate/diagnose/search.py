@@ -55,8 +55,9 @@ def unswallowed(at: Search) -> Search | None:
     if at.state.distrusted < FEWEST_AFTER:
         return None
     trusting = at.state.trusting()
-    steps = tuple(t for t in trusting.candidates() if t.shape is Shape.STEP and not t.open)
-    bench = Bench(trusting, Bench(trusting).menu_of(steps))
+    whole = Bench(trusting)
+    steps = tuple(t for t in whole.candidates if t.shape is Shape.STEP and not t.open)
+    bench = Bench(trusting, whole.menu_of(steps))
     proposed = admissible(bench, bench.scores, None, 0.0, at.causes | at.banned)
     if proposed is None:
         return None

@@ -4,9 +4,10 @@ Only that part of an effect can be seen; a fit hands the rest to lengths and off
 Plumlee, Bayesian calibration of inexact computer models, J. Am. Stat. Assoc. 112(519), 2017, section 3.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,10 @@ from calibrate.effects.term import Term
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+K = TypeVar("K")
 
 VISIBLE = 1e-5  # share of a column's square; below it the poses do not show the effect
+BLIND = 2e-3  # of the largest lever of a joint: a millimetre or two, where other errors of the arm count as a turn
 RANK = 1e-10  # of the largest singular value of the scaled geometry
 
 
@@ -47,6 +50,15 @@ def sight_of(rows: Rows) -> Sight:
     basis = U[:, :rank]
     residual = rows.residual - basis @ (basis.T @ rows.residual)
     return Sight(basis, residual, (basis / s[:rank]) @ Vt[:rank], int(rows.data.sum()))
+
+
+def blind(levers: Mapping[K, float]) -> tuple[K, ...]:
+    """Joints that next to no reading follows, such as joint 6 where the target lies on its axis.
+
+    Their lever is what errors elsewhere leave there: a size over it is no angle of the joint.
+    """
+    most = max(levers.values(), default=0.0)
+    return tuple(one for one, size in levers.items() if size < BLIND * most)
 
 
 @dataclass(frozen=True)

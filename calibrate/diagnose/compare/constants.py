@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from calibrate.diagnose.diagnosis import Named
 from calibrate.diagnose.fitted import Fitted
+from calibrate.diagnose.visible import blind
 from calibrate.effects.since_model import RECORDING
 from calibrate.effects.term import Shape
 from calibrate.parameters import Parameter, plausible_sizes
@@ -35,9 +36,6 @@ FRAMES = {
 }
 TIED = 2.0  # of BIC: no more than a bare mention (Kass, Raftery 1995)
 RIVAL = 6.0  # of BIC: strong evidence against what is farther off (Kass, Raftery 1995)
-BLIND = (
-    2e-3  # of the largest lever of a joint: a millimetre or two, about which other errors of the arm count as a turn
-)
 
 
 @dataclass(frozen=True)
@@ -119,14 +117,10 @@ class Quadratic:
 
 
 def blind_zeros(fitted: Fitted, parts: Sequence[Part]) -> tuple[Part, ...]:
-    """Zeros that next to no reading follows, such as that of joint 6 where the target lies on its axis.
-
-    Their lever is what the fit of the other constants leaves there: a size over it is no angle of the joint.
-    """
+    """Zeros that next to no reading follows."""
     free = [p.name for p in fitted.problem.parameters if p.free]
     felt = np.linalg.norm(fitted.rows.geometry[fitted.rows.data], axis=0)
-    lever = {part: float(felt[free.index(part.names[0])]) for part in parts if part.physics == ZERO}
-    return tuple(part for part, size in lever.items() if size < BLIND * max(lever.values()))
+    return blind({part: float(felt[free.index(part.names[0])]) for part in parts if part.physics == ZERO})
 
 
 def fewest(whole: Quadratic) -> tuple[Part, ...]:

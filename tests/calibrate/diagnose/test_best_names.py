@@ -7,7 +7,10 @@ import pytest
 
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.doubt import with_best_names
+from calibrate.diagnose.findings import findings_of
 from calibrate.diagnose.line_search import refined
+from calibrate.diagnose.linearised import Accepted
+from calibrate.diagnose.rivals import Rival, confidences
 from calibrate.diagnose.searching import Search
 from calibrate.effects.term import Shape
 
@@ -70,3 +73,42 @@ def test_time_and_a_temperature_that_follows_it_are_rivals_of_each_other(world):
         _, at, rivals = settled(replace(session, terms=terms), first, np.random.default_rng(0))
         told = {at.state.accepted[0].term.key, *(r.term.key for r in rivals[0])}
         assert {by_time.key, by_warmth.key} <= told
+
+
+def believed(world, *rivals):
+    """(1 + rival,) of a finding joint-compliance; `rivals` as physics, margin, whether a machine could be so."""
+    session = world.session(np.random.default_rng(5), [])
+    own = replace(named(session, "joint2.angle", "encoder-eccentricity"), physics="joint-compliance")
+    others = [
+        Rival(Accepted(replace(own, physics=p), np.ones(2), np.zeros(0)), margin, refitted=True, plausible=could)
+        for p, margin, could in rivals
+    ]
+    return confidences(Bench(session), own, others)
+
+
+def test_the_first_name_is_never_less_likely_than_another(world):
+    own, better = believed(world, ("backlash", -1.5, True))
+    assert own == better == 0.5
+    own, better = believed(world, ("backlash", -9.0, False))
+    assert own == better < 0.05
+
+
+def test_of_names_that_fit_alike_the_softer_part_is_likelier(world):
+    joint, base, link, tool = believed(
+        world, ("base-compliance", 0.0, True), ("link-bending", 0.0, True), ("tool-sag", 0.0, True)
+    )
+    assert joint == pytest.approx(2.0 * base)
+    assert base == pytest.approx(2.0 * link)
+    assert link == pytest.approx(2.0 * tool)
+
+
+def test_a_name_that_nobody_believes_gives_way_to_an_unknown_cause(world):
+    rng = np.random.default_rng(2)
+    session = world.session(rng, [(world.at_joint(2, lambda d: np.sin(d.q_rad[:, 1])), 0.4)])
+    _, at, _ = settled(session, named(session, "joint2.angle", "encoder-eccentricity"), rng)
+    winner = Rival(at.state.accepted[0], -9.0, refitted=True, plausible=False)
+    winner = replace(winner, accepted=replace(winner.accepted, term=replace(winner.term, physics="backlash")))
+    for rivals, physics in (((), "encoder-eccentricity"), ((winner,), "unknown")):
+        (found,) = findings_of(at, [rivals], np.ones(1))
+        assert (found.name.where, found.name.physics) == ("joint2.angle", physics)
+        assert not rivals or {r.name.physics for r in found.rivals} == {"encoder-eccentricity", "backlash"}

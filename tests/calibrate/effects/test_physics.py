@@ -4,17 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from calibrate.diagnose.ported import perturbed_frames
 from calibrate.effects.arm_thermal_growth import EFFECT as ARM_GROWTH
 from calibrate.effects.backlash import EFFECT as BACKLASH
 from calibrate.effects.curves import bumps, splines
 from calibrate.effects.encoder_eccentricity import EFFECT as ECCENTRICITY
-from calibrate.effects.gravity import gravity_in_flange, masses
+from calibrate.effects.gravity import gravity_in_flange, likely_torque_nm, masses
 from calibrate.effects.link_bending import EFFECT as BENDING
 from calibrate.effects.open_at_readouts import EFFECT as READOUTS
 from calibrate.effects.ports import Perturbation
-from calibrate.effects.term import Shape
+from calibrate.effects.reading_lag import EFFECT as LAG
+from calibrate.effects.term import Shape, Size
 from calibrate.effects.tool_sag import EFFECT as SAG
 
 from .conftest import full_session
@@ -90,6 +92,44 @@ def test_an_approach_that_is_derived_is_called_hysteresis():
     shapes = {d: {t.shape for t in BACKLASH.terms(replace(drivers, approach_derived=d))} for d in (False, True)}
     assert Shape.HYSTERESIS not in shapes[False]
     assert Shape.HYSTERESIS in shapes[True]
+
+
+def test_flanks_do_not_overlap():
+    for term in BACKLASH.terms(full_session("tracker").drivers):
+        inner = np.array([spec.grid[0] for spec in term.inner])
+        assert term.plausible(np.array([3e-5]), inner, 1e-6)
+        assert not term.plausible(np.array([-3e-5]), inner, 1e-6)
+
+
+def test_gravity_turns_no_slack_over_about_an_upright_axis():
+    """The foot is 5 mrad off level: the moment about joint 1 has both signs, and no flank follows it."""
+    drivers = full_session("tracker").drivers
+    arm = drivers.rig.arm
+    tilted = replace(
+        drivers, rig=structs.replace(drivers.rig, arm=structs.replace(arm, gravity_m_s2=(0.05, 0.0, -9.81)))
+    )
+    assert np.ptp(np.sign(likely_torque_nm(tilted, 1))) == 2.0
+    by_gravity = {t.port.where for t in BACKLASH.terms(tilted) if t.depends_on[0].startswith("gravity_torque")}
+    assert "joint1.angle" not in by_gravity
+    assert by_gravity
+
+
+@pytest.mark.parametrize(
+    ("driver", "share", "says"),
+    [
+        ("last_move2", 0.04, "Joint 2 stops short by 4 ± 0.1% of its last move"),
+        ("last_move2", -0.04, "The reading of joint 2 is behind the joint by 4 ± 0.1% of its last move"),
+        (
+            "cmd_minus_q2",
+            0.04,
+            "The reading of joint 2 is behind the joint by 4 ± 0.1% of what it was still asked to go",
+        ),
+        ("cmd_minus_q2", -0.04, "Joint 2 is behind its reading by 4 ± 0.1% of what it was still asked to go"),
+    ],
+)
+def test_a_lag_says_what_is_behind_what(driver, share, says):
+    term = next(t for t in LAG.terms(full_session("tracker").drivers) if t.depends_on == (driver,))
+    assert term.says({"lag_share": Size(share, 1e-3)}) == says
 
 
 def test_bent_light_falls_along_gravity_by_the_square_of_the_level_range():
