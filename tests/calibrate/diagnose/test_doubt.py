@@ -50,7 +50,8 @@ def test_a_clear_effect_has_no_rivals_and_full_confidence(world):
     rng = np.random.default_rng(1)
     found = search(world.session(rng, [(world.at_joint(2, sine(2)), 2.0)]), rng)
     assert rivals_of(found.bench, 0) == ()
-    assert confidences(()) == pytest.approx([1.0])
+    (own,) = found.state.accepted
+    assert confidences(found.bench, own.term, ()) == pytest.approx([1.0])
 
 
 def test_isolability_is_one_for_the_same_shape_and_small_for_others(world):
