@@ -1,5 +1,6 @@
 """A state on the bench: what judging additions, removals and replacements needs, computed once and if asked for."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -31,10 +32,14 @@ class Bench:
     @cached_property
     def blind(self) -> frozenset[str]:
         """Ports of joints that next to no reading follows: nothing can be found there, whatever its size."""
+        return frozenset(blind(self._levers))
+
+    @cached_property
+    def _levers(self) -> Mapping[str, float]:
+        """Port of each joint -> what one radian there does to all rows together."""
         n = self.state.drivers.n_joints
         angles = [unit(at_joint(joint, n)[0], joint - 1) for joint in range(1, n + 1)]
-        felt = {one.port.where: float(np.linalg.norm(self.state.columns(one, np.zeros(0)))) for one in angles}
-        return frozenset(blind(felt))
+        return {one.port.where: float(np.linalg.norm(self.state.columns(one, np.zeros(0)))) for one in angles}
 
     @cached_property
     def candidates(self) -> tuple[Term, ...]:
@@ -81,13 +86,8 @@ class Bench:
     @cached_property
     def noise_rad(self) -> float:
         """Turn of the joint that is felt most, which an average pose would show as one sigma."""
-        felt = [
-            float(np.linalg.norm(block.raw[0, 0] * block.size[0, 0]))
-            for block in self.menu.blocks
-            if block.size.size
-            and self.menu.terms[self.menu.entries[block.entries[0]].term].port.where.endswith(".angle")
-        ]
-        return float(np.sqrt(self.state.samples) / max(felt)) if felt and max(felt) > 0.0 else 0.0
+        most = max(self._levers.values())
+        return float(np.sqrt(self.state.samples) / most) if most > 0.0 else 0.0
 
     @cached_property
     def plausible(self) -> NDArray[np.bool_]:
