@@ -29,7 +29,7 @@ class Beliefs:
     zero_rad: float = 0.02  # a zero within 2 deg
     mount_m: float = 1e-3
     mount_rad: float = 4e-3
-    place_m: float = 1e-2  # a fixture set down by hand where the rig file says
+    place_m: float = 1e-2  # a fixture set down by hand where the rig file has it
     place_rad: float = 0.03
     links_m: float = 3e-4  # links are held nominal; this much of the spots they leave unexplained
 

@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 
 class Light(Enum):
-    """Where a beam goes, as believed."""
+    """Where a beam goes, as assumed."""
 
     BOTH_LIT = "the beam strikes the first face and is reflected onto the second"
     OFF_FACE = "the beam meets a face's plane beside the face"

@@ -11,7 +11,7 @@ from calibrate.sensors.dual_psd import PairBelief
 # An uncalibrated arm misses by up to 2.6 mm and some mrad (arms/belief.py); a single link may hold several times that,
 # since neighbours share it.
 WIDE = LinkBelief(5e-3, 1e-2, assumed=True)
-# Cones without a bar hold no scale: least squares shrinks the arm, and it looks like a better fit. Machined links.
+# Cones without a bar hold no scale: least squares shrinks the arm, and the fit seems better. Machined links.
 SCALELESS = LinkBelief(0.5e-3, 2e-3, assumed=True)
 # Of PSD 2 in PSD 1: two detectors screwed to a bracket, which is not machined to what they resolve.
 PAIR = PairBelief(1e-3, 5e-3, assumed=True)

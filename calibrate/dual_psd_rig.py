@@ -15,7 +15,7 @@ from calibrate.sensors.spots import laser_of as laser_of
 from calibrate.sensors.spots import psd_sigma_m
 
 JOINT_BELIEVED_RAD = (
-    1e-5  # 10 um at 1 m reach: repeatability class of small arms (calibration data sheets: 0.01-0.03 mm)
+    1e-5  # 10 µm at 1 m reach: repeatability class of small arms (calibration data sheets: 0.01-0.03 mm)
 )
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 
 class DataError(ValueError):
-    """Too few poses, a missing column, shapes that disagree; the message says what, where, value and remedy."""
+    """Too few poses, a missing column, shapes that disagree; the message states what, where, value and remedy."""
 
 
 class UndeterminedError(DataError, np.linalg.LinAlgError):

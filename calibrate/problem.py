@@ -99,7 +99,7 @@ class Problem:
         """Rank is to be judged here: a condition at the nearest joint readings that fulfil it; readings as they are.
 
         What moves everything alike (a turn about axis 1 with all seats) turns what is left of a condition as well, and
-        the derivative by it would look like information; where nothing is left there is none.
+        the derivative by it would resemble information; where nothing is left there is none.
         """
         if not self.condition:
             return self

@@ -96,12 +96,12 @@ class SampleTable:
 
     @property
     def tool_seen_m(self) -> Floats | None:
-        """(3,) the target as found with the device's frame; None where the rig says it, or without positions."""
+        """(3,) the target as found with the device's frame; None where the rig states it, or without positions."""
         return self._aligned[1]
 
     @cached_property
     def target(self) -> Target:
-        """As the rig says, else as the first of the sensors that can finds it."""
+        """As the rig states, else as the first of the sensors that can finds it."""
         point = self.rig.tool.point_m
         if point is not None:
             return Target(np.array(point))
@@ -129,7 +129,7 @@ class SampleTable:
         return self.target.in_base(np.zeros(3), self.T_base_flange)
 
     def device(self, origin_m: Callable[[], Floats] | None = None) -> Device:
-        """As the rig says, else as the positions have it, else about an origin (3,) in the axes of the base."""
+        """As the rig states, else as the positions have it, else about an origin (3,) in the axes of the base."""
         if (given := self.rig.device) is not None:
             tolerance = self.rig.tolerance
             prior = None

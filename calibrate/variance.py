@@ -1,6 +1,6 @@
 """Sizes of several sources of noise at once, over several instruments, by restricted maximum likelihood (REML).
 
-What is found is the variance of each source over the believed one: joint repeatability mapped through the arm, the
+What is found is the variance of each source over the assumed one: joint repeatability mapped through the arm, the
 detectors' own noise, ... The believed sizes are the start and hold the answer by a wide prior. Sources: Patterson,
 Thompson, Biometrika 58(3), 1971 (REML); Satterthwaite's degrees of freedom: Fai, Cornelius, J. Statist. Comput. Simul.
 54, 1996.
@@ -47,7 +47,7 @@ class VarianceFactors:
 
 
 def as_believed(sources: int) -> VarianceFactors:
-    """Every source as large as believed, and as doubtful."""
+    """Every source as large as assumed, and as uncertain."""
     return VarianceFactors(
         np.zeros(sources), LOG_VARIANCE_PRIOR**2 * np.eye(sources), converged=True, at_zero=(False,) * sources
     )

@@ -36,7 +36,7 @@ class Measured:
 
     name: str  # "position", "dual-psd", ...
     problem: Problem
-    own_sigma: Mapping[str, Floats]  # source -> (row, k) as believed, zero where the source does not reach
+    own_sigma: Mapping[str, Floats]  # source -> (row, k) as assumed, zero where the source does not reach
     sample_rows: Indices  # (row, 1) or (row, 2): rows of the table of samples that each row was made of
     own_correlation: Floats | None = None  # (row,) of pairs: of its own noise with the next row's, if they share a pose
 
@@ -104,11 +104,11 @@ class Weighting:
 
     @property
     def believed(self) -> VarianceFactors:
-        """Every source as large as believed."""
+        """Every source as large as assumed."""
         return as_believed(len(self.sources))
 
     def problem(self, theta: Floats, factors: VarianceFactors | None = None) -> JointProblem:
-        """The joint problem with weights from the noise at `theta` (param,), as believed without `factors`."""
+        """The joint problem with weights from the noise at `theta` (param,), as assumed without `factors`."""
         size = self.believed if factors is None else factors
         blocks = [
             instrument.weighted(self.unweighted.of_block(i, theta), self.joint_rad, self._sources_of(i), size)

@@ -4,7 +4,7 @@
     y = y0 + gy v + cy u + py v u^2 + qy v^3        all coefficients in metres
 
 g is gain, c cross-talk of the axes, p and q the odd cubic terms of a cushion or barrel: a face that is symmetric about
-both axes has no others up to the third order. Size to expect: Hamamatsu, S1880 and S2044 data sheets, 40 to 150 um.
+both axes has no others up to the third order. Size to expect: Hamamatsu, S1880 and S2044 data sheets, 40 to 150 µm.
 """
 
 import json

@@ -46,7 +46,7 @@ class EmulatedWorld:
 
     physics: World | HandWorld
     verbs: Mapping[str, Callable[..., Any]]  # of the side channel, beside those of the devices
-    time_scale: float  # as the rig says
+    time_scale: float  # as the rig states
     write_truth: Callable[[Path], None]
 
 
@@ -92,7 +92,7 @@ Announcement = dict[str, dict[str, Any]]
 
 @dataclass(frozen=True)
 class ServeOptions:
-    """What a start may set beside the rig; None leaves what the rig says."""
+    """What a start may set beside the rig; None leaves what the rig states."""
 
     robot_host: str | None = None  # an address, or "auto": the first 127.0.0.x that is free
     truth_path: Path | None = None  # where the concealed truth is written, outside of any recording

@@ -43,7 +43,7 @@ def between(near: BeamTarget, far: BeamTarget, share: float) -> BeamTarget:
 
 
 def flange_for(arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, target: BeamTarget) -> Floats:
-    """T_base_flange (4, 4) that puts the believed beam on target."""
+    """T_base_flange (4, 4) that puts the assumed beam on target."""
     hit_m, direction = optics.line(np.array(target.spots_m), target.first)
     R = T_base_fixture[:3, :3]
     direction_base = R @ direction

@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 
 
 class BelievedArm(Kinematics, Protocol):
-    """The arm with its laser as believed now. `q_rad` (joint,) are the controller's readings."""
+    """The arm with its laser as known now. `q_rad` (joint,) are the controller's readings."""
 
     def beam(self, q_rad: Floats) -> tuple[Floats, Floats]:
         """Origin (3,) m and unit direction (3,) of the laser beam in the base frame."""

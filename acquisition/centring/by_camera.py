@@ -35,7 +35,7 @@ class Aimed(Enum):
 
 @dataclass(frozen=True, eq=False)
 class CameraAim:
-    """Where the arm stands after it, at command `q_rad`; the fixture as believed there, and the roll that it took."""
+    """Where the arm stands after it, at command `q_rad`; the fixture as assumed there, and the roll that it took."""
 
     aimed: Aimed
     target: BeamTarget
@@ -52,7 +52,7 @@ class Aim:
         self._motions = 0
 
     def run(self, target: BeamTarget, q_rad: Floats, T_base_fixture: Floats, rng: np.random.Generator) -> CameraAim:
-        """From command `q_rad` (joint,), where the arm stands; `T_base_fixture` as believed so far."""
+        """From command `q_rad` (joint,), where the arm stands; `T_base_fixture` as known so far."""
         fixture, seen_rad = T_base_fixture, None
         for _ in range(LOOKS):
             found = self._sight.fixture(self._arm, q_rad, fixture)

@@ -87,7 +87,7 @@ class Limits:
     tolerance_m: float = 5e-6  # on each of the four coordinates
     max_steps: int = 40
     step_rad: float = 0.2  # largest joint step
-    dwell_s: float = 0.05  # 50 samples of 2 um: 0.3 um
+    dwell_s: float = 0.05  # 50 samples of 2 µm: 0.3 µm
     halvings: int = 6  # of a step that lost the light
     cycle: int = 6  # steps without a better reading that end a run near the target
     cycle_m: float = 1e-4  # "near"

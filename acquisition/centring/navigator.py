@@ -185,7 +185,7 @@ class Navigator:
         return not all(self._bench.look(GLANCE_S).lit(first))
 
     def _seen(self, T: Floats) -> Floats:
-        """The fixture as the camera sees it from here; as believed where it does not, or where there is none."""
+        """The fixture as the camera sees it from here; as assumed where it does not, or where there is none."""
         seen = None if self._sight is None else self._sight.fixture(self._learner.arm, self.q_rad, T)
         return T if seen is None else seen
 

@@ -45,7 +45,7 @@ def grip(arm: BelievedArm, q_rad: Floats, stand_off_m: float) -> float:
 
 
 def rolled(arm: BelievedArm, q_rad: Floats, stand_off_m: float) -> Floats:
-    """A joint step (joint,) that rolls about the believed beam towards the better grip, until that is twice enough."""
+    """A joint step (joint,) that rolls about the assumed beam towards the better grip, until that is twice enough."""
     begin_rad, (origin_m, direction) = q_rad, arm.beam(q_rad)
     while grip(arm, q_rad, stand_off_m) < 2.0 * LEAST_GRIP:
         held = _held(arm, q_rad, stand_off_m)
@@ -151,7 +151,7 @@ class Registered:
         return Proposal(step, "correct", promise=gain)
 
     def _onto_beam(self, T_guess: Floats, q_rad: Floats, spots_m: Floats) -> Floats:
-        """The guess, turned and shifted as little as possible so that the measured beam lies on the believed one."""
+        """The guess, turned and shifted as little as possible so that the measured beam lies on the assumed one."""
         hit_m, direction = self._optics.line(spots_m, self._first)
         origin_base_m, direction_base = self._arm.beam(q_rad)
         turned = Rotation.align_vectors(direction_base[None], (T_guess[:3, :3] @ direction)[None])[0]
@@ -215,7 +215,7 @@ def correction(
 def stand_off(
     arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, q_rad: Floats, spots_m: Floats, first: int
 ) -> float:
-    """From the laser to the first face along the beam (m), as believed, within what can be."""
+    """From the laser to the first face along the beam (m), as assumed, within what can be."""
     hit_m, direction = optics.line(spots_m, first)
     origin_m, _ = in_fixture(T_base_fixture, *arm.beam(q_rad))
     return float(np.clip((hit_m - origin_m) @ direction, *STAND_OFF_RANGE_M))

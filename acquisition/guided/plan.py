@@ -1,6 +1,6 @@
 """What a guided session takes, in its order: readings of one visit are recorded together.
 
-Cones come twice, before and after the bars, so that what drifts meanwhile does not look like geometry.
+Cones come twice, before and after the bars, so that what drifts meanwhile is not taken for geometry.
 """
 
 from collections.abc import Iterator, Mapping

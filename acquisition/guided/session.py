@@ -16,7 +16,7 @@ from acquisition.guided.reading import Cone, Judge, Reading, SphereSpot, Target
 from acquisition.guided.stillness import ArmMotion, EncoderWatch, GuidedArm, StillRule, Window
 
 Floats = NDArray[np.float64]
-ATTEMPTS = 4  # at one reading; then it is left out, or taken where only its place is in doubt
+ATTEMPTS = 4  # at one reading; then it is left out, or taken where only its place is uncertain
 CANDIDATES = 48  # postures to choose from
 NEAR_M = 0.05  # of the place in the rig file: cones stand about there, and the arm is not calibrated
 ANEW_RAD = 3e-3  # a standstill is another one when some joint has moved so far since the last reading
@@ -42,7 +42,7 @@ class GuidedSummary:
 
     readings: tuple[Reading, ...]
     slips: int  # readings that were rejected
-    doubted: int  # taken though they stayed in doubt: the identification decides
+    doubted: int  # taken though they stayed uncertain: the identification decides
     skipped: int  # visits without a reading
 
 
@@ -81,7 +81,7 @@ class GuidedSession:
         return GuidedSummary(tuple(self._taken), **self._counts)
 
     def _take(self, visit: GuidedVisit) -> None:
-        """All readings of a visit, again while they are in doubt."""
+        """All readings of a visit, again while they are uncertain."""
         for attempt in range(1, ATTEMPTS + 1):
             readings = [
                 reading for target in visit.targets if (reading := self._reading(target, visit, attempt)) is not None

@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 
 class GuidedArm(Protocol):
-    """A measuring arm as believed."""
+    """A measuring arm as assumed."""
 
     @property
     def lower_rad(self) -> Floats:
@@ -84,7 +84,7 @@ class StillRule:
     place_m: float = 15e-6  # beyond what a reading's noise gives at 1 m; a ball on the rim is off by ten times that
     sigmas: float = 6.0
     joint_rad: float = (
-        0.01  # swing of a joint: beyond, the probe's place at the mean angle is not its mean place: 10 um
+        0.01  # swing of a joint: beyond, the probe's place at the mean angle is not its mean place: 10 µm
     )
 
     def judge(self, arm: GuidedArm, window: Window) -> ArmMotion:

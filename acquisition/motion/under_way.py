@@ -38,7 +38,7 @@ class UnderWay:
         self._near_m = nearest_m(cell.keep_out, self._body.at(frames)[0]) if cell.keep_out else np.empty(0)
 
     def check(self, q_rad: Floats, t_s: float) -> None:
-        """The next set-point (joint,), about to be sent. InterruptedMotionError says what is wrong."""
+        """The next set-point (joint,), about to be sent. InterruptedMotionError states what is wrong."""
         while len(self._sent) > 1 and self._sent[1][0] <= t_s - WINDOW_S:
             self._sent.popleft()
         self._check_range(q_rad)

@@ -17,7 +17,7 @@ from acquisition.recording.recording import Stream
 from acquisition.recording.samples import Floats
 
 FEWEST = 10  # samples
-SHORTEST_S = 1.0  # of device time: below it a delay of a millisecond looks like a rate of 0.1 %
+SHORTEST_S = 1.0  # of device time: below it a delay of a millisecond resembles a rate of 0.1 %
 WINDOW_S = 60.0  # a crystal's rate changes with the room's temperature, over minutes
 THINNINGS = 8  # each leaves half of the points or fewer for the slow loop
 WINDOWS_LEAST = 3  # for a statement about how the rate changes

@@ -29,7 +29,7 @@ class SettleRule:
     window_s: float = 0.02
     sigmas: float = 4.0
     floor_m: float = (
-        1e-6  # below the reading noise of a window at 1 kHz (2 um / sqrt(20) = 0.45 um, two windows, 1.5 sigma)
+        1e-6  # below the reading noise of a window at 1 kHz (2 µm / sqrt(20) = 0.45 µm, two windows, 1.5 sigma)
     )
     limit_s: float = 1.0  # of device time; then the sample is taken and marked as not settled
 

@@ -160,7 +160,7 @@ class TrackerBench:
 def calms_down(position_m: Floats, rule: SettleRule) -> bool:
     """Whether positions (sample, 3) of a dwell scatter more at its beginning than at its end: the arm still swings.
 
-    The windows of a slow instrument are of few samples, between which a swing of the arm looks like noise.
+    The windows of a slow instrument are of few samples, between which a swing of the arm resembles noise.
     """
     half = len(position_m) // 2
     early_m, later_m = (part[np.isfinite(part).all(axis=1)] for part in (position_m[:half], position_m[half:]))

@@ -153,7 +153,7 @@ def _tracker(rig: Rig, clock: Clock) -> DeviceCheck:
 
 
 def _other(other: OtherDevice, clock: Clock) -> DeviceCheck:
-    """Of a plug-in's instrument all that can be told is that it sends, and how fast."""
+    """Of a plug-in's instrument all that can be determined is that it sends, and how fast."""
     (found,) = other_drivers((other,), clock)
     try:
         found.device.connect()
@@ -239,7 +239,7 @@ def _stopped(block: Block) -> str:
 
 
 def _misplaced(rig: Rig, q_rad: NDArray[np.float64]) -> str:
-    """Joint readings that the rig says cannot be: another arm, or a wrong register map."""
+    """Joint readings that the rig states cannot be: another arm, or a wrong register map."""
     if len(q_rad) != rig.n_joints:
         return f"it has {len(q_rad)} joints, the rig file {rig.n_joints}: correct the rig file"
     for number, (q, joint) in enumerate(zip(q_rad, rig.arm.joints, strict=True), start=1):

@@ -122,7 +122,7 @@ def end_event(writer: RecordingWriter, clock: Clock, summary: Summary) -> None:
 
 
 class Stoppable(Protocol):
-    """A bench whose arm can be told to stop."""
+    """A bench whose arm can be asked to stop."""
 
     def stop(self) -> None: ...
 

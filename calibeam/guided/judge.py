@@ -1,6 +1,6 @@
 """What the arm as known so far says of a reading: refitted to all that was accepted, by the models of `calibrate`.
 
-Not the identification that is reported: zeros have a wide belief, the probe is held in link n, noise is as believed.
+Not the identification that is reported: zeros have a wide belief, the probe is held in link n, noise is as assumed.
 """
 
 from collections.abc import Mapping, Sequence

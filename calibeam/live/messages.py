@@ -139,7 +139,7 @@ def _on_face(T_base_face: Points, x_m: float, y_m: float) -> list[float]:
 
 
 def _point(point_m: list[float]) -> list[float]:
-    """To 10 um: the screen shows no more, and the message is shorter."""
+    """To 10 µm: the screen shows no more, and the message is shorter."""
     return [round(value, 5) for value in point_m]
 
 

@@ -97,7 +97,7 @@ TURNS = 6  # of Gauss-Newton for the best motion: errors are small, three are en
 
 
 def errors_m(said: Tool | None, truth: FreeSpace) -> float | None:
-    """Rms over the poses, three axes together. None where the model says nothing, or not of the same tool."""
+    """Rms over the poses, three axes together. None where the model states nothing, or not of the same tool."""
     if isinstance(said, LaserBeam):
         if truth.beam_origin_m is None or truth.beam_direction is None:
             return None

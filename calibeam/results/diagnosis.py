@@ -39,7 +39,7 @@ def diagnose_recording(
     keep: Keep | None = None,
     begun: Callable[[Stage], None] | None = None,
 ) -> tuple[Diagnosed, DiagnosisFile]:
-    """Both as records and as the file says it; with a `model` only what is new to it.
+    """Both as records and as the file states it; with a `model` only what is new to it.
 
     `keep` is called once with what is known as soon as the causes are: sizes, alternatives and proofs take a while.
     `begun` is called with each stage as it begins.
@@ -120,7 +120,7 @@ def plan_next(found: Diagnosed, path: Path) -> str:
     physics = found.physics
     try:
         chosen = separating(physics.diagnosis, np.random.default_rng(SEED))
-    except DataError as why:  # an effect of the known model that cannot be told at other poses
+    except DataError as why:  # an effect of the known model that cannot be determined at other poses
         return f"no plan: {why}; diagnose without --model"
     if chosen is None:
         return "no plan: no finding has an alternative explanation that more poses could exclude"

@@ -1,7 +1,7 @@
 """An arm whose encoder discs may sit off their shafts: two more parameters a joint, beside its zero.
 
 angle_i = reading_i + zero_i + sine_i sin(reading_i) + cosine_i cos(reading_i). To first order in e / r, disc centre off
-the shaft over radius of the graduation; what is left out is (e / r)^2, 1e-8 rad at 100 urad. Source: Sanchez-Brea,
+the shaft over radius of the graduation; what is left out is (e / r)^2, 1e-8 rad at 100 µrad. Source: Sanchez-Brea,
 Morlanes, Metrological errors in optical encoders, Meas. Sci. Technol. 19, 2008. A measuring arm is calibrated with it
 as with any length (docs/decisions/0020).
 """

@@ -2,7 +2,7 @@
 
 A hypothesis wins where it alone brings the strain between arm and readings down to a fraction. A real arm lies a few
 millimetres beside its drawing, a wrong convention decimetres, so the two are never mixed up. What drawn things would
-have to move counts too: half a turn of a wrist joint can look like a target on the other side. Two mistakes at once
+have to move counts too: half a turn of a wrist joint can resemble a target on the other side. Two mistakes at once
 are tried where one leaves a gross strain. What the readings cannot separate from the file as written is not named.
 """
 

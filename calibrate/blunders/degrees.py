@@ -31,7 +31,7 @@ def as_radians(q_rad: Floats, limits_rad: Floats) -> Floats:
     """The same angles read as degrees in the column of `beyond_limits`; in all columns where it is several."""
     out = q_rad.copy()
     beyond = _columns(q_rad, limits_rad)
-    every = len(beyond) > 1  # degrees of a joint that moves little can look like radians
+    every = len(beyond) > 1  # degrees of a joint that moves little can resemble radians
     out[:, slice(None) if every else beyond] *= np.pi / 180.0
     return out
 

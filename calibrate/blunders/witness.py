@@ -1,4 +1,4 @@
-"""What an instrument has to say on whether the nominal arm can have moved as the file says: its strain, in metres.
+"""What an instrument has to say on whether the nominal arm can have moved as the file states: its strain, in metres.
 
 A witness fits, robustly and in milliseconds, whatever nobody states exactly (the device's frame, the target, the cones)
 and tells what distance remains. Files by another convention are found by comparing strains, never by a threshold.

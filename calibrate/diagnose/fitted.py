@@ -1,7 +1,7 @@
 """A session with geometry and terms fitted together: robust, with the noise that the residuals show.
 
 Weights and least squares take turns (calibrate/diagnose/scatter.py); drivers that the model predicts are refreshed in
-between. A new term is tried from unit weights, too: data of a moved seat look like outliers to the model before it.
+between. A new term is tried from unit weights, too: data of a moved seat resemble outliers to the model before it.
 """
 
 from collections.abc import Sequence
@@ -252,7 +252,7 @@ def fit_from_model(
 
 
 def _makes_outliers(term: Term) -> bool:
-    """Whether data without the term may look like wild rows: few of them follow it."""
+    """Whether data without the term may resemble gross errors: few of them follow it."""
     return term.slow or term.open
 
 

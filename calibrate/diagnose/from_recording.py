@@ -37,7 +37,7 @@ from calibrate.weighting import Measured
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
-FEWEST = 20  # samples: below, no term can be told from noise, whatever it is
+FEWEST = 20  # samples: below, no term can be separated from noise, whatever it is
 
 
 @dataclass(frozen=True, eq=False)

@@ -86,7 +86,7 @@ def _sure(term: Term) -> float:
 
 
 def _sure_ones(at: Search, first: Accepted, barred: frozenset[Key]) -> list[Accepted]:
-    """The first, and what is beyond doubt beside it: one refit for several clear effects."""
+    """The first, and what is certain beside it: one refit for several clear effects."""
     out, bench = [first], at.bench
     while len(out) < AT_ONCE:
         bench = bench.with_taken(out[-1])

@@ -1,4 +1,4 @@
-"""What the scatter of a driver that was not recorded would look like at each port: how far the readings follow it.
+"""What the scatter of a driver that was not recorded would resemble at each port: how far the readings follow it.
 
 A hidden direction of approach turns one joint the same amount either way, a hidden payload by its lever, a hidden speed
 all joints at once, a hidden current of a detector pulls spots towards where foreign light falls.

@@ -59,7 +59,7 @@ class Wander:
 
 @dataclass(frozen=True)
 class Series:
-    """Rows of one instrument in the order of capture, and what a wander would look like in its residual."""
+    """Rows of one instrument in the order of capture, and what a wander would resemble in its residual."""
 
     rows: Ints  # (time, k) row numbers
     forms: tuple[Wander, ...]

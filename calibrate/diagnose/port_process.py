@@ -195,5 +195,5 @@ def places_of(bench: Bench) -> tuple[tuple[Port, int], ...]:
 
 
 def _may_pair(names: tuple[str, ...]) -> bool:
-    """Joint angles with each other: pairs of anything are too many to be told apart."""
+    """Joint angles with each other: pairs of anything are too many to be separated."""
     return all(name.startswith("q") and name[1:].isdigit() for name in names)

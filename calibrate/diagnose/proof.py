@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 ROUNDS = 500
-WILD = 6.0  # sigmas after the terms: a wild row, which no model is to blame for
+WILD = 6.0  # sigmas after the terms: a gross error, which no model is to blame for
 FEWEST_DOF = 20  # of repeats, for a floor
 EXCHANGES, BY_CHANCE = 300, 0.01
 POSITION = 3  # components of a reading that are lengths

@@ -1,4 +1,4 @@
-"""Poses that could be taken next: recorded ones, and others like them that the model says can be read.
+"""Poses that could be taken next: recorded ones, and others like them that the model states can be read.
 
 Between and around recorded poses of one place, then landed: spots go to a random point of both faces, a probe back into
 its cone. Nothing leaves the joint limits, or the space in which flange and links have been. Where nothing has to be

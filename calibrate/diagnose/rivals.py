@@ -27,7 +27,7 @@ LARGE = 800  # samples: the same of larger sessions
 WARMTH = "temp_"
 
 # Odds before any reading, of names for one pattern that turns with weight, beside a soft joint. A harmonic drive yields
-# 10 to 70 urad per Nm (mismatch catalogue); a bolted foot, a cast link and a flanged tool are several times as stiff.
+# 10 to 70 µrad per Nm (mismatch catalogue); a bolted foot, a cast link and a flanged tool are several times as stiff.
 ODDS = {"base-compliance": 1.0 / 2.0, "link-bending": 1.0 / 4.0, "tool-sag": 1.0 / 8.0}
 
 

@@ -19,7 +19,7 @@ NU = 5.0  # degrees of freedom: a tenth less efficient than least squares on Gau
 TURNS = 20
 SETTLED = 1e-4  # of -2 log L per observation
 FLOOR = 1e-6  # of the assumed noise: perfect data have a scale, too
-LOG_RATIO = (-18.0, 18.0)  # of variance by joints over own variance, as believed both
+LOG_RATIO = (-18.0, 18.0)  # of variance by joints over own variance, as assumed both
 
 
 @dataclass(frozen=True)

@@ -166,7 +166,7 @@ class SmallestRecord(NameRecord, frozen=True):
 
 
 class NotRecorded(Record, frozen=True):
-    """A driver that the record does not hold, and the physics that cannot be told without it."""
+    """A driver that the record does not hold, and the physics that cannot be determined without it."""
 
     driver: Label
     column: Label

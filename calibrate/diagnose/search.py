@@ -4,8 +4,8 @@ Greedy selection alone is wrong as soon as two effects share a lever, so after e
 tried against all others. Sources: stepwise search with swaps, Miller, Subset selection in regression, 2002, section
 3.7; term-by-term model building of telescopes, Wallace, TPOINT.
 
-Steps that robust weights have swallowed: shots at a fixture that stood elsewhere for a while look like outlying rows.
-Trusted again, they propose the step; it stays where a robust refit leaves no doubt.
+Steps that robust weights have swallowed: shots at a fixture that stood elsewhere for a while resemble outlying rows.
+Trusted again, they propose the step; it stays where a robust refit is certain.
 """
 
 from dataclasses import replace

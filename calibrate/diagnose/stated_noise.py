@@ -63,7 +63,7 @@ class NoiseFound:
     instrument: str
     quantity: str  # as in calibrate/sensors/kind.py, "" where the reading is one quantity
     unit: str  # of `stated` and `found`: "m" or "rad"
-    stated: float | None  # rms of one coordinate; None where the rig file says nothing
+    stated: float | None  # rms of one coordinate; None where the rig file states nothing
     found: float
     times: float | None  # found over stated
     times_sigma: float | None

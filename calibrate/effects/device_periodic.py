@@ -11,7 +11,7 @@ from calibrate.sensors.kind import Trait
 
 SHORTEST_M, LONGEST_M = 0.05, 1.0  # circumference of drums in use
 LIMIT_M = 5e-3
-LIMIT_RAD = 5e-4  # 20 um on a radius of 40 mm
+LIMIT_RAD = 5e-4  # 20 µm on a radius of 40 mm
 _CIRCLES = (("azimuth", 1), ("azimuth", 2), ("elevation", 1), ("elevation", 2))
 
 

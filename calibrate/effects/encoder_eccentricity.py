@@ -9,7 +9,7 @@ from calibrate.effects.kind import Kind
 from calibrate.effects.term import Shape, Term
 
 Floats = NDArray[np.float64]
-LIMIT_RAD = 5e-3  # 100 um on a radius of 20 mm: a disc that was dropped
+LIMIT_RAD = 5e-3  # 100 µm on a radius of 20 mm: a disc that was dropped
 
 
 def once_a_turn(joint: int, drivers: Drivers, inner: Floats) -> Floats:

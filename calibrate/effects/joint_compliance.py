@@ -12,7 +12,7 @@ from calibrate.effects.loads import Load
 from calibrate.effects.term import Inner, Missing, Shape, Term
 from calibrate.effects.weighed import By, Weighed, by_corrected, by_unknown, yields
 
-LIMIT_RAD_NM = 1e-3  # fourteen times the softest seen on a small arm (mismatch catalogue: 1 to 70 urad per Nm)
+LIMIT_RAD_NM = 1e-3  # fourteen times the softest seen on a small arm (mismatch catalogue: 1 to 70 µrad per Nm)
 KNEES = (0.15, 0.3, 0.5, 0.75)  # of the largest torque
 LIMIT_RAD = 2e-2  # of the deflection, where masses are not known
 

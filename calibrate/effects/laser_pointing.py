@@ -8,7 +8,7 @@ from calibrate.effects.ports import Place, Port
 from calibrate.effects.term import Inner, Shape, Term
 from calibrate.effects.time_laws import Law
 
-LIMIT_RAD = 5e-3  # what a mount that is not loose does; diode modules drift by 5 to 50 urad (makers' data sheets)
+LIMIT_RAD = 5e-3  # what a mount that is not loose does; diode modules drift by 5 to 50 µrad (makers' data sheets)
 LIMIT_M = 1e-3
 
 

@@ -16,7 +16,7 @@ from calibrate.effects.time_laws import varies
 from calibrate.effects.weighed import By, Weighed, by_corrected, by_stated, by_unknown, yields
 from calibrate.rigid import cross
 
-LIMIT_RAD_NM = 5e-4  # ten times the softest link of a small arm (mismatch catalogue: 1 to 50 urad per Nm)
+LIMIT_RAD_NM = 5e-4  # ten times the softest link of a small arm (mismatch catalogue: 1 to 50 µrad per Nm)
 LIMIT_RAD = 1e-2  # of the slope, where masses are not known
 PARALLEL = 0.1  # sine between link and axis
 

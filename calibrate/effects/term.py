@@ -68,7 +68,7 @@ class Term(ABC):
     order: int | None = None
     inner: tuple[Inner, ...] = ()
     slow: bool = False  # a function of time: has to beat a wandering null, too
-    variant: str = ""  # tells terms apart that a person would give one name
+    variant: str = ""  # separates terms that a person would give one name
     open: bool = False  # an open family (spline, product, unknown period): competes, but names no physics
 
     @abstractmethod

@@ -2,7 +2,7 @@
 
 An export holds geometry. Where the effects of the model are zero (no load, mean temperature) it is the model's arm;
 elsewhere the tip is off by what they move it. Poses are drawn evenly between the smallest and largest angle that each
-joint had, each under the conditions of a recorded sample; beyond, the model says nothing of its effects.
+joint had, each under the conditions of a recorded sample; beyond, the model states nothing of its effects.
 """
 
 from collections.abc import Iterator, Sequence

@@ -54,10 +54,10 @@ def identify(
     bootstrap_rounds: int | None = None,
     plan: FitPlan = DEFAULT,
 ) -> Identification:
-    """Everything about the arm that these samples tell, by all instruments whose columns they have, as the plan says.
+    """Everything about the arm that these samples tell, by all instruments whose columns they have, as the plan states.
 
     `held_out_share` of the rows, drawn by `rng`, are predicted from the others (0: no held-out proof), and
-    `bootstrap_rounds` fits are made to drawn rows; None: as the plan says. DataError where there is nothing to fit,
+    `bootstrap_rounds` fits are made to drawn rows; None: as the plan states. DataError where there is nothing to fit,
     where the whole file is wrong, or where the plan asks for what rig or samples do not have.
     """
     rig, samples = rig_as_planned(rig, plan), samples_as_planned(samples, plan)

@@ -206,7 +206,7 @@ def _most_different(data: Observations, rows: Indices) -> tuple[int, int] | None
 
 
 def drawing_doubt(rig: Rig, line_m: float = 5e-6) -> DrawingDoubt:
-    """What the point constraint takes from the drawing; 5 um is how well the servo centres."""
+    """What the point constraint takes from the drawing; 5 µm is how well the servo centres."""
     links = links_of(rig)
     return DrawingDoubt(line_m, links.length_sigma_m, links.angle_sigma_rad)
 

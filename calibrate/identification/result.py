@@ -32,7 +32,7 @@ SCALELESS = set(names_with(Trait.SCALELESS))  # cones: an arm half as large woul
 
 @dataclass(frozen=True)
 class Noise:
-    """One source of noise: one sigma as believed, as the residuals say, and how well they say it."""
+    """One source of noise: one sigma as assumed, as the residuals say, and how well they say it."""
 
     source: str  # "position", "wire", ...; "joint" is shared by all instruments, rad
     believed: float

@@ -67,7 +67,7 @@ def settled_fit(
 
 
 def first_fit(weighting: Weighting, start: Floats) -> Floats:
-    """(param,) of one round from `start` (param,), the noise as believed: enough to compare misfits by factors."""
+    """(param,) of one round from `start` (param,), the noise as assumed: enough to compare misfits by factors."""
     return _round(weighting, weighting.believed, start, FAR_START, Redundant.REMOVED).fit.theta
 
 

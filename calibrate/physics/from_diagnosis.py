@@ -349,7 +349,7 @@ def _noise(fit: Fitted) -> Fields:
 
 
 def _normal_size(squares: Floats, k: int) -> float:
-    """Variance, in units of what whitened them, under which squares (row,) of k values are normal but for wild rows.
+    """Variance, in units of what whitened them, under which squares (row,) of k values are normal but for gross errors.
 
     Source: Huber, Robust Statistics, 1981, section 6.4 (proposal 2), with squares cut at 99 % of chi-square.
     """

@@ -31,11 +31,11 @@ from calibrate.sensors import seat
 
 Floats = NDArray[np.float64]
 
-ANEW = ("device.", "camera.", "marker.", "encoder")  # set up or found anew for each recording: nothing is known of it
+ANEW = ("device.", "camera.", "marker.", "encoder")  # set up or found again for each recording: nothing is known of it
 FOUND = ("tool", seat.POINTS)  # corrections about points that were found in closed form, in `about` of the model
 AXES = ("x", "y", "z")
 STRAIGHT = 1e-3  # m, rad or a factor: its square, over a metre, is a micrometre
-LOOSE = 1e3  # sigmas of an effect's value: never held beyond what the model says of it
+LOOSE = 1e3  # sigmas of an effect's value: never held beyond what the model states of it
 
 
 @dataclass(frozen=True, eq=False)

@@ -71,7 +71,7 @@ class Taken:
 def blocks_of(candidates: Candidates, chosen: Rows) -> list[Rows]:
     """Chosen candidates by place, the fixture moved once to each; there both orders in the pattern 1 2 2 1.
 
-    So neither order comes earlier than the other, and what drifts does not look like the order.
+    So neither order comes earlier than the other, and what drifts does not resemble the order.
     """
     out: list[Rows] = []
     for place in np.unique(candidates.placement[chosen]):

@@ -66,5 +66,5 @@ def _noise_m(rig: Rig, poses: Candidates) -> float:
 
 
 def _without_distances(rig: Rig) -> Rig:
-    """A diagnosis looks at readings alone; a distance as believed would agree with the drawing and say nothing."""
+    """A diagnosis looks at readings alone; a distance as assumed would agree with the drawing and say nothing."""
     return msgspec.structs.replace(rig, known_distances=())

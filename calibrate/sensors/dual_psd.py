@@ -24,7 +24,7 @@ from calibrate.sensors.optics import Strike
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-PLACE_PLAUSIBLE_M = 0.05  # a fixture set down by hand where the rig file says
+PLACE_PLAUSIBLE_M = 0.05  # a fixture set down by hand where the rig file has it
 PLACE_PLAUSIBLE_RAD = 0.2
 PAIR_PLAUSIBLE_M = 1e-3  # PSD 2 in PSD 1: a machined bracket
 PAIR_PLAUSIBLE_RAD = 0.02

@@ -28,7 +28,7 @@ Ints = NDArray[np.intp]
 
 NAME = "encoder-difference"
 SOURCE = "encoder"  # of noise
-BELIEVED_RAD = 5e-6  # a count of 20 bits a turn is 6 urad; the data correct it
+BELIEVED_RAD = 5e-6  # a count of 20 bits a turn is 6 µrad; the data correct it
 FOLLOWS_RAD = 0.05  # what no drive and no disc does: the readings are then not of one joint, or not in joint angles
 FEWEST = 10  # rows of a joint, for a zero and a scatter
 PLAUSIBLE_RAD = 1e-3  # by which a zero may lie off the middle of the differences

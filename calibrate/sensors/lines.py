@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-CENTRED_M = 1e-4  # a spot farther off moves the line by more than the tolerance of a 5 um centring can explain
+CENTRED_M = 1e-4  # a spot farther off moves the line by more than the tolerance of a 5 µm centring can explain
 
 
 @dataclass(frozen=True)

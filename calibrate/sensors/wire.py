@@ -81,12 +81,12 @@ FEWEST_POSES = 30  # one number each; drum and target have six unknowns
 
 @dataclass(frozen=True)
 class WireWitness:
-    """Drum and target are found, from trilateration and from where the rig says; a drawn target should not move."""
+    """Drum and target are found, from trilateration and from the place in the rig; a drawn target should not move."""
 
     q_rad: Floats  # (pose, joint)
     length_m: Floats  # (pose,)
     point_m: Floats | None  # (3,) target as drawn in the flange frame
-    drum_m: Floats | None  # (3,) as the rig says, in the base
+    drum_m: Floats | None  # (3,) as the rig states, in the base
 
     def strain(self, T_base_flange: Floats) -> Strain:
         R, t = T_base_flange[..., :3, :3], T_base_flange[..., :3, 3]

@@ -78,6 +78,6 @@ def levenberg(rows: Rows, theta: Floats, rules: LevenbergRules) -> Ended:
 
 
 def _lost_in_rounding(promised: float, old: Floats, new: Floats) -> bool:
-    """So near the minimum that neither the promise nor what came of it can be told from rounding of the sum."""
+    """So near the minimum that neither the promise nor what came of it can be separated from rounding of the sum."""
     least = UNMEASURABLE * float(old @ old)
     return promised < least and abs(float((old - new) @ (old + new))) < least

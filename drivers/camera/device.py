@@ -1,7 +1,7 @@
 """A camera by OpenCV: a video device by its number, a network camera by its URL, or a picture in a file.
 
 Whatever a camera has in its buffers is of the past. A reader therefore takes every frame as it comes, and `picture`
-waits for one that can only be of now. A source that is one picture (.jpg, .png) is opened anew each time instead.
+waits for one that can only be of now. A source that is one picture (.jpg, .png) is opened again each time instead.
 """
 
 import threading

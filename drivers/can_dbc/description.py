@@ -101,7 +101,7 @@ def _scale(signal: Signal, units_per_turn: float | None) -> Scale:
 
 
 def _range(signal: Signal, units_per_turn: float) -> int:
-    """Counts after which the signal begins anew: its stated ends when they are inside its bits, else its bits.
+    """Counts after which the signal begins again: its stated ends when they are inside its bits, else its bits.
 
     Both ends are values that it takes, unless they are whole turns apart: then they are one place of the disc, so that
     "[0|360]" in degrees is what "[0|359.9]" with a count of 0.1 is.

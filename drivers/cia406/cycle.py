@@ -3,7 +3,7 @@
 An answer says nothing of the SYNC that it answers: a node's answers belong to the SYNCs in their order. That is certain
 only when in the end each node has answered as often as it was asked. So rows are held until nothing is on the way any
 more, which between two SYNCs of a quick bus is always; where it is not, no SYNC goes out after HOLD_S until it is. When
-answers are missing then, what that node said since is in doubt and becomes NaN. A deadline left out shows as a step of
+answers are missing then, what that node said since is uncertain and becomes NaN. A deadline left out shows as a step of
 the sequence.
 """
 

@@ -98,7 +98,7 @@ class ModbusArm:
     def move_joints(self, q_rad: ArrayLike, speed_rad_s: float, acceleration_rad_s2: float) -> None:
         """To joint readings (6,) in rad; blocks until the arm has arrived.
 
-        DeviceRefused: stopped, or not taken (the message says why). DeviceLost, DeviceStale: no line any more.
+        DeviceRefused: stopped, or not taken (the message states why). DeviceLost, DeviceStale: no line any more.
         """
         target_rad = _checked(q_rad, speed_rad_s, acceleration_rad_s2)
         with self._moving:

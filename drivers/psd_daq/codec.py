@@ -3,7 +3,7 @@
 No length field is trusted: a frame ends at its 0x00, must pass its CRC and then fit its layout to the byte; a run of
 more than MAX_FRAME bytes without 0x00 is dropped. So the first whole frame after any damage is read again.
 
-The messages of samples become a block in SI units: their 32-bit sequence number wraps and starts anew, that of a block
+The messages of samples become a block in SI units: their 32-bit sequence number wraps and starts again, that of a block
 only rises.
 """
 

@@ -1,6 +1,6 @@
 """One KPA101 on its line: who it is, one reading at a time.
 
-A reply does not say which request it answers. So after a reply that did not come in time the line is in doubt: the
+A reply does not say which request it answers. So after a reply that did not come in time the line is uncertain: the
 next reading waits behind a question of another kind, whose answer proves that everything before it has been heard.
 """
 

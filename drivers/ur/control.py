@@ -97,7 +97,7 @@ class UrControl:
     def move_joints(self, q_rad: ArrayLike, speed_rad_s: float, acceleration_rad_s2: float) -> None:
         """To joint readings (6,) in rad; blocks until the arm has arrived.
 
-        DeviceRefused: stopped meanwhile (the message says by what), or the controller does not take the numbers.
+        DeviceRefused: stopped meanwhile (the message states by what), or the controller does not take the numbers.
         DeviceLost, DeviceStale: no control any more; the arm was told to stop by another way.
         """
         target_rad = _six_numbers(q_rad, "q_rad")

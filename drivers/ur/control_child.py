@@ -197,7 +197,7 @@ class ControlChild:
         self._stopped_up_to = max(self._stopped_up_to, request.up_to)
         self._stops.send(Alive())
         fault = self._fault()
-        if fault is not None:  # told before braking, which then waits in vain for the controller's answer
+        if fault is not None:  # told before braking, which then waits for an answer that does not come
             self._stops.send(fault)
         self._brake(request.deceleration_rad_s2)
         if fault is None:

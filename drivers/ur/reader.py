@@ -83,7 +83,7 @@ VARIABLES = (
     Variable("tcp_offset", Channel("tcp_offset_m_rad", "m, rad", SIX)),  # from PolyScope 5.x on
     Variable("actual_digital_input_bits", Channel("digital_inputs", "1")),
     Variable("actual_digital_output_bits", Channel("digital_outputs", "1")),
-    Variable("standard_analog_input0", Channel("analog_input0", "1")),  # V or A, as the installation says
+    Variable("standard_analog_input0", Channel("analog_input0", "1")),  # V or A, as the installation states
     Variable("standard_analog_input1", Channel("analog_input1", "1")),
     Variable("payload", Channel("payload_kg", "kg")),  # from PolyScope 3.11 / 5.5.1 on
     Variable("payload_cog", Channel("payload_cog_m", "m", (3,))),
@@ -253,7 +253,7 @@ class UrReader(StreamDevice[socket.socket]):
                 raise WireError(f"{self.place}: {name} comes as {types[name]}, the shape {channel.shape} is expected")
 
     def _await(self, kind: type[Answer]) -> Answer:
-        """The next message of that kind. DeviceRefused when the controller says otherwise, DeviceStale on silence."""
+        """The next message of that kind. DeviceRefused when the controller states otherwise, DeviceStale on silence."""
         deadline_s = self._clock.now_s() + ANSWER_TIMEOUT_S
         while True:
             messages = self._take_messages()

@@ -28,7 +28,7 @@ from drivers.ur.control_link import (
     is_stopped,
 )
 
-SILENCE_LIMIT_S = 2.0  # twenty heartbeats of the child; ur_rtde itself blocks up to 4 s when it waits in vain
+SILENCE_LIMIT_S = 2.0  # twenty heartbeats of the child; ur_rtde itself blocks up to 4 s when no answer comes
 LOOK_S = 0.1  # between two looks whether the child was stopped by a signal
 STOP_NOTICE_S = 0.3  # the child looks at its stop line every millisecond; a busy machine may take tenths
 STOP_LIMIT_S = 1.0  # braking from full speed at 5 rad/s2 takes 0.63 s; after this the other way is taken

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """One arm, true or believed. n joints; link i follows joint i, link 0 stands before joint 1."""
+    """One arm, true or assumed. n joints; link i follows joint i, link 0 stands before joint 1."""
 
     fixed: Floats  # (n + 1, 4, 4)
     zero_rad: Floats  # (n,) true angle less reading of a perfect joint

@@ -109,7 +109,7 @@ def postures(rig: TrueRig, seat_m: Floats, seat: Whole, rng: np.random.Generator
 class Observed:
     """Noise-free."""
 
-    reading_rad: Floats  # (row, n) what the encoders say
+    reading_rad: Floats  # (row, n) what the encoders read
     values_m: Floats  # (row, channel); for a seated probe: where a perfect arm with these readings would have its probe
     sum_v: Floats | None  # (row, 2) of a dual PSD
 
@@ -131,7 +131,7 @@ def observe(
 
 
 COUNT_RAD = 2.0 * np.pi / (1 << 20)
-NOISE_RAD = 2e-6  # one sigma: bearings of the encoder, and gears that seat anew
+NOISE_RAD = 2e-6  # one sigma: bearings of the encoder, and gears that seat again
 AGAINST = 0.2  # share of encoders that count against their joint
 # What maker's sheets and service engineers find on arms in use: stiffness of drives, play, centring of discs, slips.
 SIZES: dict[type[Any], tuple[float, float]] = {

@@ -59,7 +59,7 @@ def rig_of_world(rig: WorldRig, truth: Truth, plain: Mapping[str, Any]) -> TrueR
 
 
 def nominal_truth(rig: WorldRig) -> Truth:
-    """What the rig file says, and nothing off."""
+    """What the rig file states, and nothing off."""
     return draw_truth(msgspec.structs.replace(rig, emulation=Emulation()), 0)
 
 
@@ -212,7 +212,7 @@ def _watch(true: TrueRig, table: Timetable) -> Callable[[Sequence[Defect]], Obse
 
 
 def _sigma_m(rig: WorldRig, true: TrueRig, table: Timetable, rng: np.random.Generator) -> float:
-    """One sigma of a reading: gears that seat anew, and what is left of the detector's noise."""
+    """One sigma of a reading: gears that seat again, and what is left of the detector's noise."""
     seated_rad = rig.emulation.joint_repeatability_rad * rng.standard_normal(table.scene.goal_rad.shape)
     off = observe(true, table.scene, (), table.scene.goal_rad + seated_rad).values_m - _watch(true, table)(()).values_m
     return float(np.sqrt(np.mean(off**2) + rig.emulation.psd_noise_m**2 / AVERAGED))

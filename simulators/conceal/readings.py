@@ -70,7 +70,7 @@ def true_shaft_rad(defects: Sequence[Defect], scene: Scene, reading_rad: Floats)
 
 
 def said_rad(defects: Sequence[Defect], scene: Scene, shaft_rad: Floats) -> Floats:
-    """What the encoders say of shafts at `shaft_rad`."""
+    """What the encoders read of shafts at `shaft_rad`."""
     readers = [defect for defect in defects if isinstance(defect, ReadsAngle)]
     return shaft_rad + sum((reader.reading_error_rad(shaft_rad, scene) for reader in readers), np.zeros_like(shaft_rad))
 

@@ -82,7 +82,7 @@ class Belief:
     """All that goes into rig.toml."""
 
     drawing: Drawing
-    rig: TrueRig  # as believed
+    rig: TrueRig  # as assumed
     tool_kg: float | None
     tool_com_m: Floats
     device_known: bool
@@ -90,7 +90,7 @@ class Belief:
     bars_m: Sequence[float]
     noise: Mapping[str, float]
     tolerance: Mapping[str, float]  # empty: the file has none
-    encoder_side: str = ""  # of all second encoders, as the file says; empty: it does not
+    encoder_side: str = ""  # of all second encoders, as the file states; empty: it does not
 
 
 def rig_document(belief: Belief) -> dict[str, Any]:

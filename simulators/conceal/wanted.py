@@ -67,4 +67,4 @@ class Wanted:
     noise: Kind = "white"
     withhold: bool = False  # the column that would name the defect is not recorded
     encoders: Side | None = None  # second encoders are recorded, and defects are of machine-like size, whatever `enr`
-    side_stated: bool = False  # the rig file says on which side of the gear they sit
+    side_stated: bool = False  # the rig file states on which side of the gear they sit

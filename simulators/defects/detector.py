@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PsdDefect(Defect):
-    """Of one of the two PSDs; a member says where that one sees the spot."""
+    """Of one of the two PSDs; a member gives where that one sees the spot."""
 
     psd: int
 

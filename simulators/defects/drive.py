@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class DriveDefect(Defect):
-    """Of the drive of one joint; a member says by how much its output turns."""
+    """Of the drive of one joint; a member gives by how much its output turns."""
 
     joint: int
 
@@ -56,7 +56,7 @@ class GearRunout(DriveDefect):
     KIND = "gear-runout"
     PHYSICS = "gear-transmission-error"
     SIZE = "runout_m"
-    TYPICAL = 2.5e-6  # 50 urad at 50 mm
+    TYPICAL = 2.5e-6  # 50 µrad at 50 mm
     NEEDS = ("gear_ratio",)
 
     @property
@@ -226,7 +226,7 @@ class SoftJoint(DriveDefect):
     PHYSICS = "joint-compliance"
     DRIVERS = ("gravity_torque{joint}",)
     SIZE = "compliance_rad_nm"
-    TYPICAL = 5e-6  # 1 to 10 urad/Nm: arms of 10 to 200 kg
+    TYPICAL = 5e-6  # 1 to 10 µrad/Nm: arms of 10 to 200 kg
     FIGURES = ("compliance_rad_nm",)
 
     @classmethod

@@ -17,7 +17,7 @@ GRID = 721  # half a degree: the trapezium rule on a periodic curve is exact far
 
 @dataclass(frozen=True)
 class EncoderDefect(Defect):
-    """Of the encoder of one joint; a member says by how much it reads wrong."""
+    """Of the encoder of one joint; a member gives by how much it reads wrong."""
 
     joint: int
 
@@ -51,7 +51,7 @@ class Disc(EncoderDefect):
 
     PHYSICS = "encoder-eccentricity"
     SIZE = "eccentricity_m"
-    TYPICAL = 2e-6  # 100 urad at 20 mm
+    TYPICAL = 2e-6  # 100 µrad at 20 mm
 
     @property
     def figures(self) -> dict[str, float]:
@@ -105,7 +105,7 @@ class OvalRing(EncoderDefect):
     KIND = "oval-ring"
     PHYSICS = "encoder-harmonic"
     SIZE = "ovality"
-    TYPICAL = 1e-4  # 50 urad
+    TYPICAL = 1e-4  # 50 µrad
 
     @property
     def figures(self) -> dict[str, float]:

@@ -128,7 +128,7 @@ class WarmLaser(Defect):
     PORT = "laser.direction"
     DRIVERS = ("temp_laser",)
     SIZE = "turn_rad_k"
-    TYPICAL = 6e-6  # 2 to 12 urad/K
+    TYPICAL = 6e-6  # 2 to 12 µrad/K
     INSTRUMENTS = SPOTS
     NEEDS = ("temp_laser_degC",)
 

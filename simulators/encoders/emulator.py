@@ -54,7 +54,7 @@ class PlainEncoder:
         self._fault = int(code != 0)
 
     def reset(self) -> None:
-        """A power dip: the counter begins anew."""
+        """A power dip: the counter begins again."""
         self._counter = self._fault = 0
 
 

@@ -51,7 +51,7 @@ Address = tuple[int, int]  # index, subindex
 
 @dataclass(frozen=True)
 class Entry:
-    """What the EDS says of one sub-object; `size` in bytes, None for text."""
+    """What the EDS states of one sub-object; `size` in bytes, None for text."""
 
     size: int | None
     signed: bool
@@ -71,7 +71,7 @@ class NodeDictionary:
         self._values = {address: entry.default for address, entry in self.entries.items()}
         self._stored: dict[Address, bytes] = {}
         self._numbers: dict[Address, int] = {}  # of values that are not live, as `number` has read them
-        self.changes = 0  # counts every change of a value, so that what follows from values need not be worked out anew
+        self.changes = 0  # counts every change of a value, so that what follows from values need not be computed again
         self._read_hooks: dict[Address, Callable[[], int]] = {}
         self._write_hooks: dict[Address, Callable[[int], None]] = {}
 

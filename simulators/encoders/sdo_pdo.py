@@ -122,7 +122,7 @@ class SdoServer:
         return self._transfer
 
     def _size(self, index: int, subindex: int) -> int:
-        """Bytes of an object whose writer gave no size: those that the dictionary says."""
+        """Bytes of an object whose writer gave no size: those that the dictionary states."""
         entry = self._dictionary.entries.get((index, subindex))
         return 4 if entry is None or entry.size is None else entry.size
 

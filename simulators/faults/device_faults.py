@@ -56,7 +56,7 @@ MOST_JUNK_BYTES = 65536
 
 
 class FaultError(Exception):
-    """A fault that cannot be injected; the message says what there is instead."""
+    """A fault that cannot be injected; the message states what there is instead."""
 
 
 @dataclass(frozen=True)

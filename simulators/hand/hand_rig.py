@@ -111,7 +111,7 @@ class HandEmulation(msgspec.Struct, frozen=True):
 
 
 class HandRig(msgspec.Struct, frozen=True):
-    """Everything that this world wants to know, as believed; the deviations come on top."""
+    """Everything that this world wants to know, as assumed; the deviations come on top."""
 
     arm: MeasuringArm
     tool: ProbeTool = ProbeTool()

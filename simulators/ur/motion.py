@@ -46,7 +46,7 @@ HISTORY_STEPS = 100  # what get_actual_joint_positions_history can look back
 
 
 class MoveRefused(Exception):  # noqa: N818 - said by the controller, not an error of the emulator
-    """The arm may not or cannot make this move; the message says why."""
+    """The arm may not or cannot make this move; the message states why."""
 
 
 class ArmController:

@@ -147,7 +147,7 @@ V2_RECIPE = 1  # one output recipe per connection, so that its id is always the 
 
 
 class RtdeServer:
-    """Shared by all connections: what the controller says this cycle, packed once per distinct recipe."""
+    """Shared by all connections: what the controller states this cycle, packed once per distinct recipe."""
 
     def __init__(self, memory: Memory, version: tuple[int, int, int, int], read: Callable[[], Readout]) -> None:
         self.memory, self.version = memory, version

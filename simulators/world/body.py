@@ -10,7 +10,7 @@ one cycle and its speed is known to the servo. A jump becomes a ramp at top spee
 
 Joint repeatability: after every motion the output of a gear stands a little off what the motor side says.
 
-Mechanism: when a gear turns, teeth and rolling elements seat anew, so the output comes to rest N(0, sigma) away from
+Mechanism: when a gear turns, teeth and rolling elements seat again, so the output comes to rest N(0, sigma) away from
 the motor-side angle, and stays there as long as nothing moves. A motion begins when the set-point changes after
 standing; then the next offset is drawn and taken up along a smooth curve of SEATING_S, so that no step is seen. A
 motion has ended when the set-point has not changed for SEATING_S: every curve is finished by then.

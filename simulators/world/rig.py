@@ -94,7 +94,7 @@ class Emulation(msgspec.Struct, frozen=True):
 
 
 class WorldRig(msgspec.Struct, frozen=True):
-    """Everything the world wants to know, as believed; the deviations come on top."""
+    """Everything the world wants to know, as assumed; the deviations come on top."""
 
     arm: ArmOfRig
     tool: Tool

@@ -39,7 +39,7 @@ class Engine:
         self.applied: Floats = self._data.qfrc_applied
 
     def refresh(self) -> None:
-        """Works everything out anew after `qpos` or `qvel` was written."""
+        """Computes everything again after `qpos` or `qvel` was written."""
         _mujoco.mj_step1(self._model, self._data)
 
     def step(self) -> None:
@@ -88,7 +88,7 @@ class Engine:
         _mujoco.mj_step1(self._model, self._scratch)
 
 
-# The 0.13 mrad that a 3 rad/s^2 braking ramp leaves are below 0.1 urad after 70 ms, and steps of 1 ms stay stable.
+# The 0.13 mrad that a 3 rad/s^2 braking ramp leaves are below 0.1 µrad after 70 ms, and steps of 1 ms stay stable.
 BANDWIDTH_RAD_S = 150.0
 STIFFNESS = BANDWIDTH_RAD_S**2
 DAMPING = 2.0 * BANDWIDTH_RAD_S

@@ -120,7 +120,7 @@ class Sight:
         self._eye, self._model, self._board, self._T_board_psd1 = eye, model, board, inverse(T_psd1_board)
 
     def fixture(self, arm: BelievedArm, q_rad: Floats, T_base_fixture: Floats) -> Floats | None:
-        """T_base_psd1 (4, 4) for the assumed arm, which stands at `q_rad` (joint,); `T_base_fixture`: as believed.
+        """T_base_psd1 (4, 4) for the assumed arm, which stands at `q_rad` (joint,); `T_base_fixture`: as assumed.
 
         None where the board is not in the picture. DeviceError of the camera.
         """

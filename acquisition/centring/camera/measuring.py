@@ -111,7 +111,7 @@ def line_before(T_camera_fixture: Floats, hit_m: Floats, direction: Floats) -> L
 
 
 def onto_beam(model: CameraModel, lines: Sequence[Line], arm: BelievedArm) -> tuple[CameraModel, float, float]:
-    """The mount turned and shifted as little as brings the mean of `lines` onto the believed laser; and their scatter:
+    """The mount turned and shifted as little as brings the mean of `lines` onto the assumed laser; and their scatter:
 
     rms angle (rad) of the directions, rms distance (m) of the points struck from the mean line.
     """

@@ -1,4 +1,4 @@
-"""A camera on the flange as believed: its lens, and where it sits; and the file that keeps both.
+"""A camera on the flange as assumed: its lens, and where it sits; and the file that keeps both.
 
 camera.json, version 1: see docs/formats.md.
 """
@@ -73,7 +73,7 @@ class _File(Struct, frozen=True):
 
 
 def drawn(camera: Camera) -> CameraModel:
-    """As the rig file says it: a pinhole, and the mount as built."""
+    """As the rig file states it: a pinhole, and the mount as built."""
     focal_px = 0.5 * camera.width_px / np.tan(0.5 * camera.view_rad)
     matrix = np.array(
         [[focal_px, 0.0, 0.5 * camera.width_px], [0.0, focal_px, 0.5 * camera.height_px], [0.0, 0.0, 1.0]]

@@ -46,7 +46,7 @@ def suffix_of(key: str) -> str | None:
 
 
 def si_value(key: str, text: str) -> float:
-    """The SI number for a text such as "0.2 mm" under a key with a unit suffix. ValueError says what does not fit."""
+    """The SI number for a text such as "0.2 mm" under a key with a unit suffix. ValueError states what does not fit."""
     suffix = suffix_of(key)
     if suffix is None:
         raise ValueError(f"'{shown(text)}' stands where a number is expected")

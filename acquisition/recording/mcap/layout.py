@@ -31,7 +31,7 @@ class Presence(enum.Enum):
     """How often a field stands in one message."""
 
     ONCE = "once"
-    OPTIONAL = "optional"  # absence is told from zero
+    OPTIONAL = "optional"  # absence is distinguished from zero
     REPEATED = "repeated"  # packed
 
 

@@ -128,7 +128,7 @@ UNREADABLE_MOST = 64  # sectors in a row: a disk that refuses more has failed, a
 
 
 def next_batch(file: IO[bytes], begin: int, size: int) -> int | None:
-    """The place of the first record from `begin` on that looks like a chunk and fits into the file; None: no more.
+    """The place of the first record from `begin` on that resembles a chunk and fits into the file; None: no more.
 
     What the disk does not give is left out; behind UNREADABLE_MOST sectors in a row nothing more is tried.
     """

@@ -39,7 +39,7 @@ def next_part(folder: Path) -> Path:
 def joined(each: Sequence[Recording], folder: Path) -> Recording:
     """All samples and events of the parts as one recording, under the rig of the last one.
 
-    Times of later parts count on from the first by the calendar, for a machine's own clock begins anew when it is
+    Times of later parts count on from the first by the calendar, for a machine's own clock begins again when it is
     started. Streams are left out where there is more than one part: each stands under clocks of its own part.
     RecordingError where the parts are of different arms, or of places that have moved.
     """

@@ -322,7 +322,7 @@ class Scribe:
                 self._write(entries)
             self._file.metadata(END_METADATA, {"complete": "true" if self._complete else "false"})
             self._file.finish()
-        except Exception as error:  # whatever it was, nobody may wait for this thread in vain
+        except Exception as error:  # whatever it was, nobody may wait for ever for this thread
             self._spool.fail(self._says(error))
             with contextlib.suppress(OSError):  # the failure itself has been told already
                 self._file.give_up()

@@ -80,7 +80,7 @@ class PsdDevice(Struct, frozen=True, forbid_unknown_fields=True):
     driver: PsdDriver
     port: FilePath | None = None
     serial_number: Name | None = None
-    rate_hz: Hertz = 1000.0  # where the 2 um of a PSD are stated
+    rate_hz: Hertz = 1000.0  # where the 2 µm of a PSD are stated
     ports: tuple[FilePath, FilePath] | None = None
     serial_numbers: tuple[Name, Name] | None = None
     error_maps: tuple[MaybePath, MaybePath] | None = None  # files of both faces, "" for none

@@ -1,4 +1,4 @@
-"""The rig file as frozen records: the rig as believed, how its devices are reached, how it may move.
+"""The rig file as frozen records: the rig as assumed, how its devices are reached, how it may move.
 
 Names, units and optional keys are those of the session-folder format, version 1 (docs/formats.md). A key that is
 not declared here is refused. Vectors are plain tuples: metres, or radians of a rotation vector.
@@ -121,7 +121,7 @@ class Arm(Struct, frozen=True, forbid_unknown_fields=True):
     gravity_m_s2: Gravity = (0.0, 0.0, -9.81)  # an arm that stands on its feet
     flange: Pose = Pose()
     base: Pose = Pose()  # of a D-H table: fixed transform in front of the first joint
-    serial_number: Name | None = None  # of the maker's plate: tells two arms of one kind apart
+    serial_number: Name | None = None  # of the maker's plate: distinguishes two arms of one kind
     make: Make | None = None  # None: not stated
 
 
@@ -211,7 +211,7 @@ class PermissibleErrors(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Noise(Struct, frozen=True, forbid_unknown_fields=True):
-    """One sigma as believed: a start value only. None: nothing is believed."""
+    """One sigma as assumed: a start value only. None: nothing is believed."""
 
     psd_m: SigmaMetres | None = None
     position_m: SigmaMetres | None = None
@@ -258,7 +258,7 @@ class Camera(Struct, frozen=True, forbid_unknown_fields=True):
     source: Count | FilePath  # number of a video device, URL, or path of a picture or film
     width_px: Pixels
     height_px: Pixels
-    view_rad: Annotated[float, Meta(ge=1e-3, lt=3.0)]  # across the width, as the data sheet says
+    view_rad: Annotated[float, Meta(ge=1e-3, lt=3.0)]  # across the width, as the data sheet states
     in_flange: Pose  # x right in the picture, y down, z where it looks
     board: CameraBoard
     calibration: FilePath | None = None  # file of `calibeam camera`

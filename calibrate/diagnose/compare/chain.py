@@ -1,7 +1,7 @@
 """The chain from set-point to reading, link by link: what each adds to the difference of two sessions of one motion.
 
 A link's own difference is what is left when everything in front of it is taken out: joints less set-points, encoders
-less joints, readings less what the model says the joints' difference does to them. So the first link that differs is
+less joints, readings less what the model states the joints' difference does to them. So the first link that differs is
 where the two part, and those behind it do not repeat it. Of a probe in a cone or at a bar the joints are the reading:
 such rows are compared in calibrate/diagnose/compare/seated.py.
 """

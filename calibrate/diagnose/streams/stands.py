@@ -10,7 +10,7 @@ from calibrate.diagnose.streams.track import Track
 Floats = NDArray[np.float64]
 
 SHORTEST_S = 0.1
-MOVING_RAD_S = 1e-3  # 60 urad/s in 60 ms: slower than any motion of a program, faster than noise of a reading
+MOVING_RAD_S = 1e-3  # 60 µrad/s in 60 ms: slower than any motion of a program, faster than noise of a reading
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ Trace = Mapping[str, Any]
 INK, SOFT, BEAM = "#16202b", "#55626f", "#c8003c"  # of report.css on white paper
 TONES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # Okabe and Ito, as tones.py
 SYMBOLS = ("circle", "diamond", "square", "cross", "x", "triangle-up")  # beside the colours
-DIGITS = 7  # of a number in the page: metres to 0.1 um
+DIGITS = 7  # of a number in the page: metres to 0.1 µm
 
 
 @dataclass(frozen=True)

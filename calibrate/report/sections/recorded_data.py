@@ -89,7 +89,7 @@ def streams(recording: Recording) -> list[Html]:
 
 
 def findings(recording: Recording) -> Html:
-    """What the check of the recording says."""
+    """What the check of the recording states."""
     found = check(recording)
     if not found:
         return tag("p", "The check of the recording found nothing wrong.")
