@@ -128,7 +128,7 @@ class Movable(Protocol):
     def connect(self) -> None: ...
 
     def move_joints(self, q_rad: Floats, speed_rad_s: float, acceleration_rad_s2: float) -> None:
-        """Blocks until the controller reports the end of the motion. DeviceRefused on a stop, DeviceLost, DeviceStale."""
+        """Blocks until the controller reports its end. DeviceRefused on a stop, DeviceLost, DeviceStale."""
         ...
 
     def stop(self, deceleration_rad_s2: float = ...) -> None:

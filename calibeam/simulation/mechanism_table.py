@@ -49,11 +49,13 @@ from calibeam.simulation.of_instruments import (
     make_hanging,
     make_leaning,
     make_mount,
+    make_moved_laser,
     make_pointing,
     make_scale,
     make_spring_mount,
     make_strained,
     make_stray,
+    make_target,
     make_walking,
     make_waves,
 )
@@ -101,7 +103,7 @@ from simulators.defects.link import (
     WarmingUp,
     WornBearing,
 )
-from simulators.defects.tool import CarriedLaser, ElasticMount, LaserWarmUp, SaggingMount, WarmLaser
+from simulators.defects.tool import CarriedLaser, CarriedTarget, ElasticMount, LaserWarmUp, SaggingMount, WarmLaser
 from simulators.defects.tracker import (
     CarriedDevice,
     ChangingScale,
@@ -486,6 +488,17 @@ TABLE: tuple[Line, ...] = (
         make_pointing,
     ),
     Line("laser-thermal-drift", "of the origin", _any, CarriedLaser, "shift, m/K, and thermometer", make_walking),
+    Line(
+        "laser-moved",
+        "all of it",
+        _any,
+        CarriedLaser,
+        "shift, m, and turn, rad, of the housing across its beam, and moment",
+        make_moved_laser,
+    ),
+    Line(
+        "tool-moved", "all of it", _any, CarriedTarget, "shift on the flange, m, moment or time constant", make_target
+    ),
     Line(
         "fixture-moved",
         "all of it",

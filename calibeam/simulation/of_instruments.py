@@ -10,6 +10,7 @@ from calibeam.simulation.found import FoundEffect
 from calibeam.simulation.of_arm import course_of
 from calibrate.effects.laser_pointing import beam_axes
 from calibrate.effects.ports import Place
+from calibrate.effects.since_model import line_of
 from calibrate.effects.tool_sag import PAIRS
 from calibrate.sensors.catalogue import kind_of
 from calibrate.sensors.kind import Trait
@@ -24,7 +25,7 @@ from simulators.defects.detector import (
     WavesOnFace,
 )
 from simulators.defects.found_curve import CurveAtBase, CurveAtJoints, CurveAtLink, CurveInReading
-from simulators.defects.tool import CarriedLaser, ElasticMount, LaserWarmUp, SaggingMount, WarmLaser
+from simulators.defects.tool import CarriedLaser, CarriedTarget, ElasticMount, LaserWarmUp, SaggingMount, WarmLaser
 from simulators.defects.tracker import (
     CircleOffCentre,
     DrumOutOfRound,
@@ -96,6 +97,20 @@ def make_walking(f: FoundEffect) -> Defect:
     course, at_s, over_s = course_of(f)
     shift = as_vector(size * np.array(along))
     return CarriedLaser(shift, NOWHERE, NOWHERE, course, at_s, over_s, f.thermometer)
+
+
+def make_target(f: FoundEffect) -> Defect:
+    course, at_s, over_s = course_of(f)
+    return CarriedTarget(as_vector(f.coefficients), NOWHERE, NOWHERE, course, at_s, over_s)
+
+
+def make_moved_laser(f: FoundEffect) -> Defect:
+    """Two small turns and shifts of one body add up; the turns are about the origin of the beam."""
+    twist = line_of(f.session.drivers) @ f.coefficients
+    origin = np.array(f.session.predictor.rig.tool.laser_origin_m or NOWHERE)
+    course, at_s, over_s = course_of(f)
+    shift = twist[:3] + np.cross(twist[3:], origin)
+    return CarriedLaser(as_vector(shift), as_vector(twist[3:]), as_vector(origin), course, at_s, over_s)
 
 
 # --- detectors

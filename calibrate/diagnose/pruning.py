@@ -1,7 +1,7 @@
 """Terms that have to go: not worth their cost, replaced or balanced by others, gone at the same pose, or mere noise.
 
 Whether a slow term holds where the arm came back to a pose: geometry cannot change there, but time has gone by.
-A drift that geometry has half absorbed resembles one; between two visits of one pose geometry predicts the same, so what
+A drift that geometry has half absorbed resembles one; between two visits of one pose geometry is the same, so what
 changed there is the drift alone, or there was none (mismatch catalogue, false alarms).
 """
 

@@ -19,6 +19,7 @@ from calibrate.effects import (
     hand_force,
     joint_compliance,
     joint_coupling,
+    laser_moved,
     laser_thermal_drift,
     laser_warm_up,
     latency,
@@ -36,6 +37,7 @@ from calibrate.effects import (
     psd_nonlinearity,
     reading_lag,
     seat_moved,
+    tool_moved,
     tool_sag,
 )
 from calibrate.effects.drivers import Drivers
@@ -66,6 +68,8 @@ EFFECTS: tuple[Effect, ...] = (
     device_drift.EFFECT,  # before base-moved: the same to look at, and a tripod gives way sooner than a bolted base
     base_moved.EFFECT,
     tool_sag.EFFECT,
+    tool_moved.EFFECT,
+    laser_moved.EFFECT,
     laser_warm_up.EFFECT,
     laser_thermal_drift.EFFECT,
     fixture_moved.EFFECT,

@@ -103,20 +103,24 @@ def _tool(drivers: Drivers) -> Iterator[Form]:
 
 
 def _laser(drivers: Drivers) -> Form:
-    """By the four numbers of its line that a model has: nothing shows how far it slid along its beam or turned about
-    it, and numbers of which one is invisible are all without a size.
+    return _constant(
+        Port("laser.direction", Place.FRAME, drivers.n_joints),
+        "laser-moved",
+        LASER,
+        line_of(drivers),
+        "The laser moved by {shift_u_m}, {shift_v_m} and turned by {tilt_u_rad}, {tilt_v_rad} across its beam",
+    )
+
+
+def line_of(drivers: Drivers) -> Floats:
+    """(6, 4) twists of the flange by the numbers of LASER, which are those of its line that a model has: nothing shows
+    how far it slid along its beam or turned about it, and numbers of which one is invisible are all without a size.
     """
     mount = spots.laser_of(drivers.rig)
     shifts = [np.concatenate([axis, np.zeros(3)]) for axis in (mount.u, mount.v)]
     # A turn about v tilts the beam towards u, one about -u towards v; the origin stays where it is.
     tilts = [np.concatenate([-np.cross(axis, mount.origin_m), axis]) for axis in (mount.v, -mount.u)]
-    return _constant(
-        Port("laser.direction", Place.FRAME, drivers.n_joints),
-        "laser-moved",
-        LASER,
-        np.stack([*shifts, *tilts], axis=1),
-        "The laser moved by {shift_u_m}, {shift_v_m} and turned by {tilt_u_rad}, {tilt_v_rad} across its beam",
-    )
+    return np.stack([*shifts, *tilts], axis=1)
 
 
 def _standing(drivers: Drivers) -> Iterator[Form]:

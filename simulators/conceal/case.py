@@ -81,7 +81,7 @@ def choose(wanted: Wanted, rng: np.random.Generator) -> tuple[type[Defect], ...]
     chosen: list[type[Defect]] = []
     for name in wanted.defects:
         if name in ("any", "outside"):
-            among = [k for k in possible if (k.PHYSICS == OUTSIDE) == (name == "outside")]
+            among = [k for k in possible if (k.PHYSICS == OUTSIDE) == (name == "outside") and not k.ASKED]
             fresh = [k for k in among if k not in chosen and _agree(k, chosen)] or among
             chosen.append(fresh[int(rng.integers(len(fresh)))])
         else:
@@ -107,7 +107,8 @@ def spares(wanted: Wanted, kinds: Sequence[type[Defect]], rng: np.random.Generat
     """What may stand in for a drawn mechanism that does not fit: none where each was asked for by name."""
     if any(name not in ("any", "outside") for name in wanted.defects):
         return ()
-    possible = [kind for kind in MECHANISMS if INSTRUMENT[wanted.family] in kind.INSTRUMENTS and kind not in kinds]
+    shown = [kind for kind in MECHANISMS if INSTRUMENT[wanted.family] in kind.INSTRUMENTS]
+    possible = [kind for kind in shown if kind not in kinds and not kind.ASKED]
     outside = {kind.PHYSICS == OUTSIDE for kind in kinds}
     fitting = [k for k in possible if (k.PHYSICS == OUTSIDE) in outside and (_agree(k, kinds) or not k.HABIT)]
     return tuple(fitting[int(index)] for index in rng.permutation(len(fitting)))

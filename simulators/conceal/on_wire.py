@@ -196,7 +196,7 @@ def _one(
     possible = [kind for kind in MECHANISMS if site.instrument in kind.INSTRUMENTS and not kind.HABIT]
     outside = wanted.defects == ("outside",)
     named = [kind for kind in possible if kind.KIND in wanted.defects]
-    among = named or [kind for kind in possible if kind.KIND.startswith("outside-") == outside]
+    among = named or [kind for kind in possible if kind.KIND.startswith("outside-") == outside and not kind.ASKED]
     for index in rng.permutation(len(among)):
         try:
             found = hidden_of(among[int(index)], rng)

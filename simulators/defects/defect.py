@@ -56,6 +56,7 @@ class Defect(Mechanism):
     INSTRUMENTS: ClassVar[tuple[str, ...]]  # where it can occur
     HABIT: ClassVar[str] = ""  # how a session must be run to show it: "moving", "direct", "payload" or "" for any
     NEEDS: ClassVar[tuple[str, ...]] = ()  # see `needs`
+    ASKED: ClassVar[bool] = False  # drawn only where its name is asked for: seeds of published proofs keep their cases
 
     @property
     def needs(self) -> tuple[str, ...]:

@@ -63,7 +63,16 @@ from simulators.defects.outside import (
     StickingPad,
     UnevenSpring,
 )
-from simulators.defects.tool import CarriedLaser, ElasticMount, LaserWarmUp, SaggingMount, WarmLaser
+from simulators.defects.tool import (
+    CarriedLaser,
+    CarriedTarget,
+    ElasticMount,
+    LaserWarmUp,
+    ReseatedLaser,
+    ReseatedTarget,
+    SaggingMount,
+    WarmLaser,
+)
 from simulators.defects.tracker import (
     BumpedDevice,
     CarriedDevice,
@@ -113,6 +122,8 @@ MECHANISMS: tuple[type[Defect], ...] = (
     WireScale,
     DrumOutOfRound,
     MovedCone,
+    ReseatedTarget,
+    ReseatedLaser,
     SaturatedProduct,
     NarrowBump,
     CableBundle,
@@ -137,6 +148,7 @@ GIVEN: tuple[type[Defect], ...] = (
     CarriedBase,
     ElasticMount,
     CarriedLaser,
+    CarriedTarget,
     CarriedFixture,
     StrainedFace,
     UnevenLayer,

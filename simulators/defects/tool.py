@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from simulators.arm.rigid import Vector, shifted, turned_about
 from simulators.arm.statics import Load
 from simulators.defects.defect import ROBOT, SPOTS, Defect, as_vector, direction
-from simulators.defects.displacement import CarriedPart
+from simulators.defects.displacement import Bump, CarriedPart
 from simulators.defects.scene import Scene, Site
 
 Floats = NDArray[np.float64]
 ORIGIN: Vector = (0.0, 0.0, 0.0)
+TARGETS = ("position", "wire", "seat")
 
 
 @dataclass(frozen=True)
@@ -156,3 +157,48 @@ class CarriedLaser(CarriedPart):
 
     def tool_motion(self, scene: Scene, load: Load) -> Floats:
         return self.carried(scene)
+
+
+@dataclass(frozen=True)
+class CarriedTarget(CarriedPart):
+    """The target in its nest, in the flange frame."""
+
+    KIND = "carried-target"
+    PHYSICS = "tool-moved"
+    PORT = "tool.point"
+    INSTRUMENTS = TARGETS
+
+    def tool_motion(self, scene: Scene, load: Load) -> Floats:
+        return self.carried(scene)
+
+
+@dataclass(frozen=True)
+class ReseatedTarget(Bump):
+    """A reflector or probe that was taken off and put on again, with a grain of dust below it."""
+
+    KIND = "reseated-target"
+    PHYSICS = "tool-moved"
+    PORT = "tool.point"
+    TYPICAL = 5e-5
+    TURNS_RAD_M = (0.0, 0.0)  # of a point no turn is seen
+    INSTRUMENTS = TARGETS
+    ASKED = True
+
+    def tool_motion(self, scene: Scene, load: Load) -> Floats:
+        return self.motion(scene)
+
+
+@dataclass(frozen=True)
+class ReseatedLaser(Bump):
+    """A laser that was unscrewed, or knocked, and points along another line from then on."""
+
+    KIND = "reseated-laser"
+    PHYSICS = "laser-moved"
+    PORT = "laser.direction"
+    TYPICAL = 4e-5
+    TURNS_RAD_M = (1.0, 4.0)
+    INSTRUMENTS = SPOTS
+    ASKED = True
+
+    def tool_motion(self, scene: Scene, load: Load) -> Floats:
+        return self.motion(scene)

@@ -91,3 +91,24 @@ def test_a_bumped_tracker_may_as_well_be_a_moved_base_and_no_pose_tells(tmp_path
     assert abs(other.margin) < 0.5
     assert finding.confidence == pytest.approx(0.5, abs=0.1)
     assert any("alike at every pose" in told for told in found.next)
+
+
+@pytest.mark.parametrize(
+    ("family", "mechanism", "physics", "where"),
+    [
+        ("tracker", "reseated-target", "tool-moved", "tool.point"),
+        ("dual-psd", "reseated-laser", "laser-moved", "laser.direction"),
+    ],
+)
+def test_what_was_seated_again_is_named_with_its_size(tmp_path, family, mechanism, physics, where):
+    recording = recording_of(tmp_path, family=family, seed=24, samples=160, defects=(mechanism,), enr=2.0)
+    truth = json.loads((tmp_path / "sealed" / "truth.json").read_bytes())["defects"][0]["figures"]
+    diagnosed = diagnose_samples(recording.rig, recording.samples, np.random.default_rng(1))
+    (found,) = diagnosed.physics.diagnosis.findings
+    assert (found.name.physics, found.name.where, found.name.depends_on) == (physics, where, ("t",))
+    sizes = found.parameters
+    assert abs(sizes["time_s"].value - truth["at_s"]) < 3.0 * sizes["time_s"].sigma
+    if family == "tracker":
+        shift = np.array([sizes[f"shift_{axis}_m"].value for axis in "xyz"])
+        sigma = max(sizes[f"shift_{axis}_m"].sigma for axis in "xyz")
+        assert abs(np.linalg.norm(shift) - truth["shift_m"]) < 3.0 * sigma

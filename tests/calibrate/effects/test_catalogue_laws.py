@@ -28,7 +28,7 @@ TEXT = (
     "joint-compliance payload-compliance backlash encoder-slip axis-wobble link-thermal-growth base-compliance "
     "base-moved latency reading-lag tool-sag link-bending psd-nonlinearity psd-gain psd-ambient-light "
     "psd-cover-glass laser-warm-up laser-thermal-drift fixture-moved device-scale device-drift device-periodic "
-    "seat-moved not-settled unknown"
+    "seat-moved tool-moved laser-moved not-settled unknown"
 )
 PHYSICS = set(TEXT.split())
 SMALL = 1e-7

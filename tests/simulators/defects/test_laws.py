@@ -46,6 +46,8 @@ PHYSICS = {
     "device-drift",
     "device-periodic",
     "seat-moved",
+    "tool-moved",
+    "laser-moved",
     "not-settled",
     "unknown",
 }
