@@ -26,7 +26,7 @@ PROMISED = {
     "Physics": "encoder-eccentricity encoder-harmonic gear-transmission-error gear-ratio-error joint-coupling "
     "joint-compliance payload-compliance backlash encoder-slip axis-wobble link-thermal-growth base-compliance "
     "base-moved latency reading-lag tool-sag link-bending psd-nonlinearity psd-gain psd-ambient-light psd-cover-glass "
-    "laser-warm-up laser-thermal-drift fixture-moved device-scale device-drift device-periodic seat-moved tool-moved laser-moved not-settled "
+    "laser-warm-up laser-thermal-drift fixture-moved device-scale device-drift device-periodic seat-moved not-settled "
     "unknown",
 }
 PLACEHOLDERS = (("<i>", r"\d+"), ("<k>", r"\d+"), ("<where>", r"\w+"))
