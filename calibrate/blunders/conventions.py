@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.blunders import coupling, degrees, offsets, signs
+from calibrate.blunders import coupling, degrees, joint_hypotheses, offsets
 from calibrate.blunders.finding import Blunder, BlunderKind
 from calibrate.blunders.hypothesis import Hypothesis
 from calibrate.blunders.least_distance import median
@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 Flange = Callable[[Floats], Floats]
 _Trial = tuple[Hypothesis, ...]  # by which the angles are read, one after the other
 
-KNOWN = (degrees.hypotheses, signs.hypotheses, offsets.hypotheses, coupling.hypotheses)
+KNOWN = (degrees.hypotheses, joint_hypotheses.hypotheses, offsets.hypotheses, coupling.hypotheses)
 
 GAIN = 4.0  # by which the strain must fall
 RIVAL = 1.5  # times the winner's strain: as good an explanation
@@ -139,7 +139,7 @@ class _Search:
             yield account
         trials = [(hypothesis,) for hypothesis in self._of_angles()]
         if before.gross or mirrored:
-            trials += [(hypothesis,) for hypothesis in signs.sets(self._joints)]
+            trials += [(hypothesis,) for hypothesis in joint_hypotheses.sets(self._joints)]
         yield from self.accounts(self.witnesses, trials)
 
     def doubles(self, before: _Account) -> Iterator[_Account]:
@@ -165,7 +165,7 @@ class _Search:
         witnesses = self.witnesses
         for wanted in kept:
             witnesses = next(w for other, w in _of_readings(witnesses) if _same(other, wanted))
-        turned = (*signs.hypotheses(self._joints), *signs.sets(self._joints))
+        turned = (*joint_hypotheses.hypotheses(self._joints), *joint_hypotheses.sets(self._joints))
         yield from self.accounts(witnesses, [(*angles, hypothesis) for hypothesis in turned], tuple(kept))
 
     @property
@@ -262,7 +262,7 @@ def _others(best: _Account, tried: list[_Account]) -> str:
     as_good = [a for a in tried if a is not best and not a.reflected and _as_good(a, best)]
     wider = [a for a in as_good if best.signs and set(best.signs) < set(a.signs) and a.besides == best.besides]
     unseen = sorted({j for a in wider for j in a.signs} - set(best.signs))
-    out = f"; these readings leave the sign of {signs.in_words(tuple(unseen))} open" if unseen else ""
+    out = f"; these readings leave the sign of {joint_hypotheses.in_words(tuple(unseen))} open" if unseen else ""
     rest = [a for a in as_good if a not in wider]
     out += "".join(f"; or {_in_words(a)}" for a in sorted(rest, key=_compared)[:NAMED])
     return out + (f"; or {len(rest) - NAMED} other explanations" if len(rest) > NAMED else "")

@@ -4,7 +4,7 @@ import numpy as np
 
 from acquisition.recording import Samples
 from calibrate.blunders.finding import Blunder, BlunderKind
-from calibrate.blunders.left_alone import left_alone
+from calibrate.blunders.of_the_table import left_alone
 
 
 def samples(n, **columns):
