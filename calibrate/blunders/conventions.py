@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.blunders import coupling, degrees, joint_hypotheses, offsets
+from calibrate.blunders import degrees, joint_hypotheses
 from calibrate.blunders.finding import Blunder, BlunderKind
 from calibrate.blunders.hypothesis import Hypothesis
 from calibrate.blunders.least_distance import median
@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 Flange = Callable[[Floats], Floats]
 _Trial = tuple[Hypothesis, ...]  # by which the angles are read, one after the other
 
-KNOWN = (degrees.hypotheses, joint_hypotheses.hypotheses, offsets.hypotheses, coupling.hypotheses)
+KNOWN = (degrees.hypotheses, joint_hypotheses.turned, joint_hypotheses.shifted, joint_hypotheses.coupled)
 
 GAIN = 4.0  # by which the strain must fall
 RIVAL = 1.5  # times the winner's strain: as good an explanation
@@ -165,7 +165,7 @@ class _Search:
         witnesses = self.witnesses
         for wanted in kept:
             witnesses = next(w for other, w in _of_readings(witnesses) if _same(other, wanted))
-        turned = (*joint_hypotheses.hypotheses(self._joints), *joint_hypotheses.sets(self._joints))
+        turned = (*joint_hypotheses.turned(self._joints), *joint_hypotheses.sets(self._joints))
         yield from self.accounts(witnesses, [(*angles, hypothesis) for hypothesis in turned], tuple(kept))
 
     @property

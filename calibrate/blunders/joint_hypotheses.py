@@ -1,4 +1,7 @@
-"""Joints that the file counts the other way round than the rig: one of them, or several at once.
+"""How a joint may be counted otherwise than the rig has it: another zero, one joint following another, another sign.
+
+Arms with a parallelogram, and some controllers, give joint 3 against the base or the horizontal instead of against link
+2. Source: Siciliano, Sciavicco, Villani, Oriolo, Robotics, 2009, ch. 2.9.2 (parallelogram arm).
 
 Controllers choose the senses of their joints freely; KUKA counts A1, A4 and A6 against the D-H model of the usual
 tables. Where links 2 and 3 move in one plane, these three signs together mirror the arm at that plane.
@@ -8,17 +11,54 @@ from collections.abc import Iterator, Mapping
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibrate.blunders.finding import BlunderKind
 from calibrate.blunders.hypothesis import Hypothesis
 
+Floats = NDArray[np.float64]
+
+
+def shifted(n_joints: int) -> Iterator[Hypothesis]:
+    """Each joint alone, shifted by 90, 180 or -90 degrees. Source: the usual differences between zero conventions."""
+    for j in range(n_joints):
+        for degrees in (90, 180, -90):
+            shift = np.where(np.arange(n_joints) == j, np.radians(degrees), 0.0)
+            yield Hypothesis(
+                BlunderKind.JOINT_OFFSET,
+                f"column q{j + 1}_rad",
+                f"zero of joint {j + 1} is {abs(degrees)} deg beside the rig's",
+                f"add {np.radians(degrees):.6f} rad to the column or to theta_offset_rad of joint {j + 1}",
+                lambda q, s=shift: q + s,
+            )
+
+
+COUPLED_BY = {(2, 3): ", as for FANUC"}  # who counts so: docs/robots.md, with sources
+
+
+def coupled(n_joints: int) -> Iterator[Hypothesis]:
+    """Each joint alone, with the angle of its neighbour in front added or taken away."""
+    for j in range(1, n_joints):
+        for sign in (-1.0, 1.0):
+            mixing = np.eye(n_joints)
+            mixing[j, j - 1] = sign
+            yield Hypothesis(
+                BlunderKind.JOINT_COUPLING,
+                f"column q{j + 1}_rad",
+                f"joint {j + 1} is coupled with joint {j}: its angle is not counted from link {j}",
+                f"in the rig file, write follows = {{ joint = {j}, by = {sign} }} for joint {j + 1}"
+                f"{COUPLED_BY.get((j, j + 1), '')}, or remove it there",
+                lambda q, m=mixing: q @ m.T,
+            )
+
+
 EVERY_SET = 8  # joints up to which all sets are tried: 247 of them, in a second
 # Against the table with every axis drawn as the one before it turns: docs/robots.md, with sources
-MAKES: Mapping[tuple[int, ...], str] = {(1, 4, 6): "KUKA"}
+TURNED_BY: Mapping[tuple[int, ...], str] = {(1, 4, 6): "KUKA"}
 LARGEST_SET = 3  # of longer arms; no controller is known that turns more
 
 
-def hypotheses(n_joints: int) -> Iterator[Hypothesis]:
+def turned(n_joints: int) -> Iterator[Hypothesis]:
     """Each joint alone with its sign changed."""
     for j in range(1, n_joints + 1):
         yield _turned((j,), n_joints)
@@ -45,7 +85,7 @@ def in_words(joints: tuple[int, ...]) -> str:
 
 def _makes(joints: tuple[int, ...]) -> str:
     """Who counts these joints so."""
-    return f", as for {MAKES[joints]}" if joints in MAKES else ""
+    return f", as for {TURNED_BY[joints]}" if joints in TURNED_BY else ""
 
 
 def _turned(joints: tuple[int, ...], n_joints: int) -> Hypothesis:

@@ -18,10 +18,8 @@ from acquisition.recording.samples import POSITION
 from calibrate.arms.catalogue import arm_of
 from calibrate.blunders.conventions import wrong_convention
 from calibrate.blunders.degrees import as_radians, beyond_limits
-from calibrate.blunders.duplicates import duplicated_rows
 from calibrate.blunders.finding import Blunder
-from calibrate.blunders.limits import rows_beyond_limits
-from calibrate.blunders.of_the_table import left_alone
+from calibrate.blunders.of_the_table import duplicated_rows, left_alone, rows_beyond_limits
 from calibrate.blunders.other_session import sessions_apart
 from calibrate.blunders.spot_signs import mirrored_axes
 from calibrate.blunders.witness import by_target

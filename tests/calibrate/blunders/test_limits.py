@@ -4,7 +4,7 @@ import numpy as np
 
 from acquisition.recording import Samples
 from calibrate.blunders.finding import BlunderKind
-from calibrate.blunders.limits import rows_beyond_limits
+from calibrate.blunders.of_the_table import rows_beyond_limits
 
 LIMITS = np.array([[-2.0, 2.0], [-1.0, 3.0]])
 
