@@ -158,6 +158,55 @@ def test_enter_after_the_question_measures_the_place(command, typist, capsys) ->
     assert "'yes' is no answer" in typist.screen
 
 
+TAUGHT = """[transform]
+P = { untaught = true }
+Q = { untaught = true }
+[position]
+"at pin" = "T6 = P"
+"at hole" = "T6 = Q"
+[[teach]]
+transform = "P"
+at = "at pin"
+[[teach]]
+transform = "Q"
+at = "at hole"
+"""
+
+
+@pytest.fixture
+def teach(monkeypatch, tmp_path) -> list[str]:
+    """Two positions to be taught, on an arm of which every reading is another one."""
+    (tmp_path / "untaught.toml").write_text(TAUGHT)
+    readings = iter(np.full(6, 0.1 * k) for k in range(9))
+    monkeypatch.setattr(task_by_hand, "watched_joints", lambda *_: nullcontext(lambda: next(readings)))
+    words = [
+        "task",
+        "teach",
+        str(tmp_path / "untaught.toml"),
+        "--rig",
+        str(RIG),
+        "--out",
+        str(tmp_path / "taught.toml"),
+    ]
+    return words
+
+
+def test_an_enter_typed_ahead_teaches_nothing(teach, typist, capsys, tmp_path) -> None:
+    typist.ahead("\n\n")
+    typist.answers(PLACE_CUE, "q\n")
+    assert run(teach) == 1
+    assert "teaching ended before 'at pin'" in capsys.readouterr().err
+    assert not (tmp_path / "taught.toml").exists()
+
+
+def test_enters_pasted_at_the_first_position_teach_no_second_one(teach, typist, capsys, tmp_path) -> None:
+    typist.answers(PLACE_CUE, "\n\n\n", "q\n")
+    assert run(teach) == 1
+    assert "teaching ended before 'at hole'; what was taught until then is kept" in capsys.readouterr().err
+    assert (tmp_path / "taught.toml").read_text().count("untaught") == 1
+    assert typist.asked == 0
+
+
 @pytest.mark.parametrize("name", [*MOVING, "psd-check"])
 def test_without_a_terminal_nobody_is_asked(command, monkeypatch, capsys, tmp_path, name) -> None:
     (tmp_path / "answers").write_text("go\ny\n\n")
