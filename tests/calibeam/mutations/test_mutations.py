@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from calibeam.command_list import COMMANDS
-from tests.calibeam.mutations.cases import Fault, faults, lay_out, run_case
+from tests.calibeam.mutations.cases import Fault, faults, lay_out, run_case, run_in_turn
 from tests.calibeam.mutations.recording_mutators import rewritten
 from tests.calibeam.mutations.server import Ran, Server, watched
 from tests.calibeam.mutations.table import DAILY as DAILY_SEEDS
@@ -25,6 +25,7 @@ from tests.calibeam.mutations.table_mutators import with_member
 Change = Callable[[bytes], bytes]
 
 CHUNK = 100  # seeds of one test
+IN_TURN = 10  # runs of one process, every day; hundreds of each have a process of their own
 REAL = (  # through the installed console script as well: one of each way to end
     ("fit.toml|identify_tracker_--plan_fit.toml", 3),
     ("model.json|predict_model.json_tracker:samples.csv", 1),
@@ -85,8 +86,15 @@ def named(pair: Pair, seeds: range) -> str:
     return f"{pair.name}|{seeds.start}-{seeds.stop - 1}"
 
 
-def ran_into(server: Server, good: Path, pair: Pair, seeds: range, scratch: Path) -> list[Fault]:
+def ran_into(
+    server: Server, good: Path, pair: Pair, seeds: range, scratch: Path, *, in_turn: bool = False
+) -> list[Fault]:
     found: list[Fault] = []
+    if in_turn and not pair.together:
+        for first in range(seeds.start, seeds.stop, IN_TURN):
+            some = range(first, min(first + IN_TURN, seeds.stop))
+            found += run_in_turn(server, good, pair, some, scratch / f"turn-{first}")
+        return found
     for seed in range(seeds.start, seeds.stop, max(1, pair.together)):
         some = range(seed, min(seed + max(1, pair.together), seeds.stop))
         found += run_case(server, good, pair, some, scratch / "case")[1]
@@ -102,7 +110,7 @@ ENDURED = [(pair, range(first, first + CHUNK)) for pair in TABLE for first in ra
 def test_a_mutated_file_is_refused_in_one_message_or_read(
     pair: Pair, seeds: range, server: Server, good: Path, tmp_path: Path
 ) -> None:
-    found = ran_into(server, good, pair, seeds, tmp_path)
+    found = ran_into(server, good, pair, seeds, tmp_path, in_turn=True)
     assert not found, "\n".join(map(str, found))
 
 
@@ -199,3 +207,17 @@ def test_a_fork_reaches_no_other_machine(server: Server, good: Path, tmp_path: P
     (tmp_path / "rig.toml").write_text(text.replace("127.0.0.9", "robot.example").replace("psd1.json", ""), "utf-8")
     ran = server.run(["move", "rig.toml", "--home", "--dry-run"], tmp_path, 60.0, 10**9)
     assert "no network in this test" in ran.err
+
+
+def test_runs_in_turn_end_as_each_by_itself(server: Server, good: Path, tmp_path: Path) -> None:
+    """A folder that is not there ends the process: those after it are missing, and are run by themselves."""
+    words, folders = ["check", "tracker"], [tmp_path / name for name in ("good", "bad", "also")]
+    for folder in folders:
+        shutil.copytree(good / "tracker", folder / "tracker")
+    (folders[1] / "tracker" / "samples.csv").write_bytes(b"\0")
+    together = server.run_in_turn(words, folders, 60.0, 10**9)
+    alone = [server.run(words, folder, 60.0, 10**9) for folder in folders]
+    assert [(ran.code, ran.out, ran.err) for ran in together] == [(ran.code, ran.out, ran.err) for ran in alone]
+    assert [ran.code for ran in together] == [0, 1, 0]
+    ended = server.run_in_turn(words, [folders[0], tmp_path / "nowhere", folders[2]], 60.0, 10**9)
+    assert [ran.code for ran in ended] == [0]
