@@ -17,7 +17,7 @@ from acquisition.recording.rig import Rig
 from benchmarks.blundered import ROWS, WHOLE_FILE, Made, Mistake
 from benchmarks.healthy import INSTRUMENTS, Drawn
 from calibrate.arms.catalogue import arm_of
-from calibrate.blunders.conventions import strain_of
+from calibrate.blunders.witness import Strain
 from calibrate.blunders.witnesses import witnesses_of
 from calibrate.errors import DataError
 from calibrate.identification.identify import refuse_wrong_file, without_blunders
@@ -95,9 +95,11 @@ def _judge(count: Count, rig: Rig, healthy: Samples, made: Made) -> None:
 
 
 def _strain(rig: Rig, samples: Samples) -> float:
-    arm = arm_of(rig)
-    witnesses = witnesses_of(rig, samples, samples.joints())
-    return strain_of(lambda q: arm.flange(start_values(arm.parameters), q), witnesses).compared_m
+    """Of all instruments together, the file being right as it is written."""
+    arm, strain = arm_of(rig), Strain(np.zeros(1), np.zeros(1))
+    for witness in witnesses_of(rig, samples, samples.joints()):
+        strain = strain + witness.strain(arm.flange(start_values(arm.parameters), witness.q_rad)[None])
+    return float(strain.compared_m[0])
 
 
 def _drawn_from(folder: Path) -> Draw:

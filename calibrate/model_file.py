@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.files import JsonKind, read_json, shown
+from acquisition.recording.files import JsonKind, read_json, shown, write_json
 from acquisition.recording.files.bounds import (
     Correction,
     Count,
@@ -207,9 +207,7 @@ class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 def write_model(path: Path, model: ModelFile) -> None:
     """Write model.json, whole or not at all. OSError where the folder cannot be written."""
-    partial = path.with_name(path.name + ".partial")
-    partial.write_bytes(msgspec.json.format(msgspec.json.encode(model), indent=1) + b"\n")
-    partial.replace(path)
+    write_json(path, model)
 
 
 def read_model(path: Path) -> ModelFile:

@@ -49,3 +49,8 @@ def test_one_file_of_at_most_400_lines_is_compiled() -> None:
     }
     assert users == {"calibrate/arms/fast.py"}
     assert len((ROOT / "calibrate/arms/fast.py").read_text().splitlines()) <= 400
+
+
+def test_the_benchmarks_can_be_started() -> None:
+    """They use inner parts of the program, and `make test` runs none of them."""
+    __import__("benchmarks.__main__")

@@ -6,8 +6,9 @@ import msgspec
 from rich.console import Console
 
 from acquisition.recording import Recording, read
+from acquisition.recording.files import write_json
 from calibeam.printing.comparison_lines import print_comparison
-from calibeam.results.comparison import compare, write_comparison
+from calibeam.results.comparison import compare
 from calibeam.results.identification import naming_source
 from calibeam.results.simulator import TIMEOUT_S, Simulator, simulated_by
 from calibrate.errors import DataError
@@ -67,7 +68,7 @@ def compare_command(
     with naming_source(measured):
         other = _simulation(source, simulated, simulator, structure, timeout_s)
         file = compare(source, other, diagnosed=diagnose, structure=structure)
-    write_comparison(out, file)
+    write_json(out, file)
     if json:
         print(msgspec.json.encode(file).decode())
         return

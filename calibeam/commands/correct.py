@@ -23,6 +23,8 @@ from calibrate.model_file import ModelFile, read_model
 
 Floats = NDArray[np.float64]
 
+LARGEST_BYTES = 32_000_000  # a program of 300,000 targets
+LONGEST = 10_000  # letters of a line; controllers end at some hundred
 LISTED = 12  # poses that are not ok, before the rest is counted
 SIDES = {"positive": 1, "negative": -1}
 UM = 1e6
@@ -216,7 +218,11 @@ def _write_table(out: Path, header: list[str], rows: list[list[str]]) -> None:
 
 def _text(path: Path, encoding: str) -> str:
     try:
-        return path.read_bytes().decode(encoding)
+        with path.open("rb") as file:
+            data = file.read(LARGEST_BYTES + 1)
+        if len(data) > LARGEST_BYTES or max(map(len, data.splitlines()), default=0) > LONGEST:
+            raise DataError(f"{path}: larger than {LARGEST_BYTES / 1e6:g} MB, or a line of more than {LONGEST} letters")
+        return data.decode(encoding)
     except FileNotFoundError as error:
         raise DataError(f"{path}: there is no such file") from error
     except UnicodeDecodeError as error:

@@ -5,6 +5,7 @@ from pathlib import Path
 from acquisition.recording import read
 from acquisition.recording.can_log import SUFFIXES, export_can
 from acquisition.recording.session_folder import TableFormat, export, write_streams
+from calibeam.outcome import taken_back
 
 
 def export_command(recording: Path, *, out: Path, table: TableFormat = TableFormat.CSV, streams: bool = False) -> None:
@@ -32,10 +33,11 @@ def export_command(recording: Path, *, out: Path, table: TableFormat = TableForm
     """
     source = read(recording)
     if out.suffix.lower() in SUFFIXES:
-        print(f"{out}: {export_can(source, out)} CAN frames")
+        with taken_back(out):
+            print(f"{out}: {export_can(source, out)} CAN frames")
         return
-    export(source, out, table)
-    print(f"{out}: rig.toml and samples.{table.value} with {len(source.samples)} samples")
-    if streams:
-        for path in write_streams(source, out, table):
+    with taken_back(out):
+        export(source, out, table)
+        print(f"{out}: rig.toml and samples.{table.value} with {len(source.samples)} samples")
+        for path in write_streams(source, out, table) if streams else ():
             print(f"{path}: {path.stat().st_size} bytes")

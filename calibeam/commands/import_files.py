@@ -37,7 +37,7 @@ from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.session_folder import CSV, PARQUET, RIG
 from acquisition.recording.session_folder.folder_import import import_folder, write_recording
 from calibeam.asking import NotAgreedError, at_terminal, someone
-from calibeam.outcome import PartialResult
+from calibeam.outcome import PartialResult, taken_back
 from calibeam.software import SOFTWARE
 from calibrate.report.quantities import significant
 
@@ -102,7 +102,8 @@ def import_command(
             raise RecordingError(f"{others[0]}: a session folder is imported by itself; leave the others out")
         given = {"rig": rig, "columns": columns, "sheet": sheet, "streams": streams}
         _refuse(source, "a session folder has its own rig.toml", **given)
-        import_folder(source, out, software=SOFTWARE)
+        with taken_back(out):
+            import_folder(source, out, software=SOFTWARE)
         print(f"{out}: {len(read(out).samples)} samples")
         return
     for path in (source, *others):
@@ -138,14 +139,16 @@ def _can(source: Path, out: Path, rig: Path) -> None:
     """Every frame, and where the rig names a DBC file what the encoders sent."""
     encoders = load_rig(rig).devices.encoders
     if encoders is None or not described_by_dbc(encoders):
-        done = import_can(source, out, rig_text=rig_text(rig), software=SOFTWARE)
+        with taken_back(out):
+            done = import_can(source, out, rig_text=rig_text(rig), software=SOFTWARE)
         print(f"{out}: {done.frames} CAN frames in {', '.join(done.streams)}")
     else:
         done, frames = _frames(source, rig, out)
         rows = encoder_rows(frames, encoders)
         whole = replace(frames, streams={**frames.streams, ENCODERS: encoder_stream(rows)})
         started_utc = datetime.fromisoformat(frames.started_utc)
-        write_recording(whole, out, software=SOFTWARE, imported_from=source.name, started_utc=started_utc)
+        with taken_back(out):
+            write_recording(whole, out, software=SOFTWARE, imported_from=source.name, started_utc=started_utc)
         print(f"{out}: {done.frames} CAN frames in {', '.join(done.streams)}, {len(rows)} rows of {ENCODERS}")
     if done.damage is not None:
         raise PartialResult(f"{source}: {done.damage}; everything before it is in {out}")
@@ -192,8 +195,9 @@ def _logs(tables: Sequence[Understanding], out: Path, *, yes: bool) -> None:
         print_columns(console, one)
     _agreed(yes=yes)
     names = ", ".join(str(table.sheet.path.name) for table in tables)
-    write_recording(recording, out, software=SOFTWARE, imported_from=names, started_utc=started_utc)
-    beside = write_columns(about, out)
+    with taken_back(out):
+        write_recording(recording, out, software=SOFTWARE, imported_from=names, started_utc=started_utc)
+        beside = write_columns(about, out)
     for name, stream in recording.streams.items():
         console.print(f"{out}: {name}, {len(stream.host_s)} rows", markup=False, highlight=False)
     console.print(f"columns: {beside}", markup=False, highlight=False)
@@ -220,7 +224,8 @@ def _table(table: Understanding, out: Path, *, yes: bool) -> None:
     about = columns_file(table, samples, SOFTWARE)
     print_columns(console, about)
     _agreed(yes=yes)
-    beside = write_session(table, samples, about, out)
+    with taken_back(out):
+        beside = write_session(table, samples, about, out)
     for line in (f"{out}: {RIG} and {CSV} with {len(samples)} samples", f"columns: {beside}"):
         console.print(line, markup=False, highlight=False)
 

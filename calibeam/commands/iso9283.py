@@ -14,11 +14,13 @@ from rich.console import Console
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Samples, read
+from acquisition.recording.files import write_json
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan, read_pose_plan, write_pose_plan
 from acquisition.recording.rig import Rig, load_rig, parse_rig
 from acquisition.recording.session_folder import read_csv
 from calibeam.motion.cube_in_reach import CubeInReach, cube_in_reach, ways_to
 from calibeam.motion.motion_inverse import MotionInverse
+from calibeam.outcome import taken_back
 from calibeam.printing.pose_test import print_pose_test
 from calibeam.software import SOFTWARE
 from calibrate.arms.rig_arm import RigArm
@@ -131,15 +133,17 @@ def plan(
     sides = {number: ways_to(loaded, cube.q_rad[number - 1]) for number in FROM_THREE_SIDES} if three_sides else {}
     visits = tuple(_visits(cycles, sides))
     poses_csv = out.with_suffix(".poses.csv")
-    write_pose_plan(out, _plan_of(loaded, cube, visits, cube.q_rad[[v.pose - 1 for v in visits]], "nominal"))
-    _write_poses(poses_csv, cube)
+    with taken_back(out, poses_csv):
+        write_pose_plan(out, _plan_of(loaded, cube, visits, cube.q_rad[[v.pose - 1 for v in visits]], "nominal"))
+        _write_poses(poses_csv, cube)
     centre = ", ".join(f"{1e3 * float(x):.0f}" for x in cube.centre_m)
     print(f"cube: edge {1e3 * cube.edge_m:.0f} mm, centre {centre} mm in the base, plane {plane}")
     print(f"plan: {out}, {len(visits)} visits; poses: {poses_csv}")
     if model is not None:
         known = _model(model, loaded)
         commands, why = _corrected(known, cube, visits)
-        write_pose_plan(corrected, _plan_of(loaded, cube, visits, commands, f"corrected by {model.name}"))
+        with taken_back(corrected):
+            write_pose_plan(corrected, _plan_of(loaded, cube, visits, commands, f"corrected by {model.name}"))
         for line in why:
             print(line)
         print(f"corrected plan: {corrected}; evaluate its recording with --plan {out}")
@@ -191,11 +195,9 @@ def evaluate_test(
     planned = None if plan is None else read_pose_plan(plan, loaded)
     found = evaluate(samples, loaded, known, planned, frame)
     file = _file(found, loaded, recording, model)
-    text = msgspec.json.encode(file)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_bytes(msgspec.json.format(text, indent=1) + b"\n")
+    write_json(out, file)
     if json_:
-        print(text.decode())
+        print(msgspec.json.encode(file).decode())
     else:
         print_pose_test(Console(), found, f"figures: {out}")
 

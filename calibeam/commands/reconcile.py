@@ -6,9 +6,10 @@ import msgspec
 from rich.console import Console
 
 from acquisition.recording import Recording, read
+from acquisition.recording.files import write_json
 from acquisition.recording.rig import rig_text
+from calibeam.outcome import taken_back
 from calibeam.printing.comparison_lines import print_reconciliation
-from calibeam.results.comparison import write_comparison
 from calibeam.results.identification import naming_source
 from calibeam.results.reconciliation import Reconciled, reconcile
 from calibeam.results.reconciliation_page import write_reconciliation_page
@@ -54,7 +55,8 @@ def reconcile_command(
     other: Recording | str = rig_text(simulation) if simulation.suffix == ".toml" else read(simulation)
     with naming_source(measured):
         found = reconcile(source, other, simulation.name, seed=seed)
-    _write(out, found, source)
+    with taken_back(out):
+        _write(out, found, source)
     if json:
         print(msgspec.json.encode(found.file).decode())
         return
@@ -66,11 +68,11 @@ def reconcile_command(
 def _write(out: Path, found: Reconciled, source: Recording) -> None:
     """Every file of the folder."""
     out.mkdir(parents=True, exist_ok=True)
-    write_comparison(out / "before.json", found.before)
+    write_json(out / "before.json", found.before)
     write_diagnosis(out / "diagnosis.json", found.diagnosis)
     write_model(out / "model.json", found.model)
     about = {"replayed": source.path.name, "model": "model.json", "seed": str(found.file.seed), "noise": "as found"}
     write_replayed(out / "simulated.mcap", found.simulated, found.measured, about)
-    write_comparison(out / "after.json", found.after)
-    (out / "reconcile.json").write_bytes(msgspec.json.format(msgspec.json.encode(found.file), indent=2) + b"\n")
+    write_json(out / "after.json", found.after)
+    write_json(out / "reconcile.json", found.file)
     write_reconciliation_page(out / "page.html", found)

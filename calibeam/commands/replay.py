@@ -7,6 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from acquisition.recording import read
+from calibeam.outcome import taken_back
 from calibeam.results.identification import naming_source
 from calibeam.simulation.physics import names_of
 from calibeam.simulation.replayed_recording import over_noise, replay, write_replayed
@@ -63,7 +64,8 @@ def replay_command(
         source = read(recording)
         found = replay(source, known, without=without, seed=seed, noisy=noise, noise_found=noise_found)
     about = {"replayed": recording.name, "model": model.name, "seed": str(seed), "noise": "drawn" if noise else "none"}
-    write_replayed(out, found, source, about | ({"without": ", ".join(without)} if without else {}))
+    with taken_back(out):
+        write_replayed(out, found, source, about | ({"without": ", ".join(without)} if without else {}))
     apart = over_noise(found, source.samples)
     if json:
         sizes = {what: {"rms": rms, "noise": drawn} for what, (rms, drawn) in apart.items()}

@@ -9,7 +9,7 @@ from rich.console import Console
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Recording, read
-from acquisition.recording.files import si_value
+from acquisition.recording.files import si_value, write_json
 from acquisition.recording.rig import Rig, rig_sha256
 from acquisition.recording.samples import ORIENTATION, POSITION
 from calibeam.outcome import PartialResult
@@ -22,7 +22,7 @@ from calibrate.model_file import ModelFile, RigIdentity, read_model
 from calibrate.predict import Predictor
 from calibrate.tool_axes.arm_prior import DEFAULT, ArmErrors, assumed_prior, prior_of_model
 from calibrate.tool_axes.tool import calibrate_tool
-from calibrate.tool_axes.tool_file import ToolFile, tool_record, write_tool
+from calibrate.tool_axes.tool_file import ToolFile, tool_record
 from calibrate.tool_axes.wrist_fit import TargetRows
 
 TARGET = "target"  # column: which target of the tool a row is of, a whole number; absent: there is one
@@ -76,7 +76,7 @@ def tool_axes_command(
     source = read(recording)
     errors = errors_of(source.rig, zero_sigma, length_sigma, angle_sigma)
     found = tool_of(source, errors, model)
-    write_tool(out, found)
+    write_json(out, found)
     if json:
         print(msgspec.json.encode(found).decode())
     else:

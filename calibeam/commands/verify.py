@@ -9,12 +9,13 @@ from rich.console import Console
 from rich.table import Table
 
 from acquisition.recording import read
+from acquisition.recording.files import write_json
 from calibeam.geometry_only import read_geometry
 from calibeam.outcome import CheckFailed
 from calibeam.software import SOFTWARE
 from calibrate.report.quantities import DASH, length
 from calibrate.report.verification_page import SAYS, write_verification_page
-from calibrate.verification.verify import Verification, verification_file, verify, write_verification
+from calibrate.verification.verify import Verification, verification_file, verify
 
 
 def verify_command(
@@ -54,7 +55,7 @@ def verify_command(
     source = read(recording)
     found = verify(source, read_geometry(model))
     file = verification_file(found, rig=source.rig.name, recording=recording.name, model=model.name, software=SOFTWARE)
-    write_verification(out, file)
+    write_json(out, file)
     report.parent.mkdir(parents=True, exist_ok=True)
     write_verification_page(report, source, found, SOFTWARE)
     if json_:

@@ -97,4 +97,7 @@ def _joint(path: Path, number: int, row: Sequence[str], columns: Sequence[tuple[
         if not math.isfinite(value):
             raise DataError(f"{path}, row {number}: {shown(cell.strip())} is not finite; correct it")
         values[key] = value * factor
-    return msgspec.convert(values, Joint)
+    try:
+        return msgspec.convert(values, Joint)
+    except msgspec.ValidationError as error:
+        raise DataError(f"{path}, row {number}: {shown(str(error))}; correct it") from error

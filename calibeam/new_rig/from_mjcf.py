@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording.files import shown
+from acquisition.recording.files.bounds import ANGLE_RAD, LENGTH_M
 from calibeam.new_rig.drawn import ANY_TURN_RAD, DrawnArm, DrawnJoint, onto_axis
 from calibrate.errors import DataError
 from calibrate.rigid import inverse, transform
@@ -32,6 +33,7 @@ def mjcf_arm(path: Path, base_body: str | None = None, tip: str | None = None) -
         model = mujoco.MjModel.from_xml_path(str(path))
     except (ValueError, mujoco.FatalError) as error:
         raise DataError(f"{path}: MuJoCo cannot load it: {' '.join(str(error).split())}; correct the file") from error
+    _check_bounds(path, model)
     base = WORLD if base_body is None else _body(mujoco, model, path, base_body)
     end, T_end = _end(mujoco, model, path, tip)
     bodies = _way(model, path, base, end)
@@ -67,6 +69,18 @@ def mjcf_arm(path: Path, base_body: str | None = None, tip: str | None = None) -
     if free:
         notes.append(f"Joints without limits there, taken as one turn either way: {', '.join(free)}.")
     return DrawnArm(path.stem, tuple(drawn), behind @ T_end, tuple(notes))
+
+
+def _check_bounds(path: Path, model: Any) -> None:
+    """DataError for numbers of which no rig file could be made; MuJoCo itself takes any."""
+    lengths = (model.body_pos, model.body_ipos, model.jnt_pos, model.site_pos)
+    for all_of, most, unit in ((lengths, LENGTH_M, "m"), ((model.qpos0, model.jnt_range), ANGLE_RAD, "rad")):
+        worst = np.abs(np.concatenate([np.ravel(one) for one in all_of])).max(initial=0.0)
+        if not worst <= most:
+            raise DataError(f"{path}: {worst:g} {unit} stands in it, which no arm has; correct the number")
+    for units in (model.body_quat, model.site_quat, model.jnt_axis):
+        if not np.all(np.abs(np.linalg.norm(units, axis=1) - 1.0) < 1e-6):
+            raise DataError(f"{path}: a quaternion or an axis in it has no direction; correct it")
 
 
 def _laden(model: Any, joint: DrawnJoint, T: Floats, body: int, bodies: list[int]) -> DrawnJoint:

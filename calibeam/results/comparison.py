@@ -7,7 +7,6 @@ in docs/formats.md.
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -157,12 +156,6 @@ class ComparisonFile(msgspec.Struct, frozen=True):
     streams: tuple[StreamRecord, ...]
     notes: tuple[str, ...]
     diagnosis: DiagnosisFile | None
-
-
-def write_comparison(path: Path, file: ComparisonFile) -> None:
-    """OSError where it cannot be written."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(msgspec.json.format(msgspec.json.encode(file), indent=2) + b"\n")
 
 
 FEWEST = 20  # samples of a search; fewer hold no more than the geometry

@@ -61,6 +61,8 @@ def replay(
     DataError for a model of another arm, for names that it does not list, or where nothing was measured.
     """
     samples = recording.samples
+    if len(samples) == 0:
+        raise DataError(f"{recording.path}: no samples, so there is no motion to replay; give a recording with samples")
     predictor = _predictor(recording.rig, model)
     same = model.readings_sha256 == readings_sha256(samples)
     physics = physics_of(model, predictor, samples.n_joints, same_recording=same, without=without)

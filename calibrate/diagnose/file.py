@@ -3,9 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-import msgspec
-
-from acquisition.recording.files import JsonKind, read_json, shown
+from acquisition.recording.files import JsonKind, read_json, shown, write_json
 from calibrate.diagnose.schema import SCHEMA, DiagnosisFile
 from calibrate.errors import DataError
 
@@ -14,10 +12,7 @@ KIND = JsonKind("diagnosis.json", "give the diagnosis.json of a diagnosis", "dia
 
 def write_diagnosis(path: Path, diagnosis: DiagnosisFile) -> None:
     """Write diagnosis.json, whole or not at all. OSError where the folder cannot be written."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(path.name + ".partial")
-    partial.write_bytes(msgspec.json.format(msgspec.json.encode(diagnosis), indent=1) + b"\n")
-    partial.replace(path)
+    write_json(path, diagnosis)
 
 
 def read_diagnosis(path: Path) -> DiagnosisFile:

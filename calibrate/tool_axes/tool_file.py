@@ -3,7 +3,6 @@
 Angles are rad, lengths m.
 """
 
-from pathlib import Path
 from typing import Literal
 
 import msgspec
@@ -134,14 +133,6 @@ def tool_record(
         flange=_flange(found.flange),
         axes=tuple(_axis(axis, target) for target in found.targets for axis in target.axes),
     )
-
-
-def write_tool(path: Path, tool: ToolFile) -> None:
-    """Write tool.json, whole or not at all. OSError where the folder cannot be written."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(path.name + ".partial")
-    partial.write_bytes(msgspec.json.format(msgspec.json.encode(tool), indent=1) + b"\n")
-    partial.replace(path)
 
 
 def _target(target: TargetFound) -> TargetRecord:

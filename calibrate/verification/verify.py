@@ -6,7 +6,6 @@ the result, version 1 (docs/formats.md).
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 import msgspec
@@ -192,11 +191,3 @@ def _record(figure: Figure) -> FigureRecord:
         tuple(OneMeasurement(*one) for one in figure.each),
         dict(figure.also),
     )
-
-
-def write_verification(path: Path, file: VerificationFile) -> None:
-    """Whole or not at all. OSError where the folder cannot be written."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(path.name + ".partial")
-    partial.write_bytes(msgspec.json.format(msgspec.json.encode(file), indent=1) + b"\n")
-    partial.replace(path)

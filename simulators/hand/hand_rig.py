@@ -300,11 +300,3 @@ def write_hand_truth(truth: HandTruth, path: Path) -> None:
     """Writes the truth as JSON, SI names with their units; folders are made."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(msgspec.json.format(msgspec.json.encode(truth), indent=1) + b"\n")
-
-
-def read_hand_truth(path: Path) -> HandTruth:
-    """The truth that `write_hand_truth` left. WorldError when the file is not one."""
-    try:
-        return msgspec.json.decode(path.read_bytes(), type=HandTruth)
-    except msgspec.DecodeError as error:
-        raise WorldError(f"{path}: no truth of a hand-held arm: {error}; emulate with --truth") from error

@@ -83,7 +83,13 @@ class Robot:
 
 
 @pytest.fixture
-def command(monkeypatch, tmp_path) -> Callable[[str], list[str]]:
+def quick(monkeypatch) -> None:
+    """A person who needs no time to read, where nothing is typed between a question and its cue."""
+    monkeypatch.setattr(asking, "REACTION_S", 0.0)
+
+
+@pytest.fixture
+def command(monkeypatch, tmp_path, quick) -> Callable[[str], list[str]]:
     """The command line of every command that asks, without any device: what would move the arm says so instead."""
     for name, stand_in in (
         ("streamed_robot", lambda *_: Robot()), ("gate_of", lambda *_: Gate()),
@@ -158,6 +164,55 @@ def test_enter_after_the_question_measures_the_place(command, typist, capsys) ->
     assert "'yes' is no answer" in typist.screen
 
 
+TAUGHT = """[transform]
+P = { untaught = true }
+Q = { untaught = true }
+[position]
+"at pin" = "T6 = P"
+"at hole" = "T6 = Q"
+[[teach]]
+transform = "P"
+at = "at pin"
+[[teach]]
+transform = "Q"
+at = "at hole"
+"""
+
+
+@pytest.fixture
+def teach(monkeypatch, tmp_path, quick) -> list[str]:
+    """Two positions to be taught, on an arm of which every reading is another one."""
+    (tmp_path / "untaught.toml").write_text(TAUGHT)
+    readings = iter(np.full(6, 0.1 * k) for k in range(9))
+    monkeypatch.setattr(task_by_hand, "watched_joints", lambda *_: nullcontext(lambda: next(readings)))
+    words = [
+        "task",
+        "teach",
+        str(tmp_path / "untaught.toml"),
+        "--rig",
+        str(RIG),
+        "--out",
+        str(tmp_path / "taught.toml"),
+    ]
+    return words
+
+
+def test_an_enter_typed_ahead_teaches_nothing(teach, typist, capsys, tmp_path) -> None:
+    typist.ahead("\n\n")
+    typist.answers(PLACE_CUE, "q\n")
+    assert run(teach) == 1
+    assert "teaching ended before 'at pin'" in capsys.readouterr().err
+    assert not (tmp_path / "taught.toml").exists()
+
+
+def test_enters_pasted_at_the_first_position_teach_no_second_one(teach, typist, capsys, tmp_path) -> None:
+    typist.answers(PLACE_CUE, "\n\n\n", "q\n")
+    assert run(teach) == 1
+    assert "teaching ended before 'at hole'; what was taught until then is kept" in capsys.readouterr().err
+    assert (tmp_path / "taught.toml").read_text().count("untaught") == 1
+    assert typist.asked == 0
+
+
 @pytest.mark.parametrize("name", [*MOVING, "psd-check"])
 def test_without_a_terminal_nobody_is_asked(command, monkeypatch, capsys, tmp_path, name) -> None:
     (tmp_path / "answers").write_text("go\ny\n\n")
@@ -196,7 +251,7 @@ def test_a_plain_word_refuses(typist, word) -> None:
         Asking(typist.terminal).may_move()
 
 
-def test_anything_else_asks_again(typist) -> None:
+def test_anything_else_asks_again(typist, quick) -> None:
     typist.answers(CUE, "y\n", "\n", "going\n", "\x1b[A\n", "go\n")
     Asking(typist.terminal).may_move()
     assert typist.asked == 0
@@ -245,14 +300,14 @@ def test_a_terminal_that_can_only_be_read_shows_the_question_all_the_same(typist
         os.close(reading)
 
 
-def test_a_choice_is_one_of_its_letters_or_enter_for_the_first_offered(typist) -> None:
+def test_a_choice_is_one_of_its_letters_or_enter_for_the_first_offered(typist, quick) -> None:
     asks, choices = Asking(typist.terminal), {"f": "finish", "n": "a further place"}
     typist.answers("what next? [f/n, ENTER: f] ", "x\n", "N\n", "\n", "\x04")
     assert [asks.choice("what next?", choices, "f") for _ in range(3)] == ["n", "f", None]
     assert "'x' is none of them" in typist.screen
 
 
-def test_numbers_are_asked_for_until_they_are_numbers(typist) -> None:
+def test_numbers_are_asked_for_until_they_are_numbers(typist, quick) -> None:
     asks = Asking(typist.terminal)
     typist.answers("> ", "1 2 3\n", "1 two\n", "1 nan\n", "1, -2.5\n", "\x04")
     assert [asks.numbers("where?", 2) for _ in range(2)] == [(1.0, -2.5), None]

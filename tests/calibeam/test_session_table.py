@@ -4,16 +4,10 @@ from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
-import numpy as np
 import pytest
 from rich.console import Console
 
-from acquisition.recording import RecordingWriter, Samples, read
-from acquisition.recording.rig import load_rig, plain_rig, rig_text
-from acquisition.session.plan import PlanOptions
-from acquisition.session.session import Session
-from calibeam.devices.recorder import RecordingJournal
-from calibeam.learner import FittedLearner
+from acquisition.recording import Samples
 from calibeam.printing.identification import print_identification
 from calibeam.results.identification import Planned, identify_session, session_model
 from calibrate.errors import DataError
@@ -21,21 +15,14 @@ from calibrate.fit_plan import parse_plan
 from calibrate.identification.point_constraint import point_constraints
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_verdict import session_verdict
-from drivers.clock import SystemClock
-from tests.support.direct_bench import direct_bench
+from tests.support.recorded_session import recorded_session
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
 
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
-    path, clock, rig = tmp_path_factory.mktemp("terminal") / "r.mcap", SystemClock(), load_rig(RIG)
-    bench = direct_bench(rig, plain_rig(rig_text(RIG), "rig"), seed=12)
-    with RecordingWriter(path, rig_text=rig_text(RIG), software="calibeam", clock=clock) as writer:
-        options = PlanOptions(centred=2, off_centre=4, repeats=1)
-        journal = RecordingJournal(writer, clock)
-        Session(bench, FittedLearner(rig), journal, options, np.array(rig.motion.home_rad)).run((1, 2, 3))
-    return read(path)
+    return recorded_session(tmp_path_factory)
 
 
 def printed(recording, plan=None):

@@ -1,4 +1,4 @@
-"""Reads a JSON file into records, with one clear error that names file, key, value and remedy."""
+"""Writes records as a JSON file, and reads them with one clear error that names file, key, value and remedy."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -61,6 +61,17 @@ def read_json(path: Path, kind: JsonKind, records: type[T], other: Check, renewe
         raise kind.fault(
             f"{path}: damaged {kind.name}: {shown(key, 80)}{spelled}: {shown(plain(says))}; {kind.again}"
         ) from error
+
+
+def write_json(path: Path, records: object) -> None:
+    """Whole or not at all; what was there before stays until then. OSError where the folder cannot be written."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(path.name + ".partial")
+    try:
+        partial.write_bytes(msgspec.json.format(msgspec.json.encode(records), indent=1) + b"\n")
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
 
 
 def _read(path: Path, kind: JsonKind) -> bytes:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.errors import RecordingError, SamplesError, shown
+from acquisition.recording.files import write_json
 from acquisition.recording.files.quantity import spelt, suffix_of
 from acquisition.recording.foreign.column_meanings import (
     CAMERA,
@@ -303,7 +304,7 @@ def write_columns(about: Sequence[ColumnsFile], out: Path) -> Path:
     beside = out.with_name(f"{out.name}.columns.json")
     content = about[0] if len(about) == 1 else about
     try:
-        beside.write_bytes(msgspec.json.format(msgspec.json.encode(content), indent=2) + b"\n")
+        write_json(beside, content)
     except OSError as error:
         raise RecordingError(f"{beside}: cannot be written ({error.strerror}); choose another place") from error
     return beside

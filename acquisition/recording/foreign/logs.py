@@ -248,9 +248,9 @@ def _bag(path: Path) -> list[Sheet]:
             rows: dict[str, list[tuple[int, Any]]] = {c.topic: [] for c in wanted}
             for connection, received_ns, raw in bag.messages(connections=wanted):
                 rows[connection.topic].append((received_ns, store.deserialize_cdr(raw, connection.msgtype)))
-    except reader.ReaderError as error:
+    except Exception as error:  # of damaged bytes the libraries below raise whatever they stumble over
         raise RecordingError(
-            f"{path}: no ROS 2 bag that can be read ({shown(str(error), 80)}); check the path"
+            f"{path}: no ROS 2 bag that can be read ({shown(str(error) or type(error).__name__, 80)}); check the path"
         ) from error
     if not wanted:
         raise RecordingError(
@@ -258,7 +258,9 @@ def _bag(path: Path) -> list[Sheet]:
         )
     kinds = {c.topic: c.msgtype for c in wanted}
     made = [(_joint_table if kinds[topic] == JOINT_STATE else _pose_table)(path, topic, r) for topic, r in rows.items()]
-    return [sheet for sheet in made if sheet.rows]
+    if not (filled := [sheet for sheet in made if sheet.rows]):
+        raise RecordingError(f"{path}: no message on {shown(', '.join(rows))}; record the topics, or check the bag")
+    return filled
 
 
 def _joint_table(path: Path, topic: str, messages: Sequence[tuple[int, Any]]) -> Sheet:

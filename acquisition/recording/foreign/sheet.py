@@ -9,7 +9,6 @@ import importlib
 import io
 import math
 import re
-import zipfile
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime, time
@@ -153,7 +152,7 @@ def _workbook(path: Path, wanted: str | None) -> Sheet:
         book = books.load_workbook(path, read_only=True, data_only=True)
     except OSError as error:
         raise SamplesError(f"{path}: cannot read the workbook ({error.strerror or error}); check the path") from error
-    except (zipfile.BadZipFile, KeyError, ValueError, books.utils.exceptions.InvalidFileException) as error:
+    except Exception as error:  # of a damaged archive or its XML the library raises whatever it stumbles over
         raise SamplesError(f"{path}: no workbook ({shown(str(error), 80)}); save it again as xlsx") from error
     try:
         sheets = {str(one.title): _sheet_rows(path, one) for one in book.worksheets}
@@ -175,9 +174,9 @@ def _sheet_rows(path: Path, sheet: Any) -> list[tuple[int, list[Raw]]]:
         cells = [
             [c.strip() or None if isinstance(c, str) else c for c in row] for row in sheet.iter_rows(values_only=1)
         ]
-    except (KeyError, ValueError, TypeError, SyntaxError, zipfile.BadZipFile) as error:
+    except Exception as error:  # as above: the sheet is read while its rows are asked for
         raise SamplesError(
-            f"{path}: sheet '{sheet.title}' is damaged ({shown(str(error), 80)}); save it again"
+            f"{path}: sheet '{shown(sheet.title, 40)}' is damaged ({shown(str(error), 80)}); save it again"
         ) from error
     return list(enumerate(cells, start=1))
 

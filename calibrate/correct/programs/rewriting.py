@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording.files import shown
+from acquisition.recording.files.bounds import ANGLE_RAD, LENGTH_M
 from calibrate.correct.corrected import (
     Arms,
     Corrected,
@@ -92,15 +94,19 @@ def correct_program(
     conditions = moves_conditions(wanted, found.nominal_rad, options)
     after, _, _ = predicted_errors(model, wanted, q_rad, conditions, options)
     new = _replaced(text, pieces)
-    shown = difflib.unified_diff(text.splitlines(), new.splitlines(), name, "corrected", lineterm="", n=0)
+    changes = difflib.unified_diff(text.splitlines(), new.splitlines(), name, "corrected", lineterm="", n=0)
     names = tuple(one.name for one in targets.literals)
-    return CorrectedProgram(new, tuple(shown), names, replace(found, q_rad=q_rad, after=after), targets.skipped)
+    return CorrectedProgram(new, tuple(changes), names, replace(found, q_rad=q_rad, after=after), targets.skipped)
 
 
 def _check(targets: Targets, dialect: Dialect, frame: Floats | None, options: Options, name: str) -> None:
     if not targets.literals:
         why = f"; {targets.skipped[0]}" if targets.skipped else ""
         raise DataError(f"{name}: no target of {dialect.name} that could be corrected{why}")
+    if far := next((one for one in targets.literals if not _in_bounds(one, dialect)), None):
+        raise DataError(
+            f"{name}: {shown(far.name, 40)} has a number beyond {LENGTH_M / 1e3:g} km or {ANGLE_RAD:g} rad; correct it"
+        )
     framed = sorted({one.frame for one in targets.literals if one.frame not in ("", "0")})
     if framed and frame is None:
         raise DataError(
@@ -120,6 +126,15 @@ def _check(targets: Targets, dialect: Dialect, frame: Floats | None, options: Op
         )
     if options.approach and dialect.overshoot is None:
         raise DataError(f"{name}: overshoot points cannot be inserted into {dialect.name}; leave --approach out")
+
+
+def _in_bounds(one: Literal, dialect: Dialect) -> bool:
+    """Whether what is written could be lengths and angles."""
+    sizes = np.abs(one.numbers)
+    lengths_m, angles_rad = (sizes[:0], sizes) if one.joints else (sizes[:3], sizes[3:])
+    if dialect.mm:
+        lengths_m, angles_rad = 1e-3 * lengths_m, np.radians(angles_rad)
+    return bool(np.all(lengths_m <= LENGTH_M) and np.all(angles_rad <= ANGLE_RAD))
 
 
 def _wanted(

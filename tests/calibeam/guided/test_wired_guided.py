@@ -5,6 +5,7 @@ import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from rich.console import Console
@@ -20,7 +21,7 @@ from calibeam.guided.recorded import BelievedGuidedArm, encoder_address, record_
 from calibeam.guided.run import PersonGuide
 from calibeam.outcome import PartialResult
 from drivers.clock import SystemClock
-from simulators.hand.hand_rig import read_hand_truth
+from simulators.hand.hand_rig import HandTruth
 
 RIG_FILE = Path(__file__).parents[3] / "rigs" / "arm-cmm-reference.toml"
 RIG = load_rig(RIG_FILE)
@@ -79,7 +80,8 @@ def test_a_whole_session_is_in_the_recording(takes: Takes, tmp_path: Path) -> No
     (end,) = (event.detail for event in recording.events if event.kind == "end")
     assert end == {"samples": 8, "slips": summary.slips, "doubted": summary.doubted, "skipped": 0}
     # The arm of this seed is off by millimetres, and so are the cones; a probe in the air would be off by far more.
-    truth = {seat.id: seat.origin_m for seat in read_hand_truth(tmp_path / "truth.json").seats}
+    written = msgspec.json.decode((tmp_path / "truth.json").read_bytes(), type=HandTruth)
+    truth = {seat.id: seat.origin_m for seat in written.seats}
     tips = BelievedGuidedArm.of_rig(RIG).tip_m(recording.samples.joints()[:6])
     apart = np.linalg.norm(tips - [truth[k] for k in (1, 1, 1, 2, 2, 2)], axis=1)
     assert apart.max() < 8e-3

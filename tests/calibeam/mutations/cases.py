@@ -40,6 +40,18 @@ def run_case(server: Server, good: Path, pair: Pair, seeds: range, folder: Path)
     return ran, [Fault(pair, seeds[0], what) for what in faults(pair, seeds[0], ran)]
 
 
+def run_in_turn(server: Server, good: Path, pair: Pair, seeds: range, folder: Path) -> list[Fault]:
+    """The same seeds in one process, one after the other; what looks wrong there is run again by itself."""
+    folder.mkdir()
+    folders = [folder / str(seed) for seed in seeds]
+    for seed, own in zip(seeds, folders, strict=True):
+        lay_out(good, pair, range(seed, seed + 1), own)
+    runs = server.run_in_turn(pair.words.split(), folders, LIMIT_S, LIMIT_BYTES)
+    doubted = [seed for k, seed in enumerate(seeds) if k >= len(runs) or faults(pair, seed, runs[k])]
+    again = [run_case(server, good, pair, range(seed, seed + 1), folder / f"again-{seed}") for seed in doubted]
+    return [fault for _, found in again for fault in found]
+
+
 def lay_out(good: Path, pair: Pair, seeds: range, folder: Path) -> None:
     """The inputs with one of them mutated; together: session folders sets/s<seed>, each with one file mutated."""
     changed, _, name = pair.file.partition("/")

@@ -13,9 +13,12 @@ from typing import Any
 import can
 import msgspec
 import numpy as np
+import openpyxl
 import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Channel, Event, Gap, RecordingWriter
@@ -59,14 +62,58 @@ position_m = 1e-5
 """
 
 
-POSES = """name,x_m,y_m,z_m,rx_rad,ry_rad,rz_rad
-a,0.4,0.1,0.3,3.1,0.0,0.0
-b,0.35,-0.2,0.4,2.9,0.2,0.1
+POSES = """x_m,y_m,z_m,rx_rad,ry_rad,rz_rad
+0.4,0.1,0.3,3.1,0.0,0.0
+0.35,-0.2,0.4,2.9,0.2,0.1
 """
 WELD = """DEF weld()
 PTP {A1 0, A2 -90, A3 90, A4 0, A5 90, A6 0}
 LIN {X 400.0, Y 100.0, Z 300.0, A 180.0, B 0.0, C 180.0}
 END
+"""
+URSCRIPT = """def weld():
+  set_tcp(p[0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+  above = p[0.4, 0.1, 0.3, 3.1, 0.0, 0.0]
+  movej([0.0, -1.57, 1.57, 0.0, 1.57, 0.0], a=1.4, v=1.05)
+  movel(above, a=1.2, v=0.25)
+  movel(p[0.35, -0.2, 0.4, 2.9, 0.2, 0.1], v=0.10)
+end
+"""
+RAPID = """MODULE weld
+  PERS tooldata torch := [TRUE,[[0.0,0.0,0.0],[1,0,0,0]],[1.0,[0,0,1.0],[1,0,0,0],0,0,0]];
+  CONST robtarget p10 := [[400.0,100.0,300.0],[0.0,1.0,0.0,0.0],[0,-1,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+  CONST jointtarget home := [[0.0,-90.0,90.0,0.0,90.0,0.0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+  PROC main()
+    MoveAbsJ home, v200, z10, torch;
+    MoveL p10, v50, fine, torch\\WObj:=wobj0;
+  ENDPROC
+ENDMODULE
+"""
+FANUC = """/PROG  WELD
+/MN
+   1:J P[1] 100% FINE    ;
+   2:L P[2] 50mm/sec FINE    ;
+/POS
+P[1]{
+   GP1:
+\tUF : 0, UT : 1,
+\tJ1 = 0.000 deg, J2 = -90.000 deg, J3 = 90.000 deg, J4 = 0.000 deg, J5 = 90.000 deg, J6 = 0.000 deg
+};
+P[2]{
+   GP1:
+\tUF : 0, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',
+\tX = 400.000 mm, Y = 100.000 mm, Z = 300.000 mm,
+\tW = 180.000 deg, P = 0.000 deg, R = 0.000 deg
+};
+/END
+"""
+MJCF = """<mujoco model="two">
+<compiler angle="radian" autolimits="true"/>
+<worldbody><body name="base" pos="0 0 0.3"><body name="upper">
+<joint name="a" axis="0 0 1" range="-3 3"/><geom type="sphere" size="0.05" mass="2" pos="0 0 0.1"/>
+<body name="fore" pos="0.4 0 0" quat="0.7 0.7 0 0"><joint name="b" axis="0 1 0" pos="0.02 0 0" ref="0.1" range="-2 2"/>
+<geom type="sphere" size="0.05" mass="1"/><site name="tip" pos="0.3 0 0.05" euler="0 0.5 0"/>
+</body></body></body></worldbody></mujoco>
 """
 URDF = """<robot name="two">
 <link name="base"/>
@@ -79,10 +126,10 @@ URDF = """<robot name="two">
 <axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
 </robot>
 """
-DH = """a_mm,alpha_deg,d_mm,theta_deg
-0,90,300,0
-400,0,0,0
-300,0,0,0
+DH = """standard,a [mm],alpha [deg],d [mm],theta [deg]
+1,0,90,300,0
+2,400,0,0,0
+3,300,0,0,0
 """
 
 
@@ -93,6 +140,8 @@ def write_inputs(folder: Path, run: Run) -> None:
     q = rng.uniform(-2.0, 2.0, (20, len(LINKS)))
     _session(folder / "tracker", q, seen(q + np.array([0.0, 2e-4, 3e-4]), rng))
     _session(folder / "other", q, seen(q, rng))
+    longer = rng.uniform(-2.0, 2.0, (32, len(LINKS)))
+    _session(folder / "longer", longer, seen(longer + np.array([0.0, 2e-4, 3e-4]), rng))
     again = np.tile(q[:4], (3, 1))
     _session(folder / "cycled", again, seen(again, rng))
     cycles = "".join(f"[[block.pose]]\nq_rad = {one.tolist()}\nrepeat = {k}\n" for k, one in enumerate(q[:4], start=1))
@@ -109,6 +158,7 @@ def write_inputs(folder: Path, run: Run) -> None:
     _parquet(folder / "tracker", folder / "columns")
     _guided(folder)
     _ur(folder)
+    _of_laboratories(folder)
     _can_logs(folder)
     _streams(folder / "streams.mcap", folder / "rig.toml")
     _made_by_calibeam(folder, run)
@@ -177,9 +227,43 @@ def _drawn_model(path: Path, rig_file: Path) -> None:
     write_model(path, model)
 
 
+def _of_laboratories(folder: Path) -> None:
+    """A table as others write it, as CSV, Parquet and workbook; and a ROS 2 bag of each storage."""
+    rng = np.random.default_rng(5)
+    headings = ["Time [s]", *(f"A{i} [deg]" for i in range(1, 4)), "X [mm]", "Y [mm]", "Z [mm]", "Remark"]
+    q_deg, xyz_mm = rng.uniform(-90.0, 90.0, (12, 3)).round(4), rng.uniform(300.0, 900.0, (12, 3)).round(4)
+    rows = [[float(k), *q, *xyz, "ok"] for k, (q, xyz) in enumerate(zip(q_deg.tolist(), xyz_mm.tolist(), strict=True))]
+    with (folder / "lab.csv").open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerows([headings, *rows])
+    numbers = {name: list(column) for name, column in zip(headings, zip(*rows, strict=True), strict=True)}
+    pq.write_table(pa.table(numbers), folder / "lab.parquet")
+    book = openpyxl.Workbook()
+    sheet = book.worksheets[0]
+    for row in (headings, *rows):
+        sheet.append(row)
+    book.save(folder / "lab.xlsx")
+    for suffix, storage in (("db3", StoragePlugin.SQLITE3), ("mcap", StoragePlugin.MCAP)):
+        _bag(folder / f"bag-{suffix}", storage, np.radians(q_deg))
+
+
+def _bag(path: Path, storage: StoragePlugin, q_rad: Floats) -> None:
+    """Joint states, a tenth of a second apart."""
+    store, kind = get_typestore(Stores.ROS2_HUMBLE), "sensor_msgs/msg/JointState"
+    header, stamp = (store.types[name] for name in ("std_msgs/msg/Header", "builtin_interfaces/msg/Time"))
+    with Writer(path, version=9, storage_plugin=storage) as bag:
+        topic = bag.add_connection("/joint_states", kind, typestore=store)
+        for k, q in enumerate(q_rad):
+            now, none = header(stamp(1_790_000_000, 100_000_000 * k % 10**9), "base"), np.empty(0)
+            state = store.types[kind](now, ["a", "b", "c"], q, none, none)
+            bag.write(topic, 1_790_000_000 * 10**9 + 10**8 * k, store.serialize_cdr(state, kind))
+
+
 def _ur(folder: Path) -> None:
     """The shipped arm with encoders by DBC, error maps and, in eye.toml, a camera; no device is where it says."""
-    plain, eye = ((RIGS / name).read_text("utf-8") for name in ("ur5e-dual-psd.toml", "ur5e-dual-psd-camera.toml"))
+    names = ("ur5e-dual-psd.toml", "ur5e-dual-psd-camera.toml", "ur5e-tracker.toml")
+    plain, eye, tracked = ((RIGS / name).read_text("utf-8") for name in names)
+    tracked = tracked.replace("127.0.0.2", "127.0.0.9").replace('"127.0.0.1" ', '"127.0.0.9" ')
+    (folder / "tracked.toml").write_text(tracked, encoding="utf-8")
     encoders = plain[plain.index("[devices.encoders]") : plain.index("[devices.robot]")]
     signals = ", ".join(f'"ENCODER{i}.Angle"' for i in range(1, 7))
     described = (
@@ -214,8 +298,10 @@ def _ur(folder: Path) -> None:
     (folder / "plan.toml").write_text(plan, encoding="utf-8")
     spots = "\n".join(f"{x:.3f},{y:.3f}" for x in (-0.006, -0.002, 0.002, 0.006) for y in (-0.006, 0.0, 0.006))
     (folder / "poses.csv").write_text(POSES, encoding="utf-8")
-    (folder / "weld.src").write_text(WELD, encoding="utf-8")
+    for suffix, program in {"src": WELD, "script": URSCRIPT, "mod": RAPID, "ls": FANUC}.items():
+        (folder / f"weld.{suffix}").write_text(program, encoding="utf-8")
     (folder / "arm.urdf").write_text(URDF, encoding="utf-8")
+    (folder / "arm.xml").write_text(MJCF, encoding="utf-8")
     (folder / "dh.csv").write_text(DH, encoding="utf-8")
     (folder / "points.csv").write_text(f"x_m,y_m\n{spots}\n", encoding="utf-8")
     fit = 'schema = 1\nmodel = "mdh"\nfree = ["joint*.zero"]\nhold = ["link3.*"]\nloss = "huber"\nseed = 1\n'
@@ -234,8 +320,19 @@ def _camera() -> dict[str, Any]:
 
 
 def _frames() -> list[can.Message]:
+    """Frames of anybody's, and those of the encoders as encoders.dbc has them, in order of time."""
     rng = np.random.default_rng(4)
-    return [
+    angles = [
+        can.Message(
+            timestamp=1_790_000_000.2501 + 1e-3 * k,
+            arbitration_id=257 + k % 6,
+            is_extended_id=False,
+            data=(1000 * k).to_bytes(4, "little") + bytes((k // 6, 0)),
+            channel=0,
+        )
+        for k in range(30)
+    ]
+    others = [
         can.Message(
             timestamp=1_790_000_000.25 + 1e-3 * k,
             arbitration_id=int(rng.integers(0, 0x7FF)),
@@ -245,6 +342,7 @@ def _frames() -> list[can.Message]:
         )
         for k in range(30)
     ]
+    return sorted(angles + others, key=lambda message: message.timestamp)
 
 
 def _can_logs(folder: Path) -> None:
@@ -287,11 +385,15 @@ def _streams(path: Path, rig_file: Path) -> None:
 def _made_by_calibeam(folder: Path, run: Run) -> None:
     """What its own commands write: model, diagnosis, recording, results of a fleet. RuntimeError where they fail."""
     earlier, fleet = folder / "earlier", folder / "fleet"
+    (folder / "long").mkdir()
+    teach = ["task", "teach", f"{folder}/cell.toml", "--rig", f"{folder}/rig.toml", "--poses", f"{folder}/taught.csv"]
     for words in (
         ["identify", f"{folder}/tracker", "--out", f"{folder}/model.json"],
         ["diagnose", f"{folder}/tracker", "--out", f"{folder}/diagnosis.json"],
         ["report", f"{folder}/tracker", "--out", f"{folder}/report.html"],
         ["import", f"{folder}/tracker", "--out", f"{folder}/recording.mcap"],
+        ["import", f"{folder}/longer", "--out", f"{folder}/long/recording.mcap"],
+        [*teach, "--out", f"{folder}/taught.toml"],
         ["import", f"{folder}/turned", "--out", f"{folder}/turned.mcap"],
         ["import", f"{folder}/guided", "--out", f"{folder}/guided.mcap"],
         ["export", f"{folder}/streams.mcap", "--streams", "--out", f"{folder}/streamed"],

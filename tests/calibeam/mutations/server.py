@@ -2,7 +2,8 @@
 
 As a module it is that process: a JSON line in, {"words", "folder", "limit_s", "limit_bytes"}, a JSON line out, a `Ran`.
 A fork gets no keyboard, its own process group and no network but loopback. It shares no thread with its parent, which
-has none; test_mutations.py compares it with the installed console script.
+has none; test_mutations.py compares it with the installed console script. Several runs may be asked of one fork, one
+after the other: starting and ending one costs as much as a small command.
 """
 
 import gc
@@ -18,7 +19,7 @@ import threading
 import time
 import traceback
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from types import TracebackType
@@ -81,11 +82,18 @@ class Server:
         self._answer()
 
     def run(self, words: list[str], folder: Path, limit_s: float, limit_bytes: int) -> Ran:
-        request = {"words": words, "folder": str(folder), "limit_s": limit_s, "limit_bytes": limit_bytes}
+        return self.run_in_turn(words, [folder], limit_s, limit_bytes)[0]
+
+    def run_in_turn(self, words: list[str], folders: list[Path], limit_s: float, limit_bytes: int) -> list[Ran]:
+        """In one process. It ends with the first run that does not come to its end: those after it are missing.
+
+        The limits are those of all together; `peak_bytes` is the most until then.
+        """
+        request = {"words": words, "folders": list(map(str, folders)), "limit_s": limit_s, "limit_bytes": limit_bytes}
         assert self._process.stdin is not None
         self._process.stdin.write(json.dumps(request) + "\n")
         self._process.stdin.flush()
-        return Ran(**self._answer())
+        return [Ran(**one) for one in self._answer()["runs"]]
 
     def _answer(self) -> dict[str, Any]:
         assert self._process.stdout is not None
@@ -120,52 +128,81 @@ def serve(folder: Path) -> None:
     print("{}", file=answers)
     for line in sys.stdin:
         request = json.loads(line)
-        ran = forked(request["words"], Path(request["folder"]), request["limit_s"], request["limit_bytes"])
-        print(json.dumps(asdict(ran)), file=answers)
+        runs = forked(request["words"], request["folders"], request["limit_s"], request["limit_bytes"])
+        print(json.dumps({"runs": [asdict(ran) for ran in runs]}), file=answers)
 
 
-def forked(words: list[str], folder: Path, limit_s: float, limit_bytes: int) -> Ran:
-    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+def forked(words: list[str], folders: list[str], limit_s: float, limit_bytes: int) -> list[Ran]:
+    with tempfile.TemporaryDirectory() as said:
         began_s = time.monotonic()
         pid = os.fork()
         if pid == 0:
-            _become(words, folder, out.fileno(), err.fileno())
+            _become(words, folders, Path(said))
         killed = watched(pid, limit_s, limit_bytes)
         _, status, usage = os.wait4(pid, 0)
         _end_group(pid)  # processes that it has started and left
-        for file in (out, err):
-            file.seek(0)
-        texts = [file.read().decode("utf-8", "replace") for file in (out, err)]
-    code = os.waitstatus_to_exitcode(status)
-    cpu_s = usage.ru_utime + usage.ru_stime
-    return Ran(code, *texts, time.monotonic() - began_s, cpu_s, 1024 * usage.ru_maxrss, killed)
+        code, seconds = os.waitstatus_to_exitcode(status), time.monotonic() - began_s
+        whole = Ran(code, "", "", seconds, usage.ru_utime + usage.ru_stime, 1024 * usage.ru_maxrss, killed)
+        runs: list[Ran] = []
+        for number in range(len(folders)):
+            if not (out := Path(said, f"{number}.out")).exists():
+                break
+            texts = [path.read_text("utf-8", "replace") for path in (out, out.with_suffix(".err"))]
+            own = _own(out.with_suffix(".json"), whole)
+            runs.append(replace(own, out=texts[0], err=texts[1]))
+        return runs or [whole]
 
 
-def _become(words: list[str], folder: Path, out: int, err: int) -> None:
-    """The child: ends the process."""
+def _own(ended: Path, whole: Ran) -> Ran:
+    """What a run has left of itself, or where it did not come to its end, what there is of the process."""
+    return replace(whole, **json.loads(ended.read_text())) if ended.exists() else whole
+
+
+def _become(words: list[str], folders: list[str], said: Path) -> None:
+    """The child: ends the process, with the exit code of its last run."""
     code = 70
     try:
         os.setsid()
-        os.chdir(folder)
-        for source, target in ((os.open(os.devnull, os.O_RDONLY), 0), (out, 1), (err, 2)):
-            os.dup2(source, target)
+        os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_BYTES, FILE_BYTES))
         sys.addaudithook(_loopback_only)
         sys.argv = ["calibeam", *words]
-        from calibeam.cli import main
-
-        try:
-            main()
-        except SystemExit as ending:
-            code = ending.code if isinstance(ending.code, int) else 1
-        except BaseException:
-            traceback.print_exc()
-            code = 1
-        sys.stdout.flush()
-        sys.stderr.flush()
+        for number, folder in enumerate(folders):
+            os.chdir(folder)
+            for suffix, target in (("out", 1), ("err", 2)):
+                file = os.open(said / f"{number}.{suffix}", os.O_CREAT | os.O_WRONLY | os.O_APPEND, 0o600)
+                os.dup2(file, target)
+                os.close(file)
+            began_s, before_s = time.monotonic(), _cpu_s()
+            code = _ended()
+            ran = {"code": code, "seconds": time.monotonic() - began_s, "cpu_s": _cpu_s() - before_s, "killed": ""}
+            ran["peak_bytes"] = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+            (said / f"{number}.json").write_text(json.dumps(ran))
     finally:
         os._exit(code)
+
+
+def _ended() -> int:
+    """The exit code of one run of the command line."""
+    from calibeam.cli import main
+
+    code = 0
+    try:
+        main()
+    except SystemExit as ending:
+        code = ending.code if isinstance(ending.code, int) else 1
+    except BaseException:
+        traceback.print_exc()
+        code = 1
+    sys.stdout.flush()
+    sys.stderr.flush()
+    return code
+
+
+def _cpu_s() -> float:
+    """Of this process and of those that it has started."""
+    return sum(os.times()[:4])
 
 
 def _loopback_only(event: str, arguments: tuple[Any, ...]) -> None:

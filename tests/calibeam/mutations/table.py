@@ -14,24 +14,27 @@ import numpy as np
 from calibeam.command_list import COMMANDS
 from tests.calibeam.mutations.json_mutators import JSON
 from tests.calibeam.mutations.recording_mutators import RECORDING
-from tests.calibeam.mutations.table_mutators import CSV, PARQUET
+from tests.calibeam.mutations.table_mutators import CSV, PARQUET, WORKBOOK
 from tests.calibeam.mutations.text_mutators import BINARY, LINES, TOML, Mutator
 
 KINDS = {
     ".toml": "toml", ".json": "json", ".csv": "csv", ".parquet": "parquet", ".mcap": "recording", ".blf": "binary",
     ".log": "lines", ".asc": "lines", ".dbc": "lines", ".jsonl": "lines",
-    ".urdf": "lines", ".src": "lines",
+    ".urdf": "lines", ".xml": "lines", ".src": "lines", ".script": "lines", ".mod": "lines", ".ls": "lines",
+    ".xlsx": "workbook", ".yaml": "lines", ".db3": "binary",
 }  # fmt: skip
 MUTATORS: dict[str, tuple[Mutator, ...]] = {
     "toml": TOML, "json": JSON, "csv": CSV, "lines": LINES, "binary": BINARY, "parquet": PARQUET,
-    "recording": RECORDING,
+    "recording": RECORDING, "workbook": WORKBOOK, "others' csv": CSV,  # which may be of another encoding
 }  # fmt: skip
+OTHERS = {"bus.csv": "lines", "lab.csv": "others' csv", "bag-mcap/bag-mcap.mcap": "binary"}  # of their suffix
 REFUSED = {"bad_utf8": ("toml", "json", "csv")}  # what no reader of these kinds may take
 SMALL = "--arms 500 --poses 2"  # of an error simulation
 DAILY, ENDURE = 20, 300
 FEW, FEWER, TWO = 6, 4, 2  # daily, where another command has read the format; of commands slow on a valid input
-SLOW = dict.fromkeys(("diagnose", "compare", "design", "simulate-errors", "reconcile", "iso9283"), FEWER) | {
+SLOW = dict.fromkeys(("diagnose", "compare", "design", "simulate-errors", "iso9283"), FEWER) | {
     "report": TWO,
+    "reconcile": TWO,
 }
 
 
@@ -45,7 +48,7 @@ class Pair:
     kind: str = field(init=False)
 
     def __post_init__(self) -> None:
-        kind = "lines" if self.file == "bus.csv" else KINDS[PurePosixPath(self.file).suffix]
+        kind = OTHERS.get(self.file, KINDS[PurePosixPath(self.file).suffix])
         object.__setattr__(self, "kind", kind)
 
     @property
@@ -148,14 +151,20 @@ MODELS = (
     Pair("guided.json", "verify guided --model guided.json"),
     Pair("arm.json", "correct arm.json poses.csv --out made.csv"),
     Pair("poses.csv", "correct arm.json poses.csv --out made.csv"),
-    Pair("weld.src", "correct arm.json weld.src --out made.src"),
+    *(Pair(f"weld.{one}", f"correct arm.json weld.{one} --out made.{one}") for one in ("src", "script", "mod", "ls")),
     Pair("model.json", "iso9283 evaluate cycled --model model.json --out made.json"),
     Pair("cycled/samples.csv", "iso9283 evaluate cycled --model model.json --frame fit --out made.json"),
     Pair("cycled/rig.toml", "iso9283 evaluate cycled/samples.csv --rig cycled/rig.toml --out made.json"),
     Pair("model.json", "export-model model.json --to urdf --out made.urdf"),
     Pair("physics.json", "export-model physics.json --to mjcf --out made.xml"),
     Pair("model.json", "replay tracker --model model.json --out made.mcap"),
-    Pair("tracker/rig.toml", "reconcile tracker --simulation tracker/rig.toml --out made"),
+    Pair("tracker/samples.csv", "replay tracker --model model.json --out made.mcap"),
+    Pair("tracker/rig.toml", "replay tracker --model model.json --out made.mcap"),
+    Pair("recording.mcap", "replay recording.mcap --model model.json --out made.mcap"),
+    Pair("longer/rig.toml", "reconcile longer --simulation tracker/rig.toml --out made"),
+    Pair("longer/samples.csv", "reconcile longer --simulation tracker/rig.toml --out made"),
+    Pair("tracker/rig.toml", "reconcile longer --simulation tracker/rig.toml --out made"),
+    Pair("long/recording.mcap", "reconcile long/recording.mcap --simulation tracker/rig.toml --out made"),
     Pair("arm.json", "live rig.toml --model arm.json --port 0 --for-s 0"),
     Pair("arm.json", "move rig.toml --home --model arm.json --dry-run"),
     Pair("arm.json", "jog rig.toml --joint 1 --by-deg 1 --model arm.json --dry-run"),
@@ -169,7 +178,11 @@ RIGS = (
     Pair("rig.toml", "live rig.toml --port 0 --for-s 0"),
     Pair("rig.toml", "centre rig.toml --out made.mcap --yes"),
     Pair("arm.urdf", "rig new --from-urdf arm.urdf --out made.toml"),
+    Pair("arm.xml", "rig new --from-mjcf arm.xml --tip-link tip --out made.toml"),
     Pair("dh.csv", "rig new --from-dh dh.csv --out made.toml"),
+    Pair("tracked.toml", "session tracked.toml --out made --yes"),
+    Pair("tracked.toml", "check tracked.toml"),
+    Pair("tracked.toml", "log tracker tracked.toml --out made --for-s 0"),
     Pair("rig.toml", "log encoders rig.toml --out made --for-s 0"),
     Pair("rig.toml", "design rig.toml --poses 8 --repeats 0 --candidates 4"),
     Pair("rig.toml", "iso9283 plan rig.toml --cycles 2 --centre-m 0.5 0 0.3 --edge-m 0.2 --out made.toml"),
@@ -194,6 +207,7 @@ PLANS = (
     Pair("fit.toml", "identify tracker --plan fit.toml"),
     Pair("task.toml", "move rig.toml --task task.toml --position bin --dry-run"),
     Pair("cell.toml", "task run cell.toml --rig rig.toml --dry-run"),
+    Pair("taught.toml", "task run taught.toml --rig rig.toml --dry-run"),
     Pair("cell.toml", "task teach cell.toml --rig rig.toml --poses taught.csv --out made.toml"),
     Pair("taught.csv", "task teach cell.toml --rig rig.toml --poses taught.csv --out made.toml"),
     Pair("errors.toml", f"simulate-errors tracker/rig.toml --errors errors.toml {SMALL}"),
@@ -202,6 +216,15 @@ DEVICES = (
     *(
         Pair(f"bus.{suffix}", f"import bus.{suffix} --rig rig.toml --out made.mcap")
         for suffix in ("log", "asc", "blf", "csv")
+    ),
+    *(
+        Pair(f"lab.{suffix}", f"import lab.{suffix} --rig tracker/rig.toml --yes --out made")
+        for suffix in ("xlsx", "csv", "parquet")
+    ),
+    Pair("lab.csv", "import lab.csv --streams --rig tracker/rig.toml --yes --out made.mcap"),
+    *(
+        Pair(file, f"import {file.partition('/')[0]} --rig tracker/rig.toml --yes --out made.mcap")
+        for file in ("bag-db3/metadata.yaml", "bag-db3/bag-db3.db3", "bag-mcap/bag-mcap.mcap")
     ),
     Pair("encoders.dbc", "check rig.toml"),
     Pair("encoders.dbc", "log encoders rig.toml --out made --for-s 0"),

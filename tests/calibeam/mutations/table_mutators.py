@@ -2,15 +2,20 @@
 
 import csv
 import io
+import math
 import re
+import zipfile
 from collections.abc import Callable
 from typing import Any
 
+import openpyxl
 import pyarrow as pa
 import pyarrow.parquet as pq
+from openpyxl.cell.cell import ILLEGAL_CHARACTERS_RE
 
 from tests.calibeam.mutations.text_mutators import (
     NUMBERS,
+    TEXT,
     TEXTS,
     Mutator,
     Rng,
@@ -162,6 +167,42 @@ def parquet_table(rng: Rng, data: bytes) -> bytes:
     return made.getvalue()
 
 
+def workbook_table(rng: Rng, data: bytes) -> bytes:
+    """The sheet as a table, changed; a cell that is a number stays one."""
+    sheet = openpyxl.load_workbook(io.BytesIO(data)).worksheets[0]
+    out = io.StringIO()
+    csv.writer(out).writerows(sheet.iter_rows(values_only=True))
+    book = openpyxl.Workbook()
+    for row in csv.reader(io.StringIO(pick(rng, TABLE_ONLY)(rng, out.getvalue().encode()).decode())):
+        book.worksheets[0].append([_cell(each) for each in row])
+    made = io.BytesIO()
+    book.save(made)
+    return made.getvalue()
+
+
+def _cell(text: str) -> float | str:
+    """What a workbook can hold: no control characters, at most 32,767 characters."""
+    number = _number(text)
+    plain = ILLEGAL_CHARACTERS_RE.sub("", text)[:32_767]
+    return plain if number is None or not math.isfinite(number) else number
+
+
+def member_changed(rng: Rng, data: bytes) -> bytes:
+    """One file of the archive, with its new checksum."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        chosen = pick(rng, [name for name in archive.namelist() if name.endswith((".xml", ".rels"))])
+    return with_member(data, chosen, lambda text: pick(rng, TEXT)(rng, text))
+
+
+def with_member(data: bytes, chosen: str, change: Callable[[bytes], bytes]) -> bytes:
+    """The archive with that file changed."""
+    made = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(data)) as old, zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as new:
+        for name in old.namelist():
+            new.writestr(name, change(old.read(name)) if name == chosen else old.read(name))
+    return made.getvalue()
+
+
 def _number(cell: str) -> float | None:
     try:
         return float(cell)
@@ -194,4 +235,5 @@ TABLE_ONLY: tuple[Mutator, ...] = (
     rows_same, ragged, header_twice, holes,
 )  # fmt: skip
 CSV = (flipped, cut, bad_utf8, nul, bom, crlf, long_line, semicolons, quotes, *TABLE_ONLY)
+WORKBOOK = (flipped, cut, lengths, blank, *[workbook_table] * 4, *[member_changed] * 4)
 PARQUET = (flipped, cut, lengths, blank, parquet_table, parquet_table, parquet_table, parquet_types)

@@ -5,6 +5,7 @@ A command answers bad content with exit code 1 and a line `error: …`, or keeps
 names the command that repeats it: see cases.py.
 """
 
+import re
 import shutil
 import subprocess
 import sys
@@ -14,14 +15,17 @@ from pathlib import Path
 import pytest
 
 from calibeam.command_list import COMMANDS
-from tests.calibeam.mutations.cases import Fault, faults, lay_out, run_case
+from tests.calibeam.mutations.cases import Fault, faults, lay_out, run_case, run_in_turn
 from tests.calibeam.mutations.recording_mutators import rewritten
 from tests.calibeam.mutations.server import Ran, Server, watched
+from tests.calibeam.mutations.table import DAILY as DAILY_SEEDS
 from tests.calibeam.mutations.table import ENDURE, EXEMPT, TABLE, Pair, missing
+from tests.calibeam.mutations.table_mutators import with_member
 
 Change = Callable[[bytes], bytes]
 
 CHUNK = 100  # seeds of one test
+IN_TURN = 10  # runs of one process, every day; hundreds of each have a process of their own
 REAL = (  # through the installed console script as well: one of each way to end
     ("fit.toml|identify_tracker_--plan_fit.toml", 3),
     ("model.json|predict_model.json_tracker:samples.csv", 1),
@@ -32,6 +36,13 @@ REAL = (  # through the installed console script as well: one of each way to end
 )
 PSD_CHECK = "psd-check rig.toml --points points.csv --no-wait"
 CONTINUE = "session rig.toml --continue --out begun --yes"
+MJCF, DH = "rig new --from-mjcf arm.xml --tip-link tip --out made.toml", "rig new --from-dh dh.csv --out made.toml"
+KRL, RAPID = (f"correct arm.json weld.{one} --out made.{one}" for one in ("src", "mod"))
+LAB, BAG = (
+    "import lab.xlsx --rig tracker/rig.toml --yes --out made",
+    "import bag-db3 --rig tracker/rig.toml --yes --out a.mcap",
+)
+SHEET = "xl/worksheets/sheet1.xml"
 FACTOR = b"(0.00034332275390625,0)"
 FOUND = (  # what mutations have shown once: file, change, command line, what is in its answer
     ("encoders.dbc", lambda data: data.replace(FACTOR, b"(0,0)", 1), "check rig.toml", "correct the DBC file"),
@@ -41,6 +52,17 @@ FOUND = (  # what mutations have shown once: file, change, command line, what is
     ("points.csv", lambda data: data.replace(b"-0.006", b"1e308", 1), PSD_CHECK, "row 1: x_m = 1e+308"),
     ("points.csv", lambda data: b"\xff" + data, PSD_CHECK, "it needs columns x_m, y_m"),
     ("begun/recording.mcap", lambda data: _other_events(data), CONTINUE, "do not contain which poses are done"),
+    ("arm.xml", lambda data: data.replace(b"0.4 0 0", b"1e308 0 0"), MJCF, "1e+308 m stands in it"),
+    ("arm.xml", lambda data: data.replace(b"0.7 0.7", b"1e308 1e308"), MJCF, "has no direction"),
+    ("dh.csv", lambda data: data.replace(b"400", b"400000"), DH, "row 2: Expected `float` <= 20.0 - at `$.a_m`"),
+    ("weld.src", lambda data: data.replace(b"400.0", b"1e308"), KRL, "has a number beyond 1 km or 100000 rad"),
+    ("weld.mod", lambda data: data.replace(b"MoveL", b"MoveL " * 9000), RAPID, "a line of more than 10000 letters"),
+    ("lab.xlsx", lambda data: with_member(data, SHEET, lambda text: text[:-9]), LAB, "save it again"),
+    ("bag-db3/metadata.yaml", lambda data: b"\xff" + data, BAG, "no ROS 2 bag that can be read"),
+)
+AWAY = re.compile(  # of a session without its devices, and of a program whose second pose is out of reach
+    r"serial port away/|could not open port|127\.0\.0\.9|not fit for a session|cannot be opened|have no command"
+    r"|lacks 8 things"
 )
 
 
@@ -64,8 +86,15 @@ def named(pair: Pair, seeds: range) -> str:
     return f"{pair.name}|{seeds.start}-{seeds.stop - 1}"
 
 
-def ran_into(server: Server, good: Path, pair: Pair, seeds: range, scratch: Path) -> list[Fault]:
+def ran_into(
+    server: Server, good: Path, pair: Pair, seeds: range, scratch: Path, *, in_turn: bool = False
+) -> list[Fault]:
     found: list[Fault] = []
+    if in_turn and not pair.together:
+        for first in range(seeds.start, seeds.stop, IN_TURN):
+            some = range(first, min(first + IN_TURN, seeds.stop))
+            found += run_in_turn(server, good, pair, some, scratch / f"turn-{first}")
+        return found
     for seed in range(seeds.start, seeds.stop, max(1, pair.together)):
         some = range(seed, min(seed + max(1, pair.together), seeds.stop))
         found += run_case(server, good, pair, some, scratch / "case")[1]
@@ -81,7 +110,7 @@ ENDURED = [(pair, range(first, first + CHUNK)) for pair in TABLE for first in ra
 def test_a_mutated_file_is_refused_in_one_message_or_read(
     pair: Pair, seeds: range, server: Server, good: Path, tmp_path: Path
 ) -> None:
-    found = ran_into(server, good, pair, seeds, tmp_path)
+    found = ran_into(server, good, pair, seeds, tmp_path, in_turn=True)
     assert not found, "\n".join(map(str, found))
 
 
@@ -104,6 +133,14 @@ def test_every_file_that_is_mutated_is_there_and_the_same_seed_gives_the_same_by
     some = TABLE[0]
     assert some.mutated(good, 7) == some.mutated(good, 7)
     assert len({some.mutated(good, seed) for seed in range(20)}) > 15
+
+
+@pytest.mark.parametrize("pair", [pair for pair in TABLE if pair.daily == DAILY_SEEDS], ids=lambda pair: pair.name)
+def test_the_good_file_is_taken(pair: Pair, server: Server, good: Path, tmp_path: Path) -> None:
+    """Else its mutations would all end at the same refusal, and try nothing."""
+    shutil.copytree(good, tmp_path / "case")
+    ran = server.run(pair.words.split(), tmp_path / "case", 60.0, 10**9)
+    assert ran.code == 0 or AWAY.search(ran.out + ran.err), ran.err
 
 
 @pytest.mark.parametrize(("name", "seed"), REAL)
@@ -170,3 +207,17 @@ def test_a_fork_reaches_no_other_machine(server: Server, good: Path, tmp_path: P
     (tmp_path / "rig.toml").write_text(text.replace("127.0.0.9", "robot.example").replace("psd1.json", ""), "utf-8")
     ran = server.run(["move", "rig.toml", "--home", "--dry-run"], tmp_path, 60.0, 10**9)
     assert "no network in this test" in ran.err
+
+
+def test_runs_in_turn_end_as_each_by_itself(server: Server, good: Path, tmp_path: Path) -> None:
+    """A folder that is not there ends the process: those after it are missing, and are run by themselves."""
+    words, folders = ["check", "tracker"], [tmp_path / name for name in ("good", "bad", "also")]
+    for folder in folders:
+        shutil.copytree(good / "tracker", folder / "tracker")
+    (folders[1] / "tracker" / "samples.csv").write_bytes(b"\0")
+    together = server.run_in_turn(words, folders, 60.0, 10**9)
+    alone = [server.run(words, folder, 60.0, 10**9) for folder in folders]
+    assert [(ran.code, ran.out, ran.err) for ran in together] == [(ran.code, ran.out, ran.err) for ran in alone]
+    assert [ran.code for ran in together] == [0, 1, 0]
+    ended = server.run_in_turn(words, [folders[0], tmp_path / "nowhere", folders[2]], 60.0, 10**9)
+    assert [ran.code for ran in ended] == [0]

@@ -7,20 +7,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording import Recording, RecordingWriter, Samples, read
-from acquisition.recording.rig import load_rig, parse_rig, plain_rig, rig_sha256, rig_text
-from acquisition.session.plan import PlanOptions
-from acquisition.session.session import Session
-from calibeam.devices.recorder import RecordingJournal
-from calibeam.learner import FittedLearner
+from acquisition.recording import Recording, Samples
+from acquisition.recording.rig import parse_rig, rig_sha256, rig_text
 from calibeam.results.identification import identify_session, session_model
 from calibrate.identification.identify import identify
 from calibrate.identification.record import record_of
 from calibrate.model_file import ModelFile, RigIdentity
 from calibrate.report.session_evidence import SessionEvidence, session_evidence
 from calibrate.report.session_report import session_page
-from drivers.clock import SystemClock
-from tests.support.direct_bench import direct_bench
+from tests.support.recorded_session import recorded_session
 
 RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
 POSITION, ORIENTATION = ("x_m", "y_m", "z_m"), ("rx_rad", "ry_rad", "rz_rad")
@@ -29,14 +24,9 @@ NOISE_M, NOISE_RAD = 20e-6, 1e-4
 
 @pytest.fixture(scope="session")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recording:
-    path, clock, rig = tmp_path_factory.mktemp("report") / "r.mcap", SystemClock(), load_rig(RIG)
-    bench = direct_bench(rig, plain_rig(rig_text(RIG), "rig"), seed=12)
+    drawn = recorded_session(tmp_path_factory)
     hostile = rig_text(RIG).replace('name = "ur5e-dual-psd"', 'name = "<script>alert(1)</script>"')
-    with RecordingWriter(path, rig_text=hostile, software="calibeam", clock=clock, notes={"seed": "12"}) as writer:
-        options = PlanOptions(centred=2, off_centre=4, repeats=1)
-        journal = RecordingJournal(writer, clock)
-        Session(bench, FittedLearner(rig), journal, options, np.array(rig.motion.home_rad)).run((1, 2, 3))
-    return read(path)
+    return replace(drawn, path=Path("r.mcap"), rig_text=hostile, rig=parse_rig(hostile, "rig"))
 
 
 @pytest.fixture(scope="session")

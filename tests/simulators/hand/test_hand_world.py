@@ -4,11 +4,12 @@ import math
 import tomllib
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
 from simulators.errors import WorldError
-from simulators.hand.hand_rig import is_hand_held, read_hand_truth, write_hand_truth
+from simulators.hand.hand_rig import HandTruth, is_hand_held, write_hand_truth
 from simulators.hand.held_arm import CannotReachError
 from simulators.hand.world import HandWorld
 
@@ -153,7 +154,7 @@ def test_what_is_out_of_reach_or_not_there_is_refused():
 def test_the_truth_comes_back_from_its_file(tmp_path):
     truth = HandWorld.from_rig(rig(disc_eccentricity_m=2e-6)).truth
     write_hand_truth(truth, tmp_path / "truth.json")
-    assert read_hand_truth(tmp_path / "truth.json") == truth
+    assert msgspec.json.decode((tmp_path / "truth.json").read_bytes(), type=HandTruth) == truth
 
 
 def test_a_rig_with_a_robot_or_without_artefacts_is_not_hand_held():

@@ -24,9 +24,17 @@ from tests.simulators.ur.calls import (
 STOPPED = Refused("Robot stopped")
 AHEAD = [0.1, *HOME[1:]]
 
+
+def electric(joints) -> bool:
+    """Voltage, current and temperature of every joint; of the board it reads places of an older firmware."""
+    volts, amperes, degrees = ([joints[f"{what}{j}"] for j in range(6)] for what in ("V_actual", "I_actual", "T_motor"))
+    return volts == [48.0] * 6 and all(map(math.isfinite, amperes)) and min(degrees) > 15.0
+
+
 SECONDARY = [
     Row("secondary", "wait"),
     Row("secondary", "get_all_data", gives=lambda data: {"RobotModeData", "JointData", "CartesianInfo"} <= data.keys()),
+    Row("secondary", "get_all_data", gives=lambda data: electric(data["JointData"])),
     Row("secondary", "get_cartesian_info", (True,), gives=lambda data: math.isfinite(data["X"])),
     Row(
         "secondary", "get_joint_data", (True,), gives=lambda data: data["V_actual0"] == 48.0 and data["T_motor0"] > 15.0
