@@ -29,7 +29,7 @@ from calibrate.errors import DataError
 from calibrate.older_models import with_present_names
 from calibrate.parameters import Parameter
 from calibrate.physics.records import Effect, SessionRecord, check_physics
-from calibrate.sensors.catalogue import FRAMES
+from calibrate.sensors.catalogue import BY_NAME, FRAMES
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -198,6 +198,9 @@ class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         check_physics(self.schema, self.effects, self.session)
+        unknown = [name for name in self.instruments if name not in BY_NAME]
+        if unknown:
+            raise ValueError(f"instruments: no sensor is called '{shown(unknown[0])}' here; install what brings it")
         for name, numbers in self.about.items():
             own = next((f.numbers for f in FRAMES if f.prefix == name.rstrip("0123456789")), 3)
             sizes = (6,) if name == "device" else (3, 6) if name == "tool" else (own,)

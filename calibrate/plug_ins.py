@@ -12,6 +12,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import TypeVar
 
 DEVICES, SENSORS, EFFECTS = "calibeam.devices", "calibeam.sensors", "calibeam.effects"
+EXPORTS = "calibeam.exports"
 T = TypeVar("T")
 
 

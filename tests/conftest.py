@@ -27,6 +27,7 @@ WIRED = (
     "calibeam/test_centre_cli.py",
     "calibeam/test_check_cli.py",
     "calibeam/test_cli.py",
+    "calibeam/test_corrected_on_wires.py",
     "calibeam/test_device_faults.py",
     "calibeam/test_log_cli.py",
     "calibeam/test_modbus_session.py",

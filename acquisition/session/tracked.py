@@ -1,8 +1,12 @@
-"""A session with a tracker: poses of a plan, each from its side, read once the target has settled."""
+"""A session with a tracker: poses of a plan, each from its side, read once the target has settled.
 
-from collections.abc import Callable, Mapping
+Between two poses it may be paused; a pose that was broken off is taken again, from where the arm then stands.
+"""
+
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -11,11 +15,15 @@ from numpy.typing import NDArray
 from acquisition.errors import AcquisitionError, RefusedMotionError
 from acquisition.recording.pose_plan import PlannedPose, PosePlan
 from acquisition.recording.samples import Cell
+from acquisition.session.control import BrokenOffError, EndedEarlyError, RunControl, RunEvent
+from acquisition.session.stepping import ELSEWHERE_RAD
 from acquisition.wires.tracker_bench import TargetLook
+from drivers.errors import DeviceError
 
 Floats = NDArray[np.float64]
 MOVED_RAD = 1e-6  # by which a joint counts as having moved
 SPREAD_FROM = 4  # samples: from so many on, wrong units show in how far the readings spread
+GLANCE_S = 0.05  # of a look at where the arm stands after a pause
 LEAST_SPREAD_M = 0.02  # of the nominal positions; less says nothing about units
 SPREADS = (0.5, 2.0)  # measured over nominal: arms are drawn to 1 %, units are wrong by 25 and more
 
@@ -89,6 +97,8 @@ class TrackedSession:
     """Runs a plan; the only owner of what was taken. Stopping the arm after an error is the caller's.
 
     `nominal_m`: positions (pose, 3) of the target by the nominal arm, at joint readings (pose, joint), in the base.
+    `control`: how a person pauses and ends it; None: nobody does. `done`: poses of the plan, from 1, that were taken
+    before.
     """
 
     def __init__(
@@ -100,11 +110,14 @@ class TrackedSession:
         nominal_m: Callable[[Floats], Floats],
         *,
         tell: Callable[[int, int], None] = lambda done, total: None,
+        control: RunControl | None = None,
+        done: Collection[int] = (),
     ) -> None:
         self._bench, self._journal, self._options, self._tell = bench, journal, options, tell
         self._home_rad, self._nominal_m = home_rad, nominal_m
         self._at_rad: Floats | None = None
         self._approach = np.zeros(len(home_rad), dtype=np.int64)
+        self._control, self._done = control or RunControl(bench.stop), frozenset(done)
         self._samples: list[TrackedSample] = []
         self._skipped = 0
 
@@ -114,16 +127,44 @@ class TrackedSession:
         return len(self._samples)
 
     def run(self, plan: PosePlan) -> TrackedSummary:
-        """Home, every pose of every block, home. DeviceError, AcquisitionError, RecordingError end it."""
+        """Home, every pose that is left, home. DeviceError, AcquisitionError, RecordingError end it.
+
+        A person may end it sooner: that is no failure, and the arm stays where it is.
+        """
         check_tracked_plan(plan)
-        self._move(self._home_rad)
-        for pose in (pose for block in plan.block for pose in block.pose):
-            self._take(pose)
-            self._tell(len(self._samples) + self._skipped, plan.poses)
-        self._move(self._home_rad)
+        self._control.tell(RunEvent.START)
+        try:
+            self._step(lambda: self._move(self._home_rad))
+            for number, pose in enumerate((pose for block in plan.block for pose in block.pose), start=1):
+                if number not in self._done:
+                    self._step(partial(self._take, number, pose))
+                    self._tell(len(self._done) + len(self._samples) + self._skipped, plan.poses)
+            self._step(lambda: self._move(self._home_rad))
+        except EndedEarlyError:
+            self._journal.event("ended by a person", {"samples": self.taken})
+        self._control.finish()
         return TrackedSummary(tuple(self._samples), self._skipped)
 
-    def _take(self, pose: PlannedPose) -> None:
+    def _step(self, act: Callable[[], None]) -> None:
+        """Done again where a pause broke it off. Raises what ends a session."""
+        waited = False
+        while True:
+            waited = self._control.checkpoint() or waited
+            try:
+                if waited:
+                    self._look_where_it_stands()
+                return act()
+            except BrokenOffError:
+                waited = True
+
+    def _look_where_it_stands(self) -> None:
+        """A motion was broken off, or a person has moved the arm: the way of each joint begins there."""
+        if self._at_rad is not None:
+            self._control.check()
+            q_rad = self._bench.look(GLANCE_S).q_rad
+            self._at_rad = np.where(np.abs(q_rad - self._at_rad) > ELSEWHERE_RAD, q_rad, self._at_rad)
+
+    def _take(self, number: int, pose: PlannedPose) -> None:
         q_rad, way = np.array(pose.q_rad), np.array(pose.approach or np.zeros(len(pose.q_rad)))
         try:
             if np.any(way):
@@ -131,19 +172,30 @@ class TrackedSession:
                     self._move(q_rad - self._options.opposite_rad * way)
             self._move(q_rad)
         except RefusedMotionError as why:
-            return self._skip(str(why))
+            return self._skip(number, str(why))
+        self._control.check()
         look = self._bench.look(self._options.dwell_s)
+        self._control.check()
         if not np.isfinite(look.position_m).all():
-            return self._skip("the instrument gave no valid position: the target is hidden, or turned away from it")
+            return self._skip(
+                number, "the instrument gave no valid position: the target is hidden, or turned away from it"
+            )
         sample = TrackedSample(look, self._approach.copy(), pose.repeat)
         self._samples.append(sample)
         self._journal.sample(sample)
+        self._journal.event("sample", {"pose": number})
         if len(self._samples) == SPREAD_FROM:
             self._check_spread()
         return None
 
     def _move(self, q_rad: Floats) -> None:
-        self._bench.move(q_rad)
+        self._control.check(begins=True)
+        try:
+            self._bench.move(q_rad)
+        except DeviceError:
+            self._control.check()  # it was the pause that ended the motion
+            raise
+        self._control.check()  # an arm that arrived before the stop came counts as broken off all the same
         if self._at_rad is not None:
             moved_rad = q_rad - self._at_rad
             self._approach = np.where(np.abs(moved_rad) > MOVED_RAD, np.sign(moved_rad), self._approach).astype(
@@ -162,8 +214,8 @@ class TrackedSession:
                 "the columns of [devices.tracker], and whether the instrument follows the target of this arm"
             )
 
-    def _skip(self, why: str) -> None:
-        self._journal.event("skipped", {"why": why})
+    def _skip(self, number: int, why: str) -> None:
+        self._journal.event("skipped", {"pose": number, "why": why})
         self._skipped += 1
 
 

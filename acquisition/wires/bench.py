@@ -113,32 +113,12 @@ class Pumps:
     encoders: Pump | None = None
 
 
-@dataclass
-class WiredBench:
-    """Implements acquisition.bench.Bench. `place` asks a person, or the emulated world, to move the fixture."""
+class ArmStops:
+    """What a bench can do with the arm beside moving it, for a session that may be paused."""
 
     arm: GatedArm
-    pumps: Pumps
-    view: PsdView
     speeds: Speeds
-    supervisor: Supervisor
-    clock: Clock
-    place: Callable[[int], None]
-    hurry: float = 1.0  # device seconds in one second of this program's clock
-    rule: SettleRule = field(default_factory=SettleRule)
-    beside: Mapping[str, Pump] = field(default_factory=dict[str, Pump])  # further instruments, by name
-    _cmd_rad: Floats = field(default_factory=lambda: np.empty(0), init=False)
-    _start_s: float | None = field(default=None, init=False)
-
-    def move(self, q_rad: Floats) -> None:
-        self.supervisor.check()
-        self._cmd_rad = q_rad.copy()
-        try:
-            self.arm.move_joints(q_rad, self.speeds.speed_rad_s, self.speeds.acceleration_rad_s2)
-        except DeviceError:
-            self.supervisor.check()  # the arm was stopped because another device failed: that is the news
-            raise
-        self.supervisor.check()
+    hurry: float  # device seconds in one second of this program's clock
 
     def stop(self) -> None:
         self.arm.stop()
@@ -163,6 +143,34 @@ class WiredBench:
     def hold(self) -> None:
         """As `stop`, and no motion is accepted any more."""
         self.arm.hold()
+
+
+@dataclass
+class WiredBench(ArmStops):
+    """Implements acquisition.bench.Bench. `place` asks a person, or the emulated world, to move the fixture."""
+
+    arm: GatedArm
+    pumps: Pumps
+    view: PsdView
+    speeds: Speeds
+    supervisor: Supervisor
+    clock: Clock
+    place: Callable[[int], None]
+    hurry: float = 1.0  # device seconds in one second of this program's clock
+    rule: SettleRule = field(default_factory=SettleRule)
+    beside: Mapping[str, Pump] = field(default_factory=dict[str, Pump])  # further instruments, by name
+    _cmd_rad: Floats = field(default_factory=lambda: np.empty(0), init=False)
+    _start_s: float | None = field(default=None, init=False)
+
+    def move(self, q_rad: Floats) -> None:
+        self.supervisor.check()
+        self._cmd_rad = q_rad.copy()
+        try:
+            self.arm.move_joints(q_rad, self.speeds.speed_rad_s, self.speeds.acceleration_rad_s2)
+        except DeviceError:
+            self.supervisor.check()  # the arm was stopped because another device failed: that is the news
+            raise
+        self.supervisor.check()
 
     def place_fixture(self, placement: int) -> None:
         self.place(placement)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from acquisition.motion.gated_arm import GatedArm
 from acquisition.wires.bench import (
     SILENCE_S,
+    ArmStops,
     SettleRule,
     Speeds,
     device_time,
@@ -60,7 +61,7 @@ class TrackerPumps:
 
 
 @dataclass
-class TrackerBench:
+class TrackerBench(ArmStops):
     """`rate_hz`: of the instrument, as stated. `hurry`: device seconds in one second of this program's clock."""
 
     arm: GatedArm
@@ -85,9 +86,6 @@ class TrackerBench:
             raise
         self._cmd_rad = q_rad.copy()
         self.supervisor.check()
-
-    def stop(self) -> None:
-        self.arm.stop()
 
     def look(self, dwell_s: float) -> TargetLook:
         """Wait until the position has settled, then average `dwell_s` of the instrument's time. DeviceError."""

@@ -20,6 +20,7 @@ from calibrate.correct.programs.rewriting import correct_program, dialect_of
 from calibrate.correct.tables import corrected_rows, read_poses
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile, read_model
+from calibrate.physics.applied import conditions_of_effects
 
 Floats = NDArray[np.float64]
 
@@ -101,7 +102,9 @@ def correct_command(
         else _program(console, job, poses, out, options, verbose)
     )
     needless = tuple(
-        f"{c} is given; no effect of the model depends on it" for c in job.every if c not in job.known.needs
+        f"{c} is given; no effect of the model depends on it"
+        for c in job.every
+        if c not in conditions_of_effects(job.known)
     )
     _print_found(console, job.known, found, names, (*needless, *notes, *found.notes), verbose)
     console.print(f"corrected: {out}", markup=False)
@@ -144,7 +147,7 @@ def _table(job: _Job, poses: Path, out: Path, options: Options) -> tuple[Correct
     given = tuple(
         f"column {c} is no condition that the model depends on"
         for c in wanted.conditions
-        if c not in job.known.needs and c not in job.every
+        if c not in conditions_of_effects(job.known) and c not in job.every
     )
     return found, [f"pose {row + 1}" for row in range(len(wanted))], given
 

@@ -5,11 +5,11 @@ from pathlib import Path
 from acquisition.recording.rig import ArmModel, parse_rig
 from calibrate.converted_rig import rig_in_model
 from calibrate.errors import DataError
-from calibrate.export.export import SUFFIX, ExportForm, export_model
+from calibrate.export.export import FormName, export_model, form_named
 from calibrate.model_file import read_model
 
 
-def export_model_command(model: Path, *, to: ExportForm, out: Path | None = None) -> None:
+def export_model_command(model: Path, *, to: FormName | str, out: Path | None = None) -> None:
     """Export a model to another program, or to its controller.
 
     The file states in µm over the workspace what it cannot carry. A form that does not suit the arm is refused: the
@@ -29,17 +29,18 @@ def export_model_command(model: Path, *, to: ExportForm, out: Path | None = None
         The model.json of an identification or of a diagnosis; it holds the rig.
     to
         urdf, mjcf (MuJoCo, with joint stiffness), dh-csv, ur-kinematics, ur-calibration, kuka-mastering, abb-moc,
-        fanuc-mastering, json, matlab, table (nominal, correction, calibrated; degrees and mm, in the robot's signs).
+        fanuc-mastering, json, matlab, table (nominal, correction, calibrated; degrees and mm, in the robot's signs), or
+        a form that an installed package brings.
     out
         The file to write. Default: beside the model, under its name.
 
     """
-    known = read_model(model)
+    form, known = form_named(to), read_model(model)
     if known.rig.text is None:
         raise DataError(f"{model}: the rig's text is not in the file; identify again")
     rig = rig_in_model(parse_rig(known.rig.text, f"rig.toml in {model}"), ArmModel(known.arm_model))
-    path = model.with_name(model.stem + SUFFIX[to]) if out is None else out
+    path = model.with_name(model.stem + form.suffix) if out is None else out
     path.parent.mkdir(parents=True, exist_ok=True)
-    for says in export_model(path, rig, known, to):
+    for says in export_model(path, rig, known, form):
         print(says)
-    print(f"{to.value}: {path}")
+    print(f"{form.name}: {path}")

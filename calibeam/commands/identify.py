@@ -19,7 +19,7 @@ from calibeam.results.identification import (
     write_session_model,
 )
 from calibrate.errors import DataError
-from calibrate.export.export import SUFFIX, ExportForm, export_model
+from calibrate.export.export import ExportForm, FormName, export_model, form_named
 from calibrate.fit import Status
 from calibrate.identification.planned import rig_as_planned
 from calibrate.model_file import ModelFile, read_model, write_model
@@ -35,7 +35,7 @@ def identify_command(
     model: Path | None = None,
     bootstrap: Annotated[int, Parameter(validator=validators.Number(gte=0))] | None = None,
     out: Path = Path("model.json"),
-    export: Annotated[tuple[ExportForm, ...], Parameter(show_default=False)] = (),
+    export: Annotated[tuple[FormName | str, ...], Parameter(show_default=False)] = (),
     verbose: bool = False,
     json: bool = False,
 ) -> None:
@@ -74,17 +74,18 @@ def identify_command(
         Print the model as it stands in the file, on one line, and nothing else.
 
     """
+    forms = tuple(form_named(name) for name in export)
     if model is not None:
         if plan is not None or bootstrap:
             raise DataError("--model refits a known structure; give it without --plan and --bootstrap")
         with naming_source(recording):
-            _refit(Console(quiet=json), recording, read_model(model), out, export)
+            _refit(Console(quiet=json), recording, read_model(model), out, forms)
         if json:
             print(msgspec.json.encode(read_model(out)).decode())
         return
     planned = Planned.read(plan)
     with naming_source(recording):
-        status = _identify(Console(quiet=json), recording, planned, bootstrap, out, export, verbose=verbose)
+        status = _identify(Console(quiet=json), recording, planned, bootstrap, out, forms, verbose=verbose)
     if json:
         print(msgspec.json.encode(read_model(out)).decode())
     report_unfinished(status, out)
@@ -129,8 +130,8 @@ def _export(console: Console, rig: Rig, out: Path, export: tuple[ExportForm, ...
         return
     model, lost = read_model(out), tuple[str, ...]()
     for form in export:
-        beside = out.with_name(out.stem + SUFFIX[form])
+        beside = out.with_name(out.stem + form.suffix)
         lost = export_model(beside, rig, model, form)
-        console.print(f"{form.value}: {beside}", markup=False)
+        console.print(f"{form.name}: {beside}", markup=False)
     for says in lost:
         console.print(says, markup=False, highlight=False)

@@ -246,9 +246,9 @@ def session(
         _refuse_ignored(wanted.rig, of_robot, "a rig that a controller moves, and a hand moves this one")
         _session_by_hand(wanted, hand, Console())
     elif is_tracked(wanted.rig):
-        of_light = {name: given for name, given in robot.given.items() if name != "--yes"}
+        of_light = {name: given for name, given in robot.given.items() if name not in ("--yes", "--continue")}
         _refuse_ignored(wanted.rig, {**of_light, **hand.given}, "detectors or a measuring arm; this rig has a tracker")
-        _session_with_tracker(wanted, tracker, page, agrees=robot.yes)
+        _session_with_tracker(wanted, tracker, page, robot)
     else:
         _refuse_ignored(wanted.rig, hand.given, "a measuring arm")
         _session_of_robot(wanted, robot, page, Console())
@@ -278,18 +278,21 @@ def _session_of_robot(wanted: Wanted, robot: RobotOptions, page: PageOptions, co
         run_session(job, console, earlier, feed, asking=asking, agrees=agrees, stands=robot.stands)
 
 
-def _session_with_tracker(wanted: Wanted, tracker: TrackerOptions, page: PageOptions, *, agrees: bool) -> None:
+def _session_with_tracker(wanted: Wanted, tracker: TrackerOptions, page: PageOptions, robot: RobotOptions) -> None:
     """The session of a driven arm whose target a tracker measures."""
     from calibeam.sessions.with_tracker import TrackedJob, run_tracked
 
     rig, console, control = wanted.rig, Console(), wanted.emulators.address()
     check_tracked_session(rig)
     addresses, asking = tracker_addresses_of(rig, hurry=wanted.emulators.time_scale), at_terminal()
-    if parts(wanted.out):
-        raise RecordingError(f"{wanted.out}: holds a session already; choose another --out")
+    if not robot.continue_:
+        _refuse_begun(wanted.out)
     plan = read_pose_plan(wanted.plan, rig) if wanted.plan is not None else None
-    agreed = agrees or (control is not None and asking is None and moves_nothing_real(addresses.robot))
-    job = TrackedJob(rig, wanted.text, wanted.out, addresses, plan, tracker.poses, wanted.seed)
+    plan_text = "" if wanted.plan is None else wanted.plan.read_text(encoding="utf-8")
+    agreed = robot.yes or (control is not None and asking is None and moves_nothing_real(addresses.robot))
+    job = TrackedJob(
+        rig, wanted.text, wanted.out, addresses, plan, tracker.poses, wanted.seed, plan_text, robot.continue_
+    )
     with _page(rig, page, console) as feed:
         run_tracked(job, console, feed, asking=asking, agrees=agreed)
 
@@ -321,17 +324,23 @@ def _page(rig: Rig, asked: PageOptions, console: Console) -> Generator[Feed]:
 
 def _earlier(job: Job, *, go_on: bool, place: tuple[float, float, float, float] | None) -> EarlierParts:
     """What was taken already. RecordingError where a session is in the folder and nobody wants to go on with it."""
-    if not go_on and parts(job.out):
-        raise RecordingError(
-            f"{job.out}: holds a session already, and no recording is written over; go on with it by --continue, or "
-            "choose another --out"
-        )
+    if not go_on:
+        _refuse_begun(job.out)
     earlier = read_earlier_parts(job.out, job.rig) if go_on else EarlierParts()
     if place is None:
         return earlier
     if job.plan is not None:
         raise AcquisitionError("--place with --plan: a plan names its places itself; give one of them")
     return with_place(earlier, new_place(with_places(job.rig, job.text, earlier.added)[0], place))
+
+
+def _refuse_begun(out: Path) -> None:
+    """RecordingError where a session is in the folder."""
+    if parts(out):
+        raise RecordingError(
+            f"{out}: holds a session already, and no recording is written over; go on with it by --continue, or choose "
+            "another --out"
+        )
 
 
 def _check_verify(rig: Rig, plan: Path | None, *, verify: bool) -> None:

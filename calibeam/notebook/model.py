@@ -181,16 +181,16 @@ class Model:
         return Path(path)
 
     def export(self, form: str, path: Path | str) -> tuple[str, ...]:
-        """Write the arm for another program, by a word of `calibeam identify --export-…` such as "urdf" or "dh-csv".
+        """Write the arm for another program, by a word of `calibeam export-model --to` such as "urdf".
 
         Returns sentences on what the file cannot carry; they stand in it, too. DataError for an arm that the form
-        cannot hold, ValueError for a form that there is not, OSError where it cannot be written.
+        cannot hold and for a form that there is not, OSError where it cannot be written.
         """
         from acquisition.recording.rig import parse_rig
-        from calibrate.export.export import ExportForm, export_model
+        from calibrate.export.export import export_model, form_named
 
         rig = parse_rig(self.file.rig.text or "", "rig.toml in the model")
-        return export_model(Path(path), rig, self.file, ExportForm(form))
+        return export_model(Path(path), rig, self.file, form_named(form))
 
     def __repr__(self) -> str:
         return f"<calibeam.Model of {self.file.rig.name}: {self.says}>"

@@ -23,6 +23,7 @@ from calibeam.devices.site import Addresses
 
 PLACE_EVENT, STANDS_IN = "placement", "place added"
 SEED_NOTE, PLAN_NOTE = "plan_seed", "plan_sha256"
+GO_ON = "to go on, give the same command with --continue"
 
 
 @dataclass(frozen=True)
@@ -237,13 +238,13 @@ def with_fixture_moved(earlier: EarlierParts, place: Placement, instead_of: int)
 def notes_of(job: Job, seed: int) -> dict[str, str]:
     """How a session is begun, for who goes on with it."""
     notes = {SEED_NOTE: str(seed)}
-    return notes if job.plan is None else {**notes, PLAN_NOTE: _sha256(job.plan_text)}
+    return notes if job.plan is None else {**notes, PLAN_NOTE: plan_sha256(job.plan_text)}
 
 
 def _check_same_plan(job: Job, earlier: EarlierParts) -> None:
     if not earlier.begun:
         return
-    told, begun = (_sha256(job.plan_text) if job.plan is not None else None), earlier.notes.get(PLAN_NOTE)
+    told, begun = (plan_sha256(job.plan_text) if job.plan is not None else None), earlier.notes.get(PLAN_NOTE)
     if told != begun:
         raise AcquisitionError(
             f"{job.out}: the session was begun {'without a plan' if begun is None else 'with another --plan'}; "
@@ -251,5 +252,5 @@ def _check_same_plan(job: Job, earlier: EarlierParts) -> None:
         )
 
 
-def _sha256(text: str) -> str:
+def plan_sha256(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()

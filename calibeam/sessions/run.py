@@ -23,6 +23,7 @@ from calibeam.live.feed import SILENT, Feed
 from calibeam.outcome import PartialResult, interruption
 from calibeam.sessions.forecast import ahead_of_blocks, ahead_of_plan
 from calibeam.sessions.job import (
+    GO_ON,
     EarlierParts,
     Job,
     Part,
@@ -44,7 +45,6 @@ from calibrate.pose_design.candidates import POSE_S
 from drivers.clock import Clock, SystemClock
 from drivers.errors import DeviceError, DeviceRefused
 
-GO_ON = "to go on, give the same command with --continue"
 FINISH, MORE, PLACE = "f", "m", "n"
 
 

@@ -1,9 +1,9 @@
-"""A whole session with a tracker: devices, plan, arm, measure, results.
+"""A whole session with a tracker: devices, plan, arm, measure, results; paused and gone on with as any other.
 
 Without a plan poses are drawn evenly over the joints' ranges, ordered by short ways, some of them repeated.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,23 +12,31 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import Progress as Bar
 
-from acquisition.recording import Event, RecordingWriter, RigFileError
+from acquisition.errors import AcquisitionError
+from acquisition.recording import Event, RecordingError, RecordingWriter, RigFileError, read
+from acquisition.recording.mcap import differs, next_part, parts
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
 from acquisition.recording.rig import Rig
+from acquisition.session.control import RunControl, RunState
 from acquisition.session.tracked import TrackedOptions, TrackedSession, TrackedSummary, check_tracked_plan
 from acquisition.wires.tracker_bench import TrackerBench
 from calibeam.asking import YES, Asking, someone
 from calibeam.devices.check import check_devices
-from calibeam.devices.recorder import RecordingJournal, kept, new_recording
+from calibeam.devices.recorder import Earlier, RecordingJournal, kept, new_recording
 from calibeam.devices.site import TrackerAddresses, connected_tracker
+from calibeam.interrupts import INTERRUPTS
 from calibeam.live.feed import SILENT, Feed, Progress
 from calibeam.motion.reachable_poses import candidates_of, way_is_clear
+from calibeam.outcome import PartialResult
 from calibeam.printing.progress import progress_bar
+from calibeam.sessions.job import GO_ON, PLAN_NOTE, SEED_NOTE, plan_sha256
+from calibeam.sessions.keys import Keys
 from calibrate.arms.rig_arm import RigArm
 from drivers.clock import Clock, SystemClock
-from drivers.errors import DeviceRefused
+from drivers.errors import DeviceError, DeviceRefused
 
 Floats = NDArray[np.float64]
+POSES_NOTE = "plan_poses"
 
 
 @dataclass(frozen=True)
@@ -42,6 +50,50 @@ class TrackedJob:
     plan: PosePlan | None = None
     poses: int = 40
     seed: int = 1
+    plan_text: str = ""
+    go_on: bool = False  # with the session in `out`
+
+
+@dataclass(frozen=True)
+class TakenBefore:
+    """By earlier recordings of the session: poses of its plan, from 1, and how many samples that made."""
+
+    plan: PosePlan
+    notes: Mapping[str, str]
+    done: frozenset[int] = frozenset()
+    samples: int = 0
+
+    @property
+    def left(self) -> int:
+        return self.plan.poses - len(self.done)
+
+
+def taken_before(job: TrackedJob) -> TakenBefore:
+    """What the session goes on with; its plan is that of its beginning, whatever --seed and --poses are now.
+
+    RecordingError where there is none, or it is of another rig; AcquisitionError for another plan; RigFileError as
+    `drawn_plan`.
+    """
+    notes = {SEED_NOTE: str(job.seed), POSES_NOTE: str(job.poses)}
+    if job.plan is not None:
+        notes = {PLAN_NOTE: plan_sha256(job.plan_text)}
+    each = [read(path) for path in parts(job.out)] if job.go_on else []
+    if job.go_on and not each:
+        raise RecordingError(f"{job.out}: no session to go on with; leave --continue out, or give the folder of one")
+    if each:
+        if said := differs(each[-1].rig, job.rig):
+            raise RecordingError(f"{job.out}: its session was of another rig: {said}; begin one with another --out")
+        begun = {name: each[0].notes[name] for name in (SEED_NOTE, POSES_NOTE, PLAN_NOTE) if name in each[0].notes}
+        if begun.get(PLAN_NOTE) != notes.get(PLAN_NOTE):
+            other = "another --plan" if PLAN_NOTE in begun and job.plan is not None else "other poses"
+            raise AcquisitionError(f"{job.out}: the session was begun with {other}; go on with it as it was begun")
+        notes = begun
+    plan = job.plan or drawn_plan(job.rig, int(notes.get(POSES_NOTE, job.poses)), int(notes.get(SEED_NOTE, job.seed)))
+    done = frozenset(int(e.detail["pose"]) for one in each for e in one.events if e.kind == "sample")
+    samples = sum(len(one.samples) for one in each)
+    if samples and not done:
+        raise RecordingError(f"{job.out}: recorded by a version that did not record poses; begin with another --out")
+    return TakenBefore(plan, notes, done, samples)
 
 
 def run_tracked(job: TrackedJob, console: Console, feed: Feed = SILENT, *, asking: Asking | None, agrees: bool) -> None:
@@ -51,48 +103,100 @@ def run_tracked(job: TrackedJob, console: Console, feed: Feed = SILENT, *, askin
     """
     if job.plan is not None:
         check_tracked_plan(job.plan)
-    clock, path = SystemClock(), job.out / "recording.mcap"
+    clock = SystemClock()
     if job.addresses.hurry == 1.0:
         _check(job.rig, console, clock)
-    plan = drawn_plan(job.rig, job.poses, job.seed) if job.plan is None else job.plan
-    console.print(f"session with a tracker: {plan.poses} readings, repeats among them", highlight=False)
-    if not agrees:
-        someone(asking, "whether the arm may move", YES).may_move()
-    job.out.mkdir(parents=True, exist_ok=True)
-    with (
-        new_recording(path, job.text, clock, {"plan_seed": str(job.seed)}) as writer,
-        connected_tracker(job.rig, job.addresses, writer, clock, feed) as bench,
-    ):
-        summary = record_tracked(bench, job.rig, writer, plan, clock, progress_bar(console), feed=feed)
-    console.print(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {path}", highlight=False)
+    before = taken_before(job)
+    taken = f", {before.samples} taken before" if before.samples else ""
+    console.print(f"session with a tracker: {before.left} readings, repeats among them{taken}", highlight=False)
+    if before.left:
+        if not agrees:
+            someone(asking, "whether the arm may move", YES).may_move()
+        job.out.mkdir(parents=True, exist_ok=True)
+        path = next_part(job.out)
+        with (
+            new_recording(path, job.text, clock, before.notes) as writer,
+            connected_tracker(job.rig, job.addresses, writer, clock, feed) as bench,
+        ):
+            terminal, earlier = None if asking is None else asking.fd, Earlier(job.out, before.samples)
+            summary = record_tracked(
+                bench,
+                job.rig,
+                writer,
+                before,
+                clock,
+                progress_bar(console),
+                feed=feed,
+                terminal=terminal,
+                earlier=earlier,
+            )
+        console.print(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {path}", highlight=False)
+    else:
+        console.print("everything that was planned is taken", highlight=False)
+    files = parts(job.out)
     from calibeam.results.session_results import (
         write_session_results,  # a second of libraries that no device waits for
     )
 
-    write_session_results(path, console)
+    write_session_results(files[0] if len(files) == 1 else job.out, console)
 
 
 def record_tracked(
     bench: TrackerBench,
     rig: Rig,
     writer: RecordingWriter,
-    plan: PosePlan,
+    before: TakenBefore,
     clock: Clock,
     bar: Bar,
     options: TrackedOptions | None = None,
     feed: Feed = SILENT,
+    terminal: int | None = None,
+    earlier: Earlier | None = None,
 ) -> TrackedSummary:
-    """Take the poses of a plan. PartialResult when it ended early: the arm stands, samples are kept."""
+    """Take the poses that are left. PartialResult when it ended early: the arm stands, samples are kept.
+
+    `terminal`: file descriptor that keys are read from: SPACE or Ctrl-C pauses, as in a session with detectors.
+    """
+    plan = before.plan
     with bar:
-        task = bar.add_task("measuring", total=plan.poses)
+        task = bar.add_task("measuring", total=plan.poses, completed=len(before.done))
 
         def tell(done: int, total: int) -> None:
             bar.update(task, completed=done)
             feed.progress(Progress("measure", done, total))
 
+        def told(state: RunState) -> None:
+            bar.update(task, description=state.value)
+            if state in (RunState.PAUSED, RunState.RUNNING):
+                writer.event(Event(clock.now_s(), "run state", {"state": state.value}))
+            if state is RunState.PAUSED:
+                bar.console.print("paused, the arm stands; r goes on, s ends here, a aborts", highlight=False)
+
+        def undelivered(trouble: DeviceError | None) -> None:
+            if trouble is not None:
+                bar.console.print(f"STOP NOT DELIVERED, press the emergency stop: {trouble}", highlight=False)
+
+        control = RunControl(
+            bench.stop,
+            clock,
+            lambda: bench.supervisor.failure,
+            told,
+            hold_arm=bench.hold,
+            undelivered=undelivered,
+            rests_in_s=bench.rests_in_s,
+            ease_arm=bench.ease,
+        )
         journal, home_rad = RecordingJournal(writer, clock), np.array(rig.motion.home_rad)
-        session = TrackedSession(bench, journal, options or TrackedOptions(), home_rad, nominal_target(rig), tell=tell)
-        summary = kept(bench, writer, clock, session, lambda: session.run(plan))
+        session = TrackedSession(
+            bench, journal, options or TrackedOptions(), home_rad, nominal_target(rig),
+            tell=tell, control=control, done=before.done,
+        )  # fmt: skip
+        with Keys(control, terminal, clock):
+            try:
+                summary = kept(bench, writer, clock, session, lambda: session.run(plan), earlier)
+            except PartialResult as early:
+                INTERRUPTS.close()  # a recording is being closed
+                raise PartialResult(f"{early}; {GO_ON}") from early.__cause__
     writer.event(Event(clock.now_s(), "end", {"samples": len(summary.samples), "skipped": summary.skipped}))
     return summary
 

@@ -4,11 +4,12 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 
 from acquisition.recording.rig import Rig
 from calibeam.simulation.physics import physics_of
-from calibeam.simulation.rig_in_numbers import arm_in_numbers, light_of
+from calibeam.simulation.rig_in_numbers import arm_in_numbers, light_of, tracker_of
 from calibeam.simulation.scene_of_samples import rest_degC
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
@@ -26,7 +27,8 @@ FOLLOWED = ("q", "gravity_torque", "qd", "last_move", "approach", "spot")  # dri
 
 
 def emulated(model: ModelFile, rig: Rig) -> tuple[Given, tuple[Defect, ...], tuple[str, ...]]:
-    """Geometry and mechanisms, and sentences on what is left out. DataError for a model of another arm or of no light.
+    """Geometry and mechanisms, and sentences on what is left out. DataError for a model of another arm, and for
+    one that knows no laser where the rig has one.
 
     An emulated session is none of those that the model was found in.
     """
@@ -45,22 +47,33 @@ def emulated(model: ModelFile, rig: Rig) -> tuple[Given, tuple[Defect, ...], tup
             notes.append(f"left out: {name}, {physics.sizes.get(name, 'geometry')}: {why}")
         else:
             mechanisms.append(made.defect)
-    return _given(model, predictor), tuple(mechanisms), tuple(notes)
+    given = _given(model, predictor, rig)
+    if rig.devices.tracker is not None and given.device is None:
+        notes.append("the model does not know where a tracker stands: its place and the target are those of the seed")
+    return given, tuple(mechanisms), tuple(notes)
 
 
-def _given(model: ModelFile, predictor: Predictor) -> Given:
-    arm, light = arm_in_numbers(predictor), light_of(predictor)
-    if light is None:
-        raise DataError(f"rig {predictor.rig.name}: the emulated world has a laser and a fixture, the model has none")
-    fixture = light[0]
-    return Given(
+def _given(model: ModelFile, predictor: Predictor, rig: Rig) -> Given:
+    arm, light, seen = arm_in_numbers(predictor), light_of(predictor), tracker_of(predictor)
+    plain = Given(
         parts=tuple(_pose(part) for part in arm.fixed),
         joint_zero_rad=tuple(arm.zero_rad.tolist()),
+        rest_degC=rest_degC(model),
+    )
+    if rig.devices.tracker is not None and seen is not None:
+        target_m = as_vector(predictor.tip_at(np.eye(4)[np.newaxis])[0])
+        plain = structs.replace(plain, device=_pose(seen.device), target_m=target_m)
+    if light is None:
+        if rig.fixture is not None:
+            raise DataError(f"rig {rig.name} has a laser and a fixture, the model has none; give a model of such a rig")
+        return plain
+    fixture = light[0]
+    return structs.replace(
+        plain,
         laser_origin_m=as_vector(fixture.laser_origin_m),
         laser_direction=as_vector(fixture.laser_direction),
         placements=tuple(TruePlacement(k, _pose(fixture.places[k - 1])) for k in sorted(predictor.rig.placements)),
         psd2_in_psd1=_pose(fixture.psd2_in_psd1),
-        rest_degC=rest_degC(model),
     )
 
 

@@ -40,7 +40,7 @@ def rigged(predictor: Predictor, samples: Samples) -> Rigged:
         arm=arm_in_numbers(predictor),
         tool_point_m=predictor.tip_at(np.eye(4)[np.newaxis])[0],
         light=_light(predictor, samples),
-        tracker=_tracker(predictor),
+        tracker=tracker_of(predictor),
         camera=_camera(predictor),
         seat_m=_seats_m(predictor, samples),
     )
@@ -143,7 +143,8 @@ def _light(predictor: Predictor, samples: Samples) -> DualPsd | None:
     return None if found is None or "placement" not in samples else found[0]
 
 
-def _tracker(predictor: Predictor) -> Mounted | None:
+def tracker_of(predictor: Predictor) -> Mounted | None:
+    """The tracker in the base and its target on the flange; None where neither model nor rig knows a place."""
     try:
         device = predictor.T_base_device
     except DataError:

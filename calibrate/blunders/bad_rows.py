@@ -38,8 +38,8 @@ def bad_rows(shots: Shots, among: Indices | None = None) -> tuple[Blunder, ...]:
     misfit = shots.misfit()
     k = misfit.shape[1]
     distance = np.linalg.norm(misfit, axis=1)
-    scale = robust_scale(distance, k)
-    found = np.flatnonzero(outlying(distance, k))
+    scale = robust_scale(distance, k, shots.met)
+    found = np.flatnonzero(outlying(distance, k, shots.met))
     found = found if among is None else np.intersect1d(found, among)
     found = found[~err_alike(misfit, postures(shots.q_rad), found)]
     return tuple(_named(shots, int(i), misfit[i], scale) for i in found)

@@ -27,8 +27,9 @@ def rows_of_another_session(shots: Shots) -> tuple[Blunder, ...]:
     """One blunder a block. `shots` are positions (k = 3) after a fit that such blocks could not pull."""
     misfit = shots.misfit()
     distance = np.linalg.norm(misfit, axis=1)
-    scale = robust_scale(distance, misfit.shape[1])
-    found = (_block(shots, first, last, misfit, scale) for first, last in _blocks(outlying(distance, misfit.shape[1])))
+    k = misfit.shape[1]
+    scale, odd = robust_scale(distance, k, shots.met), outlying(distance, k, shots.met)
+    found = (_block(shots, first, last, misfit, scale) for first, last in _blocks(odd))
     return tuple(blunder for blunder in found if blunder is not None)
 
 

@@ -26,6 +26,7 @@ class Shots:
     sigma: Floats  # (k,) believed, in the unit of the columns
     expect: Callable[[Rows, Floats], Floats]  # which of the obs, their angles (m, joint) -> (m, k)
     posture: Floats | None = None  # (obs, n) between which distances are those of postures; None: by the angles
+    met: int = 0  # rows that the fit can meet exactly: they say nothing about what distance is usual
 
     def misfit(self) -> Floats:
         """(obs, k) expected minus observed over believed sigma."""
@@ -33,11 +34,15 @@ class Shots:
         return (self.expect(every, self.q_rad) - self.observed) / self.sigma
 
 
-def robust_scale(distance: Floats, k: int) -> float:
-    """One sigma of a coordinate from the median of distances (obs,) over k coordinates (Hampel's MAD, for chi)."""
-    return max(float(np.median(distance)) / float(np.sqrt(chdtri(k, 0.5))), LEAST_SCALE)
+def robust_scale(distance: Floats, k: int, met: int = 0) -> float:
+    """One sigma of a coordinate from the median of distances (obs,) over k coordinates (Hampel's MAD, for chi).
+
+    `met`: so many of the nearest rows are not counted.
+    """
+    middle = float(np.median(np.sort(distance)[met:]))
+    return max(middle / float(np.sqrt(chdtri(k, 0.5))), LEAST_SCALE)
 
 
-def outlying(distance: Floats, k: int) -> Bools:
+def outlying(distance: Floats, k: int, met: int = 0) -> Bools:
     """(obs,) rows whose distance over k coordinates no noise of these data reaches."""
-    return distance > LIMIT * robust_scale(distance, k)
+    return distance > LIMIT * robust_scale(distance, k, met)

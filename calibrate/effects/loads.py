@@ -23,6 +23,7 @@ FIRST_MOMENT_M = 0.1  # a link's centre of mass is about this far from its frame
 # motors to the reader, so a stated mass is believed to about a seventh.
 MASS_SHARE = 0.15
 CENTRE_SHARE = 0.05  # of the longest link: 20 mm on a small arm
+UNSTATED_CENTRE_M = 0.1  # one sigma along each axis, of a load at the flange whose centre is not stated: a gripper long
 TOOL_SHARE = 0.05  # of all stated mass, where the tool's own is not stated
 
 

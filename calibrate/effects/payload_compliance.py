@@ -8,6 +8,7 @@ from calibrate.effects.term import Missing, Shape, Term
 from calibrate.effects.time_laws import varies
 
 LIMIT = 5e-3  # rad per kg, and per kg m
+UNKNOWN_CENTRE = "unknown centre"  # variant that finds the first moment of the payload
 
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
@@ -34,7 +35,7 @@ def _term(drivers: Drivers, joint: int, payload_kg: Floats, columns: int) -> Ter
         ("payload",),
         Shape.LINEAR,
         "payload-compliance",
-        variant="" if columns == 1 else "unknown centre",
+        variant="" if columns == 1 else UNKNOWN_CENTRE,
         function=function,
         names=names,
         limit=LIMIT,

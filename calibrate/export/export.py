@@ -1,8 +1,12 @@
-"""An identified arm to the file of another program; a new form is one file beside this one and one line here."""
+"""An identified arm to the file of another program; a new form is one file beside this one and one line here.
 
-import enum
+Forms of installed packages are entry points of the group `calibeam.exports`.
+"""
+
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from acquisition.recording.rig import Make, Rig
 from acquisition.recording.rig.devices import RobotDriver
@@ -18,67 +22,80 @@ from calibrate.export.ur import ur_calibration_text, ur_kinematics_text
 from calibrate.export.urdf import urdf_text
 from calibrate.model_file import ModelFile, corrections
 from calibrate.physics.records import Effect
+from calibrate.plug_ins import EXPORTS, loaded
 
 COMPLIANCE = "compliance_rad_nm"
 
 
-class ExportForm(enum.Enum):
-    """By the word of the command line."""
+@dataclass(frozen=True, kw_only=True)
+class ExportForm:
+    """A form of file that an arm can be exported in: one of FORMS, or brought by an installed package.
 
-    URDF = "urdf"
-    DH_CSV = "dh-csv"
-    UR_KINEMATICS = "ur-kinematics"  # YAML of the ROS description
-    UR_CALIBRATION = "ur-calibration"  # lists of the controller's calibration.conf
-    JSON = "json"
-    MATLAB = "matlab"
-    MJCF = "mjcf"  # MuJoCo, with joint stiffness
-    KUKA_MASTERING = "kuka-mastering"
-    ABB_MOC = "abb-moc"
-    FANUC_MASTERING = "fanuc-mastering"
-    TABLE = "table"  # nominal, correction, calibrated
+    `text` gives the whole file; it should hold `IdentifiedArm.sign` and each sentence of `not_carried`, and may raise
+    DataError for an arm that it cannot hold.
+    """
+
+    name: str  # the word of the command line
+    suffix: str  # of the file beside the model
+    text: Callable[[IdentifiedArm], str]
+    make: Make | None = None  # whose controllers it is for; None: any
+    offsets: bool = False  # it holds zeros, no geometry
+    springs: bool = False  # it carries joints that yield in proportion to their torque
+    uncoupled: str = ""  # why it cannot carry a joint that follows another one; "": it can
 
 
-FORMS: Mapping[ExportForm, Callable[[IdentifiedArm], str]] = {
-    ExportForm.URDF: urdf_text,
-    ExportForm.DH_CSV: dh_csv_text,
-    ExportForm.UR_KINEMATICS: ur_kinematics_text,
-    ExportForm.UR_CALIBRATION: ur_calibration_text,
-    ExportForm.JSON: json_text,
-    ExportForm.MATLAB: matlab_text,
-    ExportForm.MJCF: mjcf_text,
-    ExportForm.KUKA_MASTERING: kuka_mastering_text,
-    ExportForm.ABB_MOC: abb_moc_text,
-    ExportForm.FANUC_MASTERING: fanuc_mastering_text,
-    ExportForm.TABLE: nominal_table_text,
-}
+NO_UR = "no arm of Universal Robots has one; take another form, or correct the rig"
+GUESSED = "the rig file does not hold how its motors are coupled: offsets of motors would be guesses"
+FORMS: tuple[ExportForm, ...] = (
+    ExportForm(name="urdf", suffix=".urdf", text=urdf_text),
+    ExportForm(name="dh-csv", suffix=".dh.csv", text=dh_csv_text),
+    ExportForm(  # YAML of the ROS description
+        name="ur-kinematics", suffix=".kinematics.yaml", text=ur_kinematics_text, make=Make.UR, uncoupled=NO_UR
+    ),
+    ExportForm(  # lists of the controller's calibration.conf
+        name="ur-calibration", suffix=".calibration.conf", text=ur_calibration_text, make=Make.UR, uncoupled=NO_UR
+    ),
+    ExportForm(name="json", suffix=".arm.json", text=json_text),
+    ExportForm(name="matlab", suffix=".m", text=matlab_text),
+    ExportForm(name="mjcf", suffix=".mjcf.xml", text=mjcf_text, springs=True),  # MuJoCo
+    ExportForm(
+        name="kuka-mastering", suffix=".kuka-mastering.csv", text=kuka_mastering_text, make=Make.KUKA, offsets=True
+    ),
+    ExportForm(
+        name="abb-moc", suffix=".abb-moc.csv", text=abb_moc_text, make=Make.ABB, offsets=True, uncoupled=GUESSED
+    ),
+    ExportForm(
+        name="fanuc-mastering", suffix=".fanuc-mastering.csv", text=fanuc_mastering_text, make=Make.FANUC, offsets=True
+    ),
+    ExportForm(name="table", suffix=".table.csv", text=nominal_table_text),  # nominal, correction, calibrated
+)
+# The words of FORMS, for the command line: what a help page lists and a shell completes before anything is loaded.
+FormName = Literal[
+    "urdf",
+    "dh-csv",
+    "ur-kinematics",
+    "ur-calibration",
+    "json",
+    "matlab",
+    "mjcf",
+    "kuka-mastering",
+    "abb-moc",
+    "fanuc-mastering",
+    "table",
+]
 
-SUFFIX: Mapping[ExportForm, str] = {
-    ExportForm.URDF: ".urdf",
-    ExportForm.DH_CSV: ".dh.csv",
-    ExportForm.UR_KINEMATICS: ".kinematics.yaml",
-    ExportForm.UR_CALIBRATION: ".calibration.conf",
-    ExportForm.JSON: ".arm.json",
-    ExportForm.MATLAB: ".m",
-    ExportForm.MJCF: ".mjcf.xml",
-    ExportForm.KUKA_MASTERING: ".kuka-mastering.csv",
-    ExportForm.ABB_MOC: ".abb-moc.csv",
-    ExportForm.FANUC_MASTERING: ".fanuc-mastering.csv",
-    ExportForm.TABLE: ".table.csv",
-}
-MAKES: Mapping[ExportForm, Make] = {  # whose controllers a form is for
-    ExportForm.UR_KINEMATICS: Make.UR,
-    ExportForm.UR_CALIBRATION: Make.UR,
-    ExportForm.KUKA_MASTERING: Make.KUKA,
-    ExportForm.ABB_MOC: Make.ABB,
-    ExportForm.FANUC_MASTERING: Make.FANUC,
-}
-OFFSETS = (ExportForm.KUKA_MASTERING, ExportForm.ABB_MOC, ExportForm.FANUC_MASTERING)  # hold zeros, no geometry
 
-UNCOUPLED: Mapping[ExportForm, str] = {  # forms that cannot carry a joint that follows another one, with the reason
-    ExportForm.UR_KINEMATICS: "no arm of Universal Robots has one; take another form, or correct the rig",
-    ExportForm.UR_CALIBRATION: "no arm of Universal Robots has one; take another form, or correct the rig",
-    ExportForm.ABB_MOC: "the rig file does not hold how its motors are coupled: offsets of motors would be guesses",
-}
+def form_named(name: str) -> ExportForm:
+    """The form of this word, of ours or of an installed package. DataError with the list of all for another word."""
+    own = next((form for form in FORMS if form.name == name), None)
+    if own is not None:  # nothing is looked up, and no package can take the place of a form of ours
+        return own
+    brought = loaded(EXPORTS, ExportForm)
+    found = next((form for form in brought if form.name == name), None)
+    if found is None:
+        known = ", ".join(form.name for form in (*FORMS, *brought))
+        raise DataError(f"no form of export is called '{name}'; there are {known}; install the package that brings it")
+    return found
 
 
 def export_text(rig: Rig, values: Mapping[str, float], form: ExportForm) -> str:
@@ -87,7 +104,7 @@ def export_text(rig: Rig, values: Mapping[str, float], form: ExportForm) -> str:
     DataError for a correction of no parameter, or an arm that the form cannot hold.
     """
     _refuse_coupled(rig, form)
-    return FORMS[form](identified_arm(rig, values))
+    return form.text(identified_arm(rig, values))
 
 
 def export_model(path: Path, rig: Rig, model: ModelFile, form: ExportForm) -> tuple[str, ...]:
@@ -98,23 +115,23 @@ def export_model(path: Path, rig: Rig, model: ModelFile, form: ExportForm) -> tu
     """
     refuse_other_make(rig, form)
     _refuse_coupled(rig, form)
-    soft = _linear_compliance(rig, model) if form is ExportForm.MJCF else {}
+    soft = _linear_compliance(rig, model) if form.springs else {}
     says = _not_carried(model, tuple(soft)) if model.effects else ()
-    if form in OFFSETS:
+    if form.offsets:
         says = (_geometry_lost(model), *says)
     compliance = {int(e.where.removeprefix("joint").split(".")[0]): c for e, c in soft.values()}
     arm = identified_arm(
         rig, corrections(model), model.about.get("tool"), says, model.parameters, compliance, model.covariance
     )
     partial = path.with_name(path.name + ".partial")
-    partial.write_text(FORMS[form](arm), encoding="utf-8")
+    partial.write_text(form.text(arm), encoding="utf-8")
     partial.replace(path)
     return says
 
 
 def refuse_other_make(rig: Rig, form: ExportForm) -> None:
     """DataError for a form of a controller that this arm has not; a UR driver tells the make, too."""
-    wanted, robot = MAKES.get(form), rig.devices.robot
+    wanted, robot = form.make, rig.devices.robot
     made = rig.arm.make
     if made is None and robot is not None and robot.driver is RobotDriver.UR_RTDE:
         made = Make.UR
@@ -122,7 +139,7 @@ def refuse_other_make(rig: Rig, form: ExportForm) -> None:
         return
     state = "not stated" if made is None else f"'{made.value}'"
     raise DataError(
-        f"rig {rig.name}: {form.value} is for arms of make '{wanted.value}', and the make of this one is {state}; take "
+        f"rig {rig.name}: {form.name} is for arms of make '{wanted.value}', and the make of this one is {state}; take "
         f'another form, or state make = "{wanted.value}" under [arm] if it is one'
     )
 
@@ -130,8 +147,8 @@ def refuse_other_make(rig: Rig, form: ExportForm) -> None:
 def _refuse_coupled(rig: Rig, form: ExportForm) -> None:
     """DataError for an arm with a joint that follows another one, where the form cannot carry that."""
     followers = [i for i, joint in enumerate(rig.arm.joints, start=1) if joint.follows is not None]
-    if followers and form in UNCOUPLED:
-        raise DataError(f"rig {rig.name}: joint {followers[0]} follows another joint, and {UNCOUPLED[form]}")
+    if followers and form.uncoupled:
+        raise DataError(f"rig {rig.name}: joint {followers[0]} follows another joint, and {form.uncoupled}")
 
 
 def _linear_compliance(rig: Rig, model: ModelFile) -> dict[str, tuple[Effect, float]]:

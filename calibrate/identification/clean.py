@@ -1,6 +1,8 @@
 """Bad rows are found against a fit that they cannot pull, named, and left out before anything is averaged."""
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +13,8 @@ from calibrate.blunders.shots import outlying
 from calibrate.errors import DataError
 from calibrate.identification.rounds import distances, wary_fit
 from calibrate.identification.session import columns_of, shots_of
+from calibrate.joint_problem import JointProblem
+from calibrate.parameters import priors
 from calibrate.sensors.catalogue import kind_of
 from calibrate.weighting import Measured, Weighting
 
@@ -18,6 +22,7 @@ Floats = NDArray[np.float64]
 
 FEWEST_ROWS = 12  # of an instrument: below, nobody can say which row is the odd one
 PASSES = 3  # bad rows can hide behind worse ones
+UNSEEN = 1e-9  # of the largest singular value, columns scaled: the data do not see it
 MOST_BAD = 0.4  # of the rows: beyond, the question is which of two sessions is the right one
 
 
@@ -61,21 +66,44 @@ def _found(weighting: Weighting, theta: Floats) -> list[Blunder]:
     for index, (measured, distance) in enumerate(every):
         if measured.problem.rows < FEWEST_ROWS:
             continue
+        met = _met_exactly(problem, index, theta, measured)
         own = problem.of_block(index, theta)
         shots = shots_of(measured, own)
         if shots is None:
-            out += _bad_pairs(measured, distance, np.linalg.norm(measured.problem.misfit(own), axis=1))
+            out += _bad_pairs(measured, distance, met, np.linalg.norm(measured.problem.misfit(own), axis=1))
             continue
+        shots = replace(shots, met=met)
         blocks = kind_of(measured.name).blocks(shots)
         inside = {row for b in blocks for row in b.rows}
         out += [*blocks, *(b for b in bad_rows(shots) if b.rows[0] not in inside)]
     return out
 
 
-def _bad_pairs(measured: Measured, distance: Floats, away_m: Floats) -> list[Blunder]:
+def _met_exactly(problem: JointProblem, index: int, theta: Floats, measured: Measured) -> int:
+    """How many rows of a block the fit can meet exactly, where these are half of them; otherwise 0.
+
+    A fit that lets rows go meets as many observations exactly as it has effective parameters there, the trace of the
+    hat matrix. Where that is half of the block, the median distance is no longer one of noise.
+    Source: Rousseeuw, Leroy, Robust Regression and Outlier Detection, 1987, section 3.4 (the exact fit property).
+    """
+    free = np.flatnonzero([p.free for p in problem.parameters])
+    own = problem.jacobian_of(index, theta)[:, free]
+    if len(own) >= 2 * len(free):
+        return 0
+    others = (problem.jacobian_of(i, theta)[:, free] for i in range(len(problem.blocks)) if i != index)
+    every = np.concatenate([own, *others, np.diag(1.0 / priors(problem.parameters)[free])])
+    scale = np.maximum(np.linalg.norm(every, axis=0), np.finfo(float).tiny)
+    U, s, _ = np.linalg.svd(every / scale, full_matrices=False)
+    effective = float(np.sum(U[: len(own), s > UNSEEN * s[0]] ** 2))
+    rows = measured.problem.rows
+    met = min(math.ceil(effective * rows / len(own)), rows - 1)
+    return met if 2 * met >= rows else 0
+
+
+def _bad_pairs(measured: Measured, distance: Floats, met: int, away_m: Floats) -> list[Blunder]:
     """Pairs of rows, of which nobody can say which one is wrong; (row,) whitened and plain misfit."""
     out: list[Blunder] = []
-    for i in np.flatnonzero(outlying(distance, measured.problem.observed.shape[1])):
+    for i in np.flatnonzero(outlying(distance, measured.problem.observed.shape[1], met)):
         rows = tuple(sorted(int(r) for r in measured.sample_rows[i]))
         what = f"{measured.name} {1e3 * away_m[i]:.3g} mm away from what all other rows predict"
         remedy = "take both again, or remove them"

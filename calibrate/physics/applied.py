@@ -7,10 +7,11 @@ conditions of its own samples, and new rows are appended to them when an effect 
 Readings of a model's own recording less what its effects add are what a fit of geometry alone needs.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 
 from acquisition.recording import Samples
@@ -18,6 +19,8 @@ from acquisition.recording.samples import SEAT, required
 from calibrate.diagnose.augmented import encoder_channels
 from calibrate.diagnose.ported import look
 from calibrate.effects.drivers import Drivers, moves_of, temperatures_of
+from calibrate.effects.loads import UNSTATED_CENTRE_M
+from calibrate.effects.payload_compliance import UNKNOWN_CENTRE
 from calibrate.effects.ports import Perturbation, Port
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
@@ -39,6 +42,7 @@ BY_JOINT = {
 OF_POSE = ("q", "spot", "incidence", "first_psd", "reading")  # what joints and the instrument's place say
 BY_WEIGHT = ("gravity_torque", "overturning_moment", "payload")
 PAYLOAD = ("payload_kg", "payload_com_x_m", "payload_com_y_m", "payload_com_z_m")
+CENTRE = PAYLOAD[1:]
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,9 +170,12 @@ class Applied:
     notes: tuple[str, ...]
 
 
-def effects_at(model: ModelFile, predictor: Predictor, samples: Samples, same_session: bool) -> Applied:
+def effects_at(
+    model: ModelFile, predictor: Predictor, samples: Samples, same_session: bool, *, doubts_too: bool = True
+) -> Applied:
     """`same_session`: the rows are of the recording that the effects were found in, whose clock they share. Elsewhere
-    what slips and bumps have left behind at its end is applied.
+    what slips and bumps have left behind at its end is applied. Without `doubts_too` only what the effects add is found
+    and not what is unknown of it.
 
     DataError for rows at which an effect of the model cannot be evaluated.
     """
@@ -176,7 +183,8 @@ def effects_at(model: ModelFile, predictor: Predictor, samples: Samples, same_se
     nothing = Perturbation.none(len(samples), samples.n_joints)
     if model.session is None or not used:
         return Applied(nothing, (), (), ("",) * len(samples), notes)
-    recorded = recorded_samples(model, samples.n_joints)
+    recorded, of_load = _with_payload(recorded_samples(model, samples.n_joints), samples, used)
+    notes = (*notes, *of_load)
     carried = listed(used, drivers_under(predictor, recorded, Perturbation.none(len(recorded), samples.n_joints)))
     needs = needed_columns((d for c in carried for d in c.drivers), recorded.names)
     filled = completed(samples, recorded, needs, same_session)
@@ -187,12 +195,20 @@ def effects_at(model: ModelFile, predictor: Predictor, samples: Samples, same_se
     by = nothing
     for one in found:
         by = by.plus(one.port, one.amount)
+    if not doubts_too:
+        return Applied(by, found, (), ("",) * len(samples), notes)
     doubts = [*_of_range(found), *((one.port, one.undated) for one in found if np.any(one.undated))]
     notes = (*notes, *(_between(one) for one in found if np.any(one.undated)))
     for name, rows in filled.missing.items():
+        if name in CENTRE:
+            continue  # _of_centres, which also knows rows of a session that did not record it
         felt = _of_missing(name, rows, carried, found, predictor, recorded, filled)
         doubts += [(one.port, off) for one, off in felt]
         notes = (*notes, *_lacks(name, rows, [one.carried.record.name for one, _ in felt]))
+    if not same_session:  # the fit has seen what the loads of its own rows do
+        for what, name, felt in _of_centres(samples, filled, carried, predictor, recorded):
+            doubts += felt
+            notes = (*notes, f"{what}, sigma widened by {UNSTATED_CENTRE_M:g} m along each axis ({name})")
     outside = _outside(carried, found, predictor, both, len(recorded))
     return Applied(by, found, tuple(doubts), outside, notes)
 
@@ -225,6 +241,96 @@ def _used(effects: Sequence[Effect], same_session: bool) -> tuple[list[Effect], 
         for e in effects
         if e.holds != "always"
     )
+
+
+def by_weight(depends_on: Iterable[str]) -> bool:
+    """Whether one of these drivers is a weight."""
+    return any(name.rstrip("0123456789") in BY_WEIGHT for name in depends_on)
+
+
+def conditions_of_effects(model: ModelFile) -> frozenset[str]:
+    """Columns that a prediction with this model can use; the payload, wherever something yields to weight."""
+    weighs = any(by_weight(effect.depends_on.split(",")) for effect in model.effects)
+    return frozenset(model.needs) | (frozenset(PAYLOAD) if weighs else frozenset())
+
+
+def _with_payload(recorded: Samples, asked: Samples, effects: Sequence[Effect]) -> tuple[Samples, tuple[str, ...]]:
+    """The session's rows with the columns of a payload that the rows asked for state and the session did not record.
+
+    Without a payload in the session they are nought there, and nothing else changes; sentences on what was assumed.
+    """
+    load_kg, columns = _payload_kg(asked), dict(recorded.columns)
+    if not load_kg.any() or not any(by_weight(effect.depends_on.split(",")) for effect in effects):
+        return recorded, ()
+    notes: tuple[str, ...] = ()
+    if PAYLOAD[0] not in recorded:
+        columns[PAYLOAD[0]] = np.zeros(len(recorded))
+        notes = ("payload_kg was not recorded in the session of the model: taken as 0 kg there; record it, 0 too",)
+    lacking = [name for name in CENTRE if name not in recorded]
+    if lacking and any(name in asked for name in CENTRE):
+        if columns[PAYLOAD[0]].any():
+            notes = (*notes, f"{', '.join(CENTRE)} are not used: the session of the model carried a payload and did "
+                     "not record where; record them, and diagnose again")  # fmt: skip
+        else:
+            columns |= {name: np.zeros(len(recorded)) for name in CENTRE}
+    return Samples(columns, recorded.n_joints), notes
+
+
+def _payload_kg(samples: Samples) -> Floats:
+    """(row,), 0 where none is stated."""
+    return np.nan_to_num(samples.column(PAYLOAD[0])) if PAYLOAD[0] in samples else np.zeros(len(samples))
+
+
+def _of_centres(
+    asked: Samples, filled: Completed, carried: Sequence[Carried], predictor: Predictor, recorded: Samples
+) -> Iterator[tuple[str, str, list[tuple[Port, Floats]]]]:
+    """Loads at the flange whose centre of mass nobody states: a sentence, the effects, and one sigma at their ports.
+
+    An effect that found the payload's first moment itself has it among its coefficients.
+    """
+    weighed = [c for c in carried if by_weight(c.drivers) and c.record.variant != UNKNOWN_CENTRE]
+    if not weighed:
+        return
+    zero = {name: np.zeros(len(recorded)) for name in CENTRE if name not in recorded}
+    old = Samples({**recorded.columns, **zero}, recorded.n_joints)
+    at = {name: filled.samples.columns.get(name, np.zeros(len(asked))) for name in CENTRE}
+    if zero:
+        at = {name: np.zeros(len(asked)) for name in CENTRE}  # the session did not record it: not used
+
+    def added(by: Predictor, centre: Mapping[str, Floats]) -> list[Floats]:
+        new = Samples({**filled.samples.columns, **centre}, recorded.n_joints)
+        return [one.amount for one in acting(weighed, by, old, joined(old, new))]
+
+    plain = added(predictor, at)
+
+    def felt(others: Iterable[list[Floats]]) -> tuple[str, list[tuple[Port, Floats]]]:
+        each = [(c, b - a) for other in others for c, a, b in zip(weighed, plain, other, strict=True)]
+        some = [(c, shift) for c, shift in each if np.any(shift)]
+        names = ", ".join(dict.fromkeys(c.record.name for c, _ in some))
+        return names, [(c.accepted.term.port, shift) for c, shift in some]
+
+    stated = np.all(
+        [np.isfinite(asked.column(c)) if c in asked else np.zeros(len(asked), bool) for c in CENTRE], axis=0
+    )
+    carries = _payload_kg(filled.samples) != 0.0
+    rows = carries & (~stated | bool(zero))
+    if rows.any():
+        off = np.where(rows, UNSTATED_CENTRE_M, 0.0)
+        names, doubts = felt([added(predictor, {**at, name: at[name] + off}) for name in CENTRE])
+        where = "at the flange" if zero or not np.any(list(at.values())) else "where it was in the session"
+        if doubts:
+            yield (
+                f"{', '.join(CENTRE)} are missing in {int(rows.sum())} of {int(carries.sum())} rows with a payload "
+                f"(state them, and record them in the session): centre of mass taken {where}", names, doubts,
+            )  # fmt: skip
+    tool = predictor.rig.tool
+    if tool.mass_kg and tool.com_m is None:
+        turned = (tuple((UNSTATED_CENTRE_M * axis).tolist()) for axis in np.eye(3))
+        rigs = (structs.replace(predictor.rig, tool=structs.replace(tool, com_m=com)) for com in turned)
+        names, doubts = felt([added(replace(predictor, rig=rig), at) for rig in rigs])
+        if doubts:
+            says = f"rig {predictor.rig.name}: [tool] com_m is not stated (state it): centre of mass of its"
+            yield f"{says} {tool.mass_kg:g} kg taken at the flange", names, doubts
 
 
 def _at_the_end(filled: Completed, last_t_s: float) -> Completed:
@@ -314,7 +420,7 @@ def without_effects(weighting: Weighting, theta: Floats, samples: Samples, model
     if not model.effects:
         return weighting
     predictor = Predictor.of(model)
-    by, q = effects_at(model, predictor, samples, same_session=True).by, samples.joints()
+    by, q = effects_at(model, predictor, samples, same_session=True, doubts_too=False).by, samples.joints()
     arm, nothing = arm_in(predictor), Perturbation.none(len(samples), samples.n_joints)
     plain, moved = (flange_frames(arm, predictor, q, one) for one in (nothing, by))
 

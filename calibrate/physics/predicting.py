@@ -223,9 +223,11 @@ class Placed:
 
 
 def flange_with_physics(model: ModelFile, samples: Samples) -> tuple[Floats, Applied]:
-    """(row, 4, 4) with the effects of the model beyond their session, and what these are there. DataError as above."""
+    """(row, 4, 4) with the effects of the model beyond their session, and what these are there, without what is unknown
+    of them. DataError as above.
+    """
     predictor = Predictor.of(model)
-    applied = effects_at(model, predictor, samples, same_session=False)
+    applied = effects_at(model, predictor, samples, same_session=False, doubts_too=False)
     return _flange(predictor, applied, samples.joints())(predictor, applied.by), applied
 
 

@@ -8,6 +8,7 @@ joint's angle act on this instrument directly (calibrate/effects/ports.py, Pertu
 Mean and spread of angles that wrap: Mardia, Jupp, Directional Statistics, 2000, section 2.2.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,6 +32,7 @@ SOURCE = "encoder"  # of noise
 BELIEVED_RAD = 5e-6  # a count of 20 bits a turn is 6 µrad; the data correct it
 FOLLOWS_RAD = 0.05  # what no drive and no disc does: the readings are then not of one joint, or not in joint angles
 FEWEST = 10  # rows of a joint, for a zero and a scatter
+LISTED = 5  # rows of a sentence
 PLAUSIBLE_RAD = 1e-3  # by which a zero may lie off the middle of the differences
 
 
@@ -114,7 +116,32 @@ def not_following(samples: Samples) -> tuple[str, ...]:
 
 
 def _unused(samples: Samples) -> tuple[str, ...]:
+    """Columns that are not used at all, then rows that are not, joint by joint."""
     names = per_joint("enc", "_rad", samples.n_joints)
+    return (*_rows_unused(samples), *_columns_unused(samples, names))
+
+
+def _rows_unused(samples: Samples) -> Iterator[str]:
+    """A sentence for each encoder because of which rows of all second encoders are left out."""
+    if (found := differences(samples)) is None:
+        return
+    away = np.abs(found.difference_rad - found.zero_rad)[:, [joint - 1 for joint in found.used]]
+    blank = np.isnan(away) & np.isfinite(away).any(axis=1, keepdims=True)  # where none answered, nothing is left out
+    off = np.nan_to_num(away) >= FOLLOWS_RAD
+    for k, joint in enumerate(found.used):
+        for rows, why in (
+            (np.flatnonzero(off[:, k]), f"is more than {FOLLOWS_RAD:g} rad off its usual difference from the joint"),
+            (np.flatnonzero(blank[:, k]), "holds no number"),
+        ):
+            if len(rows):
+                listed = ", ".join(str(row + 1) for row in rows[:LISTED].tolist()) + " ..." * (len(rows) > LISTED)
+                yield (
+                    f"enc{joint}_rad {why} in {len(rows)} of {len(away)} rows ({listed}): no second encoder is used "
+                    "in these rows; correct the cells, or remove the column"
+                )
+
+
+def _columns_unused(samples: Samples, names: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(
         f"{name} does not follow joint {names.index(name) + 1} and is not used: its readings differ from "
         f"q{names.index(name) + 1}_rad by more than {FOLLOWS_RAD:g} rad; put it in the column of the joint that it "

@@ -66,17 +66,19 @@ class Truth(msgspec.Struct, frozen=True):
 
 
 class Given(msgspec.Struct, frozen=True):
-    """A rig that is given in numbers, instead of drawn: what a calibration found.
+    """A rig that is given in numbers, instead of drawn: what a calibration found. What it does not hold is drawn.
 
     T_base_flange(q) = F0 Rz(q1 + zero1) F1 ... Rz(qn + zeron) Fn with the `parts` F.
     """
 
     parts: tuple[Pose, ...]
     joint_zero_rad: tuple[float, ...]
-    laser_origin_m: Vector
-    laser_direction: Vector
-    placements: tuple[TruePlacement, ...]
-    psd2_in_psd1: Pose
+    laser_origin_m: Vector | None = None
+    laser_direction: Vector | None = None
+    placements: tuple[TruePlacement, ...] = ()
+    psd2_in_psd1: Pose | None = None
+    target_m: Vector | None = None
+    device: Pose | None = None
     rest_degC: dict[str, float] = {}  # by place: the temperature at which it is so
 
 
@@ -88,14 +90,19 @@ def given_truth(rig: WorldRig, seed: int, given: Given) -> Truth:
     missing = {place.id for place in drawn.placements} - {place.id for place in given.placements}
     if missing:
         raise WorldError(f"place {min(missing)} of the rig file is not among the given ones; give all of them")
+    instruments = {
+        "laser_origin_m": given.laser_origin_m,
+        "laser_direction": given.laser_direction,
+        "psd2_in_psd1": given.psd2_in_psd1,
+        "target_m": given.target_m,
+        "device": given.device,
+    }
     return msgspec.structs.replace(
         drawn,
         joint_zero_rad=given.joint_zero_rad,
-        laser_origin_m=given.laser_origin_m,
-        laser_direction=given.laser_direction,
         placements=given.placements,
         parts=given.parts,
-        psd2_in_psd1=given.psd2_in_psd1,
+        **{name: value for name, value in instruments.items() if value is not None},
     )
 
 

@@ -1,19 +1,29 @@
 """The package of the documentation, installed into a temporary folder: its device and its effect, no edit of ours."""
 
+import csv
 import importlib
+import json
 import os
-import shutil
 import subprocess
 import sys
-import tomllib
+import zipfile
 from pathlib import Path
+from typing import get_args
 
+import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from acquisition.recording import Samples
 from acquisition.recording.rig import parse_rig, rig_text
+from acquisition.recording.session_folder import write_csv
 from calibeam.devices.check import check_devices
 from calibeam.devices.others import DeviceKind, emulated_others, other_drivers
+from calibrate.arms.rig_arm import RigArm
 from calibrate.effects.kind import Kind
+from calibrate.errors import DataError
+from calibrate.export.export import FORMS, FormName, form_named
+from calibrate.model_file import read_model
 from calibrate.plug_ins import DEVICES, EFFECTS, loaded, plug_ins
 from drivers.clock import SystemClock
 from drivers.errors import DeviceRefused
@@ -53,13 +63,34 @@ def install(folder: Path, project: dict, entries: dict[str, dict[str, str]]) -> 
     importlib.invalidate_caches()
 
 
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of the package, as its own pyproject.toml has it built."""
+    folder = tmp_path_factory.mktemp("wheel")
+    build = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "--no-index"]
+    subprocess.run([*build, "-w", str(folder), str(PACKAGE)], check=True)
+    (made,) = folder.glob("*.whl")
+    return made
+
+
 @pytest.fixture
-def installed(site_packages: Path) -> Path:
-    for module in (*PACKAGE.glob("*.py"), ROOT / "docs" / "examples" / "balancer_pull.py"):
-        shutil.copy(module, site_packages)
-    project = tomllib.loads((PACKAGE / "pyproject.toml").read_text())["project"]
-    install(site_packages, project, project["entry-points"])
+def installed(site_packages: Path, wheel: Path) -> Path:
+    zipfile.ZipFile(wheel).extractall(site_packages)
+    importlib.invalidate_caches()
     return site_packages
+
+
+def in_a_fresh_interpreter(installed: Path, says: str, *words: str) -> str:
+    """Standard output of a program in a Python that finds the package; nothing may stand on standard error."""
+    out = subprocess.run(
+        [sys.executable, "-c", says, *words],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join((str(installed), str(ROOT)))},
+    )
+    assert (out.returncode, out.stderr) == (0, "")
+    return out.stdout
 
 
 class World:
@@ -91,16 +122,105 @@ def test_its_driver_reads_its_emulator(installed: Path) -> None:
 
 def test_its_effect_is_in_the_catalogue_of_a_fresh_interpreter(installed: Path) -> None:
     says = "from calibrate.effects.catalogue import EFFECTS; print(EFFECTS[-1].physics)"
-    paths = os.pathsep.join((str(installed), str(ROOT)))
-    out = subprocess.run(
-        [sys.executable, "-c", says],
-        capture_output=True,
-        text=True,
-        check=True,
-        env={**os.environ, "PYTHONPATH": paths},
-    )
-    assert out.stdout.strip() == "balancer-pull"
-    assert out.stderr == ""
+    assert in_a_fresh_interpreter(installed, says).strip() == "balancer-pull"
+
+
+LAB = (ROOT / "docs" / "examples" / "lab" / "rig.toml").read_text()
+LONGER_M = 4e-4  # of link 2, against the drawing
+COMMANDS = """
+import sys
+from calibeam.cli import run
+folder = sys.argv[1]
+assert run(["identify", f"{folder}/session", "--out", f"{folder}/model.json", "--export", "pykdl"]) == 0
+samples, predicted = f"{folder}/session/samples.csv", f"{folder}/predicted.csv"
+assert run(["predict", f"{folder}/model.json", samples, "--out", predicted]) == 0
+assert run(["export-model", f"{folder}/model.json", "--to", "pykdl", "--out", f"{folder}/arm.py"]) == 0
+"""
+
+
+@pytest.fixture
+def exported(installed: Path, tmp_path: Path) -> Path:
+    """A folder with a session of heights over a tilted plate, and what the commands made of it."""
+    rng = np.random.default_rng(3)
+    q_rad = rng.uniform(-1.5, 1.5, (150, 6))
+    true = RigArm.of_rig(parse_rig(LAB.replace("a_m = -0.425", f"a_m = {-0.425 - LONGER_M}"), "rig.toml"))
+    normal = Rotation.from_rotvec([0.01, -0.02, 0.0]).apply([0.0, 0.0, 1.0])
+    height_m = 0.7 + true.tip_m(q_rad) @ normal + rng.normal(0.0, 5e-6, len(q_rad))
+    columns = {"t_s": np.arange(150.0)} | {f"q{j + 1}_rad": angle for j, angle in enumerate(q_rad.T)}
+    folder = tmp_path / "lab"
+    (folder / "session").mkdir(parents=True)
+    (folder / "session" / "rig.toml").write_text(LAB, encoding="utf-8")
+    write_csv(Samples(columns | {"height_m": height_m}, 6), folder / "session" / "samples.csv")
+    in_a_fresh_interpreter(installed, COMMANDS, str(folder))
+    return folder
+
+
+def test_its_sensor_identifies_an_arm_and_its_readings_are_predicted(exported: Path) -> None:
+    model = json.loads((exported / "model.json").read_text())
+    assert model["instruments"] == ["height"]
+    length = next(p for p in model["parameters"] if p["name"] == "link2.length")
+    assert length["value"] == pytest.approx(-LONGER_M, abs=4.0 * length["sigma"])
+    assert length["sigma"] < 5e-5
+    with (exported / "predicted.csv").open() as file:
+        left_m = [float(row["r_height_m"]) for row in csv.DictReader(file)]
+    assert np.sqrt(np.mean(np.square(left_m))) < 6e-6
+
+
+class Kdl:
+    """What the exported module uses of PyKDL, on plain matrices; the end of the chain at joint angles."""
+
+    class Joint(str):
+        Fixed, RotZ = "fixed", "rot-z"
+
+    def __init__(self) -> None:
+        self.segments: list[tuple[str, np.ndarray]] = []
+        self.Chain, self.addSegment = (lambda: self), self.segments.append
+
+    def Rotation(self, *numbers: float) -> np.ndarray:
+        return np.reshape(numbers, (3, 3))
+
+    def Vector(self, *numbers: float) -> np.ndarray:
+        return np.array(numbers)
+
+    def Frame(self, rotation: np.ndarray, origin: np.ndarray) -> np.ndarray:
+        return np.block([[rotation, origin[:, None]], [np.zeros((1, 3)), np.ones((1, 1))]])
+
+    def Segment(self, joint: str, frame: np.ndarray) -> tuple[str, np.ndarray]:
+        return joint, frame
+
+    def end(self, q_rad: np.ndarray) -> np.ndarray:
+        T, angles = np.eye(4), iter(q_rad)
+        for joint, frame in self.segments:
+            if joint == self.Joint.RotZ:
+                T[:3, :3] = T[:3, :3] @ Rotation.from_rotvec([0.0, 0.0, next(angles)]).as_matrix()
+            T = T @ frame
+        return T
+
+
+def test_its_export_form_writes_the_identified_arm(exported: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (exported / "arm.py").read_text()
+    assert text == (exported / "model.kdl.py").read_text()
+    kdl = Kdl()
+    monkeypatch.setitem(sys.modules, "PyKDL", kdl)
+    exec(compile(text, "arm.py", "exec"), {})
+    q_rad = np.random.default_rng(5).uniform(-2.0, 2.0, (20, 6))
+    chain = json.loads((exported / "model.json").read_text())["chain"]
+    arm = RigArm.of_rig(parse_rig(LAB, "rig.toml"), chain)
+    np.testing.assert_allclose([kdl.end(q) for q in q_rad], arm.frames(q_rad)[:, -1], atol=1e-12)
+
+
+def test_a_model_of_a_sensor_that_is_not_installed_is_refused_with_the_name(exported: Path) -> None:
+    with pytest.raises(DataError, match="no sensor is called 'height' here; install what brings it"):
+        read_model(exported / "model.json")
+
+
+def test_a_form_that_nobody_brings_is_named_with_those_there_are(site_packages: Path) -> None:
+    with pytest.raises(DataError, match=r"no form of export is called 'pykdl'; there are urdf, .*table; install"):
+        form_named("pykdl")
+
+
+def test_the_words_of_the_command_line_are_those_of_the_forms() -> None:
+    assert get_args(FormName) == tuple(form.name for form in FORMS)
 
 
 @pytest.mark.parametrize(

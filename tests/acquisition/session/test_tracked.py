@@ -1,5 +1,6 @@
 """Sessions with a tracker in process: what a row holds, what is skipped, wrong units, a clock that goes back."""
 
+import threading
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -8,11 +9,12 @@ import pytest
 
 from acquisition.errors import AcquisitionError, RefusedMotionError
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
+from acquisition.session.control import RunControl, RunEvent, RunState
 from acquisition.session.tracked import TrackedOptions, TrackedSession
 from acquisition.wires.bench import Speeds
 from acquisition.wires.tracker_bench import TargetLook, TrackerBench, TrackerPumps
 from drivers.device import Block
-from drivers.errors import DeviceStale
+from drivers.errors import DeviceLost, DeviceStale
 
 HOME = np.zeros(2)
 LOOK = TargetLook(0.0, 0.0, HOME, HOME, HOME, None, np.zeros(3), np.full(3, 1e-6), 10, {"hall": 21.0}, settled=True)
@@ -76,7 +78,7 @@ def test_rows_have_the_columns_of_an_imported_table() -> None:
 def test_what_cannot_be_reached_or_seen_is_skipped_with_its_reason() -> None:
     summary, journal = taken(Bench(), PlannedPose((2.5, 0.0)), PlannedPose((1.99, 0.0), (-1, 0)))
     assert (len(summary.samples), summary.skipped) == (1, 1)
-    assert journal.events == [("skipped", {"why": "beyond its range"})]
+    assert journal.events == [("skipped", {"pose": 1, "why": "beyond its range"}), ("sample", {"pose": 2})]
     assert journal.rows[0]["approach1"] == 1  # from its other side it would have been beyond the range
     hidden = Bench()
     hidden.hidden = True
@@ -151,3 +153,51 @@ def test_a_clock_that_went_back_is_told() -> None:
     device_s = np.concatenate([86390.0 + 0.01 * np.arange(10), 0.01 * np.arange(900)])
     with pytest.raises(DeviceStale, match="its time does not go on, or went back"):
         bench_of(Readings(device_s, ringing(910))).look(0.2)
+
+
+class Stopped(Bench):
+    """Told to stop on its way to 1 rad; in the pause a person moves it to 0.5 rad."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.control = RunControl(lambda: None)
+        self.trouble = iter((True,))
+
+    def move(self, q_rad: np.ndarray) -> None:
+        if q_rad[0] == 1.0 and next(self.trouble, False):
+            self.at = np.array([0.5, 0.5])
+            self.control.tell(RunEvent.BREAK)
+            threading.Timer(0.05, self.control.resume).start()  # a person, once the arm stands
+            raise DeviceLost("the motion was broken off")
+        super().move(q_rad)
+
+
+def test_a_pose_that_a_pause_broke_off_is_taken_again_and_its_side_is_that_of_the_last_way() -> None:
+    bench, journal = Stopped(), Journal()
+    session = TrackedSession(bench, journal, TrackedOptions(), HOME, nominal_m, control=bench.control)
+    poses = (PlannedPose((1.5, 0.5)), PlannedPose((1.0, -0.5)), PlannedPose((0.2, -0.5)))
+    summary = session.run(PosePlan(1, "rig", (PlannedBlock(poses),)))
+    assert [row["q1_rad"] for row in journal.rows] == [1.5, 1.0, 0.2]
+    assert [row["approach1"] for row in journal.rows] == [1, 1, -1]
+    assert (len(summary.samples), summary.skipped) == (3, 0)
+    assert bench.control.state is RunState.DONE
+
+
+def test_poses_of_before_are_left_out_and_the_others_keep_their_numbers() -> None:
+    bench, journal = Bench(), Journal()
+    session = TrackedSession(bench, journal, TrackedOptions(), HOME, nominal_m, done={1, 3})
+    poses = tuple(PlannedPose((0.1 * k, 0.3)) for k in range(1, 5))
+    session.run(PosePlan(1, "rig", (PlannedBlock(poses),)))
+    assert [row["q1_rad"] for row in journal.rows] == pytest.approx([0.2, 0.4])
+    assert [detail["pose"] for kind, detail in journal.events if kind == "sample"] == [2, 4]
+
+
+def test_a_session_that_a_person_ends_is_no_failure() -> None:
+    bench, journal = Bench(), Journal()
+    control = RunControl(bench.stop)
+    session = TrackedSession(
+        bench, journal, TrackedOptions(), HOME, nominal_m, control=control, tell=lambda done, total: control.stop()
+    )
+    summary = session.run(PosePlan(1, "rig", (PlannedBlock((PlannedPose((0.1, 0.3)), PlannedPose((0.2, 0.3)))),)))
+    assert len(summary.samples) == 1
+    assert journal.events[-1] == ("ended by a person", {"samples": 1})

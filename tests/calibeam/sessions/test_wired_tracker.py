@@ -1,5 +1,7 @@
 """A tracker over real wires: a session is recorded and identified, and every way in which it can end early."""
 
+import os
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +16,14 @@ from calibeam.devices.site import connected_tracker, tracker_addresses_of
 from calibeam.emulation import Emulation
 from calibeam.outcome import PartialResult
 from calibeam.printing.progress import progress_bar
-from calibeam.sessions.with_tracker import drawn_plan, nominal_target, record_tracked
+from calibeam.sessions.with_tracker import (
+    TakenBefore,
+    TrackedJob,
+    drawn_plan,
+    nominal_target,
+    record_tracked,
+    taken_before,
+)
 from drivers.clock import SystemClock
 from simulators.world.truth import read_truth
 
@@ -23,12 +32,15 @@ RIG = load_rig(RIG_FILE)
 PACE = 8.0
 PLAN = drawn_plan(RIG, 4, 1)
 OPTIONS = TrackedOptions(dwell_s=0.2)
+BEGINS = TakenBefore(PLAN, {"plan_seed": "1", "plan_poses": "4"})
 
 
-def session(tmp_path: Path, emulation: Emulation, after: int = 0, trouble=lambda: None):
+def session(tmp_path: Path, emulation: Emulation, after: int = 0, trouble=lambda: None, before=BEGINS, name="r.mcap"):
     clock, count, quiet, rig = SystemClock(), [0], Console(quiet=True), RIG
     with (
-        RecordingWriter(tmp_path / "r.mcap", rig_text=rig_text(RIG_FILE), software="test", clock=clock) as writer,
+        RecordingWriter(
+            tmp_path / name, rig_text=rig_text(RIG_FILE), software="test", clock=clock, notes=before.notes
+        ) as writer,
         connected_tracker(rig, tracker_addresses_of(rig, emulation.address, PACE), writer, clock) as bench,
     ):
         plain = writer.sample
@@ -40,7 +52,7 @@ def session(tmp_path: Path, emulation: Emulation, after: int = 0, trouble=lambda
                 trouble()
 
         writer.sample = counted
-        return record_tracked(bench, rig, writer, PLAN, clock, progress_bar(quiet), OPTIONS)
+        return record_tracked(bench, rig, writer, before, clock, progress_bar(quiet), OPTIONS)
 
 
 def test_a_session_has_the_positions_that_are_true(tmp_path: Path) -> None:
@@ -80,3 +92,37 @@ def test_a_closed_connection_is_told(tmp_path: Path) -> None:
     with Emulation(RIG_FILE, seed=5, time_scale=PACE) as emulation, pytest.raises(PartialResult, match=says):
         session(tmp_path, emulation, 1, lambda: emulation.inject("tracker", "disconnect", count=1))
     assert len(read(tmp_path / "r.mcap").samples) == 1
+
+
+def test_paused_by_one_interrupt_ended_by_three_and_gone_on_with(tmp_path: Path, monkeypatch) -> None:
+    """The pause ends by SIGCONT, for there is no keyboard; what is left is taken into a further recording."""
+    states: list[str] = []
+
+    def heard(kind: str, detail: dict) -> None:
+        if kind == "run state":
+            states.append(detail["state"])
+            if detail["state"] == "paused, the arm stands" and len(states) < 4:
+                os.kill(os.getpid(), signal.SIGCONT)
+
+    plain = RecordingWriter.event
+    monkeypatch.setattr(RecordingWriter, "event", lambda w, e: (plain(w, e), heard(e.kind, e.detail))[0])
+    interrupts = [1, 3]
+
+    def interrupt() -> None:
+        for _ in range(interrupts.pop(0)):
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with Emulation(RIG_FILE, seed=5, time_scale=PACE) as emulation:
+        whole = session(tmp_path, emulation, 1, interrupt, name="paused.mcap")
+        assert states[:3] == ["measuring", "paused, the arm stands", "measuring"]
+        assert len(whole.samples) == 6
+        with pytest.raises(PartialResult, match=r"the session was aborted.*to go on, give the same command with --con"):
+            session(tmp_path, emulation, 2, interrupt, name="recording.mcap")
+        job = TrackedJob(RIG, rig_text(RIG_FILE), tmp_path, None, seed=9, go_on=True)
+        before = taken_before(job)
+        assert (before.plan, before.done) == (PLAN, frozenset({1, 2}))
+        rest = session(tmp_path, emulation, before=before, name="recording-0002.mcap")
+    assert len(rest.samples) == 4
+    assert taken_before(job).left == 0
+    twice, once = (read(tmp_path / name).samples.joints() for name in ("paused.mcap", "recording-0002.mcap"))
+    np.testing.assert_allclose(once, twice[2:], atol=1e-4)

@@ -60,10 +60,37 @@ def test_an_emulated_session_is_another_one() -> None:
     assert notes == ("left out, true of its own session only: joint3-encoder-slip",)
 
 
-def test_a_model_without_light_cannot_be_emulated() -> None:
+TRACKED = Path("rigs/ur5e-tracker.toml")
+FOUND = {"joint2.zero": 2e-3, "link2.length": 4e-4, "tool.x": 1.5e-3, "device.x": 3e-3, "device.yaw": 2e-3}
+
+
+def test_an_emulated_tracker_stands_where_the_model_has_it_and_sees_its_target() -> None:
+    text = TRACKED.read_text(encoding="utf-8")
+    rig, plain = parse_rig(text, str(TRACKED)), tomllib.loads(text)
+    identity = RigIdentity(rig.name, "", text)
+    base = structs.replace(model_of(bench("tracker")), rig=identity, arm_model="dh", about={}, session=None, effects=())
+    model = structs.replace(base, chain=FOUND)
+    given, mechanisms, notes = emulated(model, rig)
+    assert (mechanisms, notes) == ((), ())
+    world = World.from_rig({**plain, "emulation": {}}, q_rad=plain["motion"]["home_rad"], given=given)
+    predictor = Predictor.of(model)
+    T, tip_m = predictor.T_base_device, predictor.tip_at(predictor.flange(world.joints().q_rad[np.newaxis]))[0]
+    np.testing.assert_allclose(world.target_position_m(), T[:3, :3].T @ (tip_m - T[:3, 3]), atol=5e-6)
+    bare, _, _ = emulated(structs.replace(base, chain={}), rig)
+    drawn = World.from_rig({**plain, "emulation": {}}, q_rad=plain["motion"]["home_rad"], given=bare)
+    assert np.linalg.norm(world.target_position_m() - drawn.target_position_m()) > 2e-3
+
+
+def test_a_soft_joint_of_a_model_bends_the_arm_under_the_tracker() -> None:
     place = bench("tracker")
-    with pytest.raises(DataError, match="laser and a fixture"):
-        emulated(model_of(place), place.predictor.rig)
+    _, mechanisms, notes = emulated(model_of(place, SOFT), place.predictor.rig)
+    assert [type(one).KIND for one in mechanisms] == ["soft-joint"]
+    assert notes == ()
+
+
+def test_a_model_without_light_is_none_of_a_rig_with_a_laser() -> None:
+    with pytest.raises(DataError, match="has a laser and a fixture, the model has none"):
+        emulated(model_of(bench("tracker")), parse_rig(RIG.read_text(encoding="utf-8"), str(RIG)))
 
 
 def test_mechanisms_by_hand() -> None:

@@ -11,7 +11,7 @@ import pytest
 from acquisition.recording import Samples
 from acquisition.recording.rig import parse_rig
 from calibeam.cli import run
-from calibrate.export.export import ExportForm, export_model
+from calibrate.export.export import export_model, form_named
 from calibrate.export.mjcf import SPRING
 from calibrate.model_file import Covariance, ModelParameter, RigIdentity, write_model
 from calibrate.physics.predicting import flange_with_physics
@@ -82,7 +82,7 @@ def samples(q):
 
 def test_mujoco_stands_where_the_model_has_the_flange(tmp_path):
     known = model()
-    text, _ = exported(tmp_path, known, ExportForm.MJCF)
+    text, _ = exported(tmp_path, known, form_named("mjcf"))
     for q, T in zip(Q, flange_with_physics(known, samples(Q))[0], strict=True):
         np.testing.assert_allclose(mujoco_flange(text, q), T, atol=1e-9)
 
@@ -95,7 +95,7 @@ def test_mujoco_sags_as_the_model_does(tmp_path, joint, text):
     effect, session = soft(joint)
     rig = RigIdentity("irb120", "0" * 64, text)
     known = model(schema=2, effects=(effect,), session=session, covariance=Covariance((), ()), instruments=(), rig=rig)
-    text, lost = exported(tmp_path, known, ExportForm.MJCF)
+    text, lost = exported(tmp_path, known, form_named("mjcf"))
     assert f"carried: {effect.name}" in lost
     assert not [says for says in lost if says.startswith("not carried")]
     stiff = model(rig=rig)
@@ -105,12 +105,12 @@ def test_mujoco_sags_as_the_model_does(tmp_path, joint, text):
         sagged = mujoco_flange(text, q, [f"joint{joint}{SPRING}"])
         assert np.linalg.norm(sagged[:3, 3] - there_m) < 1e-9
     with pytest.raises(KeyError):
-        mujoco.MjModel.from_xml_string(exported(tmp_path, stiff, ExportForm.MJCF)[0]).joint(f"joint{joint}{SPRING}")
+        mujoco.MjModel.from_xml_string(exported(tmp_path, stiff, form_named("mjcf"))[0]).joint(f"joint{joint}{SPRING}")
 
 
 def test_what_a_spring_cannot_be_is_not_carried(tmp_path):
     known = two_joints()
-    text, lost = exported(tmp_path, known, ExportForm.MJCF)
+    text, lost = exported(tmp_path, known, form_named("mjcf"))
     assert "not carried: joint1-backlash: 250.0 µm rms, at most 250.0 µm" in lost
     assert SPRING not in text
 
@@ -134,7 +134,7 @@ def table_of(text):
 
 @pytest.mark.parametrize(("form", "make", "axis"), [("kuka-mastering", "kuka", "A"), ("fanuc-mastering", "fanuc", "J")])
 def test_offsets_are_degrees_in_the_robots_signs_and_only_what_is_known(tmp_path, form, make, axis):
-    text, lost = exported(tmp_path, of_make(make, parameters=PARAMETERS), ExportForm(form))
+    text, lost = exported(tmp_path, of_make(make, parameters=PARAMETERS), form_named(form))
     rows = table_of(text)
     assert [row["axis"] for row in rows] == [f"{axis}{j}" for j in range(1, 7)]
     given = {row["axis"]: float(row["offset_deg"]) for row in rows if row["offset_deg"]}
@@ -156,8 +156,8 @@ def test_offsets_alone_leave_what_lengths_and_axes_move_the_tip(tmp_path):
     """A model whose only errors are zeros loses nothing; one whose only errors are lengths gains nothing."""
     zeros = {name: v for name, v in CHAIN.items() if name.endswith(".zero")}
     lengths = {"link2.length": 8e-4}
-    (whole,) = exported(tmp_path, of_make("kuka", chain=zeros), ExportForm.KUKA_MASTERING)[1]
-    (none,) = exported(tmp_path, of_make("kuka", chain=lengths), ExportForm.KUKA_MASTERING)[1]
+    (whole,) = exported(tmp_path, of_make("kuka", chain=zeros), form_named("kuka-mastering"))[1]
+    (none,) = exported(tmp_path, of_make("kuka", chain=lengths), form_named("kuka-mastering"))[1]
     assert "the tip is off by 0.0 µm rms, at most 0.0 µm" in whole
     alone, without = (part.split("µm rms")[0].split()[-1] for part in none.split(";")[1:])
     assert float(alone) == float(without) > 50.0
@@ -165,7 +165,7 @@ def test_offsets_alone_leave_what_lengths_and_axes_move_the_tip(tmp_path):
 
 def test_motor_angles_are_those_of_the_gear(tmp_path):
     geared = RIG.replace("[[arm.joint]]", "[[arm.joint]]\ngear_ratio = 100.0")
-    rows = table_of(exported(tmp_path, of_make("abb", geared, parameters=PARAMETERS), ExportForm.ABB_MOC)[0])
+    rows = table_of(exported(tmp_path, of_make("abb", geared, parameters=PARAMETERS), form_named("abb-moc"))[0])
     assert float(rows[1]["motor_rad"]) == pytest.approx(100.0 * CHAIN["joint2.zero"])
     assert rows[3]["motor_rad"] == ""
 

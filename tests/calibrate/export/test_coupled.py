@@ -14,7 +14,7 @@ from calibeam.commands.rig import shipped_rigs
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.coupled_readings import by_reading
 from calibrate.errors import DataError
-from calibrate.export.export import ExportForm, export_model, export_text
+from calibrate.export.export import export_model, export_text, form_named
 from calibrate.model_file import Covariance, ModelParameter, RigIdentity
 from calibrate.parameters import values_by_name
 
@@ -54,13 +54,13 @@ def in_mujoco(text, angles):
 @pytest.mark.parametrize("form", ["urdf", "dh-csv", "json", "matlab", "mjcf"])
 def test_a_file_read_back_at_physical_angles_stands_where_the_readings_put_the_arm(rig, form, monkeypatch):
     wrong = errors_of(rig)
-    text = export_text(rig, wrong, ExportForm(form))
+    text = export_text(rig, wrong, form_named(form))
     by = rig.arm.joints[2].follows.by
     angles = Q.copy()
     angles[:, 2] += by * Q[:, 1]  # as the file says
     assert f"joint 3 = reading 3 {'+' if by > 0 else '-'} reading 2" in text
     monkeypatch.setattr(test_export, "Q", angles)
-    there = in_mujoco(text, angles) if form == "mjcf" else test_export.READERS[ExportForm(form)](text)
+    there = in_mujoco(text, angles) if form == "mjcf" else test_export.READERS[form_named(form)](text)
     np.testing.assert_allclose(there, flange(rig, wrong), atol=1e-9)
     assert np.max(np.abs(np.array(there) - flange(rig, wrong, angles))) > 0.1  # the readings are other angles
 
@@ -68,13 +68,13 @@ def test_a_file_read_back_at_physical_angles_stands_where_the_readings_put_the_a
 @pytest.mark.parametrize(("rig", "by"), [(FANUC, 1.0), (AGAINST, -1.0)])
 def test_limits_are_those_of_the_angle(rig, by):
     two, three = rig.arm.joints[1], rig.arm.joints[2]
-    low, high = json.loads(export_text(rig, {}, ExportForm.JSON))["joints"][2].values()
+    low, high = json.loads(export_text(rig, {}, form_named("json")))["joints"][2].values()
     other = (two.lower_rad, two.upper_rad) if by > 0 else (-two.upper_rad, -two.lower_rad)
     assert (low, high) == pytest.approx((three.lower_rad + other[0], three.upper_rad + other[1]))
 
 
 def test_the_json_has_the_matrix_from_readings_to_angles():
-    content = json.loads(export_text(FANUC, {}, ExportForm.JSON))
+    content = json.loads(export_text(FANUC, {}, form_named("json")))
     assert np.array_equal(content["angles_by_readings"], by_reading(FANUC.arm))
 
 
@@ -99,7 +99,7 @@ def test_mastered_by_these_offsets_the_controller_reads_where_the_arm_stands(tmp
     """An arm as drawn at readings with the offsets added stands where the model has the arm at the readings."""
     text = TEXT.replace("by = 1.0", f"by = {by}")
     rig = parse_rig(text, "rig.toml")
-    export_model(tmp_path / "x", rig, known(rig, text), ExportForm.FANUC_MASTERING)
+    export_model(tmp_path / "x", rig, known(rig, text), form_named("fanuc-mastering"))
     offsets = np.radians([float(row["offset_deg"]) for row in table_of(tmp_path / "x")])
     np.testing.assert_allclose(flange(rig, {}, Q + offsets), flange(rig, ZEROS), atol=1e-12)
     assert offsets[2] == pytest.approx(ZEROS["joint3.zero"] - by * ZEROS["joint2.zero"], abs=1e-15)
@@ -108,7 +108,7 @@ def test_mastered_by_these_offsets_the_controller_reads_where_the_arm_stands(tmp
 
 @pytest.mark.parametrize(("correlation", "shares"), [(0.0, math.sqrt(2.0)), (0.9, math.sqrt(0.2))])
 def test_sigma_of_a_coupled_offset_has_both_zeros_and_their_correlation(tmp_path, correlation, shares):
-    export_model(tmp_path / "x", FANUC, known(FANUC, TEXT, 1e-4, correlation), ExportForm.FANUC_MASTERING)
+    export_model(tmp_path / "x", FANUC, known(FANUC, TEXT, 1e-4, correlation), form_named("fanuc-mastering"))
     sigma = np.radians([float(row["sigma_deg"]) for row in table_of(tmp_path / "x")])
     assert sigma == pytest.approx([1e-4, 1e-4, shares * 1e-4, 1e-4, 1e-4, 1e-4])
 
@@ -117,7 +117,7 @@ def test_an_offset_of_a_zero_that_is_not_determined_is_not_either(tmp_path):
     found = known(FANUC, TEXT)
     open_ = ModelParameter("joint2.zero", "rad", None, None, "seen only together with joint 3")
     parameters = tuple(open_ if p.name == open_.name else p for p in found.parameters)
-    export_model(tmp_path / "x", FANUC, replace(found, parameters=parameters), ExportForm.FANUC_MASTERING)
+    export_model(tmp_path / "x", FANUC, replace(found, parameters=parameters), form_named("fanuc-mastering"))
     why = [row["not_entered_because"] for row in table_of(tmp_path / "x")]
     assert [bool(one) for one in why] == [False, True, True, False, False, False]
 
@@ -127,5 +127,5 @@ def test_what_a_form_cannot_carry_is_refused_with_the_reason(tmp_path, form, mak
     text = TEXT.replace('make = "fanuc"', f'make = "{make}"')
     rig = parse_rig(text, "rig.toml")
     with pytest.raises(DataError, match="joint 3 follows another joint, and"):
-        export_model(tmp_path / "x", rig, known(rig, text), ExportForm(form))
+        export_model(tmp_path / "x", rig, known(rig, text), form_named(form))
     assert not list(tmp_path.iterdir())

@@ -15,7 +15,7 @@ from acquisition.recording.rig import ArmModel, Rig, load_rig
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.convert import convert
 from calibrate.errors import DataError
-from calibrate.export.export import FORMS, OFFSETS, ExportForm, export_text
+from calibrate.export.export import FORMS, export_text, form_named
 from calibrate.parameters import values_by_name
 
 RIGS = Path(__file__).parents[3] / "rigs"
@@ -126,16 +126,16 @@ def read_matlab(text):
 
 
 READERS = {
-    ExportForm.URDF: read_urdf,
-    ExportForm.DH_CSV: read_csv,
-    ExportForm.UR_KINEMATICS: read_yaml,
-    ExportForm.JSON: read_json,
-    ExportForm.MATLAB: read_matlab,
+    form_named("urdf"): read_urdf,
+    form_named("dh-csv"): read_csv,
+    form_named("ur-kinematics"): read_yaml,
+    form_named("json"): read_json,
+    form_named("matlab"): read_matlab,
 }
 
 
 @pytest.mark.filterwarnings("ignore:Gimbal lock")
-@pytest.mark.parametrize("form", list(READERS), ids=lambda f: f.value)
+@pytest.mark.parametrize("form", list(READERS), ids=lambda f: f.name)
 @pytest.mark.parametrize("wrong", [False, True], ids=["as drawn", "identified"])
 def test_a_file_read_back_gives_the_same_flange(rig, form, wrong):
     corrections = errors_of(rig) if wrong else {}
@@ -149,7 +149,7 @@ def test_lists_of_the_controller_added_to_the_drawing_give_the_same_flange(name)
     rig = ARMS[name]
     corrections = {k: v for k, v in errors_of(rig).items() if not k.startswith(("link0", "link6.tilt"))}
     lists = dict(
-        re.findall(r"^(delta_\w+) = \[(.*)\]$", export_text(rig, corrections, ExportForm.UR_CALIBRATION), re.M)
+        re.findall(r"^(delta_\w+) = \[(.*)\]$", export_text(rig, corrections, form_named("ur-calibration")), re.M)
     )
     delta = np.array(
         [[float(v) for v in lists[k].split(",")] for k in ("delta_theta", "delta_d", "delta_a", "delta_alpha")]
@@ -162,7 +162,7 @@ def test_lists_of_the_controller_added_to_the_drawing_give_the_same_flange(name)
 
 def test_mujoco_reads_the_urdf_and_agrees(rig):
     corrections = errors_of(rig)
-    text = export_text(rig, corrections, ExportForm.URDF)
+    text = export_text(rig, corrections, form_named("urdf"))
     option = '<mujoco><compiler boundmass="1" boundinertia="1" fusestatic="false"/></mujoco>'
     model = mujoco.MjModel.from_xml_string(re.sub(r"(<robot[^>]*>)", r"\1" + option, text))
     data = mujoco.MjData(model)
@@ -175,14 +175,14 @@ def test_mujoco_reads_the_urdf_and_agrees(rig):
 
 
 def test_the_urdf_carries_limits_and_the_tool_point_as_corrected():
-    robot = ET.fromstring(export_text(CMM, {"tool.x": 1e-3, "device.x": 5.0}, ExportForm.URDF))
+    robot = ET.fromstring(export_text(CMM, {"tool.x": 1e-3, "device.x": 5.0}, form_named("urdf")))
     tool = next(j for j in robot.iter("joint") if j.get("name") == "tool_point_fixed")
     assert tool.find("origin").get("xyz") == "0.001 0.0 0.0"
     first = next(j for j in robot.iter("joint") if j.get("name") == "joint1").find("limit")
     assert float(first.get("lower")) == CMM.arm.joints[0].lower_rad
 
 
-@pytest.mark.parametrize("form", [f for f in FORMS if f not in (*OFFSETS, ExportForm.TABLE)], ids=lambda f: f.value)
+@pytest.mark.parametrize("form", [f for f in FORMS if not f.offsets and f.name != "table"], ids=lambda f: f.name)
 def test_every_file_states_unit_and_sign(form):
     text = export_text(UR5E, {}, form)
     assert re.search(r"\bm(,| and) rad\b", text)
@@ -191,7 +191,7 @@ def test_every_file_states_unit_and_sign(form):
 
 def test_a_ur_kinematics_file_of_the_drawing_is_the_published_one():
     """ur_description, ur5e: shoulder z, upper_arm roll, forearm x, wrist_1 x and z, wrist_2 y, wrist_3 y."""
-    text = export_text(UR5E, {}, ExportForm.UR_KINEMATICS)
+    text = export_text(UR5E, {}, form_named("ur-kinematics"))
     values, name = {}, ""
     for line in text.splitlines():
         key, _, value = line.partition("#")[0].strip().partition(":")
@@ -212,4 +212,4 @@ def test_a_ur_kinematics_file_of_the_drawing_is_the_published_one():
 
 def test_a_correction_of_a_joint_that_is_not_there_is_refused():
     with pytest.raises(DataError, match=r"no parameter joint9\.zero .* 6 joints"):
-        export_text(UR5E, {"joint9.zero": 1e-3}, ExportForm.JSON)
+        export_text(UR5E, {"joint9.zero": 1e-3}, form_named("json"))

@@ -14,7 +14,7 @@ from calibeam.commands.rig import shipped_rigs
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.convert import convert
 from calibrate.arms.rig_arm import RigArm
-from calibrate.export.export import ExportForm, export_model
+from calibrate.export.export import export_model, form_named
 from calibrate.export.identified import identified_arm
 from calibrate.export.nominal_table import nominal_table
 from calibrate.model_file import ModelParameter, RigIdentity, write_model
@@ -100,7 +100,7 @@ def test_the_file_and_the_json_hold_the_same_rows(tmp_path):
     parameters = stated(IRB, without=("joint1.zero",))
     chain = {p.name: p.value for p in parameters if p.value is not None}
     known = model(rig=RigIdentity("irb120", "0" * 64, RIG), parameters=parameters, chain=chain, covariance=None)
-    export_model(tmp_path / "arm.json", IRB, known, ExportForm.JSON)
+    export_model(tmp_path / "arm.json", IRB, known, form_named("json"))
     in_json = json.loads((tmp_path / "arm.json").read_text())["table"]
     write_model(tmp_path / "model.json", known)
     assert run(["export-model", str(tmp_path / "model.json"), "--to", "table"]) == 0

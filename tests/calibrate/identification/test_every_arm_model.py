@@ -6,7 +6,7 @@ import pytest
 
 from acquisition.recording.rig import ArmModel
 from calibrate.arms.convert import convert
-from calibrate.export.export import ExportForm, export_text
+from calibrate.export.export import FORMS, export_text
 from calibrate.fit import Status
 from calibrate.identification.identify import identify
 from calibrate.predict import Predictor, predict
@@ -62,7 +62,7 @@ def test_identified_predicted_and_exported_alike(rig, session, samples):
         left[model] = instrument.rms_distance_after_m
         predicted = predict(Predictor(own, values, result.about, (instrument.name,)), seen)
         told[model] = np.stack([predicted[c] for c in sorted(set(predicted) - {"t_s"})])
-        for form in ExportForm:
+        for form in FORMS:
             assert export_text(own, values, form)
     np.testing.assert_allclose(list(left.values()), left[ArmModel.DH], rtol=1e-3)
     if instrument.name in (

@@ -55,6 +55,19 @@ def test_an_encoder_that_never_answered_is_no_fault_of_its_joint():
     assert not_following(samples) == ()
 
 
+def test_rows_that_one_encoder_spoils_for_all_are_named_with_it():
+    """Row 7 is off, row 9 blank; in row 12 no encoder was read, so that nothing is left out there."""
+    columns = {name: column.copy() for name, column in table().columns.items()}
+    columns["enc2_rad"][6] += 0.06
+    columns["enc3_rad"][8] = np.nan
+    for joint in range(1, JOINTS + 1):
+        columns[f"enc{joint}_rad"][11] = np.nan
+    off, blank = unused_columns(Samples(columns, JOINTS))
+    assert off.startswith("enc2_rad is more than 0.05 rad off its usual difference from the joint in 1 of 40 rows (7):")
+    assert blank.startswith("enc3_rad holds no number in 1 of 40 rows (9): no second encoder is used in these rows")
+    assert unused_columns(table()) == ()
+
+
 def test_a_session_without_second_encoders_has_no_difference():
     q = {f"q{j + 1}_rad": np.zeros(ROWS) for j in range(JOINTS)}
     assert differences(Samples(q, JOINTS)) is None
