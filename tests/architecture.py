@@ -148,7 +148,7 @@ def figures() -> tuple[Figure, ...]:
 
 TODAY = {
     "files": 813,
-    "lines": 109_960,
+    "lines": 110_700,
     "longest_function": 54,
     "one_importer": 21,
     "classes": 26,
