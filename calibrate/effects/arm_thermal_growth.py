@@ -59,7 +59,8 @@ def _term(
         function=function,
         names=(name,),
         limit=limit,
-        sentence=f"The whole arm grows by {{{name}}}, most of all its longest link, {_longest(drivers)}: heat",
+        sentence=f"The whole arm grows by {{{name}}}{time_laws.when(inner)}, most of all its longest link, "
+        f"{_longest(drivers)}: heat",
     )
 
 

@@ -29,7 +29,7 @@ def _terms(drivers: Drivers) -> tuple[Term, ...]:
             names=LASER,
             limit=LIMIT,
             sentence="The laser moved by {shift_u_m}, {shift_v_m} and turned by {tilt_u_rad}, {tilt_v_rad} across its "
-            "beam: seated again, or slipped in its mount",
+            "beam from {time_s} on: seated again, or slipped in its mount",
         ),
     )
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from calibrate.effects import time_laws
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.form import Floats, Form
 from calibrate.effects.ports import Place, Port
@@ -48,7 +49,8 @@ def pointing(
         function=law,
         names=(f"turn_u_rad{per}", f"turn_v_rad{per}"),
         limit=LIMIT_RAD,
-        sentence=f"The laser beam turns by {{turn_u_rad{per}}} and {{turn_v_rad{per}}} across itself with {driver}",
+        sentence=f"The laser beam turns by {{turn_u_rad{per}}} and {{turn_v_rad{per}}} across itself"
+        + (time_laws.when(inner) if driver == "t" else f" with {driver}"),
         directions=directions,
     )
 
@@ -77,6 +79,7 @@ def shifting(
         function=law,
         names=(f"shift_u_m{per}", f"shift_v_m{per}"),
         limit=LIMIT_M,
-        sentence=f"The laser beam shifts by {{shift_u_m{per}}} and {{shift_v_m{per}}} across itself with {driver}",
+        sentence=f"The laser beam shifts by {{shift_u_m{per}}} and {{shift_v_m{per}}} across itself"
+        + (time_laws.when(inner) if driver == "t" else f" with {driver}"),
         directions=np.concatenate([np.stack([u, v], axis=1), np.zeros((3, 2))]),
     )

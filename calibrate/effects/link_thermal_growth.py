@@ -64,7 +64,7 @@ def _term(
         function=function,
         names=(name,),
         limit=limit,
-        sentence=f"Link {link} grows by {{{name}}}: heat",
+        sentence=f"Link {link} grows by {{{name}}}{time_laws.when(inner)}: heat",
         # What is warmed grows; over time it may cool, too.
         believable=None if driver == "t" else lambda coefficients, inner: bool(coefficients[0] >= 0.0),
     )

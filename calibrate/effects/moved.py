@@ -70,7 +70,8 @@ def motion(
         limit=LIMIT,
         sentence=f"{what} moved by {sizes[0]} in x, y, z of the base"
         + (f" and turned by {sizes[1]}" if width == 6 else "")
-        + (f" with {driver}" if driver != "t" else ""),
+        + (f" with {driver}" if driver != "t" else "")
+        + time_laws.when(inner),
     )
 
 

@@ -55,6 +55,12 @@ def constant_inner(drivers: Drivers) -> tuple[Inner, ...]:
     return (Inner("time_constant_s", grid, grid[0] / 2.0, grid[-1] * 2.0),)
 
 
+def when(inner: tuple[Inner, ...]) -> str:
+    """End of a sentence: the moment of a step, the time constant of a drift."""
+    said = {"time_s": " from {time_s} on", "time_constant_s": " with a time constant of {time_constant_s}"}
+    return "".join(said.get(spec.name, "") for spec in inner)
+
+
 def varies(values: Floats) -> bool:
     """Whether a driver says anything at all."""
     return bool(np.ptp(values) > 1e-9 * max(1.0, float(np.abs(values).max())))

@@ -37,8 +37,9 @@ def _moved(drivers: Drivers, shape: Shape, law: Law, inner: tuple[Inner, ...]) -
         directions=np.eye(6)[:, :3],
         names=SIX[:3],
         limit=LIMIT_M,
-        sentence="The target moved by {shift_x_m}, {shift_y_m}, {shift_z_m} in x, y, z of the flange: seated again, or "
-        "creeping in its seat",
+        sentence="The target moved by {shift_x_m}, {shift_y_m}, {shift_z_m} in x, y, z of the flange"
+        + time_laws.when(inner)
+        + ": seated again, or creeping in its seat",
     )
 
 

@@ -11,6 +11,7 @@ import pytest
 from calibrate.diagnose.visible import grid_of, sight_of
 from calibrate.effects import catalogue
 from calibrate.effects.catalogue import EFFECTS, missing_of
+from calibrate.effects.form import Form
 from calibrate.effects.ports import Place
 from calibrate.effects.term import UNITS, Shape
 
@@ -215,3 +216,9 @@ def test_every_effect_says_what_it_is():
         assert effect.source
         assert set(effect.mistaken_for) <= PHYSICS
         assert fields(effect)
+
+
+def test_a_step_says_when_and_a_drift_how_fast(drivers):
+    for term in terms_of(drivers):
+        if isinstance(term, Form) and not term.open:
+            assert all(f"{{{spec.name}}}" in term.sentence for spec in term.inner if spec.name.startswith("time"))
