@@ -182,12 +182,17 @@ def _print_program(console: Console, diff: tuple[str, ...], found: Corrected, na
     if not verbose and len(diff) > LISTED:
         console.print(f"... {len(diff) - LISTED} more lines of the diff (--verbose)", markup=False)
     for row, name in enumerate(names if verbose else names[:LISTED]):
-        before, after = (
-            f"{UM * p.error_m[row]:.0f} ± {UM * p.s_error_m[row]:.0f} µm" for p in (found.before, found.after)
-        )
+        before, after = (_error(p.error_m[row], p.s_error_m[row]) for p in (found.before, found.after))
         console.print(f"{name}: predicted tool error {before}, corrected {after}", markup=False)
     if not verbose and len(names) > LISTED:
         console.print(f"... {len(names) - LISTED} more targets (--verbose)", markup=False)
+
+
+def _error(error_m: float, sigma_m: float) -> str:
+    """With its unit; of a target without a command there is none."""
+    if not np.isfinite(error_m):
+        return "not known (no command)"
+    return f"{UM * error_m:.0f}" + (f" ± {UM * sigma_m:.0f} µm" if np.isfinite(sigma_m) else " µm")
 
 
 def _print_found(
@@ -198,10 +203,11 @@ def _print_found(
     def say(text: str) -> None:
         console.print(text, markup=False)
 
-    say(
-        f"{commanded} of {len(names)} poses corrected; predicted tool error, uncertainty included, rms: "
+    rms = (
+        f"; predicted tool error, uncertainty included, rms: "
         f"{UM * found.before.rms_m:.0f} µm before, {UM * found.after.rms_m:.1f} µm after"
     )
+    say(f"{commanded} of {len(names)} poses corrected{rms if commanded else ''}")
     if model.covariance is None:
         say("the model has no covariance: the predicted errors have no uncertainty")
     bad = [f"{name}: {status}: {why}" for name, status, why in zip(names, found.status, found.says, strict=True) if why]

@@ -4,7 +4,7 @@ Forms of installed packages are entry points of the group `calibeam.exports`.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -14,7 +14,7 @@ from calibrate.errors import DataError
 from calibrate.export.dh_csv import dh_csv_text
 from calibrate.export.identified import IdentifiedArm, identified_arm
 from calibrate.export.json_text import json_text
-from calibrate.export.mastering import abb_moc_text, fanuc_mastering_text, kuka_mastering_text
+from calibrate.export.mastering import abb_moc_text, fanuc_mastering_text, kuka_mastering_text, refused
 from calibrate.export.matlab import matlab_text
 from calibrate.export.mjcf import mjcf_text
 from calibrate.export.nominal_table import nominal_table_text
@@ -44,6 +44,10 @@ class ExportForm:
     uncoupled: str = ""  # why it cannot carry a joint that follows another one; "": it can
 
 
+NO_OFFSETS = (
+    "every offset is empty: beside free lengths and axes no zero is clear; for the best zeros alone, identify with a "
+    'fit plan that holds the others: schema = 1, hold = ["link*"]'
+)
 NO_UR = "no arm of Universal Robots has one; take another form, or correct the rig"
 GUESSED = "the rig file does not hold how its motors are coupled: offsets of motors would be guesses"
 FORMS: tuple[ExportForm, ...] = (
@@ -123,6 +127,10 @@ def export_model(path: Path, rig: Rig, model: ModelFile, form: ExportForm) -> tu
     arm = identified_arm(
         rig, corrections(model), model.about.get("tool"), says, model.parameters, compliance, model.covariance
     )
+    freed = any(p.name.startswith("link") and p.value is not None for p in model.parameters)
+    if form.offsets and freed and all(refused(zero) for zero in arm.zeros):
+        says = (*says, NO_OFFSETS)
+        arm = replace(arm, not_carried=says)
     partial = path.with_name(path.name + ".partial")
     partial.write_text(form.text(arm), encoding="utf-8")
     partial.replace(path)

@@ -22,6 +22,7 @@ from calibeam.sessions.with_tracker import (
     drawn_plan,
     nominal_target,
     record_tracked,
+    run_tracked,
     taken_before,
 )
 from drivers.clock import SystemClock
@@ -106,7 +107,10 @@ def test_paused_by_one_interrupt_ended_by_three_and_gone_on_with(tmp_path: Path,
 
     plain = RecordingWriter.event
     monkeypatch.setattr(RecordingWriter, "event", lambda w, e: (plain(w, e), heard(e.kind, e.detail))[0])
-    interrupts = [1, 3]
+    interrupts, concluded = [1, 3], list[Path]()
+    monkeypatch.setattr(
+        "calibeam.results.session_results.write_session_results", lambda path, console: concluded.append(path)
+    )
 
     def interrupt() -> None:
         for _ in range(interrupts.pop(0)):
@@ -118,11 +122,13 @@ def test_paused_by_one_interrupt_ended_by_three_and_gone_on_with(tmp_path: Path,
         assert len(whole.samples) == 6
         with pytest.raises(PartialResult, match=r"the session was aborted.*to go on, give the same command with --con"):
             session(tmp_path, emulation, 2, interrupt, name="recording.mcap")
-        job = TrackedJob(RIG, rig_text(RIG_FILE), tmp_path, None, seed=9, go_on=True)
+        wires = tracker_addresses_of(RIG, emulation.address, PACE)
+        job = TrackedJob(RIG, rig_text(RIG_FILE), tmp_path, wires, seed=9, go_on=True)
         before = taken_before(job)
         assert (before.plan, before.done) == (PLAN, frozenset({1, 2}))
-        rest = session(tmp_path, emulation, before=before, name="recording-0002.mcap")
-    assert len(rest.samples) == 4
+        for _ in ("the rest", "nothing"):
+            run_tracked(job, Console(quiet=True), asking=None, agrees=True)
+    assert concluded == [tmp_path, tmp_path]
     assert taken_before(job).left == 0
     twice, once = (read(tmp_path / name).samples.joints() for name in ("paused.mcap", "recording-0002.mcap"))
     np.testing.assert_allclose(once, twice[2:], atol=1e-4)

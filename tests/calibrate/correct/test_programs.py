@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from calibeam.cli import run
 from calibrate.correct.corrected import Options
 from calibrate.correct.programs.rewriting import correct_program, dialect_of
 from calibrate.errors import DataError
+from calibrate.model_file import write_model
 
 from .six_joints import drawn, inverse, model, postures, real
 
@@ -220,6 +222,18 @@ def test_a_configuration_that_no_posture_has_leaves_its_target_as_it_was():
     assert done.found.status[-1] == "unreachable"
     assert "configuration" in done.found.says[-1]
     assert done.text.splitlines()[6] == text.splitlines()[6]
+
+
+def test_a_target_without_a_command_has_no_error_on_the_terminal(tmp_path, capsys):
+    write_model(tmp_path / "model.json", model())
+    only = UR[: UR.index("movej")] + "movel(p[9.0,0.0,0.0,0.0,0.0,0.0], a=1, v=0.1)\nend\n"
+    (tmp_path / "weld.script").write_text(only)
+    out = str(tmp_path / "out.script")
+    assert run(["correct", str(tmp_path / "model.json"), str(tmp_path / "weld.script"), "--out", out]) == 3
+    printed = capsys.readouterr().out
+    assert "predicted tool error not known (no command), corrected not known (no command)" in printed
+    assert "0 of 1 poses corrected\n" in printed
+    assert "nan" not in printed
 
 
 @pytest.mark.parametrize("suffix", [".src", ".mod"])

@@ -163,6 +163,18 @@ def test_offsets_alone_leave_what_lengths_and_axes_move_the_tip(tmp_path):
     assert float(alone) == float(without) > 50.0
 
 
+def test_a_table_without_an_offset_says_how_to_get_one(tmp_path):
+    """Beside a link that was found, no zero is; with the links held none is only because none is off."""
+    no_zero = tuple(ModelParameter(f"joint{j}.zero", "rad", None, None, "seen only with link 1") for j in range(1, 7))
+    link = ModelParameter("link2.length", "m", 1e-4, 1e-5, None)
+    text, lost = exported(tmp_path, of_make("kuka", parameters=(*no_zero, link)), form_named("kuka-mastering"))
+    assert lost[-1].startswith("every offset is empty")
+    assert 'hold = ["link*"]' in lost[-1]
+    assert lost[-1] in text
+    held = of_make("kuka", parameters=no_zero)
+    assert not any("every offset" in says for says in exported(tmp_path, held, form_named("kuka-mastering"))[1])
+
+
 def test_motor_angles_are_those_of_the_gear(tmp_path):
     geared = RIG.replace("[[arm.joint]]", "[[arm.joint]]\ngear_ratio = 100.0")
     rows = table_of(exported(tmp_path, of_make("abb", geared, parameters=PARAMETERS), form_named("abb-moc"))[0])
