@@ -22,8 +22,8 @@ from acquisition.guided.reading import Reading
 from acquisition.guided.session import GuidedSession
 from acquisition.guided.stillness import ArmMotion, GuidedArm, StillRule
 from acquisition.recording.rig import Rig, load_rig, plain_rig, rig_sha256, rig_text
+from benchmarks.direct_hand import COUNTS, DirectHand
 from benchmarks.slices import Slices
-from calibeam.guided.hand import COUNTS, DirectHand
 from calibeam.guided.judge import FittedJudge
 from calibeam.guided.recorded import BelievedGuidedArm
 from calibeam.guided.refit import samples_of

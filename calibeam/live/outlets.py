@@ -29,7 +29,6 @@ from calibeam.devices.site import VIEWED
 from drivers.device import Block
 
 LOOPBACK = "127.0.0.1"
-PLOTJUGGLER_PORT = 9870  # what its dialog offers
 
 
 class OutletError(AcquisitionError):

@@ -31,7 +31,6 @@ Floats = NDArray[np.float64]
 ZERO = (0.0, 0.0, 0.0)
 BAR_END = "bar_end"
 NO_LIMIT_RAD = 2.0 * np.pi
-GAIN_EXACT = 1.0
 
 
 def rigged(predictor: Predictor, samples: Samples) -> Rigged:

@@ -16,8 +16,6 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 ALARM_P = 0.01
-ALARM_RATIO = 1.2  # of misfit over scatter, with enough repeats to believe it
-BELIEVED_DOF = 100
 FEWEST = 4  # groups
 
 

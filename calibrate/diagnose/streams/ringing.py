@@ -18,7 +18,6 @@ Levers = Callable[[float], Floats]  # time of the stream -> (channel, joint) wha
 WINDOW_S = 2.0  # a machine of 3 Hz and 2 % has faded to a third by then
 FEWEST_SAMPLES = 40
 ALARM = 1e-3  # family-wise over all stops
-FRAMES_APART = 3.0  # noise is judged between neighbours; what swings slower than this many samples is no noise
 AGAIN = 0.2  # share of the stops: what swings after one of many is a knock or the servo, not a soft machine
 CLEAR = 0.9  # share of the swing that one joint explains
 RIVAL = 0.05  # of the share: joints within it are not separated

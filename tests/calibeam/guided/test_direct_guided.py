@@ -9,7 +9,7 @@ from acquisition.guided.plan import GuidedOptions, calibration_plan
 from acquisition.guided.reading import BarEnd, Cone, Reading
 from acquisition.guided.session import GuidedSession, GuidedSummary
 from acquisition.recording.rig import load_rig, plain_rig, rig_sha256, rig_text
-from calibeam.guided.hand import DirectHand
+from benchmarks.direct_hand import DirectHand
 from calibeam.guided.judge import FittedJudge
 from calibeam.guided.recorded import BelievedGuidedArm
 from calibeam.guided.refit import samples_of
