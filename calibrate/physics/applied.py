@@ -199,7 +199,7 @@ def effects_at(
         return Applied(by, found, (), ("",) * len(samples), notes)
     doubts = list(_of_range(found))
     for name, rows in filled.missing.items():
-        if name in CENTRE:
+        if name in CENTRE and not same_session:
             continue  # _of_centres, which also knows rows of a session that did not record it
         felt = _of_missing(name, rows, carried, found, predictor, recorded, filled)
         doubts += [(one.port, off) for one, off in felt]
