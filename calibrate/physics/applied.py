@@ -200,7 +200,7 @@ def effects_at(
     doubts = [*_of_range(found), *((one.port, one.undated) for one in found if np.any(one.undated))]
     notes = (*notes, *(_between(one) for one in found if np.any(one.undated)))
     for name, rows in filled.missing.items():
-        if name in CENTRE:
+        if name in CENTRE and not same_session:
             continue  # _of_centres, which also knows rows of a session that did not record it
         felt = _of_missing(name, rows, carried, found, predictor, recorded, filled)
         doubts += [(one.port, off) for one, off in felt]
