@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from acquisition.errors import AcquisitionError
     from acquisition.recording import RecordingError, RigFileError, SamplesError
     from calibeam.notebook import Model, Session, open_model
-    from calibeam.notebook import open_recording as open  # noqa: A004 - `calibeam.open` is what a notebook says
+    from calibeam.notebook import open_recording as open  # noqa: A004 - `calibeam.open` is what a notebook calls
     from calibeam.notebook import session_of_arrays as session
     from calibrate.errors import DataError
     from drivers.errors import DeviceError

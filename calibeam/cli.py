@@ -25,7 +25,7 @@ from drivers.errors import DeviceError
 from simulators.conceal.wanted import ConcealError
 from simulators.errors import HostError, WorldError
 
-# What is told in one sentence instead of a traceback: everything that is about the user's world, not about our code.
+# Reported in one sentence instead of a traceback: everything that is about the user's world, not about our code.
 TOLD = (
     AcquisitionError,
     BrokenSealError,

@@ -1,4 +1,4 @@
-"""Models for commands that take geometry and frames only: what they leave out is said in one line."""
+"""Models for commands that take geometry and frames only: what they leave out is printed in one line."""
 
 import sys
 from pathlib import Path

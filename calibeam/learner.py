@@ -1,7 +1,7 @@
 """The assumed rig during a session: refitted to the samples so far, so that the next pose is hit.
 
-Not the identification that is reported: joint zeros, laser mount and places are bettered under wide beliefs, links
-stay as drawn.
+Not the identification that is reported: joint zeros, laser mount and places are improved under wide priors, links
+stay nominal.
 """
 
 from dataclasses import dataclass, replace

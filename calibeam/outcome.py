@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 class PartialResult(Exception):  # noqa: N818 - it is a result
-    """The job ended early, and what it had is kept; the message says where and how to go on. Exit code 3."""
+    """The job ended early, and what it had is kept; the message states where and how to go on. Exit code 3."""
 
 
 class CheckFailed(Exception):  # noqa: N818 - a result of the check, not an error of it

@@ -21,7 +21,7 @@ from drivers.clock import SystemClock
 
 SAME_S = 1.0  # longer than any driver keeps a sample
 EMULATED = 0.01  # of the rate: no clock of a device runs so far off; emulators run at another pace than real time
-MOST_LINES = 20  # findings of one file told one by one; a script gets all of them with --json
+MOST_LINES = 20  # findings of one file printed one by one; a script gets all of them with --json
 
 
 def check_recording(path: Path, *, as_json: bool = False) -> bool:

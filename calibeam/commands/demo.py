@@ -30,7 +30,7 @@ from simulators.world.truth import read_truth
 
 @dataclass(frozen=True)
 class ZeroAgainstTruth:
-    """One joint: what was reported, what is true. `deviation` is in stated sigmas, None where nothing was said."""
+    """One joint: what was reported, what is true. `deviation` is in stated sigmas, None where nothing was reported."""
 
     joint: int
     value_rad: float | None

@@ -85,7 +85,7 @@ def emulate(
     """
     from simulators.serve import ServeOptions, serve  # the physics takes a second to load: only here
 
-    stated = load_rig(rig).devices.robot  # tells what is wrong with the file in its own words
+    stated = load_rig(rig).devices.robot  # reports what is wrong with the file in its own words
     plain = plain_rig(rig_text(rig), str(rig))
     given, mechanisms = _simulated(rig, plain, model, hide)
     options = ServeOptions(

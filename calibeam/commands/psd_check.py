@@ -73,7 +73,7 @@ def psd_check_command(rig: Path, *, points: Path, unit: int = 1, out: Path | Non
     device = loaded.devices.psd
     if device is None:
         raise DeviceRefused(f"rig {loaded.name}: no [devices.psd]; name the detectors in the rig file")
-    psd = psd_driver(structs.replace(device, error_maps=None), loaded, SystemClock())  # they are measured anew
+    psd = psd_driver(structs.replace(device, error_maps=None), loaded, SystemClock())  # they are measured again
     psd.connect()
     try:
         face = _face(psd, device, unit)

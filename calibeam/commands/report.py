@@ -22,7 +22,7 @@ MODEL, DIAGNOSIS = "model.json", "diagnosis.json"  # as sessions name them
 
 
 def read_earlier_calibration(path: Path) -> Calibration:
-    """DataError, RecordingError for what is none. A recording is identified anew, without a plan."""
+    """DataError, RecordingError for what is none. A recording is identified again, without a plan."""
     if path.suffix == ".json":
         return Calibration(str(path), read_model(path))
     if path.is_dir() and (path / MODEL).exists():

@@ -42,7 +42,7 @@ NAMES = ("psd", "tracker", "encoders", "robot")
 
 @dataclass(frozen=True)
 class DeviceCheck:
-    """One line. `wrong` is empty for a device that is fit for a session, else it says what is wrong and what to do."""
+    """One line. `wrong` is empty for a device that is fit for a session, else it names what is wrong and what to do."""
 
     device: str
     what: str = ""
@@ -218,7 +218,7 @@ def _robot(rig: Rig, clock: Clock) -> DeviceCheck:
 
 
 def _ur(host: str) -> tuple[str, str]:
-    """What the dashboard says that it is, and why it would not move."""
+    """What the dashboard reports that it is, and why it would not move."""
     dashboard = UrDashboard(host)
     identity, state = dashboard.identity(), dashboard.state()
     what = f"{identity.model} {identity.serial_number}"
@@ -230,7 +230,7 @@ def _ur(host: str) -> tuple[str, str]:
 
 
 def _stopped(block: Block) -> str:
-    """Why it would not move, as far as its register map tells."""
+    """Why it would not move, as far as its register map shows."""
     if block.values.get("emergency_stopped", np.zeros(1))[-1]:
         return "emergency stop: release it and switch the motors on at the controller"
     if block.values.get("protective_stopped", np.zeros(1))[-1]:

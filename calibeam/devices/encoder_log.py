@@ -28,13 +28,13 @@ from drivers.clock import Clock
 from drivers.device import Block
 from drivers.errors import DeviceError
 
-YOUNG = 20_000  # objects made and not yet gone, before Python looks for cycles: a block has less than a thousand
+YOUNG = 20_000  # objects made and not yet gone, before Python searches for cycles: a block has less than a thousand
 LOOK_S = 0.1  # how often the log looks after itself: the last frames of a quiet bus wait no longer for the disk
 
 
 @dataclass(frozen=True)
 class LogState:
-    """What a log can say of itself."""
+    """What a log can report of itself."""
 
     segment: Path
     rows: int  # SYNCs with an answer, over all segments of this run

@@ -67,7 +67,7 @@ def uneven_layers(faces: Sequence[FaceIdentity], lit: Sequence[bool], current_a:
 
 
 def bus_trouble(block: Block, error_registers: Mapping[int, int]) -> str:
-    """What encoders, and the bus, have told of themselves by the newest sample; 1001h of each node at the start."""
+    """What encoders, and the bus, have reported of themselves by the newest sample; 1001h of each node at the start."""
     for number, code in enumerate(block.values.get("emergency_code", np.zeros((1, 0)))[-1], start=1):
         if code:
             words = EMERGENCY_TEXTS.get(int(code), "unknown to this program")
@@ -129,7 +129,7 @@ def emulated_encoders(device: EncodersDevice, announced: Mapping[str, Any]) -> E
 
 
 def names_of(driver: Device) -> tuple[str, ...]:
-    """Which encoders are connected, for a comparison with those of before; none for those that cannot say so."""
+    """Which encoders are connected, for a comparison with those of before; none for those that cannot report it."""
     if not isinstance(driver, Cia406Encoders):
         return ()
     return tuple(
@@ -140,7 +140,7 @@ def names_of(driver: Device) -> tuple[str, ...]:
 
 
 def identities_of(driver: Device) -> list[dict[str, Any]]:
-    """What each encoder of a connected driver said of itself, as JSON-like values: with it raw frames can be read."""
+    """What each encoder of a connected driver reported of itself, as JSON-like values: raw frames are read by it."""
     if not isinstance(driver, Cia406Encoders):
         return []
     return [msgspec.to_builtins(identity) for identity in driver.identities]

@@ -74,7 +74,7 @@ def new_recording(path: Path, rig_text: str, clock: Clock, notes: Mapping[str, s
 
 
 class Counted(Protocol):
-    """A session that says how much it has taken, also after it was cut short."""
+    """A session that reports how much it has taken, also after it was cut short."""
 
     @property
     def taken(self) -> int: ...
@@ -90,7 +90,8 @@ def record_session(
     plan: PosePlan | None = None,
     sight: Sight | None = None,
 ) -> Summary:
-    """Take every place of the rig, or the poses of a plan, told by `bar`; with a camera the light is aimed at by it.
+    """Take every place of the rig, or the poses of a plan, with progress on `bar`; with a camera the light is aimed at
+    by it.
 
     PartialResult when it ended early: the arm stands, samples are kept. Nobody is asked, and nothing can be paused:
     calibeam/sessions/run.py.

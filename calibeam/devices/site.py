@@ -66,7 +66,7 @@ class TrackerAddresses:
 
 @dataclass(frozen=True)
 class Kept:
-    """Where what the devices say goes."""
+    """Where the messages of the devices go."""
 
     writer: RecordingWriter
     clock: Clock
@@ -76,7 +76,7 @@ class Kept:
 
 def check_session(rig: Rig) -> None:
     """What a session needs of a rig beyond what every rig file has. DataError, RigFileError; no device is touched."""
-    fixture_of(rig)  # said before an hour of measuring that could not be identified
+    fixture_of(rig)  # refused before an hour of measuring that could not be identified
     laser_of(rig)
     _check_driven(rig)
 
@@ -224,7 +224,7 @@ def _spots_beside(psd: PsdInstrument, device: PsdDevice, writer: RecordingWriter
     """Spots of every block as a stream of their own, one sample a block: what a viewer shows without set-up."""
     stream = writer.stream("spots", tuple(Channel(name, "m") for name in SPOTS))
     count = itertools.count()
-    seen: list[PsdView] = []  # made with the first block: before, nobody knows the faces
+    seen: list[PsdView] = []  # made with the first block: before, the faces are unknown
 
     def keep(block: Block) -> None:
         if not seen:

@@ -2,10 +2,10 @@
 
 Line: least Huber loss (threshold 1.345: 95 % efficiency in normal noise) of the zeros in units of their own sigma;
 where they scatter by more than that, the scale grows with them by Huber's proposal 2, and his covariance with its
-correction for few points says how much (Huber, Robust Statistics, 1981, ch. 7.6 to 7.8).
+correction for few points gives the amount (Huber, Robust Statistics, 1981, ch. 7.6 to 7.8).
 
 A few points hardly show what their sigmas are worth. So, first, all zeros of the fleet together do: the median of
-their scatter, where it is more than stated, widens all sigmas. Then a sigma is believed to a quarter of itself, which
+their scatter, where it is more than stated, widens all sigmas. Then a sigma is uncertain by a quarter of itself, which
 is worth 8 degrees of freedom (JCGM 100:2008, G.4.2), and the scatter about the line is weighed against it by its own;
 Student's law gets the sum of both.
 

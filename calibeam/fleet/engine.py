@@ -24,20 +24,20 @@ from calibeam.worker_processes import without_ctrl_c
 from calibrate.errors import DataError
 
 ROUNDS = 3  # in which a worker may die over one recording, before it is given up
-# joblib takes whole numbers, too, where its hints say text
+# joblib takes whole numbers, too, where its hints have text
 ONE_BY_ONE: dict[str, Any] = {"return_as": "generator_unordered", "batch_size": 1, "pre_dispatch": "n_jobs"}
 OF_OUR_OWN: dict[str, Any] = {
     "threads_per_worker": 1,
     "processes": True,
     "host": "127.0.0.1",
     "dashboard_address": None,
-    "silence_logs": logging.CRITICAL,  # a lost worker is told in a row
+    "silence_logs": logging.CRITICAL,  # a lost worker is reported in a row
 }
 WAIT_S = 30.0  # for the first worker of a cluster
 MARGIN_S = 60.0  # beyond what any recording may take, for a cluster to start and to move a task
 LOST = f"the worker that had it died or fell silent {ROUNDS} times"
 NEEDS_DASK = "--engine dask needs Dask, which is not installed; pip install 'calibeam[fleet]', or take --engine loky"
-NEEDS_LIMIT = (  # Dask gives up what killed its workers, and joblib is never told
+NEEDS_LIMIT = (  # Dask gives up what killed its workers, and joblib is not informed
     "--timeout 0 is not for --engine dask: what kills its workers would be waited for without end; "
     "give seconds, or take --engine loky"
 )

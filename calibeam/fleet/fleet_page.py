@@ -28,7 +28,7 @@ MARKS = ("o", "s", "^", "D", "v", "P", "X")  # beside the colour: joints are sep
 ASIDE = 0.008  # of the span of dates, by which joints stand beside each other so that their bars can be seen
 UNITS = ((1.0, "rad"), (1e-3, "mrad"), (1e-6, "µrad"))
 CELL_IN = 0.34
-DAYS_TOLD = 0.3  # years: over less, a month says too little
+DAYS_TOLD = 0.3  # years: over less, a month means too little
 
 
 def over_time(robots: Sequence[tuple[str, Sequence[Series]]], drifting: Sequence[Drift]) -> Html:

@@ -45,7 +45,9 @@ class FleetRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Zero(FleetRecord, frozen=True):
-    """Zero of one joint: angle in the arm's table = reading + drawn + value. Value None where `status` says why."""
+    """Zero of one joint: angle in the arm's table = reading + nominal + value. Value None where `status` gives the
+    reason.
+    """
 
     joint: Identity  # from 1
     value_rad: Correction | None
@@ -67,7 +69,7 @@ class Cause(FleetRecord, frozen=True):
 
 
 class Row(FleetRecord, frozen=True):
-    """What a run over a fleet says of one recording; SI units. Fields after `error` are empty where it failed."""
+    """What a run over a fleet reports of one recording; SI units. Fields after `error` are empty where it failed."""
 
     path: Sentence
     name: Sentence  # below the folder of the fleet
@@ -82,16 +84,16 @@ class Row(FleetRecord, frozen=True):
     robot: Label = ""
     robot_serial: Label = ""
     rig: Label = ""
-    started_utc: Label = ""  # ISO 8601, or a date; "" where nobody knows
+    started_utc: Label = ""  # ISO 8601, or a date; "" where it is unknown
     complete: bool = True
     samples: Count = 0
     instruments: Few[Name] = ()
     fit_status: Sentence = ""
     zeros: PerJoint[Zero] = ()
     noise: dict[Name, Statistic] = msgspec.field(default_factory=dict[Name, Statistic])  # source -> as found, m or rad
-    held_out_before_m: Statistic | None = None  # first instrument, rms on unseen rows: arm as drawn
+    held_out_before_m: Statistic | None = None  # first instrument, rms on unseen rows: nominal arm
     held_out_after_m: Statistic | None = None
-    free_space_before_m: Statistic | None = None  # rms over the workspace: arm as drawn against the identified one
+    free_space_before_m: Statistic | None = None  # rms over the workspace: nominal arm against the identified one
     free_space_after_m: Statistic | None = None  # predicted rms of the identified one
     trust: Label = ""  # "yes", "with care", "no"
     says: Sentence = ""

@@ -36,7 +36,7 @@ def run_in_child(order: Order) -> Row:
 
 
 def end_child() -> None:
-    """End the process of this thread, if it has one: where work is done without workers, who asked for it says when."""
+    """End the process of this thread, if it has one: without workers, who asked for it decides when."""
     child: Child | None = getattr(_of_thread, "child", None)
     if child is not None:
         child.close()
@@ -52,7 +52,7 @@ class Child:
         self._said = tempfile.TemporaryFile()  # noqa: SIM115 - its errors, as long as it lives; an unread pipe would stop it
 
     def ask(self, order: Order) -> Row:
-        """The row of a recording; one that is lost says why."""
+        """The row of a recording; one that is lost gives the reason."""
         begun_s = self._clock()
         try:
             process = self._started()
@@ -121,7 +121,7 @@ class Child:
         return bytes(read)
 
     def _how(self, process: "subprocess.Popen[bytes]") -> str:
-        """How it ended, with the last thing it said."""
+        """How it ended, with its last message."""
         how = death(process.wait())
         size = self._said.seek(0, os.SEEK_END)
         self._said.seek(max(0, size - TAIL_BYTES))
@@ -129,5 +129,5 @@ class Child:
         return f"{how} ({lines[-1]})" if lines else how
 
 
-class _Ended(Exception):  # noqa: N818 - an outcome, told in a row
+class _Ended(Exception):  # noqa: N818 - an outcome, reported in a row
     """The process is gone."""

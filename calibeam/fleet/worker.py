@@ -52,7 +52,7 @@ def judge_recording(task: Task) -> Row:
         fields = {"outcome": Outcome.FAILED, "error": f"{task.path}: {why.strerror or why}"}
     except MemoryError:
         fields = {"outcome": Outcome.LOST, "error": "memory was short: give fewer --jobs"}
-    except Exception as why:  # a fault of ours must not end a run over thousands; it is told as what it is
+    except Exception as why:  # a fault of ours must not end a run over thousands; it is reported as what it is
         fields = {"outcome": Outcome.FAILED, "error": f"a fault of this program: {type(why).__name__}: {why}"}
     return task.row(sha256=sha256, seconds=time.monotonic() - begun_s, **fields)
 
@@ -138,8 +138,8 @@ SEED = 1  # the same poses for every recording of an arm: what differs are the a
 def drawn_against_identified(model: ModelFile) -> float | None:
     """Rms distance (m) over poses drawn evenly between the joint limits, three axes together, base frames laid over.
 
-    The target is the identified one on both arms. None where the model predicts no error in free space: then nobody
-    can say what the target does. Source of the best turn: Kabsch, Acta Cryst. A32, 1976.
+    The target is the identified one on both arms. None where the model predicts no error over the workspace: then it is
+    unknown what the target does. Source of the best turn: Kabsch, Acta Cryst. A32, 1976.
     """
     room = model.free_space
     if room is None or room.rms_m is None:

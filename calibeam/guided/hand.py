@@ -24,11 +24,11 @@ def wish(target: Target, posture_rad: Floats) -> Mapping[str, Any]:
 
 
 Ask = Callable[..., Any]  # verb, arguments by name
-CANNOT = "cannot put the probe"  # how simulators/hand/held_arm.py says that the arm has no such posture
+CANNOT = "cannot put the probe"  # how simulators/hand/held_arm.py reports that the arm has no such posture
 
 
 class EmulatedHand:
-    """Implements acquisition.guided.guide.Guide; what is told goes on to `show`."""
+    """Implements acquisition.guided.guide.Guide; what is reported goes on to `show`."""
 
     def __init__(self, ask: Ask, show: Callable[[GuidedProgress], None]) -> None:
         self._ask, self._show = ask, show

@@ -1,6 +1,6 @@
-"""What the arm as known so far says of a reading: refitted to all that was accepted, by the models of `calibrate`.
+"""How a reading agrees with the arm as known so far: refitted to all that was accepted, by the models of `calibrate`.
 
-Not the identification that is reported: zeros have a wide belief, the probe is held in link n, noise is as assumed.
+Not the identification that is reported: zeros have a wide prior, the probe is held in link n, noise is as assumed.
 """
 
 from collections.abc import Mapping, Sequence
@@ -53,7 +53,7 @@ class FittedJudge:
             self.repeatability_m = self._scatter_m()
 
     def doubt(self, visit: Sequence[Reading]) -> Doubt | None:
-        """What the fit has bent towards an earlier slip would doubt an honest reading: so the one that all others
+        """What the fit has bent towards an earlier slip would reject a good reading: so the one that all others
         speak against is looked for among the earlier ones, too.
         """
         miss, slope, noise = self._miss(visit)

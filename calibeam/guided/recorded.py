@@ -1,6 +1,6 @@
 """A guided session that is recorded: connects the encoders, runs the plan, and whatever happens the file is whole.
 
-The assumed arm says where the probe is and which postures bring it somewhere.
+The assumed arm gives where the probe is and which postures bring it somewhere.
 """
 
 from collections.abc import Generator, Mapping, Sequence

@@ -1,8 +1,8 @@
 """The arm refitted to what a guided session has so far, without the visits that the others speak against.
 
 Data snooping (Baarda, A testing procedure for use in geodetic networks, 1968): of all visits the one whose misfit is
-largest by the doubt of a fit without it goes first, then the fit is made again. An early reading on the rim was taken
-when nobody could tell, and the fit has bent towards it; left out, all others agree again.
+largest by the uncertainty of a fit without it goes first, then the fit is made again. An early reading on the rim was
+taken when it could not be recognised, and the fit has bent towards it; left out, all others agree again.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,7 +24,7 @@ from calibrate.weighting import Weighting
 
 Floats = NDArray[np.float64]
 Visit = tuple[Reading, ...]  # a reading in a cone, or both ends of a bar
-ZERO_RAD = 0.02  # a zero within a degree: an arm that was set up; wide enough for one that was put together anew
+ZERO_RAD = 0.02  # a zero within a degree: an arm that was set up; wide enough for one that was put together again
 LIMIT_SIGMAS = 6.0  # of what is not known, noise included: one of 1e8 honest readings is asked for again
 MOST_DROPPED = 8  # in one go; more of them are no slips but another trouble
 
@@ -41,7 +41,7 @@ class Refit:
 
 
 def visits_of(readings: Sequence[Reading]) -> tuple[Visit, ...]:
-    """Cones one by one, ends of bars two by two; what is neither has no say."""
+    """Cones one by one, ends of bars two by two; what is neither does not count."""
     cones = [(reading,) for reading in readings if isinstance(reading.target, Cone)]
     ends = [reading for reading in readings if BAR in reading.target.columns]
     return (*cones, *zip(ends[::2], ends[1::2], strict=True))
@@ -110,7 +110,7 @@ def _without_itself(problem: JointProblem, weighting: Weighting, theta: Floats, 
 
 
 def assumed_prior(p: Parameter) -> Parameter:
-    """Wide beliefs where the identification has none; the probe is held, for link n has the same three shifts."""
+    """Wide priors where the identification has none; the probe is held, for link n has the same three shifts."""
     if p.name.startswith("tool."):
         return replace(p, free=False)
     return replace(p, prior=ZERO_RAD) if p.name.endswith(".zero") else p

@@ -144,7 +144,7 @@ STATE_EVERY = 8  # beats
 
 @dataclass
 class Pulse:
-    """`hurry` has the next beat tell how things stand."""
+    """`hurry` has the next beat report the state."""
 
     viewers: Viewers
     composer: Composer
@@ -172,7 +172,7 @@ class Pulse:
         self._beats += 1
 
     def _tell(self, kind: Picture, made: Callable[[], str]) -> None:
-        """What cannot be made is told on the page: it must neither end the beat, nor pass for no news, nor be hidden
+        """What cannot be made is shown on the page: it must neither end the beat, nor pass for no news, nor be hidden
         by what can.
         """
         try:

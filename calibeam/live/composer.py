@@ -1,4 +1,4 @@
-"""Makes the messages of a page from the newest that was told; once for all pages that look."""
+"""Makes the messages of a page from the newest that was reported; once for all open pages."""
 
 from math import isfinite
 
@@ -28,7 +28,7 @@ from calibeam.software import SOFTWARE
 Floats = NDArray[np.float64]
 
 SHOWN_LINES = 8  # of the log
-READINGS = (("robot", "actual_q_rad"), ("encoders", "position_rad"))  # the first that is fresh tells the joints
+READINGS = (("robot", "actual_q_rad"), ("encoders", "position_rad"))  # the first that is fresh gives the joints
 
 
 class Composer:
@@ -60,7 +60,7 @@ class Composer:
         )
 
     def state(self) -> str:
-        """State; also finds out where the fixture stands, if nobody says so."""
+        """State; also finds out where the fixture stands, if nobody states it."""
         latest, now_s = self._latest, self._latest.clock.now_s()
         devices = [self._watch.look(name, latest.of(name), now_s) for name in self._watch.asked_hz]
         self._scene.believe(latest.rig or self._rig, latest.corrections)
@@ -100,7 +100,7 @@ class Composer:
         if stop.last is None:
             return StopMessage(stop.ready)
         last = stop.last
-        age_s = round(now_s - last.host_s, 3)  # a page tells by it whether its own press was sooner
+        age_s = round(now_s - last.host_s, 3)  # by it a page knows whether its own press was sooner
         return StopMessage(stop.ready, age_s, last.delivered, last.who, last.says)
 
     def _fresh(self, device: str, now_s: float) -> DeviceReadings | None:
@@ -112,7 +112,7 @@ class Composer:
         return None if heard is None or heard.block is None or view is None else faces_now(view, heard.block)
 
     def _joints(self, now_s: float) -> tuple[Floats | None, str]:
-        """Readings (joint,) and who told them."""
+        """Readings (joint,) and their device."""
         for device, name in READINGS:
             heard = self._fresh(device, now_s)
             if heard is not None and heard.block is not None and name in heard.block.values:

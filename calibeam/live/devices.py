@@ -90,6 +90,6 @@ def _read(watched: Watched, feed: Feed, done: threading.Event) -> None:
                 feed.said(str(why))
             away = True
         finally:
-            with suppress(DeviceError):  # how it failed was told, or nobody reads any more; it is tried again
+            with suppress(DeviceError):  # how it failed was reported, or nobody reads any more; it is tried again
                 device.close()
         done.wait(AGAIN_S)

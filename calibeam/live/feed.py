@@ -1,4 +1,4 @@
-"""What readers and a session tell the live page: verbs that return at once, from any thread, and never raise."""
+"""What readers and a session report to the live page: verbs that return at once, from any thread, and never raise."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ class Progress:
 
 
 class Feed(Protocol):
-    """Whoever tells it something need not wait, nor know whether anybody looks."""
+    """Who reports to it need not wait, nor know whether a page is open."""
 
     def heard(self, device: str, block: Block) -> None:
         """Every block of "psd", "encoders", "robot", from its one reader thread; never changed afterwards."""

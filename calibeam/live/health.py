@@ -20,7 +20,7 @@ from calibeam.live.stopping import Stop
 from drivers.clock import Clock
 from drivers.device import Block
 
-LINES = 200  # of what was said that are kept
+LINES = 200  # of the messages that are kept
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class DeviceReadings:
 
 @dataclass(frozen=True)
 class ReportedLine:
-    """Something that was said."""
+    """A message."""
 
     number: int
     host_s: float
@@ -98,7 +98,7 @@ class Latest:
 
 
 def _missed(before: Block | None, block: Block, count: int) -> int:
-    """Samples between the last one heard and the end of this block that never came; none where counting began anew."""
+    """Samples between the last one heard and the end of this block that never came; none where counting began again."""
     last = int(block.sequence[0]) - 1 if before is None else int(before.sequence[-1])
     return max(0, int(block.sequence[-1]) - last - count)
 

@@ -64,7 +64,7 @@ class LimitedHttp(H11Protocol):
 
     @property
     def expendable(self) -> bool:
-        """All but an action under way: its answer says whether the STOP was delivered."""
+        """All but an action under way: its answer reports whether the STOP was delivered."""
         return not self._in_an_answer or self.scope["method"] != "POST"
 
     @property

@@ -40,7 +40,7 @@ class SceneBeam(Struct, frozen=True):
 
 
 class SceneFixture(Struct, frozen=True):
-    """The fixture in the base: corners (m) of PSD 1, PSD 2. `told`: the session says so, else it was guessed."""
+    """The fixture in the base: corners (m) of PSD 1, PSD 2. `told`: by the session, else it was guessed."""
 
     placement: int
     first_psd: int
@@ -88,7 +88,7 @@ class Scene:
     def standing(
         self, told: tuple[int, int] | None, T_base_flange: Floats | None, measured_m: list[float] | None
     ) -> SceneFixture | None:
-        """As told; else the place and order by which the beam would strike nearest to where light is, or should be."""
+        """As reported; else the place and order by which the beam would strike nearest to the light that is expected."""
         if self._believed is None:
             return None
         if told is not None and told[0] in self._faces:
@@ -143,7 +143,7 @@ def _point(point_m: list[float]) -> list[float]:
     return [round(value, 5) for value in point_m]
 
 
-NEWEST = 50  # samples at 1 kHz: longer than a look at 30 Hz, so that a mean sees them all
+NEWEST = 50  # samples at 1 kHz: longer than a frame at 30 Hz, so that a mean sees them all
 
 
 class FaceNow(Struct, frozen=True):
@@ -167,7 +167,7 @@ def faces_now(view: PsdView, block: Block) -> tuple[FaceNow, FaceNow]:
 
 
 def _face(view: PsdView, k: int, current_a: NDArray[np.float64], newest: int, ever: int) -> FaceNow:
-    """One spot; PsdView.each says the same of many samples, and would take twice the time of one."""
+    """One spot; PsdView.each does the same for many samples, and would take twice the time of one."""
     face, error_map = view.faces[k], view.maps[k]
     reading = face.read(current_a)
     sum_v, half_m = round(float(reading.sum_a) * view.transimpedance_v_a, 4), 0.5 * face.length_m
@@ -199,7 +199,7 @@ class RigMessage(Struct, frozen=True, tag_field="kind", tag="rig"):
     lower_rad: list[float]
     upper_rad: list[float]
     devices: list[str]
-    half_m: float | None  # of a face as drawn in the rig
+    half_m: float | None  # of a face as stated in the rig
     reach_m: float
 
 
@@ -212,7 +212,7 @@ class LineMessage(Struct, frozen=True):
 
 
 class StopMessage(Struct, frozen=True):
-    """`ready`: there is an arm that STOP stops; the rest tells of the last one pressed."""
+    """`ready`: there is an arm that STOP stops; the rest is of the last one pressed."""
 
     ready: bool
     age_s: float | None = None
@@ -244,6 +244,6 @@ class PictureMessage(Struct, frozen=True, tag_field="kind", tag="now"):
     number: int
     faces: tuple[FaceNow, FaceNow] | None
     q_rad: list[float | None] | None  # None: this joint does not answer
-    by: str  # the device that told the joints
+    by: str  # the device that gave the joints
     points_m: Points | None  # origins of the base and of every link's frame
     beam: SceneBeam | None

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from drivers.clock import Clock
 from drivers.errors import DeviceError
 
-ON_THE_WAY = 6  # messages not yet taken: 30 Hz up to a tenth of a second away, told of every third (link.js)
+ON_THE_WAY = 6  # messages not yet taken: 30 Hz up to a tenth of a second away, every third acknowledged (link.js)
 
 
 class Viewer:

@@ -39,7 +39,7 @@ WORDS = "r resume, s stop, a abort, h halt, then ENTER"
 
 
 class MotionKeys:
-    """What was pressed, told to the gate."""
+    """What was pressed, handed to the gate."""
 
     def __init__(self, gate: Gate, asking: Asking | None, out: TextIO) -> None:
         self._gate, self._asking, self._out = gate, asking, out
@@ -135,7 +135,7 @@ def keys_of(gate: Gate) -> Generator[MotionKeys]:
     try:
         yield keys
     except BaseException:
-        INTERRUPTS.close()  # the arm stands, or was told to stop; what is left is to release it
+        INTERRUPTS.close()  # the arm stands, or has the stop command; what is left is to release it
         raise
     finally:
         for number, handler in before.items():

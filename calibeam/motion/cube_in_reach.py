@@ -3,7 +3,7 @@
 The standard wants the cube where the arm is used most, as large as it can be, and one orientation of the tool in all
 poses (clause 6.8). Here it stands before the arm, along x of the base first, and all five poses and its eight corners
 are reached with one posture, a margin to every limit, above the table and clear of the boxes of [motion]. The way
-between the poses is not planned: what else stands in the cell nobody knows here.
+between the poses is not planned: what else stands in the cell is unknown here.
 """
 
 from collections.abc import Iterator

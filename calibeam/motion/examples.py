@@ -30,7 +30,7 @@ from drivers.clock import Clock
 
 Floats = NDArray[np.float64]
 
-LEAST_SPEED_RAD_S = 0.02  # of a joint, where it is judged: slower ones say nothing
+LEAST_SPEED_RAD_S = 0.02  # of a joint, where it is judged: slower ones do not count
 
 
 @dataclass
@@ -95,7 +95,7 @@ PINS: Mapping[str, Floats] = {
 
 @dataclass(frozen=True, eq=False)
 class ExampleResult:
-    """One sweep of an example: planned, and as the controller said (time s, readings)."""
+    """One sweep of an example: planned, and as the controller reported (time s, readings)."""
 
     name: str
     plan: Plan

@@ -116,7 +116,7 @@ def write_figure(path: Path, width_in: float, height_in: float, paint: Callable[
 
 
 def draw_joints(figure: Figure, shown: ExampleResult) -> None:
-    """Readings and speeds over time: planned thin, said by the controller broad."""
+    """Readings and speeds over time: planned thin, reported by the controller broad."""
     position, speed = figure.subplots(2, 1, sharex=True)
     t_s, q_rad = fine(shown.plan)
     begin_s = _begin_s(shown, q_rad)
@@ -217,7 +217,7 @@ def _transitions(many: Sequence[Axes], plan: Plan) -> None:
 
 
 def _begin_s(shown: ExampleResult, planned_rad: Floats) -> float:
-    """When the arm set off, by what the controller said, less when it was planned to."""
+    """When the arm set off, by what the controller reported, less when it was planned to."""
     moved = np.flatnonzero(np.max(np.abs(shown.q_rad - shown.q_rad[0]), axis=1) > 1e-3)
     planned = np.flatnonzero(np.max(np.abs(planned_rad - planned_rad[0]), axis=1) > 1e-3)
     if moved.size == 0 or planned.size == 0:

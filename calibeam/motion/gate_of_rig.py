@@ -62,7 +62,7 @@ def cell_of(rig: Rig) -> Cell:
 
 
 def gated_arm(arm: Movable, rig: Rig, robot: Pump) -> GatedArm:
-    """The controller behind the gate, for motions that it makes itself. DeviceStale where it tells no joints."""
+    """The controller behind the gate, for motions that it makes itself. DeviceStale where it reports no joints."""
 
     def now() -> Floats:
         block = robot.latest() or robot.wait(-np.inf, WAIT_S)[-1]

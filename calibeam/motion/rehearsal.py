@@ -1,6 +1,6 @@
 """A session on paper: every pose of its plan and the way there, gone through the gate before the arm moves.
 
-Poses are where the rig file believes arm and places to be. The arm that is met is known better from pose to pose, so
+Poses are where the rig file assumes arm and places to be. The arm that is met is known better from pose to pose, so
 the true ways differ by what zeros of degrees do; each passes the same gate again when it is made.
 """
 
@@ -61,7 +61,7 @@ class Rehearsal:
 
 @dataclass
 class PaperArm:
-    """Implements drivers.device.Movable: it is where it was told to go, at once."""
+    """Implements drivers.device.Movable: it is where it was sent, at once."""
 
     q_rad: Floats
     name: str = "robot"

@@ -31,7 +31,7 @@ class StreamedArm(Movable, SetPoints, Protocol):
 
 @dataclass
 class Track:
-    """What the controller said while it was read."""
+    """What the controller reported while it was read."""
 
     blocks: list[Block] = field(default_factory=list[Block])
 

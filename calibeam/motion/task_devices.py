@@ -60,13 +60,13 @@ class TaskDevices:
 
 
 class OutputHand:
-    """GRASP and RELEASE by a digital output of the controller, whose stream says whether it has switched."""
+    """GRASP and RELEASE by a digital output of the controller, whose stream reports whether it has switched."""
 
     def __init__(self, hand: Hand, outputs: UrOutputs, robot: StreamedRobot) -> None:
         self._hand, self._outputs, self._robot = hand, outputs, robot
 
     def act(self, action: str) -> None:
-        """Returns once the output has switched. DeviceRefused where it does not, or the controller does not say."""
+        """Returns once the output has switched. DeviceRefused where it does not, or nothing reports it."""
         level = self._hand.closed if action == GRASP else not self._hand.closed
         self._outputs.switch(self._hand.bit, level)
         deadline_s = self._robot.clock.now_s() + SWITCHED_S

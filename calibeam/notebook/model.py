@@ -1,4 +1,4 @@
-"""An identified arm in a notebook: its numbers with their doubt, as tables and as an arm that computes."""
+"""An identified arm in a notebook: its numbers with their uncertainty, as tables and as an arm that computes."""
 
 import math
 import warnings
@@ -27,7 +27,7 @@ Frame = Literal["robot", "world"]  # of sigmas: the robot's own base frame, or t
 
 @dataclass(frozen=True)
 class Model:
-    """An identified arm: numbers with their doubt. `file` holds everything that model.json does."""
+    """An identified arm: numbers with their uncertainty. `file` holds everything that model.json does."""
 
     file: "ModelFile"
     trust: str  # "yes", "with care" or "no"; "unknown" where the model was opened without its session
@@ -80,9 +80,10 @@ class Model:
     ) -> Floats:
         """(pose, 6) one sigma of `flange`: m along x, y, z of the base, rad about them. NaN without a covariance.
 
-        In the frame "robot": doubt of geometry and physics, as seen from the base frame that lies best on the arm over
-        its joint limits; where the base stands and how it is turned is no part of it. In the frame "world" that counts,
-        too: where only a device of unknown place has seen the arm, it is most of it. Without noise of any instrument.
+        In the frame "robot": uncertainty of geometry and physics, as seen from the base frame that lies best on the arm
+        over its joint limits; where the base stands and how it is turned is no part of it. In the frame "world" that
+        counts, too: where only a device of unknown place has seen the arm, it is most of it. Without noise of any
+        instrument.
         """
         return self._placed(q_rad, conditions, same_session, frame).flange_sigma
 

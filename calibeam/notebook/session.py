@@ -57,7 +57,8 @@ class Session:
     fit = identify  # what other libraries call it
 
     def diagnose(self) -> "DiagnosisFile":
-        """What the model lacks: `verdict`, `findings` with size and doubt, `next`; fields are those of diagnosis.json.
+        """What the model lacks: `verdict`, `findings` with size and uncertainty, `next`; fields are those of
+        diagnosis.json.
 
         DataError where the recording holds too little.
         """

@@ -44,7 +44,7 @@ def verdict_words(answers: Answers) -> Iterator[str]:
 
 
 def evidence_lines(evidence: Evidence) -> list[str]:
-    """Held-out error, observability, free space, bootstrap; what was not asked for is not spoken of."""
+    """Held-out error, observability, workspace, bootstrap; what was not asked for is left out."""
     out = [_held_out(unseen) for unseen in evidence.proven.held_out]
     out += [f"no proof ({why})" for why in evidence.proven.unproven]
     if evidence.observability is not None:

@@ -48,7 +48,7 @@ class Outlook:
         self._stage = Stage.FAULTS
 
     def enter(self, stage: Stage, now_s: float) -> None:
-        """A stage begins: what the ones before it took says how long all of them will."""
+        """A stage begins: what the ones before it took gives how long all will take."""
         done = _share_before(stage)
         if done > 0.0:
             self._whole_s = (now_s - self.begun_s) / done

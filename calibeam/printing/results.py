@@ -17,11 +17,13 @@ from calibrate.report.diagnosis.words import (
     verdict_words,
 )
 
-MOST = 8  # of what is only told by the way; all of it stands in the file
+MOST = 8  # of what is of less weight; all of it stands in the file
 
 
 def print_diagnosis(console: Console, file: DiagnosisFile, *, verbose: bool = False) -> None:
-    """Verdict first, then what decides; `verbose`: all causes and rivals, clocks, what was not recorded, the proof."""
+    """Verdict first, then what decides; `verbose`: all causes and alternatives, clocks, what was not recorded, the
+    proof.
+    """
     console.print(f"[bold]{verdict_words(file)}[/bold]", highlight=False)
     if verbose:
         _print_details(console, file)
@@ -34,7 +36,7 @@ FEW, CAUSES, RIVALS = 2, 3, 1  # of a kind, of causes, of other names for one
 
 
 def _brief(file: DiagnosisFile) -> Iterator[str]:
-    """Causes with their best rival, what is unexplained, unseen rows before and after, what to do next."""
+    """Causes with their best alternative, what is unexplained, unseen rows before and after, what to do next."""
     yield from _few([f"fault of the file: {blunder.says}" for blunder in file.blunders])
     for number, finding in enumerate(file.findings[:CAUSES], start=1):
         yield from list(_finding(number, finding))[: 2 + RIVALS]

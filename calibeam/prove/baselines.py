@@ -116,7 +116,7 @@ class GaussianProcess:
         module: Any = import_module("sklearn.gaussian_process")
         kernels: Any = import_module("sklearn.gaussian_process.kernels")
         wide = float(np.sqrt(X.shape[1]))
-        # Bounds so wide that they decide nothing: a length that runs off says "no structure".
+        # Bounds so wide that they decide nothing: a length that runs off means "no structure".
         kernel = kernels.ConstantKernel(1.0, (1e-6, 1e4)) * kernels.RBF(wide, (1e-2 * wide, 1e3 * wide))
         kernel += kernels.WhiteKernel(1.0, (1e-3, 1e4))
         columns: list[Floats] = []

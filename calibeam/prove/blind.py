@@ -16,7 +16,7 @@ FORBIDDEN = "simulators"
 
 
 class NoSimulators:
-    """Import hook: a diagnosis that could draw the world anew would prove nothing."""
+    """Import hook: a diagnosis that could draw the world again would prove nothing."""
 
     def find_spec(
         self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
@@ -28,7 +28,7 @@ class NoSimulators:
 
 
 def answer(recording: Path, asked: Path, out: Path) -> None:
-    """Writes diagnosis.json and, where both models say it, unseen.npz with the tool at the poses asked."""
+    """Writes diagnosis.json and, where both models have it, unseen.npz with the tool at the poses asked."""
     from acquisition.recording import read
     from calibeam.prove.unseen import read_asked, tool_at, write_unseen
     from calibeam.results.diagnosis import diagnose_recording
@@ -55,7 +55,7 @@ def forget(physics: Sequence[str]) -> None:
 
 
 def main(without: Sequence[str]) -> None:
-    """Until standard input ends. A case that fails says why, and the next one is taken."""
+    """Until standard input ends. A case that fails gives the reason, and the next one is taken."""
     sys.meta_path.insert(0, NoSimulators())
     if without:
         forget(without)

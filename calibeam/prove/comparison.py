@@ -81,7 +81,7 @@ def oracle_terms(state: Fitted, defects: Sequence[TrueDefect], family: str) -> t
 
 
 def said_terms(state: Fitted, findings: Sequence[FindingRecord]) -> tuple[Accepted, ...] | None:
-    """The terms behind the findings of a file, fitted anew. None where one of them cannot be told from its words."""
+    """The terms behind the findings of a file, fitted again. None where the words of one are of no term."""
     for finding in findings:
         best = _best(state, [t for t in state.candidates() if _is_said(t, finding)], 0.0)
         if best is None:
@@ -143,14 +143,14 @@ class Compared:
 
     before_m: float
     oracle_m: float
-    free_space_m: float | None  # of the oracle; None where its terms say nothing of other poses
+    free_space_m: float | None  # of the oracle; None where its terms do not hold at other poses
     baselines: tuple[BaselineScore, ...]
 
 
 def compare(recording: Path, answer: Path, asked: Path, truth: Truth, family: str) -> Compared | None:
     """None where the catalogue does not hold what was hidden, so that there is no oracle.
 
-    `asked`: the poses at which the truth says where the tool is.
+    `asked`: the poses at which the truth has the place of the tool.
     """
     source = read(recording)
     state = fit_geometry(session_of(source.rig, source.samples))
@@ -209,7 +209,7 @@ def _rival(method: Method, rest: _Rest) -> BaselineScore:
 
 
 def _tame(misfit: Floats) -> Floats:
-    """Wild rows cut to six sigmas: the learners have no robust loss, and are not to lose by that."""
+    """Gross errors cut to six sigmas: the learners have no robust loss, and are not to lose by that."""
     return np.clip(misfit, -6.0, 6.0)
 
 
@@ -257,7 +257,7 @@ def _worth_it(case: CaseScore) -> bool:
 
 
 def _compared(order: tuple[Layout, str, Truth, str]) -> Compared | None:
-    """None where a recording cannot be fitted at all: the diagnosis has said so already."""
+    """None where a recording cannot be fitted at all: the diagnosis has reported it already."""
     layout, name, truth, family = order
     try:
         return compare(layout.recording(name), layout.answer(name), layout.asked(name), truth, family)

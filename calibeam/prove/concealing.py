@@ -139,7 +139,7 @@ def _record(wired: Wired, path: Path, pace: float) -> None:
 
 
 def _taken(recording: Recording) -> Taken:
-    """ConcealError where the recording does not say when its samples were taken."""
+    """ConcealError where the recording has no times of its samples."""
     samples, windows = recording.samples, sample_windows(recording)
     if windows is None:
         raise ConcealError("the session on the wires took no sample, or recorded no times")

@@ -64,7 +64,7 @@ def faults(case: CaseScore) -> list[str]:
 
 
 def misses(proof: ProofFile) -> Iterator[str]:
-    """Case, what was hidden, what was said, what is wrong with that."""
+    """Case, what was hidden, what was reported, what is wrong with that."""
     for case in proof.cases:
         wrong = faults(case)
         if wrong:

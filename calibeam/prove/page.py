@@ -91,7 +91,7 @@ MARGIN_IN = 2.2
 
 
 def confusion(cases: Sequence[CaseScore]) -> tuple[list[str], list[str], NDArray[np.int64]]:
-    """Words hidden, words said, counts. Of cases with none or one cause; several at once have no single answer."""
+    """Names hidden, names reported, counts. Of cases with none or one cause; several at once have no single answer."""
     pairs: Counter[tuple[str, str]] = Counter()
     for case in cases:
         if case.kind in SINGLE and case.defects and case.defects[0].enr >= PLAIN:
@@ -105,7 +105,7 @@ def confusion(cases: Sequence[CaseScore]) -> tuple[list[str], list[str], NDArray
 
 
 def _said(case: CaseScore) -> str:
-    """The right word where it was said at the right place, else the largest finding's."""
+    """The right name where it was reported at the right place, else the largest finding's."""
     if any(d.named for d in case.defects):
         return case.defects[0].physics
     if case.error:

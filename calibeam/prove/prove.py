@@ -32,7 +32,7 @@ class Plan:
     seed: int
     cases: int
     jobs: int
-    without: tuple[str, ...] = ()  # physics that is taken out of the catalogue, to see what is said then
+    without: tuple[str, ...] = ()  # physics that is taken out of the catalogue, to see what is reported then
     wired: int = 0  # further cases, whose recordings come over emulated wires
     compare: int = 0  # cases for which the oracle and other methods are asked, too
 

@@ -83,7 +83,7 @@ Ints = NDArray[np.intp]
 STARTS = 48  # over the range of the joint: arms may reach a point with an angle far off
 STEPS = 12
 SETTLED_RAD = 1e-9
-FAINT_RAD = 0.01  # by which an angle has to be known: the target of a joint beside it says nothing
+FAINT_RAD = 0.01  # by which an angle has to be known: the target of a joint beside it shows nothing
 SEED = 5
 
 
@@ -96,7 +96,7 @@ class HiddenAngle:
     rms_rad: float | None  # inferred less recorded; None where no pose feels the joint
     expected_rad: float | None  # from what the model misses at other unseen poses, and how the joint is felt
     unfelt: int  # poses at which the target stands next to the joint's axis: left out
-    misses: tuple[float, ...] = ()  # inferred less recorded over the doubt stated of that pose, in order of poses
+    misses: tuple[float, ...] = ()  # inferred less recorded over the sigma stated of that pose, in order of poses
 
 
 def hidden_angles(recording: Recording) -> tuple[HiddenAngle, ...]:
@@ -129,7 +129,7 @@ def _misfit(state: Fitted, unseen: Ints) -> float:
 
 
 def _hidden(state: Fitted, test: Ints, joint: int, misfit: float) -> HiddenAngle:
-    """`misfit`: known from other poses, for the doubt of an angle may not hang on the angle that is hidden."""
+    """`misfit`: known from other poses, for the uncertainty of an angle may not hang on the angle that is hidden."""
     chain, values, observed, q_rad = _at(state, test)
     limits = state.session.rig.arm.joints[joint]
     found = _inferred(chain, values, observed, q_rad, joint, (limits.lower_rad, limits.upper_rad))
@@ -175,7 +175,7 @@ MOST_SAMPLES = 1000  # of a long session: every n-th row, over the whole of its 
 
 
 class RealScore(msgspec.Struct, frozen=True):
-    """One set. Nobody knows the truth of it: error on unseen samples, and hidden columns, are all that counts."""
+    """One set. Its truth is unknown: error on unseen samples, and hidden columns, are all that counts."""
 
     name: str
     samples: int
@@ -331,7 +331,7 @@ def _paint(figure: Figure, angles: Sequence[HiddenAngle]) -> None:
 
 
 def _room(one: RealScore) -> list[Html]:
-    """What was said without the room's temperature, where the file has it."""
+    """What was reported without the room's temperature, where the file has it."""
     if one.blind is None or one.diagnosis is None:
         return []
     with_it, without = ([f"{f.physics} at {f.where}" for f in file.findings] for file in (one.diagnosis, one.blind))

@@ -12,7 +12,7 @@ SCHEMA = 1
 UNKNOWN = "unknown"
 DIAGNOSIS = "diagnosis"  # among the methods that are compared
 PLAIN = 0.6  # effect over noise from which a cause has to be found and named
-CONFIDENT = 0.9  # a name with less is a suspicion, and said as one
+CONFIDENT = 0.9  # a name with less is a suspicion, and reported as one
 
 
 class ProofRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -44,8 +44,8 @@ class DefectScore(ProofRecord, frozen=True):
     equivalent: str  # why another word for the place is as good; mostly empty
     named: bool  # place and physics, as first choice
     driver: bool  # and what it depends on
-    among_rivals: bool  # named, or among what was said to be as good
-    unknown_there: bool  # said at its place: a cause without a name
+    among_rivals: bool  # named, or among what was reported to be as good
+    unknown_there: bool  # reported at its place: a cause without a name
     sizes: tuple[SizeScore, ...] = ()
 
 
@@ -62,7 +62,7 @@ class NamedCause(ProofRecord, frozen=True):
 
     @property
     def misnamed(self) -> bool:
-        """A name of physics, believed, for what was not hidden there."""
+        """A name of physics, reported as certain, for what was not hidden there."""
         return self.physics != UNKNOWN and self.confidence >= CONFIDENT and not self.right
 
 
@@ -109,7 +109,9 @@ class CaseScore(ProofRecord, frozen=True):
 
     @property
     def alarmed(self) -> bool:
-        """Something is claimed: a finding, or structure without one, which counts as said where something is hidden."""
+        """Something is claimed: a finding, or structure without one, which counts as reported where something is
+        hidden.
+        """
         return bool(self.said) or self.unexplained
 
     @property
@@ -126,7 +128,7 @@ class ProofFile(ProofRecord, frozen=True):
     seed: int
     development: bool  # the seed is one that development may have seen: no figure for the public
     command: str
-    published: str  # SHA-256 of the list of hashes, told before anything was diagnosed
+    published: str  # SHA-256 of the list of hashes, printed before anything was diagnosed
     wall_s: float
     cases: tuple[CaseScore, ...]
     without: tuple[str, ...] = ()  # physics that was taken out of the catalogue: those cases count as unlisted ones

@@ -43,7 +43,7 @@ DEFECTS: dict[Kind, tuple[str, ...]] = {
     "encoders": ("any",),
 }
 ENR = (0.15, 8.0)  # effect over noise: from hardly there to plain
-ENR_OF: dict[Kind, tuple[float, float]] = {  # one that must be noticed before anything can be said of it
+ENR_OF: dict[Kind, tuple[float, float]] = {  # one that must be noticed before it can be named
     "three": (0.6, 4.0),
     "eighteen": (0.6, 3.0),
     "outside": (0.6, 5.0),
@@ -82,7 +82,7 @@ class Mix:
 
 @dataclass(frozen=True)
 class Scenario:
-    """One case before it is drawn. The name says nothing of what is in it."""
+    """One case before it is drawn. Its name gives nothing away."""
 
     name: str
     kind: Kind
@@ -130,7 +130,7 @@ def wired_scenario(mix: Mix, seed: int, number: int, attempt: int) -> Scenario:
 
 
 def _with_encoders(wanted: Wanted, rng: Generator) -> Wanted:
-    """Second encoders on any side of the gear, which the rig file says or not; some sessions have only their zeros."""
+    """Second encoders on any side of the gear, stated in the rig file or not; some sessions have only their zeros."""
     nothing = wanted.defects == ("any",) and rng.random() < NO_FAULT
     return replace(
         wanted,
@@ -167,7 +167,7 @@ def _noise(kind: Kind, rng: Generator) -> Noise:
 
 
 def _seed(seed: int, number: int, attempt: int) -> int:
-    """Never one of the development seeds, and nothing that a recording could be told by."""
+    """Never one of the development seeds, and nothing that a recording could be recognised by."""
     digest = hashlib.sha256(f"calibeam proof {seed} {number} {attempt}".encode()).digest()
     return DEVELOPMENT + int.from_bytes(digest[:6], "big")
 

@@ -1,13 +1,13 @@
 """Scores one case: what was reported against what was hidden.
 
-Places that no measurement of these instruments can tell apart count as one; each such rule has its reason. The rules
-are few on purpose: where a diagnosis may say "or", it has to name the alternative itself.
+Places that no measurement of these instruments can separate count as one; each such rule has its reason. The rules
+are few on purpose: where a diagnosis may answer "or", it has to name the alternative itself.
 
 The noise that no model can explain is known, because the concealing side keeps the exact readings.
 
-Error in free space is where the model puts the tool against where it truly is. Where the base frame stands is nobody's
-error, so the best rigid motion between both is taken out first. A beam has no point that is its own: its error is the
-distance of the true beam's points, at working distances, from the reported line.
+Error over the workspace is where the model puts the tool against where it truly is. Where the base frame stands is
+nobody's error, so the best rigid motion between both is taken out first. A beam has no point that is its own: its error
+is the distance of the true beam's points, at working distances, from the reported line.
 """
 
 import re
@@ -35,7 +35,7 @@ from calibrate.diagnose.schema import DiagnosisFile, FindingRecord, NameRecord
 class Rule:
     """Two names of one place."""
 
-    holds: Callable[[str, str, str], bool]  # true port, said port, family
+    holds: Callable[[str, str, str], bool]  # true port, reported port, family
     reason: str
     names: frozenset[str] = frozenset()  # of causes at these places that are as equal as the places
 
@@ -59,14 +59,14 @@ RULES = (
 
 
 def same_place(true: str, said: str, family: str) -> str | None:
-    """Why the said port is the true one: "" the same word, else the reason of the rule; None: it is another."""
+    """Why the reported port is the true one: "" the same word, else the reason of the rule; None: it is another."""
     if true == said:
         return ""
     return next((rule.reason for rule in RULES if rule.holds(true, said, family)), None)
 
 
 def same_name(true: str, said: str, why: str) -> bool:
-    """Whether two names are those of one cause, to every reading; `why` as told by `same_place`."""
+    """Whether two names are those of one cause, to every reading; `why` as given by `same_place`."""
     return true == said or any(rule.reason == why and {true, said} <= rule.names for rule in RULES)
 
 
@@ -147,11 +147,11 @@ def _rms(errors: Floats) -> float:
 
 
 FAILED = "failed"
-TIED = 0.5  # of BIC: told as equal
+TIED = 0.5  # of BIC: reported as equal
 
 
 def score(layout: Layout, concealed: Concealed, answered: Answered, truth: Truth) -> CaseScore:
-    """Of an opened seal and an answer; a diagnosis that did not end has said nothing."""
+    """Of an opened seal and an answer; a diagnosis that did not end has reported nothing."""
     drawn, wanted = concealed.scenario, concealed.scenario.wanted
     file = None if answered.error else read_diagnosis(layout.answer(drawn.name) / "diagnosis.json")
     own = _own(truth.defects, () if file is None else file.findings, wanted.family)
@@ -213,7 +213,7 @@ def _worth(defect: TrueDefect, finding: FindingRecord, family: str) -> float:
 
 
 def _left_over(file: DiagnosisFile | None) -> tuple[str, ...]:
-    """Places of what was said to be unexplained."""
+    """Places of what was reported as unexplained."""
     if file is None:
         return ()
     return tuple(u.where for u in (file.unexplained, *file.also_unexplained) if u is not None)
@@ -243,7 +243,7 @@ def _defect(defect: TrueDefect, findings: Sequence[FindingRecord], left: Sequenc
 
 
 def _as_good(finding: FindingRecord, defect: TrueDefect, why: str) -> bool:
-    """A name that no reading can tell from the true one, if the answer says itself that it could be that."""
+    """A name that no reading can separate from the true one, if the answer states itself that it could be that."""
     tied = any(r.physics == defect.physics and r.margin < TIED for r in finding.rivals)
     return same_name(defect.physics, finding.physics, why) and tied
 
@@ -282,7 +282,7 @@ def _said(finding: FindingRecord, truth: Truth, family: str) -> NamedCause:
 
 
 def _asks_for(file: DiagnosisFile, truth: Truth, defects: tuple[DefectScore, ...]) -> bool:
-    """Doubt, and the missing column by name; or the right cause without it."""
+    """No certain name, and the missing column by name; or the right cause without it."""
     if not truth.withheld:
         return False
     if all(d.named for d in defects):

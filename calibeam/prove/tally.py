@@ -176,7 +176,7 @@ def at_once(cases: Sequence[CaseScore], kind: str) -> TallyLine:
 
 
 def in_streams(cases: Sequence[CaseScore]) -> TallyLine:
-    """All faults that streams tell, together."""
+    """All faults that streams show, together."""
     return _line("faults found in streams", [c for c in cases if c.kind == "streams"])
 
 
@@ -263,7 +263,7 @@ def _gains(label: str, gains: Sequence[float | None]) -> ProofFigure:
 
 
 def _said_unknown(case: CaseScore) -> bool:
-    """And nothing else believed beside it."""
+    """And nothing else reported as certain beside it."""
     return not case.misnamed and (case.unexplained or all(d.unknown_there for d in case.defects))
 
 

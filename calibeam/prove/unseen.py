@@ -39,7 +39,7 @@ Tool = Floats | LaserBeam  # tip (pose, 3) m in the base frame, or the laser's b
 
 
 def tool_at(state: Fitted, q_rad: Floats, approach: Floats) -> Tool | None:
-    """By one model. None where one of its terms cannot be said at poses other than those measured."""
+    """By one model. None where one of its terms cannot be evaluated at poses other than those measured."""
     session, n_arm = state.session, len(state.session.arm.parameters)
     nothing = Perturbation.none(*q_rad.shape)
     frames = perturbed_frames(session.arm, state.geometry[:n_arm], q_rad, nothing)

@@ -161,7 +161,7 @@ class ComparisonFile(msgspec.Struct, frozen=True):
 FEWEST = 20  # samples of a search; fewer hold no more than the geometry
 READING = tuple(reading.link for reading in READINGS)
 EXPLAINED = (*READING, "encoders")  # links whose differences are asked of the model
-CLEAR = 5.0  # sigmas of a time that is told
+CLEAR = 5.0  # sigmas of a time that is reported
 LENGTH_OR_ANGLE = re.compile(r"_(m|rad)(?: [0-9]+)?$")
 LATENCY = "latency"
 SHORTEST_S = 1e-4  # of a device that comes later: below, the motion does not show it
@@ -170,7 +170,7 @@ SAYS = {"rad": angle, "m": length}  # how a person reads a size
 
 @dataclass(frozen=True, eq=False)
 class _Asked:
-    """What a search gave; `beside` None: it was not made, and `why` says why."""
+    """What a search gave; `beside` None: it was not made, and `why` has the reason."""
 
     beside: Beside | None
     readings: tuple[ReadingRecord, ...]
@@ -241,7 +241,7 @@ def _refuse_wrong(recording: Recording) -> None:
     try:
         wrong = wrong_file(recording.rig, recording.samples)
     except (DataError, np.linalg.LinAlgError):
-        return  # joints alone, or another arm: no reading tells which convention was meant
+        return  # joints alone, or another arm: no reading shows which convention was meant
     if wrong:
         raise DataError(f"{recording.path}: {'; besides, '.join(blunder.says for blunder in wrong)}")
 
@@ -457,7 +457,7 @@ def _of_noise(one: NoiseDifference) -> Mismatch:
 
 
 def _as_explained(one: Parted, asked: _Asked, explained: bool) -> Parted:
-    """After a search a reading parts where it found something; noise is what it found, not what was believed."""
+    """After a search a reading parts where it found something; noise is what it found, not what was assumed."""
     if asked.beside is None or one.link not in EXPLAINED:
         return one
     if not explained:

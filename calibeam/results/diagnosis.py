@@ -1,4 +1,4 @@
-"""From a recording to diagnosis.json: where it parts from what the model predicts, and why."""
+"""From a recording to diagnosis.json: where it disagrees with the model, and why."""
 
 from collections.abc import Callable
 from functools import partial
@@ -111,7 +111,8 @@ def _with_streams(file: DiagnosisFile, recording: Recording, found: Diagnosed) -
 
 
 def plan_next(found: Diagnosed, path: Path) -> str:
-    """The poses that separate the rivals of a diagnosis as a plan at `path`; a sentence about it, or why there is none.
+    """The poses that separate the alternatives of a diagnosis as a plan at `path`; a sentence about it, or why there is
+    none.
 
     OSError where it cannot be written.
     """

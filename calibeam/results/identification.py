@@ -1,6 +1,6 @@
 """From any recording or session folder to a model of the arm and the verdict on it, whatever instruments it holds.
 
-For a script an identification ends good, partial, or failed with one sentence that says where and why.
+For a script an identification ends good, partial, or failed with one sentence that states where and why.
 """
 
 from collections.abc import Generator, Sequence
@@ -42,7 +42,7 @@ def naming_source(source: Path) -> Generator[None]:
 
 
 def refuse_undetermined(status: Status, estimates: Sequence[Estimate]) -> None:
-    """DataError where a fit that came to its end determines not one parameter: its model would say nothing."""
+    """DataError where a fit that came to its end determines not one parameter: its model would hold nothing."""
     if status is Status.NOT_FINITE:
         raise DataError(f"nothing can be identified: {status.value}")
     if status not in UNFINISHED and estimates and all(estimate.value is None for estimate in estimates):
@@ -75,7 +75,7 @@ class Planned:
 def identify_session(
     recording: Recording, planned: Planned | None = None, bootstrap_rounds: int | None = None
 ) -> Identification:
-    """The arm by all instruments of the recording. DataError when it holds nothing to fit, or is a blunder as such."""
+    """The arm by all instruments of the recording. DataError when it holds nothing to fit, or is wrong as a whole."""
     plan = DEFAULT if planned is None else planned.plan
     rng = np.random.default_rng(plan.seed)
     return identify(recording.rig, recording.samples, rng=rng, plan=plan, bootstrap_rounds=bootstrap_rounds)
@@ -128,7 +128,7 @@ class JudgedModel:
 
 
 def identify_and_judge(recording: Recording, planned: Planned | None = None) -> JudgedModel:
-    """Identify as `calibeam identify` does. DataError where nothing can be identified, or the file is a blunder."""
+    """Identify as `calibeam identify` does. DataError where nothing can be identified, or all of the file is wrong."""
     result = identify_session(recording, planned)
     refuse_undetermined(result.status, result.estimates)
     known = session_evidence(recording, session_model(result, recording, planned))

@@ -1,7 +1,7 @@
 """A simulation brought to agree with a recording: compared, diagnosed, replayed with what was found, compared again.
 
 Rows are split by pose, so that repeats stay together: the diagnosis sees three quarters, and how far the simulation is
-away, before and after, is told on the others. The two comparisons take all rows. reconcile.json, version 1, is
+away, before and after, is measured on the others. The two comparisons take all rows. reconcile.json, version 1, is
 described in docs/formats.md.
 """
 
@@ -76,7 +76,7 @@ class UnseenRecord(msgspec.Struct, frozen=True):
 
 
 class LeftOut(msgspec.Struct, frozen=True):
-    """What the simulation lacks, as `before` or the diagnosis says it."""
+    """What the simulation lacks, as `before` or the diagnosis reports it."""
 
     where: str
     physics: str

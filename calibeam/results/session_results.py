@@ -39,7 +39,8 @@ def write_recording_report(
     against: Calibration | None = None,
     interactive: bool = False,
 ) -> Answers:
-    """The report at `path`; without a model the recording is identified anew, without a plan. Returns its first screen.
+    """The report at `path`; without a model the recording is identified again, without a plan. Returns its first
+    screen.
 
     A diagnosis adds pages, an earlier calibration of the same arm (`against`) a chapter on what has changed since,
     `interactive` figures that can be turned. DataError where the recording holds nothing to fit, the model is not of
@@ -67,7 +68,7 @@ def write_session_results(recording_path: Path, console: Console) -> Identificat
 
 @contextmanager
 def recording_kept(recording_path: Path) -> Generator[None]:
-    """Whatever ends what follows a recording, the recording is whole: PartialResult says so and how to go on."""
+    """Whatever ends what follows a recording, the recording is whole: PartialResult states it and how to go on."""
     try:
         yield
     except (KeyboardInterrupt, DataError, OSError) as why:

@@ -33,7 +33,7 @@ Floats = NDArray[np.float64]
 PLACE = "{samples}"
 TIMEOUT_S = 60.0
 SHOWN = 300  # characters of what a program that failed has written
-INPUTS = ("placement", "first_psd", SEAT, BAR, "target")  # said of a reading, not read
+INPUTS = ("placement", "first_psd", SEAT, BAR, "target")  # stated of a reading, not read
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ def _refuse_seated(samples: Samples) -> None:
 
 
 def reading_columns(samples: Samples) -> tuple[str, ...]:
-    """Columns of instruments in the samples, in their order; what is said of a reading beside it is an input."""
+    """Columns of instruments in the samples, in their order; what is stated of a reading beside it is an input."""
     instruments = {name for kind in SENSORS for name in (*kind.columns, *kind.reads)} - {*INPUTS, BAR_END}
     instruments |= set(per_joint("enc", "_rad", samples.n_joints))
     beside = ("_sum_v", "_sigma_m")  # of a detector: light and scatter, which no simulation is asked for

@@ -1,7 +1,7 @@
 """What a session's samples determine so far, and how many more of its poses make it accurate enough.
 
-The error is that of the beam in free space, as the covariance of the fit so far predicts it: the same fit, noise and
-target as identification and pose design have (calibrate/identification, calibrate/pose_design), at the values and
+The error is that of the beam over the workspace, as the covariance of the fit so far predicts it: the same fit, noise
+and target as identification and pose design have (calibrate/identification, calibrate/pose_design), at the values and
 under the noise found so far. For what these samples do not determine the reason is given instead of a number.
 
 Postures still to come are those of the nominal rig; a pose out of reach is left out here and reported by the drawing
@@ -108,7 +108,7 @@ class Forecast:
     now_m: float | None = None  # None: not determined, see `why`
     more: int | None = None  # poses of the plan until the goal, 0: reached; None: not by this plan
     end_m: float | None = None  # when all of the plan is taken
-    why: str = ""  # nothing can be said yet
+    why: str = ""  # no number yet
     corrections: dict[str, float] | None = None  # fitted values by parameter name
 
     @property
@@ -126,7 +126,7 @@ class Forecast:
 
 
 def forecast(rig: Rig, taken: list[Sample], ahead: Candidates, goal_m: float) -> Forecast:
-    """Of samples taken, and poses still to be taken in this order. A fit that fails is told, never raised."""
+    """Of samples taken, and poses still to be taken in this order. A fit that fails is reported, never raised."""
     nothing = Forecast(len(taken), goal_m)
     if not taken:
         return replace(nothing, why="no pose yet")
@@ -180,7 +180,7 @@ def _information(
         target.by[:, free] * size,
         target.by_scale[free] * size,
         target.says,
-        np.zeros((len(free), 0)),  # what nothing shows and moves the target forbids a number: `seen` tells
+        np.zeros((len(free), 0)),  # what nothing shows and moves the target forbids a number: see `seen`
     )
     return found, seen, np.linalg.norm(target.by[:, free] @ seen.unseen, axis=0)
 
@@ -241,7 +241,7 @@ class Asked:
 
 
 class Forecaster:
-    """One thread; `make` computes and tells. What it raises is told to `failed`, once, and no more is made."""
+    """One thread; `make` computes and reports. What it raises goes to `failed`, once, and no more is made."""
 
     def __init__(self, make: Callable[[Asked], None], failed: Callable[[Exception], None]) -> None:
         self._make, self._failed = make, failed

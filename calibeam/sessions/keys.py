@@ -51,7 +51,7 @@ class KeyStream:
         return text.removesuffix(self._begun).replace(ESC, "")
 
 
-LISTEN_S = 0.2  # between two times at which a stop that was not heard is said again
+LISTEN_S = 0.2  # between two times at which a stop that was not heard is sent again
 END = 0  # beside the numbers of signals
 ENDED_BY = {signal.SIGTERM: "SIGTERM", signal.SIGHUP: "the terminal was closed"}
 ENTER = "\n"
@@ -66,7 +66,7 @@ class _Question:
 
 
 class Keys:
-    """What was pressed, told to the run control; or to who asks, while somebody does."""
+    """What was pressed, handed to the run control; or to who asks, while somebody does."""
 
     def __init__(self, control: RunControl, terminal: int | None, clock: Clock | None = None) -> None:
         """`terminal`: file descriptor that keys are read from."""

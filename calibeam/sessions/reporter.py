@@ -70,7 +70,7 @@ class StatusReporter:
         )
 
     def undelivered(self, trouble: DeviceError | None) -> None:
-        """From the run control: the arm could not be told to stop; None: now it was, or it need not be."""
+        """From the run control: the arm could not be stopped; None: now it was, or it need not be."""
         with self._turn:
             self._now(undelivered="" if trouble is None else str(trouble))
             told = "no stop is outstanding any more" if trouble is None else f"{UNDELIVERED.upper()}: {trouble}"
@@ -120,7 +120,7 @@ class StatusReporter:
 
 
 class ReportingJournal:
-    """Implements acquisition.session.records.Journal: what goes into the recording is told as well."""
+    """Implements acquisition.session.records.Journal: what goes into the recording is reported as well."""
 
     def __init__(self, journal: Journal, reporter: StatusReporter, took: Callable[[list[Sample]], None]) -> None:
         """`took`: all samples so far, after each."""

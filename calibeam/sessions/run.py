@@ -110,7 +110,7 @@ class OnSite:
             raise PartialResult(f"{reason}; what was taken is kept in {self._job.out}; {GO_ON}") from why
 
     def _devices(self) -> None:
-        """One line each; goes on when all are good, or a person says so. DeviceRefused where one cannot be had."""
+        """One line each; goes on when all are good, or a person decides so. DeviceRefused where one cannot be had."""
         self.reporter.step("device check")
         if self._job.addresses.hurry != 1.0:
             self.reporter.report("emulators at another pace than real time: their devices are not judged")
@@ -156,7 +156,7 @@ class OnSite:
         return answer == "g"
 
     def _again(self) -> EarlierParts:
-        """After a failure every device is connected anew, and asked for, into a further recording."""
+        """After a failure every device is connected again, and asked for, into a further recording."""
         self._devices()
         return self._since(read_earlier_parts(self._job.out, self._job.rig), stands=False)
 

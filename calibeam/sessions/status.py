@@ -29,7 +29,7 @@ class Pace:
         self._poses = 0
 
     def work(self, working: bool) -> None:
-        """The arm works from now on, or it waits. Said again, it changes nothing."""
+        """The arm works from now on, or it waits. Reported again, it changes nothing."""
         if working and self._since_s is None:
             self._since_s = self._clock.now_s()
         elif not working and self._since_s is not None:
@@ -41,7 +41,7 @@ class Pace:
         self._poses += 1
 
     def left_s(self, poses: int) -> float | None:
-        """For so many more; None while nobody can tell."""
+        """For so many more; None while it is unknown."""
         if self._poses < ENOUGH:
             return None
         running_s = 0.0 if self._since_s is None else self._clock.now_s() - self._since_s
@@ -107,7 +107,7 @@ UNDELIVERED = "stop not delivered, press the red emergency stop"
 
 @dataclass(frozen=True)
 class SessionStatus:
-    """None: nothing to say yet."""
+    """None: nothing yet."""
 
     state: RunState = RunState.IDLE
     step: str = ""  # "4 of 7  measure"
@@ -116,7 +116,7 @@ class SessionStatus:
     quality: Quality | None = None
     forecast: Forecast | None = None
     asked: str = ""  # what a person is waited for
-    undelivered: str = ""  # why the arm could not be told to stop
+    undelivered: str = ""  # why the arm could not be stopped
 
     @property
     def head(self) -> str:
@@ -131,7 +131,7 @@ class SessionStatus:
 
 
 class Listener(Protocol):
-    """Terminal, log file or page. Told from several threads, one at a time; never raises."""
+    """Terminal, log file or page. Called from several threads, one at a time; never raises."""
 
     def report(self, text: str, on_screen: bool) -> None:
         """One line; those that are not for the screen stand in the log alone."""

@@ -94,7 +94,7 @@ class LogFile:
             file.write(lines)
 
     def shows(self, shown: SessionStatus) -> None:
-        """A log holds what was said."""
+        """A log holds what was reported."""
 
 
 REFRESH_HZ = 4.0

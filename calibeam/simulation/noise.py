@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """One sigma by column, of the joints' repeatability, and of a probe in its cone; zero: nobody knows of any."""
+    """One sigma by column, of the joints' repeatability, and of a probe in its cone; zero: none is known."""
 
     sigma: Mapping[str, float]
     joint_rad: float
