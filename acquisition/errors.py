@@ -18,7 +18,7 @@ class UnreachableError(AcquisitionError):
 
 
 class StoppedError(AcquisitionError):
-    """A person said stop; the arm is held, and what was recorded is kept."""
+    """A person stopped it; the arm is held, and what was recorded is kept."""
 
 
 class TaskError(AcquisitionError):
@@ -33,4 +33,4 @@ class RefusedMotionError(UnreachableError):
 
 
 class InterruptedMotionError(AcquisitionError):
-    """A motion under way was aborted, or could not be streamed in time; the arm was told to stop."""
+    """A motion under way was aborted, or could not be streamed in time; the arm has the stop command."""

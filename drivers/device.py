@@ -91,7 +91,7 @@ class StreamDevice(ABC, Generic[LineT]):
         """End the stream as far as the line still carries it, and free the line. Raises nothing for a dead line."""
 
     def connect(self) -> None:
-        """Open the line and begin the stream, anew if it was open. DeviceLost, DeviceStale, DeviceRefused."""
+        """Open the line and begin the stream, again if it was open. DeviceLost, DeviceStale, DeviceRefused."""
         self.close()
         line = self._line = self._open()
         try:

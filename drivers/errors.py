@@ -23,7 +23,7 @@ class DeviceStale(DeviceError, TimeoutError):  # noqa: N818 - see above
 
 
 class DeviceRefused(DeviceError):  # noqa: N818 - see above
-    """The instrument understood and said no: protective stop, wrong mode, abort code, wrong identity."""
+    """The instrument understood and refused: protective stop, wrong mode, abort code, wrong identity."""
 
 
 class WireError(DeviceError):

@@ -1,4 +1,4 @@
-"""From the currents of one face of a position-sensitive detector to spot, light and doubt.
+"""From the currents of one face of a position-sensitive detector to spot, light and uncertainty.
 
 A face is one kind of electrode layout: how its four currents make two differences over two sums, and how such a ratio
 reads in metres. The next kind is its row in KINDS.
@@ -95,7 +95,7 @@ NEEDS_SPOT_RADIUS = (FaceKind.QUADRANT,)
 class Face:
     """One detector face. `length_m`: from electrode to electrode. `spot_radius_m`: at 1/e^2, for a quadrant face only.
 
-    ValueError when a quadrant face has no spot radius: its ratio says nothing of metres without one.
+    ValueError when a quadrant face has no spot radius: its ratio means nothing in metres without one.
     """
 
     kind: FaceKind
@@ -157,7 +157,7 @@ class Face:
 
 def layer_mismatch(current_a: ArrayLike) -> Floats:
     """|X sum - Y sum| over their mean, of duo-lateral currents (..., 4): the layers carry the same photocurrent, so
-    more than some per mille tells of a bad contact or of saturation; NaN in the dark.
+    more than some per mille points to a bad contact or of saturation; NaN in the dark.
     """
     ratios = _duo_lateral(_four(current_a))
     return _quotient(np.abs(ratios.over_a[..., 0] - ratios.over_a[..., 1]), ratios.photocurrent_a)

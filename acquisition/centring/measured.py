@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 PROBE_SPOT_M = 1.5e-3  # a probe moves the spots by about this: 15 % of a 20 mm face, 5000 x the noise of a look
 PROBE_LIMIT_RAD = 0.02
 LEVER_M = 0.1  # turns beam angles into metres: about the distance between the two faces
-UPDATE_FLOOR_RAD = 1e-4  # shorter steps say more about noise than about the Jacobian
+UPDATE_FLOOR_RAD = 1e-4  # shorter steps show more of noise than about the Jacobian
 
 
 class MeasuredStrategy:

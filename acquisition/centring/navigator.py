@@ -23,7 +23,7 @@ from acquisition.session.records import Journal, Learner
 Floats = NDArray[np.float64]
 
 LANDING_TRIES = 12  # on the way to a pose: halvings of the jump and stops to learn, together
-GLANCE_S = 0.01  # enough to tell light from dark: 10 samples at 1 kHz
+GLANCE_S = 0.01  # enough to separate light from dark: 10 samples at 1 kHz
 FINDING_STAND_OFF_M = 0.2
 NEAR = Limits(tolerance_m=1.5e-3, max_steps=8)  # anywhere near the asked-for spots will do
 
@@ -34,7 +34,7 @@ class LitPose:
 
     target: BeamTarget
     q_rad: Floats
-    T_base_fixture: Floats  # as it must be believed for the assumed arm to agree with the spots here
+    T_base_fixture: Floats  # as it must be assumed for the assumed arm to agree with the spots here
 
 
 class Navigator:
@@ -65,7 +65,7 @@ class Navigator:
         self._note(q_rad)
 
     def find(self, placement: int, first: int, roll_rad: float) -> None:
-        """Begin a block: aim by what is seen or believed, else search, come near the centres.
+        """Begin a block: aim by what is seen or known, else search, come near the centres.
 
         NoLightError; UnreachableError where the arm can stand before the faces in no roll.
         """
@@ -153,7 +153,7 @@ class Navigator:
         self._lit = [replace(pose, T_base_fixture=T) for pose in self._lit]
 
     def _land(self, target: BeamTarget) -> Floats:
-        """Reach light near the target; returns the fixture pose believed there."""
+        """Reach light near the target; returns the fixture pose assumed there."""
         share = 1.0
         for _ in range(LANDING_TRIES):
             near = self._nearest(target)

@@ -124,7 +124,7 @@ class Registered:
         first: int,
         first_gain: float = FIRST_GAIN,
     ) -> None:
-        """`first_gain` is 1 for a fixture pose that earlier poses have told: then the first step is a whole one."""
+        """`first_gain` is 1 for a fixture pose that earlier poses have given: then the first step is a whole one."""
         self._arm, self._optics, self._first, self._first_gain = arm, optics, first, first_gain
         self.T_base_fixture = T_base_fixture
         self._q_rad: list[Floats] = []

@@ -14,7 +14,7 @@ from acquisition.guided.reading import Target
 Floats = NDArray[np.float64]
 Counts = NDArray[np.int64]
 STEP_RAD = np.pi / 6.0  # a disc off centre shows once a turn: a dozen steps see it whole
-NEAR_RAD = 0.5  # a posture this near an earlier one in the same place says half of what a far one says
+NEAR_RAD = 0.5  # a posture this near an earlier one in the same place shows half of what a far one shows
 
 
 class Coverage:
@@ -77,10 +77,10 @@ class GuidedProgress:
 
 
 class Guide(Protocol):
-    """Told by the session."""
+    """As the session reports it."""
 
     def ask(self, request: Request) -> bool:
-        """False: whoever moves the probe says that it does not get there; another posture will be asked for."""
+        """False: who moves the probe reports that it does not get there; another posture will be asked for."""
         ...
 
     def tell(self, progress: GuidedProgress) -> None:

@@ -1,7 +1,7 @@
 """What a person puts the probe on (a cone, one end of a bar, a spot of a sphere), the reading taken there, and its
 judge.
 
-A reading is the mean of the encoders while the probe was held. Whether it can be is said by the arm as known so far,
+A reading is the mean of the encoders while the probe was held. Whether it can be is judged by the arm as known so far,
 which is passed in, for fits are not made here.
 """
 
@@ -30,7 +30,7 @@ class Cone:
 
     @property
     def columns(self) -> Mapping[str, Cell]:
-        """What the row says of it, in the words of samples.csv."""
+        """Its row, in the words of samples.csv."""
         return {"seat": self.id}
 
 

@@ -1,6 +1,6 @@
 """A guided session: asks for one posture after the other, takes a reading when the probe is still, rejects slips.
 
-Whether a still probe tells anything new: a cone in another posture, a sphere at another spot, no plane of spots.
+Whether a still probe adds anything new: a cone in another posture, a sphere at another spot, no plane of spots.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ TELL_S = 0.2  # of the encoders' time
 OTHER_RAD = 0.1  # of some joint: nearer postures have the same errors of the arm and show the encoders' scatter only
 APART_M = 2e-3  # of two spots of a series: the nearest of 25 that are evenly over half a ball of 31 mm are 4.4 mm apart
 FLAT_M = 3e-4  # rms about the plane of all spots: of the first five of those 25 it is 0.85 mm
-FLAT_FROM = 5  # spots: with fewer a plane says nothing yet
+FLAT_FROM = 5  # spots: with fewer a plane means nothing yet
 
 
 class GuidedJournal(Protocol):
@@ -184,7 +184,7 @@ class GuidedSession:
 
 
 def nothing_new(arm: GuidedArm, target: Target, q_rad: Floats, taken: Sequence[Reading]) -> str | None:
-    """What to do instead, for a person; None where a reading (n,) at the target says something new."""
+    """What to do instead, for a person; None where a reading (n,) at the target adds something new."""
     if isinstance(target, Cone):
         return _old_posture(q_rad, [one.q_rad for one in taken if one.target == target])
     if isinstance(target, SphereSpot):

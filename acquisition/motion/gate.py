@@ -65,7 +65,7 @@ class Gate:
         self._made = plan(self._solver, start_rad, resting, self._pace, self._cell, belt)
         return self._made
 
-    # --- what a person may say, from any thread and in every state
+    # --- commands of a person, from any thread and in every state
 
     def pause(self) -> None:
         """At the next rest, or braking along the path where that is further than REST_S; again within 10 s: at once."""
@@ -154,7 +154,7 @@ class Gate:
         return following.followed
 
     def _following(self, made: Plan, belt: BeltNow) -> Following:
-        """Solving takes a while: whatever is said meanwhile counts, for the motion has begun."""
+        """Solving takes a while: whatever is commanded meanwhile counts, for the motion has begun."""
         path = made.path() if made.carried else SolvedPath(made.path(), 1.0 / self._stream.solve_hz)
         self._points = points = LookAhead(path, self._stream.solve_hz, belt, made.start_rad, self._stream.lag_s)
         checked = UnderWay(self._solver.arm, self._pace, self._cell, made.start_rad, 1.0 / self._stream.hz)
@@ -186,7 +186,7 @@ class Gate:
             )
 
     def _end(self, event: MotionEvent, end: MotionState) -> None:
-        """The first one that ends a motion says how; a stop after an abort does not make a success of it."""
+        """The first one that ends a motion decides how; a stop after an abort does not make a success of it."""
         with self._lock:
             if self._state is not MotionState.ENDING:
                 self._wanted_end = end

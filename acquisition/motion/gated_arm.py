@@ -21,7 +21,7 @@ EDGE_RAD = 1e-9  # rounding of a target on the joint limit itself
 
 
 class GatedArm:
-    """A `Movable`. `now` tells the readings (joint,) of the arm, which stands when a motion begins."""
+    """A `Movable`. `now` gives the readings (joint,) of the arm, which stands when a motion begins."""
 
     def __init__(self, arm: Movable, kinematics: Kinematics, cell: Cell, now: Callable[[], Floats]) -> None:
         self.name = arm.name

@@ -63,7 +63,7 @@ def no_camera(name: str) -> Floats:
 
 @dataclass(frozen=True)
 class Around:
-    """What a program needs beside the arm. `belt` tells how far the belt has gone, now."""
+    """What a program needs beside the arm. `belt` gives how far the belt has gone, now."""
 
     joints: Callable[[], Floats]  # readings (joint,) of the arm, which rests
     read: Callable[[str], Floats] = no_camera  # T (4, 4) of a transform that a camera sees
@@ -82,7 +82,7 @@ class Ran:
 
 
 def teach(graph: TaskGraph, steps: Sequence[Teach], solver: Solver, placed: Callable[[str], Floats]) -> TaskGraph:
-    """The task with its transforms taught; `placed` has the arm placed at a position and tells its readings (joint,).
+    """The task with its transforms taught; `placed` has the arm placed at a position and returns its readings (joint,).
 
     TaskError where a step cannot be solved yet.
     """

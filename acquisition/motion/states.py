@@ -37,7 +37,7 @@ class Action:
     def _run(self) -> None:
         try:
             self._act(self._name)
-        except BaseException as failure:  # told to the stream, which stops the arm
+        except BaseException as failure:  # handed to the stream, which stops the arm
             self._failure = failure
 
 
@@ -59,7 +59,7 @@ class MotionState(enum.Enum):
 
 
 class MotionEvent(enum.Enum):
-    """What a person, a device or the path itself says."""
+    """What comes from a person, a device or the path itself."""
 
     START = "start"
     PAUSE = "pause"

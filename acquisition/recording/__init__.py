@@ -1,7 +1,7 @@
 """The recording: what a session measured, as one self-describing file; the only thing that a fit and a session share.
 
-`read` opens a file, a session of several files or a session folder; `RecordingWriter` writes one; `check` says what is
-wrong with one; `recover` saves what a damaged one holds. Below are `rig` (the rig file), `mcap` (the file itself),
+`read` opens a file, a session of several files or a session folder; `RecordingWriter` writes one; `check` reports what
+is wrong with one; `recover` saves what a damaged one holds. Below are `rig` (the rig file), `mcap` (the file itself),
 `session_folder` (rig.toml with tables) and `files` (TOML and JSON to records). A new kind of content is a topic or a
 metadata record in `mcap.layout`; what an older program does not know, it leaves alone.
 """

@@ -27,7 +27,7 @@ class FrameFlag(enum.IntFlag):
 
     EXTENDED = 1  # identifier of 29 bits
     REMOTE = 2  # asks for data; `length` is what it asks for
-    ERROR = 4  # told by the adapter: bus off, passive, form, bit, ...
+    ERROR = 4  # reported by the adapter: bus off, passive, form, bit, ...
     FD = 8
     BIT_RATE_SWITCH = 16
     ERROR_STATE = 32  # ESI: its sender is error passive
@@ -98,7 +98,7 @@ def stream_names(buses: Iterable[int | str | None]) -> dict[str, int | str | Non
     named: dict[str, int | str | None] = {}
     for channel in buses:
         plain = STREAM if channel is None else f"{STREAM}-{re.sub(r'[^A-Za-z0-9]+', '-', str(channel))}"
-        taken = {name.lower() for name in named}  # case does not tell files apart on every disk
+        taken = {name.lower() for name in named}  # case does not separate files on every disk
         names = (plain, *(f"{plain}-{number}" for number in range(2, len(named) + 3)))
         named[next(name for name in names if name.lower() not in taken)] = channel
     return named

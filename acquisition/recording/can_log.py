@@ -115,7 +115,7 @@ SUFFIXES = tuple(_READERS)
 
 @dataclass(frozen=True)
 class CanImport:
-    """What an import brought; `damage` says where the file could not be read further."""
+    """What an import brought; `damage` states where the file could not be read further."""
 
     frames: int
     streams: tuple[str, ...]
@@ -199,7 +199,7 @@ class _FirstFrame:
 
 
 class _Log:
-    """The messages of a file up to its end or to where it makes no sense; then `damage` says so."""
+    """The messages of a file up to its end or to where it makes no sense; then `damage` states it."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

@@ -145,5 +145,5 @@ def cells_of(name: str, values: NDArray[Any]) -> list[Cell]:
 
 
 def readings_sha256(samples: Samples) -> str:
-    """Of the joint angles in their order, hexadecimal; what else is said of the rows does not count."""
+    """Of the joint angles in their order, hexadecimal; what else is stated of the rows does not count."""
     return hashlib.sha256(np.ascontiguousarray(samples.joints(), dtype="<f8").tobytes()).hexdigest()

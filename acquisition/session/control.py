@@ -3,7 +3,7 @@
 The arm is stopped by whoever calls, not by the session, which may be waiting for that very motion. A stop can fall
 between the session's last look and its next motion: so it is repeated until the session has taken note.
 
-One table says what a session can be doing, what can happen to it, and what it then does, in the words of bluesky:
+One table lists what a session can be doing, what can happen to it, and what it then does, in the words of bluesky:
 pause: the arm rests within REST_S, at the end of the motion under way or braked softly, and no further motion begins;
 the pose is taken again later. Again within PAUSE_AGAIN_S: at once, the arm is stopped. resume goes on from the last
 checkpoint. stop: ends at the next checkpoint, as a success; a pause takes precedence over it. abort: the arm is stopped
@@ -40,7 +40,7 @@ class RunState(enum.Enum):
 
 
 class RunEvent(enum.Enum):
-    """What a person, a device or the session itself says."""
+    """What comes from a person, a device or the session itself."""
 
     START = "measuring begins, or begins again"
     PAUSE = "pause"
@@ -72,7 +72,7 @@ _TABLE: dict[RunState, dict[RunEvent, RunState]] = {
     RunState.HALTED: {},
     RunState.RUNNING: {**_UNDER_WAY, RunEvent.PAUSE: RunState.PAUSING},
     RunState.PAUSING: {**_UNDER_WAY, RunEvent.RESUME: RunState.RUNNING, RunEvent.CHECKPOINT: RunState.PAUSED},
-    # A stop would let the motion go on that is being broken off: it is to be said once the arm stands.
+    # A stop would let the motion go on that is being broken off: it is to be sent once the arm stands.
     RunState.BREAKING: {**_UNDER_WAY, RunEvent.CHECKPOINT: RunState.PAUSED, RunEvent.STOP: RunState.BREAKING},
     RunState.PAUSED: {
         RunEvent.RESUME: RunState.RUNNING,
@@ -111,9 +111,9 @@ class RunControl:
     """Owner of a session's state. `stop_arm` works from any thread; DeviceError where it cannot be delivered.
 
     `failure`: what has gone wrong with a device, so that a pause does not outlast it. `hold_arm`: stops for good, after
-    abort and halt. `undelivered`: told of a stop that could not be delivered; None: there is none of these any more.
-    `rests_in_s`: when the motion under way ends; 0: nothing moves. `ease_arm`: brakes softly. `pausing`: called with
-    the time until the arm rests after a pause (s, at most), and whether it brakes for that.
+    abort and halt. `undelivered`: informed of a stop that could not be delivered; None: there is none of these any
+    more. `rests_in_s`: when the motion under way ends; 0: nothing moves. `ease_arm`: brakes softly. `pausing`: called
+    with the time until the arm rests after a pause (s, at most), and whether it brakes for that.
     """
 
     def __init__(
@@ -146,7 +146,7 @@ class RunControl:
     def state(self) -> RunState:
         return self._state
 
-    # --- what a person may say, from any thread and in every state
+    # --- commands of a person, from any thread and in every state
 
     def interrupt(self) -> None:
         """Ctrl-C: pause; again within 10 s: at once; a third one, or one long after the arm stands: abort."""
@@ -193,7 +193,7 @@ class RunControl:
         self.tell(RunEvent.HALT)
 
     def insist(self) -> None:
-        """Say the stop once more while the session has not taken note; to be called a few times a second."""
+        """Send the stop once more while the session has not taken note; to be called a few times a second."""
         state = self._state
         if state in BROKEN:
             self._brake(state)
@@ -201,7 +201,7 @@ class RunControl:
             self._ease(self._rests_in_s())
 
     def tell(self, event: RunEvent) -> None:
-        """Any event; where it stops the arm, the arm has been told when this returns."""
+        """Any event; where it stops the arm, the arm has the command when this returns."""
         with self._news:
             before, now = self._state, after(self._state, event)
             if before in (RunState.IDLE, RunState.DONE):
@@ -270,7 +270,7 @@ class RunControl:
         outlasts = rests_in_s > 0.0 and self._clock.now_s() - self._paused_s > REST_S
         if not self._eased and (rests_in_s > REST_S or outlasts):
             self._eased = True  # before the arm stops, for the session notices that at once
-            # A thread of its own: whoever says so must be heard again while the arm brakes.
+            # A thread of its own: who commands it must be heard again while the arm brakes.
             self._easing = threading.Thread(target=self._deliver, args=(self._ease_arm,), name="ease", daemon=True)
             self._easing.start()
 
@@ -287,5 +287,5 @@ class RunControl:
 
     def _keep(self, trouble: DeviceError | None) -> None:
         before, self.trouble = self.trouble, trouble
-        if str(before) != str(trouble):  # it is said again and again, and is news once
+        if str(before) != str(trouble):  # it is reported again and again, and is news once
             self._undelivered(trouble)

@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PoseKey:
-    """Which pose of which plan a sample is: told in the journal, so that a session can be gone on with."""
+    """Which pose of which plan a sample is: noted in the journal, so that a session can be gone on with."""
 
     placement: int
     first: int

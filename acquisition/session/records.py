@@ -98,7 +98,7 @@ def _spot(face: str, spot: Spot) -> dict[str, Cell]:
 
 
 class Learner(Protocol):
-    """What is believed now."""
+    """What is known now."""
 
     @property
     def arm(self) -> BelievedArm: ...
@@ -122,7 +122,7 @@ class Journal(Protocol):
 
 
 def key_detail(key: PoseKey, look: Look) -> dict[str, Any]:
-    """Of the event "sample": which pose it is, and when it was read, so that the streams tell what happened about."""
+    """Of the event "sample": which pose it is, and when it was read, so that the streams show what happened about."""
     detail: dict[str, Any] = {"pose": asdict(key)}
     if look.window_s is not None:
         detail |= {"psd_from_s": look.window_s[0], "psd_to_s": look.window_s[1]}
@@ -160,4 +160,4 @@ Tell = Callable[[Progress], None]
 
 
 def silent(progress: Progress) -> None:
-    """For a session that nobody looks at."""
+    """For a session without a display."""

@@ -130,7 +130,7 @@ class Session:
                 self._stepping.step(partial(self._again, block, visit, sample, again))
 
     def _visit(self, block: Block, visit: Visit) -> Sample | None:
-        """Go to one pose and record it; None, and said in the journal, where that cannot be done."""
+        """Go to one pose and record it; None, and noted in the journal, where that cannot be done."""
         if self._lit != (block.placement, block.first):
             self._say(Phase.AIM, block)
             self._navigator.find(block.placement, block.first, block.visits[0].target.roll_rad)

@@ -23,8 +23,8 @@ from drivers.errors import DeviceError
 Floats = NDArray[np.float64]
 MOVED_RAD = 1e-6  # by which a joint counts as having moved
 SPREAD_FROM = 4  # samples: from so many on, wrong units show in how far the readings spread
-GLANCE_S = 0.05  # of a look at where the arm stands after a pause
-LEAST_SPREAD_M = 0.02  # of the nominal positions; less says nothing about units
+GLANCE_S = 0.05  # of a reading of where the arm stands after a pause
+LEAST_SPREAD_M = 0.02  # of the nominal positions; less shows nothing about units
 SPREADS = (0.5, 2.0)  # measured over nominal: arms are drawn to 1 %, units are wrong by 25 and more
 
 

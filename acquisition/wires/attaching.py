@@ -56,7 +56,7 @@ RETRY_S = 0.05  # a device that comes back is used within a second; a try on a p
 
 
 class Reopening:
-    """A `drivers.device.Device`. `lost` is told what went wrong and when; `back` from when to when it was away.
+    """A `drivers.device.Device`. `lost` is informed of what went wrong and when; `back` from when to when it was away.
 
     `read` waits for the device as long as it takes; `give_up` or `close`, from another thread, ends that.
     """
@@ -70,7 +70,7 @@ class Reopening:
         retry_s: float = RETRY_S,
         who: Callable[[], tuple[str, ...]] = tuple,
     ) -> None:
-        """`who`: which instruments are connected, where they can say so; they must say the same after every outage."""
+        """`who`: which instruments are connected, where they can report it; it must be the same after every outage."""
         self.name = device.name
         self._who = who
         self._were: tuple[str, ...] = ()
@@ -80,7 +80,7 @@ class Reopening:
         self._declared: tuple[Channel, ...] = ()
 
     def connect(self) -> None:
-        """The first time it must be there: DeviceError as the device says."""
+        """The first time it must be there: DeviceError as the device raises it."""
         self._device.connect()
         self._declared, self._were = self._device.describe(), self._who()
 
@@ -113,7 +113,7 @@ class Reopening:
                 self._device.close()
                 self._device.connect()
             except DeviceError:
-                continue  # what was lost is told already; it stays lost
+                continue  # what was lost is reported already; it stays lost
             self._check_same()
             self._back(from_s, self._clock.now_s())
             return

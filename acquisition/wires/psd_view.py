@@ -76,7 +76,7 @@ class PsdView:
         return np.stack(columns, axis=1)
 
     def mean(self, window: PsdWindow) -> tuple[Spot, Spot]:
-        """Both spots of the averaged currents. A face counts as dark when most samples of the window say so."""
+        """Both spots of the averaged currents. A face counts as dark when most samples of the window are."""
         return self._mean(window, 0), self._mean(window, 1)
 
     def _mean(self, window: PsdWindow, k: int) -> Spot:

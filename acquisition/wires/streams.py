@@ -1,4 +1,4 @@
-"""One reader thread per device: every block goes to the recording and into a short memory that the servo looks at.
+"""One reader thread per device: every block goes to the recording and into a short memory that the servo reads.
 
 A thread ends in one of two ways: it is asked to, or the device failed; then the failure is kept and passed on at once.
 The supervisor stops the arm when any device fails or falls silent, and lets the session know at its next step.
@@ -15,7 +15,7 @@ from drivers.device import Block, Device
 from drivers.errors import DeviceError, DeviceStale
 
 FROZEN_S = 1.0  # in which this program did nothing at all: stopped by a signal, or the machine hung
-STALE_S = 1.0  # twice what a reader itself waits: this is for one that hangs in a library and tells nothing
+STALE_S = 1.0  # twice what a reader itself waits: this is for one that hangs in a library and reports nothing
 LOOK_S = 0.05
 
 
@@ -46,7 +46,7 @@ class Supervisor:
     def failed(self, failure: Exception) -> None:
         """A device, or the recording, cannot go on: stop the arm now; later failures are followers of the first.
 
-        Called from reader threads, so it never raises: an arm that does not take the stop is told of by the session,
+        Called from reader threads, so it never raises: an arm that does not take the stop is reported by the session,
         which stops it again.
         """
         with self._lock:
@@ -56,7 +56,7 @@ class Supervisor:
                 self._hold_arm()
 
     def stop(self, why: Exception) -> None:
-        """A person says so, from any thread and in every state: the arm is held, whatever was before.
+        """A person commands it, from any thread and in every state: the arm is held, whatever was before.
 
         DeviceError when the stop cannot be delivered; the session ends all the same, at its next step.
         """
@@ -188,7 +188,7 @@ class Pump:
                     self._blocks.append(block)
                     self._news.notify_all()
                 self._sink(block)
-        except Exception as failure:  # kept and told to the supervisor, whatever it was
+        except Exception as failure:  # kept and handed to the supervisor, whatever it was
             if not self._stopping.is_set():
                 with self._news:
                     self.failure = failure

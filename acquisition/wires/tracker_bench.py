@@ -29,7 +29,7 @@ from drivers.errors import DeviceError, DeviceStale
 
 Floats = NDArray[np.float64]
 CLOCK_S = 5.0  # host time within which a reading of after the motion comes; emulators fall behind by less
-LEAST_HALF = 5  # samples of half a dwell: with fewer their scatter says nothing
+LEAST_HALF = 5  # samples of half a dwell: with fewer their scatter means nothing
 CALMER = 2.5  # of 20 samples of noise one half scatters so much more in 2 of 100 dwells: these begin a little later
 GOOD_SHARE = 0.5  # of the samples of a dwell that have to be good
 
@@ -176,7 +176,7 @@ class TargetWindow:
     device_s: Floats  # (sample,), NaN: it has no clock
     time_s: Floats  # (sample,)
     position_m: Floats  # (sample, 3)
-    temperature_degC: Floats  # (sample,), or empty: it tells none
+    temperature_degC: Floats  # (sample,), or empty: it reports none
 
     def only(self, keep: NDArray[np.bool_]) -> "TargetWindow":
         degC = self.temperature_degC[keep] if len(self.temperature_degC) else self.temperature_degC

@@ -88,7 +88,7 @@ class Scene:
     def standing(
         self, told: tuple[int, int] | None, T_base_flange: Floats | None, measured_m: list[float] | None
     ) -> SceneFixture | None:
-        """As reported; else the place and order by which the beam would strike nearest to the light that is expected."""
+        """As reported; else the place and order by which the beam would strike nearest to the expected light."""
         if self._believed is None:
             return None
         if told is not None and told[0] in self._faces:

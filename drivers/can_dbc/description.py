@@ -1,4 +1,4 @@
-"""What a DBC file says of encoders: which frame carries which joint, and what one count is.
+"""What a DBC file states of encoders: which frame carries which joint, and what one count is.
 
 cantools reads the file and takes frames apart; what it raises becomes DeviceRefused here, with the cause kept.
 """
@@ -86,7 +86,7 @@ def _joint_signal(database: Database, path: Path, name: str, units_per_turn: flo
 
 
 def _scale(signal: Signal, units_per_turn: float | None) -> Scale:
-    """The unit of the signal tells the angle of a count; without one, `units_per_turn` of the rig file does."""
+    """The unit of the signal gives the angle of a count; without one, `units_per_turn` of the rig file does."""
     unit_rad = UNITS_RAD.get((signal.unit or "").strip().lower())
     if units_per_turn is not None:
         count_rad = math.tau / units_per_turn

@@ -163,7 +163,7 @@ class CanDbcEncoders(StreamDevice[can.BusABC]):
         now_s = self._clock.now_s()
         silent = [self.joints[place].name for place, heard_s in self._heard_s.items() if now_s - heard_s >= SILENT_S]
         if silent:
-            self._heard_s = dict.fromkeys(self._heard_s, now_s)  # told once, and again after as long
+            self._heard_s = dict.fromkeys(self._heard_s, now_s)  # reported once, and again after as long
             raise DeviceStale(
                 f"{self.name}: {', '.join(silent)} sent nothing for {SILENT_S:g} s; "
                 "check its power, cable and termination"

@@ -37,7 +37,7 @@ class Operating(IntFlag):
 
 
 class NmtState(IntEnum):
-    """What a heartbeat says (CiA 301, 7.2.8.3)."""
+    """What a heartbeat reports (CiA 301, 7.2.8.3)."""
 
     BOOT_UP = 0x00
     STOPPED = 0x04
@@ -101,7 +101,7 @@ class MappedNumber:
         self._at, self._mask, self._least_bits = at, (1 << bits) - 1, at + bits
 
     def read(self, data: bytes | bytearray) -> int | None:
-        """Its unsigned value; None when the frame is shorter than its mapping says."""
+        """Its unsigned value; None when the frame is shorter than its mapping states."""
         if 8 * len(data) < self._least_bits:
             return None
         return int.from_bytes(data, "little") >> self._at & self._mask
@@ -143,7 +143,7 @@ TIME_SCATTER_S = 0.002  # host times of SYNCs against the latching; measured: be
 
 @dataclass(frozen=True)
 class Scale:
-    """What the encoder says of its counts."""
+    """What the encoder states of its counts."""
 
     units_per_turn: float  # of CiA 406 a whole number
     range_units: int  # the position wraps here
@@ -156,7 +156,7 @@ class Scale:
 
     @property
     def multi_turn(self) -> bool:
-        """The position tells turns apart."""
+        """The position separates turns."""
         return self.range_units > self.units_per_turn
 
 
@@ -184,8 +184,8 @@ class ContinuousAngle:
     Step = ((new - old + R/2) mod R) - R/2, R the range in units. A step is motion when it is no faster than the speed
     limit (over j at least: a busy host takes in one go what came one after the other) and, where an acceleration limit
     is given, no farther from the last speed v than a dt^2 + 2 |v| j allows, j the scatter of the host's times. Any
-    other is NaN. When READINGS_OF_A_SLIP of them in a row agree with each other the position has slipped: it is told
-    from there on, and the slip is kept.
+    other is NaN. When READINGS_OF_A_SLIP of them in a row agree with each other the position has slipped: it is
+    reported from there on, and the slip is kept.
     """
 
     def __init__(

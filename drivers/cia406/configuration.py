@@ -17,7 +17,7 @@ from drivers.cia406.codec import MappedObject, Operating, Scale, mapped_object, 
 from drivers.errors import DeviceRefused, DeviceStale
 
 SEND_LIMIT_S = 0.5  # an adapter that takes no frame for so long has stopped
-LISTEN_S = 0.02  # how soon the listening thread of the set-up ends when told
+LISTEN_S = 0.02  # how soon the listening thread of the set-up ends when asked
 STOP_S = 5.0  # for its end, on a busy host: two readers of one bus would each get half of the frames
 
 
@@ -89,7 +89,7 @@ class EncoderIdentity:
 
     @property
     def multi_turn(self) -> bool:
-        """As 1000h says in its high word: 1 single-turn, 2 multi-turn (CiA 406, 1000h)."""
+        """As 1000h states in its high word: 1 single-turn, 2 multi-turn (CiA 406, 1000h)."""
         return self.device_type >> 16 == MULTI_TURN
 
 
@@ -159,7 +159,7 @@ def configure(encoder: EncoderObjects) -> EncoderIdentity:
 
 
 def preset(encoder: EncoderObjects, scale: Scale, angle_rad: float, *, store: bool) -> None:
-    """The present position reads `angle_rad` from now on. DeviceRefused when the encoder says no.
+    """The present position reads `angle_rad` from now on. DeviceRefused when the encoder refuses.
 
     `store` keeps it through power-off where the encoder does not by itself; its memory wears: never in a loop.
     """
@@ -184,7 +184,7 @@ def _scale(encoder: EncoderObjects) -> Scale:
     range_units = encoder.read(codec.RANGE_UNITS) if scaled else 0
     resolution, turns = encoder.read(codec.TURN_RESOLUTION), encoder.read(codec.TURNS)
     try:
-        return scale_of(operating, units, range_units, resolution, max(turns, 1))  # single-turn devices may say 0
+        return scale_of(operating, units, range_units, resolution, max(turns, 1))  # single-turn devices may report 0
     except ValueError as cause:
         raise encoder.refuse(f"states a scale that cannot be: {cause}; check 6000h to 6002h, 6501h, 6502h") from cause
 
@@ -212,7 +212,7 @@ def _mapping(encoder: EncoderObjects) -> tuple[MappedObject, ...]:
 
 
 def _map_position(encoder: EncoderObjects) -> None:
-    """The sequence of CiA 301, 7.5.2.36: no entries, write them, say how many."""
+    """The sequence of CiA 301, 7.5.2.36: no entries, write them, state how many."""
     encoder.write(codec.TPDO2_MAPPING, 0, 0, 1)
     encoder.write(codec.TPDO2_MAPPING, 1, POSITION_ENTRY, 4)
     encoder.write(codec.TPDO2_MAPPING, 0, 1, 1)

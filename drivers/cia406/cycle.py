@@ -1,9 +1,9 @@
 """SYNCs and their answers, and when the next SYNC is due. No I/O: times and frames come in, rows and blocks come out.
 
-An answer says nothing of the SYNC that it answers: a node's answers belong to the SYNCs in their order. That is certain
+An answer does not name the SYNC that it answers: a node's answers belong to the SYNCs in their order. That is certain
 only when in the end each node has answered as often as it was asked. So rows are held until nothing is on the way any
 more, which between two SYNCs of a quick bus is always; where it is not, no SYNC goes out after HOLD_S until it is. When
-answers are missing then, what that node said since is uncertain and becomes NaN. A deadline left out shows as a step of
+answers are missing then, what that node sent since is uncertain and becomes NaN. A deadline left out shows as a step of
 the sequence.
 """
 
@@ -18,7 +18,7 @@ import numpy as np
 from drivers.device import Block
 
 ANSWER_LIMIT_S = 0.1  # answers take some ms; measured with an emulator on a busy host: now and then 50 ms
-HOLD_S = 0.1  # rows are told of no later than this, and what waits for the file is no more
+HOLD_S = 0.1  # rows are reported no later than this, and what waits for the file is no more
 MOST_UNDER_WAY = 16  # feels right: 16 ms at 1 kHz, which is more than a USB adapter keeps back
 
 
@@ -115,7 +115,7 @@ class SyncCycle:
         return self._close(set(range(self._nodes)) - self._under_way[-1].answers.keys())
 
     def silent(self, limit_s: float, now_s: float) -> list[int]:
-        """Nodes that answered nothing for `limit_s`; each is told once, and again after as long."""
+        """Nodes that answered nothing for `limit_s`; each is reported once, and again after as long."""
         if not self._silent_since_s:
             return []
         mute = sorted(node for node, since_s in self._silent_since_s.items() if now_s - since_s >= limit_s)

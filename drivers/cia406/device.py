@@ -169,7 +169,7 @@ class Cia406Encoders(StreamDevice[can.BusABC]):
                 for node in self.nodes:
                     line.send(nmt(NMT_PRE_OPERATIONAL, node), SEND_LIMIT_S)
         except DeviceLost:
-            pass  # nobody is left to be told
+            pass  # nobody is left to be informed
         finally:
             self._stop_taking()
             shut_down(line)

@@ -1,4 +1,4 @@
-"""What encoders say of their own health: emergencies, heartbeats, a restart that nobody ordered.
+"""What encoders report of their own health: emergencies, heartbeats, a restart that nobody ordered.
 
 A heartbeat that stays away is found within one and a half periods, without blaming nodes for a pause of the host: time
 counts only while the bus is heard, between two frames of anybody at most PAUSE_S. A host that slept, an adapter that
@@ -42,7 +42,7 @@ class Heartbeats:
             self._heard_s[node] = self._alive_s
 
     def late(self) -> tuple[int, ...]:
-        """Nodes whose heartbeat is overdue; each is told once, and again after as long."""
+        """Nodes whose heartbeat is overdue; each is reported once, and again after as long."""
         found = tuple(node for node, heard_s in self._heard_s.items() if self._alive_s - heard_s > self._limit_s)
         for node in found:
             self._heard_s[node] = self._alive_s
@@ -56,7 +56,7 @@ class NodeWatch:
     """Takes every frame that is not a position. `codes` holds each node's last emergency code, 0 for none."""
 
     def __init__(self, name: str, nodes: Sequence[int], heartbeat_s: float) -> None:
-        """`heartbeat_s`: the period that the nodes are told, in host time."""
+        """`heartbeat_s`: the period set at the nodes, in host time."""
         self.emergencies: tuple[Emergency, ...] = ()  # the newest EMERGENCIES_KEPT, in the order they came
         self.codes = tuple(0 for _ in nodes)
         self.bad_frames = 0
@@ -64,13 +64,14 @@ class NodeWatch:
         self._nodes = tuple(nodes)
         self._heard_s: dict[int, float] = {}  # last heartbeat
         self._operational = False
-        self._started: set[int] = set()  # nodes that have said that they are operational
+        self._started: set[int] = set()  # nodes that have reported that they are operational
         self._heartbeats = Heartbeats(nodes, heartbeat_s)
 
     def set_operational(self, operational: bool, now_s: float) -> None:
         """From now on a boot-up, or another state than operational, is a fault; or no longer.
 
-        Not the other states before a node has said "operational": a heartbeat may cross the start command on its way.
+        Not the other states before a node has reported "operational": a heartbeat may cross the start command on its
+        way.
         """
         self._operational = operational
         self._heard_s = {}
@@ -91,11 +92,11 @@ class NodeWatch:
             )
 
     def forget_codes(self) -> None:
-        """Nodes were configured anew: what they reported before is history."""
+        """Nodes were configured again: what they reported before is history."""
         self.codes = tuple(0 for _ in self._nodes)
 
     def take(self, can_id: int, data: bytes, now_s: float) -> None:
-        """DeviceLost on a restart, DeviceRefused when a node was told to leave the operational state."""
+        """DeviceLost on a restart, DeviceRefused when a node was commanded to leave the operational state."""
         function, node = can_id & ~0x7F, can_id & 0x7F
         if node not in self._nodes:
             return

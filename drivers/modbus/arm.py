@@ -19,7 +19,7 @@ from drivers.errors import DeviceError, DeviceLost, DeviceRefused, DeviceStale
 from drivers.modbus.line import ModbusLine
 from drivers.modbus.register_map import ANSWERS, COMMANDS, RegisterMap
 
-POLL_S = 0.02  # between two looks at a running move
+POLL_S = 0.02  # between two readings of a running move
 LIFE_S = 0.1  # between two counts of host_life, a tenth of what the controller's program waits for
 BEGIN_LIMIT_S = 4.0  # from the call to the command's number: four writes of up to 0.75 s each, and room
 TAKEN_LIMIT_S = 1.0  # from the command's number to the program's answer: some cycles
@@ -31,7 +31,7 @@ NUMBERS = 65535  # command numbers go from 1 to this, and begin again
 
 
 class State(IntEnum):
-    """What the controller's program says of the command whose number it shows."""
+    """What the controller's program reports of the command whose number it shows."""
 
     NONE = 0
     MOVING = 1
@@ -89,7 +89,7 @@ class ModbusArm:
             raise DeviceRefused(f"{self._line.place}: the arm moves; wait until it stands, then connect again")
         self._number = number
         with self._ordering:
-            if self._stops != stops:  # told to stop while connecting
+            if self._stops != stops:  # stopped while connecting
                 raise DeviceRefused(f"{self._line.place}: stopped by stop() while connecting; connect again")
             self._put("command_number", number)  # a command that was never taken must not run when the stop is lifted
             self._put("stop", 0)
@@ -148,7 +148,7 @@ class ModbusArm:
             self._put("command_number", self._number)
 
     def _give_up(self) -> None:
-        """Nobody knows whether the command arrived: a program that takes it late must find the stop set.
+        """It is unknown whether the command arrived: a program that takes it late must find the stop set.
 
         On a dead line a stop takes more than a second to be found undeliverable: who is writing one already need not be
         waited for, and does not lift it again, because the arm is held.

@@ -1,7 +1,7 @@
 """One Modbus connection, TCP or RTU, through pymodbus: reads and writes of registers, one error tree.
 
 A request that is lost or damaged on the line is sent again, twice; every request of this driver may be repeated. After
-a failure the connection is closed and the next request opens it anew, so that no late answer is taken for a new one.
+a failure the connection is closed and the next request opens it again, so that no late answer is taken for a new one.
 """
 
 import contextlib

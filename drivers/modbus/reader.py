@@ -42,7 +42,7 @@ class ModbusReader:
         self._life: tuple[float, float] = (math.nan, 0.0)  # its count, and since when
 
     def connect(self) -> None:
-        """Reads once, so that a map that does not fit is told at once. DeviceLost, DeviceStale, DeviceRefused."""
+        """Reads once, so that a map that does not fit is reported at once. DeviceLost, DeviceStale, DeviceRefused."""
         self._line.connect()
         self._start_s, self._slot, self._q_rad = None, -1, None
         self._life = (math.nan, self._clock.now_s())

@@ -1,7 +1,7 @@
 """Where a Modbus controller's quantities stand in its registers, how they are coded, how few requests fetch them.
 
 A register has 16 bits, high byte first (Modbus Application Protocol V1.1b3, section 4.2); how two or four of them make
-a longer number is not standardised, so the map says it.
+a longer number is not standardised, so the map states it.
 """
 
 import math
@@ -21,7 +21,7 @@ ADDRESSES = 65536
 
 @dataclass(frozen=True)
 class Register:
-    """`count` numbers of one quantity from `address` on; SI value = scale * number, plus whole turns where told.
+    """`count` numbers of one quantity from `address` on; SI value = scale * number, plus whole turns where stated.
 
     `turns_address`: where the signed 16-bit counts of whole turns begin that belong to the numbers, one for each (a UR
     controller gives an angle within the turn and the turn apart). ValueError for a type or place that Modbus lacks.

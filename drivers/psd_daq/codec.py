@@ -199,7 +199,7 @@ class SequenceCount:
         self._shift = 0  # rising minus raw number, of the present stream
 
     def restart(self) -> None:
-        """The box counts from zero again; whatever it says next is behind all that was before."""
+        """The box counts from zero again; whatever it sends next is behind all that was before."""
         if self._next > 0:
             self._next += 1  # what passed between the streams is not known to be nothing
         self._shift = self._next

@@ -1,4 +1,4 @@
-"""What is said on the line to a PSD DAQ box, as records: docs/protocols/psd-daq.md in Python."""
+"""The messages on the line to a PSD DAQ box, as records: docs/protocols/psd-daq.md in Python."""
 
 from dataclasses import dataclass
 from enum import IntEnum

@@ -118,7 +118,7 @@ class Kpa101Codec:
                 self._skip(inner)  # this message was cut short by the next
                 continue
             if size > len(self._buffer) or (inner and not quiet):
-                return  # more bytes tell whether it is whole, or the next message begins inside it
+                return  # more bytes decide whether it is whole, or the next message begins inside it
             self._end_junk(messages)
             messages.append(_parse(bytes(self._buffer[:size])))
             self._drop(size)
@@ -140,7 +140,7 @@ class Kpa101Codec:
 
 
 def _size(buffer: bytearray, *, quiet: bool) -> int | None:
-    """Bytes of the message at the front; 0 when none begins here, None when more bytes are needed to tell."""
+    """Bytes of the message at the front; 0 when none begins here, None when more bytes are needed to decide."""
     front = bytes(buffer[: HEADER + 2])
     undecided = False
     for head, size in _HEADS:

@@ -1,4 +1,4 @@
-"""What a KPA101 and a program say to each other, as records.
+"""The messages between a KPA101 and a program, as records.
 
 Source: Thorlabs, "APT communications protocol" (Host-Controller Communications Protocol, issue 37), sections on
 generic system messages and on quad control messages; layouts cross-checked with two independent clients.
@@ -109,7 +109,7 @@ class Status:
 
 @dataclass(frozen=True)
 class Fault:
-    """The unit could not do what it was told; `text` is empty when it gives none."""
+    """The unit could not do what it was sent; `text` is empty when it gives none."""
 
     message: int
     code: int

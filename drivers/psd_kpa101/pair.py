@@ -64,7 +64,7 @@ class Wiring:
 def currents(signal_v: Floats, transimpedance_v_a: float) -> Floats:
     """Corner currents (sample, 4) A, in the order of a pin-cushion or quadrant face, with these differences and sum.
 
-    The unit tells three signals of four currents. Whatever the fourth was, the spot is a function of these three, so
+    The unit gives three signals of four currents. Whatever the fourth was, the spot is a function of these three, so
     currents with the same signals read as the same spot: nothing is lost, nothing added.
     """
     x, y, total = np.moveaxis(signal_v / transimpedance_v_a, -1, 0)

@@ -20,7 +20,7 @@ LEAST_PLACES = 3
 
 
 class CheckStatus(Enum):
-    """Whether the places tell."""
+    """Whether the places are enough."""
 
     GOOD = "good"
     TOO_FEW_PLACES = "too few places: give at least 3 with light, each axis moved"
@@ -39,7 +39,7 @@ class AxisCheck:
 
 @dataclass(frozen=True)
 class UnitCheck:
-    """Both axes, None when the status says why not; `sum_full_scale_v` is their mean by weight."""
+    """Both axes, None when the status has the reason; `sum_full_scale_v` is their mean by weight."""
 
     status: CheckStatus
     x: AxisCheck | None = None
@@ -82,7 +82,7 @@ def _follows(one: Floats, other: Floats) -> float:
 
 
 def _axis(q: Floats, place_m: Floats, rounding: float) -> AxisCheck | None:
-    """`rounding`: one sigma of q by the converter alone; the scatter of the places is never believed to be less."""
+    """`rounding`: one sigma of q by the converter alone; the scatter of the places is never taken to be less."""
     a, b = q - q.mean(), place_m - place_m.mean()
     spread = float(a @ a)
     if spread == 0.0:

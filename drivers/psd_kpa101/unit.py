@@ -1,6 +1,6 @@
 """One KPA101 on its line: who it is, one reading at a time.
 
-A reply does not say which request it answers. So after a reply that did not come in time the line is uncertain: the
+A reply does not name the request that it answers. So after a reply that did not come in time the line is uncertain: the
 next reading waits behind a question of another kind, whose answer proves that everything before it has been heard.
 """
 
@@ -49,7 +49,7 @@ class Kpa101Unit(StreamDevice[Transport]):
         self._heard: list[Message] = []
 
     def identify(self) -> Info:
-        """Connect, and say who is there: in monitor mode, quiet unless asked."""
+        """Connect, and report who is there: in monitor mode, quiet unless asked."""
         self.connect()
         assert self.info is not None  # noqa: S101 - asked for by `connect`
         return self.info
@@ -82,7 +82,7 @@ class Kpa101Unit(StreamDevice[Transport]):
         return answer
 
     def request(self, deadline_s: float) -> bool:
-        """Ask for a reading, to be fetched by `fetch`. False when the line could not be cleared of doubt in time."""
+        """Ask for a reading, to be fetched by `fetch`. False when the line could not be cleared in time."""
         self._heard.clear()
         if self._in_doubt:
             self._write(RequestMode())

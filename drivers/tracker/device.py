@@ -50,7 +50,7 @@ class LineTracker(StreamDevice[Transport]):
         name: str = "tracker",
         clock: Clock | None = None,
     ) -> None:
-        """`rate_hz`: of its stream, or how often it is triggered. ValueError when that is too slow to tell silence."""
+        """`rate_hz`: of its stream, or how often it is triggered. ValueError: too slow to notice silence."""
         if not rate_hz >= SLOWEST_HZ:
             raise ValueError(
                 f"{name}: rate_hz {rate_hz:g}; a stream below {SLOWEST_HZ:g} Hz counts as silent, let it measure "
@@ -85,7 +85,7 @@ class LineTracker(StreamDevice[Transport]):
             raise DeviceLost(f"{self.name}: {lost}") from lost
 
     def _set_up(self, line: Transport) -> None:
-        """The first line tells whether the right instrument is there. DeviceStale, DeviceRefused, DeviceLost."""
+        """The first line shows whether the right instrument is there. DeviceStale, DeviceRefused, DeviceLost."""
         self._reset()
         if self._dialogue.start:
             with self._named():
@@ -119,7 +119,7 @@ class LineTracker(StreamDevice[Transport]):
         return (*own, Channel("temperature_degC", "degC")) if self._temperature else own
 
     def read(self, timeout_s: float) -> Block:
-        """As the protocol says; WireError where lines came and none could be read."""
+        """By the protocol; WireError where lines came and none could be read."""
         deadline_s = self._clock.now_s() + timeout_s
         refused_before = self.bad_lines
         while not self._pending:

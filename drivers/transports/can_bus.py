@@ -150,7 +150,7 @@ class TappedBus(can.BusABC):
         self._bus.state = new_state
 
     @property
-    def serialPortOrig(self) -> Any:  # python-can's name: whoever closes a bus whose adapter has gone looks for it
+    def serialPortOrig(self) -> Any:  # python-can's name: whoever closes a bus whose adapter has gone asks for it
         return getattr(self._bus, "serialPortOrig", None)
 
 
@@ -205,7 +205,7 @@ class BusFaults:
             raise self._bus_off()
 
     def check(self, bus: can.BusABC) -> None:
-        """DeviceLost when the adapter itself says that it is bus-off. One that cannot tell is believed healthy."""
+        """DeviceLost when the adapter itself reports bus-off. One that cannot report is taken as healthy."""
         try:
             state = bus.state
         except (NotImplementedError, can.CanError):
@@ -235,7 +235,7 @@ def lost_as_device_lost(name: str, doing: str) -> Generator[None]:
 def shut_down(bus: can.BusABC) -> None:
     """Releases the bus also when its adapter has gone.
 
-    python-can's slcan first tells the adapter, and leaves the port open when that fails: then we close it.
+    python-can's slcan first informs the adapter, and leaves the port open when that fails: then we close it.
     """
     try:
         bus.shutdown()

@@ -1,6 +1,6 @@
 """A serial port, found by path or by USB serial number, opened for one program only.
 
-pyserial tells of an unplugged port in several ways (SerialException, OSError 5 or 6, termios.error, and TypeError when
+pyserial reports an unplugged port in several ways (SerialException, OSError 5 or 6, termios.error, and TypeError when
 closed by another thread; pyserial issues 331, 506): here all of them become DeviceLost, with the cause kept.
 """
 
@@ -78,7 +78,7 @@ class SerialLine:
     def begin_apt(self, clock: Clock) -> None:
         """What a Thorlabs unit wants of its FTDI plug: short latency, purge, flow control, RTS. DeviceLost.
 
-        An FTDI chip keeps back less than 62 bytes for 16 ms unless told otherwise: replies of 18 would come at 60 Hz.
+        An FTDI chip keeps back less than 62 bytes for 16 ms unless set otherwise: replies of 18 would come at 60 Hz.
         A port without modem lines (pseudo-terminal, socket) is no FTDI plug: nothing of this is done.
         Source: Thorlabs, APT communications protocol, "Implementing the protocol" (order and dwell times).
         """

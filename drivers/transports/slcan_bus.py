@@ -123,7 +123,7 @@ class BlockSlcanBus(slcanBus):
         self._put(string.encode() + self.LINE_TERMINATOR, self.serialPortOrig.write_timeout)
 
     def _put(self, line: bytes, timeout: float | None) -> None:
-        """Without waiting until the last bit has left, which says nothing of whether the adapter could send it."""
+        """Without waiting until the last bit has left, which does not show whether the adapter could send it."""
         try:
             descriptor = self._descriptor()
             taken = 0 if descriptor is None else os.write(descriptor, line)
@@ -149,7 +149,7 @@ class BlockSlcanBus(slcanBus):
             return None
 
     def _split(self, data: bytes) -> None:
-        """Whole lines to `_lines`; acknowledgements and refusals say nothing that anybody waits for."""
+        """Whole lines to `_lines`; nobody waits for acknowledgements and refusals."""
         *lines, begun = (self._begun + data.decode("latin-1")).replace("\a", "\r").split("\r")
         self._lines.extend([line for line in lines if line not in _ACKNOWLEDGED])
         self._begun = begun[:LONGEST_LINE]

@@ -13,7 +13,7 @@ from drivers.errors import DeviceLost
 
 
 class Transport(Protocol):
-    """An open line. Raises DeviceLost when it has gone; `name` says where it leads, for messages."""
+    """An open line. Raises DeviceLost when it has gone; `name` states where it leads, for messages."""
 
     name: str
 

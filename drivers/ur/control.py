@@ -90,7 +90,7 @@ class UrControl:
             child.release()
             raise
         with self._stopping:
-            if self._holds != holds:  # told to hold while connecting
+            if self._holds != holds:  # held while connecting
                 child.hold()
             self.ready, self._child = answer, child
 
@@ -98,7 +98,7 @@ class UrControl:
         """To joint readings (6,) in rad; blocks until the arm has arrived.
 
         DeviceRefused: stopped meanwhile (the message states by what), or the controller does not take the numbers.
-        DeviceLost, DeviceStale: no control any more; the arm was told to stop by another way.
+        DeviceLost, DeviceStale: no control any more; the arm was stopped by another way.
         """
         target_rad = _six_numbers(q_rad, "q_rad")
         _check_rates(speed_rad_s, acceleration_rad_s2)
@@ -213,7 +213,7 @@ class UrControl:
                 return DeviceRefused(f"{self.place}: {ended.text}")
 
     def _why_not_running(self) -> DeviceError:
-        """What the dashboard says about it."""
+        """What the dashboard reports of it."""
         try:
             self._check_state()
         except DeviceError as error:

@@ -37,7 +37,7 @@ from drivers.ur.control_link import (
 )
 from drivers.ur.pulse import Pulse
 
-WATCH_S = 0.001  # between two looks at a running motion; the control object itself learns of its end every 2 ms
+WATCH_S = 0.001  # between two checks of a running motion; the control object itself learns of its end every 2 ms
 ASK_S = 0.05  # between two looks whether the parent was stopped
 ALIVE_S = 0.1  # the parent gives up after many of these
 KICKS_PER_WATCHDOG = 20  # kicks in the time that the watchdog allows, so that a busy machine may miss many
@@ -164,7 +164,7 @@ class ControlChild:
         return self._fault() or Ended(Outcome.REFUSED, "the control program did not take the command")
 
     def _fault(self) -> Ended | None:
-        """Return values of ur_rtde alone say nothing after a loss: its own flags are asked as well."""
+        """Return values of ur_rtde alone mean nothing after a loss: its own flags are asked as well."""
         if not self._control.isConnected():
             return Ended(Outcome.DISCONNECTED)
         if self._silent():
@@ -197,7 +197,7 @@ class ControlChild:
         self._stopped_up_to = max(self._stopped_up_to, request.up_to)
         self._stops.send(Alive())
         fault = self._fault()
-        if fault is not None:  # told before braking, which then waits for an answer that does not come
+        if fault is not None:  # reported before braking, which then waits for an answer that does not come
             self._stops.send(fault)
         self._brake(request.deceleration_rad_s2)
         if fault is None:
@@ -221,7 +221,7 @@ class ControlChild:
 
 def main(arguments: Sequence[str]) -> int:
     """Exit code 0 after Close, 1 when there is no control, 3 when the parent has gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C belongs to the parent, which then says what to do
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C belongs to the parent, which then decides what to do
     host, watchdog_hz = arguments[0], float(arguments[3])
     calls, stops = (Link(socket.socket(fileno=int(fd))) for fd in arguments[1:3])
     try:

@@ -1,4 +1,4 @@
-"""What the parent and its child say to each other: one JSON object a line, over a socket pair.
+"""The messages between the parent and its child: one JSON object a line, over a socket pair.
 
 There are two lines: `calls` for one call at a time and its answer, `stops` for a stop in the middle of a call and for
 the beats by which the parent shows that it runs.
@@ -109,7 +109,7 @@ _answers = msgspec.json.Decoder[Answer](Answer)
 
 
 def is_stopped(pid: int) -> bool:
-    """Whether a signal or a debugger has stopped the process: Linux proc(5), state T. False where nobody can say."""
+    """Whether a signal or a debugger has stopped the process: Linux proc(5), state T. False where that is unknown."""
     try:
         status = Path(f"/proc/{pid}/stat").read_bytes()
     except OSError:

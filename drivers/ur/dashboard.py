@@ -22,7 +22,7 @@ MAX_LINE_BYTES = 4096
 
 @dataclass(frozen=True)
 class ArmState:
-    """What the dashboard says, for example ("RUNNING", "NORMAL", True)."""
+    """What the dashboard reports, for example ("RUNNING", "NORMAL", True)."""
 
     robot_mode: str
     safety_status: str
@@ -63,7 +63,7 @@ class UrDashboard:
         self._command("stop", "Stopped", min(STOP_TIMEOUT_S, self._timeout_s))
 
     def unlock_protective_stop(self) -> None:
-        """Refused for the first 5 s. Look for the cause before: the arm may move again afterwards."""
+        """Refused for the first 5 s. Find the cause before: the arm may move again afterwards."""
         self._converse(["close safety popup"])
         self._command("unlock protective stop", "Protective stop releasing")
 

@@ -1,6 +1,6 @@
 """Whether a controller's stream is alive, judged by its time stamps, beside ur_rtde and independent of it.
 
-ur_rtde says "connected" for 2.5 s after the last package, and for ever when the same package comes again and again
+ur_rtde reports "connected" for 2.5 s after the last package, and for ever when the same package comes again and again
 (reference: its source, receive thread). Without numpy, because the control child must start quickly.
 Source: Universal Robots, "Real-Time Data Exchange (RTDE) Guide", protocol version 2.
 """

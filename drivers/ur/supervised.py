@@ -30,9 +30,9 @@ from drivers.ur.control_link import (
 
 SILENCE_LIMIT_S = 2.0  # twenty heartbeats of the child; ur_rtde itself blocks up to 4 s when no answer comes
 LOOK_S = 0.1  # between two looks whether the child was stopped by a signal
-STOP_NOTICE_S = 0.3  # the child looks at its stop line every millisecond; a busy machine may take tenths
+STOP_NOTICE_S = 0.3  # the child checks its stop line every millisecond; a busy machine may take tenths
 STOP_LIMIT_S = 1.0  # braking from full speed at 5 rad/s2 takes 0.63 s; after this the other way is taken
-UNREACHED = (Outcome.DISCONNECTED, Outcome.SILENT)  # then nobody knows whether the arm brakes
+UNREACHED = (Outcome.DISCONNECTED, Outcome.SILENT)  # then it is unknown whether the arm brakes
 CLOSE_LIMIT_S = 1.0
 CHILD_MODULE = "drivers.ur.control_child"
 SHOWN_BYTES = 300  # of what ur_rtde printed last

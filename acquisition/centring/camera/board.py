@@ -1,6 +1,6 @@
 """The printed board on the fixture as a camera sees it: its markers in a picture, and from these where the fixture is.
 
-The arm's zeros are wrong by degrees, so this is where the fixture must be believed to be *for the arm as it stands*:
+The arm's zeros are wrong by degrees, so this is where the fixture must be assumed to be *for the arm as it stands*:
 right for what is near, and taken again after every longer way.
 """
 
@@ -78,7 +78,7 @@ class Board:
 
 
 def _corners(drawing: CameraBoard, number: int) -> Floats:
-    """(4, 3) of marker `number` in reading order: from top left, clockwise as seen, which is how OpenCV tells them."""
+    """(4, 3) of marker `number` in reading order: from top left, clockwise as seen, which is OpenCV's order."""
     row, column = divmod(number, drawing.columns)
     pitch_m = drawing.side_m + drawing.gap_m
     left = pitch_m * (column - 0.5 * (drawing.columns - 1)) - 0.5 * drawing.side_m
@@ -88,7 +88,7 @@ def _corners(drawing: CameraBoard, number: int) -> Floats:
 
 
 # A flat board has two poses that look nearly alike. The second one counts as well while its misfit is less than this
-# many times the first one's; then the one nearer to what was believed is taken.
+# many times the first one's; then the one nearer to what was assumed is taken.
 ALIKE = 2.0
 WORST_PX = 2.0  # rms misfit of a corner beyond which something else was taken for the board
 
@@ -132,7 +132,7 @@ class Sight:
         return self._board.find(self._eye.picture()) is not None
 
     def before_camera(self, arm: BelievedArm, q_rad: Floats, T_base_fixture: Floats) -> Floats | None:
-        """T_camera_psd1 (4, 4): of poses that fit alike the one nearer to what is believed. As `fixture` otherwise."""
+        """T_camera_psd1 (4, 4): of poses that fit alike the one nearer to what is assumed. As `fixture` otherwise."""
         seen = self._board.find(self._eye.picture())
         poses = [] if seen is None else board_poses(self._model, seen)
         if not poses:

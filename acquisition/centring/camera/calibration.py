@@ -20,7 +20,7 @@ from acquisition.motion.kinematics import inverse, rotation_vector
 Floats = NDArray[np.float64]
 
 LEAST_VIEWS = 8
-LEAST_TURN_RAD = 0.3  # two turns about axes that stand across each other by less say too little of the mount
+LEAST_TURN_RAD = 0.3  # two turns about axes that stand across each other by less show too little of the mount
 WORST_PX = 1.0  # rms: beyond it the lens is no pinhole with a bend, or the drawing of the board is wrong
 # What joint zeros wrong by 2 deg leave in the board's place over such a tour, twice: 1 m of arm, postures 30 deg apart.
 WORST_M, WORST_RAD = 0.02, 0.06
@@ -76,7 +76,7 @@ def calibrate_camera(views: Sequence[View], start: CameraModel) -> Calibration:
 
 
 def _lens(views: Sequence[View], start: CameraModel) -> tuple[CameraModel, float]:
-    """The lens with two radial terms: a board of centimetres does not tell more."""
+    """The lens with two radial terms: a board of centimetres does not show more."""
     points = [view.seen.points_m.astype(np.float32) for view in views]
     pixels = [view.seen.pixels.astype(np.float32) for view in views]
     flags = cv2.CALIB_USE_INTRINSIC_GUESS | cv2.CALIB_FIX_ASPECT_RATIO | cv2.CALIB_ZERO_TANGENT_DIST | cv2.CALIB_FIX_K3

@@ -1,6 +1,6 @@
 """How a camera is measured: a tour round the board for lens and mount, then a few poses with light for the beam.
 
-The tour looks at the board from all round, near and far, turned, and not only in the middle: rotations about two axes
+The tour sees the board from all round, near and far, turned, and not only in the middle: rotations about two axes
 across each other fix the mount; tilts of the board against the picture fix the focal length.
 
 Hand-eye calibration gives the mount in the flange as the arm's readings have it, whose last zero may be wrong by
@@ -55,7 +55,7 @@ def viewpoints(model: CameraModel, radius_m: float) -> Iterator[Floats]:
 def stops(
     arm: BelievedArm, model: CameraModel, T_base_board: Floats, radius_m: float, q_rad: Floats, rng: np.random.Generator
 ) -> Iterator[Floats]:
-    """Joint readings (joint,) of the tour from `q_rad`, as drawn; what the arm cannot reach is left out."""
+    """Joint readings (joint,) of the nominal tour from `q_rad`; what the arm cannot reach is left out."""
     for T_board_camera in viewpoints(model, radius_m):
         try:
             q_rad = reach(arm, T_base_board @ T_board_camera @ inverse(model.T_flange_camera), q_rad, rng)
@@ -68,7 +68,7 @@ CENTRES = (0.0, 0.0, 0.0, 0.0)
 STAND_OFF_M = 0.2  # of the laser from the first face
 ROLLS_RAD = (0.0, 0.4, -0.4)  # of the poses with light, each in both orders
 GLANCE_S = 0.01
-STEADY_S = 0.05  # of the spots that the beam is told by
+STEADY_S = 0.05  # of the spots that give the beam
 
 
 @dataclass(frozen=True)

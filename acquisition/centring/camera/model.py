@@ -48,7 +48,7 @@ class CameraFit:
     reprojection_px: float  # rms of a coordinate
     board_m: float  # rms scatter of the board's place in the base over the views
     board_rad: float  # and of its turn
-    lit: int = 0  # poses with light that told the beam
+    lit: int = 0  # poses with light that gave the beam
     beam_m: float | None = None  # rms scatter of the beam before the camera over them
     beam_rad: float | None = None
 

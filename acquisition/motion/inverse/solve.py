@@ -41,7 +41,7 @@ class Solved:
 
 
 class Goal(Protocol):
-    """What postures have to bring about; `rows` says which of them `frames` (pose, joint + 1, 4, 4) are."""
+    """What postures have to bring about; `rows` states which of them `frames` (pose, joint + 1, 4, 4) are."""
 
     def missing(self, frames: Floats, rows: Rows) -> Floats:
         """(pose, k) what is left, m and rad."""

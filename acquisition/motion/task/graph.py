@@ -82,7 +82,7 @@ class TaskGraph:
     def place(self, position: str) -> Place:
         """The position as T6 TOOL = COORD(s) POS. TaskError where it is not determined."""
         equation = self._position(position)
-        self.solve(position, ARM)  # tells what is missing
+        self.solve(position, ARM)  # reports what is missing
         behind = _behind_arm(equation)
         wanted = _reduced((*equation.equal_to(ARM), *behind))  # T6 TOOL
         last = max((i for i, t in enumerate(wanted) if self._source(t.name).moves), default=-1)

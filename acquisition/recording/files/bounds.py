@@ -100,7 +100,7 @@ Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 Number = Annotated[float, Meta(ge=-NUMBER, le=NUMBER)]
 NotNegative = Annotated[float, Meta(ge=0.0, le=NUMBER)]
 Positive = Annotated[float, Meta(ge=1e-20, le=NUMBER)]
-Correction = Annotated[float, Meta(ge=-1e6, le=1e6)]  # m, rad or a factor, about what a rig or a form says
+Correction = Annotated[float, Meta(ge=-1e6, le=1e6)]  # m, rad or a factor, about what a rig or a form states
 Statistic = Annotated[float, Meta(ge=-STATISTIC, le=STATISTIC)]
 Count = Annotated[int, Meta(ge=0, le=COUNT)]
 Whole = Annotated[int, Meta(ge=-COUNT, le=COUNT)]

@@ -1,4 +1,4 @@
-"""Turns what the type check says about a file into one line for a person: file, place, value, remedy.
+"""Turns what the type check reports of a file into one line for a person: file, place, value, remedy.
 
 `root` is the record of the whole file: that of the rig, or of another file that is read in the same way.
 """
@@ -55,7 +55,7 @@ def located(error: msgspec.ValidationError, document: Mapping[str, Any], root: A
 
 
 def unknown_key(key: str, path: KeyPath, known: Sequence[str]) -> str:
-    """Says what a key that nobody knows was probably meant to be."""
+    """What an unknown key was probably meant to be."""
     says = f"unknown key '{shown(key, 60)}' in {section(path)}"
     if (in_si := si_name(key)) in known:
         return f"{says}; the file is in SI units: write '{in_si}' in {spelt(suffix_of(str(in_si)) or '')}"

@@ -1,4 +1,4 @@
-"""Quantities written as text, "0.2 mm", become SI numbers; the suffix of the key says which quantity is meant.
+"""Quantities written as text, "0.2 mm", become SI numbers; the suffix of the key states which quantity is meant.
 
 Symbols and factors: SI Brochure, 9th edition (BIPM 2019), tables 2, 4, 7 and 8.
 """

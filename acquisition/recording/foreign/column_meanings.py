@@ -47,7 +47,7 @@ _OWN_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 class Group:
     """Columns that mean one thing: `columns` are places in the sheet, in the order of the meaning.
 
-    `unit` is as written, "" where none stands and one is needed; `stated`: by a person, who is believed.
+    `unit` is as written, "" where none stands and one is needed; `stated`: by a person, and not questioned.
     """
 
     meaning: str
@@ -169,7 +169,7 @@ def common_unit(sheet: Sheet, columns: Sequence[int]) -> str:
 
 
 class _Headings:
-    """Looks for meanings among the headings that nobody has stated a meaning of."""
+    """Searches for meanings among the headings that nobody has stated a meaning of."""
 
     def __init__(self, sheet: Sheet, n_joints: int, stated: Sequence[Group]) -> None:
         self._sheet, self._n, self._stated = sheet, n_joints, stated

@@ -1,7 +1,7 @@
 """A foreign table in SI: what it is understood to mean, which units are open, and the samples that come of it.
 
 A unit is never assumed. Where none stands, or the one that stands makes values that no arm can have, there is a
-`Question`; `answered` settles it. What a person states is believed, up to the bounds of all files.
+`Question`; `answered` settles it. What a person states is taken, up to the bounds of all files.
 """
 
 import hashlib
@@ -39,7 +39,7 @@ from acquisition.recording.samples import Cell, Floats, Samples, cells_of, per_j
 from acquisition.recording.session_folder import export
 
 EPOCH_S = 1e8  # a time beyond counts from 1970 or the like, no session lasts three years
-FEWEST = 3  # rows whose spread says something of their unit
+FEWEST = 3  # rows whose spread shows something of their unit
 Exact = int | float | Decimal
 
 

@@ -107,7 +107,7 @@ def stream_name(sheet: Sheet) -> str:
 
 
 def recording_of(tables: Sequence[Understanding], path: Path) -> tuple[Recording, datetime | None]:
-    """The streams of all logs as one recording without samples, and when it began, where a calendar says so.
+    """The streams of all logs as one recording without samples, and when it began, where a calendar has it.
 
     SamplesError where their times have nothing in common.
     """

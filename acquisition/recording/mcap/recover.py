@@ -1,7 +1,7 @@
 """A new, whole file of what is good in a torn or damaged one.
 
-Every message that is read is copied to the letter, with the description that the old file holds. What was lost is told
-in the new file, which stays an incomplete session for ever.
+Every message that is read is copied to the letter, with the description that the old file holds. What was lost is
+reported in the new file, which stays an incomplete session for ever.
 """
 
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,7 @@
 """Every readable record of an MCAP file, in file order, however the file ends.
 
 Reads from the front, because the index at the end is missing when a session was killed. Layout of the records:
-https://mcap.dev/spec. A batch whose checksum is wrong is left out and told; the batches after it are still
+https://mcap.dev/spec. A batch whose checksum is wrong is left out and reported; the batches after it are still
 read, also where the length of a record is damaged and the next batch must be searched for, or the disk gives no bytes.
 
 The search for the next batch in damaged bytes: a chunk record is 06, its length, start, end, uncompressed size (8 bytes
@@ -40,7 +40,7 @@ ContentRecord = Header | Schema | Channel | Message | Metadata
 
 
 class Scan:
-    """One pass over a file; `damage` says afterwards what could not be read, `whole` whether the end was reached."""
+    """One pass over a file; `damage` states afterwards what could not be read, `whole` whether the end was reached."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -114,7 +114,7 @@ def _check_magic(path: Path, start: bytes, size: int) -> None:
 def _says(error: BaseException) -> str:
     if isinstance(error, OSError):
         return f"the disk cannot read it ({error.strerror or error})"
-    if isinstance(error, EndOfFile | struct.error):  # the parser's words for a record that is shorter than it says
+    if isinstance(error, EndOfFile | struct.error):  # the parser's words for a record that is shorter than it states
         return "the file ends too early"
     return str(error) or type(error).__name__
 

@@ -260,7 +260,7 @@ class Spool(Generic[T]):
                 raise RecordingError(f"{self._name}: the disk has not answered for {timeout_s:.0f} s; check it")
 
     def fail(self, why: str) -> None:
-        """Nothing more can be written: everyone who puts or waits is told."""
+        """Nothing more can be written: everyone who puts or waits is informed."""
         with self._changed:
             self._failure = why
             self._items.clear()
@@ -324,7 +324,7 @@ class Scribe:
             self._file.finish()
         except Exception as error:  # whatever it was, nobody may wait for ever for this thread
             self._spool.fail(self._says(error))
-            with contextlib.suppress(OSError):  # the failure itself has been told already
+            with contextlib.suppress(OSError):  # the failure itself has been reported already
                 self._file.give_up()
 
     def _write(self, entries: list[Entry]) -> None:

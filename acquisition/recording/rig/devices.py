@@ -186,7 +186,7 @@ class TrackerDevice(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class OtherDevice(Struct, frozen=True, forbid_unknown_fields=True):
-    """An instrument of a plug-in, recorded beside the others. Its package says which settings it takes."""
+    """An instrument of a plug-in, recorded beside the others. Its package states which settings it takes."""
 
     name: Annotated[str, Meta(pattern="^[a-z][a-z0-9_-]{0,31}$")]  # of its stream, and of its temperatures' columns
     driver: Name  # entry point of the group calibeam.devices

@@ -90,7 +90,7 @@ def _in_si(value: Any, path: KeyPath, key: str) -> Any:
 
 
 def _emulation_faults(section: Any) -> Iterator[tuple[KeyPath, str]]:
-    if not isinstance(section, Mapping):  # absent, or no table: that is told by the type check
+    if not isinstance(section, Mapping):  # absent, or no table: the type check reports that
         return
     for key, value in cast("Mapping[str, object]", section).items():
         path = ("emulation", key)

@@ -109,7 +109,7 @@ class Joint(Struct, frozen=True, forbid_unknown_fields=True):
     encoder_side: EncoderSide | None = None  # of the second encoder; None: not known
     mass_kg: Kilograms | None = None
     com_m: ArmVector | None = None
-    sign: Literal[-1, 1] = 1  # -1: the controller counts against the axis as drawn; taken into the numbers (senses.py)
+    sign: Literal[-1, 1] = 1  # -1: the controller counts against the nominal axis; taken into the numbers (senses.py)
     follows: Follows | None = None  # angle from the link in front = reported angle + by * reported angle of that joint
 
 
@@ -211,7 +211,7 @@ class PermissibleErrors(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Noise(Struct, frozen=True, forbid_unknown_fields=True):
-    """One sigma as assumed: a start value only. None: nothing is believed."""
+    """One sigma as assumed: a start value only. None: nothing is assumed."""
 
     psd_m: SigmaMetres | None = None
     position_m: SigmaMetres | None = None
@@ -223,7 +223,7 @@ class Noise(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Tolerance(Struct, frozen=True, forbid_unknown_fields=True):
-    """One sigma of the drawing: priors of the fit. What may be None is, without it, taken as `docs/formats.md` says."""
+    """One sigma of the drawing: priors of the fit. What may be None is then taken as in `docs/formats.md`."""
 
     length_m: SigmaMetres
     angle_rad: SigmaRadians
@@ -283,7 +283,7 @@ class SlowBox(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Motion(Struct, frozen=True, forbid_unknown_fields=True):
-    """Limits of every motion. The defaults are slow: nobody has said yet what this cell allows."""
+    """Limits of every motion. The defaults are slow: nobody has stated yet what this cell allows."""
 
     speed_rad_s: Speed = 0.5
     acceleration_rad_s2: Acceleration = 1.0
