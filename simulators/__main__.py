@@ -9,7 +9,7 @@ from simulators.serve import ServeOptions, serve
 
 
 def main() -> int:
-    """Exit code 0 when told to stop, 1 when the rig cannot be emulated."""
+    """Exit code 0 when asked to stop, 1 when the rig cannot be emulated."""
     request = json.loads(sys.stdin.readline())
     options = request["options"]
     if options.get("truth_path") is not None:

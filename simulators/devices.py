@@ -187,7 +187,7 @@ def addresses(host: Host, devices: EmulatedDevices, rig: Mapping[str, Any]) -> d
 
 
 def _robot_address(host: Host, robot: Bench, driver: str) -> dict[str, Any]:
-    """A UR controller has the ports of its make; a Modbus server says which."""
+    """A UR controller has the ports of its make; a Modbus server states which."""
     sockets = [port for port in robot.ports if isinstance(port, TcpPort)]
     if not sockets:
         return {"serial_port": host.serial_address(_serial_name(robot))}
@@ -214,7 +214,7 @@ def _serial_name(bench: Bench) -> str:
 
 
 def plug_in_bench(world: Any, other: Mapping[str, Any]) -> Bench | None:
-    """The bench of one [[devices.other]]; None, said on standard error, where its package emulates nothing.
+    """The bench of one [[devices.other]]; None, reported on standard error, where its package emulates nothing.
 
     The entry point of an installed package is an object with `emulator`, "module:function" or an empty text; the
     function is called with the world and the settings of the rig file. HostError naming the package where that fails,

@@ -14,7 +14,7 @@ class HostError(Exception):
 
 
 class PortBusy(HostError):  # noqa: N818 - the field says "port busy"
-    """A TCP address is taken; `host` says which, so that another can be tried."""
+    """A TCP address is taken; `host` names it, so that another can be tried."""
 
     def __init__(self, message: str, host: str) -> None:
         super().__init__(message)

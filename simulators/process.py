@@ -22,7 +22,7 @@ SAID_LINES = 50  # of standard error that are remembered
 
 
 class EmulatorsError(Exception):
-    """The emulators did not start, ended, or refused; the message holds what they said."""
+    """The emulators did not start, ended, or refused; the message holds what they reported."""
 
 
 def ask_emulators(host: str, port: int, verb: str, arguments: Mapping[str, Any], token: str | None = None) -> Any:

@@ -2,7 +2,7 @@
 
     read = replayed(rig, scene, mechanisms, reading_rad)
 
-The arm stands where its mechanisms and its weight let it (`conceal.chain`); each instrument that the rig has looks at
+The arm stands where its mechanisms and its weight let it (`conceal.chain`); each instrument that the rig has observes
 it there. A probe in a cone is another matter: its point is fixed, so it is the encoders that read something else.
 """
 

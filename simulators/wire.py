@@ -42,7 +42,7 @@ TICK_S = 0.002  # one cycle of an e-Series controller, 500 Hz (reference: RTDE g
 
 
 class Wire(Protocol):
-    """One connection's protocol. Its docstring says what it does NOT imitate.
+    """One connection's protocol. Its docstring states what it does NOT imitate.
 
     A wire may have an attribute `closing`. Once it is true and all bytes are sent, the host closes a TCP connection
     (dashboard `quit`, a controller that drops its clients); a serial port is unplugged for as long as it is true.
@@ -80,7 +80,7 @@ class SerialPort:
 
 @dataclass(frozen=True)
 class TcpPort:
-    """A listening socket; every client gets a wire of its own. `close` is told when a client has gone."""
+    """A listening socket; every client gets a wire of its own. `close` is called when a client has gone."""
 
     name: str
     host: str

@@ -83,7 +83,7 @@ def turning_com_m(drawing: Drawing) -> Floats:
 
 
 def as_local_poe(drawing: Drawing) -> Drawing:
-    """The same arm in the notation that can say everything."""
+    """The same arm in the notation that can describe everything."""
     parts = fixed_parts(drawing)
     return Drawing(
         name=drawing.name,

@@ -40,7 +40,7 @@ class HttpWire:
 
     @property
     def wants_frames(self) -> bool:
-        """Whether somebody looks at what the camera sees."""
+        """Whether somebody fetches what the camera sees."""
         return self._streams or self._waits
 
     def handle(self, data: bytes) -> bytes:
@@ -154,7 +154,7 @@ class NetworkCamera:
 
 
 def build(world: SeenWorld, rig: Mapping[str, Any], seed: int) -> Bench:
-    """Listens where the rig's `source` says, if that is an http address; else on loopback, on any port that is free."""
+    """Listens where the rig's `source` has it, if that is an http address; else on loopback, on any free port."""
     camera = NetworkCamera(Eye(world, rig, seed))
     source = rig["camera"].get("source", "")
     parts = urlsplit(source if isinstance(source, str) else "")

@@ -244,7 +244,7 @@ class Case:
     sigma_m: float
     recorded: frozenset[str]  # columns beside the required ones
     withheld: tuple[str, ...]
-    second_rad: Floats | None  # (row, n) what second encoders say; None: there are none
+    second_rad: Floats | None  # (row, n) what second encoders read; None: there are none
     rng: np.random.Generator  # for what is still to be drawn when the table is written
 
 

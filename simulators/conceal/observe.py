@@ -153,7 +153,7 @@ class ReadsSecond(Protocol):
 
 
 def machine_like(wanted_kinds: Sequence[str], site: Site, rng: np.random.Generator) -> list[Defect]:
-    """One mechanism of each kind, "any" for any, each of a size as drawn from SIZES. ConcealError for unknown ones."""
+    """One mechanism of each kind, "any" for any, each of a size drawn from SIZES. ConcealError for unknown ones."""
     out: list[Defect] = []
     for name in wanted_kinds:
         kinds = [kind for kind in SIZES if name in ("any", kind.KIND)]

@@ -64,7 +64,7 @@ def nominal_truth(rig: WorldRig) -> Truth:
 
 
 def drawing_of(plain: Mapping[str, Any], rng: np.random.Generator) -> Drawing:
-    """The arm of a rig file; of one in seven nobody knows the masses."""
+    """The arm of a rig file; of one in seven the masses are unknown."""
     joints, flange = plain["arm"]["joint"], plain["arm"].get("flange", {})
     weighed = rng.random() >= 0.15
     return Drawing(
@@ -83,7 +83,7 @@ def drawing_of(plain: Mapping[str, Any], rng: np.random.Generator) -> Drawing:
 
 
 def spread_of(rig: WorldRig) -> Spread:
-    """What [emulation] draws; PSD 2 stands in PSD 1 as drawn, and masses are what they are."""
+    """What [emulation] draws; PSD 2 stands in PSD 1 at its nominal pose, and masses are what they are."""
     of = rig.emulation
     return Spread(
         length_m=of.length_sigma_m,
@@ -135,7 +135,7 @@ class Taken:
 
 
 def draw_wired(wanted: Wanted, plain: Mapping[str, Any]) -> Wired:
-    """For the first places of the rig file `plain`, whose [emulation] says how far truth lies off.
+    """For the first places of the rig file `plain`, whose [emulation] states how far truth lies off.
 
     ConcealError: another seed.
     """

@@ -55,13 +55,13 @@ class Stance:
 
 
 def stand(rig: TrueRig, scene: Scene, defects: Sequence[Defect], reading_rad: Floats) -> Stance:
-    """The arm whose encoders say `reading_rad` (row, n)."""
+    """The arm whose encoders read `reading_rad` (row, n)."""
     shaft_rad = true_shaft_rad(defects, scene, reading_rad)
     return balanced(rig.arm, scene, defects, shaft_rad)
 
 
 def true_shaft_rad(defects: Sequence[Defect], scene: Scene, reading_rad: Floats) -> Floats:
-    """Shaft angles at which the encoders say `reading_rad`: reading = shaft + error(shaft), solved for the shaft."""
+    """Shaft angles at which the encoders read `reading_rad`: reading = shaft + error(shaft), solved for the shaft."""
     readers = [defect for defect in defects if isinstance(defect, ReadsAngle)]
     shaft_rad = reading_rad
     for _ in range(READING_STEPS if readers else 0):
@@ -166,7 +166,7 @@ def _meet(origin: Floats, direction: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class SpotReadings:
-    """What both sensors say."""
+    """What both sensors read."""
 
     seen_m: Floats  # (row, 4)
     sum_v: Floats  # (row, 2)

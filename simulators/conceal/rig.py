@@ -1,4 +1,4 @@
-"""A whole rig in numbers: the arm, what hangs at it, and what looks at it. The same record holds truth and belief.
+"""A whole rig in numbers: the arm, what hangs at it, and what observes it. The same record holds truth and assumption.
 
 How far the true rig lies from its drawing: six small motions at every link, zeros, tool, laser, places, device.
 """
@@ -77,7 +77,7 @@ class Spread:
 
 
 def perturbed(rig: TrueRig, spread: Spread, rng: np.random.Generator) -> TrueRig:
-    """A true rig around a believed one."""
+    """A true rig around an assumed one."""
     tool_point_m = rig.tool_point_m + spread.tool_m * rng.standard_normal(3)
     return TrueRig(_arm(rig.arm, spread, rng), tool_point_m, _instrument(rig.instrument, spread, rng))
 

@@ -166,7 +166,7 @@ NO_LASER_PLACE = np.eye(4)[np.newaxis]
 
 @dataclass(frozen=True, eq=False)
 class DrawnRig:
-    """Drawing, belief and truth."""
+    """Nominal, assumed and true."""
 
     drawing: Drawing  # as the rig file shows it: perhaps in another notation, perhaps without masses
     believed: TrueRig

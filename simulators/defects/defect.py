@@ -1,7 +1,7 @@
 """What a mechanism is, and the places where it may take hold of the chain, in the order of the signal.
 
 A defect is a frozen record of what is physically wrong, with one quantity (`SIZE`) that scales it: zero changes
-nothing. It takes hold by having one or more of the methods of the protocols below; the chain looks for them and calls
+nothing. It takes hold by having one or more of the methods of the protocols below; the chain finds them and calls
 each at its place.
 """
 
@@ -200,7 +200,7 @@ class MovesSeat(Protocol):
 
 @runtime_checkable
 class DistortsSpots(Protocol):
-    """Between light and what a PSD says."""
+    """Between light and what a PSD reads."""
 
     def seen_spots_m(self, spot_m: Floats, light: Light, scene: Scene) -> Floats:
         """Spots (row, 2, 2) as given when they are truly at `spot_m`."""
@@ -218,7 +218,7 @@ class ChangesSums(Protocol):
 
 @runtime_checkable
 class DistortsPosition(Protocol):
-    """Between a target and what a tracker says."""
+    """Between a target and what a tracker reads."""
 
     def seen_position_m(self, position_m: Floats, scene: Scene) -> Floats:
         """(row, 3) in the device's frame."""
@@ -227,7 +227,7 @@ class DistortsPosition(Protocol):
 
 @runtime_checkable
 class DistortsLength(Protocol):
-    """Between a wire and what its drum says."""
+    """Between a wire and what its drum reads."""
 
     def seen_length_m(self, length_m: Floats, scene: Scene) -> Floats:
         """(row,)."""

@@ -79,7 +79,7 @@ Course = Literal["step", "settling", "steady", "warmth"]
 class CarriedPart(Defect):
     """A part that is carried away: by `shift_m`, and turned by `turn_rad` about `about_m`, in its own frame.
 
-    `course` says when: all of it from `at_s` on ("step"); slowly to that end with the time constant `over_s`, from
+    `course` states when: all of it from `at_s` on ("step"); slowly to that end with the time constant `over_s`, from
     `at_s` on ("settling"); by that much in every `over_s`, steadily ("steady"); by that much for each kelvin at
     `where` ("warmth").
     """

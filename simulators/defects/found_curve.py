@@ -1,4 +1,4 @@
-"""A mechanism that nobody knows: what it does was found as a curve, and here it does just that.
+"""An unknown mechanism: what it does was found as a curve, and here it does just that.
 
 It is a table of what was seen, not a law. Between the rows of the table it is interpolated, beyond them it ends at the
 nearest row: nothing is known there.

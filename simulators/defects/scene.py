@@ -44,7 +44,7 @@ class Scene:
         return self.goal_rad - self.via_rad if self.moved_rad is None else self.moved_rad
 
     def warmed_k(self, where: str) -> Floats:
-        """(row,) temperature against the one at which the rig is as drawn; where none is stated, against the start."""
+        """(row,) temperature against the one at which the rig is nominal; where none is stated, against the start."""
         degC = self.temperature_degC[where]
         return degC - self.rest_degC.get(where, float(degC[0]))
 

@@ -175,7 +175,7 @@ class SlcanAdapter:
         return bytes(out)
 
     def damaged(self, output: bytes) -> bytes:
-        """For injected faults: frames whose checksum is wrong end in the adapter, which tells the client nothing."""
+        """For injected faults: frames whose checksum is wrong end in the adapter, which does not inform the client."""
         lines = output.split(CR)
         return CR.join(line for line in lines if line[:1] not in (b"t", b"T", b"r", b"R"))
 
@@ -241,7 +241,7 @@ class SlcanAdapter:
 
 
 def as_line(frame: CanFrame) -> bytes:
-    """The line that tells the client of a frame."""
+    """The line by which the client learns of a frame."""
     letter = "r" if frame.remote else "t"
     number = f"{letter.upper()}{frame.id:08X}" if frame.extended else f"{letter}{frame.id:03X}"
     return f"{number}{frame.dlc:X}{frame.data.hex().upper()}\r".encode("ascii")

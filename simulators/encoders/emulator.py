@@ -3,7 +3,7 @@
 An encoder that sends by itself, without any protocol above the frame: rigs/encoders-plain.dbc in Python.
 
 Frame 0x100 + node every period: angle i32 little endian, 2^20 a turn, rising counter-clockwise; a counter of frames u8;
-a byte whose bit 0 says that the encoder is at fault. Does not imitate: drift of its clock, a start that takes time.
+a byte whose bit 0 means that the encoder is at fault. Does not imitate: drift of its clock, a start that takes time.
 """
 
 import math
@@ -36,7 +36,7 @@ class PlainEncoder:
         self._fault = 0
 
     def handle(self, frame: CanFrame, now_s: float) -> list[CanFrame]:
-        """Nothing that others say concerns it."""
+        """No message of others concerns it."""
         return []
 
     def due(self, now_s: float) -> list[CanFrame]:

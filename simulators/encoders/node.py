@@ -66,7 +66,7 @@ LOAD = int.from_bytes(b"load", "little")  # 1011h
 
 
 class NmtState(IntEnum):
-    """As the heartbeat tells it; INITIALISING is the boot-up message."""
+    """As the heartbeat reports it; INITIALISING is the boot-up message."""
 
     INITIALISING = 0x00
     STOPPED = 0x04

@@ -115,7 +115,7 @@ class NodeDictionary:
         return self._values[index, subindex]
 
     def number(self, index: int, subindex: int = 0) -> int:
-        """Decoded once: a node looks at its settings every cycle, and they hardly ever change."""
+        """Decoded once: a node reads its settings every cycle, and they hardly ever change."""
         address = index, subindex
         known = self._numbers.get(address)
         if known is not None:

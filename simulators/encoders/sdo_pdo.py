@@ -155,7 +155,7 @@ class TransmitPdo:
             dictionary.on_write(self._mapping, entry, partial(self._accept_entry, entry))
 
     def start(self, now_s: float) -> None:
-        """The node becomes operational: count SYNCs anew, first event now."""
+        """The node becomes operational: count SYNCs from zero, first event now."""
         self._syncs = 0
         self._next_event_s = now_s
 
@@ -216,7 +216,7 @@ class TransmitPdo:
         self._syncs = 0
 
     def _accept_timer(self, period_ms: int) -> None:
-        self._next_event_s = None  # the new period counts from the next look at the time
+        self._next_event_s = None  # the new period counts from the next reading of the clock
 
     def _accept_entry(self, entry: int, word: int) -> None:
         if self._valid or self._dictionary.number(self._mapping, 0) != 0:

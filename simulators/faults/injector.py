@@ -28,7 +28,7 @@ from simulators.wire import TICK_S, Bench, SerialPort, TcpPort, UdpPort, Wire
 
 LINE_KINDS = {kind.name: kind for kind in LINE_FAULTS}
 STATE_KINDS = {kind.name: kind for kind in STATE_FAULTS}
-ERROR = "error"  # the device says no, in the words of its protocol, and does not do what it was asked for
+ERROR = "error"  # the device refuses, in the words of its protocol, and does not do what it was asked for
 KINDS = (*LINE_KINDS, ERROR, *STATE_KINDS)
 
 

@@ -151,7 +151,7 @@ def read_hand_rig(rig: Mapping[str, Any]) -> HandRig:
 Floats = NDArray[np.float64]
 SCHEMA = 1
 KIND = "hand-held-arm"
-LINES = 256  # groups of graduation lines a turn: a head looks at some hundred lines at a time and averages them
+LINES = 256  # groups of graduation lines a turn: a head reads some hundred lines at a time and averages them
 CYCLES = (-3, -2, -1, 2, 3)  # error motions of an axis a turn, see simulators/hand/held_arm.py
 AXIAL_CYCLES = (1, 2, 3)
 

@@ -86,7 +86,7 @@ ANSWER_LIMIT_BYTES = 1024 * 1024  # feels right: thousands of answers that nobod
 
 
 class Outbox:
-    """`write` takes bytes and says how many it took; BlockingIOError means none now."""
+    """`write` takes bytes and returns how many it took; BlockingIOError means none now."""
 
     def __init__(self, write: Callable[[bytearray], int]) -> None:
         self._write = write
@@ -108,7 +108,7 @@ class Outbox:
         return False
 
     def gather(self, data: bytes) -> None:
-        """Streamed output for the next `flush`, where `takes_stream` has said yes."""
+        """Streamed output for the next `flush`, where `takes_stream` is true."""
         self._waiting += data
 
     def stream(self, data: bytes) -> None:

@@ -59,7 +59,7 @@ class SerialLine:
         self._send(answer, self._outbox.answer)
 
     def send_due(self) -> None:
-        """Sends what became due; called once a tick. Also looks for a new client, which raises no event."""
+        """Sends what became due; called once a tick. Also checks for a new client, which raises no event."""
         if not self.attached and not self.unplugged:
             self.receive()
         try:
@@ -107,8 +107,8 @@ class SerialLine:
     def _detach(self) -> None:
         """The client has gone: what it left unread must not greet the next one.
 
-        What came from clients is not flushed: the hang-up is told after its last byte, so that anything there now is
-        the next client's, who may have been quick.
+        What came from clients is not flushed: the hang-up is reported after its last byte, so that anything there now
+        is the next client's, who may have been quick.
         """
         if self.attached:
             self._outbox.clear()

@@ -52,7 +52,7 @@ class SideChannelWire:
 
 
 def side_channel(verbs: Verbs, control: Control | None = None) -> TcpPort:
-    """The port, on 127.0.0.1 unless told otherwise, with a number that the system chooses."""
+    """The port, on 127.0.0.1 unless set otherwise, with a number that the system chooses."""
     where = control or Control()
     return TcpPort(name="control", host=where.host, port=0, accept=lambda: SideChannelWire(verbs, where.token))
 

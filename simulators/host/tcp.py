@@ -14,7 +14,7 @@ BACKLOG = 16  # clients that connect within one tick
 
 
 class Connection:
-    """One client. `alive` turns False when it has gone, was dropped, or its wire has said goodbye."""
+    """One client. `alive` turns False when it has gone, was dropped, or its wire has ended it."""
 
     def __init__(self, client: socket.socket, wire: Wire, place: str, report: Report) -> None:
         self.client, self.wire = client, wire
@@ -104,7 +104,7 @@ class Listener:
         return Connection(client, wire, self._port.name, self._report)
 
     def bid_farewell(self, connection: Connection) -> None:
-        """Closes a connection and tells the instrument."""
+        """Closes a connection and informs the instrument."""
         connection.client.close()
         try:
             self._port.closed(connection.wire)

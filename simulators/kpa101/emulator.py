@@ -108,7 +108,7 @@ MONITOR, OPEN_LOOP, CLOSED_LOOP, AUTO = 1, 2, 3, 4
 STATUS_BITS = {MONITOR: 1, OPEN_LOOP: 2, CLOSED_LOOP: 4, AUTO: 4}
 NOISE_RATE_HZ = 1000.0  # where the world's noise is stated
 UPDATE_S = 0.1  # status updates come ten times a second
-UNACKNOWLEDGED_MOST = 50  # updates that nobody acknowledges; then the unit says no more (APT, HW_START_UPDATEMSGS)
+UNACKNOWLEDGED_MOST = 50  # updates that nobody acknowledges; then the unit sends no more (APT, HW_START_UPDATEMSGS)
 BODY_BYTES = {PID: 6, OUTPUTS: 16, MODE: 2, DISPLAY: 6, MANUAL: 4}
 DEFAULTS = {
     PID: struct.pack("<HHH", 16384, 16384, 0),
@@ -133,14 +133,14 @@ class Kpa101Unit:
     """An instrument of `simulators.wire`: reads face `place` (0 or 1) of the world whenever it is asked.
 
     `x_sign` and `sum_volts` (at 65535 counts) are how this unit is wired: clients disagree about both, so a test sets
-    them. Does not imitate: the control loops (closed and auto loop only say that they are on), digital I/O, triggers,
-    the 15 kHz of the head, the converter's own noise.
+    them. Does not imitate: the control loops (closed and auto loop only report that they are on), digital I/O,
+    triggers, the 15 kHz of the head, the converter's own noise.
     """
 
     def __init__(self, world: LitFaces, place: int, serial_number: int, transimpedance_v_a: float) -> None:
         self.name = f"psd{place + 1}"
         self.x_sign, self.sum_volts = -1, 10.0
-        self.silent = False  # fault: obeys and says nothing
+        self.silent = False  # fault: obeys and sends nothing
         self.line = TransmitLine(115_200)
         self._world, self._place, self._serial_number = world, place, serial_number
         self._transimpedance_v_a = transimpedance_v_a

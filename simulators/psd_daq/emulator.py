@@ -212,7 +212,7 @@ DEFAULT_SERIAL_NUMBER = "CB-0001"
 def build(world: LitFaces, rig: Mapping[str, Any], baud: int = DEFAULT_BAUD) -> Bench:
     """The box of `rig["devices"]["psd"]` with the faces of `rig["fixture"]`; its link is the rig's port, if any.
 
-    Verbs: "psd.silence" {on} stops all that it says while sampling goes on; "psd.damage" {frames} turns one bit in
+    Verbs: "psd.silence" {on} stops all that it sends while sampling goes on; "psd.damage" {frames} turns one bit in
     each of the next so many data frames.
     """
     device = rig["devices"]["psd"]

@@ -94,7 +94,7 @@ class Request:
 
 
 class RequestReader:
-    """Collects bytes until a delimiter; what does not pass its CRC is ignored, as the box has nobody to tell."""
+    """Collects bytes until a delimiter; what does not pass its CRC is ignored, as the box has nobody to inform."""
 
     def __init__(self) -> None:
         self._bytes = bytearray()

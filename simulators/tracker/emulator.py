@@ -29,7 +29,7 @@ LOOPBACK = "127.0.0.1"
 
 
 class TargetWorld(Protocol):
-    """What it looks at."""
+    """What it observes."""
 
     @property
     def time_s(self) -> float: ...

@@ -127,7 +127,7 @@ Floats = NDArray[np.float64]
 Axis = tuple[float, float, float, float, float, float]  # direction, then a point on it, in the base frame
 
 NEWTON_STEPS = 60  # from 1 rad away 6..12 are needed; more means that there is no solution near
-NEWTON_STEP_RAD = 0.5  # a longer step leaves the region where the Jacobian says anything
+NEWTON_STEP_RAD = 0.5  # a longer step leaves the region where the Jacobian means anything
 DAMPING = 1e-9  # keeps the normal equations solvable at a singularity; bends the answer by less than 1e-9 otherwise
 
 

@@ -31,7 +31,7 @@ NO_MODE = "NONE"  # the operational mode is the pendant's affair
 
 
 class Dashboard:
-    """What the dashboard says and does; shared by all connections."""
+    """What the dashboard answers and does; shared by all connections."""
 
     def __init__(
         self, arm: ArmController, runner: ProgramRunner, compile_text: Callable[[str], Program], polyscope: str,

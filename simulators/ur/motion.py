@@ -45,7 +45,7 @@ SETTLE_LIMIT_S = 1.0  # an arm that keeps trembling does not keep its program wa
 HISTORY_STEPS = 100  # what get_actual_joint_positions_history can look back
 
 
-class MoveRefused(Exception):  # noqa: N818 - said by the controller, not an error of the emulator
+class MoveRefused(Exception):  # noqa: N818 - an answer of the controller, not an error of the emulator
     """The arm may not or cannot make this move; the message states why."""
 
 

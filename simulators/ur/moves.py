@@ -33,7 +33,7 @@ class SetPoint:
 
 
 class Generator(Protocol):
-    """One motion. `finished` says that the last set-point was its end; it then stands still."""
+    """One motion. `finished`: the last set-point was its end; it then stands still."""
 
     @property
     def finished(self) -> bool: ...

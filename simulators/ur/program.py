@@ -26,7 +26,7 @@ class Program(Protocol):
         ...
 
     def halt(self) -> None:
-        """Told when it is stopped from outside."""
+        """Informed when it is stopped from outside."""
         ...
 
 

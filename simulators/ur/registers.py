@@ -72,7 +72,7 @@ class Memory:
         self.analog_types = 0b1111  # inputs 0 and 1, outputs 0 and 1: set is a voltage, clear a current (RTDE guide)
         self.tool_voltage_v = 0
         self.speed_slider = 1.0
-        self.on_int_written: list[Callable[[int], None]] = []  # told the index: what a watchdog listens to
+        self.on_int_written: list[Callable[[int], None]] = []  # called with the index: what a watchdog listens to
         self._owners: dict[str, object] = {}
 
     def claim(self, name: str, owner: object) -> bool:

@@ -225,7 +225,7 @@ class RtdeWire:
         return self._server.pack(self._output)
 
     def damaged(self, output: bytes) -> bytes:
-        """For injected faults: the first frame says that it is one byte longer. RTDE itself has no checksum."""
+        """For injected faults: the first frame states one byte more than it has. RTDE itself has no checksum."""
         size, kind = HEADER.unpack_from(output)
         return HEADER.pack(size + 1, kind) + output[HEADER.size :]
 

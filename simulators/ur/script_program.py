@@ -70,7 +70,7 @@ class Call:
         return value
 
     def first(self) -> Argument:
-        """The argument that says where to. ScriptRefused when there is none."""
+        """The argument with the goal. ScriptRefused when there is none."""
         if not self.positional:
             raise ScriptRefused(f"{self.name}: no argument")
         return self.positional[0]
@@ -256,7 +256,7 @@ class LineProgram:
                 outputs.doubles[_below(call, N_REGISTERS)] = call.number("value", 1, 0.0)
             case "write_output_boolean_register":
                 outputs.set_bit(_below(call, N_BITS), bool(call.number("value", 1, 0.0)))
-            case _:  # textmsg, popup, sync, signal_async_progress: nobody to tell
+            case _:  # textmsg, popup, sync, signal_async_progress: nobody to inform
                 pass
 
     def _after(self, delay_s: float) -> Wait:

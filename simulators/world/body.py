@@ -8,7 +8,7 @@ The set-point between two commands: a straight line over one controller cycle, n
 A controller commands once per cycle and its joints interpolate in between, so the reference trails the set-point by
 one cycle and its speed is known to the servo. A jump becomes a ramp at top speed.
 
-Joint repeatability: after every motion the output of a gear stands a little off what the motor side says.
+Joint repeatability: after every motion the output of a gear stands a little off what the motor side has.
 
 Mechanism: when a gear turns, teeth and rolling elements seat again, so the output comes to rest N(0, sigma) away from
 the motor-side angle, and stays there as long as nothing moves. A motion begins when the set-point changes after

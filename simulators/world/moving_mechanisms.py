@@ -77,7 +77,7 @@ class Exposure:
     """Follows the set-point. Joint vectors (n,) are the controller's own readings."""
 
     def __init__(self, q_rad: Floats, rest_degC: Mapping[str, float] | None = None) -> None:
-        """`rest_degC`: by place, the temperature at which the rig is as drawn; none: that at power-on."""
+        """`rest_degC`: by place, the temperature at which the rig is nominal; none: that at power-on."""
         self._rest_degC = rest_degC or {}
         self._start_rad = q_rad.copy()
         self._via_rad, self._goal_rad = q_rad.copy(), q_rad.copy()
@@ -246,7 +246,7 @@ def fixture_at(pose: Pose, motion: Floats) -> Pose:
 
 
 def seen(spots: Spots, beam: Ray, faces: tuple[Face, Face], hidden: MovingMechanisms) -> Spots:
-    """The spots as the detectors say them; a face without light stays dark."""
+    """The spots as the detectors read them; a face without light stays dark."""
     acting = hidden.at_the_light
     if not acting or hidden.scene is None or spots.psd1 is None or spots.psd2 is None:
         return spots

@@ -39,7 +39,7 @@ class Joint(msgspec.Struct, frozen=True):
 
 
 class ArmOfRig(msgspec.Struct, frozen=True):
-    """The arm as drawn."""
+    """The nominal arm."""
 
     joint: Annotated[tuple[Joint, ...], msgspec.Meta(min_length=1)]
     model: str = "dh"
@@ -73,7 +73,7 @@ class Placement(msgspec.Struct, frozen=True):
 
 
 class Emulation(msgspec.Struct, frozen=True):
-    """How far the truth lies from the drawing: one sigma, or the limit where the name says max."""
+    """How far the truth lies from the drawing: one sigma, or the limit where the name has max."""
 
     seed: Annotated[int, msgspec.Meta(ge=0)] = 0
     time_scale: Positive = 1.0
@@ -101,7 +101,7 @@ class WorldRig(msgspec.Struct, frozen=True):
     fixture: Fixture | None = None
     placement: tuple[Placement, ...] = ()
     emulation: Emulation = Emulation()
-    device: Pose = Pose((2.0, 0.0, 0.5), (0.0, 0.0, 3.0))  # of a rig that does not say where its tracker stands
+    device: Pose = Pose((2.0, 0.0, 0.5), (0.0, 0.0, 3.0))  # of a rig that does not state where its tracker stands
 
 
 def read_rig(rig: Mapping[str, Any]) -> WorldRig:

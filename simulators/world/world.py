@@ -50,7 +50,7 @@ from simulators.world.truth import Given, Truth, arm_of, draw_truth, given_truth
 
 Floats = NDArray[np.float64]
 NO_FIXTURE = 0
-HELD_STEPS = 10  # of a moving arm, between two looks at what hidden mechanisms do
+HELD_STEPS = 10  # of a moving arm, between two evaluations of hidden mechanisms
 HELD_S = 0.050  # of a standing one: what drifts does so in minutes
 
 
@@ -241,7 +241,7 @@ class World:
         return self._hidden.seen_position_m(target[:3], device)
 
     def T_base_psd1(self) -> Floats | None:
-        """Where PSD 1 stands, (4, 4), as whoever looks at the fixture sees it; None without a fixture."""
+        """Where PSD 1 stands, (4, 4), as an observer of the fixture sees it; None without a fixture."""
         face = None if self._faces is None else self._faces[0]
         if face is None:
             return None
@@ -257,7 +257,7 @@ class World:
         return self._body.beam()
 
     def spots(self) -> Spots:
-        """Where the beam strikes now, as a detector without noise says it."""
+        """Where the beam strikes now, as a detector without noise reads it."""
         return self._spots(self._body.beam())
 
     def true_joints_rad(self) -> Floats:
