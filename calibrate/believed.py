@@ -52,7 +52,7 @@ class BelievedRig:
         return tuple(self._poses)
 
     def T_base_psd1(self, placement: int) -> Floats:
-        """(4, 4) where PSD 1 is believed to be. DataError for an unknown placement."""
+        """(4, 4) where PSD 1 is assumed to be. DataError for an unknown placement."""
         if placement not in self._poses:
             known = ", ".join(map(str, self._poses))
             raise DataError(f"placement {placement} is not in the rig (known: {known}); add a [[placement]]")

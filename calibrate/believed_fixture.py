@@ -1,4 +1,4 @@
-"""The believed dual-PSD fixture, one beam at a time: spots, derivative by the beam, and the beam for given spots."""
+"""The assumed dual-PSD fixture, one beam at a time: spots, derivative by the beam, and the beam for given spots."""
 
 from enum import Enum
 

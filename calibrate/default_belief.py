@@ -1,7 +1,7 @@
-"""What is believed of a rig whose file has no [tolerance], so that nobody says how far its drawing may be off.
+"""What is assumed of a rig whose file has no [tolerance], so that nothing states how far its drawing may be off.
 
 Nobody's statement: it holds a fit where data see little, and is no source of a number (Parameter.assumed). Where the
-file has a [tolerance], what that leaves out is as docs/formats.md says.
+file has a [tolerance], what that leaves out is as docs/formats.md states.
 """
 
 from acquisition.recording.rig import Rig

@@ -84,7 +84,7 @@ class FitPlan(Struct, frozen=True, forbid_unknown_fields=True):
     angles: AnglesName = AnglesName.CONTROLLER
     free: Few[Name] = ()  # without an opinion of the drawing
     priors: Mapping[Name, Positive] = {}  # pattern -> one sigma about the drawing, m or rad; a later one wins
-    hold: Few[Name] = ()  # as drawn; wins over `free` and `priors`
+    hold: Few[Name] = ()  # nominal; wins over `free` and `priors`
     method: BesideName | None = None
     loss: LossName = LossName.LEAST_SQUARES
     solver: SolverName = SolverName.LEVENBERG

@@ -23,7 +23,7 @@ __all__ = ["WEAK", "Combination", "Identifiability", "analyse", "in_words"]
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-WEAK = 0.5  # sigma of twice the plausible size: the data say nothing; pure priors give exactly 1, so not 1
+WEAK = 0.5  # sigma of twice the plausible size: the data show nothing; pure priors give exactly 1, so not 1
 STRUCTURAL = 1e-9  # of the largest singular value: not weak data but geometry; rounding leaves about 1e-12
 TRACE = 1e-5  # share of an unseen direction below which a parameter is not part of it
 NEGLIGIBLE = 0.1  # of a sigma: what an unseen combination, off by its plausible size, may shift a parameter by

@@ -136,7 +136,7 @@ class JointProblem:
         out[:, self._columns[witness]] += self.witnessed.added(block, index, slope)
 
     def with_parameters(self, parameters: tuple[Parameter, ...]) -> "JointProblem":
-        """The same blocks with these held, bounded or believed otherwise."""
+        """The same blocks with these held, bounded or assumed otherwise."""
         return replace(self, chosen=parameters)
 
     def with_blocks(self, blocks: tuple[Block, ...]) -> "JointProblem":

@@ -86,7 +86,7 @@ class Covariance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class LeftOut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A blunder of the file: its rows, from 1, took no part."""
+    """A gross error of the file: its rows, from 1, took no part."""
 
     kind: Label
     rows: Many[Count]
@@ -103,7 +103,7 @@ class UnseenRows(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     rms_distance_before_m: Statistic
     rms_distance_after_m: Statistic
     chi_after: Statistic
-    chi_predicted: Statistic | None = None  # over noise and doubt of the fit together; absent in earlier files
+    chi_predicted: Statistic | None = None  # over noise and uncertainty of the fit together; absent in earlier files
 
 
 class ObservabilityRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -25,7 +25,7 @@ class NoisyRows:
 
     misfit: Floats  # (row, k)
     jacobian: Floats  # (row, k, param)
-    parts: Floats  # (part, row, k, k) covariance at the believed sizes
+    parts: Floats  # (part, row, k, k) covariance at the assumed sizes
     sources: tuple[int, ...]  # which source each part belongs to, counted over all instruments, each once; or FIXED
 
 
@@ -35,7 +35,7 @@ class IndependentRows:
 
     misfit: Floats  # (row,)
     jacobian: Floats  # (row, param)
-    parts: Floats  # (part, row) variances at the believed sizes
+    parts: Floats  # (part, row) variances at the assumed sizes
     sources: tuple[int, ...]
 
 
@@ -45,7 +45,7 @@ def covariance_of(parts: Floats, sources: Sequence[int], log_variance: Floats) -
 
 
 def factors_of(sources: Sequence[int], log_variance: Floats) -> Floats:
-    """(part,) by what the believed variance of each part is multiplied."""
+    """(part,) by what the assumed variance of each part is multiplied."""
     return np.exp(np.append(log_variance, 0.0)[list(sources)])  # FIXED is the last: factor 1
 
 

@@ -1,4 +1,4 @@
-"""Named unknowns of a model: unit, start value, belief, plausible size."""
+"""Named unknowns of a model: unit, start value, prior, plausible size."""
 
 import math
 from collections.abc import Iterable, Mapping

@@ -12,7 +12,7 @@ from calibrate.parameters import Parameter
 
 Floats = NDArray[np.float64]
 
-NEWTON_STEPS = 4  # from millimetres, as drawn, to rounding: each squares what is left over the size of the arm
+NEWTON_STEPS = 4  # from millimetres, nominal, to rounding: each squares what is left over the size of the arm
 SINGULAR = 0.05  # of the quickest direction: a stretched arm leaves what it cannot follow, and does not leap
 
 

@@ -1,4 +1,4 @@
-"""A session's samples beside the arm as drawn: readings, filled rows, and frames and points found in closed form."""
+"""A session's samples beside the nominal arm: readings, filled rows, and frames and points found in closed form."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -91,7 +91,7 @@ class SampleTable:
 
     @property
     def alignment(self) -> Alignment | None:
-        """Of the positions with the arm as drawn."""
+        """Of the positions with the nominal arm."""
         return self._aligned[0]
 
     @property

@@ -1,7 +1,7 @@
 """Sizes of several sources of noise at once, over several instruments, by restricted maximum likelihood (REML).
 
 What is found is the variance of each source over the assumed one: joint repeatability mapped through the arm, the
-detectors' own noise, ... The believed sizes are the start and hold the answer by a wide prior. Sources: Patterson,
+detectors' own noise, ... The assumed sizes are the start and hold the answer by a wide prior. Sources: Patterson,
 Thompson, Biometrika 58(3), 1971 (REML); Satterthwaite's degrees of freedom: Fai, Cornelius, J. Statist. Comput. Simul.
 54, 1996.
 """
@@ -28,16 +28,16 @@ TOLERANCE = 2e-3  # of the log variance in a last step of Newton's; a quarter of
 
 @dataclass(frozen=True)
 class VarianceFactors:
-    """Estimated variance over believed variance, of each source."""
+    """Estimated variance over assumed variance, of each source."""
 
     log_variance: Floats  # (source,)
     covariance: Floats  # (source, source) of the log variances
     converged: bool
-    at_zero: tuple[bool, ...]  # (source,) too small to be told from none: a bound, not a size
+    at_zero: tuple[bool, ...]  # (source,) too small to be separated from none: a bound, not a size
 
     @property
     def factor(self) -> Floats:
-        """(source,) standard deviation over believed standard deviation."""
+        """(source,) standard deviation over assumed standard deviation."""
         return np.exp(self.log_variance / 2.0)
 
     @property
@@ -87,7 +87,7 @@ def doubt(rows: Sequence[NoisyRows | IndependentRows], prior_information: Floats
 
 
 def _step(score: Score, log_variance: Floats) -> tuple[Floats, bool]:
-    """Newton's (True) where likelihood and belief are concave, which also ends for a source that is not there.
+    """Newton's (True) where likelihood and prior are concave, which also ends for a source that is not there.
 
     Else by scoring, which knows no curvature of a source with a small share, and would jump across the end for ever.
     """
@@ -107,7 +107,7 @@ def _positive(symmetric: Floats) -> bool:
 
 
 def _found(score: Score, log_variance: Floats, *, converged: bool) -> VarianceFactors:
-    """At zero: smaller than believed, and by the data fewer than TOLD of its sigmas above none."""
+    """At zero: smaller than assumed, and by the data fewer than TOLD of its sigmas above none."""
     belief = 1.0 / LOG_VARIANCE_PRIOR**2
     covariance = np.asarray(np.linalg.inv(score.expected + belief * np.eye(len(log_variance))), dtype=np.float64)
     unseen = (np.diag(score.expected) < TOLD**2) & (log_variance < 0.0)

@@ -1,4 +1,4 @@
-"""Instruments of one session with what is believed of their noise, and the joint problem under given noise.
+"""Instruments of one session with what is assumed of their noise, and the joint problem under given noise.
 
 Noise of a row is joint repeatability mapped through the arm, G G' joint^2 with G the derivative by the readings, plus
 the instrument's own. Which pose a row belongs to is known to the instrument alone, so this holds for pairs of poses
@@ -41,7 +41,7 @@ class Measured:
     own_correlation: Floats | None = None  # (row,) of pairs: of its own noise with the next row's, if they share a pose
 
     def parts(self, theta: Floats, joint_rad: float) -> Floats:
-        """(1 + source, row, k, k) covariance by joints, then by each own source, at the believed sizes."""
+        """(1 + source, row, k, k) covariance by joints, then by each own source, at the assumed sizes."""
         by_joint = self.problem.chain.by_joint(theta, self.problem.q_rad)
         each = [parts_of(by_joint, joint_rad, sigma) for sigma in self.own_sigma.values()]
         return np.stack([each[0][0], *(part[1] for part in each)])
@@ -81,9 +81,9 @@ class Weighting:
     """What is measured, and lengths that are known to a stated sigma (blocks of one residual a row)."""
 
     measured: tuple[Measured, ...]
-    joint_rad: float  # believed repeatability of one joint reading
+    joint_rad: float  # assumed repeatability of one joint reading
     known: tuple[Block, ...] = ()
-    chosen: tuple[Parameter, ...] | None = None  # `parameters` held or believed otherwise, in the same order
+    chosen: tuple[Parameter, ...] | None = None  # `parameters` held or assumed otherwise, in the same order
     shares: Floats | None = None  # (channel,) of what second encoders read that is the links' own; None: not yet known
     share_sigmas: Floats | None = None  # (channel,)
 
@@ -167,7 +167,7 @@ class Weighting:
     def noise(
         self, parameters: tuple[Parameter, ...], theta: Floats, start: VarianceFactors | None = None
     ) -> VarianceFactors:
-        """Sizes of all sources by REML at an estimate; `parameters` say what was free and believed in the fit.
+        """Sizes of all sources by REML at an estimate; `parameters` say what was free and under a prior in the fit.
 
         `start`: what was found before, which saves steps.
 

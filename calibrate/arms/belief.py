@@ -1,4 +1,4 @@
-"""What is believed of an arm's links before any data: held nominal, free, or drawn to a tolerance."""
+"""What is assumed of an arm's links before any data: held nominal, free, or drawn to a tolerance."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ LINK_PLAUSIBLE = 1e-3  # m, rad
 
 @dataclass(frozen=True)
 class LinkBelief:
-    """One sigma about the drawing; 0 holds the links as drawn, infinity leaves them free without an opinion."""
+    """One sigma about the drawing; 0 holds the links nominal, infinity leaves them free without an opinion."""
 
     length_sigma_m: float
     angle_sigma_rad: float

@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 
 def dh_rows(arm: Arm) -> tuple[DhLink, ...]:
-    """The rows of a D-H table of either kind, as drawn."""
+    """The rows of a D-H table of either kind, nominal."""
     return tuple(DhLink(j.theta_offset_rad or 0.0, j.d_m or 0.0, j.a_m or 0.0, j.alpha_rad or 0.0) for j in arm.joints)
 
 
@@ -57,7 +57,7 @@ def arm_of(rig: Rig, belief: LinkBelief | None = None) -> SerialArm:
 
 
 def drawn_belief(rig: Rig) -> LinkBelief:
-    """What the rig's [tolerance] says; nobody says how far the drawing may be off: it is taken as exact."""
+    """What the rig's [tolerance] states; nothing states how far the drawing may be off: it is taken as exact."""
     if rig.tolerance is None:
         return HELD_AS_DRAWN
     return LinkBelief(rig.tolerance.length_m, rig.tolerance.angle_rad)

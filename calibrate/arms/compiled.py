@@ -125,7 +125,7 @@ def available() -> bool:
 
 
 def state_ready() -> None:
-    """Leave the mark that `available` looks for; OSError where the folder of the source cannot be written."""
+    """Leave the mark that `available` searches for; OSError where the folder of the source cannot be written."""
     marker = _marker()
     marker.parent.mkdir(exist_ok=True)
     marker.write_text(_processor())

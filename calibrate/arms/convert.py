@@ -1,7 +1,7 @@
 """One arm model into another one, with the error that the conversion leaves.
 
 What was identified is put into the numbers of the new model: its nominal is the old arm as corrected. Only tilts,
-for which the rig file has no key, stay corrections. docs/decisions/0004 says which conversions are exact.
+for which the rig file has no key, stay corrections. docs/decisions/0004 states which conversions are exact.
 """
 
 from collections.abc import Mapping

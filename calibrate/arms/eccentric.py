@@ -25,7 +25,7 @@ class EccentricArm:
     """KinematicModel: the parameters of `arm`, then joint<i>.disc_sine and joint<i>.disc_cosine (rad)."""
 
     arm: KinematicModel
-    sigma_rad: float  # belief of each about zero
+    sigma_rad: float  # prior of each about zero
 
     @property
     def n_joints(self) -> int:
@@ -70,7 +70,7 @@ class EccentricArm:
 
 
 def with_discs(arm: KinematicModel, rig: Rig) -> KinematicModel:
-    """The arm with its discs where the rig's [tolerance] doubts them, else as it is."""
+    """The arm with its discs where the rig's [tolerance] leaves them open, else as it is."""
     if rig.tolerance is None or rig.tolerance.eccentricity_rad is None:
         return arm
     return EccentricArm(arm, rig.tolerance.eccentricity_rad)

@@ -21,7 +21,7 @@ DIFFERENCE_RAD = 1e-6
 
 @dataclass(frozen=True)
 class _Suspect:
-    """A cell, what it would have to hold, and what is left of the misfit (in believed sigmas) then."""
+    """A cell, what it would have to hold, and what is left of the misfit (in assumed sigmas) then."""
 
     column: str
     written: float
@@ -31,7 +31,7 @@ class _Suspect:
 
 
 def bad_rows(shots: Shots, among: Indices | None = None) -> tuple[Blunder, ...]:
-    """One blunder a row, of those `among` the observations. Nothing where they are too few to say what is usual.
+    """One gross error a row, of those `among` the observations. Nothing where they are too few to say what is usual.
 
     Rows whose neighbours in posture err alike are the arm's.
     """

@@ -18,7 +18,7 @@ SHARE = 0.1  # of the rows: beyond, it is the stated range that is in question a
 
 
 def rows_beyond_limits(samples: Samples, limits_rad: Floats) -> tuple[Blunder, ...]:
-    """One blunder a row whose angles leave their range (joint, 2)."""
+    """One gross error a row whose angles leave their range (joint, 2)."""
     q_rad = samples.joints()
     beyond = (q_rad < limits_rad[:, 0] - SLACK_RAD) | (q_rad > limits_rad[:, 1] + SLACK_RAD)
     rows = np.flatnonzero(beyond.any(axis=1))
@@ -38,7 +38,7 @@ READINGS = ("psd1_x_m", "x_m", "wire_m")  # columns of instruments whose noise n
 
 
 def duplicated_rows(samples: Samples) -> tuple[Blunder, ...]:
-    """One blunder per row that repeats an earlier one in every column; its `rows` are the copies only.
+    """One gross error per row that repeats an earlier one in every column; its `rows` are the copies only.
 
     The time may differ where an instrument's reading is in the row, since two shots never agree to the last digit;
     a seat row has no reading but the joints, whose counts can repeat, so there the time must be the same too.
@@ -77,7 +77,7 @@ AGAIN = "take both again, or remove it too"
 
 
 def left_alone(samples: Samples, blunders: Sequence[Blunder]) -> tuple[Blunder, ...]:
-    """One blunder for every row that has lost its partner to these blunders, or to one found here."""
+    """One gross error for every row that has lost its partner to these gross errors, or to one found here."""
     copies = {row for b in blunders if b.kind is BlunderKind.DUPLICATED_ROWS for row in b.rows}
     bad = {row for b in blunders for row in b.rows}
     out: list[Blunder] = []

@@ -24,7 +24,7 @@ USUAL = 10.0  # robust sigmas; a block of the same arm seen from another frame c
 
 
 def rows_of_another_session(shots: Shots) -> tuple[Blunder, ...]:
-    """One blunder a block. `shots` are positions (k = 3) after a fit that such blocks could not pull."""
+    """One gross error a block. `shots` are positions (k = 3) after a fit that such blocks could not pull."""
     misfit = shots.misfit()
     distance = np.linalg.norm(misfit, axis=1)
     k = misfit.shape[1]
@@ -36,9 +36,9 @@ def rows_of_another_session(shots: Shots) -> tuple[Blunder, ...]:
 def sessions_apart(
     T_base_flange: Floats, position_m: Floats, point_m: Floats | None, rows: Rows
 ) -> tuple[Blunder, ...]:
-    """The same before any fit, by the arm as drawn: blocks whose frame is so far off that no fit may see them.
+    """The same before any fit, by the nominal arm: blocks whose frame is so far off that no fit may see them.
 
-    `T_base_flange` (pose, 4, 4) as drawn, positions (pose, 3) of these rows of the samples, `point_m` the target.
+    `T_base_flange` (pose, 4, 4) nominal, positions (pose, 3) of these rows of the samples, `point_m` the target.
     """
     if len(rows) < FEWEST_POSES:
         return ()

@@ -19,7 +19,7 @@ TURNS = 25  # of frame and target in turn; compared are factors, not digits
 
 @dataclass(frozen=True)
 class RoughFit:
-    """Where the device stands and the target sits, if everything else is as drawn."""
+    """Where the device stands and the target sits, if everything else is nominal."""
 
     linear: Floats  # (..., 3, 3) base to device, determinant +1, or -1 where mirrored
     shift_m: Floats  # (..., 3)

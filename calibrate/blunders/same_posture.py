@@ -12,7 +12,7 @@ Rows = NDArray[np.intp]
 Bools = NDArray[np.bool_]
 
 NEIGHBOURS = 3  # nearest in posture, of those taken at other times; more than half have to err alike
-AS_NEAR = 2.0  # times the distance of the nearest: farther ones say nothing
+AS_NEAR = 2.0  # times the distance of the nearest: farther ones show nothing
 MORE_THAN = 0.5
 APART = 5  # rows in the order of capture: nearer ones may share a fault
 SIZE = (0.4, 2.5)  # of an error alike, over the row's own

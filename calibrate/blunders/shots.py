@@ -12,7 +12,7 @@ Rows = NDArray[np.intp]
 Bools = NDArray[np.bool_]
 
 LIMIT = 10.0  # robust sigmas: the farthest of 6000 rows of four real robots lies at 9, from physics no model had
-LEAST_SCALE = 0.1  # of the believed noise: perfect data make no row suspicious
+LEAST_SCALE = 0.1  # of the assumed noise: perfect data make no row suspicious
 
 
 @dataclass(frozen=True)
@@ -23,13 +23,13 @@ class Shots:
     columns: tuple[str, ...]  # (k,)
     q_rad: Floats  # (obs, joint)
     observed: Floats  # (obs, k)
-    sigma: Floats  # (k,) believed, in the unit of the columns
+    sigma: Floats  # (k,) assumed, in the unit of the columns
     expect: Callable[[Rows, Floats], Floats]  # which of the obs, their angles (m, joint) -> (m, k)
     posture: Floats | None = None  # (obs, n) between which distances are those of postures; None: by the angles
-    met: int = 0  # rows that the fit can meet exactly: they say nothing about what distance is usual
+    met: int = 0  # rows that the fit can meet exactly: they show nothing about what distance is usual
 
     def misfit(self) -> Floats:
-        """(obs, k) expected minus observed over believed sigma."""
+        """(obs, k) expected minus observed over assumed sigma."""
         every = np.arange(len(self.rows))
         return (self.expect(every, self.q_rad) - self.observed) / self.sigma
 

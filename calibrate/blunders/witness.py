@@ -102,5 +102,5 @@ def by_target(rig: Rig, samples: Samples, rows: Rows) -> tuple[tuple[Rows, Float
 
 
 def drawn_point_m(rig: Rig) -> Floats | None:
-    """(3,) target as drawn in the flange frame."""
+    """(3,) target at its nominal place in the flange frame."""
     return None if rig.tool.point_m is None else np.array(rig.tool.point_m)

@@ -13,7 +13,7 @@ from calibrate.effects.term import Size, Term
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
-# Of the largest variance, in plausible sizes: below, a file of double precision cannot tell it from rounding. It is
+# Of the largest variance, in plausible sizes: below, a file of double precision cannot separate it from rounding. It is
 # then taken as larger than it is.
 ROUNDING = 1e-14
 UNSEEN = 0.1  # sigmas of the data for a whole unit
@@ -38,7 +38,7 @@ class Assumed:
     def held_near(self, slope: Floats, others: Ints, unit: Floats) -> "Assumed":
         """The same, with the mean held to one `unit` (k,) along directions that it knows worse and the data not at all.
 
-        `slope` (row, value) of the whitened data, `others` the values that it says nothing of. What trades a tool for
+        `slope` (row, value) of the whitened data, `others` the values that it shows nothing of. What trades a tool for
         the last link is unknown by decimetres, and a covariance is right to first order only: some millimetres that
         way, for nothing, would hide a tool that has moved by a tenth of one.
         """

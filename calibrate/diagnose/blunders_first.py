@@ -1,4 +1,4 @@
-"""Blunders before physics: what is wrong with the file, and which rows have no part in the diagnosis.
+"""Gross errors before physics: what is wrong with the file, and which rows have no part in the diagnosis.
 
 Other than before an identification, what moved or drifted stays in: it is the very thing that is sought. Only where
 something stands farther off than any bump moves it (calibrate/effects/moved.py), rows are those of another session.
@@ -102,7 +102,7 @@ def _joined(rig: Rig, samples: Samples) -> list[Blunder]:
 
 
 def _joined_among(flange: Floats, positions: Floats, point: Floats | None, rows: NDArray[np.intp]) -> list[Blunder]:
-    """Of one target: flange poses (row, 4, 4) as drawn, positions (row, 3) of these rows, its point (3,)."""
+    """Of one target: flange poses (row, 4, 4) nominal, positions (row, 3) of these rows, its point (3,)."""
     found = sessions_apart(flange, positions, point, rows)
     if not found:
         return []

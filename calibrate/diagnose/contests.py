@@ -27,17 +27,17 @@ APART = 6.0  # of BIC: a rival that all poses together cannot drive farther off 
 
 @dataclass(frozen=True)
 class NextPoses:
-    """Poses that separate rivals, in the order of choice, and what they separate."""
+    """Poses that separate alternatives, in the order of choice, and what they separate."""
 
     poses: NewPoses
     spots_m: Floats  # (pose, 4) expected on two detectors, NaN where there are none
-    pairs: tuple[tuple[Named, Named], ...]  # finding, rival
+    pairs: tuple[tuple[Named, Named], ...]  # finding, alternative
     before: float  # BIC margin to expect of the closest pair, from what is measured
     after: float  # and with these poses
 
 
 def separating(diagnosis: Diagnosis, rng: Generator, count: int = COUNT) -> NextPoses | None:
-    """The poses to take next; None where no finding has a rival, or where no pose separates them."""
+    """The poses to take next; None where no finding has an alternative, or where no pose separates them."""
     state = diagnosis.model
     if not isinstance(state, Fitted):
         raise TypeError(f"a diagnosis of {type(state).__name__}, which is no fit to a recording")
@@ -59,7 +59,7 @@ def separating(diagnosis: Diagnosis, rng: Generator, count: int = COUNT) -> Next
 
 
 def duel(there: Elsewhere, i: int, rival: Accepted) -> Duel | None:
-    """Of accepted term i and a rival in its place; None where a term knows the measured poses only."""
+    """Of accepted term i and an alternative in its place; None where a term knows the measured poses only."""
     own, against = there.carried(there.state.accepted[i]), there.carried(rival)
     others = [there.carried(a) for j, a in enumerate(there.state.accepted) if j != i]
     if own is None or against is None:

@@ -1,6 +1,6 @@
-"""The whole diagnosis of one fitted session: search, unknowns, proof, doubt, what to do next.
+"""The whole diagnosis of one fitted session: search, unknowns, proof, uncertainty, what to do next.
 
-What to measure next where a cause has rivals: other poses, a change of temperature, or a second instrument.
+What to measure next where a cause has alternatives: other poses, a change of temperature, or a second instrument.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""The result of a diagnosis: frozen records with the words of docs/formats.md, nothing without its doubt."""
+"""The result of a diagnosis: frozen records with the words of docs/formats.md, nothing without its uncertainty."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -47,7 +47,7 @@ class Named:
 
 @dataclass(frozen=True)
 class RivalName:
-    """Another cause that the data cannot tell from the finding."""
+    """Another cause that the data cannot separate from the finding."""
 
     name: Named
     confidence: float
@@ -69,7 +69,7 @@ class Pulled:
 
 @dataclass(frozen=True)
 class Finding:
-    """One cause, its size and its doubt."""
+    """One cause, its size and its uncertainty."""
 
     name: Named
     parameters: Mapping[str, Size]

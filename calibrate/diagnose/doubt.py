@@ -3,7 +3,7 @@
 Scatter through a port's lever, misfit that repeats, a drift whose temperature was not recorded: each one says which
 column is missing, and while structure is left over no name is final.
 
-Each accepted term by the name that a full refit likes best; of names that the data cannot tell apart, that of
+Each accepted term by the name that a full refit likes best; of names that the data cannot separate, that of
 the fewest drivers and of the lowest harmonic (numbers are paid for by BIC already).
 
 The search compares candidates by linear scores, which are off by some units of BIC where robust weights or inner values
@@ -192,7 +192,7 @@ def records(lacking: Sequence[Missing]) -> tuple[str, ...]:
 
 
 def with_best_names(at: Search) -> tuple[Search, Rivals]:
-    """The search with names exchanged, and the rivals of each term in it."""
+    """The search with names exchanged, and the alternatives of each term in it."""
     for _ in range(ROUNDS):
         rivals = _rivals(at.bench)
         changed = _exchanged(at, rivals)

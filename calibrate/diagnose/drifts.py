@@ -1,7 +1,7 @@
 """Findings that change along the session: what they really follow may be a column that was not recorded.
 
 A warm-up and a cooling room are both smooth in time, and a load that is seldom changed resembles time to whoever does
-not know it. The name of such a drift has a rival that this record cannot hold.
+not know it. The name of such a drift has an alternative that this record cannot hold.
 """
 
 from collections.abc import Sequence

@@ -101,7 +101,7 @@ class Elsewhere:
 
     def fitted_along(self, terms: Sequence[Accepted]) -> tuple[Floats, Floats]:
         """Derivatives by geometry and by carried terms, those of a known model included, in plausible units: (row, m)
-        of the measured rows and beliefs, (pose, k, m) of the new poses.
+        of the measured rows and priors, (pose, k, m) of the new poses.
         """
         terms, known = (*self.brought, *terms), self.state.problem
         sizes = plain_sizes(self.session, terms, self.drivers, self.whiteners, self.rows)

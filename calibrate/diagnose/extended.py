@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 SAME = 1e-6  # of a term's size: what rounding may leave between the two sets of coefficients
-NEARLY = 0.05  # of a term's size: columns that are chosen by the poses may leave that much, a tenth of any doubt
+NEARLY = 0.05  # of a term's size: columns that are chosen by the poses may leave that much, a tenth of any sigma
 
 
 def extended(drivers: Drivers, q_rad: Floats, frames: Floats, like: Ints, copies: int = 1) -> Drivers:

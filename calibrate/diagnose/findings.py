@@ -1,4 +1,4 @@
-"""From accepted terms to findings: sizes with sigmas, share, rivals, picture, and one finding for one cause.
+"""From accepted terms to findings: sizes with sigmas, share, alternatives, picture, and one finding for one cause.
 
 Several names at one place of a machine that is sound elsewhere: pieces of one law that nobody has listed.
 Sines of a joint's angle and its torque build up any function of the pose, so a few of them that fit prove little.

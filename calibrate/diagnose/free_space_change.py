@@ -4,7 +4,7 @@ Before: how far the arm of geometry alone misses the arm of geometry and terms, 
 that doubt alone (law of propagation, JCGM 100:2008, 5.1.2). A small misfit of the readings can hide a large one of
 these, since geometry bends to imitate what is missing. Where base and target frames stand is no error of the arm (and
 spots alone do not say it): the best of both is taken out. Poses are drawn evenly between the smallest and largest
-angle that each joint had: beyond, a term found from these samples says nothing.
+angle that each joint had: beyond, a term found from these samples shows nothing.
 """
 
 from dataclasses import dataclass
@@ -62,7 +62,7 @@ def free_space_change(before: Fitted, after: Fitted, rng: Generator) -> FreeSpac
     truth = perturbed_frames(session.arm, after.geometry[:n_arm], q_rad, by)[:, -1]
     alone = perturbed_frames(session.arm, before.geometry[:n_arm], q_rad, nothing)[:, -1]
     point_m = _target_m(after)
-    # At the poses of the twists: frames that nobody knows would else be taken out a little askew, and they are far off.
+    # At the poses of the twists: frames that are unknown would else be taken out a little askew, and they are far off.
     doubt = _doubt(after, frames[:, -1], point_m, np.concatenate([arm, *slopes], axis=2), [*range(n_arm), *columns])
     missed = _missed(alone, truth, point_m)
     return FreeSpaceChange(float(np.sqrt(missed + doubt)), float(np.sqrt(doubt)), POSES)
@@ -89,7 +89,7 @@ def _target_m(state: Fitted) -> Floats:
 
 
 def _doubt(state: Fitted, T_base_flange: Floats, point_m: Floats, twists: Floats, columns: list[int]) -> float:
-    """Mean square of the target's doubt over the poses, three axes together."""
+    """Mean square of the target's uncertainty over the poses, three axes together."""
     points = _at(T_base_flange, point_m)
     slope = twists[:, :3] - cross_matrix(points) @ twists[:, 3:]
     flat = _without_frames(T_base_flange, points, slope.reshape(-1, slope.shape[-1]))

@@ -1,4 +1,4 @@
-"""From the samples of a recording to a diagnosis, by whatever instruments they hold: blunders, fit, physics.
+"""From the samples of a recording to a diagnosis, by whatever instruments they hold: gross errors, fit, physics.
 
 Scatter beyond the stated noise is no noise (stated_noise.py): no session with it is consistent, no name in it final.
 """

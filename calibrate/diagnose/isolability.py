@@ -1,4 +1,4 @@
-"""Which causes these poses can tell apart, also before anything is measured.
+"""Which causes these poses can separate, also before anything is measured.
 
 R2 between the subspaces of two candidates behind geometry: the share of one's visible square that the other can
 imitate, averaged over its directions. Source: isolability matrices of structural diagnosis, Frisk, Krysander, Jung, A

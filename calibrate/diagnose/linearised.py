@@ -97,7 +97,7 @@ class State(Protocol):
         ...
 
     def refitted(self, accepted: Sequence[Accepted]) -> Self:
-        """Joint non-linear refit of geometry and these terms (values given are the start), noise and weights anew."""
+        """Joint non-linear refit of geometry and these terms from the values given, with noise and weights found again."""
         ...
 
     def select(self, samples: Ints) -> Self:

@@ -1,6 +1,6 @@
-"""Which poses would best separate rivals: those where the other, refitted to what the one predicts, misses most.
+"""Which poses would best separate alternatives: those where the other, refitted to what the one predicts, misses most.
 
-T-optimal, one pose after the other, the rival refitted after each; of several pairs the closest one chooses.
+T-optimal, one pose after the other, the alternative refitted after each; of several pairs the closest one chooses.
 Sources: Atkinson, Fedorov, The design of experiments for discriminating between two rival models, Biometrika 62(1),
 1975; Dette, Melas, Shpilev, Ann. Statist. 43(5), 2015.
 """
@@ -20,10 +20,10 @@ COUNT = 20
 
 @dataclass(frozen=True)
 class Contest:
-    """A finding and its rival over some poses, whitened: rows of one pose together."""
+    """A finding and its alternative over some poses, whitened: rows of one pose together."""
 
     finding: Floats  # (pose, k) what the finding adds to the readings
-    rival: Floats  # (pose, k, m) geometry and the rival's coefficients: what may be refitted to imitate it
+    rival: Floats  # (pose, k, m) geometry and the alternative's coefficients: what may be refitted to imitate it
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Duel:
 
 @dataclass(frozen=True)
 class Chosen:
-    """Poses in the order of choice, and how far apart the closest rivals are after each."""
+    """Poses in the order of choice, and how far apart the closest alternatives are after each."""
 
     poses: Ints  # (count,) of the candidates
     separation: Floats  # (1 + count,) whitened squares: the BIC margin to expect, without any new pose first
@@ -71,7 +71,7 @@ def reach_of(duel: Duel) -> float:
 
 @dataclass(frozen=True)
 class _Standing:
-    """Normal equations of the rival fitted to what the finding predicts."""
+    """Normal equations of the alternative fitted to what the finding predicts."""
 
     information: Floats
     wanted: Floats
@@ -86,7 +86,7 @@ class _Standing:
         return self.square - float(self.wanted @ self.imitation)
 
     def worth(self, offered: Contest) -> Floats:
-        """(pose,) separation that each pose would add, the rival refitted to it: e^T (I + X A^-1 X^T)^-1 e."""
+        """(pose,) separation that each pose would add, the alternative refitted to it: e^T (I + X A^-1 X^T)^-1 e."""
         error = offered.finding - offered.rival @ self.imitation
         spread = offered.rival @ np.linalg.solve(self.information, np.swapaxes(offered.rival, 1, 2))
         spread[:, range(error.shape[1]), range(error.shape[1])] += 1.0

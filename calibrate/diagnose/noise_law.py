@@ -31,7 +31,7 @@ WANDERS = 6.0
 # Wander is overstated rather than understated: the strongest within this -2 log L of the best.
 CONSERVATIVE = 1.0
 FEWEST_LENGTHS = 10  # observations of an instrument, for a law of their lengths
-LEVERAGE = 0.9  # rows that geometry follows closer than this say nothing about the noise
+LEVERAGE = 0.9  # rows that geometry follows closer than this show nothing about the noise
 
 # Correlation from one sample to the next; the last one is a random walk over any session.
 RHO = np.array([0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.995])

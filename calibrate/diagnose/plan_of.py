@@ -1,4 +1,4 @@
-"""The poses that separate rivals as a plan for a session: by place, and in an order that keeps moves short."""
+"""The poses that separate alternatives as a plan for a session: by place, and in an order that keeps moves short."""
 
 from collections.abc import Sequence
 

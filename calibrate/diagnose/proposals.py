@@ -1,7 +1,7 @@
 """Candidates in the order of what they would explain with their inner values at their best.
 
 A grid of times or constants hides much of a candidate's worth once the noise of a model is small: compared by grids, a
-step that falls between two of them would never be the rival of another step.
+step that falls between two of them would never be the alternative of another step.
 """
 
 from collections.abc import Iterator

@@ -22,7 +22,7 @@ CANCELS = 0.1  # square of the sum of a port's terms over the sum of their squar
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
-TELLING = 5.0  # sigmas that the term would show between visits: with less, they say nothing
+TELLING = 5.0  # sigmas that the term would show between visits: with less, they show nothing
 HALF = 0.5  # of the term has to be there
 SIGMAS = 3.0
 

@@ -19,7 +19,7 @@ from calibrate.effects.term import Term
 
 Floats = NDArray[np.float64]
 
-WITHIN = 6.0  # of BIC: beyond, strong evidence against (mismatch catalogue, rivals)
+WITHIN = 6.0  # of BIC: beyond, strong evidence against (mismatch catalogue, alternatives)
 NEAR = 20.0  # of BIC by the linear score: refitted to be sure
 REFITS = 4  # of the nearest ones
 FEW = 4  # terms: in larger models the linear margin has to do, a refit costs seconds
@@ -36,7 +36,7 @@ class Rival:
     """Another candidate in the place of a finding."""
 
     accepted: Accepted
-    margin: float  # BIC by which the finding is better; negative: the rival is
+    margin: float  # BIC by which the finding is better; negative: the alternative is
     refitted: bool  # margin from a full refit, or from the linear score
     plausible: bool = True  # False: fits better, but is of a size that no machine has
 
@@ -80,7 +80,7 @@ def price(bench: Bench, term: Term) -> float:
 
 
 def confidences(bench: Bench, own: Term, rivals: Sequence[Rival]) -> Floats:
-    """(1 + rival,) share of belief of the finding, then of each rival.
+    """(1 + rival,) share of belief of the finding, then of each alternative.
 
     The name of a finding was chosen among equals for being the simplest (doubt.py): such a rival is as likely, not
     more. A better one of a size that no machine has takes belief from the name and is not believed itself.

@@ -1,7 +1,7 @@
 """Size and form of one instrument's noise, and how far each observation is trusted, from the residuals alone.
 
 Two forms compete by likelihood: one covariance for all observations (an instrument's own noise, whatever its axes), and
-repeatability of the joints seen through the arm plus the believed own noise (a pose with a long lever scatters more).
+repeatability of the joints seen through the arm plus the assumed own noise (a pose with a long lever scatters more).
 Both under Student's t law with 5 degrees of freedom, by expectation-maximisation. Source: Lange, Little, Taylor, Robust
 Statistical Modeling Using the t Distribution, J. Am. Stat. Assoc. 84(408), 1989, sections 2 and 3.
 """
@@ -33,7 +33,7 @@ class Scatter:
 
 
 def scatter_of(residual: Floats, by_joint: Floats, own_sigma: Floats) -> Scatter:
-    """Of residuals (row, k) with d reading / d joints (row, k, readings) and believed own noise (row, k)."""
+    """Of residuals (row, k) with d reading / d joints (row, k, readings) and assumed own noise (row, k)."""
     if len(residual) == 0:  # all rows of the instrument are held out
         return Scatter(np.zeros((0, residual.shape[1], residual.shape[1])), np.zeros(0), 0.0, 0)
     one, other = _of_one_form(residual, own_sigma), _through_joints(residual, by_joint, own_sigma)

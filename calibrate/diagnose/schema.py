@@ -31,7 +31,7 @@ class NameRecord(Record, frozen=True):
 
 
 class RivalRecord(NameRecord, frozen=True):
-    """A cause that the data cannot tell from the finding; `margin`: BIC by which the finding is better."""
+    """A cause that the data cannot separate from the finding; `margin`: BIC by which the finding is better."""
 
     confidence: Statistic
     margin: Statistic
@@ -53,7 +53,7 @@ class CurveRecord(Record, frozen=True):
 
 
 class FindingRecord(NameRecord, frozen=True):
-    """One cause with its size and its doubt."""
+    """One cause with its size and its uncertainty."""
 
     parameters: dict[Name, SizeRecord]
     share: Statistic | None  # null where it was found in a stream: it removes nothing from the samples

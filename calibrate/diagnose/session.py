@@ -1,6 +1,6 @@
-"""A session as the diagnosis sees it: instruments with beliefs about all geometry, so that nothing is singular.
+"""A session as the diagnosis sees it: instruments with priors about all geometry, so that nothing is singular.
 
-Drawings hold what data cannot see; where a rig states no tolerance, wide beliefs stand in. They are no opinion about
+Drawings hold what data cannot see; where a rig states no tolerance, wide priors stand in. They are no opinion about
 well-seen parameters, but keep cones, which hold no scale, from shrinking the arm.
 """
 
@@ -26,7 +26,7 @@ from calibrate.weighting import Measured, Weighting
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
-GAUGE = 30.0  # plausible sizes: belief of a parameter about which nobody has an opinion
+GAUGE = 30.0  # plausible sizes: prior of a parameter about which nobody has an opinion
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class Session:
     arm: SerialArm
     weighting: Weighting
     start: Floats  # (param,)
-    stated: frozenset[str] = frozenset()  # parameters of which a model has a covariance: no other belief
+    stated: frozenset[str] = frozenset()  # parameters of which a model has a covariance: no other prior
 
     @property
     def measured(self) -> tuple[Measured, ...]:
@@ -67,9 +67,9 @@ def _belief(rig: Rig, samples: Samples) -> LinkBelief | None:
 
 
 def _doubted(rig: Rig, belief: LinkBelief | None) -> Rig:
-    """The rig with a belief about the detectors' bracket, where none is stated.
+    """The rig with a prior about the detectors' bracket, where none is stated.
 
-    Gains are held unless the rig doubts them: they are then a cause to be named.
+    Gains are held unless the rig leaves them open: they are then a cause to be named.
     """
     stated = rig.tolerance
     if stated is None:

@@ -17,7 +17,7 @@ from calibrate.effects.term import Size, Term
 
 Floats = NDArray[np.float64]
 
-LEVERAGE = 0.9  # rows that the model follows closer say nothing about the noise
+LEVERAGE = 0.9  # rows that the model follows closer show nothing about the noise
 TOLD = 1e-10  # of the largest eigenvalue of unit columns: combinations below are not told by the data
 PART = 1e-3  # of a value in such a combination, for the value itself not to be told
 INNER_STEP = 1e-3  # of the range of an inner parameter, for its difference quotient

@@ -204,7 +204,7 @@ def _smallest(found: Smallest) -> SmallestRecord:
 
 
 def _confusable(bench: Bench) -> tuple[tuple[NameRecord, NameRecord, float], ...]:
-    """Causes that these poses could not tell apart by their nature, whatever the data."""
+    """Causes that these poses could not separate by their nature, whatever the data."""
     pairs = isolability(bench.menu).confusable()
     out = {(named(a), named(b)): r2 for a, b, r2 in pairs if named(a) != named(b)}
     return tuple((_name(a), _name(b), r2) for (a, b), r2 in out.items())

@@ -119,7 +119,7 @@ def _leverage_corrected(bench: Bench) -> Floats:
 def _unwhitener(bench: Bench, instrument: int, mine: Ints) -> Floats:
     """(observation, k, k) from rows as whitened, weights included, to rows in the instrument's unit.
 
-    No robust weights: where few poses feel the cause, it is the wild ones that tell of it; the null holds them, too.
+    No robust weights: where few poses feel the cause, it is the gross errors that show it; the null holds them, too.
     """
     names, k = list(bench.state.drivers.readouts), mine.shape[1]
     if instrument >= len(names):

@@ -1,7 +1,7 @@
-"""Rows of an instrument that stand apart from all others, and whether that is a blunder or physics.
+"""Rows of an instrument that stand apart from all others, and whether that is a gross error or physics.
 
 A wrong digit stands alone and far off, with nothing between it and the rest; physics makes residuals of all sizes, or
-moves rows that follow one another. So only few, single rows behind a gap are blunders before physics is sought.
+moves rows that follow one another. So only few, single rows behind a gap are gross errors before physics is sought.
 """
 
 import numpy as np

@@ -65,7 +65,7 @@ EFFECTS: tuple[Effect, ...] = (
     link_thermal_growth.EFFECT,
     arm_thermal_growth.EFFECT,
     base_compliance.EFFECT,
-    device_drift.EFFECT,  # before base-moved: the same to look at, and a tripod gives way sooner than a bolted base
+    device_drift.EFFECT,  # before base-moved: alike to every reading, and a tripod gives way before a bolted base
     base_moved.EFFECT,
     tool_sag.EFFECT,
     tool_moved.EFFECT,

@@ -184,7 +184,7 @@ def _extra(samples: Samples, n: int) -> dict[str, Floats]:
 
 
 def _filled(values: Floats) -> Floats:
-    """Empty cells take the middle of the others: they say nothing."""
+    """Empty cells take the middle of the others: they show nothing."""
     good = np.isfinite(values)
     return np.where(good, values, np.median(values[good]) if good.any() else 0.0)
 

@@ -14,7 +14,7 @@ LIMIT_M = 1e-3
 
 
 def beam_axes(drivers: Drivers) -> tuple[Floats, Floats, Floats]:
-    """Origin of the beam and two unit vectors across it, in the flange frame, as drawn."""
+    """Origin of the beam and two unit vectors across it, in the flange frame, nominal."""
     tool = drivers.rig.tool
     direction = np.array(tool.laser_direction or (0.0, 0.0, 1.0))
     direction = direction / np.linalg.norm(direction)

@@ -1,7 +1,7 @@
 """What hangs on the arm: stated masses and the payload, how far they may be off, and unknown ones.
 
 A moment of weight is linear in each body's mass and first moment (Atkeson, An, Hollerbach, Estimation of Inertial
-Parameters of Manipulator Loads and Links, Int. J. Robotics Research 5(3), 1986, section 2), so doubt about a stated
+Parameters of Manipulator Loads and Links, Int. J. Robotics Research 5(3), 1986, section 2), so uncertainty of a stated
 mass is one more load.
 """
 
@@ -20,7 +20,7 @@ Point = tuple[float, float, float]
 
 FIRST_MOMENT_M = 0.1  # a link's centre of mass is about this far from its frame: scales columns only
 # One sigma of stated masses and centres: a judgement, no measurement. Data sheets and drawings leave cables, grease and
-# motors to the reader, so a stated mass is believed to about a seventh.
+# motors to the reader, so a stated mass is known to about a seventh.
 MASS_SHARE = 0.15
 CENTRE_SHARE = 0.05  # of the longest link: 20 mm on a small arm
 UNSTATED_CENTRE_M = 0.1  # one sigma along each axis, of a load at the flange whose centre is not stated: a gripper long

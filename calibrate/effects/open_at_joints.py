@@ -14,7 +14,7 @@ from calibrate.effects.kind import Kind
 from calibrate.effects.term import Inner, Shape, Term
 from calibrate.effects.time_laws import varies
 
-LIMIT_RAD = 5e-2  # nobody would call a larger error an unknown effect: a blunder
+LIMIT_RAD = 5e-2  # nobody would call a larger error an unknown effect: a gross error
 
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:

@@ -23,7 +23,7 @@ AROUND = Place.SURROUNDINGS
 RECORDING = "recording"  # the driver: one value a recording
 LASER = ("shift_u_m", "shift_v_m", "tilt_u_rad", "tilt_v_rad")  # of calibrate/sensors/laser.py
 SAME = 1.0 - 1e-6  # cosine between two twists (m, rad) that are one
-LIMIT_RAD, LIMIT_M = 5e-2, 2e-2  # beyond, something was put together anew
+LIMIT_RAD, LIMIT_M = 5e-2, 2e-2  # beyond, something was put together again
 
 
 def changes(drivers: Drivers) -> tuple[Form, ...]:

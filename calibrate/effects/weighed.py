@@ -56,14 +56,14 @@ def by_stated(by: By) -> Weighed:
 
 
 def by_corrected(drivers: Drivers, by: By) -> Weighed | None:
-    """As by_stated, and the strongest combinations of the doubts about the masses that it does not hold itself.
+    """As by_stated, and the strongest combinations of the uncertainties of the masses that it does not hold itself.
 
-    A coefficient of one of these, over the first, is a number of sigmas. None where the doubts add nothing.
+    A coefficient of one of these, over the first, is a number of sigmas. None where they add nothing.
     """
     stated = by(drivers, carried(drivers)).sum(axis=2).ravel()
     off = doubts(
         drivers
-    )  # kept: a rig with one more mass stated has other doubts, but these columns keep their meaning
+    )  # kept: a rig with one more mass stated has other uncertainties, but these columns keep their meaning
     each = by(drivers, off)
     each = each.reshape(-1, each.shape[2])
     along = stated @ each / max(float(stated @ stated), 1e-300)

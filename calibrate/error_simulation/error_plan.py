@@ -217,7 +217,7 @@ def sources_of(
     *,
     identified: bool = False,
 ) -> tuple[Source, ...]:
-    """Of `only` these patterns, where there are any. `identified`: links and zeros are no longer off as drawn.
+    """Of `only` these patterns, where there are any. `identified`: links and zeros are no longer off nominal.
 
     DataError where a pattern matches nothing, where heat has no expansion, and where no source is left.
     """

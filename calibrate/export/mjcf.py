@@ -70,7 +70,7 @@ def mjcf_text(arm: IdentifiedArm) -> str:
 def _in_body(arm: IdentifiedArm, link: int) -> Floats:
     """(3,) centre of mass in the frame behind the turn of the joint, from the link frame of the rig's notation.
 
-    Denavit and Hartenberg's stands at the end of the link, without the flange; all others' at its start, as drawn.
+    Denavit and Hartenberg's stands at the end of the link, without the flange; all others' at its start, nominal.
     """
     own = arm.rig.arm
     com_m = np.array(own.joints[link - 1].com_m or (0.0, 0.0, 0.0))

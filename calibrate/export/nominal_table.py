@@ -1,4 +1,4 @@
-"""Every number of the arm as drawn, its correction, and as calibrated: in degrees and mm, in the robot's signs.
+"""Every number of the nominal arm, its correction, and as calibrated: in degrees and mm, in the robot's signs.
 
 Axes are angles at a reading of zero, in the senses and couplings of the controller: an axis that reads r stands at
 r + value. Links are the numbers of the arm model. A correction of a D-H table adds to the drawn number. Of a local-POE

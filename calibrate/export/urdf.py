@@ -1,7 +1,7 @@
 """URDF of an identified arm: fixed base, turning joints, a fixed flange and, where known, the tool point.
 
 Source of the form: ROS wiki, urdf/XML/joint: origin first (xyz in m, rpy in rad about fixed axes), then the turn about
-`axis`. `effort` is obligatory there and no matter of calibration: 0 says nothing.
+`axis`. `effort` is obligatory there and no matter of calibration: 0 means nothing.
 """
 
 from xml.sax.saxutils import quoteattr

@@ -1,4 +1,4 @@
-"""From a settled fit to its result: estimates with their doubt, noise found, what was there before.
+"""From a settled fit to its result: estimates with their uncertainty, noise found, what was there before.
 
 How far an unseen combination can pull on each parameter: which of its members have a number all the same.
 What the data do not see is known no better than to its plausible size. A parameter that has a share of 1e-4 in it moves

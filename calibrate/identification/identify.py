@@ -1,7 +1,7 @@
-"""Identification of an arm from any session: blunders first, then rank, then numbers with their doubt.
+"""Identification of an arm from any session: gross errors first, then rank, then numbers with their uncertainty.
 
 A fault of the whole file (angles in degrees, a mirrored axis, ...) is refused by name; bad rows are named and left out.
-docs/decisions/0003 says why rank comes before numbers and why the noise is estimated.
+docs/decisions/0003 states why rank comes before numbers and why the noise is estimated.
 """
 
 from collections.abc import Callable
@@ -125,7 +125,7 @@ def wrong_file(rig: Rig, samples: Samples) -> tuple[Blunder, ...]:
 
 
 def impossible_rows(rig: Rig, samples: Samples) -> tuple[Blunder, ...]:
-    """Rows that no instrument has to judge: copies, angles that the arm cannot have, and what says nothing without."""
+    """Rows that no instrument has to judge: copies, angles that the arm cannot have, and what shows nothing without."""
     return _with_left_alone(samples, duplicated_rows(samples) + rows_beyond_limits(samples, _limits_rad(rig)))
 
 
@@ -151,7 +151,7 @@ def _sessions_apart(rig: Rig, samples: Samples) -> tuple[Blunder, ...]:
 
 
 def _instruments_without(rig: Rig, samples: Samples, blunders: tuple[Blunder, ...], plan: FitPlan) -> Instruments:
-    """The instruments without the rows of these blunders; their rows count in the samples as given."""
+    """The instruments without the rows of these gross errors; their rows count in the samples as given."""
     if not blunders:
         return instruments_for_fit(rig, samples, plan)
     refuse_most(blunders, len(samples))

@@ -55,7 +55,7 @@ def chosen_instruments(found: Instruments, plan: FitPlan) -> Instruments:
 
 
 def as_planned(found: Instruments, plan: FitPlan) -> Instruments:
-    """Parameters held, freed and believed by the plan. DataError for a pattern that no parameter matches."""
+    """Parameters held, freed and put under priors by the plan. DataError for a pattern that no parameter matches."""
     parameters = found.weighting.parameters
     for pattern in (*plan.free, *plan.priors, *plan.hold):
         _refuse_idle(pattern, [p.name for p in parameters])

@@ -73,7 +73,7 @@ class DrawingDoubt:
 
 @dataclass(frozen=True)
 class PointConstraintResult:
-    """Zeros by the point constraint with their doubt."""
+    """Zeros by the point constraint with their uncertainty."""
 
     status: Status
     zeros: tuple[JointZero, ...]
@@ -280,7 +280,7 @@ def _refuse_unfit(data: Observations) -> None:
 
 
 def _bounded(p: Parameter) -> Parameter:
-    """Zeros between the paper's bounds, everything else as drawn."""
+    """Zeros between the paper's bounds, everything else nominal."""
     if not p.name.endswith(".zero"):
         return Parameter(p.name, p.unit, p.plausible, start=p.start, free=False)
     return Parameter(p.name, p.unit, p.plausible, lower=-BOUND_RAD, upper=BOUND_RAD)

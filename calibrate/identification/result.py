@@ -38,7 +38,7 @@ class Noise:
     believed: float
     found: float
     sigma: float
-    at_zero: bool = False  # too small to be told from none: `found` is no size, only small
+    at_zero: bool = False  # too small to be separated from none: `found` is no size, only small
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class Proven:
 class FreeSpace:
     """Error of the target anywhere: poses drawn evenly between the joint limits."""
 
-    geometry: FreeSpaceError  # the doubt of the parameters alone: what the next calibration could take away
+    geometry: FreeSpaceError  # the uncertainty of the parameters alone: what the next calibration could take away
     pose: FreeSpaceError  # with the scatter of a single pose: what a user meets
     scatter: Scatter
     scatter_says: str  # what the scatter is made of

@@ -1,6 +1,6 @@
 """Fit and weights in turn: rank, what is redundant, least squares, and the noise that the residuals then show.
 
-There are two starts: first what no prior speaks of (zeros, places, targets), with the links as drawn, then everything.
+There are two starts: first what no prior speaks of (zeros, places, targets), with nominal links, then everything.
 """
 
 from dataclasses import dataclass, replace
@@ -39,7 +39,7 @@ class Fitted:
     problem: JointProblem
     fit: Fit
     seen: Identifiability
-    factors: VarianceFactors  # noise found over believed, of weighting.sources
+    factors: VarianceFactors  # noise found over assumed, of weighting.sources
     steps: int  # of all rounds
     by: Estimator = LEAST_SQUARES
 

@@ -1,4 +1,4 @@
-"""The instruments of a session as an identification sees them: belief of arm and noise, what corrections are about."""
+"""The instruments of a session as an identification sees them: prior of arm and noise, what corrections are about."""
 
 from dataclasses import replace
 
@@ -31,7 +31,7 @@ NEGLIGIBLE_RAD = 1e-9  # joint noise, where it is left to the instruments' own: 
 
 
 def instruments_for_fit(rig: Rig, samples: Samples, plan: FitPlan = DEFAULT) -> Instruments:
-    """The instruments of the samples, as planned; links are believed to the drawing tolerance.
+    """The instruments of the samples, as planned; links have the drawing tolerance for a prior.
 
     Without one they are free, but where there are spots, which see little of an arm: as default_belief.py.
 

@@ -39,7 +39,7 @@ TURNS = 3  # drivers follow the frames that the effects have moved; each turn le
 STEP = 1e-3  # of an inner value, for its difference quotient
 SAME = 1e-6  # of a basis: then the exact formula has the same meaning as in the session
 UNIFORM = np.sqrt(3.0)  # half the width of a uniform law over its standard deviation
-CARRIED = 0.05  # of an effect's size: more may not be lost where its columns are chosen anew (diagnose/extended.py)
+CARRIED = 0.05  # of an effect's size: more may not be lost where its columns are chosen again (diagnose/extended.py)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class Acting:
     amount: Floats  # (row, width)
     by_value: Floats  # (row, width, coefficients and smooth inner values)
     outside: NDArray[np.bool_]  # (row,) beyond the recorded range: an unknown cause ends at what was last recorded
-    spread: Floats  # (width, width) of the amount over the session: doubt where it is not known
+    spread: Floats  # (width, width) of the amount over the session: uncertainty where it is not known
     undated: Floats  # (row, width) one sigma between the recorded rows that a step lies between: before it or after?
 
     @property

@@ -173,7 +173,7 @@ def _parameters(fit: Fitted, names: tuple[str, ...]) -> tuple[Parameter, ...]:
 def _covariance(fit: Fitted) -> Floats:
     """(value, value) posterior, from difference quotients at the very values of the model.
 
-    Where base and fixture stand together, or a joint's zero beside what is mounted on it, is held by wide beliefs only.
+    Where base and fixture stand together, or a joint's zero beside what is mounted on it, is held by wide priors only.
     A prediction is free of that as far as its derivative is that of the covariance; the derivative that the fit takes
     leaves out how effects turn what geometry does (1e-5 of it, and metres of it are not known).
     """
@@ -379,7 +379,7 @@ def _as_listed(
 ) -> ModelFile:
     """With coefficients that belong to the terms as a reader of the file lists them.
 
-    Columns of unknown masses are chosen anew from the conditions of the file; they span the same.
+    Columns of unknown masses are chosen again from the conditions of the file; they span the same.
     """
     if not model.effects:
         return model

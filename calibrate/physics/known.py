@@ -71,7 +71,7 @@ def known_before(model: ModelFile, samples: Samples) -> Known:
 
 
 def with_structure(effects: tuple[Effect, ...], session: Session) -> tuple[Fitted, Fitted]:
-    """Geometry alone, and geometry with these effects, both fitted to a recording anew.
+    """Geometry alone, and geometry with these effects, both fitted to a recording again.
 
     DataError where an effect needs what the recording does not hold.
     """

@@ -133,7 +133,7 @@ def _with_sigma(model: ModelFile, predictor: Predictor, samples: Samples, applie
 
 
 def _flange(predictor: Predictor, applied: Applied, q_rad: Floats) -> Callable[[Predictor, Perturbation], Floats]:
-    """(row, 4, 4) of the flange at any values and perturbation; under that of the effects, only what changed anew."""
+    """(row, 4, 4) of the flange at any values and perturbation; under that of the effects, known frames are kept."""
     if not applied.found:
         return lambda other, by: other.flange(q_rad)
     arm = arm_in(predictor)

@@ -1,6 +1,6 @@
-"""Before measuring: which causes a plan could show, from which size on, and which it could not tell apart.
+"""Before measuring: which causes a plan could show, from which size on, and which it could not separate.
 
-The session of the plan is made up at the rig as drawn, with angles and readings that scatter as the rig believes, and
+The session of the plan is made up at the nominal rig, with angles and readings that scatter as the rig believes, and
 put on the bench of a diagnosis: what that would look for, and how large it had to be, does not depend on what is read.
 """
 
@@ -66,5 +66,5 @@ def _noise_m(rig: Rig, poses: Candidates) -> float:
 
 
 def _without_distances(rig: Rig) -> Rig:
-    """A diagnosis looks at readings alone; a distance as assumed would agree with the drawing and say nothing."""
+    """A diagnosis examines readings alone; a distance as assumed would agree with the drawing and show nothing."""
     return msgspec.structs.replace(rig, known_distances=())

@@ -54,7 +54,7 @@ def reason_among(name: str, combinations: Sequence[Together], fallback: str | No
 
 
 def kind_of(combination: Together) -> str:
-    """Why nothing tells its members apart."""
+    """Why nothing separates its members."""
     if len(combination.members) == 1:
         return "the measurement does not depend on it"
     if combination.structural:

@@ -17,7 +17,7 @@ from calibrate.report.quantities import length
 from calibrate.report.svg import drawn, log_axis
 from calibrate.report.tones import PLACES, Tone
 
-SHOWN_MM = 1.0  # of the curve: beyond, there are fewer readings than unknowns, and beliefs alone speak
+SHOWN_MM = 1.0  # of the curve: beyond, there are fewer readings than unknowns, and priors alone speak
 
 
 def curve_figure(made: Design) -> Html:

@@ -61,12 +61,12 @@ def stated(value_m: float) -> str:
 
 
 def doubted_length(value_m: float, sigma_m: float) -> str:
-    """A length with its doubt in one unit: '136 ± 17 nm'."""
+    """A length with its uncertainty in one unit: '136 ± 17 nm'."""
     return _doubted(value_m, sigma_m, LENGTHS)
 
 
 def doubted_angle(value_rad: float, sigma_rad: float) -> str:
-    """An angle with its doubt in one unit: '3.12 ± 0.16 µrad'."""
+    """An angle with its uncertainty in one unit: '3.12 ± 0.16 µrad'."""
     return _doubted(value_rad, sigma_rad, ANGLES)
 
 
@@ -82,7 +82,7 @@ def _fitting(value: float, units: Sequence[tuple[float, str]]) -> tuple[float, s
 
 
 def decimals_of(sigma: float) -> int:
-    """Decimals that show two digits of the doubt."""
+    """Decimals that show two digits of the uncertainty."""
     if not (math.isfinite(sigma) and sigma > 0.0):
         return 3
     return max(0, 1 - math.floor(math.log10(sigma)))

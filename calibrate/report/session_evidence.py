@@ -39,7 +39,7 @@ About = Mapping[str, tuple[float, ...]]
 
 
 def weighting_of(recording: Recording, model: ModelFile) -> Weighting:
-    """What was fitted: rows that no blunder names, about the frames that the corrections are about.
+    """What was fitted: rows that no gross error names, about the frames that the corrections are about.
 
     DataError where recording and model do not belong together.
     """
@@ -76,7 +76,7 @@ def values_of(weighting: Weighting, model: ModelFile) -> Floats:
 
 
 def noise_of(weighting: Weighting, model: ModelFile) -> VarianceFactors:
-    """Sizes of noise as the model found them, over those believed."""
+    """Sizes of noise as the model found them, over those assumed."""
     size = np.zeros(len(weighting.sources))
     for i, source in enumerate(weighting.sources):
         found, believed = model.noise.get(source), model.noise.get(f"{source}_believed")
@@ -177,7 +177,7 @@ class SessionEvidence:
 
     @property
     def left_out(self) -> int:
-        """Rows that a blunder names."""
+        """Rows that a gross error names."""
         return len({row for blunder in self.model.blunders for row in blunder.rows})
 
 

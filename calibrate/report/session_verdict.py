@@ -77,7 +77,7 @@ def patterns(q_rad: Floats, order: Floats, residual: Floats) -> tuple[Pattern, .
 
 
 MANY_LEFT_OUT = 0.05  # of the rows: beyond, it is worth asking what went wrong while measuring
-NO_BETTER = 0.95  # of the error as drawn on unseen rows: above, the identification has gained nothing
+NO_BETTER = 0.95  # of the error of the nominal arm on unseen rows: above, the identification has gained nothing
 WORTH_SAYING = 0.1  # of what remains: a pattern of less changes no decision
 FAILED = (Status.NOT_FINITE.name, Status.OUT_OF_STEPS.name, Status.STALLED.name)
 
@@ -222,7 +222,7 @@ def _harmless(found: Scatter | None) -> Iterator[str]:
 
 
 def _noisy_sources(noise: Fields) -> Iterator[Doubt]:
-    """Which of several sources is worse than believed."""
+    """Which of several sources is worse than assumed."""
     names = [n.removesuffix("_believed") for n in noise if n.endswith("_believed")]
     for name in names if len(names) > 1 else ():
         found, believed = noise.get(name), noise.get(f"{name}_believed")

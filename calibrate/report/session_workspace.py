@@ -42,7 +42,7 @@ ALONE = 1e-6  # of 1 - J C J': below, the observation alone determines something
 
 
 def session_arm(evidence: SessionEvidence) -> KnownArm | str:
-    """The arm with its doubt, or why no error over the workspace can be determined."""
+    """The arm with its uncertainty, or why no error over the workspace can be determined."""
     problem, model, theta = evidence.problem, evidence.model, evidence.theta
     why = unpredicted(model.free_space)
     if why is not None or model.free_space is None:

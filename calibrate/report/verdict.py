@@ -12,7 +12,7 @@ from calibrate.report.elements import Html, bullets, join, tag, tile
 
 UNLIKELY = 0.01  # lack of fit: the usual level (Draper, Smith, Applied Regression Analysis, 1998, ch. 2.1)
 WORSE_UNSEEN = 1.5  # error on unseen poses over its own uncertainty; of a healthy fit near 1
-NOISIER = 3.0  # found over believed; believed noise is often wrong by this much, beyond it something is broken
+NOISIER = 3.0  # found over assumed; assumed noise is often wrong by this much, beyond it something is broken
 AGAIN = "Measure again, with more and more different poses."
 
 UNCHECKED = "There are as many unknowns as readings, or nearly so: any arm would fit, and nothing checks the result."

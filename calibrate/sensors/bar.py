@@ -31,7 +31,7 @@ class BarWitness:
 
     q_rad: Floats  # (2 pair, joint) all ends a, then all ends b
     length_m: Floats  # (pair,)
-    point_m: Floats | None  # (3,) target as drawn in the flange frame
+    point_m: Floats | None  # (3,) target at its nominal place in the flange frame
 
     def strain(self, T_base_flange: Floats) -> Strain:
         a, b = np.split(T_base_flange, 2, axis=-3)

@@ -1,6 +1,6 @@
 """The measuring device (tracker, camera, drum) in the base: a frame with six unknowns, shared by all that it measures.
 
-Corrections are shifts along, and a rotation vector about, the device's own believed axes.
+Corrections are shifts along, and a rotation vector about, the device's own assumed axes.
 """
 
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ N_PARAMETERS = 6
 
 @dataclass(frozen=True)
 class Device:
-    """Believed place; `prior` (m, rad) is one sigma of it, None: no opinion, the data find it."""
+    """Assumed place; `prior` (m, rad) is one sigma of it, None: no opinion, the data find it."""
 
     T_base_device: Floats  # (4, 4)
     prior: tuple[float, float] | None = None
@@ -37,7 +37,7 @@ class Device:
 
     @property
     def origin_parameters(self) -> tuple[Parameter, ...]:
-        """Of an instrument that knows only a point of the device: shifts, along the believed axes."""
+        """Of an instrument that knows only a point of the device: shifts, along the assumed axes."""
         return self.parameters[:3]
 
     def T_base_device_at(self, deviation: Floats) -> Floats:

@@ -38,7 +38,7 @@ AIMED = 0.8  # of the half face: where new poses are brought to
 
 @dataclass(frozen=True)
 class Fixture:
-    """The dual-PSD fixture as drawn, and where it is believed to have stood."""
+    """The nominal dual-PSD fixture, and where it is assumed to have stood."""
 
     half_size_m: float
     T_psd1_psd2: Floats  # (4, 4)
@@ -204,7 +204,7 @@ class DualPsd(Usage):
 
     @cached_property
     def _drawn(self) -> Floats:
-        """(1 + place, 4, 4) PSD 2 in PSD 1, then where the fixture is believed to have stood."""
+        """(1 + place, 4, 4) PSD 2 in PSD 1, then where the fixture is assumed to have stood."""
         return np.stack([self.fixture.T_psd1_psd2, *(self.fixture.T_base_psd1[k] for k in self.places)])
 
     def _placed(self, phi: Floats) -> Floats:

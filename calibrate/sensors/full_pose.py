@@ -48,7 +48,7 @@ class FullPose(Usage):
     target: Target
     device: Device
     R_device_target: Floats  # (pose, 3, 3) as observed
-    R_flange_target: Floats  # (3, 3) believed
+    R_flange_target: Floats  # (3, 3) assumed
     turn_plausible_rad: float = TURN_PLAUSIBLE_RAD
 
     unit = "m, rad"
@@ -95,7 +95,7 @@ class FullPose(Usage):
         out[:, :3, :3] = R_device_flange
         out[:, 3:, 3:6] = log @ R_device_flange @ self.R_flange_target @ left_jacobian(phi[3:6])
         out[:, :3, 6:] = self.device.seen_by_parameter(phi[6:], self.target.in_base(phi[:3], T_base_flange))
-        # the device turning by w is the target turning by -w, both in the device's believed axes
+        # the device turning by w is the target turning by -w, both in the device's assumed axes
         own = R_device_base @ self.device.T_base_device[:3, :3] @ left_jacobian(phi[9:])
         out[:, 3:, 9:] = -log @ own
         return out

@@ -18,7 +18,7 @@ N_PARAMETERS = 4
 
 @dataclass(frozen=True)
 class LaserMount:
-    """Beam as drawn, in the flange frame, and two axes u, v across it.
+    """Nominal beam, in the flange frame, and two axes u, v across it.
 
     origin = origin_m + shift_u u + shift_v v;  direction = direction + tilt_u u + tilt_v v (not of unit length: tilts
     are tangents). Sliding along the beam and turning about it change nothing, so they are no parameters.

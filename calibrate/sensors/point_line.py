@@ -78,7 +78,7 @@ class PointLine(Usage):
         return np.stack([m.u - phi[2] * m.direction, m.v - phi[3] * m.direction])
 
     def _beside(self, phi: Floats, T_base_flange: Floats) -> tuple[Floats, Floats]:
-        """(pose, 2) offsets from, and (pose,) travel along the beam as drawn."""
+        """(pose, 2) offsets from, and (pose,) travel along the nominal beam."""
         m = self.mount
         point = self.points.at_poses_m(phi[4:])
         R = T_base_flange[:, :3, :3]

@@ -27,7 +27,7 @@ from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 
-POSITION_BELIEVED_M = 20e-6  # start value where the rig's [noise] says nothing; the data correct it
+POSITION_BELIEVED_M = 20e-6  # start value where the rig's [noise] states nothing; the data correct it
 NOISE = NoiseSource("position", "m", "position_m")
 
 
@@ -87,7 +87,7 @@ class PositionWitness:
 
     q_rad: Floats  # (pose, joint)
     position_m: Floats  # (pose, 3)
-    point_m: Floats | None  # (3,) target as drawn in the flange frame
+    point_m: Floats | None  # (3,) target at its nominal place in the flange frame
     mirrored: bool = False
     columns: str = SAID_COLUMNS
 
@@ -106,7 +106,7 @@ class PositionWitness:
     def written_otherwise(self) -> Iterator[tuple[Otherwise, "PositionWitness"]]:
         """Columns that mirror the readings (one sign, or two of them exchanged; which is open), and millimetres.
 
-        No instrument is left-handed: conventions.py looks for joint signs first.
+        No instrument is left-handed: conventions.py searches for joint signs first.
         """
         other = replace(self, mirrored=not self.mirrored)
         yield (

@@ -1,4 +1,4 @@
-"""Instrument: a probe in cones. In one seat, from whatever side, the tip is at one point; which one nobody knows.
+"""Instrument: a probe in cones. In one seat, from whatever side, the tip is at one point; which one is unknown.
 
 Observed at a pose: tip less seat (m), which is zero. Cones hold no scale: an arm shrunk to nothing satisfies them all.
 So weights must be the joints' noise mapped through the arm (calibrate/variance.py), and one known length is needed.
@@ -33,7 +33,7 @@ Ints = NDArray[np.int64]
 TIP = ("tip_x_m", "tip_y_m", "tip_z_m")
 POINTS = "seat"  # parameters are seat<k>.x, ...
 NOISE = NoiseSource("seat", "m", "seat_m")
-SEAT_BELIEVED_M = 10e-6  # start value where the rig's [noise] says nothing; the data correct it
+SEAT_BELIEVED_M = 10e-6  # start value where the rig's [noise] states nothing; the data correct it
 PLAUSIBLE_M = 0.05  # about the mean of the nominal tips: nominal arms are off by millimetres, hand-made tools by more
 
 
@@ -97,7 +97,7 @@ def mean_tips(tips_m: Floats, seat: Ints) -> SharedPoints:
 
 FEWEST_ROWS = 12  # in seats of several rows; each seat takes three unknowns, the target three
 TURNS = 25
-DAMPING = 1e-6  # of the mean square of a column: where the probe leans one way the target stays as drawn
+DAMPING = 1e-6  # of the mean square of a column: where the probe leans one way the target stays nominal
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class SeatWitness:
 
     q_rad: Floats  # (row, joint)
     seat: NDArray[np.int64]  # (row,) every seat has several rows
-    point_m: Floats | None  # (3,) target as drawn in the flange frame
+    point_m: Floats | None  # (3,) target at its nominal place in the flange frame
 
     def strain(self, T_base_flange: Floats) -> Strain:
         """Target by linear least squares with every seat at the weighted mean of its tips."""

@@ -1,4 +1,4 @@
-"""Points in the base that nobody knows and that several poses share: cones, or where centred beams meet."""
+"""Points in the base that are unknown and that several poses share: cones, or where centred beams meet."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -40,13 +40,13 @@ PLACED = ("placement", "first_psd")  # columns that say how the fixture stood an
 PSD_BELIEVED_M = 2e-6  # a PSD in shop conditions (Deng, Ding, Zhang, Food & Machinery 2019(3))
 FEWEST_POSES = 12  # of one placement: four numbers each, six unknowns
 TURNS = 10
-DAMPING = 1e-6  # of the mean square of a column: along lines all alike a fixture stays where it is believed
+DAMPING = 1e-6  # of the mean square of a column: along lines all alike a fixture stays where it is assumed
 LEVER_M = 0.3  # a turned fixture counts by what it moves at this distance: the usual travel of the beam
 
 
 @dataclass(frozen=True)
 class SpotsWitness:
-    """Every fixture's place is found; it should not have to be far from where it is believed."""
+    """Every fixture's place is found; it should not have to be far from where it is assumed."""
 
     q_rad: Floats  # (pose, joint)
     spots_m: Floats  # (pose, 4) x, y on PSD 1, x, y on PSD 2
@@ -133,7 +133,7 @@ def _across(vector: Floats, beam: Floats) -> Floats:
 
 
 def fixture_of(rig: Rig) -> Fixture:
-    """Both faces and where they are believed to have stood. DataError where the rig has no fixture."""
+    """Both faces and where they are assumed to have stood. DataError where the rig has no fixture."""
     if rig.fixture is None or not rig.placements:
         raise DataError(f"rig {rig.name}: no [fixture] with a [[placement]]; dual-PSD data need both")
     pair = rig.fixture.psd2_in_psd1
@@ -142,14 +142,14 @@ def fixture_of(rig: Rig) -> Fixture:
 
 
 def laser_of(rig: Rig) -> LaserMount:
-    """The laser as drawn. DataError where the rig has none."""
+    """The nominal laser. DataError where the rig has none."""
     if rig.tool.laser_origin_m is None or rig.tool.laser_direction is None:
         raise DataError(f"rig {rig.name}: tool.laser_origin_m and tool.laser_direction are needed for dual-PSD data")
     return LaserMount.from_drawing(np.array(rig.tool.laser_origin_m), np.array(rig.tool.laser_direction))
 
 
 def dual_psd_of(rig: Rig, placement: NDArray[np.int64], first_psd: NDArray[np.int64]) -> DualPsd:
-    """The instrument alone; gains and PSD 2 in PSD 1 free under the [tolerance] that doubts them."""
+    """The instrument alone; gains and PSD 2 in PSD 1 free under the [tolerance] that leaves them open."""
     gain = None if rig.tolerance is None else rig.tolerance.gain
     return DualPsd(laser_of(rig), fixture_of(rig), placement, first_psd, gain, pair_of(rig))
 
@@ -170,7 +170,7 @@ def _build(table: SampleTable) -> Measured | None:
 
 
 def _known_distances(table: SampleTable) -> tuple[Block, ...]:
-    """Between placements that were both used; between others they say nothing."""
+    """Between placements that were both used; between others they show nothing."""
     if len(table.filled(*SPOTS)) == 0:
         return ()
     seen = observations(table.samples, table.angles)

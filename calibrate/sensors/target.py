@@ -23,7 +23,7 @@ TARGETS = "target"  # parameters of several are target<id>.x, ...
 
 @dataclass(frozen=True)
 class Target:
-    """Believed point in the flange frame; its parameters are corrections to it."""
+    """Assumed point in the flange frame; its parameters are corrections to it."""
 
     point_m: Floats  # (3,)
     plausible_m: float = POINT_PLAUSIBLE_M
@@ -88,7 +88,7 @@ class SeveralTargets:
 
 
 def targets_of(rig: Rig, target: Ints) -> SeveralTargets:
-    """The [[target]] of each pose (pose,), as drawn. DataError for one that the rig does not have."""
+    """The [[target]] of each pose (pose,), nominal. DataError for one that the rig does not have."""
     points = {k: np.array(t.point_m) for k, t in rig.targets.items()}
     return SeveralTargets(SharedPoints(TARGETS, points, target, POINT_PLAUSIBLE_M))
 

@@ -27,7 +27,7 @@ from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 
-WIRE_BELIEVED_M = 50e-6  # start value where the rig's [noise] says nothing; the data correct it
+WIRE_BELIEVED_M = 50e-6  # start value where the rig's [noise] states nothing; the data correct it
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class WireWitness:
 
     q_rad: Floats  # (pose, joint)
     length_m: Floats  # (pose,)
-    point_m: Floats | None  # (3,) target as drawn in the flange frame
+    point_m: Floats | None  # (3,) target at its nominal place in the flange frame
     drum_m: Floats | None  # (3,) as the rig states, in the base
 
     def strain(self, T_base_flange: Floats) -> Strain:

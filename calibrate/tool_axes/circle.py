@@ -69,7 +69,7 @@ def fit_circle(points_m: Floats, angle_rad: Floats) -> Circle:
     """Circle through points (point, 3) that a joint at readings (point,) swept. DataError for fewer than 5 points.
 
     Start: plane by the smallest singular vector, centre by Kasa's linear equations |p|^2 = 2 p.c + k (Kasa, IEEE Trans.
-    Instrum. Meas. 25(1), 1976); then geometric least squares. Doubt from the residuals' own scatter.
+    Instrum. Meas. 25(1), 1976); then geometric least squares. Uncertainty from the residuals' own scatter.
     """
     if len(points_m) < 5:
         raise DataError(f"circle: {len(points_m)} points; at least 5 are needed to fit it and to estimate its noise")

@@ -92,7 +92,7 @@ def free_space_error(
     """Prediction for the arm `model` whose parameters (and those of the tool) are among those of `fit`, by name.
 
     `seen` is the identifiability at `fit.theta` of all parameters, before anything was held. `scatter`: what a pose
-    adds that no correction takes away; without it, the doubt of the parameters alone.
+    adds that no correction takes away; without it, the uncertainty of the parameters alone.
     """
     if not np.all(np.isfinite(fit.covariance)):
         return FreeSpaceError(FreeSpaceStatus.NO_COVARIANCE, None, None, None)

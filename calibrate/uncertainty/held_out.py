@@ -36,7 +36,7 @@ class Cuttable(Block, Protocol):
     """
 
     def with_parameters(self, parameters: tuple[Parameter, ...]) -> Self:
-        """The same rows with parameters held, bounded or believed otherwise."""
+        """The same rows with parameters held, bounded or assumed otherwise."""
         ...
 
 
@@ -197,11 +197,11 @@ def _fold(
 def _predicted_squares(
     residual: Floats, train: Floats, test: Floats, parameters: tuple[Parameter, ...], own: list[int]
 ) -> float:
-    """Squares r' (I + T C T')^-1 r of the error over its own covariance, noise and doubt of the fit together.
+    """Squares r' (I + T C T')^-1 r of the error over its own covariance, noise and uncertainty of the fit together.
 
     `train`, `test`: whitened derivatives (value, param); C is the covariance of what the training rows see, and what
     only the unseen rows know (`own`) is projected out of both. Rows elsewhere than the others are missed by more than
-    the noise although nothing is wrong; this is what tells the two apart.
+    the noise although nothing is wrong; this is what separates the two.
     """
     free = [i for i, p in enumerate(parameters) if p.free]
     scale = np.linalg.norm(train[:, free], axis=0)

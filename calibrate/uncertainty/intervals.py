@@ -1,4 +1,4 @@
-"""Intervals and the words for a parameter: a value with its doubt, or the reason why there is none."""
+"""Intervals and the words for a parameter: a value with its uncertainty, or the reason why there is none."""
 
 from dataclasses import dataclass
 

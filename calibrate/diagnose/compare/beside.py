@@ -1,7 +1,7 @@
 """The measured recording asked beside the simulation: which constants of its geometry differ, and which physics.
 
 The simulation's geometry is held as fitted to its own readings (calibrate/diagnose/compare/corrected.py). What is set
-up anew for every recording, the measuring device and the zeros of second encoders, is fitted. Zeros of joints, links,
+up again for every recording, the measuring device and the zeros of second encoders, is fitted. Zeros of joints, links,
 tool and stations compete with the whole catalogue of effects in one search, so a soft joint is not taken for a zero,
 and one test prices all of them (calibrate/diagnose/searching.py).
 """

@@ -152,7 +152,7 @@ def _labels(samples: Samples, name: str) -> Floats:
 
 
 def _whole_bars(measured: Samples, rows: Ints, columns: Ints) -> tuple[Ints, Ints]:
-    """Without ends of a bar whose other end has no partner: half a length says nothing."""
+    """Without ends of a bar whose other end has no partner: half a length means nothing."""
     if BAR not in measured:
         return rows, columns
     alone = measured.integers(BAR, NONE)[rows] != NONE

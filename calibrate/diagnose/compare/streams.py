@@ -60,7 +60,7 @@ def stream_pairs(measured: Mapping[str, Device], simulated: Mapping[str, Device]
 
 
 def _pair(name: str, measured: Device, simulated: Device) -> StreamPair:
-    """Two sessions were not recorded by one host at one time, so its stamps say nothing: the motion itself does."""
+    """Two sessions were not recorded by one host at one time, so its stamps show nothing: the motion itself does."""
     one, two = measured.track.read(), simulated.track.read()
     clock = clock_between(two, one) if one.channels == two.channels else ClockFit(ClockStatus.UNRELATED)
     if clock.offset_s is None:

@@ -4,7 +4,7 @@
 
 Found by least squares on the curve of the reference (maximum likelihood of a delay: Knapp and Carter, IEEE ASSP 24,
 1976), each block with its own level and gain, so that zeros, slips and a model that is a little off do not count as
-time. Standing blocks say nothing about time and are left out.
+time. Standing blocks show nothing about time and are left out.
 """
 
 from dataclasses import dataclass

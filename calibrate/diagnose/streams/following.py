@@ -86,7 +86,7 @@ def _joint(joint: int, error: Floats, v: Floats, a: Floats, block: NDArray[np.in
 
 
 def _kind(line: Line) -> str:
-    """By what acceleration adds, where its sigma tells the two apart."""
+    """By what acceleration adds, where its sigma separates the two."""
     behind_s, by_a = float(line.values[0]), float(line.values[1])
     sigma = float(line.sigma[1])
     delay, lag = -(behind_s**2) / 2.0, -(behind_s**2)

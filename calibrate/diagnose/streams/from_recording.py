@@ -32,7 +32,7 @@ def streams_of(recording: Recording, fitted: Fitted | None) -> StreamReport | No
 
 
 def predicted_spots(fitted: Fitted, around: Around) -> Predicted | None:
-    """NaN where the beam misses a face, or nobody knows where the fixture stood. None without a dual PSD."""
+    """NaN where the beam misses a face, or it is unknown where the fixture stood. None without a dual PSD."""
     rig = fitted.session.rig
     if rig.fixture is None or not rig.placements:
         return None

@@ -43,7 +43,7 @@ class Late:
 
 
 def lateness(joints: Device, other: Device, fit: ClockFit) -> Late | None:
-    """None where clocks or stamps say nothing."""
+    """None where clocks or stamps show nothing."""
     other = replace(other, host_s=other.track.time_s) if shares_host_clock(other) else other
     start = start_between(joints, other)
     if fit.offset_s is None or fit.offset_sigma_s is None or start is None:

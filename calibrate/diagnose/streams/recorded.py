@@ -41,7 +41,7 @@ def devices_of(recording: Recording) -> Mapping[str, Device]:
 
 
 def start_between(reference: Device, other: Device) -> Ticks | None:
-    """From the host's stamps: each device's promptest ones, which were delayed least. None where they say nothing."""
+    """From the host's stamps: each device's promptest ones, which were delayed least. None where they show nothing."""
     one, two = _host_line(reference), _host_line(other)
     if one is None or two is None:
         return None

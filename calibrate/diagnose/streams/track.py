@@ -1,4 +1,4 @@
-"""One quantity of one device over that device's own clock: what the finders of streams look at."""
+"""One quantity of one device over that device's own clock: what the finders of streams examine."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

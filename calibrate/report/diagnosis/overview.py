@@ -161,7 +161,7 @@ def _listed(title: str, lines: Sequence[str]) -> Iterator[Html]:
 
 
 def _streams(file: DiagnosisFile) -> Iterator[Html]:
-    """What the streams usually show says nothing about the arm: one line, the rest to open."""
+    """What the streams usually show is nothing about the arm: one line, the rest to open."""
     lines = list(stream_words(file))
     if lines:
         notes = "1 note, none of it a finding" if len(lines) == 1 else f"{len(lines)} notes, none of them a finding"

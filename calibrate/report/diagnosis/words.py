@@ -210,7 +210,7 @@ def _clock_words(clock: ClockRecord) -> str:
 
 
 def _behind(margin: float) -> str:
-    """A rival's margin in words; what rounds to nothing is no margin."""
+    """An alternative's margin in words; what rounds to nothing is no margin."""
     words = f"{abs(margin):.1f} BIC"
     return "as good" if words == "0.0 BIC" else f"{words} {'behind' if margin > 0.0 else 'ahead'}"
 

@@ -51,7 +51,7 @@ def moved(change: Change) -> str:
 
 
 def size(change: Change) -> str:
-    """Degrees for angles, a fitting unit for lengths, with the digits that the doubt leaves."""
+    """Degrees for angles, a fitting unit for lengths, with the digits that the uncertainty leaves."""
     if change.unit == "rad":
         return f"{fixed(abs(degrees(change.change)), decimals_of(degrees(change.sigma)))}°"
     return length(abs(change.change))

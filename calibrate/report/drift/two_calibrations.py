@@ -82,7 +82,7 @@ Floats = NDArray[np.float64]
 
 FAMILY = 0.01  # chance that any of all unchanged parameters is called changed
 OF_THE_ARM = ("joint", "link")
-SPARE = 1e-12  # of the largest: a direction in which the doubt is rounding
+SPARE = 1e-12  # of the largest: a direction in which the uncertainty is rounding
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class Change:
 
     @property
     def sigmas(self) -> float:
-        """Size of the change over its doubt."""
+        """Size of the change over its uncertainty."""
         return abs(self.change) / self.sigma
 
 
@@ -212,7 +212,7 @@ class ToolChange:
     """At the poses of a Room."""
 
     moved_m: Floats  # (pose,) distance between the tool now and then
-    sigma_m: Floats  # (pose,) doubt of it, three axes together
+    sigma_m: Floats  # (pose,) uncertainty of it, three axes together
     largest_m: float  # over the supported poses
     largest_sigma_m: float  # there
 

@@ -83,7 +83,7 @@ def _blank() -> Html:
 
 
 ANYWHERE = "Anywhere"
-MOSTLY = 0.9  # of the error of a single pose, by the doubt of the parameters: the rest adds in quadrature
+MOSTLY = 0.9  # of the error of a single pose, by the uncertainty of the parameters: the rest adds in quadrature
 
 
 def masthead(evidence: SessionEvidence) -> Html:

@@ -45,7 +45,7 @@ class Measured:
     """Errors at poses of the session."""
 
     points_m: Floats  # (row, 3) of the target in the base
-    drawn_m: Floats  # (row,) distance of measured from expected, arm as drawn, frames where they fit best
+    drawn_m: Floats  # (row,) distance of measured from expected, nominal arm, frames where they fit best
     found_m: Floats  # (row,) the same for the identified arm, predicted from all other rows
 
 

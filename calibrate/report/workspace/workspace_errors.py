@@ -93,7 +93,7 @@ class Room:
     q_rad: Floats  # (pose, joint)
     points_m: Floats  # (pose, 3) of the target in the base, as identified
     supported: Bools  # (pose,)
-    drawn_m: Floats  # (pose,) error as drawn, one sigma, three axes together
+    drawn_m: Floats  # (pose,) error of the nominal arm, one sigma, three axes together
     found_m: Floats  # (pose,) as identified
     reach_m: Floats  # (pose, 3) of the target at poses between the limits
     session_m: Floats  # (row, 3) of the target at the poses of the session
