@@ -46,7 +46,7 @@ class StatusReporter:
                     listener.report(text, on_screen)
 
     def progress(self, progress: Progress) -> None:
-        """From the session, as acquisition.session.records.Tell."""
+        """From the session, as `acquisition.session.records.Tell`."""
         with self._turn:
             before = self.shown.progress
             if before is None or (before.placement, before.first) != (progress.placement, progress.first):

@@ -97,7 +97,7 @@ class State(Protocol):
         ...
 
     def refitted(self, accepted: Sequence[Accepted]) -> Self:
-        """Joint non-linear refit of geometry and these terms from the values given, with noise and weights found again."""
+        """Joint non-linear refit of geometry and these terms from the values given; noise and weights follow."""
         ...
 
     def select(self, samples: Ints) -> Self:

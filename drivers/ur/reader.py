@@ -126,7 +126,7 @@ class UrReader(StreamDevice[socket.socket]):
         """All samples since the last read, at least one; a package that was sent twice counts once.
 
         DeviceStale: nothing new within `timeout_s`. DeviceLost: the line is closed, or the controller has started
-        anew. WireError: bytes that are no RTDE.
+        again. WireError: bytes that are no RTDE.
         """
         deadline_s = self._clock.now_s() + timeout_s
         while True:
