@@ -30,7 +30,7 @@ class Alignment:
     T_a_b: Floats  # (4, 4)
     rms_m: float  # of the distances, of the points used
     mirrored_rms_m: float  # the same for the mirror image of b's points; `T_a_b` is always a rotation
-    determinant: float  # +1 or -1: the best orthogonal map is a rotation or a mirror; 0: points in a plane cannot tell
+    determinant: float  # +1 or -1: the best orthogonal map is a rotation or a mirror; 0: points in a plane decide none
     used: Bools  # (point,) False: so far off that it was left out of the start
     spread_m: float  # usual distance of the points from their middle
 
@@ -85,7 +85,7 @@ def align_with_tool(T_base_flange: Floats, points_device_m: Floats) -> tuple[Ali
 def pivot(T_base_flange: Floats, seat: NDArray[np.int64]) -> tuple[Floats, dict[int, Floats]]:
     """Probe tip in the flange (3,) and seats in the base from flange poses (pose, 4, 4): R t + p = s, linear in t, s.
 
-    DataError where the orientations are too alike to tell tip and seats apart.
+    DataError where the orientations are too alike to separate tip and seats.
     """
     seats = sorted(set(seat.tolist()))
     n = len(seat)

@@ -32,7 +32,7 @@ def pair_of(rig: Rig) -> PairBelief | None:
 
 
 def said_of(rig: Rig) -> str | None:
-    """One line for a person about what a fit to spots of this rig believes unasked; None where the rig states it."""
+    """One line for a person about what a fit to spots of this rig assumes unasked; None where the rig states it."""
     if rig.tolerance is not None:
         return None
     links = f"links assumed to ± {1e3 * WIDE.length_sigma_m:g} mm, {1e3 * WIDE.angle_sigma_rad:g} mrad"

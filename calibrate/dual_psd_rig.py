@@ -30,7 +30,7 @@ class BelievedNoise:
 def dual_psd_chain(rig: Rig, placement: NDArray[np.int64], first_psd: NDArray[np.int64]) -> Chain:
     """The rig's arm with its dual PSD, for poses with these placements and orders (pose,), (pose,).
 
-    Links and detectors as [tolerance] believes them, without one as default_belief.py.
+    Links and detectors as [tolerance] states them, without one as default_belief.py.
     """
     return Chain(arm_of(rig, links_of(rig)), dual_psd_of(rig, placement, first_psd))
 

@@ -1,11 +1,11 @@
 """What the data can determine at all, before any number: rank, singular values, and combinations in words.
 
-The whitened Jacobian is scaled by the plausible size of each parameter, so a singular value s says: the data (with
+The whitened Jacobian is scaled by the plausible size of each parameter, so a singular value s means: the data (with
 priors, where there are any) know this combination to 1/s of its plausible size. Below WEAK it is treated as unseen.
 Source: Schroer, Theory of kinematic modelling, 1993 (column scaling, rank by singular values); the rule that a
 parameter outside the range of J' has no estimate is Rao, Linear Statistical Inference, 2nd ed. 1973, ch. 4a.
 
-Parameter names put together for a person: what several frames have in common is said once.
+Parameter names put together for a person: what several frames have in common stands once.
 """
 
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ STRUCTURAL = 1e-9  # of the largest singular value: not weak data but geometry; 
 TRACE = 1e-5  # share of an unseen direction below which a parameter is not part of it
 NEGLIGIBLE = 0.1  # of a sigma: what an unseen combination, off by its plausible size, may shift a parameter by
 EQUAL = 1e-6  # of a length: two that differ by less are equally long
-SPOKEN = 0.02  # share of its largest member below which a member is not worth saying
+SPOKEN = 0.02  # share of its largest member below which a member is not named
 
 SINGLE = ("device", "tool", *(f.prefix for f in FRAMES if not f.one))
 SYMBOLS = {"offset": "d", "length": "a", "twist": "alpha", "tilt": "beta"}  # of a D-H table, Hayati's beta included
@@ -40,7 +40,7 @@ NUMBERED = ("placement", *(f.prefix for f in FRAMES if f.one))  # the number doe
 class Combination:
     """Parameters that can be changed together without the data noticing."""
 
-    spoken: tuple[str, ...]  # the representative, then the members worth saying
+    spoken: tuple[str, ...]  # the representative, then the members to be named
     members: tuple[str, ...]  # strongest first
     representative: str  # the one to hold
     structural: bool  # geometry forbids it; False: these poses are too few or too alike
@@ -172,13 +172,13 @@ def _combination(share: list[float], names: tuple[str, ...], pivot: int, structu
     """`share` (free,) of what the largest member moves by."""
     order = sorted((i for i, size in enumerate(share) if size > TRACE), key=lambda i: -round(share[i], 6))
     others = [i for i in order if i != pivot]
-    loud = SPOKEN * (share[others[0]] if others and share[others[0]] < SPOKEN else 1.0)  # a pair is never said as one
+    loud = SPOKEN * (share[others[0]] if others and share[others[0]] < SPOKEN else 1.0)  # a pair is never named as one
     spoken = (names[pivot], *(names[i] for i in sorted(others) if share[i] > loud))
     return Combination(spoken, tuple(names[i] for i in order), names[pivot], structural)
 
 
 def in_words(names: Sequence[str]) -> str:
-    """Names joined; what several placements or seats, a device, a tool or the laser mount share is said once.
+    """Names joined; what several placements or seats, a device, a tool or the laser mount share stands once.
 
     >>> in_words(["joint1.zero", "placement1.x", "placement1.yaw", "placement2.x", "placement2.yaw"])
     'joint1.zero + placement x, yaw'

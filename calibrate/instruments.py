@@ -38,7 +38,7 @@ class Instruments:
 
     weighting: Weighting
     start: Floats  # (param,) closed-form start values, in the order of weighting.parameters
-    alignment: Alignment | None  # of the positions with the nominal arm; says whether an axis is mirrored
+    alignment: Alignment | None  # of the positions with the nominal arm; shows whether an axis is mirrored
     unused: Indices  # rows of the samples that hold no observation, or only one that could not be used
 
 

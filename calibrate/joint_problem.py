@@ -85,7 +85,7 @@ class JointProblem:
 
     @property
     def row_widths(self) -> Indices:
-        """(row,) residual values of each; of a block that does not say, one: a known length."""
+        """(row,) residual values of each; of a block that does not state it, one: a known length."""
         one = [getattr(block, "row_widths", np.ones(block.rows, dtype=np.intp)) for block in self.blocks]
         return np.concatenate(one)
 

@@ -1,4 +1,4 @@
-"""model.json: an identified model with its doubt; schema 2 carries physics, too. docs/formats.md explains every key.
+"""model.json: an identified model with its sigmas; schema 2 carries physics, too. docs/formats.md explains every key.
 
 Angles are rad, lengths m. A joint's true angle is its reading plus `joint<i>.zero`.
 """
@@ -50,7 +50,7 @@ class RigIdentity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Unseen(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Parameters that can only be told together."""
+    """Parameters that can only be determined together."""
 
     words: Sentence
     members: Many[Name]
@@ -107,7 +107,7 @@ class UnseenRows(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ObservabilityRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How well the poses show what the data alone can tell; `condition` null where they show nothing."""
+    """How well the poses show what the data alone can show; `condition` null where they show nothing."""
 
     o1: Statistic
     o2: Statistic
@@ -119,7 +119,7 @@ class ObservabilityRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=Tru
 
 
 class FreeSpaceRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Predicted error of the target over the workspace; numbers null where `status` says why."""
+    """Predicted error of the target over the workspace; numbers null where `status` has the reason."""
 
     status: Label
     says: Sentence
@@ -226,7 +226,7 @@ def _other(content: dict[str, Any]) -> str | None:
 
 
 def corrections(model: ModelFile) -> dict[str, float]:
-    """The complete set of values for predictions, by parameter name: what believed.BelievedRig takes."""
+    """The complete set of values for predictions, by parameter name: what `believed.BelievedRig` takes."""
     return dict(model.chain)
 
 

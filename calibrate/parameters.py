@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Parameter:
-    """One unknown. Values are corrections to the nominal rig, so that nominal is zero unless `start` says otherwise."""
+    """One unknown. Values are corrections to the nominal rig, so that nominal is zero unless `start` is another."""
 
     name: str  # "joint3.zero"
     unit: str  # "rad", "m" or "1"
@@ -66,7 +66,7 @@ def hold(parameters: Iterable[Parameter], names: Iterable[str]) -> tuple[Paramet
 
 
 def without_assumed(parameters: Iterable[Parameter]) -> tuple[Parameter, ...]:
-    """The same parameters without the priors that nobody stated: what is asked before a number is told."""
+    """The same parameters without the priors that nobody stated: what is asked before a number is reported."""
     return tuple(replace(p, prior=math.inf) if p.assumed else p for p in parameters)
 
 

@@ -1,4 +1,4 @@
-"""What an identified model says the instruments should read: one prediction a sample, under the columns' own names."""
+"""What the instruments should read by an identified model: one prediction a sample, under the columns' own names."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -109,7 +109,7 @@ def predict(predictor: Predictor, samples: Samples) -> Columns:
     """Columns (row,) in order: what each instrument should read, and `r_...`, predicted less observed.
 
     Predicted are the instruments whose columns the samples have, or those of the model where the samples have none.
-    NaN where a row cannot say (a spot without placement), and in `r_...` where the row holds no observation.
+    NaN where a row has none (a spot without placement), and in `r_...` where the row holds no observation.
     """
     read = readings(predictor, predictor.flange(samples.joints()), samples)
     return {"t_s": samples.column("t_s")} | read | residuals(predictor, read, samples)
@@ -137,7 +137,7 @@ def residuals(predictor: Predictor, read: Columns, samples: Samples) -> Columns:
 
 
 def less_cones(predictor: Predictor, read: Columns, samples: Samples) -> Columns:
-    """The same readings, tips in cones that the model knows told from their cone."""
+    """The same readings, tips in cones that the model knows read from their cone."""
     fixed = _fixed(predictor, read, samples)
     return {**read, **{name: read[name] - np.nan_to_num(at) for name, at in fixed.items()}}
 

@@ -2,7 +2,7 @@
 
 Source: patent CN114523474B (Lu, Shi), step 5: columns that do not change E are removed first. Which columns these are
 is the null space of the whitened Jacobian, as `identifiability.analyse` finds it. Either way no member of an unseen
-combination has a value to report: `Identifiability.reason` goes on saying why.
+combination has a value to report: `Identifiability.reason` keeps the reason.
 """
 
 from dataclasses import replace

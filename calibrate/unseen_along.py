@@ -1,7 +1,7 @@
 """Unseen combinations followed along their own path: what bends into them is not determined either.
 
 Turning everything about axis 1 moves a fixture on a circle. Where the circle happens to run along one of its axes the
-Jacobian alone says that the other axis is determined; a finite turn, which the data do not see, shifts it all the
+Jacobian alone shows that the other axis is determined; a finite turn, which the data do not see, shifts it all the
 same. So the analysis is repeated some way along each combination that geometry forbids, both ways.
 """
 

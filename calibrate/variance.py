@@ -107,7 +107,7 @@ def _positive(symmetric: Floats) -> bool:
 
 
 def _found(score: Score, log_variance: Floats, *, converged: bool) -> VarianceFactors:
-    """At zero: smaller than assumed, and by the data fewer than TOLD of its sigmas above none."""
+    """At zero: smaller than assumed, and by the data fewer than `TOLD` of its sigmas above none."""
     belief = 1.0 / LOG_VARIANCE_PRIOR**2
     covariance = np.asarray(np.linalg.inv(score.expected + belief * np.eye(len(log_variance))), dtype=np.float64)
     unseen = (np.diag(score.expected) < TOLD**2) & (log_variance < 0.0)

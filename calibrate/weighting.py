@@ -167,7 +167,7 @@ class Weighting:
     def noise(
         self, parameters: tuple[Parameter, ...], theta: Floats, start: VarianceFactors | None = None
     ) -> VarianceFactors:
-        """Sizes of all sources by REML at an estimate; `parameters` say what was free and under a prior in the fit.
+        """Sizes of all sources by REML at an estimate; `parameters` state what was free and under a prior in the fit.
 
         `start`: what was found before, which saves steps.
 

@@ -47,12 +47,12 @@ ARMS: Mapping[ArmModel, Callable[[Arm, LinkBelief], SerialArm]] = {
 
 
 def serial_arm(arm: Arm, belief: LinkBelief) -> SerialArm:
-    """The arm of any model, its links believed as given, its readings coupled as declared."""
+    """The arm of any model, its links under the prior given, its readings coupled as declared."""
     return ARMS[arm.model](arm, belief).coupled(by_reading(arm))
 
 
 def arm_of(rig: Rig, belief: LinkBelief | None = None) -> SerialArm:
-    """The rig's arm, its links as `belief` says, else as the [tolerance] says, else held nominal."""
+    """The rig's arm, its links as `belief` or else the [tolerance] states, else held nominal."""
     return serial_arm(rig.arm, drawn_belief(rig) if belief is None else belief)
 
 

@@ -25,7 +25,7 @@ from calibrate.rigid import inverse
 Floats = NDArray[np.float64]
 
 SAMPLED_POSES = 200
-SEED = 4  # of the sampled poses, so that a conversion tells the same error twice
+SEED = 4  # of the sampled poses, so that a conversion reports the same error twice
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ class RigArm:
 
     @classmethod
     def of_rig(cls, rig: Rig, corrections: Mapping[str, float] | None = None) -> Self:
-        """As drawn, or with `corrections`: fitted values by parameter name, of which it takes those of the arm."""
+        """Nominal, or with `corrections`: fitted values by parameter name, of which it takes those of the arm."""
         arm = arm_of(rig)
         known = {p.name for p in arm.parameters}
         theta = values_by_name(arm.parameters, {k: v for k, v in (corrections or {}).items() if k in known})

@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 
 
 class SerialArm(ABC):
-    """KinematicModel of a chain; a kind of arm says what its parameters do to fixed parts and joint offsets."""
+    """KinematicModel of a chain; a kind of arm states what its parameters do to fixed parts and joint offsets."""
 
     def __init__(self, n_joints: int, parameters: tuple[Parameter, ...], moves_frame: tuple[int, ...]) -> None:
         """`moves_frame`: for each parameter the i of the frame B_i in which its twist is constant."""

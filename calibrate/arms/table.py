@@ -100,7 +100,7 @@ def _by_normal_plane(point_m: Floats, axis: Floats) -> tuple[DhLink, float]:
 
 
 def _last_row(T_own_flange: Floats) -> DhLink:
-    """Nothing turns behind the last row: it takes what x and z of the flange say, the flange transform the rest."""
+    """Nothing turns behind the last row: it takes x and z of the flange, the flange transform the rest."""
     x, axis, point_m = T_own_flange[:3, 0], T_own_flange[:3, 2], T_own_flange[:3, 3]
     theta = math.atan2(x[1], x[0])
     c, s = math.cos(theta), math.sin(theta)

@@ -31,7 +31,7 @@ class _Suspect:
 
 
 def bad_rows(shots: Shots, among: Indices | None = None) -> tuple[Blunder, ...]:
-    """One gross error a row, of those `among` the observations. Nothing where they are too few to say what is usual.
+    """One gross error a row, of those `among` the observations. Nothing where they are too few to show what is usual.
 
     Rows whose neighbours in posture err alike are the arm's.
     """

@@ -27,7 +27,7 @@ KNOWN = (degrees.hypotheses, joint_hypotheses.turned, joint_hypotheses.shifted, 
 
 GAIN = 4.0  # by which the strain must fall
 RIVAL = 1.5  # times the winner's strain: as good an explanation
-NOTHING_M = 2e-5  # no instrument says less: perfect data must not tell conventions apart by their rounding
+NOTHING_M = 2e-5  # no instrument shows less: rounding of perfect data must not separate conventions
 GROSS = 0.05  # of the reach: more than joint zeros 2 deg off explain, so that something else is wrong, or two things
 SIDE_BY_SIDE = 16  # trials evaluated at once: a hundred poses of so many stay in the processor's cache
 CARRIED_M = 0.3  # from the flange, along each of its axes: a beam's usual travel, a long probe
@@ -59,7 +59,7 @@ class _Account:
 
     @property
     def besides(self) -> tuple[str, ...]:
-        """What it says apart from joint signs and reflection."""
+        """Its conventions apart from joint signs and reflection."""
         return tuple(
             f"{one.column}: {one.what}"
             for one in self.said
@@ -159,7 +159,7 @@ class _Search:
                     yield self.account(both, (other, second))
 
     def unreflected(self, account: _Account) -> Iterator[_Account]:
-        """What this account says, with one sign or several in place of its reflection."""
+        """The same with one sign or several in place of its reflection."""
         angles = tuple(one for one in account.said if isinstance(one, Hypothesis))
         kept = [one for one in account.said if isinstance(one, Otherwise) and not _mirrors(one)]
         witnesses = self.witnesses

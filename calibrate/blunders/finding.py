@@ -1,4 +1,4 @@
-"""What is said of a gross error: which rows, which column, what is wrong, what to do about it."""
+"""The report of a gross error: which rows, which column, what is wrong, what to do about it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 TURNS = 25  # compared are factors, not digits
 FLOOR = 0.05  # of the median distance: closer rows all weigh the same
-DAMPING = 1e-6  # of the mean square of a column: a direction that nothing tells stays where it started
+DAMPING = 1e-6  # of the mean square of a column: a direction that nothing shows stays where it started
 
 
 def least_distance(rows: Callable[[Floats], tuple[Floats, Floats]], start: Floats) -> tuple[Floats, Floats]:

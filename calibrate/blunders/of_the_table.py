@@ -100,7 +100,7 @@ def _ends(samples: Samples, copies: set[int], bad: set[int]) -> Iterator[Blunder
 
 
 def _last_in_seat(samples: Samples, bad: set[int]) -> Iterator[Blunder]:
-    """A cone needs two rows to say anything (calibrate/sensors/seat.py)."""
+    """A cone needs two rows to show anything (calibrate/sensors/seat.py)."""
     seat = samples.integers(SEAT, -1)
     for k in np.unique(seat[seat >= 0]).tolist():
         rows = set(np.flatnonzero(seat == k).tolist())

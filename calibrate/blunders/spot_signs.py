@@ -1,8 +1,9 @@
-"""An axis of a detector counted the other way round: told by fits, since an arm off its drawing moves spots as far.
+"""An axis of a detector counted the other way round: found by fits, since an arm off its nominal values moves spots as
+far.
 
 A face with a mirrored axis is no face that could stand anywhere, so that even the best fit misses its spots by
 millimetres. Which axes they are is a comparison: every pattern of signs is fitted, and the one that is right is named.
-Zeros and places alone, which is a quarter of the work, tell a wrong pattern from all that may be right.
+Zeros and places alone, which is a quarter of the work, separate a wrong pattern from all that may be right.
 """
 
 from dataclasses import replace

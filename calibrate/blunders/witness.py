@@ -1,7 +1,7 @@
-"""What an instrument has to say on whether the nominal arm can have moved as the file states: its strain, in metres.
+"""What an instrument shows of whether the nominal arm can have moved as the file states: its strain, in metres.
 
 A witness fits, robustly and in milliseconds, whatever nobody states exactly (the device's frame, the target, the cones)
-and tells what distance remains. Files by another convention are found by comparing strains, never by a threshold.
+and returns what distance remains. Files by another convention are found by comparing strains, never by a threshold.
 """
 
 from collections.abc import Iterator
@@ -93,7 +93,7 @@ def stacked(samples: Samples, names: tuple[str, ...]) -> Floats:
 
 
 def by_target(rig: Rig, samples: Samples, rows: Rows) -> tuple[tuple[Rows, Floats | None], ...]:
-    """These rows target by target, each with its point (3,) as drawn in the flange frame; None: nobody says it."""
+    """These rows target by target, each with its point (3,) nominal, in the flange frame; None: not stated."""
     named = samples.integers(TARGET, 0)[rows]
     if not rig.targets:
         return ((rows, drawn_point_m(rig)),)

@@ -1,4 +1,4 @@
-"""From a session's samples to the witnesses that its columns allow; each wants enough rows to have a say."""
+"""From a session's samples to the witnesses that its columns allow; each wants enough rows to count."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,6 +1,6 @@
 """Joint commands at which the real tool, as a model has it with its physics, stands where it is wanted.
 
-The controller is taken to compute with the rig file's arm: what it is told to reach, it commands the joints of that arm
+The controller is taken to compute with the rig file's arm: for the pose it is given, it commands the joints of that arm
 to. The model's flange P(q) = G(q) D(q) is its geometry G with what the physics adds, D, which changes slowly; so the
 geometric arm is sent to W D(q)^-1 for a wanted flange W, and D is evaluated again until nothing changes. Each round
 leaves about a thousandth of what was left before.
@@ -98,7 +98,7 @@ class Corrected:
     q_rad: Floats  # (pose, joint) to command
     nominal_rad: Floats  # (pose, joint) that the controller would have commanded
     via_rad: Floats | None  # (pose, joint) overshoot points, visited before
-    T_base_tool: Floats  # (pose, 4, 4) to tell a controller that computes with the rig file's arm
+    T_base_tool: Floats  # (pose, 4, 4) for a controller that computes with the rig file's arm
     before: ToolErrors
     after: ToolErrors
     status: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""What a model says of a later recording: its values and their covariance, and effects that it brings along."""
+"""What a model states of a later recording: its values and their covariance, and effects that it brings along."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace

@@ -171,7 +171,7 @@ def _limit_m(session: Session, measured: Measured) -> float:
 
 
 def _pair(measured: Measured, i: int, away_m: float) -> Blunder:
-    """Of a pair of rows nobody can say which one is wrong."""
+    """Of a pair of rows it is open which one is wrong."""
     rows = tuple(sorted(int(r) for r in measured.sample_rows[i]))
     what = f"{measured.name} {1e3 * away_m:.3g} mm away from what all other rows predict"
     return Blunder(BlunderKind.BAD_SHOT, rows, ", ".join(columns_of(measured)), what, "take both again, or remove them")

@@ -22,7 +22,7 @@ from calibrate.sensors import spots
 
 Floats = NDArray[np.float64]
 
-APART = 6.0  # of BIC: a rival that all poses together cannot drive farther off is no other cause but a richer one
+APART = 6.0  # of BIC: an alternative that all poses cannot drive farther off is no other cause but a richer one
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""A smooth function of one or two drivers at one component of a port: what can be said where no physics has a name.
+"""A smooth function of one or two drivers at one component of a port: for what no physics has a name.
 
 Eigenfunctions of a box stand in for a Gaussian process. Source: Solin, Sarkka, Hilbert space methods for reduced-rank
 Gaussian process regression, Stat. Comput. 30, 2020, section 3.
@@ -67,7 +67,7 @@ def unit_of(port: Port, component: int) -> str:
 
 
 def curve(port: Port, component: int, names: tuple[str, ...], waves: int) -> Curve:
-    """A Curve with what goes without saying."""
+    """A Curve with what follows from its drivers."""
     slow = all(is_slow_cause(name) for name in names)
     shape = Shape.SMOOTH if len(names) == 1 else Shape.PRODUCT
     return Curve(port, names, shape, UNKNOWN, slow=slow, open=True, component=component, waves=waves)

@@ -53,7 +53,7 @@ class RivalName:
     confidence: float
     margin: float  # BIC by which the finding is better
     refitted: bool  # margin from a full refit, or linearised
-    alike: bool = False  # at every recorded pose, whatever the sizes: more of such poses will not tell
+    alike: bool = False  # at every recorded pose, whatever the sizes: more of such poses will not separate them
     plausible: bool = True  # False: it fits better, but only with a size that no machine has
 
 
@@ -111,7 +111,7 @@ class Unexplained:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Everything that may be said of a session."""
+    """Everything that may be reported of a session."""
 
     verdict: Verdict
     findings: tuple[Finding, ...]

@@ -1,6 +1,6 @@
 """What is found, and what speaks against taking it for the whole truth; a diagnosis adds the proof to it.
 
-Scatter through a port's lever, misfit that repeats, a drift whose temperature was not recorded: each one says which
+Scatter through a port's lever, misfit that repeats, a drift whose temperature was not recorded: each one names which
 column is missing, and while structure is left over no name is final.
 
 Each accepted term by the name that a full refit likes best; of names that the data cannot separate, that of
@@ -13,7 +13,7 @@ Does each term predict rows that the fit has not seen: exact for the linearised 
 Errors of a fold that was left out are (I - H_ff)^-1 r_f. Source: Cook, Weisberg, Residuals and Influence in Regression,
 1982, section 2.2 (several rows deleted).
 
-Which samples of a long session the search works on: its cost grows with their number, what it can tell but slowly.
+Which samples of a long session the search works on: its cost grows with their number, what it can show but slowly.
 The model that is found is fitted to all of them afterwards.
 """
 
@@ -224,7 +224,7 @@ def _exchanged(at: Search, rivals: Rivals) -> Search | None:
 
 
 def _rank(at: Search, candidate: tuple[float, Accepted], least: float, own: Accepted) -> tuple[float, int]:
-    """By margin; a hair's breadth is no reason: what nothing tells apart is named in the catalogue's order."""
+    """By margin; a hair's breadth is no reason: what nothing separates is named in the catalogue's order."""
     margin, accepted = candidate
     if margin <= least + BETTER:
         return least, at.bench.menu.place_of(accepted.term)

@@ -40,7 +40,7 @@ def doubtful(finding: Finding) -> Finding:
 
 
 def untold(finding: Finding, lacking: Sequence[Missing]) -> Unexplained:
-    """What cannot be determined of a drift, and the columns that would tell."""
+    """What cannot be determined of a drift, and the columns that would show it."""
     columns = ", ".join(dict.fromkeys(m.column for m in lacking))
     why = f"it changes along the session, and what it follows cannot be determined; missing column: {columns}"
     drivers = tuple(dict.fromkeys(m.driver for m in lacking))

@@ -136,7 +136,7 @@ class Elsewhere:
 
 
 def elsewhere(state: Fitted, poses: NewPoses) -> Elsewhere:
-    """A fitted session, and what it says of new poses. Bars, which a hand lays out, read nothing there."""
+    """A fitted session, and what it predicts of new poses. Bars, which a hand lays out, read nothing there."""
     n = len(state.session.samples)
     samples = _behind(state, poses)
     measured = tuple(_longer(m, n, poses, state, i) for i, m in enumerate(state.session.measured))

@@ -48,7 +48,7 @@ def named(term: Term) -> Named:
 def findings_of(
     at: Search, rivals: Sequence[Sequence[Rival]], predicts: Floats, final: bool = True
 ) -> tuple[Finding, ...]:
-    """Largest first. `rivals` of each term; `predicts` (term,) as calibrate/diagnose/doubt.py gives it.
+    """Largest first. `rivals` of each term; `predicts` (term,) as `calibrate/diagnose/doubt.py` gives it.
 
     All that is unknown at one port is one finding. `final`: no structure is left without a name; while some is, no
     name of physics is more likely than not.
@@ -67,7 +67,7 @@ def findings_of(
 
 
 def _unsure(at: Search, i: int, finding: Finding, predicts: Floats) -> Finding:
-    """The unknown cause in the place of a name that nobody believes, which stays among what it could be."""
+    """The unknown cause in the place of a name that is hardly likely, which stays among what it could be."""
     found = unknown_cause(at, (i,), predicts)
     own = RivalName(finding.name, finding.confidence, 0.0, refitted=True)
     return replace(found, rivals=(own, *finding.rivals), variant=finding.variant)
@@ -107,7 +107,7 @@ def _unnamed(at: Search) -> list[list[int]]:
 
 
 def _final(finding: Finding, unknown: Sequence[Finding]) -> bool:
-    """Whether a name says what it does beside unknown causes: it explains enough, and by drivers of its own.
+    """Whether a name stands beside unknown causes: it explains enough, and by drivers of its own.
 
     A cause that is in no catalogue need not act through one port only.
     """
@@ -188,7 +188,7 @@ def _of_pose(driver: str) -> bool:
 def unknown_cause(at: Search, group: Sequence[int], predicts: Floats) -> Finding:
     """One finding for the accepted open terms `group`, all of one port, the largest one first in the picture.
 
-    `predicts` (term,) as calibrate/diagnose/doubt.py gives it. The share is a square, not divided by that of
+    `predicts` (term,) as `calibrate/diagnose/doubt.py` gives it. The share is a square, not divided by that of
     all findings.
     """
     bench = at.bench

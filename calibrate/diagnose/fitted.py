@@ -193,7 +193,7 @@ class Fitted:
         apart = misfits if self.noise.shared is None else self.noise.shared.apart(misfits)
         out: list[Unseen] = []
         for i, (m, r) in enumerate(zip(self.session.measured, rows, strict=True)):
-            if len(r) == 0 or len(self.problem.rows[i]) == 0:  # without a row in the fit nobody knows its noise
+            if len(r) == 0 or len(self.problem.rows[i]) == 0:  # without a row in the fit its noise is unknown
                 continue
             W = whitener_of(covariance_at(self.scatters[i], self.problem.rows[i], r))
             out.append(Unseen(m.name, m.sample_rows[r, -1], misfits[i][r], np.einsum("nij,nj->ni", W, apart[i][r])))
@@ -331,7 +331,7 @@ def places_found(
 
 @dataclass(frozen=True, eq=False)
 class _Held:
-    """A problem with other beliefs."""
+    """A problem with other priors."""
 
     problem: Augmented
     parameters: tuple[Parameter, ...]

@@ -1,9 +1,9 @@
-"""What the missing physics does where nobody measures: predicted error of the target in free space, before and after.
+"""What the missing physics does where nobody measures: predicted error over the workspace, before and after.
 
-Before: how far the arm of geometry alone misses the arm of geometry and terms, and the doubt of the latter; after:
-that doubt alone (law of propagation, JCGM 100:2008, 5.1.2). A small misfit of the readings can hide a large one of
+Before: how far the arm of geometry alone misses the arm of geometry and terms, and the sigma of the latter; after:
+that sigma alone (law of propagation, JCGM 100:2008, 5.1.2). A small misfit of the readings can hide a large one of
 these, since geometry bends to imitate what is missing. Where base and target frames stand is no error of the arm (and
-spots alone do not say it): the best of both is taken out. Poses are drawn evenly between the smallest and largest
+spots alone do not show it): the best of both is taken out. Poses are drawn evenly between the smallest and largest
 angle that each joint had: beyond, a term found from these samples shows nothing.
 """
 
@@ -41,7 +41,7 @@ class FreeSpaceChange:
 
 
 def free_space_change(before: Fitted, after: Fitted, rng: Generator) -> FreeSpaceChange | None:
-    """Of geometry alone and with terms, of one session. None where a term cannot be said at poses not measured."""
+    """Of geometry alone and with terms, of one session. None where a term cannot be evaluated at other poses."""
     session, n_arm = after.session, len(after.session.arm.parameters)
     measured = session.samples.joints()
     q_rad = rng.uniform(measured.min(axis=0), measured.max(axis=0), (POSES, measured.shape[1]))
@@ -69,7 +69,7 @@ def free_space_change(before: Fitted, after: Fitted, rng: Generator) -> FreeSpac
 
 
 def _told(accepted: Accepted, drivers: Drivers, q_rad: Floats, frames: Floats, like: Ints) -> Floats | None:
-    """(pose, width, coefficient) what a term adds at the poses, some at a time; None: it cannot be said there."""
+    """(pose, width, coefficient) what a term adds at the poses, some at a time; None: it has no value there."""
     copies = max(1, int(np.ceil(AMONG * AT_ONCE / len(drivers.q_rad))))
     parts: list[Floats] = []
     for i in range(0, len(like), AT_ONCE):

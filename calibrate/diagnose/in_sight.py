@@ -4,7 +4,7 @@ Link n and joint n's zero do to a target what its own place on the flange does; 
 the device's place does; a bracket that gives way alike in all directions is a device that stands lower. Along such
 combinations no reading changes, but full steps along them leave the range in which the model is linear, and a solver
 creeps. They stay where they were; so does an effect along what geometry and the effects accepted before it can make
-of the readings, which is what its price in parameters says.
+of the readings, which is its price in parameters.
 
 Source: truncated singular values, Golub, Van Loan, Matrix Computations, 4th ed. 2013, section 5.5; in units of the
 deviation to be expected of each value, so that a singular value of 1 is as much as everybody knows.
@@ -134,13 +134,13 @@ class _Along:
         return moved
 
     def residual(self, theta: Floats) -> Floats:
-        """(row + believed,)"""
+        """(row + prior,)"""
         values = self.values(theta)
         away = (values[self.believed] - self.centre) / self.sigma
         return np.concatenate([self.problem.residual(values), away])
 
     def jacobian(self, theta: Floats) -> Floats:
-        """(row + believed, move)"""
+        """(row + prior, move)"""
         data = self.problem.jacobian(self.values(theta)) @ self.directions.moves
         return np.concatenate([data, self.directions.moves[self.believed] / self.sigma[:, None]])
 

@@ -24,7 +24,7 @@ class LackOfFit:
     """Misfit that repeats over scatter within repeats, both per degree of freedom."""
 
     groups: int
-    scatter: float  # robust, whitened: 1 is the noise that the fit believes
+    scatter: float  # robust, whitened: 1 is the noise that the fit assumes
     ratio: float
     p: float
 

@@ -57,14 +57,14 @@ def _explains(bench: Bench, term: Term, inner: Floats, j: int, without: Removed 
 
 
 def telling_times(bench: Bench, term: Term, inner: Floats) -> Floats:
-    """(time,) of the samples that can tell when a step was: those that would feel it, had it always been there."""
+    """(time,) of the samples that can show when a step was: those that would feel it, had it always been there."""
     always = np.where([spec.discrete for spec in term.inner], -np.inf, inner)
     felt = np.any(term.basis(bench.state.drivers, always) != 0.0, axis=(1, 2))
     return np.unique(bench.state.drivers.t_s[felt])
 
 
 def _best_of_one(squares: Callable[[float], float], spec: Inner, value: float, times: Floats) -> float:
-    """Between the neighbours of a value on the grid; a step between two of the `times` that can tell."""
+    """Between the neighbours of a value on the grid; a step between two of the `times` that can show it."""
     grid = np.array([spec.lower, *spec.grid, spec.upper])
     below, above = grid[grid < value], grid[grid > value]
     low, high = (float(below.max()) if len(below) else value), (float(above.min()) if len(above) else value)

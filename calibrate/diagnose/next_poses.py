@@ -28,7 +28,7 @@ class Contest:
 
 @dataclass(frozen=True)
 class Duel:
-    """What is measured and believed already, rows (row, m) and (row,); and what each new pose would add."""
+    """What is measured and assumed already, rows (row, m) and (row,); and what each new pose would add."""
 
     measured: Floats
     measured_finding: Floats

@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 PROBES = 24  # draws for the spectrum that geometry leaves of a wander
-FEWEST = 40  # observations of an instrument, for a wander to be told
+FEWEST = 40  # observations of an instrument, for a wander to be found
 # -2 log L that wandering has to gain: 5 % of white sessions pass, and cost power only (two parameters, chi-square).
 WANDERS = 6.0
 # Wander is overstated rather than understated: the strongest within this -2 log L of the best.

@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 MOST_FITTED = 0.2  # of the rows that are left over, at least, when noise is judged
-GLITCH = 0.3  # weight of a reading of the second encoders from which on it is believed less than fully: five sigmas off
+GLITCH = 0.3  # weight of a reading of the second encoders from which on it counts less than fully: five sigmas off
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +107,7 @@ def whiteners_of(scatters: tuple[Scatter, ...]) -> tuple[Floats, ...]:
 
 def covariance_at(scatter: Scatter, known: Ints, rows: Ints) -> Floats:
     """(row, k, k) noise at rows: as found where the fit has seen them, else the middle one of those it has."""
-    if len(scatter.covariance) == 0:  # nobody knows: as good as no weight
+    if len(scatter.covariance) == 0:  # unknown: as good as no weight
         return np.broadcast_to(np.eye(scatter.covariance.shape[-1]), (len(rows), *scatter.covariance.shape[1:]))
     out = np.broadcast_to(middle_of(scatter), (len(rows), *scatter.covariance.shape[1:])).copy()
     seen = np.isin(rows, known)

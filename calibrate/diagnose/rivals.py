@@ -80,10 +80,10 @@ def price(bench: Bench, term: Term) -> float:
 
 
 def confidences(bench: Bench, own: Term, rivals: Sequence[Rival]) -> Floats:
-    """(1 + rival,) share of belief of the finding, then of each alternative.
+    """(1 + alternative,) share of probability of the finding, then of each alternative.
 
-    The name of a finding was chosen among equals for being the simplest (doubt.py): such a rival is as likely, not
-    more. A better one of a size that no machine has takes belief from the name and is not believed itself.
+    The name of a finding was chosen among equals for being the simplest (`doubt.py`): such an alternative is as likely,
+    not more. A better one of a size that no machine has takes probability from the name and gets none itself.
     """
     margins = np.array([0.0, *(r.margin + price(bench, r.term) - price(bench, own) for r in rivals)])
     named = np.array([True, *(r.plausible for r in rivals)])

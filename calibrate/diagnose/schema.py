@@ -159,7 +159,7 @@ class RejectedRecord(NameRecord, frozen=True):
 
 
 class SmallestRecord(NameRecord, frozen=True):
-    """The smallest size of a cause that these poses would have shown; `parameter` with its unit."""
+    """The smallest size of a cause that these poses could show; `parameter` with its unit."""
 
     parameter: Label
     value: Statistic

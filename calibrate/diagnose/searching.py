@@ -1,4 +1,4 @@
-"""The state of a search: a model on the bench, and what refits have said so far."""
+"""The state of a search: a model on the bench, and what refits have shown so far."""
 
 from dataclasses import dataclass, field, replace
 

@@ -46,13 +46,13 @@ class Session:
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Geometry, every free one with a belief."""
+        """Geometry, every free one with a prior."""
         each = (replace(p, prior=np.inf) if p.name in self.stated else _believed(p) for p in self.weighting.parameters)
         return tuple(each)
 
 
 def session_of(rig: Rig, samples: Samples) -> Session:
-    """The session of a table of samples without blunders. DataError where it holds no observation."""
+    """The session of a table of samples without gross errors. DataError where it holds no observation."""
     belief = _belief(rig, samples)
     arm = arm_of(rig, belief)
     found = instruments_of(samples, _doubted(rig, belief), arm=arm, asked=names_with(Trait.BETWEEN_ENCODERS))

@@ -20,7 +20,7 @@ from calibrate.diagnose.visible import VISIBLE, Block
 Floats = NDArray[np.float64]
 
 LEVEL, POWER = 0.05, 0.95
-NO_SIZE = ("phase", "time", "period", "degree")  # words of parameters that say where or when, not how much
+NO_SIZE = ("phase", "time", "period", "degree")  # words of parameters for where or when, not how much
 
 
 @dataclass(frozen=True)

@@ -81,7 +81,7 @@ class Stages:
     def attempt(self, stage: Stage, do: Callable[[], T], otherwise: T, *, refuses: bool = False) -> T:
         """The result of a stage; `otherwise` where it fails, and the reason is kept.
 
-        A stage that `refuses` ends the diagnosis by a DataError: it says what is wrong with what was given.
+        A stage that `refuses` ends the diagnosis by a DataError: it names what is wrong with what was given.
         """
         if self.begun is not None:
             self.begun(stage)

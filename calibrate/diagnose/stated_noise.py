@@ -53,7 +53,7 @@ class Statement(Enum):
     WRONG = "wrong"  # what is left is noise, but of another size
     EXCEEDED = "exceeded"  # what is left is more than noise
     ABSENT = "absent"
-    UNTESTED = "untested"  # too few readings to say more than how large it is
+    UNTESTED = "untested"  # too few readings to show more than how large it is
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class NoiseFound:
 
     @property
     def says(self) -> str:
-        """One sentence; empty where there is nothing to say."""
+        """One sentence; empty where there is nothing to report."""
         noun = _noun(kind_of(self.instrument), self.quantity)
         if self.times is None or self.stated is None or self.statement not in (Statement.WRONG, Statement.EXCEEDED):
             return ""

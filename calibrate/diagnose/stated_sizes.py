@@ -18,8 +18,8 @@ from calibrate.effects.term import Size, Term
 Floats = NDArray[np.float64]
 
 LEVERAGE = 0.9  # rows that the model follows closer show nothing about the noise
-TOLD = 1e-10  # of the largest eigenvalue of unit columns: combinations below are not told by the data
-PART = 1e-3  # of a value in such a combination, for the value itself not to be told
+TOLD = 1e-10  # of the largest eigenvalue of unit columns: combinations below are not determined by the data
+PART = 1e-3  # of a value in such a combination, for the value itself not to be reported
 INNER_STEP = 1e-3  # of the range of an inner parameter, for its difference quotient
 WEIGHT = ("gravity_torque", "overturning_moment", "payload")  # drivers that follow from masses
 
@@ -47,7 +47,7 @@ def _between_samples(t: Floats, time_s: float) -> float:
 
 def sandwich(bench: Bench, columns: Floats) -> Floats:
     """(m, m) covariance of values with columns (row, m) that nothing else can stand in for, by what the residuals
-    really scatter; an infinite variance where the data do not tell the value.
+    really scatter; an infinite variance where the data do not determine the value.
 
     Weights follow the residuals, so least squares under them is too sure of itself. Source: Huber, The behavior of
     maximum likelihood estimates under nonstandard conditions, Proc. 5th Berkeley Symp. 1, 1967 (the sandwich), whole

@@ -27,7 +27,7 @@ LARGER = 1.2  # times what noise gives: less decides nothing
 FEWEST = 40  # samples
 FEWEST_PAIRS = 20  # of repeats
 RIDGE = 1e-9
-EDGE = 0.05  # of the session, at either end: too few rows to say
+EDGE = 0.05  # of the session, at either end: too few rows
 LONGEST = 0.95  # correlation of neighbours: noise that has forgotten itself after some sixty rows
 MOST = 0.5  # of the variance
 
@@ -42,7 +42,7 @@ class TimeLeft:
 
 
 def time_left(bench: Bench, rng: Generator) -> TimeLeft | None:
-    """None where nothing hangs together in time, or where rows are too few to say."""
+    """None where nothing hangs together in time, or where rows are too few."""
     rows, t_s = bench.state.rows, bench.state.drivers.t_s
     sample = np.where(rows.data, rows.sample, -1)
     used = np.unique(sample[sample >= 0])

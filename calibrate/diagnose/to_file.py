@@ -223,7 +223,7 @@ def _words(name: Named) -> tuple[str, str, str, int | None, str]:
 
 
 def _size(size: Size) -> SizeRecord:
-    """No number for what the data do not tell."""
+    """No number for what the data do not determine."""
     sigma = _number(size.sigma)
     return SizeRecord(None if sigma is None else _number(size.value), sigma)
 

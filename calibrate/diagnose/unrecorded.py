@@ -28,7 +28,7 @@ DRAWS = 200
 ALPHA = 0.005  # family-wise over all ports: joints that repeat unequally well are innocent, too, and not quite drawn
 RESTLESS = 12.0  # 2 ln L by which some samples have to scatter through all joints, others not (two numbers)
 FEWEST = 30  # observations
-# 2 ln L within which ports are not separated: the simplest is said, one whose column is known to be missing first.
+# 2 ln L within which ports are not separated: the simplest is reported, one whose column is known to be missing first.
 ALIKE = 6.0
 
 

@@ -18,7 +18,7 @@ GAP = 4.0  # times the next smaller misfit
 FEW = 0.05  # of the rows, and
 AT_LEAST = 3
 RUN = 3  # rows in a row: something happened, and lasted
-FEWEST_ROWS = 12  # of an instrument: below, nobody can say which row is the odd one
+FEWEST_ROWS = 12  # of an instrument: below, it is open which row is the odd one
 
 
 def alone(distance: Floats, k: int, place: Ints) -> Ints:

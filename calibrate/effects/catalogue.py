@@ -95,7 +95,7 @@ def terms_of(drivers: Drivers) -> tuple[Term, ...]:
 
 
 def missing_of(drivers: Drivers) -> tuple[Missing, ...]:
-    """What was not recorded and would let an effect be told."""
+    """What was not recorded and would let an effect be found."""
     return tuple(m for effect in EFFECTS for m in effect.missing(drivers))
 
 

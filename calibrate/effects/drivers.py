@@ -136,7 +136,7 @@ def _moves(q_rad: Floats, t_s: Floats) -> tuple[Floats, Floats]:
 def temperatures_of(samples: Samples) -> dict[str, Floats]:
     """Smoothed in the order of time, but not across a pause: what cooled meanwhile is no noise.
 
-    A thermometer that is read now and then says between two readings what they say.
+    A thermometer that is read now and then has between two readings what lies between them.
     """
     t = samples.column("t_s")
     order = np.argsort(t, kind="stable")
@@ -161,7 +161,7 @@ def _is_temperature(name: str) -> bool:
 
 
 def _recorded(samples: Samples, name: str) -> bool:
-    """Whether a column says anything: an empty one was not recorded, whatever its heading."""
+    """Whether a column holds anything: an empty one was not recorded, whatever its heading."""
     return name in samples and bool(np.isfinite(samples.column(name)).any())
 
 

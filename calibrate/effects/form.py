@@ -31,7 +31,7 @@ class Form(Term):
     sentence: str = field(kw_only=True)  # with {name} for sizes, in the units of `names`
     reversed_sentence: str = field(kw_only=True, default="")  # where the first size is below zero, of its opposite
     directions: Floats | None = field(kw_only=True, default=None)  # (width, d); None: the function has its own
-    polar: bool = field(kw_only=True, default=False)  # coefficients are (sine, cosine): amplitude and phase are told
+    polar: bool = field(kw_only=True, default=False)  # coefficients are (sine, cosine): reported as amplitude, phase
     exact: Exact | None = field(kw_only=True, default=None)  # where `function` is the first order only
     believable: Believable | None = field(kw_only=True, default=None)  # what is more than a limit of size
 

@@ -52,7 +52,7 @@ def stated_masses(drivers: Drivers) -> list[tuple[float, int, Point]]:
 
 
 def states_masses(rig: Rig) -> bool:
-    """Whether the rig gives the mass of any link; the tool alone says little about what a joint carries."""
+    """Whether the rig gives the mass of any link; the tool alone shows little of what a joint carries."""
     return any(link.mass_kg for link in rig.arm.joints)
 
 

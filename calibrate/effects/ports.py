@@ -1,6 +1,6 @@
 """Ports: the places along the chain, from joint reading to instrument reading, where physics can enter.
 
-A port says where in `Perturbation` a term acts and how many components it has there. Frames are those of
+A port states where in `Perturbation` a term acts and how many components it has there. Frames are those of
 arms.serial.SerialArm: B_0 in front of joint 1, joint i turns about z of B_(i-1), B_n is the flange.
 """
 

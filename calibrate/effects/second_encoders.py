@@ -10,7 +10,7 @@ the link give three places for one effect:
   difference shows it, and with the other sign;
 * `PAST`: a drive behind both encoders: only the flange shows it.
 
-The rig may say on which side a second encoder sits (`encoder_side`); where it does not, all places compete.
+The rig may state on which side a second encoder sits (`encoder_side`); where it does not, all places compete.
 """
 
 from collections.abc import Iterable, Iterator

@@ -1,7 +1,7 @@
 """What may have changed since a model was made: constants of geometry, which only a recording of later can show.
 
 They are candidates beside the catalogue where a model is known with its covariance: within one recording a constant is
-geometry, and nothing could tell it from that.
+geometry, and nothing could separate it from that.
 """
 
 from collections.abc import Iterator

@@ -144,7 +144,7 @@ class Effect(Protocol):
         ...
 
     def missing(self, drivers: Drivers, /) -> tuple[Missing, ...]:
-        """What would have to be recorded for it to be told."""
+        """What would have to be recorded for it to be found."""
         ...
 
 
@@ -175,7 +175,7 @@ UNITS: tuple[tuple[str, Steps], ...] = (
 
 
 def plain(name: str, size: Size) -> str:
-    """Value, doubt and unit of a size with its unit in its name: 68 ± 2 µrad per Nm. No number without a doubt."""
+    """Value, sigma and unit of a size with its unit in its name: 68 ± 2 µrad per Nm. No number without a sigma."""
     if not math.isfinite(size.sigma):
         return NOT_TOLD
     for ending, steps in UNITS:

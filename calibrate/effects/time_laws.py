@@ -39,7 +39,7 @@ def with_temperature(where: str, drivers: Drivers, inner: Floats) -> Floats:
 
 
 def step_inner(drivers: Drivers, among: NDArray[np.bool_] | None = None) -> tuple[Inner, ...]:
-    """The time of a step, between samples; `among` are those that can tell. Empty where too few."""
+    """The time of a step, between samples; `among` are those that can show it. Empty where too few."""
     times = np.unique(drivers.t_s if among is None else drivers.t_s[among])
     if len(times) < 2 * FEWEST_AFTER + 1:
         return ()
@@ -62,5 +62,5 @@ def when(inner: tuple[Inner, ...]) -> str:
 
 
 def varies(values: Floats) -> bool:
-    """Whether a driver says anything at all."""
+    """Whether a driver varies at all."""
     return bool(np.ptp(values) > 1e-9 * max(1.0, float(np.abs(values).max())))

@@ -37,7 +37,7 @@ class Weighed:
     payload: bool = False  # whether the last column is that of the payload, the only one of known mass
 
     def names(self, compliance: str) -> tuple[str, ...]:
-        """Of the columns of unknown masses: rms of each combination, and what a payload tells about compliance."""
+        """Of the columns of unknown masses: rms of each combination, and what a payload shows of compliance."""
         combinations = tuple(f"combination{k}_rad" for k in range(1, self.columns + 1 - self.payload))
         return (*combinations, compliance) if self.payload else combinations
 

@@ -74,7 +74,7 @@ class ErrorPlan(Struct, frozen=True, forbid_unknown_fields=True):
     schema: Literal[1]
     source: Few[SourceEntry]
     expansion_per_k: Expansion | None = None  # of the links' material; heat needs it
-    believed: bool = True  # whether what the rig file believes stands beside it
+    believed: bool = True  # whether what the rig file assumes stands beside it
 
 
 NOTHING_STATED = ErrorPlan(schema=1, source=())

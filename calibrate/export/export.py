@@ -138,7 +138,7 @@ def export_model(path: Path, rig: Rig, model: ModelFile, form: ExportForm) -> tu
 
 
 def refuse_other_make(rig: Rig, form: ExportForm) -> None:
-    """DataError for a form of a controller that this arm has not; a UR driver tells the make, too."""
+    """DataError for a form of a controller that this arm has not; a UR driver gives the make, too."""
     wanted, robot = form.make, rig.devices.robot
     made = rig.arm.make
     if made is None and robot is not None and robot.driver is RobotDriver.UR_RTDE:

@@ -2,8 +2,9 @@
 
 Axes are angles at a reading of zero, in the senses and couplings of the controller: an axis that reads r stands at
 r + value. Links are the numbers of the arm model. A correction of a D-H table adds to the drawn number. Of a local-POE
-arm, x, y, z are those of the next axis seen in its own frame, to which the correction adds, and turns are told from the
-drawn part, so they are drawn as zero. Where the recording determines no number, the reason stands in its place.
+arm, x, y, z are those of the next axis seen in its own frame, to which the correction adds, and turns are separated
+from the drawn part, so they are drawn as zero. Where the recording determines no number, the reason stands in its
+place.
 """
 
 import math

@@ -20,7 +20,7 @@ from calibrate.weighting import Measured, Weighting
 
 Floats = NDArray[np.float64]
 
-FEWEST_ROWS = 12  # of an instrument: below, nobody can say which row is the odd one
+FEWEST_ROWS = 12  # of an instrument: below, it is open which row is the odd one
 PASSES = 3  # bad rows can hide behind worse ones
 UNSEEN = 1e-9  # of the largest singular value, columns scaled: the data do not see it
 MOST_BAD = 0.4  # of the rows: beyond, the question is which of two sessions is the right one
@@ -50,7 +50,7 @@ def rows_of(blunders: Sequence[Blunder]) -> NDArray[np.intp]:
 
 
 def refuse_most(blunders: tuple[Blunder, ...], rows: int) -> None:
-    """DataError where so many of the rows are named that nobody can say which ones are the good ones."""
+    """DataError where so many of the rows are named that it is open which ones are the good ones."""
     bad = len(rows_of(blunders))
     if bad > MOST_BAD * rows:
         raise DataError(
@@ -101,7 +101,7 @@ def _met_exactly(problem: JointProblem, index: int, theta: Floats, measured: Mea
 
 
 def _bad_pairs(measured: Measured, distance: Floats, met: int, away_m: Floats) -> list[Blunder]:
-    """Pairs of rows, of which nobody can say which one is wrong; (row,) whitened and plain misfit."""
+    """Pairs of rows, of which it is open which one is wrong; (row,) whitened and plain misfit."""
     out: list[Blunder] = []
     for i in np.flatnonzero(outlying(distance, measured.problem.observed.shape[1], met)):
         rows = tuple(sorted(int(r) for r in measured.sample_rows[i]))

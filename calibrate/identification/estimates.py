@@ -46,7 +46,7 @@ def untold(p: Parameter, seen: Identifiability) -> str | None:
 
 
 def estimate_of(p: Parameter, value: float, sigma: float, fit: Fit, unseen: str | None) -> Estimate:
-    """The value with its sigma, or why there is none; `unseen`: what the identifiability says of the parameter."""
+    """The value with its sigma, or why there is none; `unseen`: what the identifiability states of the parameter."""
     why = unseen
     if not p.free:
         why = "held at its nominal value"

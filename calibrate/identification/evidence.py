@@ -1,4 +1,6 @@
-"""What travels with an identification beside its values: proofs on unseen rows, observability, error in free space."""
+"""What travels with an identification beside its values: proofs on unseen rows, observability, error over the
+workspace.
+"""
 
 from dataclasses import dataclass, field, replace
 
@@ -64,7 +66,7 @@ def rows_used(fitted: Fitted) -> NDArray[np.intp]:
 
 
 def observability_of(problem: JointProblem, theta: Floats, poses: int) -> Observability:
-    """Of what the data alone can tell: priors aside, one parameter of every combination that they do not see held."""
+    """Of what the data alone can show: priors aside, one parameter of every combination that they do not see held."""
     bare = tuple(replace(p, prior=np.inf) for p in problem.parameters)
     jacobian = problem.jacobian(theta)
     return observability(jacobian, reduced(bare, analyse(jacobian, bare)), poses)
@@ -73,7 +75,7 @@ def observability_of(problem: JointProblem, theta: Floats, poses: int) -> Observ
 def free_space_of(
     fitted: Fitted, seen: Identifiability, noise: tuple[Noise, ...], rig: Rig, rng: Generator
 ) -> FreeSpace:
-    """Over poses drawn evenly between the joint limits: the doubt of the parameters, and a single pose's with it."""
+    """Over poses drawn evenly between the joint limits: the sigma of the parameters, and a single pose's with it."""
     lower, upper = (np.array([getattr(j, k) for j in rig.arm.joints]) for k in ("lower_rad", "upper_rad"))
     x, y, z = about_of(fitted.weighting).get("tool", rig.tool.point_m or FLANGE)[:3]
     room = Workspace(lower, upper, np.array([x, y, z]))

@@ -1,4 +1,4 @@
-"""The proof by rows that the fit has not seen, told for each instrument in its own unit and for each way to split."""
+"""The proof by rows that the fit has not seen, for each instrument in its own unit and for each way to split."""
 
 from dataclasses import dataclass
 

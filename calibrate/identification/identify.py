@@ -52,7 +52,8 @@ def identify(
     bootstrap_rounds: int | None = None,
     plan: FitPlan = DEFAULT,
 ) -> Identification:
-    """Everything about the arm that these samples tell, by all instruments whose columns they have, as the plan states.
+    """Everything about the arm that these samples determine, by all instruments whose columns they have, as the plan
+    states.
 
     `held_out_share` of the rows, drawn by `rng`, are predicted from the others (0: no held-out proof), and
     `bootstrap_rounds` fits are made to drawn rows; None: as the plan states. DataError where there is nothing to fit,
@@ -88,7 +89,7 @@ def without_blunders(
 
 
 def refuse_wrong_file(rig: Rig, samples: Samples) -> None:
-    """DataError that says which conventions the file is written by, where they are not those of the rig."""
+    """DataError that names which conventions the file is written by, where they are not those of the rig."""
     if blunders := wrong_file(rig, samples):
         raise DataError("; besides, ".join(blunder.says for blunder in blunders))
 

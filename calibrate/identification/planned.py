@@ -1,4 +1,4 @@
-"""A fit plan applied: which columns are read, which arm is fitted, which parameters are free and what is believed."""
+"""A fit plan applied: which columns are read, which arm is fitted, which parameters are free and what is assumed."""
 
 import difflib
 from collections.abc import Iterable

@@ -1,6 +1,6 @@
 """An identified arm with everything that must travel with it.
 
-Whether a session holds any length at all: without one the size of the arm is not measured, whatever the fit says.
+Whether a session holds any length at all: without one the size of the arm is not measured, whatever the fit gives.
 """
 
 from collections.abc import Iterable
@@ -32,7 +32,7 @@ SCALELESS = set(names_with(Trait.SCALELESS))  # cones: an arm half as large woul
 
 @dataclass(frozen=True)
 class Noise:
-    """One source of noise: one sigma as assumed, as the residuals say, and how well they say it."""
+    """One source of noise: one sigma as assumed, as the residuals show, and how well they show it."""
 
     source: str  # "position", "wire", ...; "joint" is shared by all instruments, rad
     believed: float
@@ -77,7 +77,7 @@ class Unseen:
     rms_distance_before_m: float
     rms_distance_after_m: float
     chi_after: float  # rms of the prediction error over the noise, all instruments together
-    chi_predicted: float  # the same over noise and doubt of the fit together: near 1, however far the rows lie off
+    chi_predicted: float  # the same over noise and sigma of the fit together: near 1, however far the rows lie off
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ class Identification:
 
 
 def alarms_of(stated: StatedNoise, repeats: RepeatNoise | None) -> tuple[str, ...]:
-    """What chi-square says against the noise as stated, and the misfit against the scatter of repeats."""
+    """What chi-square shows against the noise as stated, and the misfit against the scatter of repeats."""
     out: list[str] = []
     if stated.alarm in (Alarm.ABOVE_STATED, Alarm.BELOW_STATED):
         out.append(f"{stated.alarm.value} (scatter {stated.noise_factor:.3g} times the stated noise)")

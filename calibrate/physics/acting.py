@@ -142,7 +142,7 @@ def _term(effect: Effect, terms: Sequence[Term], drivers: Drivers) -> Term:
 
 def _port_of(effect: Effect, drivers: Drivers) -> Port:
     """Where a curve acts. A tilt of link 1 in front of its joint and one behind it have the same name, so that a file
-    without `place` says where only if one port has that name.
+    without `place` states where only if one port has that name.
     """
     if effect.variant == SECOND:
         return Port(effect.where, Place.READING, instrument=ENCODER_DIFFERENCE)
@@ -297,7 +297,7 @@ def _readouts(predictor: Predictor, samples: Samples, frames: Floats, by: Pertur
         found = readout_at(kind.name, sensor, phi, table[rows], rows, frames)
         out[kind.name] = found if found.place is not None else replace(found, place=place)
     if joints := tuple(i for i in range(1, samples.n_joints + 1) if f"encoder{i}.zero" in predictor.values):
-        n = len(frames)  # of use to say where an effect sits; nothing else depends on these readings
+        n = len(frames)  # of use to find where an effect sits; nothing else depends on these readings
         nothing = np.full((n, len(joints)), np.nan)
         out[ENCODER_DIFFERENCE] = Readout(ENCODER_DIFFERENCE, nothing, np.zeros(n, dtype=bool), joints=joints)
     return out

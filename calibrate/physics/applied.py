@@ -39,7 +39,7 @@ BY_JOINT = {
     "qd": "qd{}_rad_s",
     "cmd_minus_q": "cmd{}_rad",
 }
-OF_POSE = ("q", "spot", "incidence", "first_psd", "reading")  # what joints and the instrument's place say
+OF_POSE = ("q", "spot", "incidence", "first_psd", "reading")  # what follows from joints and the instrument's place
 BY_WEIGHT = ("gravity_torque", "overturning_moment", "payload")
 PAYLOAD = ("payload_kg", "payload_com_x_m", "payload_com_y_m", "payload_com_z_m")
 CENTRE = PAYLOAD[1:]
@@ -87,7 +87,7 @@ def kept_conditions(every: Mapping[str, Floats], needs: Iterable[str]) -> dict[s
 
 def completed(asked: Samples, recorded: Samples, needs: Iterable[str], same_session: bool) -> Completed:
     """`needs` filled in: by the order in time and by smoothing among the session's own rows, if they are of it; else
-    with the middle of what was recorded, where `missing` says so.
+    with the middle of what was recorded, where `missing` has the row.
     """
     columns, missing = dict(asked.columns), dict[str, Bools]()
     if same_session:

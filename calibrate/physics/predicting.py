@@ -121,7 +121,7 @@ def _with_sigma(model: ModelFile, predictor: Predictor, samples: Samples, applie
         return {c: v + moved[c] if c in moved else v for c, v in read.items()}
 
     def at(predictor: Predictor, by: Perturbation) -> Columns:
-        """A tip in a cone that the model knows is told from the cone: where both stand in the base, nobody sees."""
+        """A tip in a cone that the model knows is read from the cone: where both stand in the base, nobody sees."""
         read = reading(predictor, by)
         return less_cones(predictor, read, samples)
 

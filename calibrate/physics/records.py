@@ -20,7 +20,7 @@ class Record(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class EffectParameter(Record, frozen=True):
-    """As a person reads it; null where the data do not tell."""
+    """As a person reads it; null where the data do not determine it."""
 
     value: Number | None
     sigma: Statistic | None

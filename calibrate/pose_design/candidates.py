@@ -17,7 +17,7 @@ from acquisition.recording.samples import POSITION, SPOTS, per_joint
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-POSE_S = 8.0  # from one reading to the next: of an emulated session at 1 rad/s; it sets how fast a drift is told to be
+POSE_S = 8.0  # from one reading to the next: of an emulated session at 1 rad/s; it sets how fast a drift is taken to be
 
 
 @dataclass(frozen=True)

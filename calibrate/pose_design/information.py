@@ -101,7 +101,7 @@ def _shaped(says: str, points: Floats, by: Floats, across: Floats) -> Target:
     return Target(says, flat / np.sqrt(n), spread @ flat / (spread @ spread))
 
 
-NO_OPINION = 3.0  # plausible sizes: believed of an unknown of which nobody has an opinion; far above any sigma found
+NO_OPINION = 3.0  # plausible sizes: assumed of an unknown of which nobody has an opinion; far above any sigma found
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +133,7 @@ class Information:
 
     @property
     def hidden_m(self) -> float:
-        """Rms of the target by what no candidate shows, as far as it is believed: 0 where it moves no target."""
+        """Rms of the target by what no candidate shows, as far as it is assumed: 0 where it moves no target."""
         return float(np.linalg.norm(self.by_target @ self.hidden))
 
     def of(self, poses: NDArray[np.intp], known: bool = True) -> Floats:

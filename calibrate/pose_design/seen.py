@@ -1,7 +1,8 @@
 """Before measuring: which causes a plan could show, from which size on, and which it could not separate.
 
-The session of the plan is made up at the nominal rig, with angles and readings that scatter as the rig believes, and
-put on the bench of a diagnosis: what that would look for, and how large it had to be, does not depend on what is read.
+The session of the plan is made up at the nominal rig, with angles and readings that scatter as the rig assumes, and
+put on the bench of a diagnosis: what that would search for, and how large it had to be, does not depend on what is
+read.
 """
 
 from dataclasses import dataclass

@@ -52,14 +52,14 @@ def tag(name: str, /, *children: str, **attributes: str) -> Html:
 
 
 def section(anchor: str, title: str, lead: str, *children: str) -> Html:
-    """A chapter of the report: heading, one sentence that says what it shows, content."""
+    """A chapter of the report: heading, one sentence on what it shows, content."""
     said = (tag("p", lead, cls="lead"),) if lead else ()
     opening = tag("header", tag("h2", title), *said, cls="opening")
     return tag("section", opening, *children, id=anchor)
 
 
 def figure(drawing: Html, caption: str) -> Html:
-    """A drawing with the sentence that says what to see in it."""
+    """A drawing with the sentence on what to see in it."""
     return tag("figure", drawing, tag("figcaption", caption))
 
 

@@ -27,7 +27,7 @@ COLUMNS = ("x", "y", "z", "roll", "pitch", "yaw", "zero")
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure: what it is called, its size, what it says to who cannot see it and to who can, and its painter."""
+    """A figure: what it is called, its size, its text for who cannot see it and for who can, and its painter."""
 
     name: str
     width_in: float

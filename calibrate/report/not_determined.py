@@ -28,7 +28,7 @@ NUMBERED = {**{f.prefix: f.one for f in FRAMES if f.one}, "placement": "where fi
 
 
 class Together(Protocol):
-    """Parameters that can only be told together: a combination of the analysis, or of a model.json."""
+    """Parameters that can only be determined together: a combination of the analysis, or of a model.json."""
 
     @property
     def words(self) -> str: ...
@@ -93,7 +93,7 @@ def _plain(words: str) -> str:
 
 Floats = NDArray[np.float64]
 
-DRAWING = 2.0**0.5  # s^2 = data + 1 for a combination of toleranced links: below, the drawing tells more than the data
+DRAWING = 2.0**0.5  # s^2 = data + 1 for a combination of toleranced links: below, the drawing shows more than the data
 
 
 def spectrum(singular_values: Floats, rank: int, name: str, *, with_drawing: bool = True) -> Html:

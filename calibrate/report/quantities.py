@@ -1,4 +1,4 @@
-"""Numbers for a person: a unit that fits, as many digits as the doubt leaves, columns that line up at the point."""
+"""Numbers for a person: a unit that fits, as many digits as the sigma leaves, columns that line up at the point."""
 
 import math
 from collections.abc import Sequence

@@ -70,7 +70,7 @@ def session_room(evidence: SessionEvidence) -> Room | str:
 
 
 def session_measured(evidence: SessionEvidence, known: KnownArm) -> Measured | None:
-    """Errors at the poses, each predicted from all others; None where no instrument says where the target is."""
+    """Errors at the poses, each predicted from all others; None where no instrument shows where the target is."""
     for index, name in enumerate(evidence.model.instruments):
         readings = next((r for r in evidence.readings if r.instrument == name and r.unit == "m"), None)
         if name not in IN_SPACE or readings is None:
@@ -110,7 +110,7 @@ LEAD = "How far the tool is from where the controller thinks it is, wherever the
 
 
 def workspace(room: Room | str, measured: Measured | None, why_not_measured: str) -> Html:
-    """Pictures; or why there are none. `why_not_measured` is told where `measured` is None."""
+    """Pictures; or why there are none. `why_not_measured` is printed where `measured` is None."""
     if isinstance(room, str):
         return section("workspace", WORKSPACE_TITLE, LEAD, tag("p", f"Not drawn: {room}."))
     share = float(room.supported.mean())

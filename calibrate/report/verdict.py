@@ -60,7 +60,7 @@ class Number:
 
     key: str  # for scripts
     name: str
-    value: float | None  # None: not determined; `said` tells so
+    value: float | None  # None: not determined, as `said` states
     unit: str  # "m", or "1" of a count
     said: str  # value and unit for a person
     about: str  # what it is, in one line
@@ -75,7 +75,7 @@ class Answers:
     known: tuple[str, ...] = ()  # what to know before the numbers are used: what is missing, what limits
     also: tuple[str, ...] = ()  # smaller numbers, in words
     drift: str = ""  # what changed since another calibration, in one sentence
-    warnings: tuple[str, ...] = ()  # what to know before that sentence is believed
+    warnings: tuple[str, ...] = ()  # what to know before that sentence is relied on
 
 
 def first_screen(answers: Answers, maps: Html | None = None) -> Html:

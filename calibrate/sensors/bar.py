@@ -94,7 +94,7 @@ def _build(table: SampleTable) -> Measured | None:
 
 
 def _witness(rig: Rig, samples: Samples, q_rad: Floats) -> Witness | None:
-    """Pairs of neighbouring rows that are ends of one bar; odd rows are told when the instrument is built."""
+    """Pairs of neighbouring rows that are ends of one bar; odd rows are reported when the instrument is built."""
     rows = filled(samples, BAR)
     if len(rows) < 2 or BAR_END not in samples:
         return None

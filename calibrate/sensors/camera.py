@@ -36,7 +36,7 @@ SOURCES = (
     *(NoiseSource(f"camera_{axis}", "m", "camera_m") for axis in "xyz"),
     *(NoiseSource(f"camera_r{axis}", "rad", "camera_rad") for axis in "xyz"),
 )
-# Start values where the rig's [noise] says nothing: a body of 0.1 m at 1.5 m, detected to 0.1 pixel of 0.3 mrad. Across
+# Start values where the rig's [noise] states none: a body of 0.1 m at 1.5 m, detected to 0.1 pixel of 0.3 mrad. Across
 # the axis 45 µm / sqrt(markers); along it times range over size of the body. The data correct them.
 BELIEVED = (1e-4, 1e-4, 1e-3, 1e-2, 1e-2, 1e-3)
 FRAME, BODY = "camera", "marker"  # first parts of the names of parameters

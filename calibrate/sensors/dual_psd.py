@@ -1,7 +1,7 @@
 """Instrument: laser on the flange, beam reflected from one PSD face to the other, in either order.
 
 Observed at a pose: psd1_x, psd1_y, psd2_x, psd2_y (m). Spots are those of the planes, not of the finite faces, so
-that a servo can predict them off the face too; `lit` says what light would really fall.
+that a servo can predict them off the face too; `lit` has what light would really fall.
 """
 
 from dataclasses import dataclass, replace
@@ -241,7 +241,7 @@ def _pair_parameters(belief: PairBelief | None) -> tuple[Parameter, ...]:
 
 
 def _held_unless(name: str, unit: str, plausible: float, prior: float | None, start: float = 0.0) -> Parameter:
-    """Known exactly, hence held, unless a prior sigma says how well it is known."""
+    """Known exactly, hence held, unless a prior sigma states how well it is known."""
     if prior is None:
         return Parameter(name, unit, plausible, start=start, free=False)
     return Parameter(name, unit, max(plausible, prior), start=start, prior=prior)

@@ -11,7 +11,7 @@ from calibrate.sensors.optics import Beam
 
 Floats = NDArray[np.float64]
 
-SHIFT_PLAUSIBLE_M = 5e-3  # a hand-fitted bracket; only scales columns and says when a sigma is no result
+SHIFT_PLAUSIBLE_M = 5e-3  # a hand-fitted bracket; only scales columns and decides when a sigma is no result
 TILT_PLAUSIBLE_RAD = 0.05
 N_PARAMETERS = 4
 

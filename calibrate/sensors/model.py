@@ -1,4 +1,4 @@
-"""The seam of instruments: flange poses to what the instrument would say, with analytic derivatives."""
+"""The seam of instruments: flange poses to what the instrument would read, with analytic derivatives."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -36,7 +36,7 @@ from calibrate.weighting import Measured
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-PLACED = ("placement", "first_psd")  # columns that say how the fixture stood and was struck
+PLACED = ("placement", "first_psd")  # columns that state how the fixture stood and was struck
 PSD_BELIEVED_M = 2e-6  # a PSD in shop conditions (Deng, Ding, Zhang, Food & Machinery 2019(3))
 FEWEST_POSES = 12  # of one placement: four numbers each, six unknowns
 TURNS = 10

@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 POINT_PLAUSIBLE_M = 5e-3  # a bracket or stylus fitted by hand, against the drawing
-UNKNOWN_PLAUSIBLE_M = 0.2  # nobody says where the target sits: somewhere about the flange
+UNKNOWN_PLAUSIBLE_M = 0.2  # where the target sits is not stated: somewhere about the flange
 N_PARAMETERS = 3
 TARGETS = "target"  # parameters of several are target<id>.x, ...
 

@@ -101,7 +101,7 @@ def robust_covariance(rows: Rows, theta: Floats, loss: Loss) -> Floats | None:
 
 @runtime_checkable
 class Grouped(Protocol):
-    """A problem that says how many residual values each of its observations has."""
+    """A problem that states how many residual values each of its observations has."""
 
     @property
     def row_widths(self) -> Widths:
@@ -117,7 +117,7 @@ class Groups:
 
     @classmethod
     def of(cls, problem: LeastSquares, rows: int) -> "Groups":
-        """As the problem says, else each of its `rows` values for itself."""
+        """As the problem states, else each of its `rows` values for itself."""
         return cls(problem.row_widths if isinstance(problem, Grouped) else np.ones(rows, dtype=np.intp))
 
     @cached_property

@@ -25,8 +25,8 @@ class Rows:
     problem: LeastSquares
     free: NDArray[np.intp]  # columns of theta
     scale: Floats  # (free,) plausible sizes
-    centre: Floats  # (believed,) where priors pull to
-    prior: Floats  # (believed,) their sigmas
+    centre: Floats  # (prior,) where priors pull to
+    prior: Floats  # (prior,) their sigmas
     believed: NDArray[np.intp]  # among the free ones
     lower: Floats  # (free,)
     upper: Floats
@@ -54,14 +54,14 @@ class Rows:
         return replace(self, root_weight=np.sqrt(weights))
 
     def residual(self, theta: Floats) -> Floats:
-        """(row + believed,) data rows, then prior rows."""
+        """(row + prior,) data rows, then prior rows."""
         data = self.problem.residual(theta)
         if self.root_weight is not None:
             data = self.root_weight * data
         return np.concatenate([data, (theta[self.free][self.believed] - self.centre) / self.prior])
 
     def jacobian(self, theta: Floats) -> Floats:
-        """(row + believed, free) by the scaled free parameters."""
+        """(row + prior, free) by the scaled free parameters."""
         data = self.problem.jacobian(theta)
         out = np.zeros((len(data) + len(self.believed), len(self.free)))
         rows, beliefs = out[: len(data)], out[len(data) :]

@@ -114,7 +114,7 @@ class _Points:
     parameters: tuple[Parameter, ...]
     points_m: Floats
     start: Circle
-    size_m: float  # whitens; the real noise is told by the residuals
+    size_m: float  # whitens; the real noise is shown by the residuals
 
     def residual(self, theta: Floats) -> Floats:
         circle, spoke, out = self._seen(theta)
@@ -150,7 +150,7 @@ class _Points:
 
 
 STILL_RAD = 2e-4  # a standing axis scatters by its repeatability, 1e-5 rad class; a deliberate step is far more
-FEWEST = 5  # rows: a circle has 6 unknowns and 2 equations a point, which leaves 4 to tell its noise
+FEWEST = 5  # rows: a circle has 6 unknowns and 2 equations a point, which leaves 4 to show its noise
 SHORTEST_RAD = 0.35  # 20 deg of arc: below, centre and radius trade against each other
 
 
@@ -216,7 +216,7 @@ class AxisFound:
 def wrist(axes: Sequence[AxisFound], q_rad: Floats, row_of: Callable[[int], int]) -> tuple[AxisFound, AxisFound]:
     """Rotations of the last two joints, taken with the joints before them at the same readings.
 
-    `row_of` says which row of the file, from 1, a row of `q_rad` is. DataError where they are missing or bad.
+    `row_of` states which row of the file, from 1, a row of `q_rad` is. DataError where they are missing or bad.
     """
     n = q_rad.shape[1]
     apart: list[str] = []

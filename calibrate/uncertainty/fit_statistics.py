@@ -31,7 +31,7 @@ ALARM_P = 1e-3  # a false alarm in a thousand good sets a side
 
 
 class Alarm(Enum):
-    """What a test says; the value is the sentence for a person."""
+    """The result of a test; the value is the sentence for a person."""
 
     NONE = "scatter and noise agree"
     ABOVE_STATED = "misfit is larger than the stated noise: the noise is understated or the model misses something"

@@ -1,6 +1,6 @@
 """How far off the target may be anywhere in the workspace, as the covariance of the fit predicts it.
 
-Each pose maps the doubt of the parameters to the target, J C J'. What only moves the whole workspace rigidly (where
+Each pose maps the sigma of the parameters to the target, J C J'. What only moves the whole workspace rigidly (where
 base or device stand) is no error of the arm: the best rigid motion is taken out of every column of J before, so that
 gauge freedoms do not count, whatever frame was held. A combination that geometry hides and that moves the target
 forbids a number; one that these poses merely show too little of is known as well as its plausible size. Sources: law

@@ -219,12 +219,12 @@ def _predicted_squares(
 
 
 def _idle(jacobian: Floats, parameters: tuple[Parameter, ...]) -> tuple[int, ...]:
-    """Free parameters without any say in these rows."""
+    """Free parameters without any effect on these rows."""
     return tuple(i for i, p in enumerate(parameters) if p.free and not np.any(jacobian[:, i]))
 
 
 def _refit(problem: Cuttable, parameters: tuple[Parameter, ...], by: Estimator) -> Callable[[Floats], Floats | None]:
-    """Fit of what these rows can tell; a combination that they alone do not see goes back to its nominal value."""
+    """Fit of what these rows can show; a combination that they alone do not see goes back to its nominal value."""
 
     def from_start(theta: Floats) -> Floats | None:
         seen = analyse(problem.jacobian(theta), parameters)

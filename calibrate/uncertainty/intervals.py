@@ -12,7 +12,7 @@ from calibrate.parameters import Parameter
 
 @dataclass(frozen=True)
 class Interval:
-    """One parameter; all three numbers are None where `why` says that the data do not determine it."""
+    """One parameter; all three numbers are None where `why` states that the data do not determine it."""
 
     name: str
     unit: str

@@ -70,7 +70,7 @@ def judged(value: float | None, permitted: float | None) -> Judgement:
 
 
 Floats = NDArray[np.float64]
-LEAST = 5  # points: four determine a sphere, and a fifth says something of its error
+LEAST = 5  # points: four determine a sphere, and a fifth shows something of its error
 FLAT = 0.02  # thickness of the points over their width: the radius is then off by some hundred times their errors
 INSIDE = 1e-12  # relative: rounding, when a point lies on the sphere
 

@@ -63,7 +63,7 @@ LENGTH = Source(
 
 
 def iso10360_12_figures(measured: Measured) -> tuple[Figure, ...]:
-    """All that the recording allows; what it does not hold is told as such."""
+    """All that the recording allows; what it does not hold is reported as such."""
     return (
         _of_spheres(measured, "P_Size", "probing size error", SIZE, measured.rig.mpe.p_size_m, _size),
         _of_spheres(measured, "P_Form", "probing form error", FORM, measured.rig.mpe.p_form_m, _form),
@@ -152,7 +152,7 @@ def worst_of(
 
 
 def refuse_without_probe(measured: Measured) -> None:
-    """DataError where spheres were touched and nobody says how large the probe's ball is."""
+    """DataError where spheres were touched and the size of the probe's ball is not stated."""
     if measured.touches and measured.rig.tool.probe_diameter_m is None:
         raise DataError("samples: spheres were touched, but the rig's [tool] has no probe_diameter_m; add it")
 
@@ -183,7 +183,7 @@ VOLUMETRIC = Source(
 
 
 def b89_4_22_figures(measured: Measured) -> tuple[Figure, ...]:
-    """All that the recording allows; what it does not hold is told as such."""
+    """All that the recording allows; what it does not hold is reported as such."""
     return (_diameter(measured), _single_point(measured), _volumetric(measured))
 
 

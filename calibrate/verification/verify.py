@@ -106,7 +106,7 @@ def _drawings(a: Rig, b: Rig) -> list[tuple[str, object, object]]:
 
 
 def _parts(arm: Arm) -> list[tuple[object, ...]]:
-    """What is drawn of every joint; its range and its masses may be told better later."""
+    """What is nominal of every joint; its range and its masses may be known better later."""
     drawn = ("a_m", "alpha_rad", "d_m", "theta_offset_rad", "origin_m", "rotation_rad")
     return [tuple(getattr(joint, name, None) for name in drawn) for joint in arm.joints]
 

@@ -1,4 +1,4 @@
-"""One target as it stands in the text of a program, and what a dialect has to say of such texts."""
+"""One target as it stands in the text of a program, and how a dialect describes such texts."""
 
 import re
 from collections.abc import Callable, Iterator, Sequence

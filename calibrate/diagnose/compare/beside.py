@@ -234,7 +234,7 @@ def _device(here: Floats, there: Floats, model: Fitted, covariance: Floats) -> C
 
 
 def begin(simulated: Simulated, session: Session, freed: frozenset[str] = frozenset()) -> Fitted:
-    """The session under the simulation's geometry, with what is set up anew fitted, and its constants as candidates."""
+    """The session under the simulation's geometry, with what is set up again fitted, its constants as candidates."""
     session = without_known(session)
     values = _values(simulated, session)
     held = tuple(_held(p, v, freed) for p, v in zip(session.weighting.parameters, values, strict=True))
@@ -258,7 +258,7 @@ def device_between(simulated: Simulated, pair: Pair) -> Floats:
 
 
 def device_of(model: Predictor) -> Floats | None:
-    """T_base_device (4, 4); None where nobody knows it."""
+    """T_base_device (4, 4); None where it is unknown."""
     try:
         return model.T_base_device
     except DataError:

@@ -1,7 +1,7 @@
 """Which row of one table is which of another: rows of one plan, missing on either side.
 
-What a session says of each sample, its station, beam order, number in the plan and repeat, decides where both say it.
-Tables without it that have the same stations and repeats in the same order are rows of one plan as they stand. Only
+What a session states of each sample, its station, beam order, number in the plan and repeat, decides where both state
+it. Tables without it that have the same stations and repeats in the same order are rows of one plan as they stand. Only
 where rows are missing do joint angles decide, to within what a servo may have moved the arm. Angles that differ by a
 constant in all rows, zeros of degrees, make no difference.
 
@@ -31,7 +31,7 @@ SPREAD = 0.1  # rad: joints of one plan, but for a constant of each joint, keep 
 MOST = 0.9
 # A constant of a joint beyond any servo, that hardly varies: another zero of degrees.
 CONSTANT_RAD, VARIES = 0.05, 0.2
-WHAT = ("placement", "first_psd", SEAT, BAR, BAR_END, "target")  # where both say it, it must be the same
+WHAT = ("placement", "first_psd", SEAT, BAR, BAR_END, "target")  # where both state it, it must be the same
 ORDERED = (*WHAT, "repeat")
 
 Key = tuple[object, ...]  # of a sample: its place in the plan
@@ -48,7 +48,7 @@ class Matched:
 
 
 def match(measured: Samples, simulated: Samples, plans: tuple[Sequence[Key], Sequence[Key]] | None = None) -> Matched:
-    """`plans`: of each row of both tables its place in the plan, where the recordings say it.
+    """`plans`: of each row of both tables its place in the plan, where the recordings state it.
 
     DataError for arms of different joints, and where no row of one is a row of the other.
     """
@@ -144,7 +144,7 @@ def _reach(poses: Floats) -> float:
 
 
 def _labels(samples: Samples, name: str) -> Floats:
-    """(row,) as numbers, NaN where nothing is said."""
+    """(row,) as numbers, NaN where nothing is stated."""
     if name != BAR_END:
         return samples.column(name)
     end = samples.columns[name]

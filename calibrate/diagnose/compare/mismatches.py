@@ -1,8 +1,8 @@
 """What two recordings differ by, as a list from the outside in: each with place, size, sigma, unit and one sentence.
 
 Outside are the frames in which things stand, then zeros of encoders and joints, links, then physics. A measuring device
-that stands elsewhere, and the zeros of second encoders, are set up anew for every recording: they are stated with their
-size, and decide nothing.
+that stands elsewhere, and the zeros of second encoders, are set up again for every recording: they are stated with
+their size, and decide nothing.
 """
 
 import math

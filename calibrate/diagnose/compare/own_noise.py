@@ -1,4 +1,4 @@
-"""A difference against its own scatter, whatever noise was believed: means that are not zero, rows that hang together.
+"""A difference against its own scatter, whatever noise was assumed: means that are not zero, rows that hang together.
 
 Mean: Student's t. Neighbours: von Neumann's ratio of mean square successive difference to variance (Ann. Math.
 Stat. 12, 1941) with its normal limit; noise of one sample knows nothing of the sample before.

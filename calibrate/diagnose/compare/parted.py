@@ -28,7 +28,7 @@ NUDGE_RAD = 1e-6  # of a joint, for its lever on the readings
 
 @dataclass(frozen=True)
 class Parted:
-    """One link, judged. `noise` is one sigma of a difference; None: nothing says what it may be."""
+    """One link, judged. `noise` is one sigma of a difference; None: unknown."""
 
     link: str
     unit: str

@@ -1,7 +1,7 @@
 """Rows in which the probe is seated, in a cone or at an end of a bar: there the joints are the reading.
 
-What two sessions of one motion can be asked is where each says that the tip is, by one model: of a cone, whose place
-nobody knows, about the mean of its rows; of a bar, the length.
+What two sessions of one motion can be asked is where each has the tip, by one model: of a cone, whose place
+is unknown, about the mean of its rows; of a bar, the length.
 """
 
 from itertools import pairwise

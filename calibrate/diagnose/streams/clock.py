@@ -25,7 +25,7 @@ BLOCK_S = 0.5  # a motion of an arm from pose to pose; what is slower than this 
 TOGETHER = 2  # blocks: errors of a reading that depend on the angle last as long as a motion does
 ROUNDS = 12  # Gauss-Newton from a start within its reach needs five
 STILL_S = 1e-9  # step at which it has converged
-MOVES = 20.0  # times the noise that a block must move to say something about time
+MOVES = 20.0  # times the noise that a block must move to show something about time
 FEWEST_BLOCKS = 5  # of those together
 USELESS_S = 1e-3  # a sigma beyond this is no answer: ten times what is asked for, and what unlike motions leave
 

@@ -1,4 +1,4 @@
-"""A device's clock that was set while it ran: told from missing samples by the host's stamps, and taken out."""
+"""A device's clock that was set while it ran: separated from missing samples by the host's stamps, and taken out."""
 
 from dataclasses import replace
 

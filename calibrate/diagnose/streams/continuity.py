@@ -48,8 +48,9 @@ def breaks(
 ) -> tuple[Break, ...]:
     """In order of time. `sequence` (sample,) counts at the device.
 
-    A reading that stands is told from one that is frozen by `moving`, another reading of the same channels on the same
-    clock, or because it is `noisy`: it never repeats itself, even when nothing moves. Without both nothing is said.
+    A reading that stands is separated from one that is frozen by `moving`, another reading of the same channels on the
+    same clock, or because it is `noisy`: it never repeats itself, even when nothing moves. Without both nothing is
+    reported.
     """
     found = [*_steps(track, sequence), *(_frozen(track, moving) if noisy or moving is not None else [])]
     return tuple(sorted(found, key=lambda one: one.first))

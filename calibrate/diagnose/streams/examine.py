@@ -1,4 +1,4 @@
-"""Every finder over the streams of one recording: what is wrong with them, where, how much, and what cannot be told."""
+"""Every finder over the streams of one recording: what is wrong with them, where, how much, and what is not found."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -180,7 +180,7 @@ def _of(track: Track, channels: list[int]) -> Track:
 
 @dataclass(frozen=True, eq=False)
 class _Spots:
-    """The spots on the clock of the joints: by the motion where a model tells it, else as the host's stamps say."""
+    """The spots on the clock of the joints: by the motion where a model has it, else by the host's stamps."""
 
     track: Track
     clock: ClockFit | None

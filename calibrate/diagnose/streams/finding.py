@@ -1,4 +1,4 @@
-"""What is said of a stream: a finding with place, size, sigma and when; or why nothing can be said."""
+"""The report of a stream: a finding with place, size, sigma and when; or why there is none."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

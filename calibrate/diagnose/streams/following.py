@@ -28,7 +28,7 @@ SMOOTH_S = 0.008  # over which a speed is formed: one sample of the slowest cont
 
 @dataclass(frozen=True)
 class Following:
-    """One joint (from 1). Behind by `behind_s` of speed and `by_acceleration_s2`; `kind` where they tell it."""
+    """One joint (from 1). Behind by `behind_s` of speed and `by_acceleration_s2`; `kind` where they show it."""
 
     joint: int
     outcome: Outcome

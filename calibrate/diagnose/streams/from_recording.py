@@ -1,6 +1,6 @@
 """The streams of a recording beside its diagnosis: what is wrong with them, by the model that was fitted.
 
-What a fitted model says the spots are at any moment of the motion: where the beam falls on both faces.
+Where a fitted model has the spots at any moment of the motion: where the beam falls on both faces.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
-"""Whether two clocks are farther apart than their devices' stamps at the host say: readings that come late.
+"""Whether two clocks are farther apart than their devices' stamps at the host show: readings that come late.
 
 Where two devices count from is nobody's fault, so an offset is judged against the one that the host's stamps show, with
-their own scatter and what lines delay, which no stamp tells. A device without a clock carries the host's: then its own
+their own scatter and what lines delay, which no stamp shows. A device without a clock carries the host's: then its own
 stamps are those. A quartz is off by some 100 us/s at worst; what drifts more is a fault of its clock.
 """
 

@@ -52,7 +52,7 @@ def start_between(reference: Device, other: Device) -> Ticks | None:
 
 
 def stamps_scatter_s(device: Device) -> float:
-    """How well the host's stamps tell the device's time, in its seconds: scatter of the promptest about their line.
+    """How well the host's stamps give the device's time, in its seconds: scatter of the promptest about their line.
 
     Infinite without a line.
     """

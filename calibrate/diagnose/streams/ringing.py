@@ -107,7 +107,7 @@ def _joined(sure: list[tuple[Stand, float, Swing, float]], levers: Levers | None
 
 
 def _mean(values: list[float], sigmas: list[float]) -> tuple[float, float]:
-    """Weighted; the sigma is widened where stops differ by more than they say (Birge ratio, Phys. Rev. 40, 1932)."""
+    """Weighted; the sigma is widened where stops differ by more than they state (Birge ratio, Phys. Rev. 40, 1932)."""
     v, s = np.array(values), np.maximum(np.array(sigmas), 1e-12)
     w = 1.0 / s**2
     mean = float(np.sum(w * v) / np.sum(w))
@@ -122,7 +122,7 @@ def _joint(sure: list[tuple[Stand, float, Swing, float]], levers: Levers | None)
     explained, total = 0.0, 0.0
     for _, at_s, one, _ in sure:
         lever = levers(at_s) / one.amplitude_sigma[:, None]
-        if not lever.any():  # the model cannot say what is read there: between two places, say
+        if not lever.any():  # the model has no reading there: between two places, for example
             continue
         amplitude = one.amplitude / one.amplitude_sigma
         size = np.linalg.norm(lever, axis=0)

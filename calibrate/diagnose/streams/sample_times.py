@@ -24,7 +24,7 @@ class Around:
     first_psd: Ints
 
     def at(self, time_s: Floats) -> tuple[Ints, Ints]:
-        """(row,) placement and first face; 0 where the sample before and the one after say different things."""
+        """(row,) placement and first face; 0 where the sample before and the one after differ."""
         after = np.searchsorted(self.time_s, time_s)
         before, after = np.clip(after - 1, 0, None), np.clip(after, None, len(self.time_s) - 1)
         same = (self.placement[before] == self.placement[after]) & (self.first_psd[before] == self.first_psd[after])
@@ -32,7 +32,7 @@ class Around:
 
 
 def sample_windows(recording: Recording) -> tuple[Window, ...] | None:
-    """On the clock of the PSD box, one a sample; None where the recording does not say."""
+    """On the clock of the PSD box, one a sample; None where the recording does not state it."""
     told = [event.detail for event in recording.events if event.kind == EVENT]
     if not told or len(told) != len(recording.samples):
         return None
@@ -49,7 +49,7 @@ def by_host(time_s: Floats, own: Device, other: Device) -> Floats:
 
 
 def around(recording: Recording, windows: tuple[Window, ...] | None, spots: Device, joints: Device) -> Around | None:
-    """On the clock of the joints; None where no sample says where the fixture stood.
+    """On the clock of the joints; None where no sample states where the fixture stood.
 
     Without windows `t_s` counts from `host_s0`, as docs/formats.md has it.
     """

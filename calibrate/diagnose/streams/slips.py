@@ -46,7 +46,7 @@ class Slip:
 
 @dataclass(frozen=True)
 class Slips:
-    """`judged` (joint,): False where stands are too few to tell."""
+    """`judged` (joint,): False where stands are too few."""
 
     found: tuple[Slip, ...]
     judged: tuple[bool, ...]
@@ -55,7 +55,7 @@ class Slips:
 def slips(track: Track, other: Track, stands: Sequence[Stand], causes: Causes | None = None) -> Slips:
     """Of `track` against `other`, same channels, same clock. Within a stand a step divides it in two.
 
-    `causes`: what else may turn a joint between the two, at any pose; None: nobody knows.
+    `causes`: what else may turn a joint between the two, at any pose; None: unknown.
     """
     track = track.read()
     difference = Track("difference", track.unit, track.time_s, track.values - other.curve.at(track.time_s)).read()
@@ -93,7 +93,7 @@ def _pieces(difference: Track, at: Curve, stands: Sequence[Stand], j: int) -> Fl
 
 
 def _innocent(j: int, pieces: Floats, causes: Causes | None) -> list[Floats]:
-    """Columns (stand,) of unit size that physics may ask for; none where stands are too few to tell."""
+    """Columns (stand,) of unit size that physics may ask for; none where stands are too few."""
     if causes is None or len(pieces) < SPARE + ENOUGH or not np.isfinite(pieces).all():
         return []
     columns = [pieces[:, 4], *causes(j + 1, pieces[:, 5:]).T]

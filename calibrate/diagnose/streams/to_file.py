@@ -1,7 +1,7 @@
-"""What the streams say, in the record that diagnosis.json holds.
+"""What the streams show, in the record that diagnosis.json holds.
 
-Missing samples and the way in which every servo follows its set-point are told with their size, but are no reason to
-doubt the model: they stand beside the findings, and do not decide the verdict.
+Missing samples and the way in which every servo follows its set-point are reported with their size, but are no reason
+to question the model: they stand beside the findings, and do not decide the verdict.
 """
 
 import math
@@ -39,7 +39,7 @@ EXPLAINS = {
 
 
 def with_streams(file: DiagnosisFile, report: StreamReport | None) -> DiagnosisFile:
-    """The diagnosis with what its recording's streams say; findings of the samples stay in front."""
+    """The diagnosis with what its recording's streams show; findings of the samples stay in front."""
     if report is None:
         return file
     told = [_finding(one) for one in report.findings if not _known(one, file)]
@@ -56,7 +56,7 @@ def with_streams(file: DiagnosisFile, report: StreamReport | None) -> DiagnosisF
 
 
 def _known(one: StreamFinding, file: DiagnosisFile) -> bool:
-    """A slip that the samples show already: they give its size, the streams would tell it a second time."""
+    """A slip that the samples show already: they give its size, the streams would report it a second time."""
     slip = one.name.physics == SLIP
     return slip and any(f.physics == SLIP and f.where == one.name.where for f in file.findings)
 

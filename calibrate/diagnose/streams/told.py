@@ -23,7 +23,7 @@ SAID = {
     Fault.FROZEN: "{n} samples of {stream} are one and the same{of}, while it moved, at {at}",
 }
 CERTAIN = float(np.finfo(float).tiny)  # of what was counted: no noise does it, and no probability is zero
-MOST = 8  # rows that are told one by one
+MOST = 8  # rows that are printed one by one
 
 
 def told_breaks(track: Track, faults: Sequence[Break]) -> list[StreamFinding]:

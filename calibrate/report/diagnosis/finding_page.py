@@ -160,7 +160,7 @@ def _axis(driver: str, x: Floats) -> tuple[float, str]:
 
 
 TWO_SIDED = 1.96  # sigmas of 95 %
-SURE = 1e-6  # probability below which only its smallness is told
+SURE = 1e-6  # probability below which only its smallness is reported
 
 
 def finding_page(number: int, finding: FindingRecord, file: DiagnosisFile, chain: Sequence[Link]) -> Html:

@@ -21,7 +21,7 @@ OF_STREAMS = (("_s_per_s", 1e6, "µs per s"), ("_s2", 1e6, "ms²"), ("_hz", 1.0,
 
 
 def unit_of(name: str, value: float) -> tuple[float, str]:
-    """Factor, and the unit with the space before it; one and nothing where the name says none."""
+    """Factor, and the unit with the space before it; one and nothing where the name has none."""
     for ending, factor, unit in OF_STREAMS:
         if name.endswith(ending):
             return factor, f"{TIED}{unit}" if unit else ""
@@ -193,7 +193,7 @@ def stream_words(file: DiagnosisFile) -> Iterator[str]:
     if file.streams is None:
         return
     for clock in file.streams.clocks:
-        if clock.offset_s is not None:  # one that is not told stands, with its reason, in what cannot be seen
+        if clock.offset_s is not None:  # one that is not reported stands, with its reason, in what cannot be seen
             yield _clock_words(clock)
     for usual in file.streams.usual:
         yield f"usual: {usual.says}"

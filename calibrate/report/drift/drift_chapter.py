@@ -111,7 +111,7 @@ def _rows(one: Calibration) -> Iterator[tuple[str, str]]:
 
 
 def _ranges(one: Calibration) -> Iterator[tuple[str, str]]:
-    """What the joints went through; a model alone does not say."""
+    """What the joints went through; a model alone does not show it."""
     if one.recording is None or len(one.recording.samples) == 0:
         return
     spans = np.degrees(np.ptp(one.recording.samples.joints(), axis=0))

@@ -43,7 +43,7 @@ def parameters_chapter(evidence: SessionEvidence) -> Html:
 
 
 def _unasked(evidence: SessionEvidence) -> str:
-    """What a fit to spots believes of a rig that states no tolerance."""
+    """What a fit to spots assumes of a rig that states no tolerance."""
     rig, samples = evidence.recording.rig, evidence.recording.samples
     said = said_of(rig) if holds_spots(samples) else None
     return "" if said is None else f" The rig file has {said}."

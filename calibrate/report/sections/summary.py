@@ -145,7 +145,7 @@ def _tool(room: Room | str, diagnosis: DiagnosisFile | None) -> Iterator[Number]
 
 
 def _missed_by_geometry(diagnosis: DiagnosisFile | None) -> float:
-    """In m, rms over the workspace; 0 where no diagnosis says so."""
+    """In m, rms over the workspace; 0 where no diagnosis has it."""
     change = None if diagnosis is None or not diagnosis.findings else diagnosis.free_space
     return 0.0 if change is None else float(np.sqrt(max(change.rms_before_m**2 - change.rms_after_m**2, 0.0)))
 
@@ -155,7 +155,7 @@ MAPS = "From the side, one scale for both. Hatched: not supported by these poses
 
 
 def _errors(evidence: SessionEvidence) -> tuple[Number, Number]:
-    """As drawn and now: on unseen rows where there are any, else on those of the fit."""
+    """Nominal and now: on unseen rows where there are any, else on those of the fit."""
     first, proof = evidence.readings[0], next(iter(proofs(evidence.model)), None)
     if proof is None:
         before, after = _rms(first.error_before), _rms(first.error_after)
@@ -186,7 +186,7 @@ def _rms(values: np.ndarray) -> float:
 
 
 def _anywhere(room: FreeSpaceRecord | None) -> Number:
-    """What 95 % of all poses between the joint limits stay below, one sigma, as predicted; or why it is not told."""
+    """What 95 % of all poses between the joint limits stay below, one sigma, as predicted; or why there is none."""
     if room is None or room.pose_p95_m is None:
         why = "not predicted" if room is None else f"not determined: {room.says}"
         return Number("anywhere", ANYWHERE, None, "m", DASH, why)

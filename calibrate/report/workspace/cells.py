@@ -176,7 +176,7 @@ def _stride(count: int) -> int:
 
 
 def dress(axes: Axes, grid: Grid, title: str, what: str, *, first: bool) -> None:
-    """Title, axes of equal scale, the base as a cross; the first of a view tells heights and what the row shows."""
+    """Title, axes of equal scale, the base as a cross; the first of a view gives heights and what the row shows."""
     left, right, bottom, top = grid.box_m
     axes.set(xlim=(left, right), ylim=(bottom, top), title=title, xlabel=grid.view.across)
     axes.grid(visible=False)

@@ -47,7 +47,7 @@ class KnownArm:
 
 
 def unpredicted(room: FreeSpaceRecord | None) -> str | None:
-    """Why errors over the workspace cannot be determined, as the prediction in the model says; None where they can."""
+    """Why errors over the workspace cannot be determined, by the prediction in the model; None where they can."""
     if room is None:
         return "the model holds no prediction: it has no covariance, or is of an older program"
     if room.status == FreeSpaceStatus.PREDICTED.name:
