@@ -80,4 +80,5 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    """What is meant to be used: the names above, without what they are made of."""
+    return sorted({*__all__, *(name for name in globals() if name.startswith("__"))})

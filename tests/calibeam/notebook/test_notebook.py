@@ -92,7 +92,7 @@ def test_a_model_is_exported_by_the_word_of_the_command_line(model, tmp_path) ->
 
 
 def test_errors_are_had_from_the_top_and_names_complete(tmp_path) -> None:
-    assert set(calibeam.__all__) <= set(dir(calibeam))
+    assert {name for name in dir(calibeam) if not name.startswith("_")} == set(calibeam.__all__)
     with pytest.raises(calibeam.RecordingError):
         calibeam.open(tmp_path)
     assert all(getattr(calibeam, name) is not None for name in calibeam.__all__)
