@@ -86,10 +86,14 @@ ANSWER_LIMIT_BYTES = 1024 * 1024  # feels right: thousands of answers that nobod
 
 
 class Outbox:
-    """`write` takes bytes and returns how many it took; BlockingIOError means none now."""
+    """`write` takes bytes and returns how many it took; BlockingIOError means none now.
 
-    def __init__(self, write: Callable[[bytearray], int]) -> None:
-        self._write = write
+    `pace`: emulated seconds in one of the host's. A client stands still for a time of the host, in which so much more
+    comes.
+    """
+
+    def __init__(self, write: Callable[[bytearray], int], pace: float = 1.0) -> None:
+        self._write, self._limit_bytes = write, int(STREAM_LIMIT_BYTES * max(pace, 1.0))
         self._waiting = bytearray()
         self.dropped = 0  # outputs lost because the client did not read
 
@@ -99,10 +103,10 @@ class Outbox:
 
     def takes_stream(self) -> bool:
         """False, and counted, while too much waits: what would be streamed now need not even be made."""
-        if len(self._waiting) <= STREAM_LIMIT_BYTES:
+        if len(self._waiting) <= self._limit_bytes:
             return True
         self.flush()
-        if len(self._waiting) <= STREAM_LIMIT_BYTES:
+        if len(self._waiting) <= self._limit_bytes:
             return True
         self.dropped += 1
         return False
@@ -113,7 +117,7 @@ class Outbox:
 
     def stream(self, data: bytes) -> None:
         """Output that may be lost. Raises what `write` raises, except for "not now"."""
-        self._offer(data, STREAM_LIMIT_BYTES)
+        self._offer(data, self._limit_bytes)
 
     def answer(self, data: bytes) -> bool:
         """Output that belongs to a request; False when the client has left so much unread that it was dropped."""

@@ -87,7 +87,7 @@ class Host:
         self._listeners: dict[str, Listener] = {}
         self._connections: dict[Connection, Listener] = {}
         try:
-            self._open(bench)
+            self._open(bench, time_scale)
         except BaseException:
             self.close()
             raise
@@ -141,7 +141,7 @@ class Host:
         self._lines, self._senders, self._listeners = [], [], {}
         self._selector.close()
 
-    def _open(self, bench: Bench) -> None:
+    def _open(self, bench: Bench, pace: float) -> None:
         names = [port.name for port in bench.ports]
         if len(set(names)) != len(names):
             raise ValueError(f"bench: port names {names} are not unique")
@@ -150,14 +150,14 @@ class Host:
                 check_link(port.name, Path(port.link))
         for port in bench.ports:
             if isinstance(port, TcpPort):
-                self._open_listener(port)
+                self._open_listener(port, pace)
             elif isinstance(port, UdpPort):
                 self._senders.append(UdpSender(port, self.faults))
             else:
-                self._lines.append(SerialLine(port, self.faults))
+                self._lines.append(SerialLine(port, self.faults, pace))
 
-    def _open_listener(self, port: TcpPort) -> None:
-        listener = Listener(port, self.faults)
+    def _open_listener(self, port: TcpPort, pace: float) -> None:
+        listener = Listener(port, self.faults, pace)
         self._listeners[port.name] = listener
         self._selector.register(listener.socket, selectors.EVENT_READ, lambda: self._accept(listener))
 

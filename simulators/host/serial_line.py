@@ -20,13 +20,13 @@ READ_BYTES = 65536
 class SerialLine:
     """Opens on construction. HostError when the machine has no pseudo-terminal left or the link cannot be made."""
 
-    def __init__(self, port: SerialPort, report: Report) -> None:
+    def __init__(self, port: SerialPort, report: Report, pace: float = 1.0) -> None:
         self.name = port.name
         self._wire = port.wire
         self._report = report
         self._link = None if port.link is None else Path(port.link).absolute()
         self.fd, self.path = _open_terminal(port.name)
-        self._outbox = Outbox(lambda data: os.write(self.fd, data))
+        self._outbox = Outbox(lambda data: os.write(self.fd, data), pace)
         self.attached = self.unplugged = False
         if self._link is not None:
             try:

@@ -16,10 +16,10 @@ BACKLOG = 16  # clients that connect within one tick
 class Connection:
     """One client. `alive` turns False when it has gone, was dropped, or its wire has ended it."""
 
-    def __init__(self, client: socket.socket, wire: Wire, place: str, report: Report) -> None:
+    def __init__(self, client: socket.socket, wire: Wire, place: str, report: Report, pace: float) -> None:
         self.client, self.wire = client, wire
         self._place, self._report = place, report
-        self._outbox = Outbox(client.send)
+        self._outbox = Outbox(client.send, pace)
         self.alive = True
 
     def receive(self) -> None:
@@ -76,9 +76,8 @@ class Connection:
 class Listener:
     """Opens on construction. PortBusy when the address is taken, HostError when it cannot be had at all."""
 
-    def __init__(self, port: TcpPort, report: Report) -> None:
-        self._port = port
-        self._report = report
+    def __init__(self, port: TcpPort, report: Report, pace: float = 1.0) -> None:
+        self._port, self._report, self._pace = port, report, pace
         self.socket = _listen(port)
 
     @property
@@ -101,7 +100,7 @@ class Listener:
             self._report.fault(self._port.name, fault)
             client.close()
             return None
-        return Connection(client, wire, self._port.name, self._report)
+        return Connection(client, wire, self._port.name, self._report, self._pace)
 
     def bid_farewell(self, connection: Connection) -> None:
         """Closes a connection and informs the instrument."""

@@ -45,6 +45,22 @@ def test_streamed_outputs_are_dropped_whole_when_too_much_waits():
     assert pipe.taken.endswith(b"next")
 
 
+def test_at_eight_times_the_pace_a_client_may_stand_still_as_long():
+    plain, fast = Outbox(Pipe(0).write), Outbox(Pipe(0).write, pace=8.0)
+    package = bytes(1000)
+    for _ in range(60):
+        plain.stream(package)
+        for _ in range(8):
+            fast.stream(package)
+    assert plain.dropped == fast.dropped == 0
+    for _ in range(10):
+        plain.stream(package)
+        for _ in range(8):
+            fast.stream(package)
+    assert plain.dropped > 0
+    assert fast.dropped > 0
+
+
 def test_answers_are_kept_when_the_stream_is_not_and_refused_in_the_end():
     outbox = Outbox(Pipe(0).write)
     outbox.stream(bytes(STREAM_LIMIT_BYTES + 1))
