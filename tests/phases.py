@@ -21,15 +21,10 @@ ON_WIRES = ("-m", "wired and not endure")
 CALCULATING = ("-m", "not endure and not wired", *TWO_AT_A_TIME)
 
 
-# Of the program's tests on wires those without a servo loop: pages, workers, checks, logs, an arm moved by hand. They
-# leave others room, too.
+# Of the program's tests on wires those without a servo loop: pages, workers, refusals. They leave others room, too.
 PATIENT = tuple(
-    f"tests/calibeam/{name}"
-    for name in (
-        "fleet", "guided", "live/test_browser.py", "live/test_page.py", "test_check_cli.py", "test_cli.py",
-        "test_log_cli.py", "test_psd_check_cli.py",
-    )
-)  # fmt: skip
+    f"tests/calibeam/{name}" for name in ("fleet", "live/test_browser.py", "live/test_page.py", "test_cli.py")
+)
 
 
 @dataclass(frozen=True)
