@@ -7,7 +7,7 @@ The limits of today only ever fall: who adds a small module, a second name or a 
 
 import ast
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -64,6 +64,7 @@ def lengths() -> list[int]:
     return sorted(m.lines for m in modules().values() if not (m.is_face and m.lines < 20))
 
 
+@cache
 def function_lengths() -> list[int]:
     """Lines of every function, ascending; its docstring is not counted, since a command's is its help."""
     return sorted(
@@ -123,26 +124,30 @@ def chain() -> list[str]:
 
 @dataclass(frozen=True)
 class Figure:
-    """What is counted, what it is, the most it may be today (it only ever falls), and the target of the design."""
+    """What is counted, how, the most it may be today (it only ever falls), and the target of the design."""
 
     what: str
-    value: int
+    count: Callable[[], int]
     today: int
     target: int
 
 
+def _nine_of_ten(ascending: list[int]) -> int:
+    return ascending[int(0.9 * len(ascending))]
+
+
 def figures() -> tuple[Figure, ...]:
-    files, functions = lengths(), function_lengths()
+    """Nothing is counted yet: who collects the tests does not read the whole source."""
     return (
-        Figure("product files", len(modules()), TODAY["files"], 550),
-        Figure("product lines", sum(m.lines for m in modules().values()), TODAY["lines"], 78_000),
-        Figure("lines of the file in nine of ten files, at most", files[int(0.9 * len(files))], 400, 400),
-        Figure("lines of nine of ten functions, at most", functions[int(0.9 * len(functions))], 40, 40),
-        Figure("lines of the longest function", functions[-1], TODAY["longest_function"], 80),
-        Figure("small modules with one importer", len(with_one_importer()), TODAY["one_importer"], 0),
-        Figure("class names used twice in a top-level package", len(repeated_classes()), TODAY["classes"], 0),
-        Figure("file names used twice", len(repeated_files()), TODAY["file_names"], 0),
-        Figure("longest chain of imports", len(chain()), TODAY["chain"], 15),
+        Figure("product files", lambda: len(modules()), TODAY["files"], 550),
+        Figure("product lines", lambda: sum(m.lines for m in modules().values()), TODAY["lines"], 78_000),
+        Figure("lines of the file in nine of ten files, at most", lambda: _nine_of_ten(lengths()), 400, 400),
+        Figure("lines of nine of ten functions, at most", lambda: _nine_of_ten(function_lengths()), 40, 40),
+        Figure("lines of the longest function", lambda: function_lengths()[-1], TODAY["longest_function"], 80),
+        Figure("small modules with one importer", lambda: len(with_one_importer()), TODAY["one_importer"], 0),
+        Figure("class names used twice in a top-level package", lambda: len(repeated_classes()), TODAY["classes"], 0),
+        Figure("file names used twice", lambda: len(repeated_files()), TODAY["file_names"], 0),
+        Figure("longest chain of imports", lambda: len(chain()), TODAY["chain"], 15),
     )
 
 
@@ -158,6 +163,6 @@ TODAY = {
 
 if __name__ == "__main__":
     for figure in figures():
-        print(f"{figure.value:7} {figure.what} (today <= {figure.today}, target {figure.target})")
+        print(f"{figure.count():7} {figure.what} (today <= {figure.today}, target {figure.target})")
     print(f"{lengths()[len(lengths()) // 2]:7} lines of the median file (target 120 to 220)")
     print("\n".join(chain()))
