@@ -170,7 +170,7 @@ class Fitted:
     def _felt(self, port: Port, basis: Floats) -> Sequence[Floats]:
         """Of each instrument (active row, k, m) whitened, what a port adds (sample, width, m).
 
-        A search asks for thousands: where a row follows one sample alone, by what each component of the port does there.
+        A search asks for thousands: where a row follows one sample alone, by what each component of the port does.
         """
         measured, problem = self.session.measured, self.problem
         if problem.shared is not None or any(m.sample_rows.shape[1] > 1 for m in measured):
@@ -346,8 +346,8 @@ def places_found(
         whitener_of(covariance_at(s, old, r)) for s, old, r in zip(scatters, problem.rows, rows, strict=True)
     )
     held = tuple(p if u else replace(p, free=False) for p, u in zip(parameters, unmet, strict=True))
-    there = _Held(replace(problem, rows=rows, whiteners=whiteners, last={}, slopes={}), held)
-    return solve(there, start=values, damping=NEAR_START).theta
+    there = replace(problem, rows=rows, whiteners=whiteners, last={}, slopes={}, kept=[], added={})
+    return solve(_Held(there, held), start=values, damping=NEAR_START).theta
 
 
 @dataclass(frozen=True, eq=False)
