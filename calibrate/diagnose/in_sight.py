@@ -26,7 +26,7 @@ Ints = NDArray[np.intp]
 Bools = NDArray[np.bool_]
 
 DEPENDENT = 1e-9  # of a unit column: what is left below is rounding
-UNSEEN = 2.0  # a direction known less than twice as well as is to be expected stays (docs/mathematics.md, 6)
+UNSEEN = 1.0  # a direction that the data know no better than what is to be expected stays (docs/mathematics.md, 5)
 
 
 @dataclass(frozen=True, eq=False)
