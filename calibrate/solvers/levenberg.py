@@ -24,6 +24,7 @@ FAR_START = 1e-3  # damping, of the largest diagonal element: Madsen et al. for 
 NEAR_START = 1e-12  # for a start known to be good: the first step is all but a Gauss-Newton step
 QUICKER = 0.01  # smallest factor on the damping; the book's 1/3 creeps along weak directions of these problems
 STRAIGHT = 0.75  # gain ratio; below it, a step is bent after the valley
+ASTRAY = -3e3  # gain ratio; below it, a step is so far out that it says nothing about the way back
 DAMPING_LIMIT = 1e12  # no step helps any more: the residual is at its rounding floor
 ENOUGH = 1e-4  # times tolerance, of the sum of squares: where residuals are huge, the same figures are enough
 UNMEASURABLE = 1e-12  # of a sum of squares: rows of metres at micrometres of noise are rounded at 1e-10 of a sigma
@@ -68,7 +69,7 @@ def levenberg(rows: Rows, theta: Floats, rules: LevenbergRules) -> Ended:
         trial = rows.moved(theta, step)
         new, change = rows.residual(trial), slope @ rows.taken(theta, trial)
         gain = gain_ratio(residual, new, change)
-        if gain < STRAIGHT and np.all(np.isfinite(new)):
+        if ASTRAY < gain < STRAIGHT and np.all(np.isfinite(new)):
             step[active] = damped_step(normal, moving.T @ (new - residual - change), damping)
             bent = rows.moved(trial, step)
             along = rows.residual(bent)
