@@ -37,6 +37,7 @@ NEAR = 1e-5  # m, rad: directions that the data hardly see are differences of co
 INNER_STEP = 1e-3  # of the range of an inner parameter, for its difference quotient
 PART_STEP = 1e-3  # m, rad: whether a part of the arm follows a parameter at all
 KEPT = 8  # arms of which that is remembered
+FEW = 0.75  # of the samples: where a fit sees fewer, derivatives are computed of those alone
 LOOSE = 1e3  # times the size that would be plain to see: prior about a coefficient, so that none is ever singular
 
 
@@ -77,12 +78,19 @@ class Kept:
     geometry: Floats  # (param,)
     by: Perturbation
     slopes: tuple[Floats, ...]  # of each instrument (row, k, param)
+    few: Ints | None  # samples that they are of; None: all
 
-    def near(self, geometry: Floats, by: Perturbation) -> bool:
+    def near(self, geometry: Floats, by: Perturbation, few: Ints | None) -> bool:
         """Whether frames are nearly those of the slopes. What acts on a reading moves no frame."""
+        if not _same(self.few, few):
+            return False
         parts = zip(_moving(self.by), _moving(by), strict=True)
         off = [np.abs(geometry - self.geometry), *(np.abs(old - new) for old, new in parts)]
         return max(float(part.max(initial=0.0)) for part in off) < NEAR
+
+
+def _same(one: Ints | None, other: Ints | None) -> bool:
+    return one is other if one is None or other is None else np.array_equal(one, other)
 
 
 def _moving(by: Perturbation) -> tuple[Floats, ...]:
@@ -195,7 +203,11 @@ class Augmented:
 
     def jacobian(self, theta: Floats) -> Floats:
         """By derivatives that were kept, where these values are near them."""
-        parts = [whitened.reshape(-1, whitened.shape[-1]) for whitened in self.whitened(self._slopes(theta))]
+        slopes = self._slopes(theta)
+        each = (
+            self.whitened(slopes) if self._few is None else [W @ c for W, c in zip(self.whiteners, slopes, strict=True)]
+        )
+        parts = [whitened.reshape(-1, whitened.shape[-1]) for whitened in each]
         joint, geometry = self.session.weighting.unweighted, theta[: len(self.session.parameters)]
         extra = len(theta) - len(geometry)
         for i, block in enumerate(self.session.weighting.known, start=len(self.session.measured)):
@@ -216,16 +228,46 @@ class Augmented:
         """Of each instrument's active rows (active row, k, m), from columns (row, k, m) of all of them."""
         return [W @ c[rows] for W, c, rows in zip(self.whiteners, self.apart(columns), self.rows, strict=True)]
 
+    @cached_property
+    def _few(self) -> Ints | None:
+        """(sample,) of the active rows, where these are few; None: all, also where instruments may share scatter."""
+        measured = self.session.measured
+        if any(encoder_channels(m) is not None for m in measured):
+            return None
+        seen = [m.sample_rows[rows].ravel() for m, rows in zip(measured, self.rows, strict=True)]
+        samples = np.unique(np.concatenate(seen))
+        return samples if len(samples) < FEW * len(self.session.samples) else None
+
+    @cached_property
+    def _measured(self) -> tuple[Measured, ...]:
+        """Instruments with the rows that derivatives are of, samples counted among `_few`."""
+        few, each = self._few, zip(self.session.measured, self.rows, strict=True)
+        if few is None:
+            return self.session.measured
+        cut = [m.select(rows) for m, rows in each]
+        return tuple(replace(m, sample_rows=np.searchsorted(few, m.sample_rows)) for m in cut)
+
+    def _seen(self, at: Around, geometry: Floats) -> Around:
+        """What derivatives are taken at: of the samples of the active rows alone, where these are few."""
+        few, joint = self._few, self.session.weighting.unweighted
+        if few is None:
+            return at
+        looks = [look(m, joint.of_block(i, geometry), at.frames[few]) for i, m in enumerate(self._measured)]
+        return Around(at.by.of(few), at.frames[few], tuple(looks), ())
+
     def _slopes(self, theta: Floats) -> list[Floats]:
-        """Of each instrument (row, k, value) without weights; kept, since weights change more often than values."""
+        """Of each instrument (row, k, value) without weights, where samples are few of its active rows; kept, since
+        weights change more often than values.
+        """
         key = theta.tobytes()
         if key not in self.slopes:
             self.slopes.clear()
             at, (geometry, terms) = self.around(theta), self.split(theta)
-            if not (self.kept and self.kept[0].near(geometry, at.by)):
-                self.kept[:] = [Kept(geometry, at.by, self._own_slopes(geometry, at))]
+            seen = self._seen(at, geometry)
+            if not (self.kept and self.kept[0].near(geometry, at.by, self._few)):
+                self.kept[:] = [Kept(geometry, at.by, self._own_slopes(geometry, seen), self._few)]
                 self.added.clear()
-            added = [self._added(i, accepted, at) for i, accepted in enumerate(terms)]
+            added = [self._added(i, accepted, seen) for i, accepted in enumerate(terms)]
             self.slopes[key] = [
                 np.concatenate([own, *(columns[i] for columns in added)], axis=-1)
                 for i, own in enumerate(self.kept[0].slopes)
@@ -235,7 +277,7 @@ class Augmented:
     def _own_slopes(self, geometry: Floats, at: Around) -> tuple[Floats, ...]:
         """Of each instrument (row, k, param)."""
         arm, joint = self._arm_twists(geometry[: len(self.session.arm.parameters)], at), self.session.weighting
-        return tuple(self._own_slope(joint.unweighted, i, m, at, arm) for i, m in enumerate(self.session.measured))
+        return tuple(self._own_slope(joint.unweighted, i, m, at, arm) for i, m in enumerate(self._measured))
 
     def _added(self, i: int, accepted: Accepted, at: Around) -> list[Floats]:
         """Columns of a term; those that bend with an inner value are computed for every one."""
@@ -249,7 +291,8 @@ class Augmented:
         """(sample, 6, param) of the frames as terms have moved them, each before or behind what a term adds there."""
         if not (np.any(at.by.frames) or np.any(at.by.surroundings)):
             more_rad = recoupled(self.session.arm.by_reading, at.by.joints_rad)
-            return self.session.arm.twists(theta, self.session.samples.joints() + more_rad)
+            q_rad = self.session.samples.joints()
+            return self.session.arm.twists(theta, (q_rad if self._few is None else q_rad[self._few]) + more_rad)
         B = at.frames.copy()
         for i in np.flatnonzero(np.any(at.by.frames != 0.0, axis=(0, 2))):
             B[:, i] = B[:, i] @ inverse(offsets(at.by.frames[:, i]))
@@ -299,7 +342,8 @@ class Augmented:
         for j, spec in enumerate(accepted.term.inner):
             if not spec.discrete:
                 parts.append(self._by_inner(accepted, j, INNER_STEP * (spec.upper - spec.lower))[..., None])
-        return self.columns(accepted.term.port, np.concatenate(parts, axis=-1), at)
+        basis = np.concatenate(parts, axis=-1)
+        return columns_of(self._measured, accepted.term.port, basis if self._few is None else basis[self._few], at)
 
     def _by_inner(self, accepted: Accepted, j: int, step: float) -> Floats:
         low, high = accepted.inner.copy(), accepted.inner.copy()
@@ -311,7 +355,7 @@ class Augmented:
 
     def columns(self, port: Port, basis: Floats, at: Around) -> list[Floats]:
         """Of each instrument (row, k, m) derivative of its readings by what a port adds (sample, width, m)."""
-        return columns_of(self.session, port, basis, at)
+        return columns_of(self.session.measured, port, basis, at)
 
 
 @lru_cache(maxsize=KEPT)
@@ -344,7 +388,7 @@ def plain_sizes(
     out: list[Floats] = []
     for accepted in terms:
         basis = accepted.term.basis(drivers, accepted.inner)
-        columns = columns_of(session, accepted.term.port, basis, at)
+        columns = columns_of(session.measured, accepted.term.port, basis, at)
         seen = [(W @ c[r]).reshape(-1, c.shape[-1]) for c, r, W in zip(columns, rows, whiteners, strict=True)]
         felt = np.sqrt(np.mean(np.concatenate(seen) ** 2, axis=0))
         with np.errstate(divide="ignore"):
@@ -352,7 +396,7 @@ def plain_sizes(
     return tuple(out)
 
 
-def columns_of(session: Session, port: Port, basis: Floats, at: Around) -> list[Floats]:
+def columns_of(measured: Sequence[Measured], port: Port, basis: Floats, at: Around) -> list[Floats]:
     """Of each instrument (row, k, m) derivative of its readings by what a port adds (sample, width, m)."""
     if port.place is not Place.READING:
         twists = at.twists(port, basis)
@@ -360,11 +404,11 @@ def columns_of(session: Session, port: Port, basis: Floats, at: Around) -> list[
             through(seen, m, twists)
             if (channels := encoder_channels(m)) is None
             else _between(port, basis, m, channels)
-            for seen, m in zip(at.looks, session.measured, strict=True)
+            for seen, m in zip(at.looks, measured, strict=True)
         ]
     return [
         basis[m.sample_rows[:, -1]] if m.name == port.instrument else np.zeros((*seen.expected.shape, basis.shape[-1]))
-        for seen, m in zip(at.looks, session.measured, strict=True)
+        for seen, m in zip(at.looks, measured, strict=True)
     ]
 
 

@@ -94,7 +94,7 @@ class Elsewhere:
     def added(self, accepted: Accepted) -> tuple[Floats, Floats]:
         """What a carried term adds to the readings: (row,) of the measured rows, (pose, k) of the new ones."""
         amount = accepted.term.amount(self.drivers, accepted.coefficients, accepted.inner)[..., None]
-        columns = columns_of(self.session, accepted.term.port, amount, self.around)
+        columns = columns_of(self.session.measured, accepted.term.port, amount, self.around)
         seen = self._problem((), ()).whitened(columns)
         measured, new = self._parted(seen)
         return measured[:, 0], new[..., 0]

@@ -21,6 +21,7 @@ from calibrate.diagnose.scatter import Scatter, likelihood_of
 from calibrate.diagnose.session import Session
 from calibrate.effects.catalogue import terms_of
 from calibrate.effects.drivers import Drivers
+from calibrate.effects.ports import Port
 from calibrate.effects.since_model import changes
 from calibrate.effects.term import Term
 from calibrate.fit import FAR_START, NEAR_START, Loss, Stop, solve
@@ -41,6 +42,7 @@ DAMPING = 1e-9  # of the first step: along what the data see it is a Gauss-Newto
 WILD = 0.1  # weight of a row that may have bent a plain fit
 SWALLOWED = 0.3  # weight of a row that next to nothing of a model follows: five sigmas off
 SETTLED = 0.1  # of -2 log L: far below any difference that decides
+CREEPING = SETTLED / TURNS  # the same in a turn: as many as there are would not bring it beyond that
 AT_REST = (Stop.GAIN, Stop.ROUNDING)  # of a solver that found the least squares of its weights
 PLACES = ("placement", seat.POINTS, point_line.POINTS)  # of where something stood; a place may be met unseen
 
@@ -161,10 +163,27 @@ class Fitted:
         return sum(s.minus_two_log_likelihood for s in self.scatters) + float(away @ away + known @ known)
 
     def columns(self, term: Term, inner: Floats) -> Floats:
-        parts = self.problem.columns(term.port, term.basis(self.drivers, inner), self.around)
-        data = [whitened.reshape(-1, whitened.shape[-1]) for whitened in self.problem.whitened(parts)]
+        data = [part.reshape(-1, part.shape[-1]) for part in self._felt(term.port, term.basis(self.drivers, inner))]
         rest = len(self.rows.residual) - len(self._labels[0])
         return np.concatenate([*data, np.zeros((rest, data[0].shape[1]))])
+
+    def _felt(self, port: Port, basis: Floats) -> Sequence[Floats]:
+        """Of each instrument (active row, k, m) whitened, what a port adds (sample, width, m).
+
+        A search asks for thousands: where a row follows one sample alone, by what each component of the port does.
+        """
+        measured, problem = self.session.measured, self.problem
+        if problem.shared is not None or any(m.sample_rows.shape[1] > 1 for m in measured):
+            return problem.whitened(problem.columns(port, basis, self.around))
+        if port not in self._levers:
+            each = np.broadcast_to(np.eye(basis.shape[1]), (len(basis), basis.shape[1], basis.shape[1]))
+            self._levers[port] = problem.whitened(problem.columns(port, each, self.around))
+        samples = [m.sample_rows[rows, 0] for m, rows in zip(measured, problem.rows, strict=True)]
+        return [lever @ basis[sample] for lever, sample in zip(self._levers[port], samples, strict=True)]
+
+    @cached_property
+    def _levers(self) -> dict[Port, list[Floats]]:
+        return {}
 
     def candidates(self) -> Sequence[Term]:
         return self._candidates
@@ -257,7 +276,8 @@ def _makes_outliers(term: Term) -> bool:
 
 
 def _settled(fitted: Fitted) -> Fitted:
-    """Weights and least squares in turns, until the solver is at rest and the likelihood changes no more.
+    """Weights and least squares in turns, until the solver is at rest and the likelihood changes no more; or until a
+    turn changes it so little that all turns together would decide nothing, whether the solver is at rest or not.
 
     Of turns that differ in what they take noise for, the likeliest: no refit ends worse than it was. Derivatives may be
     kept from turn to turn, but the turn that ends it begins with those of its own values.
@@ -273,7 +293,8 @@ def _settled(fitted: Fitted) -> Fitted:
         fitted = replace(new, steps=fitted.steps + new.steps)
         best = min(best, fitted, key=lambda fit: fit.minus_two_log_likelihood)
         gained = last.minus_two_log_likelihood - fitted.minus_two_log_likelihood
-        resting = turn + 1 >= FEWEST_TURNS and new.stop in AT_REST and abs(gained) < SETTLED
+        least = SETTLED if new.stop in AT_REST else CREEPING
+        resting = turn + 1 >= FEWEST_TURNS and abs(gained) < least
         if resting and anew:
             return replace(best, steps=fitted.steps, stop=Stop.LIKELIHOOD)
     return replace(best, steps=fitted.steps, stop=Stop.ROUNDS)
@@ -325,8 +346,8 @@ def places_found(
         whitener_of(covariance_at(s, old, r)) for s, old, r in zip(scatters, problem.rows, rows, strict=True)
     )
     held = tuple(p if u else replace(p, free=False) for p, u in zip(parameters, unmet, strict=True))
-    there = _Held(replace(problem, rows=rows, whiteners=whiteners, last={}, slopes={}), held)
-    return solve(there, start=values, damping=NEAR_START).theta
+    there = replace(problem, rows=rows, whiteners=whiteners, last={}, slopes={}, kept=[], added={})
+    return solve(_Held(there, held), start=values, damping=NEAR_START).theta
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 
 JOINT = "joint"  # what a port of one joint's angle begins with; a late clock turns all joints at the flange alone
 
@@ -62,6 +63,12 @@ class Perturbation:
             {},
             np.zeros((poses, joints)),
         )
+
+    def of(self, samples: Ints) -> "Perturbation":
+        """Of some of the poses."""
+        readings = {name: amount[samples] for name, amount in self.readings.items()}
+        moved = self.joints_rad[samples], self.frames[samples], self.surroundings[samples]
+        return Perturbation(*moved, readings, self.between_rad[samples])
 
     def plus(self, port: Port, amount: Floats) -> "Perturbation":
         """With `amount` (pose, width of the port) added at a port."""

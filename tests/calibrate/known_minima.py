@@ -58,3 +58,13 @@ def powell_singular():
             [2 * 10**0.5 * (t[0] - t[3]), 0, 0, -2 * 10**0.5 * (t[0] - t[3])],
         ],
     )
+
+
+def bent_valley(stiff=1e3, reach=0.3):
+    """No problem of the paper: a circle that holds `stiff` times more than what pulls along it; minimum 0 at p0 = 0."""
+    from_centre = np.hypot(reach, 1.0)
+    return Known(
+        unknowns(reach, 1.0),
+        lambda t: [stiff * (np.hypot(t[0], t[1]) - from_centre), t[0]],
+        lambda t: [[stiff * t[0] / np.hypot(t[0], t[1]), stiff * t[1] / np.hypot(t[0], t[1])], [1.0, 0.0]],
+    )

@@ -88,3 +88,13 @@ def test_a_bracket_that_gives_way_alike_is_a_device_that_stands_lower(geometry):
     own = np.flatnonzero(state.problem.owner == 0)
     moved = np.any(found.moves[own] != 0.0, axis=0)
     assert moved.sum() == 5
+
+
+def test_derivatives_of_few_samples_are_those_rows_of_all(geometry):
+    """A fit to few of them computes no others."""
+    state = with_terms(geometry, *BENT)
+    few = np.arange(0, state.samples, 3)
+    cut = state.select(few)
+    (whole,), (own,) = (one.problem.forgetting()._slopes(state.values) for one in (state, cut))
+    assert len(own) == len(few) < len(whole)
+    assert own == pytest.approx(whole[cut.problem.rows[0]], abs=1e-12 * np.max(np.abs(whole)))

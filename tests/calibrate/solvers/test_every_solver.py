@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording.rig import load_rig
 from calibrate.chain import Chain
 from calibrate.dual_psd_rig import dual_psd_chain
-from calibrate.fit import DogLegRules, Method, Status, solve
+from calibrate.fit import DogLegRules, Method, Status, Stop, solve
 from calibrate.identifiability import analyse
 from calibrate.parameters import plausible_sizes, start_values
 from calibrate.problem import Problem
@@ -20,7 +20,7 @@ from calibrate.sensors.device import Device
 from calibrate.sensors.position import Position
 from calibrate.sensors.target import Target
 
-from ..known_minima import Known, powell_singular, rosenbrock, unknowns
+from ..known_minima import Known, bent_valley, powell_singular, rosenbrock, unknowns
 
 POSITION_SIGMA_M = 20e-6
 TIGHT = DogLegRules(e2=1e-12, kmax=500)  # beyond what any measurement needs, to compare with scipy
@@ -242,3 +242,11 @@ def test_a_derivative_of_the_wrong_sign_stalls_and_does_not_claim_convergence(me
     wrong = Known(unknowns(1.0), lambda t: [t[0] - 5.0, t[0] - 5.5], lambda t: -np.ones((2, 1)))
     fit = solve(wrong, method=method, max_steps=500)
     assert fit.status is Status.STALLED
+
+
+def test_steps_follow_a_bent_valley():
+    """Straight ones leave it at once, and damped ones need 39."""
+    found = solve(bent_valley(), damping=1e-9, tolerance=1e-3)
+    assert found.stop is Stop.GAIN
+    assert found.chi2 < 1e-3
+    assert found.steps <= 10
