@@ -256,8 +256,8 @@ class Augmented:
         return Around(at.by.of(few), at.frames[few], tuple(looks), ())
 
     def _slopes(self, theta: Floats) -> list[Floats]:
-        """Of each instrument (row, k, value) without weights, where samples are few of its active rows; kept, since
-        weights change more often than values.
+        """Of each instrument (row, k, value) without weights, of its active rows alone where samples are few; kept,
+        since weights change more often than values.
         """
         key = theta.tobytes()
         if key not in self.slopes:

@@ -276,8 +276,8 @@ def _makes_outliers(term: Term) -> bool:
 
 
 def _settled(fitted: Fitted) -> Fitted:
-    """Weights and least squares in turns, until the solver is at rest and the likelihood changes no more; or until a
-    turn changes it so little that all turns together would decide nothing, whether the solver is at rest or not.
+    """Weights and least squares in turns, until the solver is at rest and the likelihood changes no more; not settled,
+    but no longer either, where a turn changes it so little that all turns together would decide nothing.
 
     Of turns that differ in what they take noise for, the likeliest: no refit ends worse than it was. Derivatives may be
     kept from turn to turn, but the turn that ends it begins with those of its own values.
@@ -296,7 +296,7 @@ def _settled(fitted: Fitted) -> Fitted:
         least = SETTLED if new.stop in AT_REST else CREEPING
         resting = turn + 1 >= FEWEST_TURNS and abs(gained) < least
         if resting and anew:
-            return replace(best, steps=fitted.steps, stop=Stop.LIKELIHOOD)
+            return replace(best, steps=fitted.steps, stop=Stop.LIKELIHOOD if new.stop in AT_REST else Stop.ROUNDS)
     return replace(best, steps=fitted.steps, stop=Stop.ROUNDS)
 
 
