@@ -9,6 +9,7 @@ from scipy.stats import binom
 
 from acquisition.recording.rig import load_rig
 from benchmarks.drawn_sessions import POSITION_SIGMA_M, SPOT_SIGMA_M, T_BASE_DEVICE, TARGET_M, Bench, Session
+from benchmarks.intervals import intervals
 from calibrate.arms.catalogue import arm_of
 from calibrate.chain import Chain
 from calibrate.dual_psd_rig import dual_psd_chain
@@ -20,7 +21,6 @@ from calibrate.rigid import transform
 from calibrate.sensors.device import Device
 from calibrate.sensors.position import Position
 from calibrate.sensors.target import Target
-from calibrate.uncertainty.intervals import intervals
 from calibrate.unseen_along import analyse_along
 
 LEVEL = 0.95

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig import load_rig
+from benchmarks.intervals import intervals
 from calibrate.arms.catalogue import arm_of
 from calibrate.dual_psd_rig import laser_of
 from calibrate.fit import Status, solve
@@ -13,7 +14,6 @@ from calibrate.identifiability import analyse
 from calibrate.identification.point_constraint import BOUND_RAD, Form, PointConstraint
 from calibrate.parameters import Parameter, hold
 from calibrate.redundant import Redundant, reduced
-from calibrate.uncertainty.intervals import intervals
 
 
 def by_name(fit, seen):
