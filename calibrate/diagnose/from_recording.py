@@ -22,6 +22,7 @@ from calibrate.diagnose.doubt import records
 from calibrate.diagnose.drifts import doubtful
 from calibrate.diagnose.fitted import Fitted, fit_geometry
 from calibrate.diagnose.free_space_change import FreeSpaceChange, free_space_change
+from calibrate.diagnose.hidden_levers import TIME
 from calibrate.diagnose.session import Session, session_of
 from calibrate.diagnose.stages import DECIDING, Incomplete, Stage, Stages
 from calibrate.diagnose.stated_noise import NoiseFound, Statement, hidden_of, missing_words, noise_found
@@ -37,6 +38,8 @@ from calibrate.weighting import Measured
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
+FEWEST_IN_A_RUN = 3
+RUN_P = 1e-3  # a session in a thousand with gross errors at random
 FEWEST = 20  # samples: below, no term can be separated from noise, whatever it is
 
 
@@ -97,7 +100,8 @@ def diagnose_samples(
     attempt = stages.attempt
     diagnosis = attempt(Stage.BEYOND_NOISE, lambda: _with_noise(diagnosis, model, rng), diagnosis)
     change = attempt(Stage.FREE_SPACE, lambda: _free_space_change(geometry, model, rng), None)
-    left = attempt(Stage.FAR_ROWS, lambda: _left(model, cleared), ())
+    left, together = attempt(Stage.FAR_ROWS, lambda: _left(model, cleared), ((), ()))
+    diagnosis = _with_unexplained(diagnosis, together)
     physics = Physics(unfinished(diagnosis, stages.failed), geometry, model, change)
     return Diagnosed(cleared, cleared.blunders + left, physics)
 
@@ -139,20 +143,54 @@ def _fitted(diagnosis: Diagnosis) -> Fitted:
     return diagnosis.model
 
 
-def _left(model: Fitted, cleared: Cleared) -> tuple[Blunder, ...]:
-    """Rows that stay far off after all physics: they had next to no weight."""
+def _with_unexplained(diagnosis: Diagnosis, more: tuple[Unexplained, ...]) -> Diagnosis:
+    """What has structure without a name is never consistent."""
+    if not more:
+        return diagnosis
+    verdict = Verdict.UNDECIDABLE if diagnosis.verdict is Verdict.CONSISTENT else diagnosis.verdict
+    return replace(diagnosis, unexplained=(*diagnosis.unexplained, *more), verdict=verdict)
+
+
+def _left(model: Fitted, cleared: Cleared) -> tuple[tuple[Blunder, ...], tuple[Unexplained, ...]]:
+    """Rows that stay far off after all physics: they had next to no weight. Then those that err one after another."""
     by_name = {m.name: m for m in model.session.measured}
     out: list[Blunder] = []
+    together: list[Unexplained] = []
     for unseen in model.held_out(model.active):
         if unseen.instrument == ENCODER_DIFFERENCE:
             continue
         far = unexplained_rows(unseen.whitened)
         posture = postures(model.session.samples.joints()[unseen.sample])
-        for i in far[~err_alike(unseen.whitened, posture, far)]:
+        far = far[~err_alike(unseen.whitened, posture, far)]
+        for i in far:
             away_m = float(np.linalg.norm(unseen.misfit[i, :3]))
             sigmas = float(np.linalg.norm(unseen.whitened[i]))
             out.append(_far(by_name[unseen.instrument], int(cleared.rows[unseen.sample[i]]), away_m, sigmas))
-    return tuple(out)
+        power = np.sum(unseen.whitened**2, axis=1)
+        for run, p in runs_of(unseen.sample[far], len(unseen.sample)):
+            share = float(power[np.isin(unseen.sample, run)].sum() / power.sum())
+            together.append(_together(cleared.rows[run], share, p))
+    return tuple(out), tuple(together)
+
+
+def runs_of(far: Ints, samples: int) -> list[tuple[Ints, float]]:
+    """Of samples that err (far,) those that follow each other without one between, and how likely chance has such runs.
+
+    As many errors that hit samples independently have no more than n (k/n)^r runs of r on average, k errors among n
+    (Feller, An introduction to probability theory, vol. 1, 3rd ed. 1968, XIII.7, first term); kept below RUN_P.
+    """
+    runs = np.split(np.unique(far), np.flatnonzero(np.diff(np.unique(far)) > 1) + 1)
+    each = [(run, samples * (len(far) / samples) ** len(run)) for run in runs if len(run) >= FEWEST_IN_A_RUN]
+    return [(run, max(p, LEAST)) for run, p in each if p < RUN_P]
+
+
+def _together(rows: Ints, share: float, p: float) -> Unexplained:
+    why = (
+        f"rows {rows[0] + 1} to {rows[-1] + 1}, one after another, are far from what all other rows predict: no gross "
+        "errors of single readings. Something stood elsewhere for that time (fixture, target, instrument, base), or "
+        "was disturbed; measure these poses again"
+    )
+    return Unexplained("", (TIME,), share, p, why)
 
 
 def _far(measured: Measured, row: int, away_m: float, sigmas: float) -> Blunder:

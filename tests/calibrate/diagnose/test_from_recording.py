@@ -7,7 +7,7 @@ import pytest
 
 from calibrate.diagnose.diagnosis import Verdict
 from calibrate.diagnose.fitted import fit_geometry
-from calibrate.diagnose.from_recording import diagnose_samples
+from calibrate.diagnose.from_recording import diagnose_samples, runs_of
 from calibrate.diagnose.session import session_of
 from calibrate.diagnose.to_file import file_of
 from calibrate.errors import DataError
@@ -62,6 +62,27 @@ def test_a_file_that_is_wrong_as_a_whole_is_undecidable_and_says_why(recording):
     assert (file.verdict, file.findings, file.rms_before_m) == ("undecidable", (), None)
     assert file.blunders[0].rows == ()
     assert "q2" in file.next[0]
+
+
+def test_readings_that_err_one_after_another_are_no_gross_errors_of_single_readings(tmp_path):
+    """Neither rule has a name for what stood elsewhere for a while: the session is not consistent for all that."""
+    recording = recording_of(tmp_path, family="tracker", seed=33, samples=120, arm="irb120")
+    plain = diagnose_samples(recording.rig, recording.samples, np.random.default_rng(1)).physics.diagnosis
+    assert plain.verdict is Verdict.CONSISTENT
+    z_m = recording.samples.column("z_m").copy()
+    z_m[50:54] += [2e-3, -3e-3, 2.5e-3, -2e-3]
+    found = diagnose_samples(
+        recording.rig, changed(recording.samples, z_m=z_m), np.random.default_rng(1)
+    ).physics.diagnosis
+    assert found.verdict is Verdict.UNDECIDABLE
+    assert "rows 51 to 54" in found.unexplained[0].why
+
+
+def test_gross_errors_here_and_there_are_no_run():
+    rng = np.random.default_rng(0)
+    hits = sum(bool(runs_of(np.sort(rng.choice(200, 10, replace=False)), 200)) for _ in range(2000))
+    assert hits <= 4  # one in a thousand at most
+    assert [run.tolist() for run, _ in runs_of(np.array([3, 50, 51, 52, 53, 120]), 200)] == [[50, 51, 52, 53]]
 
 
 def test_a_handful_of_samples_is_refused(recording):
