@@ -16,7 +16,7 @@ from drivers.clock import SystemClock
 SAID = (
     "devices checked: all good",
     "the operator has armed the robot",
-    "place 1, PSD 1 first: light found",
+    "station 1, PSD 1 first: light found",
     "pose 36 skipped: out of reach",
 )
 COLOURS = 96  # of the file: a third of its size, and no eye sees it

@@ -24,7 +24,6 @@ from calibrate.fit import Status
 from calibrate.identification.planned import rig_as_planned
 from calibrate.model_file import ModelFile, read_model, write_model
 from calibrate.report.session_evidence import session_evidence
-from calibrate.report.session_verdict import session_verdict
 from calibrate.sensors.catalogue import unused_columns
 
 
@@ -105,7 +104,7 @@ def _identify(
     result = identify_session(source, planned, bootstrap)
     refuse_undetermined(result.status, result.estimates)
     model = write_session_model(result, source, out, planned)
-    print_identification(console, result, session_verdict(session_evidence(source, model)), source.rig, verbose=verbose)
+    print_identification(console, result, session_evidence(source, model), verbose=verbose)
     for sentence in unused_columns(source.samples):
         console.print(sentence, markup=False, highlight=False)
     console.print(f"model: {out}", markup=False)

@@ -52,7 +52,7 @@ class Rehearsal:
     def says(self) -> str:
         """For a person, the first refused pose with its reason."""
         places = len({stop.placement for stop in self.stops})
-        told = f"{len(self.stops)} poses at {places} place{'' if places == 1 else 's'}"
+        told = f"{len(self.stops)} poses at {places} station{'' if places == 1 else 's'}"
         if not self.refused:
             return f"{told}, all within reach and clear of the keep-out boxes"
         first = self.refused[0]
@@ -108,7 +108,7 @@ def _aimed(rig: Rig, options: PlanOptions, paper: PaperArm) -> Iterator[Rehearse
         finding = BeamTarget(block.first, (0.0, 0.0, 0.0, 0.0), FINDING_STAND_OFF_M, block.visits[0].target.roll_rad)
         targets = [("the aim", finding), *((f"pose {visit.index + 1}", visit.target) for visit in block.visits)]
         for number, target in targets:
-            name = f"place {block.placement}, PSD {block.first} first, {number}"
+            name = f"station {block.placement}, PSD {block.first} first, {number}"
             try:
                 q_rad = reach(learner.arm, flange_for(learner.arm, learner.optics, T, target), paper.q_rad, rng)
             except UnreachableError as why:

@@ -40,7 +40,7 @@ def draw_rehearsal(figure: Figure, rehearsed: Rehearsal, rig: Rig) -> None:
     for axes, (i, j), title in ((above, (0, 1), "From above"), (side, (0, 2), "From the side")):
         axes.plot(home[:, i], home[:, j], "-o", color=Tone.SOFT.value, markersize=3, label="arm at home")
         for place, points in tracks.items():
-            name = "ways" if place is None else f"place {place}"
+            name = "ways" if place is None else f"station {place}"
             axes.plot(points[:, i], points[:, j], color=_colour(place), linewidth=0.8, label=name)
         if len(missed):
             axes.plot(missed[:, i], missed[:, j], "x", color=Tone.BEAM.value, label="cannot be had")

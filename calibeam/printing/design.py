@@ -77,8 +77,8 @@ def enough_line(made: Design) -> str:
 
 
 def _print_places(console: Console, rig: Rig, made: Design, places: Sequence[Places]) -> None:
-    title = f"places of the fixture, {made.asked.poses} poses shared out over them (numbers above the rig's: a grid)"
-    table = _table(title, "places", "error", "scale", "with distances", "scale", "distances needed")
+    title = f"stations of the fixture, {made.asked.poses} poses shared out over them (numbers above the rig's: a grid)"
+    table = _table(title, "stations", "error", "scale", "with distances", "scale", "distances needed")
     for one in places:
         table.add_row(
             ", ".join(map(str, one.ids)),

@@ -3,13 +3,12 @@
 The verdict is the first sentence of the report. A model that was refitted by --model is printed here, too.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from acquisition.recording.rig import Rig
 from calibrate.default_belief import said_of
 from calibrate.identification.estimates import ONLY_BELIEVED, JointZero
 from calibrate.identification.evidence_record import parameter_records
@@ -19,7 +18,10 @@ from calibrate.model_file import ModelFile, ModelParameter
 from calibrate.observability import Observability
 from calibrate.physics.records import Effect
 from calibrate.report.quantities import angle, length
-from calibrate.report.verdict import Answers, Trust, Verdict
+from calibrate.report.session_evidence import SessionEvidence
+from calibrate.report.session_verdict import session_verdict
+from calibrate.report.verdict import TOOL, Answers, Number, Trust, Verdict
+from calibrate.report.workspace.workspace_errors import session_room, tool_numbers
 from calibrate.sensors import spots
 from calibrate.sensors.catalogue import SENSORS, thousandth_of
 
@@ -29,14 +31,29 @@ COLOUR = {Trust.GOOD: "green", Trust.CARE: "yellow", Trust.NONE: "red"}
 def print_verdict(console: Console, judged: Verdict) -> None:
     """How far to trust what was found, and every reason for care."""
     console.print(judged.sentence, style=f"bold {COLOUR[judged.trust]}", highlight=False, markup=False)
+    console.print(f"trust: {judged.trust.value}", highlight=False, markup=False)
     for reason in judged.reasons:
         console.print(f"  {reason}", highlight=False, markup=False)
 
 
+def tool_lines(numbers: Sequence[Number]) -> Iterator[str]:
+    """The tool error over the workspace: nominal, calibrated, with physics; or why there is none."""
+    tool = [number for number in numbers if number.key.startswith(TOOL)]
+    if not tool:
+        return
+    if tool[0].value is None:
+        yield f"tool error over the workspace {tool[0].about}"
+        return
+    yield f"tool error over the workspace: {', '.join(f'{number.said} {number.name}' for number in tool)}"
+    yield f"  {tool[-1].about}"
+
+
 def verdict_words(answers: Answers) -> Iterator[str]:
-    """The first screen of a report in a few lines: verdict, drift, what to do."""
+    """The first screen of a report in a few lines: verdict, tool error, drift, what to do."""
     yield answers.verdict.sentence
+    yield f"trust: {answers.verdict.trust.value}"
     yield from (f"  {reason}" for reason in answers.verdict.reasons)
+    yield from tool_lines(answers.numbers)
     yield from answers.warnings
     if answers.drift:
         yield answers.drift
@@ -74,9 +91,12 @@ def _observability(shown: Observability) -> str:
 def _free_space(room: FreeSpace) -> list[str]:
     one, pose = room.geometry, room.pose
     if one.rms_m is None or one.p95_m is None or one.max_m is None:
-        return [f"tool error over the workspace: {one.status.value}", *(f"  {words}" for words in one.undetermined)]
+        return [
+            f"tool error between the joint limits: {one.status.value}",
+            *(f"  {words}" for words in one.undetermined),
+        ]
     out = [
-        f"tool error over the workspace, {room.poses} poses drawn evenly between the joint limits: "
+        f"tool error between the joint limits, {room.poses} poses drawn evenly: "
         f"{1e3 * one.rms_m:.3g} mm rms, {1e3 * one.p95_m:.3g} mm at 95 %, {1e3 * one.max_m:.3g} mm at most "
         "(one sigma of the calibrated geometry)"
     ]
@@ -98,10 +118,13 @@ SEE = "--verbose lists them"
 
 
 def print_identification(
-    console: Console, result: Identification, judged: Verdict, rig: Rig, *, verbose: bool = False
+    console: Console, result: Identification, evidence: SessionEvidence, *, verbose: bool = False
 ) -> None:
     """Verdict first, then what a person acts on; `verbose`: rank, every parameter, second methods, observability."""
-    print_verdict(console, judged)
+    rig = evidence.recording.rig
+    print_verdict(console, session_verdict(evidence))
+    for line in tool_lines(tuple(tool_numbers(session_room(evidence)))):
+        console.print(line, highlight=False, markup=False)
     of_spots = any(one.name == spots.KIND.name for one in result.instruments)
     if of_spots and (assumed := said_of(rig)) is not None:
         console.print(assumed, highlight=False, markup=False)
@@ -113,7 +136,7 @@ def print_identification(
 
 
 def _brief(result: Identification) -> Iterator[str]:
-    """What was left out, the proof, the workspace, joint zeros, and how much more there is."""
+    """What was left out, the proof, joint zeros, and how much more there is."""
     for listed in ([f"left out: {b.says}" for b in result.blunders], [f"ALARM: {says}" for says in result.alarms]):
         yield from listed[:MOST]
         if len(listed) > MOST:
@@ -124,17 +147,13 @@ def _brief(result: Identification) -> Iterator[str]:
             f"unseen rows ({one.split}){of}: {says(one.rms_distance_before_m)} nominal, "
             f"{says(one.rms_distance_after_m)} calibrated"
         )
-    room = result.evidence.free_space
-    if room is not None and room.geometry.rms_m is not None and room.geometry.max_m is not None:
-        rms, most = length(room.geometry.rms_m), length(room.geometry.max_m)
-        yield f"tool over the workspace, one sigma: {rms} rms, {most} at most"
     listed = parameter_records(result.estimates, result.identifiability, result.evidence.bootstrap)
     known = [(p.name, p.value, p.sigma) for p in listed if p.value is not None and p.sigma is not None]
     zeros = [one for one in known if _of_joint(one[0])]
     for name, zero_rad, sigma_rad in zeros:
         yield (
-            f"  J{name.removeprefix('joint').removesuffix(ZERO)} zero {np.degrees(zero_rad):+10.5f} deg "
-            f"± {np.degrees(sigma_rad):.5f} deg (± {1e6 * sigma_rad:.1f} µrad)"
+            f"  J{name.removeprefix('joint').removesuffix(ZERO)} zero {np.degrees(zero_rad):+10.5f}° "
+            f"± {np.degrees(sigma_rad):.5f}° (± {1e6 * sigma_rad:.1f} µrad)"
         )
     if more := len(known) - len(zeros):
         yield f"{more} more parameters are determined: {SEE}; all are in the model"

@@ -7,8 +7,10 @@ from rich.table import Table
 
 from calibrate.diagnose.schema import ClockRecord, DiagnosisFile, FindingRecord
 from calibrate.report.diagnosis.words import (
+    SPLITS,
     before_after,
     free_space_words,
+    limit_words,
     micrometres,
     noise_words,
     place_words,
@@ -45,17 +47,18 @@ def _brief(file: DiagnosisFile) -> Iterator[str]:
     yield from _few(list(_changes(file)))
     for one in (u for u in (file.unexplained, *file.also_unexplained) if u is not None):
         yield f"unexplained{f' at {one.where}' if one.where else ''}: {one.says}"
+    if file.free_space is not None:
+        yield free_space_words(file.free_space)
     floors = {f.instrument: f.rms_m for f in file.floors}
     for split in file.splits:
         before, after = before_after(split)
         of = f", {split.instrument}" if len(floors) > 1 else ""
         yield (
-            f"unseen rows ({split.split}){of}: {before} geometry alone, {after} with the physics; "
-            f"noise floor {micrometres(floors.get(split.instrument))}"
+            f"unseen rows ({SPLITS.get(split.split, split.split)}){of}, rms of a coordinate: {before} geometry alone, "
+            f"{after} with the physics; noise floor {micrometres(floors.get(split.instrument))}"
         )
-    if file.free_space is not None:
-        yield free_space_words(file.free_space)
     yield from _few([f"noise: {line}" for line in noise_words(file)])
+    yield from limit_words(file)
     yield from _few([f"not completed: {one.stage}: {one.reason}" for one in file.incomplete])
     yield from _few([f"not tested: {one.physics} (column {one.column} is missing)" for one in file.not_recorded])
     yield from _few([f"next: {line}" for line in file.next])
@@ -145,7 +148,7 @@ def _doubt(file: DiagnosisFile) -> Iterator[str]:
 
 
 def _proof(file: DiagnosisFile) -> Table:
-    table = Table(title="on samples that the fit has not seen (rms)", title_justify="left")
+    table = Table(title="on samples that the fit has not seen (rms of a coordinate)", title_justify="left")
     for heading in ("left out", "instrument", "samples", "geometry alone", "with the physics", "noise floor"):
         table.add_column(heading, justify="left" if heading in ("left out", "instrument") else "right")
     floors = {f.instrument: f.rms_m for f in file.floors}
@@ -153,7 +156,7 @@ def _proof(file: DiagnosisFile) -> Table:
         before, after = before_after(split)
         floor = floors.get(split.instrument)
         table.add_row(
-            split.split,
+            SPLITS.get(split.split, split.split),
             split.instrument,
             str(split.observations),
             before,

@@ -23,9 +23,8 @@ from calibrate.report.drift.two_calibrations import Calibration, drift_of
 from calibrate.report.elements import write_page
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_report import session_answers, session_page
-from calibrate.report.session_verdict import session_verdict
-from calibrate.report.session_workspace import session_arm, session_room
 from calibrate.report.verdict import Answers
+from calibrate.report.workspace.workspace_errors import session_arm, session_room
 
 NOW = "now"
 
@@ -83,7 +82,7 @@ def _concluded(recording_path: Path, console: Console) -> Identification:
     recording, folder = read(recording_path), _folder_of(recording_path)
     result = identify_session(recording)
     model = write_session_model(result, recording, folder / "model.json")
-    print_identification(console, result, session_verdict(session_evidence(recording, model)), recording.rig)
+    print_identification(console, result, session_evidence(recording, model))
     console.print(f"model: {folder / 'model.json'}", markup=False)
     diagnosis = write_session_diagnosis(recording, folder, console)
     write_recording_report(recording, model, folder / "report.html", diagnosis)

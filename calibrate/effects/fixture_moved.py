@@ -30,7 +30,7 @@ def _terms(drivers: Drivers) -> tuple[Term, ...]:
 
         there = in_use(at_place)
 
-        what = f"The fixture at place {place}"
+        what = f"The fixture at station {place}"
         if inner := time_laws.step_inner(drivers, at_place):
             out.append(
                 motion(

@@ -19,7 +19,7 @@ from acquisition.recording.rig import Rig
 from calibrate.blunders.finding import Blunder
 from calibrate.fit import FAR_START, Fit, Status
 from calibrate.identifiability import STRUCTURAL, WEAK, Identifiability
-from calibrate.identification.estimates import HELD, ONLY_BELIEVED, Estimate, estimate_of, untold
+from calibrate.identification.estimates import HELD, ONLY_BELIEVED, Estimate, assumed_size, estimate_of, untold
 from calibrate.identification.evidence import Asked, evidence_of, rows_used
 from calibrate.identification.held_out import lengths
 from calibrate.identification.result import FitEnd, Identification, InstrumentFound, Noise
@@ -117,7 +117,7 @@ def _why_untold(p: Parameter, fit: Fit, i: int, seen: Identifiability, *, told: 
     if not told:
         return untold(p, seen) or HELD
     if np.isfinite(p.prior) and np.sqrt(fit.covariance[i, i]) > ONLY_PRIOR * p.prior:
-        return f"{ONLY_BELIEVED}: {p.prior:.3g} {p.unit} as assumed, to which the data add nothing"
+        return f"{ONLY_BELIEVED}: {assumed_size(p)}; these data do not determine it better"
     return None
 
 

@@ -111,7 +111,8 @@ def _paint_along(figure: Figure, readings: Readings, found: Sequence[Pattern]) -
     for axes in grid[::COLUMNS]:
         axes.set_ylabel(f"mean residual ({unit})")
     if len(names) > 1:
-        grid[0].legend(loc="best", ncols=len(names), handlelength=1.4, columnspacing=0.8, fontsize=10)
+        handles, labels = grid[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower left", ncols=len(names), handlelength=1.4, fontsize=10)
 
 
 def _unit(reach: float, unit: str) -> tuple[float, str]:

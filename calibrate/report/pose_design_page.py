@@ -91,7 +91,7 @@ def paint_isolability(figure: Figure, seen: Seen) -> None:
     axes.set_yticks(range(len(names)), names, fontsize=8)
 
 
-CONTENTS = {"promise": "How many poses", "plan": "The plan", "places": "Places of the fixture", "causes": "Causes"}
+CONTENTS = {"promise": "How many poses", "plan": "The plan", "places": "Stations of the fixture", "causes": "Causes"}
 
 
 def write_page_of(path: Path, rig: Rig, made: Design, seen: Seen, places: Sequence[Places], software: str) -> Path:
@@ -159,8 +159,8 @@ def _places(places: Sequence[Places]) -> Html:
         )
         for one in places
     ]
-    head = ("places", "error", "scale", "with distances", "scale", "distances needed")
-    lead = "As many poses, shared out over the best one, two, three ... places of the rig and of a grid about them."
+    head = ("stations", "error", "scale", "with distances", "scale", "distances needed")
+    lead = "As many poses, shared out over the best one, two, three ... stations of the rig and of a grid about them."
     return section("places", CONTENTS["places"], lead, table(head, rows, numeric=range(1, 5)))
 
 

@@ -99,7 +99,7 @@ def _paint(figure: Figure, scene: Scene, view: Floats) -> None:
     centre = points.mean(axis=0) @ view
     for number, (placement, corners) in enumerate(scene.faces_m.items()):
         _fixture(axes, corners, view, tone_of(number), level)
-        _name(axes, corners, view, tone_of(number), f"place {placement}", centre)
+        _name(axes, corners, view, tone_of(number), f"station {placement}", centre)
 
 
 def _floor(axes: Axes, points: Floats, view: Floats) -> float:

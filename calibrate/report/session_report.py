@@ -26,9 +26,9 @@ from calibrate.report.sections import (
 from calibrate.report.sections.summary import when
 from calibrate.report.sections.zeros import ZEROS, zeros_part
 from calibrate.report.session_evidence import SessionEvidence, spot_session
-from calibrate.report.session_workspace import NOT_IN_SPACE, session_arm, session_measured, session_room
+from calibrate.report.session_workspace import NOT_IN_SPACE, session_measured
 from calibrate.report.verdict import Answers
-from calibrate.report.workspace.workspace_errors import Room
+from calibrate.report.workspace.workspace_errors import Room, session_arm, session_room
 
 
 def session_page(

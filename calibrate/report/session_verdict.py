@@ -97,7 +97,7 @@ def session_verdict(evidence: SessionEvidence, diagnosis: DiagnosisFile | None =
         keep = "Keep the nominal values; find out what is wrong with arm, instrument or poses, and measure again."
         return Verdict(Trust.NONE, f"{_how_good(evidence, first)} Do not use this model.", reasons, (keep, *advice))
     if not doubts:
-        ready = "Export the arm (calibeam identify --export) or use model.json as it is."
+        ready = "Correct poses and programs with it (`calibeam correct`), or export it (`calibeam export-model`)."
         return Verdict(Trust.GOOD, f"{_how_good(evidence, first)} What remains is noise.", (), (ready, *advice))
     return Verdict(Trust.CARE, f"{_how_good(evidence, first)} Use it, with care.", reasons, advice)
 

@@ -9,9 +9,7 @@ Influence in Regression, 1982, ch. 2.2 and, for several rows at once, ch. 3.6.
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.arms.rig_arm import limits_of
 from calibrate.joint_problem import JointProblem
-from calibrate.parameters import without_assumed
 from calibrate.problem import Problem
 from calibrate.report.elements import Html, figure, section, tag
 from calibrate.report.session_evidence import SessionEvidence
@@ -19,15 +17,10 @@ from calibrate.report.workspace.pictures import Measured, before_and_after
 from calibrate.report.workspace.workspace_errors import (
     KnownArm,
     Room,
-    room_of,
-    scatter_of,
     target_at,
-    unpredicted,
-    whole_covariance,
 )
 from calibrate.sensors.catalogue import names_with
 from calibrate.sensors.kind import Trait
-from calibrate.unseen_along import analyse_along
 
 IN_SPACE = names_with(Trait.IN_SPACE)  # instruments that measure where the target is
 NOT_IN_SPACE = (
@@ -39,34 +32,6 @@ NOT_IN_SPACE = (
 Floats = NDArray[np.float64]
 
 ALONE = 1e-6  # of 1 - J C J': below, the observation alone determines something, and nothing else predicts it
-
-
-def session_arm(evidence: SessionEvidence) -> KnownArm | str:
-    """The arm with its uncertainty, or why no error over the workspace can be determined."""
-    problem, model, theta = evidence.problem, evidence.model, evidence.theta
-    why = unpredicted(model.free_space)
-    if why is not None or model.free_space is None:
-        return why or ""
-    lower, upper = limits_of(evidence.recording.rig)
-    return KnownArm(
-        evidence.arm,
-        problem.parameters,
-        evidence.drawn,
-        theta,
-        whole_covariance(model.covariance, problem.parameters),
-        analyse_along(problem.fulfilled(theta), theta, without_assumed(problem.parameters)),
-        scatter_of(model.noise),
-        np.array(model.free_space.point_m),
-        lower,
-        upper,
-        evidence.q_rad,
-    )
-
-
-def session_room(evidence: SessionEvidence) -> Room | str:
-    """Errors of the tool over the workspace, or why none can be determined. About half a second."""
-    known = session_arm(evidence)
-    return known if isinstance(known, str) else room_of(known)
 
 
 def session_measured(evidence: SessionEvidence, known: KnownArm) -> Measured | None:
@@ -117,16 +82,16 @@ def workspace(room: Room | str, measured: Measured | None, why_not_measured: str
     caption = (
         "Left from the side, all directions together (radius: from the base's z axis); right from above, all heights "
         "together. Darker is worse: rms over the poses that bring the target there, one scale for all pictures. "
-        "Hatched: the arm gets there, but only with a joint beyond the angles of the session, or where the prediction "
-        "leans on the data harder than at the poses of it. Predicted: one sigma by the covariance of the fit and the "
-        "scatter of a single pose, as far as the model is right; where base and device stand is left out."
+        "Hatched: reached only with a joint beyond the angles of the session, or by extrapolation from its poses. "
+        "Predicted: one sigma, from the covariance of the fit and the scatter of a single pose, if the model is "
+        "complete; where base and device stand is left out."
     )
     told = (
-        "Measured: distance of each reading from what is expected; for the identified arm each pose is expected from "
+        "Measured: distance of each reading from what is expected; for the calibrated arm each pose is predicted from "
         "all other poses. Where measured is worse than predicted, the model lacks something there."
         if measured is not None
         else why_not_measured
     )
     pictures = tag("div", figure(before_and_after(room, measured), f"{caption} {told}"), cls="wide")
-    within = f"Of the poses between the joint angles of the session, {share:.0%} are supported."
+    within = f"Of the poses between the joint angles of the session, {share:.0%} are covered by the calibration poses."
     return section("workspace", WORKSPACE_TITLE, LEAD, pictures, tag("p", within))

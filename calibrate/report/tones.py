@@ -70,8 +70,8 @@ def patch(number: int, name: str) -> Html:
 
 
 def place_name(place: int) -> str:
-    """'place 3', on one line."""
-    return f"place{TIED}{place}"
+    """'station 3', on one line."""
+    return f"station{TIED}{place}"
 
 
 def colour_key(places: Sequence[int]) -> Html:

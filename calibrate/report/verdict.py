@@ -15,7 +15,7 @@ WORSE_UNSEEN = 1.5  # error on unseen poses over its own uncertainty; of a healt
 NOISIER = 3.0  # found over assumed; assumed noise is often wrong by this much, beyond it something is broken
 AGAIN = "Measure again, with more and more different poses."
 
-UNCHECKED = "There are as many unknowns as readings, or nearly so: any arm would fit, and nothing checks the result."
+UNCHECKED = "There are as many unknowns as readings, or nearly so: any arm would fit, and the result cannot be checked."
 MORE_POSES = "Measure more poses: at least 15, better 50, all over the workspace."
 
 Doubt = tuple[str, str]  # what speaks against trust, and what to do about it
@@ -50,8 +50,8 @@ MARKS = {
     Trust.NONE: ("\N{HEAVY MULTIPLICATION X}", "No"),
 }
 TOOL = "tool_"  # keys of the tool error begin so
-NOTHING_AGAINST = "Nothing speaks against it: what remains is noise."
-NOTHING_TO_DO = "Nothing now. Measure again after a collision, a repair, or when the work gets worse."
+NOTHING_AGAINST = "No reason for care was found: what remains is noise."
+NOTHING_TO_DO = "Nothing now. Measure again after a collision or a repair, or when accuracy at work gets worse."
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ def test_such_a_folder_is_identified_predicted_and_reported(folder, tmp_path, ca
     found = read_model(model)
     assert found.rms_distance_after_m < 5e-6
     told = {p.name: p.undetermined for p in found.parameters}
-    assert told["link6.twist"].startswith("only its prior speaks of it")
+    assert told["link6.twist"].startswith("known from its assumed tolerance only")
     assert [name for name, why in told.items() if name.endswith(".zero") and why is None] == [
         f"joint{k}.zero" for k in (2, 3, 4, 5)
     ]

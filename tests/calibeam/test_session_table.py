@@ -29,15 +29,16 @@ def printed(recording, plan=None):
     text = StringIO()
     planned = None if plan is None else Planned(parse_plan(plan, "fit.toml"), plan)
     result = identify_session(recording, planned)
-    judged = session_verdict(session_evidence(recording, session_model(result, recording, planned)))
-    print_identification(Console(file=text, width=400), result, judged, recording.rig, verbose=True)
-    return text.getvalue(), judged
+    known = session_evidence(recording, session_model(result, recording, planned))
+    print_identification(Console(file=text, width=400), result, known, verbose=True)
+    return text.getvalue(), session_verdict(known)
 
 
 def test_the_first_lines_are_the_report_s_verdict_and_no_name_of_a_status_is_printed(recording):
     told, judged = printed(recording)
-    first = [line.strip() for line in told.splitlines()][: 1 + len(judged.reasons)]
-    assert first == [judged.sentence, *judged.reasons]
+    first = [line.strip() for line in told.splitlines()][: 3 + len(judged.reasons)]
+    assert first[:-1] == [judged.sentence, f"trust: {judged.trust.value}", *judged.reasons]
+    assert first[-1].startswith("tool error over the workspace: ")
     assert "RANK_DEFICIENT" not in told
 
 

@@ -50,9 +50,9 @@ function told(state) {
 }
 
 function place(standing) {
-  if (!standing) return "No place of the fixture is near the beam.";
+  if (!standing) return "No station of the fixture is near the beam.";
   const beam = newest.now?.beam?.says ?? "";
-  return `Fixture at place ${standing.placement}${standing.told ? "" : " (guessed)"}, PSD ${standing.first_psd} first${beam ? `: ${beam}` : ""}.`;
+  return `Fixture at station ${standing.placement}${standing.told ? "" : " (guessed)"}, PSD ${standing.first_psd} first${beam ? `: ${beam}` : ""}.`;
 }
 
 // Whether the model puts no light on a face: the beam leads elsewhere, misses it, or misses the face before it. Where

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 
 from calibrate.diagnose.schema import DiagnosisFile, FindingRecord, NameRecord
 from calibrate.report.diagnosis.words import (
+    SPLITS,
     confusable_causes,
     free_space_words,
     hardest_to_see,
@@ -23,7 +24,6 @@ from calibrate.report.verdict import Trust
 
 TITLE = "What the model lacks"
 TRUST = {"mismatch": Trust.CARE, "consistent": Trust.GOOD, "undecidable": Trust.NONE}
-SPLITS = {"random": "samples at random", "place": "each place in turn", "last block": "the end of the session"}
 
 
 def overview(file: DiagnosisFile) -> Html:
@@ -50,15 +50,19 @@ def _verdict(file: DiagnosisFile) -> Html:
 
 
 def _tiles(file: DiagnosisFile) -> Html:
+    unseen = "rms of a coordinate, on samples that were left out"
     tiles = [
-        tile("Geometry alone", _length(file.rms_before_m), "rms on samples held out"),
-        tile("With the physics", _length(file.rms_after_m), "rms on the same samples"),
+        tile("Unseen readings, geometry alone", _length(file.rms_before_m), unseen),
+        tile("Unseen readings, with the physics", _length(file.rms_after_m), unseen),
         tile("Noise floor", _length(file.noise_floor_m), file.noise_floor_source or "not known"),
     ]
     if file.free_space is not None:
         change = file.free_space
-        said = f"{length(change.rms_before_m)} with geometry alone; predicted rms between these angles"
-        tiles.append(tile("Tool error, frames fitted", length(change.rms_after_m), said))
+        said = (
+            f"{length(change.rms_before_m)} with geometry alone; predicted rms between the joint angles of the "
+            "session, base and tool point fitted"
+        )
+        tiles.insert(0, tile("Tool error, with the physics", length(change.rms_after_m), said))
     return tag("div", *tiles, cls="tiles")
 
 
@@ -85,7 +89,9 @@ def _proof(file: DiagnosisFile) -> Html:
         "noise floor",
         "removed of the squares",
     )
-    return table(head, rows, numeric=range(2, 7), caption="Proof on samples that neither fit has seen")
+    return table(
+        head, rows, numeric=range(2, 7), caption="Proof on samples that neither fit has seen: rms of a coordinate"
+    )
 
 
 def _fit(file: DiagnosisFile) -> Iterator[Html]:
@@ -102,7 +108,7 @@ def _fit(file: DiagnosisFile) -> Iterator[Html]:
             f"scatter (p = {significant(misfit.p, 2)}): {reads}.",
         )
     if file.noise_wanders:
-        yield tag("p", "The noise wanders slowly: causes that grow with time had to beat a wandering chance, too.")
+        yield tag("p", "The noise drifts slowly; causes that grow with time were tested against that drift, too.")
     if file.free_space is not None:
         yield tag("p", f"Tool error: {free_space_words(file.free_space)}.")
 
@@ -151,7 +157,7 @@ def _unexplained(file: DiagnosisFile) -> Iterator[Html]:
     ]
     if rows:
         head = ("Where", "what", "of the variance", "rms", "p")
-        yield table(head, rows, numeric=(2, 3, 4), caption="There, and without a name")
+        yield table(head, rows, numeric=(2, 3, 4), caption="Found, but not explained by a known cause")
 
 
 def _listed(title: str, lines: Sequence[str]) -> Iterator[Html]:
@@ -191,7 +197,7 @@ def _visible(file: DiagnosisFile) -> Iterator[Html]:
     caption = "Detection limits of these poses (95 %): a smaller error would not be found"
     yield halves(table(head, hardest, numeric=(2,), caption=caption))
     every = [(one.where, one.physics, size_of(one.parameter, one.value), one.parameter) for one in file.smallest]
-    title = f"The same at every place: {len(every)} causes"
+    title = f"The same wherever it can act: {len(every)} causes"
     listed = table(("Where", "physics", "found from", "of"), sorted(every), numeric=(2,))
     yield folded(title, listed, on_paper=False)
 
@@ -206,7 +212,7 @@ def _rejected(file: DiagnosisFile) -> Iterator[Html]:
 
 def _invisible(names: Sequence[NameRecord]) -> Iterator[Html]:
     if names:
-        title = f"Invisible with these poses: {len(names)} causes that geometry would swallow"
+        title = f"Not visible with these poses: {len(names)} causes that geometry takes up"
         yield folded(title, bullets(place_words(name) for name in names))
 
 

@@ -1,5 +1,6 @@
 """Words of a diagnosis for a person, the same in terminal and report, and the unit of a size as a person reads it."""
 
+import re
 from collections.abc import Iterator, Sequence
 
 from calibrate.diagnose.schema import (
@@ -14,7 +15,7 @@ from calibrate.diagnose.schema import (
 )
 from calibrate.diagnose.stated_noise import Statement
 from calibrate.effects.term import UNITS
-from calibrate.report.quantities import TIED
+from calibrate.report.quantities import TIED, length
 
 # Of streams, beside those of the catalogue; the first ending that fits is taken.
 OF_STREAMS = (("_s_per_s", 1e6, "µs per s"), ("_s2", 1e6, "ms²"), ("_hz", 1.0, "Hz"), ("_count", 1.0, ""))
@@ -34,6 +35,7 @@ def unit_of(name: str, value: float) -> tuple[float, str]:
 
 ABSENT, WRONG = Statement.ABSENT.value, Statement.WRONG.value
 NOISE = 1.15  # times the floor: some dozen samples held out scatter by so much
+SPLITS = {"random": "samples at random", "place": "each place in turn", "last block": "the end of the session"}
 TOLD = ("encoder-eccentricity", "joint-compliance", "backlash")  # in a sentence; all of them stand in the table
 
 
@@ -51,7 +53,7 @@ def verdict_words(file: DiagnosisFile) -> str:
             n = len(file.findings)
             return f"Recording and model disagree: {n} cause{'s' if n > 1 else ''} found{_how_far(file)}."
         case "consistent":
-            return f"Recording and model agree: nothing is there beyond {_noise(file)}{_tested(file)}."
+            return f"Recording and model agree: what remains is {_noise(file)}{_tested(file)}."
         case _ if file.incomplete and file.unexplained is None:
             stages = ", ".join(one.stage for one in file.incomplete)
             return f"Undecidable: the diagnosis was not completed ({stages})."
@@ -112,14 +114,21 @@ def _places(left: Sequence[UnexplainedRecord]) -> str:
 
 def _tested(file: DiagnosisFile) -> str:
     """What the answer is worth."""
-    if not file.smallest:
-        return ""
     kinds = len({one.physics for one in file.smallest})
-    shown = [visible_words(one) for one in hardest_to_see(file) if one.physics in TOLD]
-    seen = f"; detection limits: {'; '.join(shown)}" if shown else ""
-    lacking = ", ".join(untested_physics(file))
-    blind = f". Not tested, for lack of columns: {lacking}" if lacking else ""
-    return f". Tested were {kinds} kinds of physics, {len(file.smallest)} places and causes{seen}{blind}"
+    return f". {kinds} {'kinds of physics were' if kinds > 1 else 'kind of physics was'} tested" if kinds else ""
+
+
+def limit_words(file: DiagnosisFile) -> Iterator[str]:
+    """Detection limits of the usual causes in one sentence; nothing where none was determined."""
+    shown = [_limit(one) for one in hardest_to_see(file) if one.physics in TOLD]
+    if shown:
+        yield f"detection limits: {'; '.join(shown)}"
+
+
+def _limit(smallest: SmallestRecord) -> str:
+    """'encoder eccentricity of joint 2, 12 µrad'."""
+    where = re.sub(r"^(joint|link)(\d+)\..*$", r"\1 \2", smallest.where)
+    return f"{smallest.physics.replace('-', ' ')} of {where}, {size_of(smallest.parameter, smallest.value)}"
 
 
 def untested_physics(file: DiagnosisFile) -> tuple[str, ...]:
@@ -132,11 +141,6 @@ def confusable_causes(file: DiagnosisFile) -> tuple[tuple[NameRecord, NameRecord
     """Pairs that the poses cannot separate, the most alike first; forms of one cause are no pair of causes."""
     pairs = (pair for pair in file.confusable if (pair[0].physics, pair[0].where) != (pair[1].physics, pair[1].where))
     return tuple(sorted(pairs, key=lambda pair: -pair[2]))
-
-
-def visible_words(smallest: SmallestRecord) -> str:
-    """'encoder-eccentricity at joint2.angle from 12 µrad on': hence at better seen places, too."""
-    return f"{smallest.physics} at {smallest.where} from {size_of(smallest.parameter, smallest.value)} on"
 
 
 def size_of(parameter: str, value: float) -> str:
@@ -183,7 +187,7 @@ def free_space_words(change: FreeSpaceRecord) -> str:
     """One sentence."""
     return (
         "predicted tool error between the joint angles of this session, base and tool point fitted: "
-        f"{micrometres(change.rms_before_m)} with geometry alone, {micrometres(change.rms_after_m)} with the physics "
+        f"{length(change.rms_before_m)} with geometry alone, {length(change.rms_after_m)} with the physics "
         f"(rms, {change.poses} poses)"
     )
 

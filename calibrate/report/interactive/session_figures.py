@@ -39,7 +39,7 @@ def spots_in_space(session: SpotSession) -> Plot | None:
         [*_standing(drawn), *_faces(drawn), *_beams(session, rig), _lasers(session, rig)],
         "plot-space",
         "the rig in space: arm, faces, beams, and where the laser was at every pose",
-        "The rig as identified: the arm at the best centred pose of every place, both faces to scale, the beam of "
+        "The rig as identified: the arm at the best centred pose of every station, both faces to scale, the beam of "
         "every pose from laser to second face, and where the laser was, darker where the spots are missed by more.",
     )
 
@@ -47,13 +47,13 @@ def spots_in_space(session: SpotSession) -> Plot | None:
 def _standing(drawn: Scene) -> Iterator[Trace]:
     for i, arm in enumerate(drawn.arms):
         colour = INK if i == 0 else TONES[i % len(TONES)]
-        yield line3(arm.bones_m, f"arm at place {arm.placement}", colour, width=7.0 if i == 0 else 3.0, shown=i == 0)
+        yield line3(arm.bones_m, f"arm at station {arm.placement}", colour, width=7.0 if i == 0 else 3.0, shown=i == 0)
 
 
 def _faces(drawn: Scene) -> Iterator[Trace]:
     for i, (place, corners) in enumerate(drawn.faces_m.items()):
         parted = np.concatenate([np.concatenate([c, c[:1], np.full((1, 3), np.nan)]) for c in corners])
-        yield line3(parted, f"faces at place {place}", TONES[i % len(TONES)], width=5.0)
+        yield line3(parted, f"faces at station {place}", TONES[i % len(TONES)], width=5.0)
 
 
 def _beams(session: SpotSession, rig: FittedRig) -> Iterator[Trace]:
@@ -95,7 +95,7 @@ def _spot_labels(session: SpotSession) -> list[str]:
     data, errors = session.data, session.readings
     rows = zip(data.placement, data.first_psd, data.q_rad, errors.error_before, errors.error_after, strict=True)
     return [
-        f"pose {i}, place {place}, PSD {first} first<br>nominal {length(float(b))}, calibrated {length(float(a))}<br>"
+        f"pose {i}, station {place}, PSD {first} first<br>nominal {length(float(b))}, calibrated {length(float(a))}<br>"
         f"{posture(q)}"
         for i, (place, first, q, b, a) in enumerate(rows, start=1)
     ]

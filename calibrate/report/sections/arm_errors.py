@@ -14,8 +14,8 @@ TITLE = "Errors before and after"
 def errors_chapter(evidence: SessionEvidence) -> Html:
     """All instruments in one table, then each by itself."""
     lead = (
-        "Expected minus observed. Nominal: the arm nominal; frames, target and cones where they fit best. "
-        "Calibrated: everything fitted. An error is the length of the difference, 3-D for a position."
+        "Expected minus observed. Nominal: nominal arm, with frames, target and cones where they fit best. "
+        "Calibrated: all fitted. An error is the length of the difference, in 3-D for a position."
     )
     rows = [row for readings in evidence.readings for row in _figures(readings)]
     head = ("Reading", "state", "count", "rms distance", "mean", "95 %", "largest")
@@ -59,21 +59,21 @@ def _noise_like(readings: Readings) -> Html:
     return panels(
         figure(
             quantiles(whitened, f"quantiles-{readings.name}"),
-            "In units of the noise found. On the line within the grey corridor: pure noise. An S shape: more far "
-            "values than noise has.",
+            "In units of the noise found. Points on the line, within the grey band: pure noise. An S shape: more large "
+            "values than noise gives.",
         ),
         figure(
             histogram(whitened, f"histogram-{readings.name}"),
-            f"{beyond} of {whitened.size} coordinates lie beyond three sigma; noise alone would put "
-            f"{significant(0.0027 * whitened.size, 2)} there.",
+            f"{beyond} of {whitened.size} coordinates lie beyond three sigma; noise alone gives "
+            f"{significant(0.0027 * whitened.size, 2)} on average.",
         ),
     )
 
 
 def _caption(found: tuple[Pattern, ...]) -> str:
     return (
-        f"What the identified arm leaves, averaged over {len(found[0].middle)} groups of readings along each factor, "
-        "with two sigma of each average. Pure noise stays about zero everywhere; a wave along a joint is physics that "
+        f"Residuals of the calibrated arm, averaged over {len(found[0].middle)} groups of readings along each factor, "
+        "with two sigma of each average. Pure noise stays near zero everywhere; a wave along a joint is physics that "
         "the model lacks."
     )
 
@@ -85,10 +85,10 @@ def _pattern_table(found: tuple[Pattern, ...]) -> Html:
             fixed(p.f, 2),
             significant(p.p, 2) if p.p > 0.0 else "0",
             f"{p.share:.0%}",
-            "a pattern: not chance" if p.clear else "no pattern that chance would not give",
+            "a pattern" if p.clear else "chance",
         )
         for p in found
     ]
-    caption = f"Does what remains depend on it (one-way analysis of variance, up to {GROUPS} groups)"
-    head = ("Factor", "F", "p", "share of what remains", "reads as")
+    caption = f"Dependence of the residuals on each factor (one-way analysis of variance, up to {GROUPS} groups)"
+    head = ("Factor", "F", "p", "share of the residuals", "result")
     return folded("The same in numbers", table(head, rows, numeric=(1, 2, 3), caption=caption), on_paper=False)

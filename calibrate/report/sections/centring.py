@@ -107,7 +107,7 @@ def _paint_courses(figure: Figure, runs: Sequence[Trace], tolerance_m: float, pl
         axes.plot(shown, "o-", color=tone.value, lw=1.0, ms=3.4, alpha=0.6, **mark)  # pyright: ignore[reportArgumentType]
     axes.axhline(tolerance_m, color=Tone.INK.value, lw=1.2, linestyle=(0, (4, 3)))
     axes.annotate(
-        f"wanted: {stated(tolerance_m)}",
+        f"tolerance: {stated(tolerance_m)}",
         (1.0, tolerance_m),
         xycoords=("axes fraction", "data"),
         xytext=(0, 4),
@@ -132,7 +132,7 @@ def _paint_counts(figure: Figure, runs: Sequence[Trace]) -> None:
     axes.spines["left"].set_visible(False)
     axes.set_yticks([])
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set(xlabel="steps", title="Runs that took so many steps", xlim=(-0.6, max(len(counts), 6) - 0.4))
+    axes.set(xlabel="steps", title="Number of runs by their steps", xlim=(-0.6, max(len(counts), 6) - 0.4))
 
 
 TITLE = "Laser centring"
@@ -159,22 +159,22 @@ def _pictures(runs: Sequence[Trace], wanted_m: float, places: Sequence[int]) -> 
     return panels(
         figure(
             courses(runs, wanted_m, places, f"course-{name}"),
-            f"{len(runs)} runs that wanted {stated(wanted_m)}. A line breaks where a face was dark.",
+            f"{len(runs)} runs with a tolerance of {stated(wanted_m)}. A line breaks where a face was dark.",
         ),
         figure(
             step_counts(runs, wanted_m, f"steps-{name}"),
-            f"{_at_once(steps)}The median is {np.median(steps):g} steps, the longest run took {max(steps)}.",
+            f"{_at_once(steps)}Median of the steps: {np.median(steps):g}; longest run: {max(steps)}.",
         ),
     )
 
 
 def _at_once(steps: Sequence[int]) -> str:
     none = sum(s == 0 for s in steps)
-    return f"{none} of {len(steps)} runs were centred at the first reading.  " if none else ""
+    return f"{none} of {len(steps)} runs were centred at the first reading. " if none else ""
 
 
 def _endings(groups: dict[float, tuple[Trace, ...]]) -> Html:
-    head = ("Wanted", "Strategy", "Ended as", "runs", "median steps", "most steps", "of them probing")
+    head = ("Tolerance", "strategy", "ended as", "runs", "median steps", "most steps", "probing steps")
     return table(head, _ending_rows(groups), numeric=(3, 4, 5, 6), caption="How the runs ended")
 
 

@@ -20,9 +20,10 @@ from calibrate.model_file import ModelFile, ModelParameter
 from calibrate.observability import WELL_CONDITIONED
 from calibrate.parameters import Parameter
 from calibrate.report.elements import Html, bullets, figure, folded, halves, join, panels, section, table, tag
-from calibrate.report.not_determined import in_plain_words, kind_of, reason_among, spectrum
+from calibrate.report.not_determined import in_plain_words, kind_of, reason_among
 from calibrate.report.quantities import DASH, aligned, decimals_of, fixed, significant
 from calibrate.report.session_evidence import SessionEvidence
+from calibrate.report.svg import spectrum
 
 TITLE = "What was identified, and what was not"
 MOST_LISTED = 12  # parameters without a number: of more, one line a reason, the rest folded
@@ -30,15 +31,15 @@ LEARNED = 0.9  # sigma over drawing tolerance: above, these data taught nothing 
 
 
 def parameters_chapter(evidence: SessionEvidence) -> Html:
-    """Rank and unseen combinations, then numbers, then refusals."""
+    """Rank and unseen combinations, then numbers, then what has none."""
     model = evidence.model
-    lead = f"Rank {model.rank} of {model.free}: what the data can see comes before any number. Fit: {model.says}."
+    lead = f"{model.rank} of {model.free} combinations of parameters are determined (rank). Fit: {model.says}."
     lead += _unasked(evidence)
     known = [p for p in model.parameters if p.value is not None]
     refused = [p for p in model.parameters if p.value is None]
     content = [_rank(evidence), tag("h3", "Identified"), _numbers(evidence, known)]
     if refused:
-        content += [tag("h3", "Refused"), tag("p", _about_refusals(), cls="lead"), _refusals(evidence, refused)]
+        content += [tag("h3", "Not determined"), tag("p", _about_refusals(), cls="lead"), _refusals(evidence, refused)]
     return section("parameters", TITLE, lead, *content)
 
 
@@ -52,20 +53,19 @@ def _unasked(evidence: SessionEvidence) -> str:
 def _rank(evidence: SessionEvidence) -> Html:
     model = evidence.model
     s = np.array(model.singular_values)
-    words = tag("div", tag("h3", "Unseen combinations"), *_combinations(evidence))
+    words = tag("div", tag("h3", "Combinations that are not determined"), *_combinations(evidence))
     if len(s) == 0:
         return words
     drawing = any(np.isfinite(p.prior) for p in evidence.parameters)
     caption = (
-        "Singular values of the weighted Jacobian in plausible sizes: how many times better than a guess one "
-        f"combination of parameters is known. Below {WEAK:g} nothing is known."
+        "Singular values of the weighted Jacobian in plausible sizes: how many times better than by its plausible size "
+        f"one combination of parameters is known. Below {WEAK:g} it is not determined."
     )
     return panels(figure(spectrum(s, model.rank, "spectrum", with_drawing=drawing), caption), words)
 
 
 def _combinations(evidence: SessionEvidence) -> Iterator[Html]:
     model = evidence.model
-    yield tag("p", f"{model.rank} of {model.free} combinations are seen.")
     yield from _observability(model)
     if not model.unseen:
         yield tag("p", "Every parameter can be separated from every other.")
@@ -80,7 +80,7 @@ def _observability(model: ModelFile) -> Iterator[Html]:
     seen = model.observability
     if seen is None:
         if model.condition is not None:
-            yield tag("p", f"Condition of what is seen: {significant(model.condition)}.")
+            yield tag("p", f"Condition of what is determined: {significant(model.condition)}.")
         return
     values = (seen.o1, seen.o2, seen.o3, seen.o4, seen.o5, seen.condition)
     row = tuple(DASH if value is None else significant(value) for value in values)
@@ -88,9 +88,7 @@ def _observability(model: ModelFile) -> Iterator[Html]:
     head = (*(f"O{k}" for k in range(1, 6)), "condition")
     yield table(head, [row], numeric=range(6), caption=caption)
     if seen.condition is not None and seen.condition > WELL_CONDITIONED:
-        says = (
-            f"A condition above {WELL_CONDITIONED:g} means that other poses would determine some parameters far better."
-        )
+        says = f"Condition above {WELL_CONDITIONED:g}: other poses would determine some parameters far better."
         yield tag("p", says, cls="lead")
 
 
@@ -135,13 +133,13 @@ def _by_refits(found: ModelParameter, drawn: bool) -> tuple[str, ...]:
 def _source(found: ModelParameter, believed: dict[str, Parameter]) -> str:
     own = believed.get(found.name)
     drawing = own is not None and (found.sigma or 0.0) > LEARNED * own.prior
-    return "drawing" if drawing else "data"
+    return "nominal" if drawing else "data"
 
 
 def _about_refusals() -> str:
     return (
-        "A number for one of these alone would be one choice among many that fit the data equally well. The model "
-        "still predicts: it holds one of each combination where it was, which changes no prediction."
+        "For each of these, many values fit the data equally well. Predictions are not affected: of each combination "
+        "one parameter is held at its nominal value."
     )
 
 

@@ -25,17 +25,17 @@ def free_space(found: FreeSpaceRecord | None) -> list[Html]:
         ]
     rows = [
         (
-            "identified geometry alone",
+            "calibrated geometry alone",
             *_three(found.rms_m, found.p95_m, found.max_m),
-            "what a better fit could still win",
+            "what better data could still remove",
         ),
         ("a single pose", *_three(found.pose_rms_m, found.pose_p95_m, found.pose_max_m), f"with {found.scatter}"),
     ]
     caption = f"Predicted error of the target, one sigma, {found.poses} poses drawn evenly between the joint limits"
     head = ("Error of", "rms", "95 %", "largest", "holds")
     note = (
-        "As far as the model is right: what it lacks is not in these figures, but it is in those of unseen rows. "
-        "Where base and device stand is no error of the arm and is left out."
+        "Valid if the model is complete: physics that it lacks shows in the unseen rows above, not here. Where base "
+        "and device stand is not an error of the arm and is left out."
     )
     return [table(head, rows, numeric=(1, 2, 3), caption=caption), tag("p", note, cls="lead"), *_guessed(found)]
 
@@ -52,7 +52,7 @@ def _guessed(found: FreeSpaceRecord) -> list[Html]:
     if not found.guessed:
         return []
     listed = "; ".join(found.guessed)
-    return [tag("p", f"Known no better than their plausible size, and counted as that: {listed}.")]
+    return [tag("p", f"Not determined, and counted with their plausible size: {listed}.")]
 
 
 def unseen_rows(found: Sequence[UnseenRows], unproven: Sequence[str]) -> list[Html]:
@@ -65,7 +65,7 @@ def unseen_rows(found: Sequence[UnseenRows], unproven: Sequence[str]) -> list[Ht
         "reading",
         "count",
         "nominal, rms distance",
-        "identified, rms distance",
+        "calibrated, rms distance",
         "over the noise",
         "over noise and sigmas",
     )
@@ -93,8 +93,8 @@ OF_JOINTS = NoiseSource(JOINT, "rad", "joint_rad")
 
 
 def proofs_chapter(evidence: SessionEvidence) -> Html:
-    """What speaks for and against the numbers."""
-    lead = "An error on rows that the fit has not seen is what to expect at work; a sigma is as good as the noise."
+    """Unseen rows, uncertainty, noise and tests of the fit."""
+    lead = "The error on rows that the fit has not seen is the error to expect at work."
     return section(
         "proofs",
         TITLE,
@@ -145,7 +145,7 @@ def _tests(model: ModelFile) -> Iterator[tuple[str, ...]]:
     yield (
         "Repeats, chi²/dof",
         fixed(repeats.chi2_per_dof, 2),
-        f"{repeats.groups} groups, {repeats.dof} degrees of freedom; owes nothing to the arm model",
+        f"{repeats.groups} groups, {repeats.dof} degrees of freedom; independent of the arm model",
     )
     if repeats.ratio is not None and repeats.p is not None:
         yield "Lack of fit, F", fixed(repeats.ratio, 2), f"p = {significant(repeats.p, 2)}: {repeats.alarm.value}"

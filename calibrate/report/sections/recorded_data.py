@@ -43,7 +43,7 @@ def recorded(recording: Recording, extras: Sequence[tuple[str, str, str]]) -> Ht
         for column, what, shows in extras
     ]
     rows += _temperature_rows(recording)
-    return table(("Quantity", "recorded", "what it is for"), rows, caption="Beside angles and spots")
+    return table(("Quantity", "recorded", "what it shows"), rows, caption="Beside angles and spots")
 
 
 def _temperature_rows(recording: Recording) -> list[tuple[str, ...]]:

@@ -76,7 +76,7 @@ RIG_TITLE = "The rig"
 
 
 def rig(session: SpotSession) -> Html:
-    """Drawings with beam and reflection, and how many poses each place has."""
+    """Drawings with beam and reflection, and how many poses each station has."""
     source = "the recording and the fit" if session.corrections else "the recording and the rig file, for want of a fit"
     lead = f"Drawn from {source}: true proportions, real poses, beams that end on the observed spots."
     return section("rig", RIG_TITLE, lead, *_drawings(session))
@@ -93,7 +93,7 @@ def _drawings(session: SpotSession) -> list[Html]:
         panels(
             figure(
                 oblique(drawn),
-                f"The arm at its best centred pose at place {first}, its joints numbered; other places in colour. "
+                f"The arm at its best centred pose at station {first}, its joints numbered; other stations in colour. "
                 "The laser beam is drawn through to the second face. Tiles of the floor are 0.2 m.",
             ),
             figure(
@@ -104,8 +104,8 @@ def _drawings(session: SpotSession) -> list[Html]:
         panels(
             figure(
                 reflection(fitted, session.data, first),
-                f"The fixture at place {first}, both faces seen on edge. The beam strikes one face, which reflects it "
-                "onto the other; the arrows are the best centred pose of each order, the thin lines the other poses.",
+                f"The fixture at station {first}, both faces seen on edge. The beam strikes one face, which reflects "
+                "it onto the other; arrows: the best centred pose of each beam order; thin lines: the other poses.",
             ),
             _poses(session),
         ),
@@ -122,5 +122,5 @@ def _poses(session: SpotSession) -> Html:
         )
         for i, place in enumerate(session.places)
     ]
-    head = ("Place", "PSD 1 first", "PSD 2 first", "poses")
-    return table(head, rows, numeric=(1, 2, 3), caption="Poses by place, and by the face that is struck first")
+    head = ("Station", "PSD 1 first", "PSD 2 first", "poses")
+    return table(head, rows, numeric=(1, 2, 3), caption="Poses by station, and by the face that is struck first")

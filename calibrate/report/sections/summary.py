@@ -3,8 +3,6 @@
 A certificate names the robot, person, place and instruments; in print, blank lines stand for what is absent.
 """
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from acquisition.recording import Recording
@@ -20,7 +18,7 @@ from calibrate.report.session_evidence import Readings, SessionEvidence
 from calibrate.report.session_verdict import session_verdict
 from calibrate.report.verdict import Answers, Number, first_screen
 from calibrate.report.workspace.pictures import tool_maps
-from calibrate.report.workspace.workspace_errors import Room
+from calibrate.report.workspace.workspace_errors import Room, tool_numbers
 from calibrate.sensors.catalogue import kind_of
 
 TITLE = "Certificate"
@@ -44,7 +42,7 @@ def certificate(recording: Recording) -> Html:
     pairs = (
         ("Robot", site.robot or make),
         ("Serial number", rig.arm.serial_number),
-        ("Place", site.place),
+        ("Site", site.place),
         ("Operator", site.operator),
         ("Measured (UTC)", when(recording) or None),
     )
@@ -82,7 +80,7 @@ def _blank() -> Html:
     return tag("span", cls="blank")
 
 
-ANYWHERE = "Anywhere"
+ANYWHERE = "Between the joint limits"
 MOSTLY = 0.9  # of the error of a single pose, by the uncertainty of the parameters: the rest adds in quadrature
 
 
@@ -118,40 +116,13 @@ def answers(evidence: SessionEvidence, room: Room | str, diagnosis: DiagnosisFil
         *([determined(evidence)] if limits else []),
         f"rows of the fit: {first.says(_rms(first.error_after))} rms distance",
     )
-    numbers = (*_tool(room, diagnosis), *_errors(evidence), _anywhere(model.free_space))
+    numbers = (*tool_numbers(room, diagnosis), *_errors(evidence), _anywhere(model.free_space))
     return Answers(session_verdict(evidence, diagnosis), numbers, limits, also)
 
 
-def _tool(room: Room | str, diagnosis: DiagnosisFile | None) -> Iterator[Number]:
-    """Over the workspace, where the data support a statement: nominal arm, calibrated, and with the physics found.
-
-    What missing physics adds to geometry alone is what the diagnosis predicts: independent of the uncertainty of the
-    geometry, hence added in quadrature.
-    """
-    if isinstance(room, str):
-        why = f"is not determined: {room}"
-        yield Number("tool_nominal", NOMINAL, None, "m", DASH, why)
-        yield Number("tool_calibrated", CALIBRATED, None, "m", DASH, why)
-        return
-    nominal, found = _rms(room.drawn_m[room.supported]), _rms(room.found_m[room.supported])
-    missed = _missed_by_geometry(diagnosis)
-    calibrated = float(np.hypot(found, missed))
-    where = "Rms over the poses between the joint angles of the session; calibrated: one sigma, predicted."
-    yield Number("tool_nominal", NOMINAL, nominal, "m", length(nominal), f"{where} The base is put where it fits best.")
-    yield Number("tool_calibrated", CALIBRATED, calibrated, "m", length(calibrated), where)
-    if missed > 0.0:
-        about = f"{where} The physics found by the diagnosis accounts for {length(missed)} of it."
-        yield Number("tool_physics", WITH_PHYSICS, found, "m", length(found), about)
-
-
-def _missed_by_geometry(diagnosis: DiagnosisFile | None) -> float:
-    """In m, rms over the workspace; 0 where no diagnosis has it."""
-    change = None if diagnosis is None or not diagnosis.findings else diagnosis.free_space
-    return 0.0 if change is None else float(np.sqrt(max(change.rms_before_m**2 - change.rms_after_m**2, 0.0)))
-
-
-NOMINAL, CALIBRATED, WITH_PHYSICS = "nominal", "calibrated", "with physics"
-MAPS = "From the side, one scale for both. Hatched: not supported by these poses; circles: poses of the session."
+MAPS = (
+    "From the side, one scale for both. Hatched: not covered by the calibration poses; circles: poses of the session."
+)
 
 
 def _errors(evidence: SessionEvidence) -> tuple[Number, Number]:
@@ -190,7 +161,7 @@ def _anywhere(room: FreeSpaceRecord | None) -> Number:
     if room is None or room.pose_p95_m is None:
         why = "not predicted" if room is None else f"not determined: {room.says}"
         return Number("anywhere", ANYWHERE, None, "m", DASH, why)
-    about = "one sigma of a single pose, in 95 % of the workspace; predicted, as far as the model is right"
+    about = "tool error, one sigma of a single pose, of 95 % of all poses; predicted, if the model is right"
     if room.p95_m is not None and room.p95_m > MOSTLY * room.pose_p95_m:
-        about += "; nearly all of it is what these data leave open of the arm's geometry"
+        about += "; nearly all of it is geometry that these readings do not determine"
     return Number("anywhere", ANYWHERE, room.pose_p95_m, "m", length(room.pose_p95_m), about)

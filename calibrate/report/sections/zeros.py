@@ -11,10 +11,10 @@ from calibrate.identification.estimates import Estimate, JointZero, joint_zeros
 from calibrate.identification.planned import rig_as_planned
 from calibrate.identification.point_constraint import PointConstraintResult, point_constraints
 from calibrate.report.elements import Html, bullets, figure, panels, section, table, tag
-from calibrate.report.not_determined import in_plain_words, plain_reason, reason_among, spectrum
+from calibrate.report.not_determined import in_plain_words, plain_reason, reason_among
 from calibrate.report.quantities import DASH, aligned, angle, decimals_of, fixed, length, significant
 from calibrate.report.session_evidence import SessionEvidence
-from calibrate.report.svg import drawn, log_axis
+from calibrate.report.svg import drawn, log_axis, spectrum
 from calibrate.report.tones import Tone
 from calibrate.report.workspace.workspace_errors import whole_covariance
 from calibrate.sensors import spots
@@ -95,9 +95,8 @@ def zeros_part(evidence: SessionEvidence) -> Iterator[Html]:
     yield tag("p", _reading(evidence), cls="lead")
     if any(z.sigma_rad is not None for z in zeros):
         caption = (
-            "How well each zero is known, on a logarithmic axis. A long line means that measuring more will not help: "
-            "the assumed tolerance of the links is the limit, because these data cannot separate the zero from the "
-            "links."
+            "Uncertainty of each zero, on a logarithmic axis. A long line: more poses will not help; the assumed "
+            "tolerance of the links is the limit, because these data do not separate the zero from the links."
         )
         yield figure(zero_uncertainties(zeros), caption)
 
@@ -142,9 +141,9 @@ def _rows(evidence: SessionEvidence, zeros: Sequence[JointZero], *, limits: bool
 def _reading(evidence: SessionEvidence) -> str:
     links = links_of(evidence.recording.rig)
     return (
-        f"Sigma includes what the links may be off the drawing ({links.length_sigma_m * 1e3:g} mm, "
-        f"{angle(links.angle_sigma_rad)}) as far as these data do not determine it. “Of measurement alone” is what "
-        "would remain if links and bracket were exactly as now fitted."
+        f"Sigma includes the assumed tolerance of the links ({links.length_sigma_m * 1e3:g} mm, "
+        f"{angle(links.angle_sigma_rad)}) where these data do not determine them. “Of measurement alone” "
+        "would remain if links and bracket were exactly as fitted."
     )
 
 
@@ -186,9 +185,9 @@ def point(evidence: SessionEvidence) -> Html:
         "point",
         POINT_TITLE,
         LEAD,
-        tag("h3", f"Four poses at place {found.placement}, as published"),
+        tag("h3", f"Four poses at station {found.placement}, as published"),
         *_one(found.four_poses, full, "four"),
-        tag("h3", f"All {found.poses} centred poses at place {found.placement}"),
+        tag("h3", f"All {found.poses} centred poses at station {found.placement}"),
         *_one(found.all_poses, full, "all"),
     )
 

@@ -111,7 +111,7 @@ def pictures(
                     dress(axes, grids[view], layer.title, what if view == 0 else "", first=k == 0)
         key = scale_says
         if width_in >= WIDTH_IN:  # else the words stand in the caption alone
-            key += "; hatched: not supported by these poses; circles: poses of the session; +: base"
+            key += "; hatched: not covered by the calibration poses; circles: poses of the session; +: base"
         scale_bar(figure, sheet.bar(figure), steps, key)
 
     return drawn(name, says, *sheet.size_in, paint)

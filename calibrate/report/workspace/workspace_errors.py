@@ -9,20 +9,27 @@ leverage of the data lies hidden extrapolation (Montgomery, Peck, Vining, Introd
 supports nothing.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from calibrate.arms.model import KinematicModel
+from calibrate.arms.rig_arm import limits_of
 from calibrate.blunders.rough_fit import frame_between
+from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.identifiability import Identifiability
 from calibrate.model_file import Covariance, Fields, FreeSpaceRecord
-from calibrate.parameters import Parameter, index_of
+from calibrate.parameters import Parameter, index_of, without_assumed
+from calibrate.report.not_determined import in_plain_words
+from calibrate.report.quantities import DASH, length
+from calibrate.report.session_evidence import SessionEvidence
+from calibrate.report.verdict import Number
 from calibrate.rigid import cross_matrix
 from calibrate.sensors.catalogue import LENGTHS
 from calibrate.uncertainty.free_space import FreeSpaceStatus, Scatter, target_by_parameter, variance_of_scatter
+from calibrate.unseen_along import analyse_along
 
 Floats = NDArray[np.float64]
 
@@ -97,11 +104,13 @@ class Room:
     found_m: Floats  # (pose,) as identified
     reach_m: Floats  # (pose, 3) of the target at poses between the limits
     session_m: Floats  # (row, 3) of the target at the poses of the session
+    limited_by: tuple[str, ...] = ()  # parameters without a number that make most of the error as identified
+    if_known_m: float = 0.0  # rms over the supported poses that would remain if these were known
 
 
 def room_of(known: KnownArm) -> Room:
-    """The same poses every time: a Sobol' sequence."""
-    sequence = qmc.Sobol(known.arm.n_joints, scramble=False).random_base2(REACH_LOG2)
+    """The same poses every time."""
+    sequence = even_points(2**REACH_LOG2, known.arm.n_joints)
     session = known.q_rad
     q_rad = between(sequence[: 2**POSES_LOG2], *np.quantile(session, (OUTERMOST, 1.0 - OUTERMOST), axis=0))
     points, slopes = target_by_parameter(known.arm, known, known.point_m, q_rad)
@@ -119,6 +128,19 @@ def room_of(known: KnownArm) -> Room:
         target_at(known, known.theta, between(sequence, known.lower_rad, known.upper_rad)),
         at_session,
     )
+
+
+def even_points(count: int, dimensions: int) -> Floats:
+    """(count, dimensions) points that fill the unit cube evenly: multiples, modulo 1, of powers of the number g with
+    g^(d+1) = g + 1.
+
+    Source: Roberts, The unreasonable effectiveness of quasirandom sequences, 2018; of this kind Niederreiter, Random
+    Number Generation and Quasi-Monte Carlo Methods, 1992, ch. 3.
+    """
+    g = 2.0
+    for _ in range(64):
+        g = (1.0 + g) ** (1.0 / (dimensions + 1))
+    return np.mod(0.5 + np.outer(np.arange(count), g ** -np.arange(1.0, dimensions + 1.0)), 1.0)
 
 
 def between(sequence: Floats, lower: Floats, upper: Floats) -> Floats:
@@ -155,3 +177,98 @@ def _apart(known: KnownArm, points_m: Floats, q_rad: Floats) -> Floats:
     as_drawn = target_at(known, known.drawn, q_rad)
     linear, shift = frame_between(as_drawn, points_m, np.ones(len(points_m)))
     return np.linalg.norm(as_drawn @ linear.T + shift - points_m, axis=1)
+
+
+SESSION = "the poses between the joint angles of the session"
+NOMINAL, CALIBRATED, WITH_PHYSICS = "nominal", "calibrated", "with physics"
+EVERY = 8  # of the supported poses: enough for a mean
+MATTERS = 0.95  # of the variance that remains with one parameter known: below, this parameter is named
+MOST = 0.5  # of the error that remains with all of them known: above, they are not the reason for its size
+
+
+def session_arm(evidence: SessionEvidence) -> KnownArm | str:
+    """The arm with its uncertainty, or why no error over the workspace can be determined."""
+    problem, model, theta = evidence.problem, evidence.model, evidence.theta
+    why = unpredicted(model.free_space)
+    if why is not None or model.free_space is None:
+        return why or ""
+    lower, upper = limits_of(evidence.recording.rig)
+    return KnownArm(
+        evidence.arm,
+        problem.parameters,
+        evidence.drawn,
+        theta,
+        whole_covariance(model.covariance, problem.parameters),
+        analyse_along(problem.fulfilled(theta), theta, without_assumed(problem.parameters)),
+        scatter_of(model.noise),
+        np.array(model.free_space.point_m),
+        lower,
+        upper,
+        evidence.q_rad,
+    )
+
+
+def session_room(evidence: SessionEvidence) -> Room | str:
+    """Errors of the tool over the workspace, or why none can be determined. About half a second."""
+    known = session_arm(evidence)
+    if isinstance(known, str):
+        return known
+    arm = {p.name for p in evidence.arm.parameters}
+    return limited(
+        known, room_of(known), [p.name for p in evidence.model.parameters if p.value is None and p.name in arm]
+    )
+
+
+def limited(known: KnownArm, room: Room, undetermined: Sequence[str]) -> Room:
+    """With the undetermined parameters that make most of the error, if any do.
+
+    A known parameter takes its part of the covariance of all others away (Schur complement).
+    """
+    column, q_rad = index_of(known.parameters), room.q_rad[room.supported][::EVERY]
+    points, slopes = target_by_parameter(known.arm, known, known.point_m, q_rad)
+    rigid = np.asarray(np.linalg.lstsq(_rigid(points), slopes.reshape(-1, slopes.shape[-1]), rcond=None)[0], float)
+    scatter = variance_of_scatter(known.arm, known, points, q_rad, known.scatter)
+
+    def variance(names: Sequence[str]) -> float:
+        k, C = [column[name] for name in names], known.covariance
+        left = C - C[:, k] @ np.linalg.pinv(C[np.ix_(k, k)]) @ C[k]
+        return float(np.mean(_variance(replace(known, covariance=left), points, slopes, rigid) + scatter))
+
+    whole = variance(())
+    names = tuple(name for name in undetermined if variance((name,)) < MATTERS * whole)
+    left_m = float(np.sqrt(variance(names)))
+    return replace(room, limited_by=names, if_known_m=left_m) if names and left_m < MOST * np.sqrt(whole) else room
+
+
+def tool_numbers(room: Room | str, diagnosis: DiagnosisFile | None = None) -> Iterator[Number]:
+    """Over the workspace, where the data support a statement: nominal arm, calibrated, and with the physics found.
+
+    What missing physics adds to geometry alone is what the diagnosis predicts: independent of the uncertainty of the
+    geometry, hence added in quadrature.
+    """
+    if isinstance(room, str):
+        why = f"is not determined: {room}"
+        yield Number("tool_nominal", NOMINAL, None, "m", DASH, why)
+        yield Number("tool_calibrated", CALIBRATED, None, "m", DASH, why)
+        return
+    nominal, found = (float(np.sqrt(np.mean(e[room.supported] ** 2))) for e in (room.drawn_m, room.found_m))
+    missed = _missed_by_geometry(diagnosis)
+    calibrated = float(np.hypot(found, missed))
+    where = f"Rms over {SESSION}; calibrated: one sigma, predicted."
+    if room.limited_by:
+        named = " and ".join(in_plain_words(name) for name in room.limited_by)
+        where += (
+            f" Nearly all of the calibrated error is the assumed tolerance of {named}, which these readings do not "
+            f"determine: with known values it would be {length(room.if_known_m)}."
+        )
+    yield Number("tool_nominal", NOMINAL, nominal, "m", length(nominal), f"{where} The base is put where it fits best.")
+    yield Number("tool_calibrated", CALIBRATED, calibrated, "m", length(calibrated), where)
+    if missed > 0.0:
+        about = f"{where} The physics found by the diagnosis accounts for {length(missed)} of it."
+        yield Number("tool_physics", WITH_PHYSICS, found, "m", length(found), about)
+
+
+def _missed_by_geometry(diagnosis: DiagnosisFile | None) -> float:
+    """In m, rms over the workspace; 0 where no diagnosis has it."""
+    change = None if diagnosis is None or not diagnosis.findings else diagnosis.free_space
+    return 0.0 if change is None else float(np.sqrt(max(change.rms_before_m**2 - change.rms_after_m**2, 0.0)))

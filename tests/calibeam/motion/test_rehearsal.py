@@ -29,11 +29,11 @@ def boxed(rig: Rig, *lower_upper: tuple[float, float, float]) -> Rig:
 
 def test_the_cell_of_the_rig_file_leaves_its_session_free_and_it_is_drawn(rig: Rig, tmp_path: Path) -> None:
     said = draw_session(rig, tmp_path / "session.svg", FEW)
-    assert said.startswith("18 poses at 3 places, all within reach and clear of the keep-out boxes")
+    assert said.startswith("18 poses at 3 stations, all within reach and clear of the keep-out boxes")
     text = (tmp_path / "session.svg").read_text()
     assert "post of place 2" in text
     assert "calibrating area, 0.25 m/s" in text
-    assert "place 3" in text
+    assert "station 3" in text
 
 
 def test_a_box_at_one_place_is_told_with_the_first_pose_that_it_costs(rig: Rig) -> None:
@@ -41,7 +41,7 @@ def test_a_box_at_one_place_is_told_with_the_first_pose_that_it_costs(rig: Rig) 
     rehearsed = rehearse(boxed(rig, (x - 0.2, y - 0.2, z - 0.2), (x + 0.2, y + 0.2, z + 0.2)), FEW)
     assert rehearsed.refused
     assert {2} <= {stop.placement for stop in rehearsed.refused}
-    assert "the first: place" in rehearsed.says
+    assert "the first: station" in rehearsed.says
     assert "keep-out box 'crate'" in rehearsed.says
 
 

@@ -11,7 +11,7 @@ from calibrate.report.drift.drift_chapter import drift_chapter, sentence
 from calibrate.report.drift.two_calibrations import Calibration, drift_of
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_report import session_answers
-from calibrate.report.session_workspace import session_arm
+from calibrate.report.workspace.workspace_errors import session_arm
 
 MOVED_RAD = 3.7e-4
 

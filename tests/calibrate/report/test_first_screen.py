@@ -10,8 +10,8 @@ import pytest
 
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_report import session_answers
-from calibrate.report.session_workspace import session_room
 from calibrate.report.verdict import MARKS, Answers, Number, Trust, Verdict, first_screen
+from calibrate.report.workspace.workspace_errors import session_room
 
 QUESTIONS = ("How good is it now?", "Can I trust it?", "What to do?")
 PAGE_MM, PANEL_MM = 182.0, 88.0  # of A4 less the margins of report.css; half of it less the gap

@@ -16,7 +16,7 @@ from calibrate.report.sections.proofs import proofs_chapter
 from calibrate.report.sections.recorded_data import data_chapter
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_report import session_answers
-from calibrate.report.session_workspace import session_arm
+from calibrate.report.workspace.workspace_errors import session_arm
 
 NEWER = ("alarms", "proofs", "unproven", "observability", "free_space", "bootstrap", "plan")
 

@@ -106,8 +106,8 @@ def test_the_point_constraint_stands_beside_the_fit_where_the_plan_names_it(reco
     np.testing.assert_allclose(found.theta, spots.theta, atol=1e-9)  # the model is that of the fit
     told = text_of(session_page(session_evidence(recorded, session_model(found, recorded, planned))))
     assert "Point constraint" in told
-    assert "Four poses at place" in told
-    assert "centred poses at place" in told
+    assert "Four poses at station" in told
+    assert "centred poses at station" in told
 
 
 def test_without_a_fit_that_ended_nothing_is_trusted(spots) -> None:

@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 
 from calibrate.fit import solve
 from calibrate.report.session_evidence import session_evidence
-from calibrate.report.session_workspace import deleted_misfit, session_arm, session_measured, workspace
+from calibrate.report.session_workspace import deleted_misfit, session_measured, workspace
 from calibrate.report.workspace.cells import ABOVE, SIDE, Grid, grid_of, paint_measured, paint_poses, steps_for
-from calibrate.report.workspace.workspace_errors import room_of
+from calibrate.report.workspace.workspace_errors import room_of, session_arm
 
 
 @pytest.fixture(scope="module")
