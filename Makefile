@@ -55,7 +55,7 @@ prove: $(BENCH)/.ready
 
 # Its table into the README: of the published seed only.
 prove-table: $(READY)
-	$(BIN)/python -m calibeam.prove.published out/proof/proof.json docs/figures.md
+	$(BIN)/python -m benchmarks.proof_table out/proof/proof.json docs/figures.md
 
 # Effects taken out of the catalogue, one after the other: their cases have to turn into "unknown, at the right place".
 mutate: $(READY)

@@ -17,7 +17,7 @@ def test_the_published_table_holds(tmp_path: Path) -> None:
     text = tmp_path / "table.md"
     text.write_text("<!-- proof: begin -->\n<!-- proof: end -->\n", encoding="utf-8")
     _run("calibeam", "prove", *CASES, "--publish", "--out", tmp_path / "proof")
-    _run("calibeam.prove.published", tmp_path / "proof" / "proof.json", text)
+    _run("benchmarks.proof_table", tmp_path / "proof" / "proof.json", text)
     assert worse(text.read_text(encoding="utf-8"), frozen_table().read_text(encoding="utf-8")) == []
 
 

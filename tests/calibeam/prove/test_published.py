@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from calibeam.prove.published import BEGIN, END, table_of, wanted_words, with_table
+from benchmarks.proof_table import BEGIN, END, table_of, wanted_words, with_table
 from calibeam.prove.record import SCHEMA, CaseScore, DefectScore, ProofFile
 from calibeam.prove.tally import ProofFigure
 from calibrate.errors import DataError

@@ -1,4 +1,4 @@
-"""`python -m calibeam.prove.published proof.json docs/figures.md`: the table of a proof, between two marks of a text.
+"""`python -m benchmarks.proof_table proof.json docs/figures.md`: the table of a proof, between two marks of a text.
 
 So that the table is never typed, and always that of a file.
 """
