@@ -12,6 +12,7 @@ from calibrate.report.diagnosis.words import (
     free_space_words,
     limit_words,
     micrometres,
+    missing_lines,
     noise_words,
     place_words,
     rival_words,
@@ -60,7 +61,7 @@ def _brief(file: DiagnosisFile) -> Iterator[str]:
     yield from _few([f"noise: {line}" for line in noise_words(file)])
     yield from limit_words(file)
     yield from _few([f"not completed: {one.stage}: {one.reason}" for one in file.incomplete])
-    yield from _few([f"not tested: {one.physics} (column {one.column} is missing)" for one in file.not_recorded])
+    yield from _few(missing_lines(file))
     yield from _few([f"next: {line}" for line in file.next])
 
 
@@ -143,8 +144,7 @@ def _doubt(file: DiagnosisFile) -> Iterator[str]:
     if file.free_space is not None:
         yield free_space_words(file.free_space)
     yield from stream_words(file)
-    for missing in file.not_recorded[:MOST]:
-        yield f"not tested: {missing.physics} (column {missing.column} is missing)"
+    yield from missing_lines(file)[:MOST]
 
 
 def _proof(file: DiagnosisFile) -> Table:

@@ -127,14 +127,8 @@ def _with_noise(diagnosis: Diagnosis, model: Fitted, rng: Generator) -> Diagnosi
     if not more:
         return replace(diagnosis, noise=noise)
     first = () if diagnosis.unexplained else records(hidden_of(diagnosis.missing))
-    return replace(
-        diagnosis,
-        noise=noise,
-        findings=tuple(map(doubtful, diagnosis.findings)),
-        unexplained=(*diagnosis.unexplained, *more),
-        next=tuple(dict.fromkeys((*first, *diagnosis.next))),
-        verdict=Verdict.UNDECIDABLE if diagnosis.verdict is Verdict.CONSISTENT else diagnosis.verdict,
-    )
+    findings, then = tuple(map(doubtful, diagnosis.findings)), tuple(dict.fromkeys((*first, *diagnosis.next)))
+    return _with_unexplained(replace(diagnosis, noise=noise, findings=findings, next=then), more)
 
 
 def _fitted(diagnosis: Diagnosis) -> Fitted:

@@ -137,6 +137,13 @@ def untested_physics(file: DiagnosisFile) -> tuple[str, ...]:
     return tuple(dict.fromkeys(m.physics for m in file.not_recorded if m.physics not in tested))
 
 
+def missing_lines(file: DiagnosisFile) -> list[str]:
+    """What lacks a column, and was tested by other columns in part or not at all."""
+    untested = untested_physics(file)
+    each = [("not tested" if m.physics in untested else "tested in part", m) for m in file.not_recorded]
+    return [f"{how}: {m.physics} (column {m.column} is missing)" for how, m in sorted(each, key=lambda one: one[0])]
+
+
 def confusable_causes(file: DiagnosisFile) -> tuple[tuple[NameRecord, NameRecord, float], ...]:
     """Pairs that the poses cannot separate, the most alike first; forms of one cause are no pair of causes."""
     pairs = (pair for pair in file.confusable if (pair[0].physics, pair[0].where) != (pair[1].physics, pair[1].where))

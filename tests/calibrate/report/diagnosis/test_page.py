@@ -30,7 +30,7 @@ from calibrate.errors import DataError
 from calibrate.model_file import ModelParameter
 from calibrate.report.diagnosis.diagnosis_page import beyond_model, chapters_of, contents_of, inserted
 from calibrate.report.diagnosis.finding_page import chain_figure, chain_of, interval_words, size_words
-from calibrate.report.diagnosis.words import verdict_words
+from calibrate.report.diagnosis.words import missing_lines, verdict_words
 
 Q = np.linspace(-1.5, 1.5, 60)
 CURVE = CurveRecord(
@@ -192,9 +192,11 @@ def test_a_cause_is_never_both_tested_and_not_tested():
     page = "".join(chapters_of(both, 6))
     assert "Not tested: columns that are missing" not in page
     assert "payload_kg" in page
+    assert missing_lines(both) == ["tested in part: payload-compliance (column payload_kg is missing)"]
     other = msgspec.structs.replace(SMALLEST, physics="joint-compliance")
     neither = msgspec.structs.replace(consistent, smallest=(other,))
     assert "Not tested: columns that are missing" in "".join(chapters_of(neither, 6))
+    assert missing_lines(neither) == ["not tested: payload-compliance (column payload_kg is missing)"]
 
 
 def test_no_cause_is_confused_with_itself():
