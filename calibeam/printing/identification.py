@@ -161,6 +161,8 @@ def _brief(result: Identification) -> Iterator[str]:
     if missing:
         shown = ", ".join(missing[:NAMED]) + (f" and {len(missing) - NAMED} more" if len(missing) > NAMED else "")
         yield f"not determined: {shown} (why: --verbose)"
+    if sum(map(_of_joint, missing)) > len(zeros) and any(name.startswith("link") for name, *_ in known):
+        yield 'joint zeros alone, links held as nominal: --plan with the lines  schema = 1  and  hold = ["link*"]'
 
 
 NAMED = 4  # undetermined parameters

@@ -48,6 +48,7 @@ NO_OFFSETS = (
     "every offset is empty: beside free lengths and axes no zero is clear; for the best zeros alone, identify with a "
     'fit plan that holds the others: schema = 1, hold = ["link*"]'
 )
+TOGETHER = "identified together with lengths and axes: for offsets alone, identify with a fit plan that holds those"
 NO_UR = "no arm of Universal Robots has one; take another form, or correct the rig"
 GUESSED = "the rig file does not hold how its motors are coupled: offsets of motors would be guesses"
 FORMS: tuple[ExportForm, ...] = (
@@ -128,8 +129,8 @@ def export_model(path: Path, rig: Rig, model: ModelFile, form: ExportForm) -> tu
         rig, corrections(model), model.about.get("tool"), says, model.parameters, compliance, model.covariance
     )
     freed = any(p.name.startswith("link") and p.value is not None for p in model.parameters)
-    if form.offsets and freed and all(refused(zero) for zero in arm.zeros):
-        says = (*says, NO_OFFSETS)
+    if form.offsets and freed:
+        says = (*says, NO_OFFSETS if all(refused(zero) for zero in arm.zeros) else TOGETHER)
         arm = replace(arm, not_carried=says)
     partial = path.with_name(path.name + ".partial")
     partial.write_text(form.text(arm), encoding="utf-8")

@@ -16,7 +16,6 @@ EXPLAINED = (
     "true angle = reading + offset, in the robot's own signs",
     "entered rightly, the reading of an axis that rests changes by its offset",
     "offsets that are not to be entered are empty; the last column has the reason",
-    "identified together with lengths and axes: for offsets alone, identify with a plan that holds those",
 )
 KUKA = "KUKA mastering: add offset_deg to $MAMES of the axis, then master it"
 FANUC = "FANUC mastering: a joint that reads r stands at r + offset_deg, which single-axis mastering is to be given"

@@ -87,7 +87,9 @@ def test_what_only_an_unstated_belief_determines_has_no_number(silent, bent):
     found = found_in(silent, bent(53))
     why = {e.name: e.why for e in found.estimates}
     assert {"link1.offset", "link6.offset", "link6.length", "link6.twist"} <= {n for n, w in why.items() if w}
-    assert why["link6.twist"].startswith("only its prior speaks of it: 0.01 rad, assumed for want of a [tolerance]")
+    assert why["link6.twist"].startswith(
+        "known from its assumed tolerance only: ± 10 mrad, assumed for want of a [tolerance]"
+    )
     for p, e in zip(found.parameters, found.estimates, strict=True):
         if p.assumed and e.value is not None:
             assert e.sigma < 0.1 * p.prior  # the data say it, not the belief

@@ -76,7 +76,7 @@ def test_a_drawing_is_not_given_back_as_a_finding(rig, session):
     q[:, 4:] = 0.4  # two joints that never move show nothing of what is behind them
     result = run(rig, table(q, **session.positions(q, TRACKER_M)), held_out_share=0.0)
     why = {e.name: e.why for e in result.estimates}
-    assert why["link6.twist"].startswith("only its prior speaks of it")
+    assert why["link6.twist"].startswith("known from its assumed tolerance only")
     assert why["link2.length"] is None
 
 
