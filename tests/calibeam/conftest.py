@@ -5,6 +5,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from acquisition.recording.rig import Rig, load_rig
@@ -18,6 +19,12 @@ RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
 @pytest.fixture(scope="session")
 def rig() -> Rig:
     return load_rig(RIG)
+
+
+def brisk(rig: Rig) -> Rig:
+    """The rig at one place of its fixture, moved near the arm's own limits: a session mostly waits for travel."""
+    motion = msgspec.structs.replace(rig.motion, speed_rad_s=3.0, acceleration_rad_s2=15.0)
+    return msgspec.structs.replace(rig, placement_list=rig.placement_list[:1], motion=motion)
 
 
 @pytest.fixture

@@ -177,7 +177,7 @@ def rms_error_m(reached_m, wanted_m):
 
 
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize("count", [40, pytest.param(200, marks=pytest.mark.endure)])
+@pytest.mark.parametrize("count", [20, pytest.param(200, marks=pytest.mark.endure)])
 def test_the_true_tool_reaches_the_corrected_poses_over_the_wires(wires, tmp_path, count):
     calibrated(tmp_path)
     wanted_m, nominal_rad, via, poses = corrected(tmp_path, count)

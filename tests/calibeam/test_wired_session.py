@@ -1,4 +1,4 @@
-"""Sessions over real wires: what the recording holds, and every way in which a session can end early."""
+"""Sessions over real wires: every way in which one can end early. Whole ones: test_same_on_wires.py."""
 
 import os
 import signal
@@ -23,6 +23,8 @@ from calibeam.outcome import PartialResult
 from calibeam.printing.progress import progress_bar
 from drivers.clock import SystemClock
 from drivers.ur.reader import UrReader
+
+from .conftest import brisk
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
 
@@ -64,8 +66,7 @@ class Takes:
 
 @pytest.fixture
 def takes(rig: Rig, emulation: Emulation, tmp_path: Path) -> Takes:
-    one_place = msgspec.structs.replace(rig, placement_list=rig.placement_list[:1])
-    return Takes(one_place, emulation, tmp_path / "recording.mcap")
+    return Takes(brisk(rig), emulation, tmp_path / "recording.mcap")
 
 
 def arm_speed_rad_s(emulation: Emulation) -> float:
@@ -75,21 +76,6 @@ def arm_speed_rad_s(emulation: Emulation) -> float:
         return float(np.max(np.abs(reader.read(2.0).values["actual_qd_rad_s"][-1])))
     finally:
         reader.close()
-
-
-def test_a_whole_session_is_in_the_recording(takes: Takes) -> None:
-    summary = takes.run()
-    recording = takes.recording()
-    assert recording.complete
-    assert len(recording.samples) == len(summary.samples) == 12
-    assert set(recording.streams) == {"psd", "spots", "robot", "encoders"}
-    assert recording.streams["psd"].gaps == ()
-    assert recording.streams["robot"].gaps == ()
-    q_rad, link_rad = recording.samples.joints(), recording.samples.encoders()
-    # Link-side encoders stand off by a constant each: zero, mounting and repeatability; they count 6 urad.
-    assert np.max(np.abs((link_rad - q_rad) - np.median(link_rad - q_rad, axis=0))) < 3e-5
-    kinds = {event.kind for event in recording.events}
-    assert {"placement", "centring", "end"} <= kinds
 
 
 def test_a_protective_stop_ends_the_session_and_keeps_the_samples(takes: Takes) -> None:
