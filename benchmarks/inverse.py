@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.motion.inverse.closed_form import closed_form
-from acquisition.motion.inverse.solve import solve_many
 from acquisition.recording.rig import load_rig
+from benchmarks.many_poses import solve_many
 from calibrate.arms.belief import HELD_AS_DRAWN
 from calibrate.arms.catalogue import dh_rows
 from calibrate.arms.dh import DhArm, DhLink

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from acquisition.motion.inverse.closed_form import closed_form
-from acquisition.motion.inverse.solve import all_solutions, solve_many, within
+from acquisition.motion.inverse.solve import all_solutions, within
 from acquisition.motion.kinematics import flange, jacobian
+from benchmarks.many_poses import solve_many
 from tests.acquisition.motion.conftest import irb120, ur5e
 
 POSES = 10_000
