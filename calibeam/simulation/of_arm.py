@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibeam.simulation.found import FoundEffect
+from calibrate.effects.fixture_moved import CARRIED
 from calibrate.effects.hand_force import FORCE_N
 from calibrate.effects.term import Shape
 from simulators.arm.rigid import Vector
@@ -143,7 +144,7 @@ def course_of(f: FoundEffect) -> tuple[Course, float, float]:
     return "steady", 0.0, f.session.length_s
 
 
-def carried(f: FoundEffect, pose: Floats, sense: float, kind: type[CarriedPart], **more: int) -> Defect:
+def carried(f: FoundEffect, pose: Floats, sense: float, kind: type[CarriedPart], **more: float) -> Defect:
     """The six of a motion about the middle of what was reached, in a part's own frame `pose`."""
     turn = pose[:3, :3].T
     six = np.zeros(6)
@@ -159,8 +160,18 @@ def make_device(f: FoundEffect) -> Defect:
 
 
 def make_fixture(f: FoundEffect) -> Defect:
-    place = int(f.variant.removeprefix("place "))
-    return carried(f, f.session.light.places[place - 1], 1.0, CarriedFixture, place=place)
+    place = int(f.variant.removeprefix("place ").removesuffix(CARRIED))
+    until_s = taken_away_s(f, place) if f.variant.endswith(CARRIED) else np.inf
+    return carried(f, f.session.light.places[place - 1], 1.0, CarriedFixture, place=place, until_s=until_s)
+
+
+def taken_away_s(f: FoundEffect, place: int) -> float:
+    """On the session's clock, when the station was next another after a knock."""
+    spots, t_s = f.session.drivers.light, f.session.drivers.t_s
+    if spots is None or spots.place is None:
+        return np.inf
+    after = t_s[spots.seen & (spots.place != place) & (t_s >= f.size("time_s"))]
+    return float(after.min(initial=np.inf)) - f.session.start_s
 
 
 def make_cone(f: FoundEffect) -> Defect:

@@ -8,7 +8,13 @@ from calibrate.effects.drivers import Drivers
 from calibrate.effects.kind import Kind
 from calibrate.effects.moved import in_use, motion
 from calibrate.effects.term import Holds, Shape, Term
+from calibrate.effects.time_laws import Law
 
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+CARRIED, TAKEN_AWAY = ", until carried", " until it was taken away"
 ONE_BODY = "all stations"  # a fixture that holds its stations together moves them all
 IN_TURNS = 3  # changes of station for each of them
 
@@ -18,7 +24,8 @@ def _terms(drivers: Drivers) -> tuple[Term, ...]:
     if spots is None or spots.place is None:
         return ()
     out: list[Term] = []
-    if _in_turns(drivers, spots.place, spots.seen) and (inner := time_laws.step_inner(drivers, spots.seen)):
+    in_turns = _in_turns(drivers, spots.place, spots.seen)
+    if in_turns and (inner := time_laws.step_inner(drivers, spots.seen)):
         there, what = in_use(spots.seen), "The fixture with all its stations"
         out.append(
             motion(
@@ -27,24 +34,14 @@ def _terms(drivers: Drivers) -> tuple[Term, ...]:
         )
     for place in np.unique(spots.place[spots.seen]).tolist():
         at_place = spots.seen & (spots.place == place)
-
-        there = in_use(at_place)
-
-        what = f"The fixture at station {place}"
+        there, what, variant = in_use(at_place), f"The fixture at station {place}", f"place {place}"
         if inner := time_laws.step_inner(drivers, at_place):
-            out.append(
-                motion(
-                    "fixture.pose",
-                    "fixture-moved",
-                    "t",
-                    Shape.STEP,
-                    time_laws.step,
-                    what,
-                    inner,
-                    there,
-                    variant=f"place {place}",
-                )
-            )
+            where = ("fixture.pose", "fixture-moved", "t", Shape.STEP)
+            out.append(motion(*where, time_laws.step, what, inner, there, variant=variant))
+            stay = _stays(drivers, spots.place, spots.seen)
+            if not in_turns and len(np.unique(stay[at_place])) > 1:
+                carried = _until_carried(at_place, stay)
+                out.append(motion(*where, carried, what, inner, there, variant=variant + CARRIED, ending=TAKEN_AWAY))
         out.append(
             motion(
                 "fixture.pose",
@@ -55,13 +52,33 @@ def _terms(drivers: Drivers) -> tuple[Term, ...]:
                 what,
                 (),
                 there,
-                variant=f"place {place}",
+                variant=variant,
             )
         )
     return tuple(out)
 
 
-def _in_turns(drivers: Drivers, place: NDArray[np.int64], seen: NDArray[np.bool_]) -> bool:
+def _until_carried(at_place: Bools, stay: Ints) -> Law:
+    """(pose, 1) one after a time, while the fixture stays at its station: put there again, it stands as before."""
+
+    def law(drivers: Drivers, inner: Floats) -> Floats:
+        after = at_place & (drivers.t_s >= inner[0])
+        if after.any() and np.isfinite(inner[0]):  # always there: every stay would have felt it
+            after &= stay == stay[np.flatnonzero(after)[np.argmin(drivers.t_s[after])]]
+        return after.astype(float)[:, None]
+
+    return law
+
+
+def _stays(drivers: Drivers, place: Ints, seen: Bools) -> Ints:
+    """(pose,) how often the fixture had been carried to another station by then; -1 where no station was seen."""
+    order = np.flatnonzero(seen)[np.argsort(drivers.t_s[seen], kind="stable")]
+    out = np.full(len(seen), -1, dtype=np.int64)
+    out[order] = np.concatenate([[0], np.cumsum(np.diff(place[order]) != 0)])
+    return out
+
+
+def _in_turns(drivers: Drivers, place: Ints, seen: Bools) -> bool:
     """Whether the arm goes to and fro between stations; one fixture that is carried stays at each for a while."""
     visited = place[seen][np.argsort(drivers.t_s[seen], kind="stable")]
     stations = len(np.unique(visited))

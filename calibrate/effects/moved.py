@@ -38,6 +38,7 @@ def motion(
     width: int = 6,
     variant: str = "",
     open_family: bool = False,
+    ending: str = "",
 ) -> Term:
     """Shift and turn by a law of drivers, about the middle of what the arm reached (turns and shifts stay apart).
 
@@ -71,7 +72,8 @@ def motion(
         sentence=f"{what} moved by {sizes[0]} in x, y, z of the base"
         + (f" and turned by {sizes[1]}" if width == 6 else "")
         + (f" with {driver}" if driver != "t" else "")
-        + time_laws.when(inner),
+        + time_laws.when(inner)
+        + ending,
     )
 
 

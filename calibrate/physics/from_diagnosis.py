@@ -25,6 +25,7 @@ from calibrate.diagnose.noise_of_fit import freedom
 from calibrate.diagnose.stated_sizes import sizes_of
 from calibrate.effects.catalogue import holds_of
 from calibrate.effects.drivers import Drivers
+from calibrate.effects.fixture_moved import CARRIED
 from calibrate.effects.ports import Perturbation, Place
 from calibrate.effects.second_encoders import SECOND
 from calibrate.effects.term import Shape, Size
@@ -229,7 +230,8 @@ def _effects(
         mine, finding = np.flatnonzero(fit.problem.owner == i), _finding_of(a, findings)
         sizes = sizes_of(bench, i) if finding is None and not a.term.open else None
         out.append(_effect(a, name, finding, fit.drivers, covariance[np.ix_(mine, mine)], sizes))
-    return (*out, *(_aftermath(effect) for effect in out if effect.shape == Shape.STEP.value))
+    lasting = (e for e in out if e.shape == Shape.STEP.value and not e.variant.endswith(CARRIED))
+    return (*out, *map(_aftermath, lasting))
 
 
 def _aftermath(effect: Effect) -> Effect:

@@ -87,9 +87,10 @@ class MovedCone(Defect):
 
 @dataclass(frozen=True)
 class CarriedFixture(CarriedPart):
-    """The fixture while it stands at a place, in the frame of PSD 1."""
+    """The fixture while it stands at a place, and until it is taken away there, in the frame of PSD 1."""
 
     place: int = 1
+    until_s: float = np.inf
 
     KIND = "carried-fixture"
     PHYSICS = "fixture-moved"
@@ -97,5 +98,5 @@ class CarriedFixture(CarriedPart):
     INSTRUMENTS = SPOTS
 
     def fixture_motion(self, scene: Scene) -> Floats:
-        here = (scene.placement == self.place)[:, np.newaxis, np.newaxis]
-        return np.where(here, self.carried(scene), np.eye(4))
+        here = (scene.placement == self.place) & (scene.t_s < self.until_s)
+        return np.where(here[:, np.newaxis, np.newaxis], self.carried(scene), np.eye(4))
