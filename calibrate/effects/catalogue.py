@@ -65,14 +65,14 @@ EFFECTS: tuple[Effect, ...] = (
     link_thermal_growth.EFFECT,
     arm_thermal_growth.EFFECT,
     base_compliance.EFFECT,
-    device_drift.EFFECT,  # before base-moved: alike to every reading, and a tripod gives way before a bolted base
+    device_drift.EFFECT,  # before base-moved: alike to every reading, and a tripod gives way before a bolted base,
+    fixture_moved.EFFECT,  # as does what is carried about
     base_moved.EFFECT,
     tool_sag.EFFECT,
     tool_moved.EFFECT,
     laser_moved.EFFECT,
     laser_warm_up.EFFECT,
     laser_thermal_drift.EFFECT,
-    fixture_moved.EFFECT,
     psd_gain.EFFECT,
     psd_nonlinearity.EFFECT,
     psd_ambient_light.EFFECT,

@@ -35,26 +35,16 @@ def _terms(drivers: Drivers) -> tuple[Term, ...]:
     for place in np.unique(spots.place[spots.seen]).tolist():
         at_place = spots.seen & (spots.place == place)
         there, what, variant = in_use(at_place), f"The fixture at station {place}", f"place {place}"
+        step = ("fixture.pose", "fixture-moved", "t", Shape.STEP)
         if inner := time_laws.step_inner(drivers, at_place):
-            where = ("fixture.pose", "fixture-moved", "t", Shape.STEP)
-            out.append(motion(*where, time_laws.step, what, inner, there, variant=variant))
-            stay = _stays(drivers, spots.place, spots.seen)
-            if not in_turns and len(np.unique(stay[at_place])) > 1:
-                carried = _until_carried(at_place, stay)
-                out.append(motion(*where, carried, what, inner, there, variant=variant + CARRIED, ending=TAKEN_AWAY))
-        out.append(
-            motion(
-                "fixture.pose",
-                "fixture-moved",
-                "t",
-                Shape.LINEAR,
-                time_laws.steadily,
-                what,
-                (),
-                there,
-                variant=variant,
-            )
-        )
+            out.append(motion(*step, time_laws.step, what, inner, there, variant=variant))
+        stay = _stays(drivers, spots.place, spots.seen)
+        taken_away = at_place & (stay < stay[at_place].max())  # in the last stay both laws are one
+        if not in_turns and (inner := time_laws.step_inner(drivers, taken_away)):
+            carried = _until_carried(at_place, stay)
+            out.append(motion(*step, carried, what, inner, there, variant=variant + CARRIED, ending=TAKEN_AWAY))
+        steady = (Shape.LINEAR, time_laws.steadily, what)
+        out.append(motion("fixture.pose", "fixture-moved", "t", *steady, (), there, variant=variant))
     return tuple(out)
 
 

@@ -11,6 +11,7 @@ from calibrate.diagnose.from_recording import diagnose_samples, runs_of
 from calibrate.diagnose.session import session_of
 from calibrate.diagnose.to_file import file_of
 from calibrate.errors import DataError
+from calibrate.physics.from_diagnosis import model_of_diagnosis
 
 from .concealed import changed, recording_of
 
@@ -76,6 +77,26 @@ def test_readings_that_err_one_after_another_are_no_gross_errors_of_single_readi
     ).physics.diagnosis
     assert found.verdict is Verdict.UNDECIDABLE
     assert "rows 51 to 54" in found.unexplained[0].why
+
+
+def test_a_fixture_that_was_knocked_and_carried_on_stands_as_before_when_it_comes_back(tmp_path):
+    """Station 1 is visited first and last; the knock at its first visit is no gross error and no lasting move."""
+    wanted = {"family": "dual-psd", "seed": 7, "samples": 120, "places": 3, "defects": ("bumped-fixture",), "enr": 6.0}
+    recording = recording_of(tmp_path, **wanted)
+    diagnosed = diagnose_samples(recording.rig, recording.samples, np.random.default_rng(1))
+    found = diagnosed.physics
+    (finding,) = found.diagnosis.findings
+    assert (finding.name.physics, finding.name.where) == ("fixture-moved", "fixture.pose")
+    assert finding.says.startswith("The fixture at station 1 moved")
+    assert finding.says.endswith("until it was taken away")
+    (term,) = found.model.accepted
+    moved = np.any(term.term.basis(found.model.drivers, term.inner) != 0.0, axis=(1, 2))
+    t_s, station = recording.samples.column("t_s"), recording.samples.column("placement")
+    first_visit = (station == 1) & (t_s < t_s[station == 2].min())
+    assert moved.any()
+    assert not np.any(moved & ~first_visit)
+    left = model_of_diagnosis(diagnosed, recording).effects
+    assert [effect.holds for effect in left] == ["session"]  # nothing of it stays for later ones
 
 
 def test_gross_errors_here_and_there_are_no_run():
