@@ -15,6 +15,7 @@ from calibeam.results.comparison import (
     StreamRecord,
 )
 from calibeam.results.reconciliation import ReconcileFile
+from calibrate.effects.term import with_sigma
 from calibrate.report.quantities import length
 
 MOST_DIFFERENCES = 14  # differences in a terminal; all of them stand in the file
@@ -111,8 +112,8 @@ def _streams(streams: tuple[StreamRecord, ...]) -> Table:
         if one.offset_s is None or one.rms is None or one.noise is None:
             table.add_row(one.stream, "-", "-", "-", "-", one.status)
             continue
-        drift = "-" if one.drift is None else f"{1e6 * one.drift:+z.2f} ± {1e6 * (one.drift_sigma or 0.0):.2g}"
-        offset = f"{one.offset_s:+z.6f} ± {one.offset_sigma_s:.2g}"
+        drift = "-" if one.drift is None else with_sigma(1e6 * one.drift, 1e6 * (one.drift_sigma or 0.0))
+        offset = with_sigma(one.offset_s, one.offset_sigma_s or 0.0)
         parts = "other motion" if one.parts is None else "yes" if one.parts else "no"
         table.add_row(one.stream, offset, drift, _size(one.rms, one.unit), _size(one.noise, one.unit), parts)
     return table

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from calibrate.default_belief import said_of
+from calibrate.effects.term import Size, plain
 from calibrate.identification.estimates import ONLY_BELIEVED, JointZero
 from calibrate.identification.evidence_record import parameter_records
 from calibrate.identification.point_constraint import PointConstraints
@@ -316,4 +317,4 @@ def refitted_lines(model: ModelFile) -> Iterator[str]:
 def _sizes(effect: Effect) -> Iterator[str]:
     for name, size in effect.parameters.items():
         if size.value is not None and size.sigma is not None:
-            yield f"{name} {size.value:.4g} ± {size.sigma:.2g}"
+            yield f"{name}: {plain(name, Size(size.value, size.sigma))}"

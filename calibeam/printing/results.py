@@ -6,6 +6,7 @@ from rich.console import Console
 from rich.table import Table
 
 from calibrate.diagnose.schema import ClockRecord, DiagnosisFile, FindingRecord
+from calibrate.effects.term import with_sigma
 from calibrate.report.diagnosis.words import (
     SPLITS,
     before_after,
@@ -132,7 +133,7 @@ def _changes(file: DiagnosisFile) -> Iterator[str]:
     """Beside a model: which of its values are others now, and which of its effects took no part."""
     for one in file.changed:
         known = "" if one.known is None else f" (known: {one.known:.6g})"
-        yield f"changed: {one.parameter} by {one.by:+.3g} ± {one.sigma:.2g}{known}"
+        yield f"changed: {one.parameter} by {with_sigma(one.by, one.sigma)}{known}"
     if file.known is not None and file.known.left_out:
         yield f"not applied, true of another recording only: {', '.join(file.known.left_out)}"
 

@@ -1,8 +1,8 @@
 """The interface of the catalogue: a term is one piece of physics at one port of one session, linear in coefficients.
 
 An effect (one file each) lists the terms that a session allows: `terms(drivers)`. The search uses the columns only;
-names, units, limits and sentences stay with the term. Sizes are written as an engineer reads them, "68 ± 2 µrad per
-Nm": the unit comes from the end of the name.
+names, units, limits and sentences stay with the term. Sizes are written as an engineer reads them, "68.0 ± 2.0 µrad
+per Nm": the unit comes from the end of the name.
 """
 
 import math
@@ -175,17 +175,27 @@ UNITS: tuple[tuple[str, Steps], ...] = (
 
 
 def plain(name: str, size: Size) -> str:
-    """Value, sigma and unit of a size with its unit in its name: 68 ± 2 µrad per Nm. No number without a sigma."""
+    """Value, sigma and unit of a size with its unit in its name: 68.0 ± 2.0 µrad per Nm. No number without a sigma."""
     if not math.isfinite(size.sigma):
         return NOT_TOLD
     for ending, steps in UNITS:
         if name.endswith(ending):
             scale, unit = next((s, u) for least, s, u in steps if abs(size.value) >= least)
             space = "" if unit in ("°", "%") else " "
-            return f"{_digits(scale * size.value, 4)} ± {_digits(scale * size.sigma, 2)}{space}{unit}"
-    return f"{_digits(size.value, 4)} ± {_digits(size.sigma, 2)}"
+            return f"{with_sigma(scale * size.value, scale * size.sigma)}{space}{unit}"
+    return with_sigma(size.value, size.sigma)
 
 
-def _digits(value: float, count: int) -> str:
-    """So many significant ones, and the whole number where it has more: 409, not 4.1e+02."""
-    return f"{value:.{count}g}" if abs(value) < 10.0**count - 0.5 else f"{value:.0f}"
+def with_sigma(value: float, sigma: float) -> str:
+    """Two digits of the sigma, and the value to the same decimal: 68.3 ± 2.1; without a sigma four digits."""
+    if not (math.isfinite(sigma) and sigma > 0.0):
+        return f"{value:.4g}"
+    decimals = decimals_of(sigma)
+    return f"{value:z.{decimals}f} ± {sigma:.{decimals}f}"
+
+
+def decimals_of(sigma: float) -> int:
+    """Decimals that show two digits of the uncertainty."""
+    if not (math.isfinite(sigma) and sigma > 0.0):
+        return 3
+    return max(0, 1 - math.floor(math.log10(sigma)))

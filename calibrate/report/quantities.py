@@ -3,6 +3,8 @@
 import math
 from collections.abc import Sequence
 
+from calibrate.effects.term import decimals_of
+
 MINUS = "\N{MINUS SIGN}"
 DIGIT_SPACE = "\N{FIGURE SPACE}"  # as wide as a digit
 POINT_SPACE = "\N{PUNCTUATION SPACE}"  # as wide as a point
@@ -79,13 +81,6 @@ def _doubted(value: float, sigma: float, units: Sequence[tuple[float, str]]) -> 
 def _fitting(value: float, units: Sequence[tuple[float, str]]) -> tuple[float, str]:
     """The largest unit of which there is at least one; rounding 999.7 nm up to 1000 nm is allowed for."""
     return next(((s, n) for s, n in units if abs(value) >= 0.9995 * s), units[-1])
-
-
-def decimals_of(sigma: float) -> int:
-    """Decimals that show two digits of the uncertainty."""
-    if not (math.isfinite(sigma) and sigma > 0.0):
-        return 3
-    return max(0, 1 - math.floor(math.log10(sigma)))
 
 
 def aligned(numbers: Sequence[str]) -> list[str]:

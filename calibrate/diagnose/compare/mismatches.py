@@ -5,7 +5,6 @@ that stands elsewhere, and the zeros of second encoders, are set up again for ev
 their size, and decide nothing.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -20,7 +19,7 @@ from calibrate.diagnose.diagnosis import Finding, Named
 from calibrate.diagnose.findings import named
 from calibrate.diagnose.linearised import Accepted
 from calibrate.effects.since_model import RECORDING
-from calibrate.effects.term import Size
+from calibrate.effects.term import Size, with_sigma
 
 Floats = NDArray[np.float64]
 
@@ -121,14 +120,11 @@ def _of_constant(one: Constant, zeros_rad: Floats) -> Mismatch:
 
 
 def _words(name: str, size: Size) -> str:
-    """Two digits of the sigma and the value to the same decimal, in the unit of the name: 2.0153 ± 0.0078 mrad."""
+    """In the unit of the name: 2.0153 ± 0.0078 mrad."""
     unit = "rad" if name.endswith("_rad") else "m"
     steps = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"))
     scale, prefix = next((one for one in steps if abs(size.value) >= one[0]), steps[-1])
-    if not (math.isfinite(size.sigma) and size.sigma > 0.0):
-        return f"{size.value / scale:.4g} {prefix}{unit}"
-    decimals = max(0, 1 - math.floor(math.log10(size.sigma / scale)))
-    return f"{size.value / scale:.{decimals}f} ± {size.sigma / scale:.{decimals}f} {prefix}{unit}"
+    return f"{with_sigma(size.value / scale, size.sigma / scale)} {prefix}{unit}"
 
 
 def _frame(one: Constant, *, decides: bool = True) -> Mismatch:

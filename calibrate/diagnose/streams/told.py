@@ -13,7 +13,7 @@ from calibrate.diagnose.streams.ringing import Ringing
 from calibrate.diagnose.streams.settling import Unsettled, Window
 from calibrate.diagnose.streams.slips import Slip
 from calibrate.diagnose.streams.track import Track
-from calibrate.effects.term import Size
+from calibrate.effects.term import Size, with_sigma
 
 SAID = {
     Fault.MISSED: "{n} samples of {stream} are missing at {at}",
@@ -53,11 +53,11 @@ def _told_kind(track: Track, fault: Fault, where: str, of: str, alike: list[Brea
 def told_late(device: str, late: Late, joints: int) -> StreamFinding:
     sizes = {"latency_s": Size(late.late_s, late.sigma_s)}
     way = "later" if late.late_s >= 0.0 else "earlier"
-    says = f"{device} carry times {1e3 * abs(late.late_s):.4g} ± {1e3 * late.sigma_s:.2g} ms {way} than the joints'"
+    says = f"{device} carry times {with_sigma(1e3 * abs(late.late_s), 1e3 * late.sigma_s)} ms {way} than the joints'"
     if late.drift is not None and late.drift_sigma is not None:
         sizes["drift_s_per_s"] = Size(late.drift, late.drift_sigma)
         if late.drifts:
-            says += f"; their clocks drift by {1e6 * late.drift:+.4g} ± {1e6 * late.drift_sigma:.2g} µs/s"
+            says += f"; their clocks drift by {with_sigma(1e6 * late.drift, 1e6 * late.drift_sigma)} µs/s"
     name = Named("time", tuple(f"qd{i + 1}" for i in range(joints)), "linear", None, "latency")
     return StreamFinding(name, device, Outcome.FOUND, sizes, None, None, max(late.p, CERTAIN), says)
 
@@ -142,7 +142,7 @@ def told_ringing(track: Track, one: Ringing) -> StreamFinding:
 
 
 def _ms(one: Following) -> str:
-    return f"{1e3 * abs(one.behind_s or 0.0):.4g} ± {1e3 * (one.behind_sigma_s or 0.0):.2g}"
+    return with_sigma(1e3 * abs(one.behind_s or 0.0), 1e3 * (one.behind_sigma_s or 0.0))
 
 
 def _behind(one: Following) -> dict[str, Size]:

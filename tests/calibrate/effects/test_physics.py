@@ -117,14 +117,14 @@ def test_gravity_turns_no_slack_over_about_an_upright_axis():
 @pytest.mark.parametrize(
     ("driver", "share", "says"),
     [
-        ("last_move2", 0.04, "Joint 2 stops short by 4 ± 0.1% of its last move"),
-        ("last_move2", -0.04, "The reading of joint 2 is behind the joint by 4 ± 0.1% of its last move"),
+        ("last_move2", 0.04, "Joint 2 stops short by 4.00 ± 0.10% of its last move"),
+        ("last_move2", -0.04, "The reading of joint 2 is behind the joint by 4.00 ± 0.10% of its last move"),
         (
             "cmd_minus_q2",
             0.04,
-            "The reading of joint 2 is behind the joint by 4 ± 0.1% of what it was still asked to go",
+            "The reading of joint 2 is behind the joint by 4.00 ± 0.10% of what it was still asked to go",
         ),
-        ("cmd_minus_q2", -0.04, "Joint 2 is behind its reading by 4 ± 0.1% of what it was still asked to go"),
+        ("cmd_minus_q2", -0.04, "Joint 2 is behind its reading by 4.00 ± 0.10% of what it was still asked to go"),
     ],
 )
 def test_a_lag_says_what_is_behind_what(driver, share, says):
