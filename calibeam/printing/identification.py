@@ -239,7 +239,7 @@ def _print_zeros(console: Console, zeros: tuple[JointZero, ...]) -> None:
 def _print_point_constraints(console: Console, found: PointConstraints) -> None:
     """The method beside the fit, in both forms."""
     console.print("\nfor comparison: point constraint, Deng, Ding, Zhang 2019; links and laser nominal")
-    at = f"at placement {found.placement}"
+    at = f"at station {found.placement}"
     forms = (
         (f"four poses {at}, as published", found.four_poses),
         (f"all {found.poses} centred poses {at}", found.all_poses),

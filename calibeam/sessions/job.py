@@ -100,10 +100,10 @@ def with_places(rig: Rig, text: str, added: Sequence[Placement]) -> tuple[Rig, s
         return rig, text
     longer = text.rstrip("\n") + "\n" + "".join(map(placement_text, added))
     try:
-        return parse_rig(longer, f"{rig.name} with the places of the session"), longer
+        return parse_rig(longer, f"{rig.name} with the stations of the session"), longer
     except RigFileError as error:
         raise RigFileError(
-            f"rig {rig.name}: a place cannot be added to the file ({error}); write its places as [[placement]]"
+            f"rig {rig.name}: a station cannot be added to the file ({error}); write its stations as [[placement]]"
         ) from error
 
 

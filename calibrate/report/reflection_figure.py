@@ -21,7 +21,7 @@ IN_FRONT = 0.8  # of the distance between the faces: how much of the arriving be
 
 def reflection(rig: FittedRig, data: Observations, placement: int) -> Html:
     """Beams of one placement in the plane that is square to both faces."""
-    says = f"the two faces of the fixture at placement {placement} seen on edge, with the beam reflected between them"
+    says = f"the two faces of the fixture at station {placement} seen on edge, with the beam reflected between them"
     return drawn("rig-close", says, 3.6, 3.45, lambda figure: _paint(figure, rig, data, placement))
 
 

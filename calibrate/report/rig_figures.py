@@ -30,14 +30,14 @@ SPREAD_ROUNDS = 100
 def oblique(scene: Scene) -> Html:
     """The whole rig from the side that shows it best."""
     view = _camera(_best_azimuth(scene), ELEVATION_RAD)
-    says = "the arm at one pose of every placement, with fixture faces and laser beam, seen from the side"
+    says = "the arm at one pose of every station, with fixture faces and laser beam, seen from the side"
     return drawn("rig-oblique", says, WIDTH_IN, _height_in(scene, view), lambda figure: _paint(figure, scene, view))
 
 
 def from_above(scene: Scene) -> Html:
     """The same from above, x to the right."""
     view = _camera(-math.pi / 2.0, ABOVE_RAD)
-    says = "the arm at one pose of every placement, with fixture faces and laser beam, seen from above"
+    says = "the arm at one pose of every station, with fixture faces and laser beam, seen from above"
     return drawn("rig-above", says, WIDTH_IN, _height_in(scene, view), lambda figure: _paint(figure, scene, view))
 
 

@@ -35,7 +35,7 @@ def unit_of(name: str, value: float) -> tuple[float, str]:
 
 ABSENT, WRONG = Statement.ABSENT.value, Statement.WRONG.value
 NOISE = 1.15  # times the floor: some dozen samples held out scatter by so much
-SPLITS = {"random": "samples at random", "place": "each place in turn", "last block": "the end of the session"}
+SPLITS = {"random": "samples at random", "place": "each station in turn", "last block": "the end of the session"}
 TOLD = ("encoder-eccentricity", "joint-compliance", "backlash")  # in a sentence; all of them stand in the table
 
 

@@ -134,7 +134,7 @@ def test_an_added_place_comes_after_the_others_which_stay_as_they_were(job, ahea
 def test_a_rig_file_that_takes_no_more_places_is_told() -> None:
     text = TEXT.replace("[[placement]]", "[[plaice]]")
     rig = parse_rig(TEXT, "rig")
-    with pytest.raises(RigFileError, match="a place cannot be added"):
+    with pytest.raises(RigFileError, match="a station cannot be added"):
         with_places(rig, text, (new_place(rig, (0.5, 0.0, 0.2, 0.0)),))
 
 
