@@ -19,7 +19,7 @@ from calibrate.arms import compiled
 from calibrate.arms.coupled_readings import by_readings, uncoupled
 from calibrate.arms.model import KinematicModel
 from calibrate.parameters import Parameter
-from calibrate.rigid import cross, cross_matrix, turn_twist
+from calibrate.rigid import cross_matrix, turn_twist
 
 Floats = NDArray[np.float64]
 
@@ -80,13 +80,12 @@ class SerialArm(ABC):
     def twists_at(self, theta: Floats, B: Floats) -> Floats:
         """(pose, 6, param) as `twists`, of frames (pose, joint + 1, 4, 4) that more than theta may have moved."""
         body = self.body_twists(theta).reshape(-1, 2, 3)
-        out = np.empty((len(B), len(self.parameters), 6))
+        out, about_base = np.empty((len(B), 6, len(self.parameters))), cross_matrix(B[..., :3, 3])
         for i, columns in enumerate(self._columns_of):
-            to_base = np.swapaxes(B[:, i, :3, :3], 1, 2)
-            seen = (body[columns].reshape(-1, 3) @ to_base).reshape(len(B), len(columns), 6)
-            seen[..., :3] += cross(B[:, i, None, :3, 3], seen[..., 3:])
-            out[:, columns] = seen
-        return np.swapaxes(out, 1, 2)
+            seen = (B[:, i, :3, :3].reshape(-1, 3) @ body[columns].reshape(-1, 3).T).reshape(len(B), 3, -1, 2)
+            out[:, 3:, columns] = turns = seen[..., 1]
+            out[:, :3, columns] = seen[..., 0] + about_base[:, i] @ turns
+        return out
 
 
 def point_by_parameter(model: KinematicModel, theta: Floats, point_m: Floats, q_rad: Floats) -> tuple[Floats, Floats]:
@@ -107,19 +106,19 @@ def chain_frames(
     """
     behind = perturbed or {}
     c, s = np.cos(angle_rad), np.sin(angle_rad)
-    B = np.empty((len(angle_rad), len(parts) + 1, 4, 4))
-    B[:, 0] = base
+    B = np.empty((len(parts) + 1, len(angle_rad), 4, 4))  # a frame of all poses after the other: in one piece each
+    B[0] = base
     for i, part in enumerate(parts):
         if i in behind:
-            B[:, i] = B[:, i] @ behind[i]
-        before, ci, si = B[:, i], c[:, i, None], s[:, i, None]
+            B[i] = B[i] @ behind[i]
+        before, ci, si = B[i], c[:, i, None], s[:, i, None]
         turned = before.copy()
         turned[:, :, 0] = ci * before[:, :, 0] + si * before[:, :, 1]
         turned[:, :, 1] = ci * before[:, :, 1] - si * before[:, :, 0]
-        B[:, i + 1] = (turned.reshape(-1, 4) @ part).reshape(-1, 4, 4)  # one product: five times faster than a stack
+        np.matmul(turned.reshape(-1, 4), part, out=B[i + 1].reshape(-1, 4))  # five times faster than a stack
     if len(parts) in behind:
-        B[:, -1] = B[:, -1] @ behind[len(parts)]
-    return B
+        B[-1] = B[-1] @ behind[len(parts)]
+    return np.swapaxes(B, 0, 1)
 
 
 def rotation_x(angle_rad: ArrayLike) -> Floats:

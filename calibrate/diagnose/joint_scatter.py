@@ -10,23 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaln, logsumexp
+from scipy.special import gammaln
 
 from calibrate.diagnose.scatter import NU
 
 Floats = NDArray[np.float64]
 
-LOUDNESS = (
-    0.03,
-    0.1,
-    0.3,
-    1.0,
-    3.0,
-    10.0,
-    100.0,
-    1000.0,
-    1e4,
-)  # variance through the joints over that of the noise, mean trace
+LOUDNESS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0, 1000.0, 1e4)  # variance through joints over noise's, mean trace
 SHARES = (0.15, 0.3, 0.5, 0.7, 0.85)  # of samples that scatter through the joints
 TURNS = 12
 HEAVY = (2.5, NU)  # degrees of freedom of innocent tails
@@ -49,7 +39,7 @@ class Innocent:
 
 def innocent(raw: Floats, joints: Floats) -> Innocent:
     """Of residuals (observation, k) in the instrument's unit and how they follow each joint (joint, observation, k)."""
-    trials = [_trial(raw, joints, form, loud) for form in _forms(raw) for loud in (0.0, *LOUDNESS)]
+    trials = [trial for form in _forms(raw) for trial in _trials(raw, joints, form)]
     best = max(trials, key=lambda trial: trial.two_log_likelihood)
     if best.loud > 0.0:
         best = _unequal(raw, joints, best)
@@ -75,16 +65,19 @@ class _Trial:
         return raw @ self.by.T, *spectrum((self.sizes[:, None, None] * joints) @ self.by.T)
 
 
-def _trial(raw: Floats, joints: Floats, form: Floats, loud: float) -> _Trial:
+def _trials(raw: Floats, joints: Floats, form: Floats) -> list[_Trial]:
+    """One of each loudness: what all of them see is the same."""
     by = np.asarray(np.linalg.inv(np.linalg.cholesky(form)), dtype=np.float64)
-    return _judged(raw, joints, _Trial(by, np.ones(len(joints)), loud, 1.0, -np.inf))
+    plain = _Trial(by, np.ones(len(joints)), 0.0, 1.0, -np.inf)
+    seen = plain.seen(raw, joints)
+    return [_judged(seen, replace(plain, loud=loud)) for loud in (0.0, *LOUDNESS)]
 
 
-def _judged(raw: Floats, joints: Floats, trial: _Trial) -> _Trial:
-    y, w, V = trial.seen(raw, joints)
+def _judged(seen: tuple[Floats, Floats, Floats], trial: _Trial) -> _Trial:
+    y, w, V = seen
     turned, width = np.einsum("okm,ok->om", V, y) ** 2, 1.0 + trial.loud * w
     scale = float(np.mean(turned / width))
-    value = 2.0 * len(raw) * _log_det(trial.by) - float(np.sum(np.log(width))) - y.size * (np.log(scale) + 1.0)
+    value = 2.0 * len(y) * _log_det(trial.by) - float(np.sum(np.log(width))) - y.size * (np.log(scale) + 1.0)
     return replace(trial, scale=scale, two_log_likelihood=value)
 
 
@@ -99,7 +92,8 @@ def _unequal(raw: Floats, joints: Floats, best: _Trial) -> _Trial:
                 moved[joint] += step
                 if np.ptp(moved) > STEPS:
                     continue
-                trial = _judged(raw, joints, replace(best, sizes=UNEQUAL ** (moved / STEPS)))
+                unequal = replace(best, sizes=UNEQUAL ** (moved / STEPS))
+                trial = _judged(unequal.seen(raw, joints), unequal)
                 if trial.two_log_likelihood > best.two_log_likelihood:
                     best, steps = trial, moved
         if best is last:
@@ -153,16 +147,15 @@ def _student(turned: Floats, width: Floats, nu: float) -> float:
 def _mixed(turned: Floats, w: Floats, loud: float, share: float) -> float:
     """Some samples as the instrument alone, `share` of them through the joints, too."""
     scale = float(np.median(turned)) / 0.4549 if share < 0.5 else float(np.mean(turned / (1.0 + loud * w)))
-    widths = (np.ones_like(w), 1.0 + loud * w)
-    priors = np.log(np.array([1.0 - share, share]))
+    widths = np.stack([np.ones_like(w), 1.0 + loud * w])
+    squares, logs = np.sum(turned / widths, axis=2), np.sum(np.log(2.0 * np.pi * widths), axis=2)
+    priors = np.log(np.array([[1.0 - share], [share]]))
     value = -np.inf
     for _ in range(TURNS):
-        each = np.stack([_log_normal(turned, scale * width) for width in widths], axis=1) + priors
-        total = np.asarray(logsumexp(each, axis=1))
+        each = priors - 0.5 * (turned.shape[1] * np.log(scale) + logs + squares / scale)
+        total = np.logaddexp(each[0], each[1])
         value = float(np.sum(total))
-        belongs = np.exp(each - total[:, None])
-        squares = np.stack([np.sum(turned / width, axis=1) for width in widths], axis=1)
-        scale = float(np.sum(belongs * squares)) / turned.size
+        scale = float(np.sum(np.exp(each - total) * squares)) / turned.size
     return value
 
 

@@ -91,10 +91,10 @@ def _through_joints(residual: Floats, by_joint: Floats, own_sigma: Floats) -> Sc
         """(row, k) of the axes, and the scale that belongs to the ratio."""
         ratio = np.exp(log_ratio)
         axes = (1.0 + ratio * np.maximum(w, 0.0)) / (1.0 + ratio)
-        square = np.sum(turned / axes, axis=1)
+        square = (turned / axes).sum(axis=1)
         scale = max(float(np.median(square)) / k, FLOOR**2)
         for _ in range(TURNS):
-            new = max(float(np.sum(square * (NU + k) / (NU + square / scale))) / (n * k), FLOOR**2)
+            new = max(float((square * (NU + k) / (NU + square / scale)).sum()) / (n * k), FLOOR**2)
             settled, scale = abs(np.log(new / scale)) < SETTLED, new
             if settled:
                 break

@@ -57,13 +57,14 @@ def unrecorded(bench: Bench, rng: Generator, missing: Sequence[Missing] = ()) ->
         base = _base(raw, asked, levers)
         restless += base.restless
         z = _turned(base.whitener, raw)
-        drawn = np.stack([z[rng.permutation(len(z))] for _ in range(DRAWS)])
+        drawn = np.stack([z, *(z[rng.permutation(len(z))] for _ in range(DRAWS))])
         for i, lever_of in enumerate(levers):
             if asked[i].port.where == TIME:
                 continue
             felt = np.stack([_turned(base.whitener, one) for one in lever_of])
-            seen[i] += _gains(felt, z[None])[:, 0]
-            null[i] += _gains(felt, drawn)
+            gains = _gains(felt, drawn)
+            seen[i] += gains[:, 0]
+            null[i] += gains[:, 1:]
     best = seen.max(axis=1)
     p = Tail(null.max(axis=(0, 1))).p(float(best.max()))
     moving = next((w for w in asked if w.port.where == TIME), None)

@@ -40,27 +40,24 @@ def weigh(arm: Arm, frames: Frames, foot: Floats, payload_kg: Floats, payload_co
     centre_m = np.einsum("rnij,nj->rni", turn, arm.com_m) + origin_m
     flange_turn, flange_m = frames.flange[:, :3, :3], frames.flange[:, :3, 3]
     carried_at_m = _in_base(flange_turn, flange_m, payload_com_m)
-    beyond_kg = arm.tool_kg + payload_kg
-    first_m = arm.tool_kg * (flange_turn @ arm.tool_com_m + flange_m) + payload_kg[:, np.newaxis] * carried_at_m
+    held_m = arm.tool_kg * (flange_turn @ arm.tool_com_m + flange_m) + payload_kg[:, np.newaxis] * carried_at_m
     by_gravity = np.cross(np.eye(3), arm.gravity_m_s2)  # v @ by_gravity is v x g
-    moment = np.empty((rows, n + 1, 3))
-    force, beyond, weight = np.empty((rows, n + 1, 3)), np.empty((rows, n + 1, 3)), np.empty((rows, n + 1, 3))
+    start_m = np.concatenate((foot[:, np.newaxis, :3, 3], origin_m), axis=1)
+    axes = np.concatenate((foot[:, np.newaxis, :3, :3], turn), axis=1)
+    bodies_kg = np.concatenate(((arm.tool_kg + payload_kg)[:, np.newaxis], np.tile(arm.mass_kg, (rows, 1))[:, ::-1]), 1)
+    bodies_m = np.concatenate((held_m[:, np.newaxis], (arm.mass_kg[:, np.newaxis] * centre_m)[:, ::-1]), axis=1)
+    beyond_kg, first_m = (np.cumsum(each, axis=1)[:, ::-1] for each in (bodies_kg, bodies_m))  # without the own body
 
-    def about(start_m: Floats, axes: Floats) -> tuple[Floats, Floats]:
-        about_start = (first_m - beyond_kg[:, np.newaxis] * start_m) @ by_gravity
-        own_n = beyond_kg[:, np.newaxis] * arm.gravity_m_s2
-        return np.einsum("rji,rj->ri", axes, about_start), np.einsum("rji,rj->ri", axes, own_n)
+    def about(kg: Floats, first_m: Floats) -> tuple[Floats, Floats]:
+        about_start = (first_m - kg[..., np.newaxis] * start_m) @ by_gravity
+        return (
+            np.einsum("rnji,rnj->rni", axes, about_start),
+            np.einsum("rnji,rnj->rni", axes, kg[..., np.newaxis] * arm.gravity_m_s2),
+        )
 
-    for link in range(n, -1, -1):
-        if link > 0:
-            start_m, axes = origin_m[:, link - 1], turn[:, link - 1]
-            beyond[:, link], weight[:, link] = about(start_m, axes)
-            beyond_kg = beyond_kg + arm.mass_kg[link - 1]
-            first_m = first_m + arm.mass_kg[link - 1] * centre_m[:, link - 1]
-        else:
-            start_m, axes = foot[:, :3, 3], foot[:, :3, :3]
-            beyond[:, link], weight[:, link] = about(start_m, axes)
-        moment[:, link], force[:, link] = about(start_m, axes)
+    own = np.maximum(np.arange(n + 1) - 1, 0)  # with the own body: all beyond the start of the link before
+    beyond, weight = about(beyond_kg, first_m)
+    moment, force = about(beyond_kg[:, own], first_m[:, own])
     carried_m = carried_at_m[:, np.newaxis] - origin_m
     carried_nm = payload_kg[:, np.newaxis, np.newaxis] * (carried_m @ by_gravity)
     payload_torque_nm = np.einsum("rni,rni->rn", carried_nm, turn[..., 2])

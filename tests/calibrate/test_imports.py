@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+import pytest
+
 FORBIDDEN = ("serial", "can", "canopen", "rtde_control", "rtde_receive", "drivers", "simulators", "mujoco", "calibeam")
 # Each costs 0.1 to 0.4 s of every start, and none is needed before there is something to draw or a batch to run.
 SLOW = ("scipy.stats", "scipy.optimize", "scipy.interpolate", "scipy.ndimage", "numba", "llvmlite", "matplotlib")
@@ -24,26 +26,29 @@ MOST_MODULES = 850  # 692 with CPython 3.11, of which 144 are numpy and 175 scip
 PROGRAM = """
 import pkgutil, sys, importlib, calibrate
 COMPILED = ("calibrate.arms.fast",)
-later = (*sys.argv[1:], *COMPILED)
-for module in pkgutil.walk_packages(calibrate.__path__, "calibrate."):
-    if not module.name.startswith(later):
-        importlib.import_module(module.name)
-print(" ".join(sorted(sys.modules)))
+names = [module.name for module in pkgutil.walk_packages(calibrate.__path__, "calibrate.")]
+for later in (tuple(sys.argv[1:]), ("calibrate.report",)):
+    for name in names:
+        if not name.startswith((*later, *COMPILED)):
+            importlib.import_module(name)
+    print(" ".join(sorted(sys.modules)))
 """
 
 
-def loaded_without(*prefixes):
-    command = [sys.executable, "-c", PROGRAM, *prefixes]
+@pytest.fixture(scope="module")
+def loaded():
+    """Modules with all of calibrate but `LATER`, then with all but the report."""
+    command = [sys.executable, "-c", PROGRAM, *LATER]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
-    return set(done.stdout.split())
+    return [set(line.split()) for line in done.stdout.splitlines()]
 
 
-def test_calibrate_loads_no_port_library():
-    assert not set(FORBIDDEN) & {name.split(".")[0] for name in loaded_without("calibrate.report")}
+def test_calibrate_loads_no_port_library(loaded):
+    assert not set(FORBIDDEN) & {name.split(".")[0] for name in loaded[1]}
 
 
-def test_no_slow_library_is_loaded_before_it_is_needed():
-    loaded = loaded_without(*LATER)
+def test_no_slow_library_is_loaded_before_it_is_needed(loaded):
+    loaded, _ = loaded
     assert "calibrate.identification.identify" in loaded
     assert not set(SLOW) & loaded
     assert len(loaded) <= MOST_MODULES

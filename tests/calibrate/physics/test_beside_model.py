@@ -59,10 +59,10 @@ def later(folder, name, samples, joint_off_rad=0.0):
     return out
 
 
-def asked(folder, recording):
+def asked(folder, recording, *more):
     """diagnosis.json of a recording beside the model of the folder."""
     out = folder / f"{recording.name}.json"
-    assert run(["diagnose", str(recording), "--model", str(folder / "model.json"), "--out", str(out)]) == 0
+    assert run(["diagnose", str(recording), "--model", str(folder / "model.json"), "--out", str(out), *more]) == 0
     return json.loads(out.read_text())
 
 
@@ -74,24 +74,41 @@ def test_its_own_recording_holds_nothing_new(soft, capsys):
     assert found["known"] == {"same_recording": True, "effects": [e["name"] for e in model["effects"]], "left_out": []}
 
 
-def test_a_later_recording_of_the_same_machine_holds_nothing_new(soft):
+def test_a_later_recording_of_the_same_machine_holds_nothing_new_and_gives_no_model(soft, capsys):
+    """Beside a model of another recording only changes are fitted; the remedy is named."""
     folder, _, _ = soft
-    found = asked(folder, later(folder, "unchanged", folder / "unseen.csv"))
+    recording, diagnosis, out = (
+        later(folder, "unchanged", folder / "unseen.csv"),
+        folder / "now.json",
+        folder / "no.json",
+    )
+    arguments = ["diagnose", str(recording), "--model", str(folder / "model.json"), "--out", str(diagnosis)]
+    assert run([*arguments, "--model-out", str(out)]) == 1
+    assert "calibeam identify --model" in " ".join(capsys.readouterr().err.split())
+    assert not out.exists()
+    found = json.loads(diagnosis.read_text())
     assert (found["verdict"], found["changed"]) == ("consistent", [])
     assert found["known"]["same_recording"] is False
 
 
-def test_a_joint_zero_that_has_moved_is_named_with_its_size(soft, capsys):
-    """A joint that reads more than before has its zero moved the other way."""
+def test_a_joint_zero_that_has_moved_is_named_with_its_size_and_without_alternative(soft, capsys):
+    """A joint that reads more than before has its zero moved the other way; a tilt about the axis of a joint is its
+    zero under another name, and no alternative: no plan is made.
+    """
     folder, _, _ = soft
-    found = asked(folder, later(folder, "moved", folder / "unseen.csv", MOVED_RAD))
+    plan = folder / "next.toml"
+    found = asked(folder, later(folder, "moved", folder / "unseen.csv", MOVED_RAD), "--plan-out", str(plan))
     (finding,) = found["findings"]
     assert (finding["where"], finding["physics"]) == (f"joint{JOINT}.angle", "joint-zero-moved")
+    assert finding["rivals"] == []
+    assert not plan.exists()
     (changed,) = found["changed"]
     assert changed["parameter"] == f"joint{JOINT}.zero"
     assert changed["by"] == pytest.approx(-MOVED_RAD, abs=4.0 * changed["sigma"])
     assert changed["sigma"] < 0.2 * MOVED_RAD
-    assert f"changed: joint{JOINT}.zero by" in capsys.readouterr().out
+    printed = " ".join(capsys.readouterr().out.split())
+    assert f"changed: joint{JOINT}.zero by" in printed
+    assert "no finding has an alternative" in printed
 
 
 def test_a_tool_that_has_moved_is_named_wherever_the_tracker_stands_now(soft, pair):
@@ -162,18 +179,6 @@ def rivals_of(state):
             yield rival_named(state, 0, named(term))
 
 
-def test_no_plan_is_made_beside_a_model_where_nothing_else_could_have_changed(soft, capsys):
-    """A tilt about the axis of a joint is its zero under another name, and no alternative."""
-    folder, _, _ = soft
-    recording, plan = later(folder, "planned", folder / "unseen.csv", MOVED_RAD), folder / "next.toml"
-    arguments = ["diagnose", str(recording), "--model", str(folder / "model.json")]
-    assert run([*arguments, "--out", str(folder / "planned.json"), "--plan-out", str(plan)]) == 0
-    assert "no finding has an alternative" in " ".join(capsys.readouterr().out.split())
-    assert not plan.exists()
-    (finding,) = json.loads((folder / "planned.json").read_text())["findings"]
-    assert finding["rivals"] == []
-
-
 def test_a_known_structure_is_refitted_to_another_recording(soft, capsys):
     folder, model, defect = soft
     recording, out = later(folder, "refit", folder / "unseen.csv"), folder / "refit.json"
@@ -205,14 +210,3 @@ def test_a_model_without_covariance_cannot_tell_what_has_changed(soft, capsys):
     recording = later(folder, "asked-of-bare", folder / "unseen.csv")
     assert run(["diagnose", str(recording), "--model", str(bare), "--out", str(folder / "none.json")]) == 1
     assert "no covariance" in " ".join(capsys.readouterr().err.split())
-
-
-def test_changes_are_not_a_model(soft, capsys):
-    """Beside a model of another recording only changes are fitted; the remedy is named."""
-    folder, _, _ = soft
-    recording = later(folder, "asked-for-model", folder / "unseen.csv")
-    known, out = folder / "model.json", folder / "no-model.json"
-    arguments = ["diagnose", str(recording), "--model", str(known), "--out", str(folder / "no-diagnosis.json")]
-    assert run([*arguments, "--model-out", str(out)]) == 1
-    assert "calibeam identify --model" in " ".join(capsys.readouterr().err.split())
-    assert not out.exists()

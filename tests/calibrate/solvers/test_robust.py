@@ -11,6 +11,7 @@ from calibrate.parameters import Parameter
 
 LOSSES = (Loss.SQUARE, Loss.HUBER, Loss.CAUCHY, Loss.STUDENT_T, Loss.student_t(2.0))
 ROBUST = LOSSES[1:]
+DRAWS = pytest.mark.parametrize("draws", [150, pytest.param(400, marks=pytest.mark.endure)])
 
 
 @dataclass(frozen=True)
@@ -86,10 +87,11 @@ def test_student_t_is_the_most_likely_answer_under_its_law():
         assert np.sum(4.0 * np.log1p(z**2 / 3.0)) > fit.cost
 
 
+@DRAWS
 @pytest.mark.parametrize("loss", [Loss.HUBER, Loss.CAUCHY, Loss.STUDENT_T], ids=str)
-def test_sigma_is_the_scatter_of_the_answers_when_a_tenth_of_the_rows_is_noisier(loss):
+def test_sigma_is_the_scatter_of_the_answers_when_a_tenth_of_the_rows_is_noisier(loss, draws):
     rng, z = np.random.default_rng(4), []
-    for _ in range(400):
+    for _ in range(draws):
         problem = curve(rng)
         rough = rng.uniform(size=60) < 0.1
         problem.y[rough] += rng.normal(0.0, 5.0 * 0.05, int(rough.sum()))
@@ -154,10 +156,11 @@ def test_the_answer_does_not_depend_on_the_axes_of_an_observation(loss):
     np.testing.assert_allclose(turn @ straight, turned, atol=1e-7)
 
 
+@DRAWS
 @pytest.mark.parametrize("loss", [Loss.HUBER, Loss.CAUCHY, Loss.STUDENT_T], ids=str)
-def test_sigma_of_whole_observations_is_the_scatter_of_the_answers(loss):
+def test_sigma_of_whole_observations_is_the_scatter_of_the_answers(loss, draws):
     rng, z = np.random.default_rng(8), []
-    for _ in range(300):
+    for _ in range(draws):
         size = np.where(rng.uniform(size=(40, 1)) < 0.1, 5.0, 1.0)
         fit = solve(WholePoints(size * rng.normal(size=(40, 3))), loss=loss)
         z.append(fit.theta / np.sqrt(np.diag(fit.covariance)))
