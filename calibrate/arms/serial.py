@@ -82,7 +82,8 @@ class SerialArm(ABC):
         body = self.body_twists(theta).reshape(-1, 2, 3)
         out, about_base = np.empty((len(B), 6, len(self.parameters))), cross_matrix(B[..., :3, 3])
         for i, columns in enumerate(self._columns_of):
-            seen = (B[:, i, :3, :3].reshape(-1, 3) @ body[columns].reshape(-1, 3).T).reshape(len(B), 3, -1, 2)
+            own = body[columns]  # (param, 2, 3)
+            seen = (B[:, i, :3, :3].reshape(-1, 3) @ own.reshape(-1, 3).T).reshape(len(B), 3, len(own), 2)
             out[:, 3:, columns] = turns = seen[..., 1]
             out[:, :3, columns] = seen[..., 0] + about_base[:, i] @ turns
         return out

@@ -56,6 +56,13 @@ def test_parameter_twists_are_the_differences_of_the_flange(arm):
         np.testing.assert_allclose(analytic[:, :, k], numeric, atol=2e-9, err_msg=arm.parameters[k].name)
 
 
+def test_no_pose_gives_empty_answers(arm):
+    theta, q = np.zeros(len(arm.parameters)), np.empty((0, arm.n_joints))
+    assert arm.flange(theta, q).shape == (0, 4, 4)
+    assert arm.twists(theta, q).shape == (0, 6, len(arm.parameters))
+    assert arm.joint_twists(theta, q).shape == (0, 6, arm.n_joints)
+
+
 def test_joint_twists_are_the_differences_of_the_flange(arm):
     rng = np.random.default_rng(2)
     theta, q = rng.normal(0, 0.05, len(arm.parameters)), rng.uniform(-3, 3, (7, arm.n_joints))
