@@ -68,11 +68,11 @@ def bare_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     For tests of what stands beside them; whole pages are those of tests/calibrate/report.
     """
 
-    def bare(figure: Any, file: TextIO, **_: object) -> None:
-        width, height = 72.0 * figure.get_size_inches()
+    def bare(canvas: Any, file: TextIO, **_: object) -> None:
+        width, height = 72.0 * canvas.figure.get_size_inches()
         file.write(f'<svg viewBox="0 0 {width:g} {height:g}"></svg>')
 
-    monkeypatch.setattr("matplotlib.figure.Figure.savefig", bare)
+    monkeypatch.setattr("matplotlib.backends.backend_svg.FigureCanvasSVG.print_svg", bare)
 
 
 @cache

@@ -49,7 +49,7 @@ class Reference:
 
     def aim(self, goal_rad: Floats) -> bool:
         """A new set-point (n,); False when it is the present one, which changes nothing."""
-        if np.array_equal(goal_rad, self.goal_rad):
+        if not np.count_nonzero(goal_rad != self.goal_rad):
             return False
         self.goal_rad = goal_rad.copy()
         per_step_rad = np.abs(goal_rad - self.q_rad) / STEPS_PER_COMMAND
@@ -65,7 +65,7 @@ class Reference:
         move_rad = np.minimum(np.maximum(left_rad, -self._stride_rad), self._stride_rad)
         self.q_rad = self.q_rad + move_rad
         self.qd_rad_s = move_rad / STEP_S
-        if not move_rad.any():
+        if not np.count_nonzero(move_rad):
             self.q_rad = self.goal_rad.copy()
             self.arrived = True
 

@@ -110,7 +110,7 @@ class Servo:
         hold_nm = self._engine.bias[self._driven]
         pull_nm = self._engine.inertia_times(self._pull_rad_s2)[self._driven]
         torque_nm = hold_nm + pull_nm
-        if (np.abs(torque_nm) > self._limit_nm).any():
+        if np.count_nonzero(np.abs(torque_nm) > self._limit_nm):  # half the time of any()
             torque_nm = self._saturated(hold_nm, pull_nm)
         self.torque_nm = torque_nm
         self._engine.applied[self._driven] = self.torque_nm

@@ -7,6 +7,7 @@ that would emulate a whole session stops at its output folder.
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path, PurePosixPath
 
 import numpy as np
@@ -56,7 +57,7 @@ class Pair:
     def command(self) -> str:
         return self.words.split()[0]
 
-    @property
+    @cached_property
     def daily(self) -> int:
         """Seeds of every day: of the first line of a format and a command; others read it by the same code.
 
@@ -71,7 +72,7 @@ class Pair:
             return SOME if self.command in SLOW else DAILY
         return SLOW.get(self.command, FEW)
 
-    @property
+    @cached_property
     def format(self) -> str:
         return PurePosixPath(self.file).name
 

@@ -23,7 +23,7 @@ def written_as(rig, model):
 
 
 def positions(session):
-    q = session.readings(80)
+    q = session.readings(60)
     return table(q, **session.positions(q, 1e-5))
 
 
@@ -34,13 +34,13 @@ def wire(session):
 
 
 def cones(session):
-    seat = np.repeat(np.arange(3), 60)
+    seat = np.repeat(np.arange(3), 40)
     q, reached = session.reaching(CONES_M[seat] + session.rng.normal(0.0, 5e-6, (len(seat), 3)))
     return table(q[reached], seat=(seat[reached] + 1).astype(float))
 
 
 def bars(session):
-    ends = session.rng.uniform([0.2, -0.5, 0.1], [0.6, 0.5, 0.5], (60, 2, 3))
+    ends = session.rng.uniform([0.2, -0.5, 0.1], [0.6, 0.5, 0.5], (40, 2, 3))
     along = ends[:, 1] - ends[:, 0]
     ends[:, 1] = ends[:, 0] + BAR_M * along / np.linalg.norm(along, axis=1, keepdims=True)
     ends += session.rng.normal(0.0, 5e-6, ends.shape)
