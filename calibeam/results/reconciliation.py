@@ -42,7 +42,7 @@ AGREES = 1.3  # rms over noise on unseen rows, up to which nothing is left
 UNSEEN = 0.25  # share of the poses
 FEWEST_UNSEEN = 5
 SAME_POSE_RAD = 2e-3  # a servo comes back closer, and other poses are farther away
-ARM = ("joint", "link")  # parameters of the arm, which a rig file states; where instruments stand is fitted
+BUILT = ("joint", "link", "psd")  # parameters of what a rig file states as built; where things stand is fitted
 QUANTITIES = {
     spots.KIND.name: SPOTS,
     position.KIND.name: POSITION,
@@ -192,8 +192,11 @@ def _sides(
 
 
 def _stated(drawn: Recording) -> tuple[str, ...]:
-    """Parameters that the rig file states: the arm, and the target on it where it has a point."""
-    stated = (*ARM, "tool.") if drawn.rig.tool.point_m is not None else ARM
+    """Parameters that the rig file states: arm and pair of detectors, and the target on it where it has a point.
+
+    Were the detectors fitted, they would bend by millimetres to make up for an arm that is another one.
+    """
+    stated = (*BUILT, "tool.") if drawn.rig.tool.point_m is not None else BUILT
     return tuple(p.name for p in session_of(drawn.rig, drawn.samples).parameters if p.name.startswith(stated))
 
 

@@ -18,6 +18,7 @@ from simulators.conceal.wanted import Wanted
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
 NOISE_M = 2e-6
+SHIFT_M = 2e-4
 
 
 @pytest.fixture(scope="module")
@@ -64,6 +65,18 @@ def test_what_the_simulation_lacks_is_named(sessions, tmp_path):
     assert finding["where"] == truth["port"]
     amplitude = finding["parameters"]["amplitude_rad"]
     assert abs(amplitude["value"] - truth["figures"]["amplitude_rad"]) < 4.0 * amplitude["sigma"]
+
+
+def test_a_detector_that_sits_elsewhere_beside_the_other_is_named(sessions, tmp_path):
+    def elsewhere(columns):
+        columns["psd2_x_m"] -= SHIFT_M  # in its own plane: the beam meets it where it did
+        return noisy(columns)
+
+    said = compared(rewritten(sessions[1], tmp_path / "shifted", elsewhere), sessions[1], tmp_path)
+    (one,) = (d for d in said["differences"] if d["decides"])
+    assert (one["where"], one["physics"]) == ("psd2.reading", "psd-moved")
+    shift = one["sizes"]["x_m"]
+    assert abs(shift["value"] - SHIFT_M) < 4.0 * shift["sigma"] < SHIFT_M / 3.0
 
 
 def test_sessions_that_differ_by_noise_agree(sessions, tmp_path):

@@ -7,7 +7,7 @@ search that begins with nothing does. Price: extended BIC, Chen, Chen, Biometrik
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from calibrate.effects.since_model import RECORDING
 from calibrate.effects.term import Shape
 from calibrate.parameters import Parameter, plausible_sizes
 from calibrate.sensors import seat
+from calibrate.sensors.dual_psd import GAINS
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -33,6 +34,7 @@ FRAMES = {
     "laser": ("laser.direction", "laser-moved"),
     "placement": ("fixture.pose", "fixture-moved"),
     seat.POINTS: ("seat.position", "seat-moved"),
+    "psd2": ("psd2.reading", "psd-moved"),  # in the frame of PSD 1
 }
 TIED = 2.0  # of BIC: no more than a bare mention (Kass, Raftery 1995)
 RIVAL = 6.0  # of BIC: strong evidence against what is farther off (Kass, Raftery 1995)
@@ -69,10 +71,12 @@ def _place(name: str) -> tuple[str, str] | None:
         return f"{owner}.angle", ZERO
     if kind == "link":
         return name, LINK
+    if owner in FRAMES:
+        return None if name in GAINS else FRAMES[owner]
     if kind not in FRAMES:
         return None
     port, physics = FRAMES[kind]
-    return (f"{port} {number}" if number else port), physics
+    return f"{port} {number}", physics
 
 
 def _inverse(information: Floats) -> Floats:
@@ -87,6 +91,7 @@ class Quadratic:
     away: Floats
     covariance: Floats
     rows: int
+    price: float  # of a number
 
     @classmethod
     def of(cls, fitted: Fitted, values: Floats, parts: Sequence[Part]) -> "Quadratic":
@@ -99,7 +104,8 @@ class Quadratic:
         away = (fitted.values - whole)[free] / scale
         G = fitted.rows.geometry
         listed = tuple((p, np.array([at[n] for n in p.names], dtype=np.intp)) for p in parts)
-        return cls(listed, away, _inverse(G.T @ G), int(fitted.rows.data.sum()))
+        rows = int(fitted.rows.data.sum())
+        return cls(listed, away, _inverse(G.T @ G), rows, float(np.log(rows) + 2.0 * np.log(max(len(listed), 1))))
 
     def cost(self, at: Ints) -> float:
         """Of taking these values back to the simulation's, all others following."""
@@ -113,7 +119,8 @@ class Quadratic:
         gain = C[:, at] @ np.linalg.pinv(C[np.ix_(at, at)], rcond=1e-12, hermitian=True)
         away, covariance = self.away - gain @ self.away[at], C - gain @ C[at]
         away[at], covariance[at], covariance[:, at] = 0.0, 0.0, 0.0
-        return Quadratic(tuple(one for one in self.parts if one[0] != part), away, covariance, self.rows)
+        left = tuple(one for one in self.parts if one[0] != part)
+        return replace(self, parts=left, away=away, covariance=covariance)
 
 
 def blind_zeros(fitted: Fitted, parts: Sequence[Part]) -> tuple[Part, ...]:
@@ -124,15 +131,41 @@ def blind_zeros(fitted: Fitted, parts: Sequence[Part]) -> tuple[Part, ...]:
 
 
 def fewest(whole: Quadratic) -> tuple[Part, ...]:
-    """The parts that are worth their numbers when all others are as in the simulation."""
-    left, every = whole, len(whole.parts)
-    while left.parts:
-        spare = [(left.cost(at) - len(at) * (np.log(left.rows) + 2.0 * np.log(every)), p) for p, at in left.parts]
+    """The parts that are worth their numbers when all others are as in the simulation.
+
+    Backward, a frame of six numbers goes before the six links that stand in for it; so each part that is gone is put
+    back, and stays where the others that it makes needless then cost less.
+    """
+    chosen = _worth_their_numbers(whole)
+    while True:
+        tried = [_worth_their_numbers(_among(whole, (*chosen, p)), p) for p, _ in whole.parts if p not in chosen]
+        best = min(tried, key=lambda parts: _dear(whole, parts), default=chosen)
+        if _dear(whole, best) >= _dear(whole, chosen):
+            return chosen
+        chosen = best
+
+
+def _worth_their_numbers(whole: Quadratic, kept: Part | None = None) -> tuple[Part, ...]:
+    """Backward from all parts that are not held; `kept` goes last."""
+    left = whole
+    while spare := [(left.cost(at) - len(at) * whole.price, p) for p, at in left.parts if p != kept]:
         excess, part = min(spare, key=lambda one: one[0])
         if excess > 0.0:
             break
         left = left.without(part)
     return tuple(p for p, _ in left.parts)
+
+
+def _among(whole: Quadratic, parts: tuple[Part, ...]) -> Quadratic:
+    """With all but these at the simulation's values."""
+    for part, _ in whole.parts:
+        whole = whole if part in parts else whole.without(part)
+    return whole
+
+
+def _dear(whole: Quadratic, chosen: tuple[Part, ...]) -> float:
+    """What the others, taken back, cost, and what the chosen ones do."""
+    return _reduced(whole, chosen) + whole.price * sum(len(part.names) for part in chosen)
 
 
 def outermost(whole: Quadratic, chosen: tuple[Part, ...]) -> tuple[Part, ...]:

@@ -73,6 +73,7 @@ PARTS = {
     "laser-moved": "The laser on the flange",
     "fixture-moved": "The fixture",
     "seat-moved": "Seat",
+    "psd-moved": "PSD 2 beside PSD 1",
     "device-moved": "The measuring device",
 }
 
