@@ -74,7 +74,10 @@ def _of_two(drivers: Drivers, joint: int, a: int, b: int) -> list[Term]:
 
 
 def _of_load(drivers: Drivers, joint: int) -> list[Term]:
-    """Any curve of the gravity torque; a spring whose stiffness changes as the joint turns."""
+    """Any curve of the gravity torque; a spring whose stiffness changes as the joint turns, up to four times a turn:
+    planets of a stage take the load one after the other, and three or four are usual. With fewer waves such a spring
+    looks like one even spring and errors of the encoder.
+    """
 
     def smooth(drivers: Drivers, inner: Floats) -> Floats:
         return splines(stated_torque_nm(drivers, joint))
@@ -82,7 +85,7 @@ def _of_load(drivers: Drivers, joint: int) -> list[Term]:
     def uneven(drivers: Drivers, inner: Floats) -> Floats:
         torque, q = stated_torque_nm(drivers, joint), drivers.q_rad[:, joint - 1]
         share = torque / max(float(np.abs(torque).max()), 1e-12)
-        return share[:, None] * np.concatenate([np.ones((len(q), 1)), _waves(q, 2.0 * q)], axis=1)
+        return share[:, None] * np.concatenate([np.ones((len(q), 1)), _waves(q, 2.0 * q, 3.0 * q, 4.0 * q)], axis=1)
 
     torque = f"gravity_torque{joint}"
     return [

@@ -154,3 +154,13 @@ def test_what_was_seated_again_is_named_with_its_size(tmp_path, family, mechanis
         shift = np.array([sizes[f"shift_{axis}_m"].value for axis in "xyz"])
         sigma = max(sizes[f"shift_{axis}_m"].sigma for axis in "xyz")
         assert abs(np.linalg.norm(shift) - truth["shift_m"]) < 3.0 * sigma
+
+
+def test_a_spring_that_is_uneven_over_a_turn_has_no_name(tmp_path):
+    """With waves of up to two a turn it was an error of the encoder, certainly."""
+    spring = ("outside-uneven-spring",)
+    recording = recording_of(tmp_path, family="tracker", seed=1, samples=200, defects=spring, enr=3.0)
+    diagnosed = diagnose_samples(recording.rig, recording.samples, np.random.default_rng(1))
+    (found,) = diagnosed.physics.diagnosis.findings
+    assert (found.name.physics, found.name.where) == ("unknown", "joint2.angle")
+    assert set(found.name.depends_on) == {"gravity_torque2", "q2"}
