@@ -5,7 +5,7 @@ away, before and after, is measured on the others. The two comparisons take all 
 described in docs/formats.md.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -41,6 +41,7 @@ Ints = NDArray[np.int64]
 AGREES = 1.3  # rms over noise on unseen rows, up to which nothing is left
 UNSEEN = 0.25  # share of the poses
 FEWEST_UNSEEN = 5
+FEW_ROWS = 0.05  # share of the unseen rows up to which they are listed
 SAME_POSE_RAD = 2e-3  # a servo comes back closer, and other poses are farther away
 BUILT = ("joint", "link", "psd")  # parameters of what a rig file states as built; where things stand is fitted
 QUANTITIES = {
@@ -139,7 +140,7 @@ def reconcile(measured: Recording, simulation: Recording | str, name: str, *, se
         unseen,
         diagnosis,
     )
-    remains = tuple(_remains(told, diagnosis, after))
+    remains = tuple(_remains(told, rows, diagnosis, after))
     agrees = not remains
     file = ReconcileFile(
         1,
@@ -180,8 +181,8 @@ def _sides(
         rows = match(measured.samples, simulation.samples, None)
         here = replace(measured, samples=measured.samples.take(rows.measured), events=())
         there = replace(simulation, samples=simulation.samples.take(rows.simulated), events=())
-        return here, there, *_split(here.samples, seed)
-    seen, unseen = _split(measured.samples, seed)
+        return here, there, *split(here.samples, seed)
+    seen, unseen = split(measured.samples, seed)
     here = replace(measured, events=())
     drawn = replace(here, rig=parse_rig(simulation, name), rig_text=simulation)
     part = replace(drawn, samples=here.samples.take(seen))
@@ -200,7 +201,7 @@ def _stated(drawn: Recording) -> tuple[str, ...]:
     return tuple(p.name for p in session_of(drawn.rig, drawn.samples).parameters if p.name.startswith(stated))
 
 
-def _split(samples: Samples, seed: int) -> tuple[Ints, Ints]:
+def split(samples: Samples, seed: int) -> tuple[Ints, Ints]:
     """Rows seen and unseen, a pose and its repeats on one side. DataError where too few are left."""
     steps = np.round(samples.joints() / SAME_POSE_RAD)
     _, pose = np.unique(steps, axis=0, return_inverse=True)
@@ -277,16 +278,30 @@ def _stacked(samples: Samples, names: tuple[str, ...]) -> Floats:
     return np.stack([samples.column(name) for name in names], axis=1)
 
 
-def _remains(told: tuple[UnseenRecord, ...], diagnosis: DiagnosisFile, after: ComparisonFile) -> Iterator[str]:
+def _remains(
+    told: tuple[UnseenRecord, ...], rows: tuple[RowRecord, ...], diagnosis: DiagnosisFile, after: ComparisonFile
+) -> Iterator[str]:
     """Why the two do not agree yet; nothing where they do."""
     for one in told:
         if not one.after <= AGREES:
-            yield f"{one.instrument}: {one.after:.2f} times the noise on unseen rows, more than {AGREES}"
+            where = _few_rows(one, [row for row in rows if row.instrument == one.instrument])
+            yield f"{one.instrument}: {one.after:.2f} times the noise on unseen rows, more than {AGREES}{where}"
     for left in (diagnosis.unexplained, *diagnosis.also_unexplained):
         if left is not None:
             yield left.says
     if after.verdict != Verdict.CONSISTENT.value:
         yield from [one.says for one in after.differences if one.decides] or [after.says]
+
+
+def _few_rows(one: UnseenRecord, rows: Sequence[RowRecord]) -> str:
+    """Which rows carry it, where the others agree: most often those at the very edge of a step or of a play."""
+    worst = sorted(rows, key=lambda row: row.after_m, reverse=True)
+    for count in range(1, round(FEW_ROWS * len(rows)) + 1):
+        others = np.sqrt(np.mean([row.after_m**2 for row in worst[count:]])) / one.noise_m
+        if others <= AGREES:
+            listed = ", ".join(f"{row.t_s:.2f} s" for row in sorted(worst[:count], key=lambda row: row.t_s))
+            return f"; {others:.2f} without {count} of {len(rows)} rows, at {listed}"
+    return ""
 
 
 def _left_out(before: ComparisonFile, diagnosis: DiagnosisFile) -> Iterator[LeftOut]:
@@ -306,7 +321,8 @@ def _says(told: tuple[UnseenRecord, ...], before: ComparisonFile, remains: tuple
     worst = max(told, key=lambda one: one.after)
     far = f"on unseen rows {worst.before:.3g} times the noise before, {worst.after:.3g} after"
     if remains:
-        return f"Simulation and recording do not agree yet: {far}; {len(remains)} things remain."
+        count = "one thing remains" if len(remains) == 1 else f"{len(remains)} things remain"
+        return f"Simulation and recording do not agree yet: {far}; {count}."
     if before.verdict == Verdict.CONSISTENT.value:
         return f"Simulation and recording agree as they are: {far}."
     return f"With what was found the simulation agrees with the recording: {far}."

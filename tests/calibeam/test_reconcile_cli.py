@@ -1,11 +1,15 @@
 """`calibeam reconcile`: a rig file against a session with a zero error and a soft joint, and against one like it."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from acquisition.recording import read
+from acquisition.recording.rig import rig_text
 from calibeam.cli import run
+from calibeam.results.reconciliation import reconcile, split
 from tests.calibeam.test_compare_simulations import EXAMPLES, arm, session
 
 RIG = EXAMPLES / "rig.toml"
@@ -83,3 +87,16 @@ def test_too_few_rows_and_a_full_folder_are_one_sentence(tmp_path, capsys):
     assert "too few to keep a quarter unseen" in capsys.readouterr().err
     assert run(["reconcile", str(few), "--simulation", str(RIG), "--out", str(few)]) == 1
     assert "not an empty folder" in capsys.readouterr().err
+
+
+def test_few_rows_that_carry_what_remains_are_listed(tmp_path):
+    q_rad = poses()[:FEW]
+    folder = session(tmp_path / "measured", q_rad, q_rad, arm())
+    recording = read(folder)
+    _, unseen = split(recording.samples, 0)
+    x_m = recording.samples.column("x_m").copy()
+    x_m[unseen[0]] += 2e-3
+    samples = replace(recording.samples, columns={**recording.samples.columns, "x_m": x_m})
+    found = reconcile(replace(recording, samples=samples), rig_text(RIG), "rig.toml").file
+    assert found.verdict == "differ"
+    assert any(f"without 1 of {FEW // 4} rows, at {unseen[0]}.00 s" in one for one in found.remains)
