@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from rich.console import Console
 from rich.table import Table
 
+from calibrate.effects.term import with_sigma
 from calibrate.iso9283.attained import EvaluatedTest
 from calibrate.iso9283.cube import CYCLES
 from calibrate.iso9283.performance import DistancePerformance, Performance, PosePerformance, PoseTest
@@ -45,16 +46,12 @@ def print_pose_test(console: Console, found: EvaluatedTest, written: str) -> Non
 
 
 def millimetres(one: Performance | None) -> str:
-    """Value and one sigma; to the first digit but one of sigma."""
-    return DASH if one is None or math.isnan(one.value) else _with_sigma(one.value, one.sigma, MM)
+    """Value and one sigma."""
+    return DASH if one is None or math.isnan(one.value) else _millimetres(one.value, one.sigma)
 
 
-def _with_sigma(value: float, sigma: float, scale: float) -> str:
-    value, sigma = scale * value, scale * sigma
-    if math.isnan(sigma):
-        return f"{value:.3f}"
-    digits = min(6, max(0, 1 - math.floor(math.log10(sigma)))) if sigma > 0.0 else 6
-    return f"{value:.{digits}f} ± {sigma:.{digits}f}"
+def _millimetres(value_m: float, sigma_m: float) -> str:
+    return with_sigma(MM * value_m, MM * sigma_m)
 
 
 def _largest(what: str, poses: Sequence[PosePerformance]) -> str:
@@ -85,7 +82,7 @@ def _poses(found: EvaluatedTest) -> Table:
     ]
     if found.corrected is not None:
         better = {one.pose: one.accuracy_m for one in found.corrected.poses}
-        columns.append(("predicted", [_with_sigma(*found.predicted_m[one.pose], MM) for one in poses]))
+        columns.append(("predicted", [_millimetres(*found.predicted_m[one.pose]) for one in poses]))
         columns.append(("corrected", [millimetres(better[one.pose]) for one in poses]))
     columns.append(("RP, mm", [millimetres(one.repeatability_m) for one in poses]))
     if any(one.variation_m is not None for one in poses):

@@ -24,7 +24,7 @@ def beam_axes(drivers: Drivers) -> tuple[Floats, Floats, Floats]:
     return np.array(tool.laser_origin_m or (0.0, 0.0, 0.0)), u, v
 
 
-def pointing(
+def of_beam(
     drivers: Drivers,
     physics: str,
     driver: str,
@@ -32,54 +32,31 @@ def pointing(
     law: Law,
     inner: tuple[Inner, ...] = (),
     open_family: bool = False,
-) -> Term:
-    """The beam turns with `law` (pose, 1) of the driver."""
+) -> tuple[Term, Term]:
+    """The beam turns with `law` (pose, 1) of the driver; it shifts across itself, its direction kept."""
     origin, u, v = beam_axes(drivers)
-    directions = np.stack([np.concatenate([np.cross(origin, t), t]) for t in (u, v)], axis=1)
+    turns = np.stack([np.concatenate([np.cross(origin, t), t]) for t in (u, v)], axis=1)
+    shifts = np.concatenate([np.stack([u, v], axis=1), np.zeros((3, 2))])
     per = "_per_k" if driver.startswith("temp") else ""
-    return Form(
-        Port("laser.direction", Place.FRAME, drivers.n_joints),
-        (driver,),
-        shape,
-        physics,
-        None,
-        inner,
-        slow=driver == "t",
-        open=open_family,
-        function=law,
-        names=(f"turn_u_rad{per}", f"turn_v_rad{per}"),
-        limit=LIMIT_RAD,
-        sentence=f"The laser beam turns by {{turn_u_rad{per}}} and {{turn_v_rad{per}}} across itself"
-        + (time_laws.when(inner) if driver == "t" else f" with {driver}"),
-        directions=directions,
-    )
 
+    def form(where: str, verb: str, unit: str, limit: float, directions: Floats) -> Form:
+        names = tuple(f"{verb}_{axis}_{unit}{per}" for axis in "uv")
+        return Form(
+            Port(where, Place.FRAME, drivers.n_joints),
+            (driver,),
+            shape,
+            physics,
+            None,
+            inner,
+            slow=driver == "t",
+            open=open_family,
+            function=law,
+            names=names,
+            limit=limit,
+            sentence=f"The laser beam {verb}s by {{{names[0]}}} and {{{names[1]}}} across itself"
+            + (time_laws.when(inner) if driver == "t" else f" with {driver}"),
+            directions=directions,
+        )
 
-def shifting(
-    drivers: Drivers,
-    physics: str,
-    driver: str,
-    shape: Shape,
-    law: Law,
-    inner: tuple[Inner, ...] = (),
-    open_family: bool = False,
-) -> Term:
-    """The beam shifts across itself, its direction kept."""
-    _, u, v = beam_axes(drivers)
-    per = "_per_k" if driver.startswith("temp") else ""
-    return Form(
-        Port("laser.origin", Place.FRAME, drivers.n_joints),
-        (driver,),
-        shape,
-        physics,
-        None,
-        inner,
-        slow=driver == "t",
-        open=open_family,
-        function=law,
-        names=(f"shift_u_m{per}", f"shift_v_m{per}"),
-        limit=LIMIT_M,
-        sentence=f"The laser beam shifts by {{shift_u_m{per}}} and {{shift_v_m{per}}} across itself"
-        + (time_laws.when(inner) if driver == "t" else f" with {driver}"),
-        directions=np.concatenate([np.stack([u, v], axis=1), np.zeros((3, 2))]),
-    )
+    turned = form("laser.direction", "turn", "rad", LIMIT_RAD, turns)
+    return turned, form("laser.origin", "shift", "m", LIMIT_M, shifts)

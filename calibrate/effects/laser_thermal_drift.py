@@ -3,7 +3,7 @@
 from calibrate.effects import time_laws
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.kind import Kind
-from calibrate.effects.laser_pointing import pointing, shifting
+from calibrate.effects.laser_pointing import of_beam
 from calibrate.effects.term import Missing, Shape, Term
 from calibrate.effects.time_laws import varies
 
@@ -12,16 +12,16 @@ def _terms(drivers: Drivers) -> tuple[Term, ...]:
     if drivers.light is None or drivers.rig.tool.laser_direction is None:
         return ()
     return tuple(
-        moves(
+        term
+        for where, T in drivers.temperatures_degC.items()
+        if varies(T)
+        for term in of_beam(
             drivers,
             "laser-thermal-drift",
             f"temp_{where}",
             Shape.LINEAR,
             lambda d, inner, where=where: time_laws.with_temperature(where, d, inner),
         )
-        for where, T in drivers.temperatures_degC.items()
-        if varies(T)
-        for moves in (pointing, shifting)
     )
 
 

@@ -3,7 +3,7 @@
 from calibrate.effects import time_laws
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.kind import Kind
-from calibrate.effects.laser_pointing import pointing, shifting
+from calibrate.effects.laser_pointing import of_beam
 from calibrate.effects.term import Holds, Shape, Term
 
 
@@ -11,10 +11,7 @@ def _terms(drivers: Drivers) -> tuple[Term, ...]:
     if drivers.light is None or drivers.rig.tool.laser_direction is None:
         return ()
     inner = time_laws.constant_inner(drivers)
-    return tuple(
-        moves(drivers, "laser-warm-up", "t", Shape.EXPONENTIAL, time_laws.towards, inner)
-        for moves in (pointing, shifting)
-    )
+    return of_beam(drivers, "laser-warm-up", "t", Shape.EXPONENTIAL, time_laws.towards, inner)
 
 
 EFFECT = Kind(

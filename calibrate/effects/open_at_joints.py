@@ -76,7 +76,7 @@ def _of_two(drivers: Drivers, joint: int, a: int, b: int) -> list[Term]:
 def _of_load(drivers: Drivers, joint: int) -> list[Term]:
     """Any curve of the gravity torque; a spring whose stiffness changes as the joint turns, up to four times a turn:
     planets of a stage take the load one after the other, and three or four are usual. With fewer waves such a spring
-    looks like one even spring and errors of the encoder.
+    is taken for an even one and errors of the encoder.
     """
 
     def smooth(drivers: Drivers, inner: Floats) -> Floats:

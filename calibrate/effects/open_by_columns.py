@@ -11,7 +11,7 @@ from calibrate.effects.curves import centred
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.form import Floats, Form, at_joint
 from calibrate.effects.kind import Kind
-from calibrate.effects.laser_pointing import pointing, shifting
+from calibrate.effects.laser_pointing import of_beam
 from calibrate.effects.link_span import SHORTEST_M, link_vectors
 from calibrate.effects.moved import motion
 from calibrate.effects.ports import Place, Port
@@ -83,8 +83,7 @@ def _around(drivers: Drivers, column: Column) -> list[Term]:
 def _at_tool(drivers: Drivers, column: Column) -> list[Term]:
     out: list[Term] = []
     if drivers.light is not None and not column.temperature:
-        for moves in (pointing, shifting):
-            out.append(moves(drivers, "unknown", column.name, Shape.LINEAR, column.law, open_family=True))
+        out += of_beam(drivers, "unknown", column.name, Shape.LINEAR, column.law, open_family=True)
     if drivers.having(Trait.TARGET):
         names = ("size_x_m", "size_y_m", "size_z_m")
         port = Port("tool.point", Place.FRAME, drivers.n_joints)
