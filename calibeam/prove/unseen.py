@@ -12,19 +12,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.diagnose.extended import carried_over, extended
+from calibrate.diagnose.extended import carried_over, extended, moves_tool
 from calibrate.diagnose.fitted import Fitted
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.ported import perturbed_frames
 from calibrate.effects.drivers import Drivers
-from calibrate.effects.ports import Perturbation, Place
+from calibrate.effects.ports import Perturbation
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 MOVED_RAD = 0.05  # of every joint before it stands, as asked
 COPIES = 40  # of the session at a time: some ten thousand poses
-OF_THE_ARM = (Place.JOINTS, Place.FRAME)  # other ports move fixture, device or reading: the tool is where it was
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,7 @@ def tool_at(state: Fitted, q_rad: Floats, approach: Floats) -> Tool | None:
     frames = perturbed_frames(session.arm, state.geometry[:n_arm], q_rad, nothing)
     by = nothing
     for accepted in state.accepted:
-        if accepted.term.port.place in OF_THE_ARM:
+        if moves_tool(accepted.term):
             basis = _basis(accepted, state.drivers, q_rad, frames, approach)
             if basis is None:
                 return None

@@ -14,13 +14,25 @@ from numpy.typing import NDArray
 from calibrate.diagnose.linearised import Accepted
 from calibrate.effects.catalogue import terms_of
 from calibrate.effects.drivers import Drivers, Readout
+from calibrate.effects.ports import Place
 from calibrate.effects.term import Term
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
+BASE = "base.pose"
 SAME = 1e-6  # of a term's size: what rounding may leave between the two sets of coefficients
 NEARLY = 0.05  # of a term's size: columns that are chosen by the poses may leave that much, a tenth of any sigma
+
+
+def moves_tool(term: Term) -> bool:
+    """Whether the tool stands elsewhere in the cell by it: by joints, links, and a base that leans under the arm.
+
+    A fixture or a device that moves leaves the tool where it was; a base that was knocked moves all that follows alike.
+    """
+    if term.port.place is Place.SURROUNDINGS:
+        return term.port.where == BASE and "t" not in term.depends_on
+    return term.port.place is not Place.READING
 
 
 def extended(drivers: Drivers, q_rad: Floats, frames: Floats, like: Ints, copies: int = 1) -> Drivers:

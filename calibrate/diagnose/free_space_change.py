@@ -14,12 +14,12 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from calibrate.blunders.rough_fit import rough_fit
-from calibrate.diagnose.extended import carried_over, extended
+from calibrate.diagnose.extended import carried_over, extended, moves_tool
 from calibrate.diagnose.fitted import Fitted
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.ported import flange_twists, perturbed_frames
 from calibrate.effects.drivers import Drivers
-from calibrate.effects.ports import Perturbation, Place
+from calibrate.effects.ports import Perturbation
 from calibrate.rigid import cross_matrix
 
 Floats = NDArray[np.float64]
@@ -28,7 +28,6 @@ Ints = NDArray[np.intp]
 POSES = 300
 AT_ONCE = 30  # poses
 AMONG = 100.0  # measured poses, copies counted, for each new one: what is chosen by the poses stays as it was to 1 %
-OF_THE_ARM = (Place.JOINTS, Place.FRAME)  # other ports move fixture, device or reading: the arm is where it was
 
 
 @dataclass(frozen=True)
@@ -50,7 +49,7 @@ def free_space_change(before: Fitted, after: Fitted, rng: Generator) -> FreeSpac
     frames = perturbed_frames(session.arm, after.geometry[:n_arm], q_rad, nothing)
     by, slopes, columns = nothing, list[Floats](), list[int]()
     for i, accepted in enumerate(after.accepted):
-        if accepted.term.port.place not in OF_THE_ARM:
+        if not moves_tool(accepted.term):
             continue
         basis = _told(accepted, after.drivers, q_rad, frames, like)
         if basis is None:

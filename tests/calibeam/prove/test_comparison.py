@@ -13,6 +13,7 @@ from calibeam.prove.baselines import features
 from calibeam.prove.comparison import GEOMETRY, compare, fold_of, oracle_terms
 from calibeam.prove.real import SEED, hidden_angles
 from calibeam.prove.record import Truth, truth_of
+from calibeam.prove.scoring import errors_m
 from calibeam.prove.unseen import tool_at, write_asked
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.diagnosis import Verdict
@@ -146,3 +147,20 @@ def test_unseen_poses_of_geometry_alone_are_those_of_the_arm(state: Fitted) -> N
     for a, b in ((0, 7), (3, 21), (11, 29)):
         said, fitted = np.linalg.norm(tip_m[a] - tip_m[b]), np.linalg.norm(expected[a] - expected[b])
         assert said == pytest.approx(fitted, abs=1e-9)
+
+
+def test_a_soft_pedestal_leans_with_the_tool(tmp_path: Path) -> None:
+    """Where the tool is in the cell: a model that knows the pedestal is closer to the truth than geometry alone."""
+    wanted = Wanted("tracker", seed=41, defects=("soft-pedestal",), enr=2.0, samples=200)
+    write_case(conceal(wanted), tmp_path)
+    hidden = truth_document(conceal(wanted))
+    truth = truth_of(msgspec.json.encode(hidden))
+    source = read(tmp_path / "recording")
+    alone = fit_geometry(session_of(source.rig, source.samples))
+    terms = oracle_terms(alone, truth.defects, "tracker")
+    assert terms is not None
+    asked = np.array(hidden["free_space"]["reading_rad"]), np.array(hidden["free_space"]["approach"])
+    before_m, after_m = (errors_m(tool_at(s, *asked), truth.free_space) for s in (alone, alone.refitted(terms)))
+    assert before_m is not None
+    assert after_m is not None
+    assert after_m < 0.5 * before_m

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from calibrate.diagnose.elsewhere import NewPoses, elsewhere
-from calibrate.diagnose.extended import alike, carried_over, extended
+from calibrate.diagnose.extended import alike, carried_over, extended, moves_tool
 from calibrate.diagnose.fitted import fit_geometry
-from calibrate.diagnose.free_space_change import AMONG, OF_THE_ARM, free_space_change
+from calibrate.diagnose.free_space_change import AMONG, free_space_change
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.session import session_of
 
@@ -33,7 +33,7 @@ def kinds_of(state):
     """One term of every kind that moves the arm."""
     first = {}
     for term in state.candidates():
-        if term.port.place in OF_THE_ARM:
+        if moves_tool(term):
             first.setdefault((term.physics, term.variant, term.shape), term)
     return list(first.values())
 
