@@ -16,7 +16,7 @@ from calibeam.results.comparison import (
 )
 from calibeam.results.reconciliation import ReconcileFile
 from calibrate.effects.term import with_sigma
-from calibrate.report.quantities import length
+from calibrate.report.quantities import length, significant
 
 MOST_DIFFERENCES = 14  # differences in a terminal; all of them stand in the file
 FEW = 3  # alternatives of one
@@ -131,7 +131,7 @@ def print_reconciliation(console: Console, file: ReconcileFile) -> None:
     console.print(f"[bold]{file.verdict}[/bold]: {file.says}", highlight=False)
     for one in file.unseen:
         parts = (
-            f"{what} {length(value)} ({over:.3g} of the noise)"
+            f"{what} {length(value)} ({significant(over)} times the noise)"
             for what, value, over in (
                 ("before", one.before_m, one.before),
                 ("after geometry", one.geometry_m, one.geometry),

@@ -157,7 +157,8 @@ def _brief(result: Identification) -> Iterator[str]:
             f"± {np.degrees(sigma_rad):.5f}° (± {1e6 * sigma_rad:.1f} µrad)"
         )
     if more := len(known) - len(zeros):
-        yield f"{more} more parameters are determined: {SEE}; all are in the model"
+        others = "one more parameter is" if more == 1 else f"{more} more parameters are"
+        yield f"{others} determined: {SEE}; all are in the model"
     missing = [p.name for p in listed if p.value is None]
     if missing:
         shown = ", ".join(missing[:NAMED]) + (f" and {len(missing) - NAMED} more" if len(missing) > NAMED else "")

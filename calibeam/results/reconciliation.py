@@ -33,6 +33,7 @@ from calibrate.errors import DataError
 from calibrate.fit_plan import FitPlan
 from calibrate.model_file import ModelFile
 from calibrate.physics.from_diagnosis import model_of_diagnosis, model_of_fit
+from calibrate.report.quantities import significant
 from calibrate.sensors import position, spots, wire
 
 Floats = NDArray[np.float64]
@@ -319,7 +320,7 @@ def _left_out(before: ComparisonFile, diagnosis: DiagnosisFile) -> Iterator[Left
 
 def _says(told: tuple[UnseenRecord, ...], before: ComparisonFile, remains: tuple[str, ...]) -> str:
     worst = max(told, key=lambda one: one.after)
-    far = f"on unseen rows {worst.before:.3g} times the noise before, {worst.after:.3g} after"
+    far = f"on unseen rows {significant(worst.before)} times the noise before, {significant(worst.after)} after"
     if remains:
         count = "one thing remains" if len(remains) == 1 else f"{len(remains)} things remain"
         return f"Simulation and recording do not agree yet: {far}; {count}."

@@ -10,7 +10,7 @@ from calibeam.results.reconciliation import Reconciled, ReconcileFile, RowRecord
 from calibeam.software import SOFTWARE
 from calibrate.report.diagnosis.finding_page import chain_figure, chain_of
 from calibrate.report.elements import Html, bullets, figure, page, panels, section, table, tag, tile, write_page
-from calibrate.report.quantities import length
+from calibrate.report.quantities import length, significant
 from calibrate.report.svg import drawn, log_axis
 from calibrate.report.tones import Tone
 
@@ -51,7 +51,7 @@ def _before(found: Reconciled) -> Html:
         f"device stands is taken into account.{where}"
     )
     tiles = [
-        tile(one.instrument, length(one.before_m), f"rms of a coordinate, {one.before:.3g} times the noise")
+        tile(one.instrument, length(one.before_m), f"rms of a coordinate, {significant(one.before)} times the noise")
         for one in file.unseen
     ]
     return section("before", CONTENTS["before"], lead, tag("div", *tiles, cls="tiles"), *_pictures(file, "before"))
@@ -78,7 +78,7 @@ def _after(file: ReconcileFile) -> Html:
             one.instrument,
             str(one.rows),
             *(
-                f"{length(value)} ({over:.3g})"
+                f"{length(value)} ({significant(over)})"
                 for value, over in (
                     (one.before_m, one.before),
                     (one.geometry_m, one.geometry),
