@@ -134,15 +134,29 @@ def _found(
 
 def _stated(model: Fitted, i: int, quantity: Quantity) -> Floats | None:
     """(row, k) sigma as the rig file states it, joints included where it states them; None where it does not."""
-    measured, noise = model.session.measured[i], model.session.rig.noise
-    kind, rows = kind_of(measured.name), model.problem.rows[i]
-    keys = {s.key for s in kind.noise if s.unit == quantity.unit}
-    if any(getattr(noise, key, None) is None for key in keys):
+    kind, noise = kind_of(model.session.measured[i].name), model.session.rig.noise
+    if any(getattr(noise, key, None) is None for key in _keys(kind, quantity)):
         return None
-    own = believed_sigma(measured)[rows][:, quantity.part]
+    own = _own(model, i, quantity)
     if noise.joint_rad is None:
         return None if Trait.CONES in kind.traits else own  # a seated probe is read by its joints
     return np.asarray(np.sqrt(own**2 + noise.joint_rad**2 * np.sum(_levers(model, i, quantity) ** 2, axis=0)))
+
+
+def _keys(kind: SensorKind, quantity: Quantity) -> set[str]:
+    """Of the rig's [noise], in the unit of the quantity."""
+    return {s.key for s in kind.noise if s.unit == quantity.unit}
+
+
+def _own(model: Fitted, i: int, quantity: Quantity) -> Floats:
+    """(row, k) sigma of the instrument alone. What a row states of itself is the scatter within its own average, and
+    what the rig file states that of a reading: a reading may be as bad as the worse of the two.
+    """
+    measured, noise = model.session.measured[i], model.session.rig.noise
+    own = believed_sigma(measured)[model.problem.rows[i]][:, quantity.part]
+    for key in _keys(kind_of(measured.name), quantity):
+        own = np.maximum(own, getattr(noise, key, None) or 0.0)
+    return own
 
 
 def _levers(model: Fitted, i: int, quantity: Quantity) -> Floats:
@@ -160,7 +174,7 @@ def _evidence(
         return (), ()
     told = [
         _close_in_time(misfit, np.array([]) if drivers.repeat is None else drivers.repeat[sample], sample),
-        _by_lever(*_whitened(model, i, quantity, misfit, tame)),
+        _by_lever(*_whitened(model, i, quantity, misfit, tame), stated=model.session.rig.noise.joint_rad is not None),
         _by_posture(misfit, drivers.q_rad[sample], sample, rng),
     ]
     given = [one for one in told if one is not None]
@@ -171,7 +185,7 @@ def _whitened(
     model: Fitted, i: int, quantity: Quantity, misfit: Floats, tame: NDArray[np.bool_]
 ) -> tuple[Floats, Floats]:
     """Misfit (row, k) and levers (joint, row, k) by the noise as stated, which may be that of the joints."""
-    own = believed_sigma(model.session.measured[i])[model.problem.rows[i]][tame][:, quantity.part]
+    own = _own(model, i, quantity)[tame]
     levers, joint_rad = _levers(model, i, quantity)[:, tame], model.session.rig.noise.joint_rad or 0.0
     form = joint_rad**2 * np.einsum("jok,jol->okl", levers, levers) + own[:, :, None] ** 2 * np.eye(own.shape[1])
     L = np.linalg.cholesky(form)
@@ -200,11 +214,13 @@ def close_pairs(repeat: Ints, sample: Ints) -> Ints:
     return np.array(out, dtype=np.intp).reshape(-1, 2)
 
 
-def _by_lever(misfit: Floats, joints: Floats) -> tuple[bool, str]:
-    """Noise of an instrument does not know how far the joints are."""
+def _by_lever(misfit: Floats, joints: Floats, *, stated: bool) -> tuple[bool, str]:
+    """Noise of an instrument does not know how far the joints are. `stated`: how well joints come back is."""
     through, plain = innocent(misfit, joints), innocent(misfit, 0.0 * joints)
     if through.two_log_likelihood - plain.two_log_likelihood > THROUGH_JOINTS and through.share > PART:
-        return False, "the scatter follows the levers of the joints"
+        size = np.sqrt(through.share * np.mean(misfit**2) / np.mean(np.sum(joints**2, axis=0)))
+        back = f" as if each came back within {_size(size, 'rad')}; state [noise] joint_rad where the arm is known to"
+        return False, f"the scatter follows the levers of the joints{'' if stated else back}"
     return True, "it does not follow the levers of the joints"
 
 

@@ -16,6 +16,8 @@ from simulators.conceal.case import conceal
 from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted
 
+from .concealed import changed
+
 SPEED = Missing("qd", "qd1_rad_s ...", "latency")
 SESSION = {"family": "tracker", "arm": "irb120", "samples": 120}
 CASES = 20
@@ -72,6 +74,30 @@ def test_a_late_clock_without_the_speed_is_more_than_noise(tmp_path):
     assert "× the stated noise of the positions" in left.why
     assert "missing columns that could explain it: qd1_rad_s" in left.why
     assert left.p < 0.01
+
+
+def test_joints_that_come_back_a_little_off_are_named_by_what_to_state(tmp_path):
+    rng, back_rad = np.random.default_rng(5), 1.5e-4
+    recording = stating(tmp_path, seed=3)
+    q = {f"q{j}_rad": recording.samples.column(f"q{j}_rad") + back_rad * rng.standard_normal(120) for j in range(1, 7)}
+    model = fit_geometry(session_of(recording.rig, changed(recording.samples, **q)))
+    (one,) = noise_found(model, rng, elsewhere=False)
+    assert one.statement is Statement.EXCEEDED
+    (words,) = [words for words in one.opposes if "levers" in words]
+    assert words.endswith("state [noise] joint_rad where the arm is known to")
+    assert float(words.split("within ")[1].split(" ")[0]) == pytest.approx(1e6 * back_rad, rel=0.25)
+
+
+def test_what_a_row_states_of_its_own_average_is_no_claim_about_the_reading(tmp_path):
+    wanted = {"family": "dual-psd", "seed": 3, "samples": 100, "arm": None}
+    case = conceal(Wanted(**{**SESSION, **wanted}))
+    write_case(replace(case, belief=replace(case.belief, noise={"psd_m": case.sigma_m})), tmp_path)
+    recording = read(tmp_path / "recording")
+    within = {f"psd{k}_{axis}_sigma_m": np.full(100, case.sigma_m / 14.0) for k in (1, 2) for axis in "xy"}
+    model = fit_geometry(session_of(recording.rig, changed(recording.samples, **within)))
+    (one,) = noise_found(model, np.random.default_rng(1), elsewhere=False)
+    assert one.statement is Statement.AGREES
+    assert one.stated == pytest.approx(case.sigma_m)
 
 
 def test_without_the_needed_column_no_name_is_likely_and_the_column_comes_first(tmp_path):
