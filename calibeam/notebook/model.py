@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 SAME = 1e-6  # of a rotation matrix: more than rounding, less than any slip
+Conditions = Mapping[str, Floats | float] | None  # columns of samples.csv by name: (pose,) or one value for all
 Frame = Literal["robot", "world"]  # of sigmas: the robot's own base frame, or that of the device or fixture
 
 
@@ -58,9 +59,7 @@ class Model:
                 return parameter
         raise KeyError(f"'{name}': no parameter of the model; it has {', '.join(p.name for p in self.file.parameters)}")
 
-    def flange(
-        self, q_rad: Floats, conditions: "Mapping[str, Floats | float] | None" = None, *, same_session: bool = False
-    ) -> Floats:
+    def flange(self, q_rad: Floats, conditions: Conditions = None, *, same_session: bool = False) -> Floats:
         """T_base_flange (pose, 4, 4), m, at joint readings (pose, joint) or (joint,), rad, with the model's effects.
 
         `conditions`: columns of samples.csv by name, (pose,) or one value for all poses: payload_kg, approach2,
@@ -71,12 +70,7 @@ class Model:
         return self._placed(q_rad, conditions, same_session).T_base_flange
 
     def flange_sigma(
-        self,
-        q_rad: Floats,
-        conditions: "Mapping[str, Floats | float] | None" = None,
-        *,
-        same_session: bool = False,
-        frame: Frame = "robot",
+        self, q_rad: Floats, conditions: Conditions = None, *, same_session: bool = False, frame: Frame = "robot"
     ) -> Floats:
         """(pose, 6) one sigma of `flange`: m along x, y, z of the base, rad about them. NaN without a covariance.
 
@@ -87,9 +81,7 @@ class Model:
         """
         return self._placed(q_rad, conditions, same_session, frame).flange_sigma
 
-    def tip(
-        self, q_rad: Floats, conditions: "Mapping[str, Floats | float] | None" = None, *, same_session: bool = False
-    ) -> Floats:
+    def tip(self, q_rad: Floats, conditions: Conditions = None, *, same_session: bool = False) -> Floats:
         """(pose, 3) target or probe tip in the base, m; arguments, warnings and errors as of `flange`.
 
         Where neither rig nor model knows a tip, the centre of the flange.
@@ -97,12 +89,7 @@ class Model:
         return self._placed(q_rad, conditions, same_session).tip_m
 
     def tip_sigma(
-        self,
-        q_rad: Floats,
-        conditions: "Mapping[str, Floats | float] | None" = None,
-        *,
-        same_session: bool = False,
-        frame: Frame = "robot",
+        self, q_rad: Floats, conditions: Conditions = None, *, same_session: bool = False, frame: Frame = "robot"
     ) -> Floats:
         """(pose, 3) one sigma of `tip`, m; what it contains in either frame: as of `flange_sigma`, and of the tool."""
         return self._placed(q_rad, conditions, same_session, frame).tip_sigma_m
@@ -123,7 +110,7 @@ class Model:
     def correct(
         self,
         poses: "Floats | Path | str",
-        conditions: "Mapping[str, Floats | float] | None" = None,
+        conditions: Conditions = None,
         *,
         near_rad: Floats | None = None,
         approach: Literal["positive", "negative"] | None = None,
@@ -156,7 +143,7 @@ class Model:
     def _placed(
         self,
         q_rad: Floats,
-        conditions: "Mapping[str, Floats | float] | None",
+        conditions: Conditions,
         same_session: bool,
         frame: Frame = "robot",
     ) -> "Placed":
