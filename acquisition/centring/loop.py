@@ -22,7 +22,7 @@ class CentringStatus(Enum):
     """Every way in which centring ends; the value is the sentence for a person."""
 
     CENTRED = "all four spot coordinates are within the tolerance"
-    OUT_OF_STEPS = "the step limit was reached; the fixture pose may be wrong by more than 90 deg"
+    OUT_OF_STEPS = "the step limit was reached; the fixture pose may be wrong by more than 90°"
     LIMIT_CYCLE = "the steps no longer bring the spots closer; the tolerance is below the arm's repeatability"
     SPOT_LOST = "the light left a face and going back did not find it"
     JOINT_LIMIT = "the next step would leave the joint range"

@@ -204,7 +204,7 @@ class Navigator:
             raise NoLightError(
                 f"station {self._placement}, PSD {first} first: {result.found.value} ({result.motions} positions "
                 "tried); "
-                "check that the laser is on and that the fixture stands as in the rig file, to a few centimetres  "
+                "check that the laser is on and that the fixture stands as in the rig file, to a few centimetres "
                 "and degrees"
             )
 

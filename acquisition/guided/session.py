@@ -198,7 +198,7 @@ def _of_series(other: Target, target: SphereSpot) -> bool:
 
 def _old_posture(q_rad: Floats, earlier: Sequence[Floats]) -> str | None:
     if any(np.abs(q_rad - other).max() < OTHER_RAD for other in earlier):
-        return f"was read here in this posture; turn some joint by {np.degrees(OTHER_RAD):.0f} deg or more"
+        return f"was read here in this posture; turn some joint by {np.degrees(OTHER_RAD):.0f}° or more"
     return None
 
 

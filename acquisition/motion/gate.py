@@ -182,7 +182,7 @@ class Gate:
         if np.max(off) > ELSEWHERE_RAD:
             joint = int(np.argmax(off))
             raise RefusedMotionError(
-                f"joint {joint + 1} stands {np.degrees(off[joint]):.2f} deg from where the plan begins; plan again"
+                f"joint {joint + 1} stands {np.degrees(off[joint]):.2f}° from where the plan begins; plan again"
             )
 
     def _end(self, event: MotionEvent, end: MotionState) -> None:

@@ -75,8 +75,8 @@ class GatedArm:
         if outside.any():
             joint = int(np.argmax(outside))
             raise RefusedMotionError(
-                f"joint {joint + 1} at {np.degrees(q_rad[joint]):.1f} deg would leave its range "
-                f"{np.degrees(arm.lower_rad[joint]):.1f} to {np.degrees(arm.upper_rad[joint]):.1f} deg"
+                f"joint {joint + 1} at {np.degrees(q_rad[joint]):.1f}° would leave its range "
+                f"{np.degrees(arm.lower_rad[joint]):.1f} to {np.degrees(arm.upper_rad[joint]):.1f}°"
             )
 
     def _check_boxes(self, frames: Floats) -> None:

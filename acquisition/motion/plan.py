@@ -175,8 +175,8 @@ def _check_range(made: Plan) -> None:
         k, joint = np.argwhere(outside)[0]
         raise RefusedMotionError(
             f"{made.name_of(int(made.segment[k]))} at {made.t_s[k]:.2f} s: joint {joint + 1} at "
-            f"{np.degrees(made.q_rad[k, joint]):.1f} deg leaves its range {np.degrees(arm.lower_rad[joint]):.1f} to "
-            f"{np.degrees(arm.upper_rad[joint]):.1f} deg; choose another branch or target"
+            f"{np.degrees(made.q_rad[k, joint]):.1f}° leaves its range {np.degrees(arm.lower_rad[joint]):.1f} to "
+            f"{np.degrees(arm.upper_rad[joint]):.1f}°; choose another branch or target"
         )
 
 

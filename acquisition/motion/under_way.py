@@ -64,8 +64,8 @@ class UnderWay:
         if outside.any():
             joint = int(np.argmax(outside))
             raise _stopped(
-                f"joint {joint + 1} at {np.degrees(q_rad[joint]):.1f} deg would leave its range "
-                f"{np.degrees(arm.lower_rad[joint]):.1f} to {np.degrees(arm.upper_rad[joint]):.1f} deg"
+                f"joint {joint + 1} at {np.degrees(q_rad[joint]):.1f}° would leave its range "
+                f"{np.degrees(arm.lower_rad[joint]):.1f} to {np.degrees(arm.upper_rad[joint]):.1f}°"
             )
 
     def _check_speed(self, q_rad: Floats, t_s: float) -> None:

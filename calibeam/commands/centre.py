@@ -135,7 +135,7 @@ def _print_run(console: Console, run: "Centring") -> None:
     table = Table("step", "for", "largest joint step (mrad)", "PSD 1 x, y (µm)", "PSD 2 x, y (µm)", box=None)
     before = run.trace[0].q_rad
     for number, step in enumerate(run.trace):
-        x1, y1, x2, y2 = (f"{1e6 * value:.1f}" if np.isfinite(value) else "dark" for value in step.spots_m)
+        x1, y1, x2, y2 = (f"{1e6 * value:z.1f}" if np.isfinite(value) else "dark" for value in step.spots_m)
         moved = f"{1e3 * float(np.max(np.abs(step.q_rad - before))):.3f}"
         table.add_row(str(number), step.purpose, moved, f"{x1}, {y1}", f"{x2}, {y2}")
         before = step.q_rad

@@ -116,7 +116,10 @@ def _places(rig: Rig, poses: int, most: int, rng: np.random.Generator, progress:
     from calibrate.pose_design.places import choose_places
 
     if rig.fixture is None or not rig.placements:
-        raise DataError(f"rig {rig.name}: --places asks where a fixture should stand, and the rig has none")
+        raise DataError(
+            f"rig {rig.name}: --places asks where the fixture should stand, but the rig file has no [fixture] "
+            "with a [[placement]]; add them"
+        )
     wide = with_grid(rig)
     offered = candidates_of(wide, PER_GRID_PLACE, rng, lambda done, total: progress("places", done, total))
     found = information_of(wide, offered, rng)

@@ -80,7 +80,7 @@ def jog_command(
     ):
         raise TaskError("what to jog is missing; give --joint N --by-deg A, or --axis x|y|z with --by-mm or --by-deg")
     if abs(by_mm or 0.0) > LARGEST_MM or abs(by_deg or 0.0) > LARGEST_DEG:
-        raise TaskError(f"a jog is at most {LARGEST_MM:.0f} mm or {LARGEST_DEG:.0f} deg; use calibeam move")
+        raise TaskError(f"a jog is at most {LARGEST_MM:.0f} mm or {LARGEST_DEG:.0f}°; use calibeam move")
     if joint is not None and not 1 <= joint <= loaded.n_joints:
         raise TaskError(f"--joint {joint}: the arm has joints 1 to {loaded.n_joints}")
     if not 0.0 < speed <= 1.0:

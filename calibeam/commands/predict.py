@@ -38,7 +38,10 @@ def _table(path: Path, rig: Rig) -> Samples:
     if path.is_dir() or path.suffix == ".mcap":
         samples = read(path).samples
         if samples.n_joints != rig.n_joints:
-            raise DataError(f"{path}: samples of {samples.n_joints} joints, but the model's arm has {rig.n_joints}")
+            raise DataError(
+                f"{path}: samples of {samples.n_joints} joints, but the model's arm has {rig.n_joints}; "
+                "give the model of this arm"
+            )
         return samples
     return read_parquet(path, rig) if path.suffix == ".parquet" else read_csv(path, rig)
 

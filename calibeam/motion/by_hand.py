@@ -188,7 +188,7 @@ def _drive(gate: Gate, made: Plan, joints: Callable[[], Floats], watch: Callable
     off = float(np.max(np.abs(end_rad - made.q_rad[-1])))
     console.print(
         f"{ending_words(gate.state, off)}; {followed.sent} set-points, {followed.missed} cycles missed; joints now "
-        f"{(np.round(np.degrees(end_rad), 3) + 0.0).tolist()} deg, {np.degrees(off):.4f} deg from the plan's end",
+        f"{(np.round(np.degrees(end_rad), 3) + 0.0).tolist()}°, {np.degrees(off):.4f}° from the plan's end",
         soft_wrap=True,
     )
     return end_rad
@@ -208,7 +208,7 @@ def said(made: Plan, plan_file: Path) -> str:
     names = ", ".join(f"{segment.name} ({segment.by.value})" for segment in made.segments)
     return (
         f"plan: {names}; {made.t_s[-1]:.1f} s, fastest joint {fastest + 1} at "
-        f"{np.degrees(np.max(np.abs(speed[:, fastest]))):.1f} deg/s; drawn in {plan_file}"
+        f"{np.degrees(np.max(np.abs(speed[:, fastest]))):.1f}°/s; drawn in {plan_file}"
     )
 
 

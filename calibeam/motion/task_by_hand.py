@@ -124,7 +124,7 @@ def run_by_hand(
     if lacking := missing(task, camera=camera):
         for line in lacking:
             console.print(f"missing: {line}", soft_wrap=True, markup=False, highlight=False)
-        raise TaskError(f"{file}: the program lacks {len(lacking)} things, listed above; nothing was moved")
+        raise TaskError(f"{file}: the program is not ready, what it lacks is listed above; nothing was moved")
     asking = None if yes or dry else someone(at_terminal(), "whether the arm may move", YES)
     clock, solver = SystemClock(), solver_of(rig, model)
     with streamed_robot(rig, clock) as robot:

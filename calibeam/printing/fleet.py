@@ -8,7 +8,7 @@ from rich.table import Table
 
 from calibeam.fleet.run import RunResult
 from calibeam.fleet.summary import Fleet, drift_words, shared_words
-from calibrate.report.quantities import length
+from calibrate.report.quantities import counted, length
 
 SHOWN = 20  # lines of a kind; the page holds more
 
@@ -24,7 +24,7 @@ def print_fleet(console: Console, ran: RunResult, fleet: Fleet) -> None:
         table.add_row(row.robot, str(count), row.started_utc[:10] or "-", unseen, row.trust, row.verdict or "-")
     console.print(table)
     if len(fleet.robots) > SHOWN:
-        console.print(f"and {len(fleet.robots) - SHOWN} more robots")
+        console.print(f"and {counted(len(fleet.robots) - SHOWN, 'more robot')}")
     told = [drift_words(drift) for drift in fleet.drifting] + [f"shared: {shared_words(c)}" for c in fleet.shared]
     if not fleet.drifting:
         told.insert(0, f"no zero is seen to drift ({len(fleet.lines)} tested)")
@@ -37,7 +37,7 @@ def print_fleet(console: Console, ran: RunResult, fleet: Fleet) -> None:
 
 
 def _counts(ran: RunResult, fleet: Fleet) -> str:
-    said = f"{len(fleet.rows)} recordings: {len(fleet.good)} identified"
+    said = f"{counted(len(fleet.rows), 'recording')}: {len(fleet.good)} identified"
     said += f" ({len(fleet.torn)} of them cut short or damaged)" if fleet.torn else ""
     said += f", {len(fleet.bad)} failed or lost"
     said += f", {len(fleet.empty)} without samples" if fleet.empty else ""

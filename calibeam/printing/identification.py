@@ -18,7 +18,7 @@ from calibrate.identification.result import Evidence, FreeSpace, Identification,
 from calibrate.model_file import ModelFile, ModelParameter
 from calibrate.observability import Observability
 from calibrate.physics.records import Effect
-from calibrate.report.quantities import angle, length
+from calibrate.report.quantities import angle, counted, length
 from calibrate.report.session_evidence import SessionEvidence
 from calibrate.report.session_verdict import session_verdict
 from calibrate.report.verdict import TOOL, Answers, Number, Trust, Verdict
@@ -157,8 +157,8 @@ def _brief(result: Identification) -> Iterator[str]:
             f"± {np.degrees(sigma_rad):.5f}° (± {1e6 * sigma_rad:.1f} µrad)"
         )
     if more := len(known) - len(zeros):
-        others = "one more parameter is" if more == 1 else f"{more} more parameters are"
-        yield f"{others} determined: {SEE}; all are in the model"
+        verb = "is" if more == 1 else "are"
+        yield f"{counted(more, 'more parameter')} {verb} determined: {SEE}; all are in the model"
     missing = [p.name for p in listed if p.value is None]
     if missing:
         shown = ", ".join(missing[:NAMED]) + (f" and {len(missing) - NAMED} more" if len(missing) > NAMED else "")
@@ -181,7 +181,7 @@ def _print_details(console: Console, result: Identification, *, of_spots: bool) 
     seen = result.identifiability
     names = ", ".join(f"{i.name} ({i.observations})" for i in result.instruments)
     console.print(
-        f"{names}: {result.n_samples} samples, rank {seen.rank} of {seen.n_free} unknowns, "
+        f"{names}: {counted(result.n_samples, 'sample')}, rank {seen.rank} of {seen.n_free} unknowns, "
         f"condition {seen.condition:.3g}",
         highlight=False,
     )

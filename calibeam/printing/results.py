@@ -20,6 +20,7 @@ from calibrate.report.diagnosis.words import (
     stream_words,
     verdict_words,
 )
+from calibrate.report.quantities import counted
 
 MOST = 8  # of what is of less weight; all of it stands in the file
 
@@ -97,7 +98,7 @@ def _print_details(console: Console, file: DiagnosisFile) -> None:
 def print_streams(console: Console, file: DiagnosisFile) -> None:
     """Of a recording without samples: each clock with its uncertainty, findings, and what the streams do not show."""
     count = len(file.findings)
-    found = f"{count} cause{'s' if count > 1 else ''} found" if count else "no fault found"
+    found = f"{counted(count, 'cause')} found" if count else "no fault found"
     console.print(f"\n[bold]Streams only: {found}. The recording has no samples.[/bold]", highlight=False)
     lines = [line for number, finding in enumerate(file.findings, start=1) for line in _finding(number, finding)]
     if file.streams is not None:

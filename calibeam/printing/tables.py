@@ -119,7 +119,7 @@ def print_error_simulation(console: Console, s: Simulation) -> None:
         console.print("no worst posture: none of these errors moves the probe", highlight=False, markup=False)
     for p in s.worst:
         joints = ", ".join(f"{np.degrees(q):.0f}" for q in p.q_rad)
-        console.print(f"worst posture: {length(p.rms_m)} rms at ({joints}) deg", highlight=False, markup=False)
+        console.print(f"worst posture: {length(p.rms_m)} rms at ({joints})°", highlight=False, markup=False)
 
 
 def _errors_table(title: str, *headings: str) -> Table:

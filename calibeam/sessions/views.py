@@ -210,7 +210,7 @@ def _facts(shown: SessionStatus) -> Table:
 
 
 def _quality(table: Table, quality: Quality) -> None:
-    spots = [f"{1e3 * v:+6.2f}" if np.isfinite(v) else "  dark" for v in quality.spots_m]
+    spots = [f"{1e3 * v:+z6.2f}" if np.isfinite(v) else "  dark" for v in quality.spots_m]
     for face in (1, 2):
         volts = quality.sums_v[face - 1]
         light = f"   light {volts:.2f} V" if np.isfinite(volts) else ""

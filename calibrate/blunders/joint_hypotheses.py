@@ -27,7 +27,7 @@ def shifted(n_joints: int) -> Iterator[Hypothesis]:
             yield Hypothesis(
                 BlunderKind.JOINT_OFFSET,
                 f"column q{j + 1}_rad",
-                f"zero of joint {j + 1} is {abs(degrees)} deg beside the rig's",
+                f"zero of joint {j + 1} is {abs(degrees)}° beside the rig's",
                 f"add {np.radians(degrees):.6f} rad to the column or to theta_offset_rad of joint {j + 1}",
                 lambda q, s=shift: q + s,
             )

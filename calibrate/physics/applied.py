@@ -398,7 +398,7 @@ def _between(one: Acting) -> str:
     rows = int(np.any(one.undated, axis=1).sum())
     return (
         f"{rows} of {len(one.undated)} rows lie between the recorded rows where {one.carried.record.name} stepped: "
-        "before or after it, nobody saw; sigma widened"
+        "whether before or after it is not recorded; sigma widened"
     )
 
 

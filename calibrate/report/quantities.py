@@ -39,6 +39,11 @@ def power_of_ten(exponent: int) -> str:
     return "10" + str(exponent).translate(RAISED)
 
 
+def counted(number: int, thing: str) -> str:
+    """'1 row', '12 rows': a number of things whose plural takes an s."""
+    return f"{number} {thing}{'' if number == 1 else 's'}"
+
+
 def length(value_m: float, digits: int = 3) -> str:
     """A length in the unit that gives 1 to 1000 of it: '1.92 µm'."""
     return _in_unit(value_m, digits, LENGTHS)

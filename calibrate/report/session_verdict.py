@@ -17,7 +17,7 @@ from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.fit import Status
 from calibrate.model_file import Fields, UnseenRows
 from calibrate.report.model_tests import Repeated, Scatter, proofs, repeated, scatter
-from calibrate.report.quantities import significant
+from calibrate.report.quantities import counted, significant
 from calibrate.report.session_evidence import SessionEvidence
 from calibrate.report.verdict import AGAIN, MORE_POSES, NOISIER, UNCHECKED, WORSE_UNSEEN, Doubt, Trust, Verdict
 from calibrate.sensors.catalogue import kind_of
@@ -168,8 +168,7 @@ def _doubts_of_rank(evidence: SessionEvidence) -> Iterator[Doubt]:
     weak = [u for u in evidence.model.unseen if not u.structural and len(u.members) > 1 and arm & set(u.members)]
     if weak:
         yield (
-            f"{len(weak)} combination{'s' if len(weak) > 1 else ''} of parameters of the arm cannot be separated with "
-            "these poses.",
+            f"{counted(len(weak), 'combination')} of parameters of the arm cannot be separated with these poses.",
             "Measure more different poses: `calibeam design` chooses them.",
         )
 
@@ -179,7 +178,7 @@ def _doubts_of_diagnosis(found: DiagnosisFile | None) -> Iterator[Doubt]:
     if found is None or found.verdict == "consistent":
         return
     if found.verdict == "mismatch":
-        causes = f"{len(found.findings)} cause{'s' if len(found.findings) != 1 else ''}"
+        causes = counted(len(found.findings), "cause")
         yield (
             f"Geometry alone does not explain the readings: the diagnosis found {causes}.",
             "Use the model with the physics, which `calibeam diagnose --model-out` writes.",

@@ -229,7 +229,7 @@ def wrist(axes: Sequence[AxisFound], q_rad: Floats, row_of: Callable[[int], int]
                 return before, last
             joint = int(np.argmax(between)) + 1
             apart.append(
-                f"joint {joint} stands {np.degrees(between[joint - 1]):.2g} deg apart between "
+                f"joint {joint} stands {np.degrees(between[joint - 1]):.2g}° apart between "
                 f"{rows_said(before.segment, row_of)} and {rows_said(last.segment, row_of)}"
             )
     raise DataError(
@@ -250,12 +250,12 @@ def _what_there_is(axes: Sequence[AxisFound], q_rad: Floats, row_of: Callable[[i
     turned = ", ".join(f"{a.segment.joint} ({rows_said(a.segment, row_of)})" for a in axes) or "none"
     n = q_rad.shape[1]
     short = [
-        f"joint {s.joint} alone turns only {np.degrees(s.span_rad(q_rad)):.3g} deg in {len(s.rows)} rows "
+        f"joint {s.joint} alone turns only {np.degrees(s.span_rad(q_rad)):.3g}° in {len(s.rows)} rows "
         f"({rows_said(s, row_of)})"
         for s in too_short(q_rad)
         if s.joint in (n - 1, n)
     ]
-    needed = f"; {np.degrees(SHORTEST_RAD):.0f} deg and {FEWEST} rows are needed" if short else ""
+    needed = f"; {np.degrees(SHORTEST_RAD):.0f}° and {FEWEST} rows are needed" if short else ""
     return "; ".join([f"found single rotations of joint {turned}", *short]) + needed
 
 

@@ -68,7 +68,7 @@ def _frame(point_before: Floats, before: Floats, point_last: Floats, last: Float
     normal = cross(before, last)
     sine = float(np.linalg.norm(normal))
     if sine < PARALLEL:
-        raise DataError(f"flange frame: the last two axes are {np.degrees(np.arcsin(sine)):.1f} deg from parallel")
+        raise DataError(f"flange frame: the last two axes are {np.degrees(np.arcsin(sine)):.1f}° from parallel")
     # foot on the last axis: point_last + t last, with (foot - point_before) square to (before x last) x before
     across = cross(normal, before)
     t = float((point_before - point_last) @ across / (last @ across))

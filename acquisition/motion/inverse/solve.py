@@ -231,6 +231,6 @@ class Solver:
         best = int(np.argmin(np.max(beyond, axis=1)))
         joint = int(np.argmax(beyond[best]))
         return (
-            f"joint {joint + 1} would stand at {np.degrees(q_rad[best, joint]):.1f} deg, outside its range "
-            f"{np.degrees(self.arm.lower_rad[joint]):.1f} to {np.degrees(self.arm.upper_rad[joint]):.1f} deg"
+            f"joint {joint + 1} would stand at {np.degrees(q_rad[best, joint]):.1f}°, outside its range "
+            f"{np.degrees(self.arm.lower_rad[joint]):.1f} to {np.degrees(self.arm.upper_rad[joint]):.1f}°"
         )

@@ -19,7 +19,7 @@ from calibrate.report.diagnosis.words import (
     verdict_words,
 )
 from calibrate.report.elements import Html, bullets, folded, halves, section, table, tag, tile
-from calibrate.report.quantities import DASH, fixed, length, significant
+from calibrate.report.quantities import DASH, counted, fixed, length, significant
 from calibrate.report.verdict import Trust
 
 TITLE = "What the model lacks"
@@ -222,7 +222,7 @@ def _confusable(file: DiagnosisFile) -> Iterator[Html]:
         ranked = pairs[:MOST_PAIRS]
         rows = [(place_words(a), place_words(b), f"{r2:.3f}") for a, b, r2 in ranked]
         more = len(pairs) - len(ranked)
-        title = f"Cannot be separated with these poses: {len(pairs)} pair{'s' if len(pairs) > 1 else ''} of causes"
+        title = f"Cannot be separated with these poses: {counted(len(pairs), 'pair')} of causes"
         note = (tag("p", f"{more} more in diagnosis.json."),) if more else ()
         yield folded(title, table(("One cause", "another", "R²"), rows, numeric=(2,)), *note, on_paper=False)
 

@@ -15,7 +15,7 @@ from calibrate.diagnose.schema import (
 )
 from calibrate.diagnose.stated_noise import Statement
 from calibrate.effects.term import UNITS
-from calibrate.report.quantities import TIED, length
+from calibrate.report.quantities import TIED, counted, length
 
 # Of streams, beside those of the catalogue; the first ending that fits is taken.
 OF_STREAMS = (("_s_per_s", 1e6, "µs per s"), ("_s2", 1e6, "ms²"), ("_hz", 1.0, "Hz"), ("_count", 1.0, ""))
@@ -45,13 +45,13 @@ def verdict_words(file: DiagnosisFile) -> str:
         return "The file is wrong as a whole: nothing can be determined about the arm."
     match file.verdict:
         case "mismatch" if file.known is not None:
-            n = len(file.findings)
-            return f"Recording and model differ: {n} change{'s' if n > 1 else ''} found{_how_far(file)}."
+            found = counted(len(file.findings), "change")
+            return f"Recording and model differ: {found} found{_how_far(file)}."
         case "consistent" if file.known is not None:
             return f"Nothing new: recording and model agree to within {_noise(file)}{_tested(file)}."
         case "mismatch":
-            n = len(file.findings)
-            return f"Recording and model disagree: {n} cause{'s' if n > 1 else ''} found{_how_far(file)}."
+            found = counted(len(file.findings), "cause")
+            return f"Recording and model disagree: {found} found{_how_far(file)}."
         case "consistent":
             return f"Recording and model agree: what remains is {_noise(file)}{_tested(file)}."
         case _ if file.incomplete and file.unexplained is None:

@@ -11,7 +11,7 @@ from calibrate.report.drift.two_calibrations import FAMILY, Calibration, Change,
 from calibrate.report.elements import Html, bullets, figure, folded, section, table, tag
 from calibrate.report.model_tests import proofs
 from calibrate.report.not_determined import in_plain_words
-from calibrate.report.quantities import DASH, aligned, angle, decimals_of, fixed, length, significant
+from calibrate.report.quantities import DASH, aligned, angle, counted, decimals_of, fixed, length, significant
 from calibrate.report.verdict import coded
 from calibrate.report.workspace.cells import VIEWS, grid_of
 from calibrate.report.workspace.pictures import Layer, pictures
@@ -35,9 +35,9 @@ def sentence(drift: Drift) -> str:
     told = [moved(change) for change in clear[:TOLD]]
     if len(clear) > TOLD:
         more = len(clear) - TOLD
-        told.append(f"{more} more parameter{'s' if more > 1 else ''} changed")
+        told.append(f"{counted(more, 'more parameter')} changed")
     if not told and found.together is not None:
-        told = [f"the arm changed, but no single parameter shows where (p =  {significant(found.together.p, 2)})"]
+        told = [f"the arm changed, but no single parameter shows where (p = {significant(found.together.p, 2)})"]
     return f"{since}: {', '.join(told)}{_tool(drift)}."
 
 

@@ -160,7 +160,7 @@ def test_a_cone_is_not_read_twice_in_one_posture():
     made, _ = session(hand, patience_s=5.0)
     first, second = made.run([GuidedVisit((CONE,)), GuidedVisit((CONE,))]).readings
     assert np.abs(first.q_rad - second.q_rad).max() > 0.1
-    assert "turn some joint by 6 deg" in hand.told[0].says
+    assert "turn some joint by 6°" in hand.told[0].says
 
 
 def spot(x, y, z):

@@ -400,7 +400,7 @@ def test_interrupted_anywhere_the_arm_is_stopped(where: str) -> None:
 def test_what_was_not_planned_or_stands_elsewhere_is_refused() -> None:
     gate = gate_of(Arm())
     made = gate.plan(HOME_RAD, there(0.1, 0.0, 0.0))
-    with pytest.raises(RefusedMotionError, match=r"joint 2 stands 2\.86 deg from where the plan begins"):
+    with pytest.raises(RefusedMotionError, match=r"joint 2 stands 2\.86° from where the plan begins"):
         gate.run(made, HOME_RAD + np.array([0.0, 0.05, 0.0, 0.0, 0.0, 0.0]))
     gate.plan(HOME_RAD, there(0.0, 0.1, 0.0))
     with pytest.raises(RefusedMotionError, match="not the last one"):

@@ -69,5 +69,5 @@ def test_the_speed_is_capped_where_the_tool_has_to_be_slow() -> None:
 
 
 def test_out_of_range_is_refused_with_its_joint() -> None:
-    with pytest.raises(RefusedMotionError, match=r"joint 3 at 206\.3 deg would leave its range"):
+    with pytest.raises(RefusedMotionError, match=r"joint 3 at 206\.3° would leave its range"):
         moved(Cell(), HOME_RAD + np.array([0, 0, 2.0, 0, 0, 0]))

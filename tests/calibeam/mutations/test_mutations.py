@@ -62,7 +62,7 @@ FOUND = (  # what mutations have shown once: file, change, command line, what is
 )
 AWAY = re.compile(  # of a session without its devices, and of a program whose second pose is out of reach
     r"serial port away/|could not open port|127\.0\.0\.9|not fit for a session|cannot be opened|have no command"
-    r"|lacks 8 things"
+    r"|what it lacks is listed above"
 )
 
 

@@ -95,7 +95,7 @@ def test_signs_and_a_quarter_turn_are_both_named():
     q, position_m = session()
     found = judged(counted(q, 1, 4, 6) + np.array([0, 0, np.pi / 2, 0, 0, 0]), position_m)
     assert "joints 1, 4 and 6 turn against the rig's sense" in found.says
-    assert "zero of joint 3 is 90 deg" in found.says
+    assert "zero of joint 3 is 90°" in found.says
 
 
 def test_what_the_message_says_mends_the_file():

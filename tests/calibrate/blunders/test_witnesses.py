@@ -115,7 +115,7 @@ def test_a_mirrored_axis_and_a_zero_off_are_both_named(scene):
     q = scene.q_rad + np.array([0, 0, np.pi / 2, 0, 0, 0])
     found = wrong_convention(flange, [positions(scene, q)])
     assert "determinant -1" in found.says
-    assert "column q3_rad: zero of joint 3 is 90 deg" in found.says
+    assert "column q3_rad: zero of joint 3 is 90°" in found.says
     assert "add -1.570796 rad" in found.remedy
 
 

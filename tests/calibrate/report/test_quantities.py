@@ -10,6 +10,7 @@ from calibrate.report.quantities import (
     TIED,
     aligned,
     angle,
+    counted,
     decimals_of,
     doubted_angle,
     doubted_length,
@@ -72,3 +73,8 @@ def test_a_column_lines_up_at_the_decimal_point() -> None:
 def test_what_rounds_to_zero_has_no_sign():
     assert fixed(-1e-9, 2) == "0.00"
     assert fixed(-0.006, 2) == "−0.01"
+
+
+@pytest.mark.parametrize(("number", "text"), [(0, "0 rows"), (1, "1 row"), (2, "2 rows")])
+def test_a_counted_thing_has_its_plural(number: int, text: str) -> None:
+    assert counted(number, "row") == text

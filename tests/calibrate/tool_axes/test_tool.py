@@ -104,14 +104,14 @@ def test_the_wrist_s_last_joint_alone_is_not_enough(arm, positions):
 
 def test_an_arc_that_is_too_short_is_told_with_its_rows(arm, positions):
     q = np.concatenate([turns(6), turns(5, span=0.1)])
-    with pytest.raises(DataError, match=r"joint 5 alone turns only 11\.5 deg .*; 20 deg and 5 rows are needed"):
+    with pytest.raises(DataError, match=r"joint 5 alone turns only 11\.5° .*; 20° and 5 rows are needed"):
         calibrated(arm, q, positions(q))
 
 
 def test_a_joint_that_was_moved_between_both_rotations_is_named(arm, positions):
     q = turns(5, 6)
     q[16:, 1] += 0.1
-    with pytest.raises(DataError, match=r"joint 2 stands 5\.7 deg apart between rows 1-16 and rows 17-31"):
+    with pytest.raises(DataError, match=r"joint 2 stands 5\.7° apart between rows 1-16 and rows 17-31"):
         calibrated(arm, q, positions(q))
 
 
