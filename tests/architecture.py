@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from tests.support.trees import tree_of
+
 ROOT = Path(__file__).parents[1]
 TOPS = ("drivers", "acquisition", "calibrate", "simulators", "calibeam")
 CATALOGUES = ("effects", "sensors", "defects", "commands", "arms")  # one file an entry is their purpose
@@ -40,7 +42,7 @@ def modules() -> dict[str, Module]:
     found: dict[str, Module] = {}
     for name, path in named.items():
         text = path.read_text(encoding="utf-8")
-        tree = ast.parse(text)
+        tree = tree_of(path)
         imports = frozenset(m for m in _imported(tree.body, named.keys()) if m != name)
         found[name] = Module(name, len(text.splitlines()), tree, imports)
     return found

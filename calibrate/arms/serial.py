@@ -34,6 +34,7 @@ class SerialArm(ABC):
         self.moves_frame = moves_frame
         self.by_reading: Floats | None = None  # (joint, joint) of coupled readings; None: angles from the links
         self._columns_of = [np.flatnonzero(np.array(moves_frame) == i) for i in range(n_joints + 1)]
+        self.latest: tuple[tuple[bytes, bytes] | None, Floats] = None, np.empty(0)  # of `frames`: asked, answered
 
     @abstractmethod
     def fixed_parts(self, theta: Floats) -> Floats:
@@ -50,7 +51,7 @@ class SerialArm(ABC):
     def coupled(self, by_reading: Floats | None) -> Self:
         """The same arm, with coupled readings: angle = by_reading @ reading + offset (arms/coupled_readings.py)."""
         out = copy(self)
-        out.by_reading = by_reading
+        out.by_reading, out.latest = by_reading, (None, np.empty(0))
         return out
 
     def angles_rad(self, theta: Floats, q_rad: Floats, more_rad: Floats | float = 0.0) -> Floats:
@@ -58,9 +59,15 @@ class SerialArm(ABC):
         return uncoupled(self.by_reading, q_rad) + more_rad + self.angle_offset_rad(theta)
 
     def frames(self, theta: Floats, q_rad: Floats) -> Floats:
-        """(pose, joint + 1, 4, 4) B_0 ... B_n: joint i turns about z of B_(i-1), B_n is the flange."""
-        fixed = self.fixed_parts(theta)
-        return chain_frames(fixed[0], fixed[1:], self.angles_rad(theta, q_rad))
+        """(pose, joint + 1, 4, 4) B_0 ... B_n: joint i turns about z of B_(i-1), B_n is the flange. To be read only."""
+        asked, (known, out) = (theta.tobytes(), q_rad.tobytes()), self.latest
+        if known != asked:  # a solver wants flanges and their derivatives at the same state
+            fixed = self.fixed_parts(theta)
+            out = chain_frames(fixed[0], fixed[1:], self.angles_rad(theta, q_rad))
+            out.flags.writeable = False
+            if len(q_rad) < compiled.WORTH_POSES:  # of more poses nothing is kept
+                self.latest = asked, out
+        return out
 
     def flange(self, theta: Floats, q_rad: Floats) -> Floats:
         if compiled.worth(len(q_rad)):

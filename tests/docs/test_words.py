@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.trees import tree_of
+
 ROOT = Path(__file__).parents[2]
 PRODUCT = ("acquisition", "calibeam", "calibrate", "drivers", "simulators")
 GONE = re.compile(
@@ -30,7 +32,7 @@ DEFINITIONS = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 def literals(path: Path) -> Iterator[str]:
     """What a program prints or raises: strings of several words, without docstrings; of a command, its help too."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    tree = tree_of(path)
     shown = path.parent.name == "commands"
     docs = {
         id(n.body[0].value) for n in ast.walk(tree) if isinstance(n, DEFINITIONS) and n.body and _is_text(n.body[0])
@@ -74,7 +76,7 @@ def test_no_docstring_uses_a_word_that_is_gone(package: str) -> None:
     found = [
         f"{path.relative_to(ROOT).as_posix()}: {m[0]}"
         for path in (ROOT / package).rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in ast.walk(tree_of(path))
         if isinstance(node, DEFINITIONS)
         for m in GONE.finditer(re.sub(r"`[^`]*`|two rival models, Biometrika", "", ast.get_docstring(node) or ""))
         if m[0] not in EXCEPTED.get(path.relative_to(ROOT).as_posix(), ())

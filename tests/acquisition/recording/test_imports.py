@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.trees import tree_of
+
 PROGRAM = """
 import sys
 import acquisition.recording.check_recording, acquisition.recording.mcap.read
@@ -49,7 +51,7 @@ def test_products_come_in_by_a_face() -> None:
         for path in (ROOT / folder).rglob("*.py"):
             if PACKAGE.replace(".", "/") in path.as_posix():
                 continue
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            for node in ast.walk(tree_of(path)):
                 module = node.module or "" if isinstance(node, ast.ImportFrom) else ""
                 if module.startswith(PACKAGE) and module not in DOORS:
                     reaching.add(f"{path.relative_to(ROOT)}: {module}")

@@ -1,5 +1,7 @@
 """Laws that every arm model keeps: derivatives against differences, and the D-H arm against plain 4x4 products."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -70,6 +72,24 @@ def test_joint_twists_are_the_differences_of_the_flange(arm):
     for k, step in enumerate(np.eye(arm.n_joints) * STEP):
         numeric = twist_between(arm.flange(theta, q - step), arm.flange(theta, q + step)) / (2 * STEP)
         np.testing.assert_allclose(analytic[:, :, k], numeric, atol=2e-9)
+
+
+def test_an_answer_is_of_the_state_that_is_asked_whatever_was_asked_before(arm):
+    theta, q = np.zeros(len(arm.parameters)), np.random.default_rng(3).uniform(-1.0, 1.0, (5, arm.n_joints))
+    other, moved = theta + 1e-3, q + 0.1
+    coupling = np.eye(arm.n_joints) + np.eye(arm.n_joints, k=-1)
+    asked = [
+        (arm, theta, q),
+        (arm, theta, q),
+        (arm, other, q),
+        (arm, other, moved),
+        (arm.coupled(coupling), other, moved),
+    ]
+    answers = [one.flange(at, readings) for one, at, readings in asked]
+    assert np.array_equal(answers[0], answers[1])
+    assert all(not np.allclose(before, after) for before, after in pairwise(answers[1:]))
+    answers[0][:] = 0.0  # whoever is given an answer may write into it
+    assert np.array_equal(arm.flange(theta, q), answers[1])
 
 
 def test_dh_flange_is_the_product_of_its_links(ur5e_truth):

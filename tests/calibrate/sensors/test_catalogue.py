@@ -10,6 +10,7 @@ from calibrate import sensors
 from calibrate.sensors.catalogue import BY_NAME, SENSORS, SOURCES, kind_of, names_with, used_with
 from calibrate.sensors.kind import Trait
 from calibrate.sensors.model import Usage
+from tests.support.trees import tree_of
 
 ROOT = Path(sensors.__file__).parents[2]
 OWN = ROOT / "calibrate" / "sensors"
@@ -61,7 +62,7 @@ def classes_tested(tree, classes):
 def test_no_other_file_spells_a_sensor_s_name():
     files = [path for path in product_files() if not excused(path, SPELLED)]
     assert len(files) > 400
-    found = {str(path.relative_to(ROOT)): spelled(ast.parse(path.read_text())) for path in files}
+    found = {str(path.relative_to(ROOT)): spelled(tree_of(path)) for path in files}
     assert {path: names for path, names in found.items() if names} == {}
 
 
@@ -69,7 +70,7 @@ def test_no_other_file_tests_for_a_sensor_s_class():
     classes = sensor_classes()
     assert {"Wire", "Seat", "DualPsd", "FullPose"} <= classes
     files = [path for path in product_files() if not excused(path, TESTED)]
-    found = {str(path.relative_to(ROOT)): classes_tested(ast.parse(path.read_text()), classes) for path in files}
+    found = {str(path.relative_to(ROOT)): classes_tested(tree_of(path), classes) for path in files}
     assert {path: names for path, names in found.items() if names} == {}
 
 
@@ -82,7 +83,7 @@ def test_both_checks_find_what_they_look_for():
 @pytest.mark.parametrize("start", [*SPELLED, *TESTED])
 def test_every_exception_is_still_needed(start):
     place = ROOT / start
-    trees = [ast.parse(path.read_text()) for path in ([place] if place.is_file() else place.rglob("*.py"))]
+    trees = [tree_of(path) for path in ([place] if place.is_file() else place.rglob("*.py"))]
     assert any(spelled(tree) if start in SPELLED else classes_tested(tree, sensor_classes()) for tree in trees)
 
 
