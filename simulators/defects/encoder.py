@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import ClassVar, Self
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from simulators.defects.defect import ANY_INSTRUMENT, ROBOT, Defect, phase
 from simulators.defects.scene import Scene, Site
@@ -132,7 +132,7 @@ class OvalRing(EncoderDefect):
         marked_rad = 2.0 * np.pi * arc / arc[-1] - np.pi
         turns = np.round(turn_rad / (2.0 * np.pi))
         rest_rad = turn_rad - 2.0 * np.pi * turns
-        return np.asarray(CubicSpline(place_rad, marked_rad)(rest_rad)) + 2.0 * np.pi * turns
+        return np.asarray(scipy.interpolate.CubicSpline(place_rad, marked_rad)(rest_rad)) + 2.0 * np.pi * turns
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import RBFInterpolator
 
 from simulators.arm.rigid import Vector, inverse, moved
 from simulators.arm.statics import Load
@@ -162,7 +162,7 @@ class Table:
         if at.shape[1] == 1 or len(first) < 4 + at.shape[1]:
             self._smooth = None
         else:
-            self._smooth = RBFInterpolator(self._at, self._values, neighbors=min(WALLS, len(first)))
+            self._smooth = scipy.interpolate.RBFInterpolator(self._at, self._values, neighbors=min(WALLS, len(first)))
 
     def __call__(self, at: Floats) -> Floats:
         """At drivers (row, d); what is beyond the table takes the nearest of its rows."""
