@@ -47,7 +47,7 @@ def lines(recording: Recording, findings: tuple[Finding, ...]) -> list[str]:
     if len(findings) > MOST_LINES:
         told.append(f"  and {len(findings) - MOST_LINES} more findings; --json prints all")
     errors = any(finding.is_error for finding in findings)
-    return [*told, "  errors: see above"] if errors else [*told, "  no errors"]
+    return [*told, "  not fit for use: errors above"] if errors else [*told, "  no errors"]
 
 
 def _rate(stream: Stream) -> str:
@@ -96,13 +96,8 @@ def _as_json(recording: Recording, findings: tuple[Finding, ...]) -> dict[str, A
             for stream in recording.streams.values()
         },
         "findings": [
-            {
-                "severity": finding.severity.value,
-                "problem": finding.problem.value,
-                "where": finding.where,
-                "says": finding.says,
-            }
-            for finding in findings
+            {"severity": f.severity.value, "problem": f.problem.value, "where": f.where, "says": f.says}
+            for f in findings
         ],
     }
 
@@ -123,8 +118,8 @@ def check_command(what: Path, *, json_: Annotated[bool, Parameter(name="--json")
     calibeam check session-1/recording.mcap
     ```
 
-    Each line reports what the device is, its firmware, rate and noise, or what is wrong and the remedy. A recording
-    is looked through for gaps, wrong order and saturation. Exit code 1 when something is wrong.
+    Each line starts with ok or error; then what the device is, its firmware, rate and noise, what is wrong and the
+    remedy. Findings of a recording are errors, warnings or information. Exit code 1 when there is an error.
 
     Parameters
     ----------
@@ -136,7 +131,7 @@ def check_command(what: Path, *, json_: Annotated[bool, Parameter(name="--json")
     """
     if what.suffix != ".toml":
         if not check_recording(what, as_json=json_):
-            raise CheckFailed(f"{what}: something is wrong with it, see above")
+            raise CheckFailed(f"{what}: it has errors, see above")
         return
     rig = load_rig(what)
     bad: list[str] = []

@@ -163,7 +163,7 @@ def _brief(result: Identification) -> Iterator[str]:
         shown = ", ".join(missing[:NAMED]) + (f" and {len(missing) - NAMED} more" if len(missing) > NAMED else "")
         yield f"not determined: {shown} (why: --verbose)"
     if sum(map(_of_joint, missing)) > len(zeros) and any(name.startswith("link") for name, *_ in known):
-        yield 'joint zeros alone: --plan FILE, a file with the lines  schema = 1  and  hold = ["link*"]  (links nominal)'
+        yield 'joint zeros alone, links nominal: --plan FILE, a file with the lines schema = 1 and hold = ["link*"]'
 
 
 NAMED = 4  # undetermined parameters
