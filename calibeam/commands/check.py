@@ -41,7 +41,7 @@ def check_recording(path: Path, *, as_json: bool = False) -> bool:
 
 def lines(recording: Recording, findings: tuple[Finding, ...]) -> list[str]:
     """For a person: the file, each stream with its rate and clock, each finding."""
-    told = [f"{recording.path}: {len(recording.samples)} settled samples, {len(recording.events)} events"]
+    told = [f"{recording.path}: settled samples: {len(recording.samples)}, events: {len(recording.events)}"]
     told += [f"  {stream.name}: {_rate(stream)}; {_clock(stream)}" for stream in recording.streams.values()]
     told += [f"  {f.severity.value}: {f.problem.value}: {f.where}: {f.says}" for f in findings[:MOST_LINES]]
     if len(findings) > MOST_LINES:
@@ -54,7 +54,7 @@ def _rate(stream: Stream) -> str:
     count = stream.host_s.size
     span_s = float(stream.host_s[-1] - stream.host_s[0]) if count > 1 else 0.0
     rate = f", {(count - 1) / span_s:.1f} a second over {span_s:.1f} s" if span_s > 0.0 else ""
-    return f"{count} samples{rate}"
+    return f"samples: {count}{rate}"
 
 
 def _clock(stream: Stream) -> str:

@@ -187,7 +187,7 @@ def _ended_early(
     if earlier is not None and earlier.samples:
         count, place = session.taken + earlier.samples, earlier.folder
         newest = f" ({session.taken} of them in {writer.path.name})"
-    told = f"{count} samples are kept in {place}{newest}"
+    told = f"samples kept in {place}: {count}{newest}"
     if count:
         told += f"; `calibeam identify {place}` fits them"
     return PartialResult("; ".join([reason, *dict.fromkeys(also), told]))

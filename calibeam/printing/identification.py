@@ -302,8 +302,8 @@ def refitted_lines(model: ModelFile) -> Iterator[str]:
     """Of `calibeam identify --model`."""
     determined = sum(p.value is not None for p in model.parameters)
     yield (
-        f"{model.poses} samples: {determined} of {len(model.parameters)} parameters of geometry determined, "
-        f"{sum(not e.after for e in model.effects)} effects refitted"
+        f"{counted(model.poses, 'sample')}: {determined} of {len(model.parameters)} parameters of geometry determined, "
+        f"{counted(sum(not e.after for e in model.effects), 'effect')} refitted"
     )
     yield (
         f"misfit of {model.instruments[0]}, rms distance: {length(model.rms_distance_before_m)} by geometry alone, "

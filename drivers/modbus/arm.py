@@ -176,7 +176,7 @@ class ModbusArm:
                     f"{number}; is the controller's motion program running?"
                 )
             if waited_s > limit_s:
-                raise DeviceStale(f"{self._line.place}: the motion has not ended within {limit_s:.3g} s")
+                raise DeviceStale(f"{self._line.place}: no end of the motion within {limit_s:.3g} s; check its pendant")
             self._count_life()
             self._clock.sleep_s(POLL_S)
 
