@@ -98,7 +98,7 @@ def record_session(
     """
     home_rad = np.array(rig.motion.home_rad)  # there is one: check_session
     with bar:
-        task = bar.add_task("collecting", total=None)
+        task = bar.add_task("measurement", total=None)
 
         def tell(now: Progress) -> None:
             text = f"station {now.placement}, PSD {now.first} first: {now.phase.value}"
