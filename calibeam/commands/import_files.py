@@ -207,9 +207,9 @@ def _agreed(*, yes: bool) -> None:
     """Returns when a person has agreed to the columns that are shown. NotAgreedError."""
     if yes:
         return
-    asking = someone(at_terminal(), "whether the columns are meant so", "give --yes when they are")
-    if not asking.enter("Are the columns meant so?"):
-        raise NotAgreedError("nothing was written: the columns are meant otherwise; state them with --columns")
+    asking = someone(at_terminal(), "whether the columns are understood correctly", "give --yes when they are")
+    if not asking.enter("Are the columns understood correctly?"):
+        raise NotAgreedError("nothing was written: the columns mean something else; state them with --columns")
 
 
 def _table(table: Understanding, out: Path, *, yes: bool) -> None:

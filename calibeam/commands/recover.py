@@ -43,4 +43,4 @@ def recover_command(recording: Path, *, out: Path, rig: Path | None = None, json
         print(f"{out}: messages: {done.messages}")
     if not done.whole:
         why = "; ".join(done.damage) or "the recording was cut short before its end"
-        raise PartialResult(f"{recording}: {why}; what is good is in {out}")
+        raise PartialResult(f"{recording}: {why}; what is readable is in {out}")
