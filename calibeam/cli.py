@@ -46,7 +46,7 @@ def _new_app() -> App:
     return App(
         name="calibeam",
         version=version("calibeam"),
-        help="Record, calibrate and diagnose robot arms with a laser and two position-sensitive detectors.",
+        help="Record, calibrate and diagnose robot arms, from laser spots, a tracker, a wire, cones or your tables.",
         default_parameter=Parameter(negative_iterable=(), consume_multiple=True),  # several values: --only a b
         suppress_keyboard_interrupt=False,  # cyclopts would end with 130 and no message
     )

@@ -193,7 +193,7 @@ class ModbusArm:
         while self._answer()[0] is State.MOVING:
             if self._clock.now_s() - begin_s > STANDING_LIMIT_S:
                 raise DeviceStale(
-                    f"{self._line.place}: it still moves {STANDING_LIMIT_S:.3g} s after the stop; press the emergency stop"
+                    f"{self._line.place}: still moves {STANDING_LIMIT_S:.3g} s after the stop; press the emergency stop"
                 )
             self._clock.sleep_s(POLL_S)
         with self._ordering:
