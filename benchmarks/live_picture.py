@@ -30,7 +30,7 @@ def write_picture(rig: Rig, path: Path) -> None:
         raise FileNotFoundError("no chromium on the PATH (Debian: apt-get install chromium)")
     with live_page(rig, clock, PageAddress(port=0)) as page, sync_playwright() as playwright:
         living = LivingRig(rig, page.feed, clock)
-        page.feed.progress(Progress("collecting", 37, 96, 1260.0, "12 more poses bring it under 20 µm"))
+        page.feed.progress(Progress("measurement", 37, 96, 1260.0, "34 µm; 12 more poses bring it under 20 µm"))
         page.feed.stands(1, 1)
         page.feed.stops_by(lambda: None)
         for line in SAID:

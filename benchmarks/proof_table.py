@@ -33,7 +33,7 @@ BEGIN, END = "<!-- proof: begin -->", "<!-- proof: end -->"
 def table_of(proof: ProofFile) -> str:
     """Markdown. DataError for a proof that was not made to be published: no figure of it is for the public."""
     if proof.development or proof.without:
-        why = f"seed {proof.seed} is one of development" if proof.development else "effects were taken out"
+        why = f"seed {proof.seed} is reserved for development" if proof.development else "effects were taken out"
         raise DataError(f"{why}; publish the table of a `calibeam prove --publish`")
     if "--publish" not in proof.command.split():
         raise DataError("this proof was not made to be published; make it with `make prove`")

@@ -46,7 +46,7 @@ def _new_app() -> App:
     return App(
         name="calibeam",
         version=version("calibeam"),
-        help="Record, calibrate and diagnose robot arms with a laser and two position-sensitive detectors.",
+        help="Record, calibrate and diagnose robot arms, from laser spots, a tracker, a wire, cones or your tables.",
         default_parameter=Parameter(negative_iterable=(), consume_multiple=True),  # several values: --only a b
         suppress_keyboard_interrupt=False,  # cyclopts would end with 130 and no message
     )
@@ -86,7 +86,7 @@ def run(arguments: list[str]) -> int:
         errors.print(f"stopped by {interruption(interrupt)}")
         return 1
     except TOLD as error:
-        errors.print("error:", brief(str(error)), markup=False)
+        errors.print("error:", "\n".join(map(brief, str(error).splitlines())), markup=False)
         return 1
     except BrokenPipeError:  # `calibeam rig list | head`: who reads has had enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -19,6 +19,7 @@ class ListedCommand:
 GROUPS: dict[str, tuple[ListedCommand, ...]] = {
     "Start here": (
         ListedCommand("rig", "rig:rig_command", "Write the rig file of a robot, or list the robots that are shipped."),
+        ListedCommand("import", "import_files:import_command", "Make a session of a table, a log or a session folder."),
         ListedCommand("demo", "demo:demo", "Run a whole session on emulated devices and show the truth."),
         ListedCommand("session", "session:session", "Run a session: check, plan, align, centre, measure, report."),
         ListedCommand("check", "check:check_command", "Check every device of a rig, or check a recording; no motion."),
@@ -69,7 +70,6 @@ GROUPS: dict[str, tuple[ListedCommand, ...]] = {
         ListedCommand("prove", "prove:prove_command", "Test the diagnosis on sessions with hidden physics."),
     ),
     "Files": (
-        ListedCommand("import", "import_files:import_command", "Make a session of a table, a log or a session folder."),
         ListedCommand(
             "export", "export:export_command", "Write a recording as tables, or its CAN frames as a CAN log."
         ),

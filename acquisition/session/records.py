@@ -133,10 +133,10 @@ class Phase(enum.Enum):
     """What the arm is doing, in a word for a person."""
 
     PLACE = "fixture"
-    AIM = "aim"
-    CENTRE = "centre"
-    COLLECT = "collect"
-    REPEAT = "repeat"
+    AIM = "alignment"
+    CENTRE = "centring"
+    COLLECT = "measurement"
+    REPEAT = "repeats"
 
 
 @dataclass(frozen=True)

@@ -100,9 +100,7 @@ def _end(ran: "RunResult", fleet: "Fleet", out: Path, *, again: bool) -> None:
     """PartialResult where not all is well, DataError where nothing is."""
     if ran.stopped:
         how = "leave --again out to go on" if again else "the same command goes on"
-        raise PartialResult(
-            f"{ran.stopped}; {len(ran.rows)} recordings are in {out / TABLE}, {ran.left} are left; {how}"
-        )
+        raise PartialResult(f"{ran.stopped}; recordings in {out / TABLE}: {len(ran.rows)}, left: {ran.left}; {how}")
     if fleet.bad and len(fleet.bad) == len(fleet.rows):
         raise DataError(f"none of {len(fleet.rows)} recordings could be identified; the first: {fleet.bad[0].error}")
     if fleet.bad:

@@ -41,20 +41,20 @@ def check_recording(path: Path, *, as_json: bool = False) -> bool:
 
 def lines(recording: Recording, findings: tuple[Finding, ...]) -> list[str]:
     """For a person: the file, each stream with its rate and clock, each finding."""
-    told = [f"{recording.path}: {len(recording.samples)} settled samples, {len(recording.events)} events"]
+    told = [f"{recording.path}: settled samples: {len(recording.samples)}, events: {len(recording.events)}"]
     told += [f"  {stream.name}: {_rate(stream)}; {_clock(stream)}" for stream in recording.streams.values()]
     told += [f"  {f.severity.value}: {f.problem.value}: {f.where}: {f.says}" for f in findings[:MOST_LINES]]
     if len(findings) > MOST_LINES:
         told.append(f"  and {len(findings) - MOST_LINES} more findings; --json prints all")
     errors = any(finding.is_error for finding in findings)
-    return [*told, "  errors: see above"] if errors else [*told, "  no errors"]
+    return [*told, "  not fit for use: errors above"] if errors else [*told, "  no errors"]
 
 
 def _rate(stream: Stream) -> str:
     count = stream.host_s.size
     span_s = float(stream.host_s[-1] - stream.host_s[0]) if count > 1 else 0.0
     rate = f", {(count - 1) / span_s:.1f} a second over {span_s:.1f} s" if span_s > 0.0 else ""
-    return f"{count} samples{rate}"
+    return f"samples: {count}{rate}"
 
 
 def _clock(stream: Stream) -> str:
@@ -96,13 +96,8 @@ def _as_json(recording: Recording, findings: tuple[Finding, ...]) -> dict[str, A
             for stream in recording.streams.values()
         },
         "findings": [
-            {
-                "severity": finding.severity.value,
-                "problem": finding.problem.value,
-                "where": finding.where,
-                "says": finding.says,
-            }
-            for finding in findings
+            {"severity": f.severity.value, "problem": f.problem.value, "where": f.where, "says": f.says}
+            for f in findings
         ],
     }
 
@@ -123,8 +118,8 @@ def check_command(what: Path, *, json_: Annotated[bool, Parameter(name="--json")
     calibeam check session-1/recording.mcap
     ```
 
-    Each line reports what the device is, its firmware, rate and noise, or what is wrong and the remedy. A recording
-    is looked through for gaps, wrong order and saturation. Exit code 1 when something is wrong.
+    Each line starts with ok or error; then what the device is, its firmware, rate and noise, what is wrong and the
+    remedy. Findings of a recording are errors, warnings or information. Exit code 1 when there is an error.
 
     Parameters
     ----------
@@ -136,7 +131,7 @@ def check_command(what: Path, *, json_: Annotated[bool, Parameter(name="--json")
     """
     if what.suffix != ".toml":
         if not check_recording(what, as_json=json_):
-            raise CheckFailed(f"{what}: something is wrong with it, see above")
+            raise CheckFailed(f"{what}: it has errors, see above")
         return
     rig = load_rig(what)
     bad: list[str] = []

@@ -122,7 +122,7 @@ def demo(*, out: Path = Path("out/demo"), rig: ShippedRig = RIG, seed: int = 1, 
         ) as bench,
     ):
         summary = record_session(bench, loaded, writer, PlanOptions(), clock, progress_bar(console))
-    console.print(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {out / RECORDING}")
+    console.print(f"samples {len(summary.samples)}, skipped {summary.skipped}; recording: {out / RECORDING}")
     from calibeam.results.session_results import write_session_results
 
     identified = write_session_results(out / RECORDING, console)

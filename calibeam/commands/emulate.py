@@ -39,14 +39,12 @@ def emulate(
     calibeam emulate rigs/ur5e-dual-psd.toml
     ```
 
-    It prints where each device listens. Trouble on their wires is asked for by one line of JSON to the address
-    "control", for example by nc 127.0.0.1 PORT; the kinds stand in docs/protocols/faults.md:
+    It prints where each device listens. Send a line of JSON to the address "control" to inject a fault, for example
+    with nc 127.0.0.1 PORT. The kinds of faults are listed in docs/protocols/faults.md:
 
     {"do": "fault.inject", "with": {"device": "psd", "kind": "silence", "count": 100}}
 
-    A rig with the geometry and the physics of a model, and one that mechanisms were put into by hand:
-
-    For example:
+    With the geometry and the physics of a model, or with mechanisms that you name:
 
     ```
     calibeam emulate rigs/ur5e-dual-psd.toml --model model.json
@@ -100,7 +98,7 @@ def emulate(
         links=links,
         end_with_stdin=end_with_stdin,
     )
-    show = _print_json if json_ else partial(_print_table, None if stated is None else stated.host)
+    show = _print_json if json_ else partial(_print_table, rig, None if stated is None else stated.host)
     serve(plain, options, show)
 
 
@@ -131,7 +129,7 @@ def _print_json(where: dict[str, dict[str, Any]]) -> None:
     print(json.dumps(where), flush=True)
 
 
-def _print_table(host: str | None, where: dict[str, dict[str, Any]]) -> None:
+def _print_table(rig: Path, host: str | None, where: dict[str, dict[str, Any]]) -> None:
     """`host`: of the controller in the rig file."""
     for device, address in where.items():
         print(f"{device:8s}", "  ".join(f"{key} {_words(value)}" for key, value in address.items()), flush=True)
@@ -141,7 +139,7 @@ def _print_table(host: str | None, where: dict[str, dict[str, Any]]) -> None:
         print(f'first write host = "{standing}" under [devices.robot] of the rig file that clients read', flush=True)
     if "control" in where:
         control = f"{where['control']['host']}:{where['control']['port']}"
-        print(f"a session on them: calibeam session RIG.toml --control {control} --out session-1", flush=True)
+        print(f"a session on them: calibeam session {rig} --control {control} --out session-1", flush=True)
 
 
 def _words(value: Any) -> str:

@@ -34,10 +34,10 @@ def export_command(recording: Path, *, out: Path, table: TableFormat = TableForm
     source = read(recording)
     if out.suffix.lower() in SUFFIXES:
         with taken_back(out):
-            print(f"{out}: {export_can(source, out)} CAN frames")
+            print(f"{out}: CAN frames: {export_can(source, out)}")
         return
     with taken_back(out):
         export(source, out, table)
-        print(f"{out}: rig.toml and samples.{table.value} with {len(source.samples)} samples")
+        print(f"{out}: rig.toml and samples.{table.value}, samples: {len(source.samples)}")
         for path in write_streams(source, out, table) if streams else ():
             print(f"{path}: {path.stat().st_size} bytes")

@@ -39,7 +39,7 @@ from acquisition.recording.session_folder.folder_import import import_folder, wr
 from calibeam.asking import NotAgreedError, at_terminal, someone
 from calibeam.outcome import PartialResult, taken_back
 from calibeam.software import SOFTWARE
-from calibrate.report.quantities import significant
+from calibrate.report.quantities import counted, significant
 
 BAG = "metadata.yaml"  # in the folder of a ROS 2 bag
 WORKBOOKS = (".xlsx", ".xlsm")
@@ -199,7 +199,7 @@ def _logs(tables: Sequence[Understanding], out: Path, *, yes: bool) -> None:
         write_recording(recording, out, software=SOFTWARE, imported_from=names, started_utc=started_utc)
         beside = write_columns(about, out)
     for name, stream in recording.streams.items():
-        console.print(f"{out}: {name}, {len(stream.host_s)} rows", markup=False, highlight=False)
+        console.print(f"{out}: {name}, {counted(len(stream.host_s), 'row')}", markup=False, highlight=False)
     console.print(f"columns: {beside}", markup=False, highlight=False)
 
 
@@ -207,9 +207,9 @@ def _agreed(*, yes: bool) -> None:
     """Returns when a person has agreed to the columns that are shown. NotAgreedError."""
     if yes:
         return
-    asking = someone(at_terminal(), "whether the columns are meant so", "give --yes when they are")
-    if not asking.enter("Are the columns meant so?"):
-        raise NotAgreedError("nothing was written: the columns are meant otherwise; state them with --columns")
+    asking = someone(at_terminal(), "whether the columns are understood correctly", "give --yes when they are")
+    if not asking.enter("Are the columns understood correctly?"):
+        raise NotAgreedError("nothing was written: the columns mean something else; state them with --columns")
 
 
 def _table(table: Understanding, out: Path, *, yes: bool) -> None:
@@ -226,7 +226,7 @@ def _table(table: Understanding, out: Path, *, yes: bool) -> None:
     _agreed(yes=yes)
     with taken_back(out):
         beside = write_session(table, samples, about, out)
-    for line in (f"{out}: {RIG} and {CSV} with {len(samples)} samples", f"columns: {beside}"):
+    for line in (f"{out}: {RIG} and {CSV} with {counted(len(samples), 'sample')}", f"columns: {beside}"):
         console.print(line, markup=False, highlight=False)
 
 
@@ -248,7 +248,7 @@ def with_units(table: Understanding, *, yes: bool, settled: bool = True) -> Unde
 def print_columns(console: Console, about: ColumnsFile) -> None:
     """What the columns of a table were understood to mean, one line each, and what is not used."""
     sheet = f", sheet {about.sheet}" if about.sheet else ""
-    console.print(f"{about.source}{sheet}: {about.rows} rows", style="bold", markup=False, highlight=False)
+    console.print(f"{about.source}{sheet}: {counted(about.rows, 'row')}", style="bold", markup=False, highlight=False)
     lines = Table("column", "meaning", "unit read", "becomes", "range")
     for record in about.columns:
         span = _range(record.si_unit, record.lowest, record.highest)

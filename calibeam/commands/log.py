@@ -133,7 +133,7 @@ def _log(job: EncoderLog, out: Path, for_s: float | None, *, json_: bool) -> Non
     except (DeviceError, RecordingError) as why:
         if job.state.rows == 0:
             raise
-        raise PartialResult(f"{why}; {job.state.rows} rows are kept in {out}") from why
+        raise PartialResult(f"{why}; rows kept in {out}: {job.state.rows}") from why
     console.print(_summary(job.state, job.segments), highlight=False)
     if json_:
         print(msgspec.json.encode(_as_json(job.state, job.segments)).decode())
@@ -145,17 +145,17 @@ def _is_over(job: EncoderLog, for_s: float | None, clock: Clock) -> bool:
 
 
 def _now(state: LogState) -> str:
-    frames = f", {state.frames} frames" if state.frames else ""
-    away = "" if state.away is None else f"; AWAY: {state.away}"
-    return f"{state.segment.name}: {state.rows} rows{frames}{away} (Ctrl-C ends the log)"
+    frames = f", frames: {state.frames}" if state.frames else ""
+    away = "" if state.away is None else f"; device lost: {state.away}"
+    return f"{state.segment.name}: rows: {state.rows}{frames}{away} (Ctrl-C ends the log)"
 
 
 def _summary(state: LogState, segments: list[Path]) -> str:
     which = segments[0].name if len(segments) == 1 else f"{segments[0].name} to {segments[-1].name}"
-    outages = f", {state.outages} outages" if state.outages else ""
-    frames = f", {state.frames} frames" if state.frames else ""
-    errors = f", {state.error_frames} of them error frames" if state.error_frames else ""
-    return f"{segments[0].parent}: {which}: {state.rows} rows{frames}{errors}{outages}"
+    outages = f", outages: {state.outages}" if state.outages else ""
+    frames = f", frames: {state.frames}" if state.frames else ""
+    errors = f", error frames among them: {state.error_frames}" if state.error_frames else ""
+    return f"{segments[0].parent}: {which}: rows: {state.rows}{frames}{errors}{outages}"
 
 
 def _as_json(state: LogState, segments: list[Path]) -> dict[str, Any]:

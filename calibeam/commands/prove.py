@@ -26,8 +26,8 @@ def prove_command(
     cases: int = 60,
     seed: int | None = None,
     out: Path = Path("out/proof"),
-    family: tuple[Family, ...] = FAMILIES,
-    kind: tuple[Kind, ...] = KINDS,
+    family: Annotated[tuple[Family, ...], Parameter(show_default=False)] = FAMILIES,
+    kind: Annotated[tuple[Kind, ...], Parameter(show_default=False)] = KINDS,
     enr: tuple[float, float] | None = None,
     mechanism: str | None = None,
     jobs: int = 2,
@@ -95,15 +95,13 @@ def prove_command(
     seed = seed if seed is not None else PUBLISHED_SEED if publish else DEVELOPED_SEED
     mix = Mix(kind, family, enr, mechanism)
     if publish and seed < DEVELOPMENT:
-        raise DataError(f"seed {seed} is one of development (below {DEVELOPMENT}); publish with another --seed")
+        raise DataError(f"seed {seed} is reserved for development; publish with --seed {DEVELOPMENT} or above")
     if publish and without:
-        raise DataError("--without makes the catalogue another one; its table is not the one to publish")
+        raise DataError("--without: a published table needs the whole catalogue; leave out --without or --publish")
     if publish and mix != Mix(KINDS, FAMILIES):
-        raise DataError(
-            "a table of some cases only is not the one to publish; leave --family, --kind, --enr, --mechanism"
-        )
+        raise DataError("a published table holds all kinds of cases; leave out --family, --kind, --enr and --mechanism")
     if cases < 1 or jobs < 1 or wire < 0:
-        raise DataError(f"--cases {cases} --jobs {jobs} --wire {wire}: cases, jobs 1 or more, wire 0 or more")
+        raise DataError(f"--cases {cases} --jobs {jobs} --wire {wire}: give 1 or more cases and jobs, wire 0 or more")
     plan = Plan(mix, seed, cases, jobs, without, wire, compare)
     proof = prove(out, plan, lambda word: _tell(console, word), " ".join(["calibeam", *sys.argv[1:]]))
     print_proof(console, proof)
@@ -115,7 +113,7 @@ def prove_command(
 def _loop(console: Console, out: Path, counts: tuple[int, int], seed: int, jobs: int, *, json: bool) -> None:
     cases, wired = counts
     if cases < 0 or wired < 0 or cases + wired < 1 or jobs < 1:
-        raise DataError(f"--cases {cases} --wire {wired} --jobs {jobs}: one case or more, jobs 1 or more")
+        raise DataError(f"--cases {cases} --wire {wired} --jobs {jobs}: give at least one case and one job")
     file = prove_loop(out, cases, wired, seed, jobs, lambda word: _tell(console, word))
     for line in summary(file.cases):
         _tell(console, line)

@@ -182,7 +182,7 @@ def asked_at(asking: Asking) -> Callable[[int, Floats], None]:
 
     def ask(number: int, place: Floats) -> None:
         where = f"x = {place[0] * 1e3:+z.3f} mm, y = {place[1] * 1e3:+z.3f} mm"
-        if not asking.enter(f"place {number}: put the spot to {where}"):
+        if not asking.enter(f"place {number}: put the spot at {where}"):
             raise NotAgreedError(f"the check was ended at place {number}; nothing was written")
 
     return ask

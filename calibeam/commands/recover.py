@@ -40,7 +40,7 @@ def recover_command(recording: Path, *, out: Path, rig: Path | None = None, json
         kept = {"out": str(out), "messages": done.messages, "whole": done.whole, "damage": done.damage}
         print(msgspec.json.encode(kept).decode())
     else:
-        print(f"{out}: {done.messages} messages")
+        print(f"{out}: messages: {done.messages}")
     if not done.whole:
         why = "; ".join(done.damage) or "the recording was cut short before its end"
-        raise PartialResult(f"{recording}: {why}; what is good is in {out}")
+        raise PartialResult(f"{recording}: {why}; what is readable is in {out}")

@@ -358,7 +358,7 @@ def _refuse_ignored(rig: Rig, given: Mapping[str, bool], kind: str) -> None:
     """AcquisitionError where an option was given that would be ignored for this kind of rig."""
     names = [name for name, is_given in given.items() if is_given]
     if names:
-        raise AcquisitionError(f"rig {rig.name}: {', '.join(names)}: meant for {kind}; leave out what is named")
+        raise AcquisitionError(f"rig {rig.name}: {', '.join(names)}: meant for {kind}; leave these options out")
 
 
 def _asked(host: str, port: int, verb: str, /, **arguments: Any) -> Any:

@@ -54,10 +54,10 @@ class DeviceCheck:
     @property
     def line(self) -> str:
         if self.wrong and not self.what:
-            return brief(f"{self.device:9s} BAD   {self.wrong}")
+            return brief(f"{self.device:9s} error  {self.wrong}")
         facts = [self.what, f"firmware {self.firmware}" if self.firmware else "", f"{self.rate_hz:.0f} Hz", self.noise]
         told = ", ".join(fact for fact in facts if fact)
-        return brief(f"{self.device:9s} BAD   {told}: {self.wrong}" if self.wrong else f"{self.device:9s} good  {told}")
+        return brief(f"{self.device:9s} " + (f"error  {told}: {self.wrong}" if self.wrong else f"ok     {told}"))
 
 
 def check_devices(rig: Rig, clock: Clock) -> Iterator[DeviceCheck]:
@@ -125,7 +125,7 @@ def _psd(rig: Rig, clock: Clock) -> DeviceCheck:
     told = "no light on either face" if len(dark) == 2 else f"noise {1e6 * sample_noise(spots_m):.2f} µm a sample"
     rate_hz, wrong = sample_rate(blocks, device.rate_hz)
     if (window.flags & (Flag.PSD1_SATURATED | Flag.PSD2_SATURATED)).any():
-        wrong = wrong or "a face is saturated: lessen the laser's power or the gain"
+        wrong = wrong or "a face is saturated: reduce the laser's power or the gain"
     if identity is not None:
         wrong = wrong or uneven_layers(identity.faces, [k + 1 not in dark for k in (0, 1)], window.current_a)
     what = "" if identity is None else f"{identity.model} {identity.serial_number}"
@@ -141,7 +141,7 @@ def _tracker(rig: Rig, clock: Clock) -> DeviceCheck:
     good_m = position_m[np.isfinite(position_m).all(axis=1)]
     rate_hz, wrong = _tracker_rate(blocks, device.rate_hz)
     if tracker.bad_lines and tracker.last_bad is not None:
-        wrong = wrong or f"{tracker.bad_lines} lines cannot be read, the last: {tracker.last_bad.reason}"
+        wrong = wrong or f"lines that cannot be read: {tracker.bad_lines}, the last: {tracker.last_bad.reason}"
     what = f"{device.driver.value} from {place_of(device)}"
     if len(good_m) < 2:
         return DeviceCheck("tracker", what, "", rate_hz, "", "no valid reading: let it see the target")
@@ -189,7 +189,7 @@ def _encoders(rig: Rig, clock: Clock) -> DeviceCheck:
     wrong = wrong or bus_trouble(blocks[-1], registers)
     mute = [k + 1 for k in range(q_rad.shape[1]) if np.isnan(q_rad[:, k]).all()]
     if mute:
-        wrong = f"encoders of joints {mute} do not answer: check their node numbers, power and cable"
+        wrong = f"no answer from the encoder of joint {', '.join(map(str, mute))}: check node number, power and cable"
     numbers = ", ".join(str(identity.get("serial_number", "?")) for identity in identities)
     what = f"{q_rad.shape[1]} encoders on {device.interface} {device.channel}"
     what += f" (serial numbers {numbers})" if numbers else ""

@@ -75,11 +75,11 @@ def _driver(other: OtherDevice, clock: Clock) -> Other:
             raise DeviceRefused(f"{other.name}: the driver '{other.driver}' has no setting '{unknown[0]}'; delete it")
         device = kind.driver(settings, other.name, clock)
     except PlugInError as why:
-        raise DeviceRefused(f"{other.name}: {why}; mend or remove the package") from why
+        raise DeviceRefused(f"{other.name}: {why}; correct or remove the package") from why
     except msgspec.ValidationError as why:
         raise DeviceRefused(f"{other.name}: settings of [[devices.other]] in the rig file: {why}") from why
     except ValueError as why:
         raise DeviceRefused(f"{other.name}: {found.package}: {why}") from why
     if device.name != other.name:
-        raise DeviceRefused(f"{other.name}: {found.package} made a device of the name '{device.name}'; its fault")
+        raise DeviceRefused(f"{other.name}: {found.package} names its device '{device.name}'; correct it")
     return Other(device, kind.silence_s, found.package)

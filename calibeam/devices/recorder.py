@@ -98,7 +98,7 @@ def record_session(
     """
     home_rad = np.array(rig.motion.home_rad)  # there is one: check_session
     with bar:
-        task = bar.add_task("collecting", total=None)
+        task = bar.add_task("measurement", total=None)
 
         def tell(now: Progress) -> None:
             text = f"station {now.placement}, PSD {now.first} first: {now.phase.value}"
@@ -187,7 +187,7 @@ def _ended_early(
     if earlier is not None and earlier.samples:
         count, place = session.taken + earlier.samples, earlier.folder
         newest = f" ({session.taken} of them in {writer.path.name})"
-    told = f"{count} samples are kept in {place}{newest}"
+    told = f"samples kept in {place}: {count}{newest}"
     if count:
         told += f"; `calibeam identify {place}` fits them"
     return PartialResult("; ".join([reason, *dict.fromkeys(also), told]))

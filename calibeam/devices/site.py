@@ -84,7 +84,7 @@ def check_session(rig: Rig) -> None:
 def _check_driven(rig: Rig) -> None:
     if rig.motion.home_rad is None:
         raise RigFileError(
-            f"rig {rig.name}: [motion] has no home_rad; give joint readings that are clear of everything"
+            f"rig {rig.name}: [motion] has no home_rad; give the joint readings of a pose clear of all obstacles"
         )
     if rig.n_joints != DRIVEN_JOINTS:
         raise RigFileError(f"rig {rig.name}: {rig.n_joints} joints, but the drivers move arms of {DRIVEN_JOINTS}")

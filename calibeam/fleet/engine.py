@@ -35,10 +35,10 @@ OF_OUR_OWN: dict[str, Any] = {
 }
 WAIT_S = 30.0  # for the first worker of a cluster
 MARGIN_S = 60.0  # beyond what any recording may take, for a cluster to start and to move a task
-LOST = f"the worker that had it died or fell silent {ROUNDS} times"
+LOST = f"the worker that had it died or stopped answering {ROUNDS} times"
 NEEDS_DASK = "--engine dask needs Dask, which is not installed; pip install 'calibeam[fleet]', or take --engine loky"
 NEEDS_LIMIT = (  # Dask gives up what killed its workers, and joblib is not informed
-    "--timeout 0 is not for --engine dask: what kills its workers would be waited for without end; "
+    "--timeout 0 is not for --engine dask: a file that kills its workers would never end; "
     "give seconds, or take --engine loky"
 )
 

@@ -160,12 +160,12 @@ def _masthead(fleet: Fleet, title: str) -> Html:
         "header",
         tag("p", "A fleet of robots", cls="kicker"),
         tag("h1", title),
-        tag("p", f"{len(fleet.robots)} robots, {len(fleet.rows)} recordings · {SOFTWARE}", cls="byline"),
+        tag("p", f"robots: {len(fleet.robots)}, recordings: {len(fleet.rows)} · {SOFTWARE}", cls="byline"),
     )
 
 
 def _short(fleet: Fleet) -> Html:
-    lead = "What a reader in a hurry should know; the chapters below hold each figure."
+    lead = "The main results; the chapters below hold each figure."
     tiles = [
         tile("Robots", str(len(fleet.robots)), f"in {len(fleet.good)} recordings that gave numbers"),
         tile("Drift", str(len({d.series.robot for d in fleet.drifting})), f"robots; {len(fleet.lines)} zeros tested"),
@@ -185,7 +185,7 @@ def _verdict(fleet: Fleet) -> Html:
     if robots:
         sentence = f"{robots} of {len(fleet.robots)} robots {'drifts' if robots == 1 else 'drift'}."
     elif fleet.lines:
-        sentence = "No joint zero of any robot is seen to drift."
+        sentence = "No joint zero of any robot drifts significantly."
     else:
         sentence = (
             f"No robot was recorded on {FEWEST} dates with a zero that can be determined: drift is not determined."
@@ -210,7 +210,7 @@ def _drift(fleet: Fleet) -> Html | None:
     order = [d.series.robot for d in fleet.lines] + [s.robot for s in series]
     robots = list(dict.fromkeys(order))
     shown = [(robot, [s for s in series if s.robot == robot]) for robot in robots[:PANELS]]
-    rest = f" {len(robots) - PANELS} more robots stand in the table." if len(robots) > PANELS else ""
+    rest = f" Robots that are only in the table: {len(robots) - PANELS}." if len(robots) > PANELS else ""
     caption = f"Zeros less their own mean, one mark and colour a joint, the clearest drift first.{rest}"
     drawing = tag("div", figure(over_time(shown, fleet.drifting), caption), cls="wide")
     rows = [
@@ -236,8 +236,8 @@ def _causes(fleet: Fleet) -> Html | None:
     if not fleet.diagnosed:
         return None
     lead = (
-        f"What the diagnosis found in {fleet.diagnosed} recordings, by place and physics. What one robot alone has is "
-        "its own trouble; what many have comes from a part, a fixture, or how it was measured."
+        f"Causes found, by place and physics; recordings diagnosed: {fleet.diagnosed}. A cause of one robot alone "
+        "lies in that robot; a cause of many lies in a common part, a fixture, or the way of measuring."
     )
     if not fleet.causes:
         return section("causes", CONTENTS["causes"], lead, tag("p", "No cause was found in any of them."))
@@ -328,4 +328,4 @@ def _change(before_m: float | None, after_m: float | None) -> str:
 
 
 def _more(count: int) -> Sequence[Html]:
-    return (tag("p", f"{count - LISTED} more are in fleet.parquet."),) if count > LISTED else ()
+    return (tag("p", f"Rows that are only in fleet.parquet: {count - LISTED}."),) if count > LISTED else ()

@@ -61,7 +61,7 @@ def write_rows(path: Path, rows: Sequence[Row]) -> None:
         pq.write_table(table, partial)
         partial.replace(path)
     except OSError as error:
-        raise RecordingError(f"{path}: cannot be written ({error.strerror or error}); free space there") from error
+        raise RecordingError(f"{path}: cannot be written ({error.strerror or error}); make room on its disk") from error
 
 
 def read_rows(path: Path) -> list[Row]:
@@ -151,7 +151,9 @@ class Journal:
             self._file.write(msgspec.json.encode(row) + b"\n")
             self._file.flush()
         except OSError as error:
-            raise RecordingError(f"{self._path}: cannot be written ({error.strerror}); free space there") from error
+            raise RecordingError(
+                f"{self._path}: cannot be written ({error.strerror}); make room on its disk"
+            ) from error
 
     def forget(self, path: str) -> None:
         """The recording has its row under another path now: it lies elsewhere, or is part of a session."""

@@ -153,7 +153,7 @@ def _ended_early(writer: RecordingWriter, clock: Clock, session: GuidedSession, 
         except RecordingError as error:
             if str(error) != reason:
                 reason = f"{reason}; {error}"
-    kept = f"{session.taken} samples are kept in {writer.path}"
+    kept = f"samples kept in {writer.path}: {session.taken}"
     if session.taken:
         kept += f"; `calibeam identify {writer.path}` fits them"
     return PartialResult(f"{reason}; {kept}")

@@ -136,8 +136,8 @@ def run_guided(
             **({} if ask is None else {"patience_s": HAND_PATIENCE_S}),
         )
     console.print(
-        f"{len(summary.readings)} samples; {summary.slips} rejected as slips, {summary.doubted} uncertain, "
-        f"{summary.skipped} left out; recording: {recording}",
+        f"samples: {len(summary.readings)}, rejected as slips: {summary.slips}, uncertain: {summary.doubted}, "
+        f"left out: {summary.skipped}; recording: {recording}",
         highlight=False,
     )
     if conclude:

@@ -54,7 +54,7 @@ def devices_of(rig: Rig, clock: Clock, feed: Feed) -> list[Watched]:
         try:
             feed.stops_by(robot.arm().stop)  # never connected: whoever moves the arm keeps it until then
         except DeviceRefused as why:
-            feed.said(f"STOP has no way to the arm: {why}")
+            feed.said(f"STOP cannot reach the arm: {why}")
     return watched
 
 

@@ -85,8 +85,8 @@ def candidates_of(
             "session` of a measuring arm needs no plan: it asks for the posture that the readings so far lack most"
         )
     raise DataError(
-        f"rig {rig.name}: no [fixture] with a [[placement]], and no [device] with tool.point_m; a design needs to know "
-        "what will be measured"
+        f"rig {rig.name}: a design needs to know what will be measured; add [device] (where the tracker stands) and "
+        "tool.point_m, or [fixture] and [[placement]]"
     )
 
 

@@ -193,9 +193,11 @@ class Model:
         return f"<p><b>{escape(self.says)}</b></p><ul>{reasons}</ul><table>{head}{rows}</table>{rest}"
 
     def __str__(self) -> str:
+        from calibrate.report.quantities import doubted_angle
+
         lines = [self.says, *(f"  {reason}" for reason in self.reasons)]
         for joint, (zero, sigma) in self.zeros().items():
-            told = "not determined" if zero is None or sigma is None else f"{zero:+z.6f} ± {sigma:.6f} rad"
+            told = "not determined" if zero is None or sigma is None else doubted_angle(zero, sigma)
             lines.append(f"joint {joint} zero: {told}")
         return "\n".join(lines)
 

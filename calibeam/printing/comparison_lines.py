@@ -139,7 +139,7 @@ def print_reconciliation(console: Console, file: ReconcileFile) -> None:
             )
         )
         _say(console, f"{one.instrument}, {one.rows} unseen rows, rms: " + ", ".join(parts))
-    _list(console, "left out of the simulation:", [one.says for one in file.left_out])
+    _list(console, "what the simulation lacks:", [one.says for one in file.left_out])
     _list(console, "what remains:", file.remains)
     _list(console, "what to do next:", file.next if file.remains else ())
 
@@ -151,7 +151,7 @@ def _list(console: Console, title: str, lines: Sequence[str]) -> None:
     for line in lines[:MOST_LINES]:
         console.print(f"  {line}", highlight=False, markup=False, no_wrap=True, overflow="ellipsis")
     if len(lines) > MOST_LINES:
-        _say(console, f"  {len(lines) - MOST_LINES} more stand in reconcile.json")
+        _say(console, f"  {len(lines) - MOST_LINES} more, all in reconcile.json")
 
 
 def _say(console: Console, line: str) -> None:

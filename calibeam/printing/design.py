@@ -14,7 +14,7 @@ from calibrate.pose_design.places import Places
 from calibrate.pose_design.seen import Seen
 from calibrate.report.diagnosis.words import size_of
 from calibrate.report.pose_design_page import of_the_curve
-from calibrate.report.quantities import length
+from calibrate.report.quantities import counted, length
 
 MATTERS_M = 1e-7  # of what no pose shows: below, the target does not feel it
 
@@ -37,8 +37,7 @@ def promise_lines(rig: Rig, made: Design) -> list[str]:
         f"{rig.name}: {len(made.taken.poses)} poses of {len(made.candidates)} candidates by criterion "
         f"{made.asked.criterion}",
         f"predicted error over the workspace ({information.target}): {length(made.free_space_m)} rms; as many random "
-        "poses: "
-        f"{length(made.random_m)} (ratio {made.free_space_m / made.random_m:.2f}); scale to "
+        f"poses: {length(made.random_m)} (ratio {made.free_space_m / made.random_m:.2f}); scale to "
         f"{1e6 * made.scale_sigma:.1f} ppm",
         f"of a steady drift geometry would absorb {100.0 * order.absorbed:.0f} % (in the order of shortest ways "
         f"{100.0 * order.absorbed_before:.0f} %); mean move {order.move_rad:.2f} rad ({order.move_before_rad:.2f})",
@@ -73,7 +72,7 @@ def enough_line(made: Design) -> str:
     """From where on more poses are not worth their time."""
     if made.curve.enough is None:
         return f"up to {made.curve.poses[-1]} poses, more of them still show what fewer do not"
-    return f"enough: {made.curve.enough} poses; from there on more of them do little but average noise"
+    return f"enough: {counted(made.curve.enough, 'pose')}; from there on more of them do little but average noise"
 
 
 def _print_places(console: Console, rig: Rig, made: Design, places: Sequence[Places]) -> None:

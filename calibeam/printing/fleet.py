@@ -27,7 +27,7 @@ def print_fleet(console: Console, ran: RunResult, fleet: Fleet) -> None:
         console.print(f"and {counted(len(fleet.robots) - SHOWN, 'more robot')}")
     told = [drift_words(drift) for drift in fleet.drifting] + [f"shared: {shared_words(c)}" for c in fleet.shared]
     if not fleet.drifting:
-        told.insert(0, f"no zero is seen to drift ({len(fleet.lines)} tested)")
+        told.insert(0, f"no zero drifts significantly ({len(fleet.lines)} tested)")
     told += [f"{row.outcome.value}: {row.name}: {row.error}" for row in fleet.bad[:SHOWN]]
     if len(fleet.bad) > SHOWN:
         told.append(f"and {len(fleet.bad) - SHOWN} more failed")
@@ -41,8 +41,8 @@ def _counts(ran: RunResult, fleet: Fleet) -> str:
     said += f" ({len(fleet.torn)} of them cut short or damaged)" if fleet.torn else ""
     said += f", {len(fleet.bad)} failed or lost"
     said += f", {len(fleet.empty)} without samples" if fleet.empty else ""
-    said += f"; {ran.stood} stood from an earlier run" if ran.stood else ""
-    return said + (f"; {ran.kept} of the table are not in this folder (any more)" if ran.kept else "")
+    said += f"; {ran.stood} unchanged since an earlier run" if ran.stood else ""
+    return said + (f"; {ran.kept} only in the table: no such file in this folder" if ran.kept else "")
 
 
 def fleet_record(ran: RunResult, fleet: Fleet, table: str, page: str) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from calibrate.default_belief import said_of
-from calibrate.effects.term import Size, plain
+from calibrate.effects.term import Size, decimals_of, plain
 from calibrate.identification.estimates import ONLY_BELIEVED, JointZero
 from calibrate.identification.evidence_record import parameter_records
 from calibrate.identification.point_constraint import PointConstraints
@@ -152,10 +152,9 @@ def _brief(result: Identification) -> Iterator[str]:
     known = [(p.name, p.value, p.sigma) for p in listed if p.value is not None and p.sigma is not None]
     zeros = [one for one in known if _of_joint(one[0])]
     for name, zero_rad, sigma_rad in zeros:
-        yield (
-            f"  J{name.removeprefix('joint').removesuffix(ZERO)} zero {np.degrees(zero_rad):+10.5f}° "
-            f"± {np.degrees(sigma_rad):.5f}° (± {1e6 * sigma_rad:.1f} µrad)"
-        )
+        sigma_deg = np.degrees(sigma_rad)
+        value = f"{np.degrees(zero_rad):+z.{decimals_of(sigma_deg)}f}° ± {sigma_deg:.{decimals_of(sigma_deg)}f}°"
+        yield f"  J{name.removeprefix('joint').removesuffix(ZERO)} zero {value} (± {angle(sigma_rad, 2)})"
     if more := len(known) - len(zeros):
         verb = "is" if more == 1 else "are"
         yield f"{counted(more, 'more parameter')} {verb} determined: {SEE}; all are in the model"
@@ -164,7 +163,7 @@ def _brief(result: Identification) -> Iterator[str]:
         shown = ", ".join(missing[:NAMED]) + (f" and {len(missing) - NAMED} more" if len(missing) > NAMED else "")
         yield f"not determined: {shown} (why: --verbose)"
     if sum(map(_of_joint, missing)) > len(zeros) and any(name.startswith("link") for name, *_ in known):
-        yield 'joint zeros alone, links held as nominal: --plan with the lines  schema = 1  and  hold = ["link*"]'
+        yield 'joint zeros alone, links nominal: --plan FILE, a file with the lines schema = 1 and hold = ["link*"]'
 
 
 NAMED = 4  # undetermined parameters
@@ -303,8 +302,8 @@ def refitted_lines(model: ModelFile) -> Iterator[str]:
     """Of `calibeam identify --model`."""
     determined = sum(p.value is not None for p in model.parameters)
     yield (
-        f"{model.poses} samples: {determined} of {len(model.parameters)} parameters of geometry determined, "
-        f"{sum(not e.after for e in model.effects)} effects refitted"
+        f"{counted(model.poses, 'sample')}: {determined} of {len(model.parameters)} parameters of geometry determined, "
+        f"{counted(sum(not e.after for e in model.effects), 'effect')} refitted"
     )
     yield (
         f"misfit of {model.instruments[0]}, rms distance: {length(model.rms_distance_before_m)} by geometry alone, "

@@ -115,5 +115,5 @@ def _angle(hidden: HiddenAngle) -> str:
         return f"joint {hidden.joint} hidden: the target sits on its axis and does not depend on it"
     return (
         f"joint {hidden.joint} hidden at {hidden.poses} poses: inferred to {1e6 * hidden.rms_rad:.0f} µrad rms, "
-        f"expected {1e6 * hidden.expected_rad:.0f}; {hidden.unfelt} more poses do not feel it"
+        f"expected {1e6 * hidden.expected_rad:.0f}; poses that do not depend on it: {hidden.unfelt}"
     )

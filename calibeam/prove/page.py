@@ -78,7 +78,7 @@ def _gain(cases: Sequence[CaseScore]) -> str:
 
 def _faulty(cases: Sequence[CaseScore]) -> str:
     wrong = sum(bool(faults(c)) for c in cases)
-    return f"{wrong} of {len(cases)} cases hold something that a strict reader would not let pass; they stand first."
+    return f"{wrong} of {len(cases)} cases have at least one fault of the diagnosis; they come first."
 
 
 SINGLE = ("one", "disturbed", "outside", "streams")
@@ -194,23 +194,23 @@ def proof_html(proof: ProofFile) -> str:
 
 
 def _masthead(proof: ProofFile) -> Html:
-    grade = "seed of development: no figures for the public" if proof.development else f"seed {proof.seed}"
+    grade = "development seed: not for publication" if proof.development else f"seed {proof.seed}"
     return tag(
         "header",
         tag("p", "Concealed physics, blind diagnosis", cls="kicker"),
-        tag("h1", f"{len(proof.cases)} sessions, {sum(len(c.defects) for c in proof.cases)} hidden causes"),
+        tag("h1", f"Sessions: {len(proof.cases)}, hidden causes: {sum(len(c.defects) for c in proof.cases)}"),
         tag("p", f"{grade} · {proof.wall_s / 60:.1f} min · {proof.software}", cls="byline"),
     )
 
 
 def _short(cases: Sequence[CaseScore]) -> Html:
-    lead = "What a reader in a hurry should know; the chapters below hold each figure, and each case."
+    lead = "The main results; the chapters below hold each figure and each case."
     return section("short", CONTENTS["short"], lead, bullets(summary(cases)))
 
 
 def _sums(cases: Sequence[CaseScore]) -> Html:
     lead = (
-        "Mechanisms that share no formula with the catalogue bent each world; the diagnosis saw the recording only. "
+        "Each world has mechanisms that share no formula with the catalogue; the diagnosis has the recording only. "
         "Located: the right place in the chain. Named: place and physics, first choice. Brackets: 95 % by Wilson."
     )
     several = [at_once(cases, "three"), at_once(cases, "eighteen")]
@@ -262,7 +262,7 @@ def _others(cases: Sequence[CaseScore]) -> Html | None:
         for c in cases
         for b in c.baselines
     ]
-    answers = table(("case", "hidden", "method", "share", "where and why, in its own words"), said, numeric=(3,))
+    answers = table(("case", "hidden", "method", "share", "where and why, as reported"), said, numeric=(3,))
     return section(
         "others",
         CONTENTS["others"],
@@ -282,7 +282,7 @@ def _stories(cases: Sequence[CaseScore]) -> Html:
 def _story(case: CaseScore) -> Html:
     wrong = faults(case)
     way = "" if case.path == "in process" else f" {case.path}"
-    title = f"{case.name} · {hidden_briefly(case)} · {'; '.join(wrong) or 'as it should be'}"
+    title = f"{case.name} · {hidden_briefly(case)} · {'; '.join(wrong) or 'as expected'}"
     lines = [
         f"{case.kind}, {case.family}{way}, {case.samples} samples.",
         f"Hidden: {hidden_words(case)}.",

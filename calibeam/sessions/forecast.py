@@ -134,7 +134,7 @@ def forecast(rig: Rig, taken: list[Sample], ahead: Candidates, goal_m: float) ->
     try:
         fitted = _fitted(rig, rows.take(np.arange(len(taken))))
         if fitted.fit.status is Status.NOT_FINITE or not np.all(np.isfinite(fitted.fit.theta)):
-            return replace(nothing, why="the fit of these poses comes to no end")
+            return replace(nothing, why="the fit of these poses does not converge")
         return _told(rig, rows, fitted, nothing)
     except np.linalg.LinAlgError:
         return replace(nothing, why="these poses are too few, or too alike")

@@ -110,7 +110,7 @@ class StatusReporter:
         """From the thread that makes them."""
         with self._turn:
             self._now(forecast=forecast)
-            self.report(f"accuracy after {forecast.samples} poses: {forecast.says}", on_screen=False)
+            self.report(f"accuracy after pose {forecast.samples}: {forecast.says}", on_screen=False)
 
     def _now(self, **changed: Any) -> None:
         self.shown = replace(self.shown, **changed)

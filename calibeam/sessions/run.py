@@ -192,7 +192,7 @@ class OnSite:
         self.reporter.report(draw_session(part.rig, drawing, part.options, part.plan))
         before = f", {len(part.earlier.taken)} taken before" if part.earlier.begun else ""
         about = clock_words(POSE_S * part.left / self._job.addresses.hurry)
-        self.reporter.report(f"{part.left} readings to take, repeats among them{before}; about {about}")
+        self.reporter.report(f"readings to take: {part.left}, repeats among them{before}; about {about}")
 
     def _measure(self, part: Part) -> Placement | None:
         """A part; a further place that a person wants, None: it is enough."""
@@ -217,7 +217,7 @@ class OnSite:
             raise PartialResult(f"{interruption(why)}; what was taken is kept in {self._job.out}; {GO_ON}") from why
         except PartialResult as early:
             raise PartialResult(f"{early}; {GO_ON}") from early.__cause__
-        self.reporter.report(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {path}")
+        self.reporter.report(f"samples {len(summary.samples)}, skipped {summary.skipped}; recording: {path}")
         return self._new_place(part) if answer == PLACE else None
 
     def _look(self, session: Measuring, summary: Summary, part: Part) -> None:

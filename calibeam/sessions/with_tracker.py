@@ -108,7 +108,7 @@ def run_tracked(job: TrackedJob, console: Console, feed: Feed = SILENT, *, askin
         _check(job.rig, console, clock)
     before = taken_before(job)
     taken = f", {before.samples} taken before" if before.samples else ""
-    console.print(f"session with a tracker: {before.left} readings, repeats among them{taken}", highlight=False)
+    console.print(f"session with a tracker, readings: {before.left}, repeats among them{taken}", highlight=False)
     if before.left:
         if not agrees:
             someone(asking, "whether the arm may move", YES).may_move()
@@ -130,7 +130,7 @@ def run_tracked(job: TrackedJob, console: Console, feed: Feed = SILENT, *, askin
                 terminal=terminal,
                 earlier=earlier,
             )
-        console.print(f"{len(summary.samples)} samples, {summary.skipped} skipped; recording: {path}", highlight=False)
+        console.print(f"samples {len(summary.samples)}, skipped {summary.skipped}; recording: {path}", highlight=False)
     else:
         console.print("everything that was planned is taken", highlight=False)
     files = parts(job.out)

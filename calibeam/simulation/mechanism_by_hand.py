@@ -26,6 +26,7 @@ USUAL: Mapping[str, Any] = {
 HALF_FACE_M = 5e-3
 UNITS = (
     ("_rad_nm", "rad/Nm"),
+    ("_rad_nm3", "rad/Nm³"),
     ("_per_nm2", "1/(Nm²)"),
     ("_per_k", "1/K"),
     ("_per_m", "1/m"),

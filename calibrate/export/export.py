@@ -45,8 +45,8 @@ class ExportForm:
 
 
 NO_OFFSETS = (
-    "every offset is empty: beside free lengths and axes no zero is clear; for the best zeros alone, identify with a "
-    'fit plan that holds the others: schema = 1, hold = ["link*"]'
+    "every offset is empty: beside free lengths and axes no zero is determined; for the zeros alone, identify with "
+    '--plan FILE, a file with the lines  schema = 1  and  hold = ["link*"]'
 )
 TOGETHER = "identified together with lengths and axes: for offsets alone, identify with a fit plan that holds those"
 NO_UR = "no arm of Universal Robots has one; take another form, or correct the rig"

@@ -14,8 +14,7 @@ from calibrate.export.identified import AxisOffset, IdentifiedArm
 CLEAR = 2.0  # sigmas: an offset that is less than this is no better than none
 EXPLAINED = (
     "true angle = reading + offset, in the robot's own signs",
-    "entered rightly, the reading of an axis that rests changes by its offset",
-    "offsets that are not to be entered are empty; the last column has the reason",
+    "when it is entered correctly, the reading of an axis at rest changes by its offset; empty: do not enter one",
 )
 KUKA = "KUKA mastering: add offset_deg to $MAMES of the axis, then master it"
 FANUC = "FANUC mastering: a joint that reads r stands at r + offset_deg, which single-axis mastering is to be given"

@@ -111,6 +111,12 @@ def _row(
 ) -> NominalRow:
     scale, word = unit
     if value is None:
-        return NominalRow(name, word, scale * nominal, None, None, None, why)
-    spread = None if sigma is None else scale * sigma
-    return NominalRow(name, word, scale * nominal, scale * value, spread, scale * (nominal + value), "")
+        return NominalRow(name, word, _short(scale * nominal), None, None, None, why)
+    spread = None if sigma is None else _short(scale * sigma)
+    return NominalRow(
+        name, word, _short(scale * nominal), _short(scale * value), spread, _short(scale * (nominal + value)), ""
+    )
+
+
+def _short(number: float) -> float:
+    return round(number, 9) + 0.0  # a pm, a hundredth of a nrad: no rounding errors such as 4.9e-14 mm, no -0.0

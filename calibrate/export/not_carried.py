@@ -126,8 +126,8 @@ def geometry_lost(model: ModelFile) -> str:
         Moved.of(_left_over(replace(predictor, values=values).tip_m(q), predictor.tip_m(q))) for values in (kept, none)
     )
     return (
-        f"not carried: lengths and axes; with the offsets alone the tip is off by {_length(off)}, over {POSES} poses "
-        f"between the joint limits; without them by {_length(drawn)}"
+        f"not carried: lengths and axes; with the offsets alone the tip differs from this model by {_length(off)}; "
+        f"with no correction by {_length(drawn)} ({POSES} poses between the joint limits)"
     )
 
 

@@ -12,7 +12,9 @@ OWNERS = {
     **{frame.prefix: frame.where for frame in FRAMES},
     "placement": "where the fixture stands",
     "laser mount": "how the laser sits on the flange",
+    "laser": "how the laser sits on the flange",
     "psd1": "the gains of PSD 1",
+    "psd2.gain": "the gains of PSD 2",
     "psd2": "how PSD 2 sits to PSD 1",
 }
 NUMBERED = {**{f.prefix: f.one for f in FRAMES if f.one}, "placement": "where fixture station"}  # one of them alone

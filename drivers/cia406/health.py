@@ -87,7 +87,7 @@ class NodeWatch:
         late = self._heartbeats.late() if self._operational else ()
         if late:
             raise DeviceStale(
-                f"{self._name}: encoder {', '.join(map(str, late))} has sent no heartbeat for 1.5 periods; "
+                f"{self._name}: no heartbeat from encoder {', '.join(map(str, late))} for 1.5 periods; "
                 "check its power and cable, and whether another master changed its 1017h"
             )
 

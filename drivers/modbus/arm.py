@@ -176,7 +176,7 @@ class ModbusArm:
                     f"{number}; is the controller's motion program running?"
                 )
             if waited_s > limit_s:
-                raise DeviceStale(f"{self._line.place}: the motion has not ended within {limit_s:.3g} s")
+                raise DeviceStale(f"{self._line.place}: no end of the motion within {limit_s:.3g} s; check its pendant")
             self._count_life()
             self._clock.sleep_s(POLL_S)
 
@@ -193,7 +193,7 @@ class ModbusArm:
         while self._answer()[0] is State.MOVING:
             if self._clock.now_s() - begin_s > STANDING_LIMIT_S:
                 raise DeviceStale(
-                    f"{self._line.place}: it moves on {STANDING_LIMIT_S:.3g} s after the stop; press the emergency stop"
+                    f"{self._line.place}: still moves {STANDING_LIMIT_S:.3g} s after the stop; press the emergency stop"
                 )
             self._clock.sleep_s(POLL_S)
         with self._ordering:

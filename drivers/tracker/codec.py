@@ -110,7 +110,7 @@ def _reading(held: Mapping[str, Any], units: Units, number: Callable[[Any], floa
     device_s = number(held[TIME]) * units.time_s if TIME in held else math.nan
     degC = number(held[TEMPERATURE]) if TEMPERATURE in held else math.nan
     if TEMPERATURE in held and not TEMPERATURES_DEGC[0] <= degC <= TEMPERATURES_DEGC[1]:
-        raise LineRefusedError(f"temperature {degC:g} is none in degC")
+        raise LineRefusedError(f"temperature {degC:g} is not one in °C")
     if STATUS in held and _word(held[STATUS]) not in units.good:
         return TargetReading(NOWHERE, False, device_s, degC)
     x, y, z = (_length(axis, number(held[axis]), units.length_m) for axis in AXES)

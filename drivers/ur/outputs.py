@@ -46,7 +46,7 @@ class UrOutputs:
         try:
             taken = getattr(self._io, verb)(bit - first, level)
         except RuntimeError as error:
-            raise DeviceLost(f"{self.place}: output {bit} was not switched: {error}") from error
+            raise DeviceLost(f"{self.place}: output {bit} was not switched: {error}; connect again") from error
         if not taken:
             raise DeviceRefused(f"{self.place}: the controller did not take output {bit}; check its pendant")
 

@@ -102,14 +102,14 @@ class SupervisedChild:
             now_s = self._clock.now_s()
             heard_s = heard_s if answer is None else now_s
             if now_s >= deadline_s:
-                raise DeviceStale(f"{self._place}: {name} has not ended within {limit_s:.3g} s")
+                raise DeviceStale(f"{self._place}: {name} has not ended within {limit_s:.3g} s; see its pendant")
             if answer is None and is_stopped(self._process.pid):
                 raise DeviceStale(
                     f"{self._place}: {name}: the control process was frozen, and the arm was stopped "
                     "through the dashboard; connect again"
                 )
             if now_s - heard_s >= SILENCE_LIMIT_S:
-                raise DeviceStale(f"{self._place}: {name}: ur_rtde is silent for {SILENCE_LIMIT_S:.3g} s")
+                raise DeviceStale(f"{self._place}: {name} is silent for {SILENCE_LIMIT_S:.3g} s; connect again")
 
     def hold(self) -> None:
         """No call is sent any more."""

@@ -93,6 +93,9 @@ class Emulation(msgspec.Struct, frozen=True):
     device_rotation_sigma_rad: Sigma = 0.0
 
 
+NEEDED = 'emulation needs [arm] model = "dh", [tool], and, unless it has [devices.tracker], [fixture], [[placement]]'
+
+
 class WorldRig(msgspec.Struct, frozen=True):
     """Everything the world wants to know, as assumed; the deviations come on top."""
 
@@ -109,9 +112,7 @@ def read_rig(rig: Mapping[str, Any]) -> WorldRig:
     try:
         checked = msgspec.convert(dict(rig), type=WorldRig)
     except msgspec.ValidationError as error:
-        raise WorldError(
-            f"rig file: {error}; the emulated world needs [arm], [tool], [fixture], [[placement]]"
-        ) from error
+        raise WorldError(f"rig file: {error}; {NEEDED}") from error
     _refuse_what_is_missing(checked, rig)
     _refuse_what_cannot_be_built(checked)
     return checked
@@ -126,9 +127,7 @@ def _refuse_what_is_missing(rig: WorldRig, plain: Mapping[str, Any]) -> None:
     named |= {f"tool.{key}": key in tool for key in ("laser_origin_m", "laser_direction")}
     missing = next((name for name, there in named.items() if not there), None)
     if missing is not None:
-        raise WorldError(
-            f"rig file: {missing} is missing; the emulated world needs [arm], [tool], [fixture], [[placement]]"
-        )
+        raise WorldError(f"rig file: {missing} is missing; {NEEDED}")
 
 
 def _refuse_what_cannot_be_built(rig: WorldRig) -> None:

@@ -75,9 +75,9 @@ def test_a_device_that_is_not_there(site, tmp_path, capsys) -> None:
     wrong.write_text(path.read_text().replace("/psd", "/nowhere"))
     assert run(["check", str(wrong)]) == 1
     out, err = capsys.readouterr()
-    assert "psd       BAD" in out
+    assert "psd       error" in out
     assert "does not exist; check the cable" in out
-    assert "robot     good" in out
+    assert "robot     ok" in out
     assert "psd: not fit for a session" in " ".join(err.split())
 
 

@@ -205,7 +205,7 @@ class Solver:
         joint, worth = self.weakest(near_rad)
         x, y, z = T_base_flange[:3, 3]
         raise UnreachableError(
-            f"the flange cannot go on straight at ({x:.3f}, {y:.3f}, {z:.3f}) m: joint {joint} has lost its grip "
+            f"the flange cannot go on straight at ({x:.3f}, {y:.3f}, {z:.3f}) m: joint {joint} hardly moves the flange "
             f"(least singular value {worth:.4f}); the pose is out of reach, or two branches meet there"
         )
 

@@ -128,7 +128,7 @@ def task_of(entries: TaskEntries) -> Task:
     for name, reading in entries.read.items():
         _check_reading(name, reading, graph)
     if entries.belt is not None and not entries.belt.m_per_turn:
-        raise TaskError("[belt] m_per_turn = 0: a turn of the encoder moves the belt by no way at all")
+        raise TaskError("[belt] m_per_turn = 0: state how far the belt moves in one turn of the encoder")
     return Task(graph, entries.step, entries.teach, entries.hand, entries.belt, entries.read)
 
 

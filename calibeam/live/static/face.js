@@ -41,7 +41,7 @@ export class FaceView {
     else if (!face) surface.shout("NO SAMPLE\nsee Devices");
     else if (missed) surface.shout("NO LIGHT");
     else if (face.state === "no spot") surface.shout("NO SPOT\nlight beyond the map of the face", 18);
-    else if (face.state === "saturated") surface.shout("TOO BRIGHT\nlessen laser or gain", 18);
+    else if (face.state === "saturated") surface.shout("TOO BRIGHT\nreduce laser or gain", 18);
   }
 
   say(face, half_m, live, missed) {

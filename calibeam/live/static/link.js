@@ -61,7 +61,7 @@ export class Link {
   async why() {
     try {
       const answer = await fetch("/", { method: "HEAD", cache: "no-store" });
-      this.refused = answer.status === 401 ? "calibeam was started anew with another token: open the address that it prints now" : "";
+      this.refused = answer.status === 401 ? "calibeam was restarted with another token: open the address that it prints now" : "";
     } catch { this.refused = ""; }
     this.look();
   }
@@ -71,7 +71,7 @@ export class Link {
     const seconds = Number.isFinite(silent_ms) ? ` for ${Math.round(silent_ms / 1000)} s` : "";
     const arrives = this.socket && silent_ms < LATE_MS, trouble = this.trouble.now || this.trouble.state;
     if (arrives && old_ms < LATE_MS) this.told("live", trouble);
-    else if (arrives) this.told("late", trouble || "Only a part arrives. What you see is old.");
+    else if (arrives) this.told("late", trouble || "Only part of the data arrives. What you see is old.");
     else if (this.socket?.readyState === WebSocket.OPEN && Number.isFinite(silent_ms)) this.told("late", `Nothing heard${seconds}: the connection is slow or calibeam is held up. What you see is old.`);
     else this.told("gone", this.refused || (this.full && "Too many pages are open: close one of them. This page tries again. STOP works.") || `${this.ended ? "calibeam has ended its page" : "Not connected to calibeam"}; nothing heard${seconds}, trying again. What you see is old. STOP may not arrive.`);
   }

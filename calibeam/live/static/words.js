@@ -83,7 +83,7 @@ function entry(line) {
 
 function nothing() {
   const item = document.createElement("li");
-  item.textContent = "nothing to tell yet";
+  item.textContent = "no entries yet";
   item.className = "quiet";
   return item;
 }

@@ -41,7 +41,7 @@ def told_breaks(track: Track, faults: Sequence[Break]) -> list[StreamFinding]:
 def _told_kind(track: Track, fault: Fault, where: str, of: str, alike: list[Break]) -> StreamFinding:
     worst = max(alike, key=lambda one: (one.samples, abs(one.jump_s)))
     n, places = sum(one.samples for one in alike), len(alike)
-    at = f"{alike[0].from_s:.3f} s" + (f" and {places - 1} more places, most at {worst.from_s:.3f} s" * (places > 1))
+    at = f"{alike[0].from_s:.3f} s" + (f" and {places - 1} more times, most at {worst.from_s:.3f} s" * (places > 1))
     says = SAID[fault].format(n=n, stream=track.name, at=at, of=of, jump=f"{abs(worst.jump_s):.6g}")
     sizes = {"samples_count": Size(float(n), 0.0), "places_count": Size(float(places), 0.0)}
     if fault in (Fault.BACKWARDS, Fault.STEPPED):

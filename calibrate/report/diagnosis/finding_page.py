@@ -245,7 +245,7 @@ def _rivals(finding: FindingRecord, file: DiagnosisFile) -> Iterator[Html]:
         return
     rows = [(_rival_words(r), fixed(r.margin + 0.0, 1), f"{r.confidence:.3f}") for r in finding.rivals]
     caption = "What it could be instead, everything else refitted"
-    yield table(("Rival", "BIC behind", "confidence"), rows, numeric=(1, 2), caption=caption)
+    yield table(("Alternative", "BIC behind", "confidence"), rows, numeric=(1, 2), caption=caption)
     advice = [line for line in file.next if finding.where in line and finding.physics in line]
     if advice:
         yield tag("p", tag("b", "What to do: "), "; ".join(advice), ".")

@@ -141,7 +141,8 @@ def missing_lines(file: DiagnosisFile) -> list[str]:
     """What lacks a column, and was tested by other columns in part or not at all."""
     untested = untested_physics(file)
     each = [("not tested" if m.physics in untested else "tested in part", m) for m in file.not_recorded]
-    return [f"{how}: {m.physics} (column {m.column} is missing)" for how, m in sorted(each, key=lambda one: one[0])]
+    lacking = [(how, m, "" if " in the rig" in m.column else "column ") for how, m in sorted(each, key=lambda e: e[0])]
+    return [f"{how}: {m.physics.replace('-', ' ')} ({what}{m.column} is missing)" for how, m, what in lacking]
 
 
 def confusable_causes(file: DiagnosisFile) -> tuple[tuple[NameRecord, NameRecord, float], ...]:

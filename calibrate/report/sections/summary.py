@@ -87,7 +87,7 @@ MOSTLY = 0.9  # of the error of a single pose, by the uncertainty of the paramet
 def masthead(evidence: SessionEvidence) -> Html:
     """Title, when and with what."""
     recording, model = evidence.recording, evidence.model
-    seen = ", ".join(kind_of(name).title.lower() for name in model.instruments)
+    seen = ", ".join(kind_of(name).title for name in model.instruments)
     said = [f"{when(recording)} UTC"] if when(recording) else []
     said += [f"{model.poses} samples", seen, model.software]
     return tag(
@@ -134,7 +134,7 @@ def _errors(evidence: SessionEvidence) -> tuple[Number, Number]:
     else:
         before, after = proof.rms_distance_before_m, proof.rms_distance_after_m
         on = f"rms distance of {proof.observations} {_what(first)} that the fit has not seen"
-    gain = f"; {significant(before / after)} times better" if after > 0.0 else ""
+    gain = f"; {significant(before / after)} times smaller" if after > 0.0 else ""
     return (
         Number(
             "as_drawn",

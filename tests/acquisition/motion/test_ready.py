@@ -105,7 +105,10 @@ def test_a_transform_in_a_table_of_its_own_is_taught_as_well(tmp_path: Path) -> 
         ("[read.A]\ncamera = true\n", "A is not a transform with unread = true"),
         ('[read.B]\ncamera = true\nat = "at"\n', "belong together"),
         ('[read.B]\ncamera = true\nat = "there"\ngives = "B"\n', "there is not among the positions"),
-        ('[belt]\nm_per_turn = 0.0\n[belt.encoder]\ndriver = "cia406"\ninterface = "slcan"\n', "no way at all"),
+        (
+            '[belt]\nm_per_turn = 0.0\n[belt.encoder]\ndriver = "cia406"\ninterface = "slcan"\n',
+            "in one turn of the encoder",
+        ),
     ],
 )
 def test_devices_that_cannot_be_are_refused_with_the_table(lines: str, why: str, tmp_path: Path) -> None:

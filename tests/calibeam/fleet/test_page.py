@@ -93,4 +93,4 @@ def test_a_fleet_of_failures_has_its_page():
     lost = [Row(f"/{i}", str(i), "", 1, 1, Outcome.LOST, "c", error="gone") for i in range(LISTED + 5)]
     page = fleet_html(Fleet(tuple(lost)), "nothing")
     assert "drift is not determined" in page
-    assert "5 more are in fleet.parquet" in page
+    assert "Rows that are only in fleet.parquet: 5." in page

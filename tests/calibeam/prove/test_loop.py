@@ -31,7 +31,7 @@ def test_the_summary_counts_what_ended_and_what_was_said_too_early():
 
 def test_no_cases_are_refused(tmp_path, capsys):
     assert run(["prove", "--loop", "--cases", "0", "--out", str(tmp_path / "out")]) == 1
-    assert "one case or more" in capsys.readouterr().err
+    assert "at least one case" in capsys.readouterr().err
 
 
 @pytest.mark.endure

@@ -44,7 +44,7 @@ def test_a_plain_effect_is_found_named_and_better_where_nobody_measured(tmp_path
     assert case.free_space_after_m < 0.5 * case.free_space_before_m
     truth = json.loads((tmp_path / "p" / "revealed" / f"{case.name}.json").read_bytes())
     assert truth["defects"][0]["mechanism"] == "encoder-eccentricity"
-    assert "as it should be" in (tmp_path / "p" / "proof.html").read_text(encoding="utf-8")
+    assert "as expected" in (tmp_path / "p" / "proof.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.endure  # as `make mutate` does with ten effects
@@ -77,7 +77,7 @@ def test_a_fault_that_only_streams_tell_is_found_and_named(tmp_path: Path) -> No
 
 def test_a_seed_of_development_is_not_published(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.run(["prove", "--out", str(tmp_path / "p"), "--seed", "21", "--publish"]) == 1
-    assert "seed 21 is one of development" in " ".join(capsys.readouterr().err.split())
+    assert "seed 21 is reserved for development" in " ".join(capsys.readouterr().err.split())
 
 
 def test_a_catalogue_with_effects_taken_out_is_not_published(
@@ -85,13 +85,13 @@ def test_a_catalogue_with_effects_taken_out_is_not_published(
 ) -> None:
     options = ("--seed", "5000", "--publish", "--without", "backlash")
     assert cli.run(["prove", "--out", str(tmp_path / "p"), *options]) == 1
-    assert "not the one to publish" in " ".join(capsys.readouterr().err.split())
+    assert "needs the whole catalogue" in " ".join(capsys.readouterr().err.split())
 
 
 def test_a_choice_of_cases_is_not_published(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for choice in (("--kind", "one"), ("--family", "tracker"), ("--enr", "3", "8"), ("--mechanism", "slack-drive")):
         assert cli.run(["prove", "--out", str(tmp_path / "p"), "--publish", *choice]) == 1
-        assert "some cases only" in " ".join(capsys.readouterr().err.split())
+        assert "all kinds of cases" in " ".join(capsys.readouterr().err.split())
 
 
 def test_nobody_looks_at_the_published_cases_by_chance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

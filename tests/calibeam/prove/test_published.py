@@ -35,7 +35,7 @@ def test_every_figure_has_its_line(proof: Callable[..., ProofFile]) -> None:
 
 
 def test_development_is_not_for_the_public(proof: Callable[..., ProofFile]) -> None:
-    with pytest.raises(DataError, match="one of development"):
+    with pytest.raises(DataError, match="reserved for development"):
         table_of(proof(seed=21))
     with pytest.raises(DataError, match="taken out"):
         table_of(proof(without=("backlash",)))

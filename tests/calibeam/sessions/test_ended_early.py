@@ -55,7 +55,7 @@ def ended(trouble: Trouble, why: BaseException) -> str:
 @pytest.mark.parametrize("times", [1, 3])
 def test_a_clean_up_that_is_interrupted_begins_again_with_the_stop(step, times) -> None:
     trouble = Trouble(**{step: [KeyboardInterrupt() for _ in range(times)]})
-    assert ended(trouble, KeyboardInterrupt()).startswith("Ctrl-C; 7 samples are kept in recording.mcap")
+    assert ended(trouble, KeyboardInterrupt()).startswith("Ctrl-C; samples kept in recording.mcap: 7")
     assert trouble.done[-3:] == ["stop", "event", "flush"]
 
 
@@ -91,7 +91,7 @@ def test_the_samples_of_the_whole_session_are_counted() -> None:
     trouble = Trouble()
     with pytest.raises(PartialResult) as told:
         kept(trouble, trouble, trouble, trouble, _aborted, Earlier(Path("session-1"), 35))
-    assert "42 samples are kept in session-1 (7 of them in recording.mcap); `calibeam identify session-1`" in str(
+    assert "samples kept in session-1: 42 (7 of them in recording.mcap); `calibeam identify session-1`" in str(
         told.value
     )
 

@@ -85,7 +85,7 @@ def reporter(rig, clock, heard) -> StatusReporter:
 @pytest.mark.parametrize(
     ("state", "large", "keys"),
     [
-        (RunState.RUNNING, "COLLECT", "SPACE pause"),
+        (RunState.RUNNING, "MEASUREMENT", "SPACE pause"),
         (RunState.PAUSING, "PAUSING, THE ARM COMES TO REST", "SPACE stop the arm now"),
         (RunState.BREAKING, "STOPPING THE ARM", "a abort    h halt"),
         (RunState.PAUSED, "PAUSED, THE ARM STANDS", "r go on    s finish here    a abort    h halt"),
@@ -239,7 +239,7 @@ def test_the_page_is_told_the_same_and_what_it_draws_by() -> None:
     view.shows(shown)
     *once, last, again = feed.told[:2] + feed.told[2:]
     assert once == [(1, 1), {"a": 1.0}]
-    assert last == again == PageProgress("collect", 3, 78, 60.0, "accuracy: not determined yet: ")
+    assert last == again == PageProgress("measurement", 3, 78, 60.0, "accuracy: not determined yet: ")
 
 
 def person(reporter, asking: Asking | None, *, agrees: bool) -> Person:

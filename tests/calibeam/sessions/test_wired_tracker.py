@@ -79,7 +79,7 @@ def test_a_session_has_the_positions_that_are_true(tmp_path: Path) -> None:
 
 def test_a_tracker_that_falls_silent_stops_the_arm_and_is_named(tmp_path: Path) -> None:
     with Emulation(RIG_FILE, seed=5, time_scale=PACE) as emulation:
-        with pytest.raises(PartialResult, match=r"tracker: no (line|sample).*2 samples are kept"):
+        with pytest.raises(PartialResult, match=r"tracker: no (line|sample).*samples kept in .*: 2;"):
             session(tmp_path, emulation, 2, lambda: emulation.ask("tracker.silence"))
         assert emulation.ask("robot.standing")
     recording = read(tmp_path / "r.mcap")
@@ -89,7 +89,7 @@ def test_a_tracker_that_falls_silent_stops_the_arm_and_is_named(tmp_path: Path) 
 
 @pytest.mark.endure  # 8 s; of the driver alone: tests/drivers/tracker/test_device.py
 def test_a_closed_connection_is_told(tmp_path: Path) -> None:
-    says = r"tracker: 127.0.0.1:\d+: the instrument closed the connection.*1 samples are kept"
+    says = r"tracker: 127.0.0.1:\d+: the instrument closed the connection.*samples kept in .*: 1;"
     with Emulation(RIG_FILE, seed=5, time_scale=PACE) as emulation, pytest.raises(PartialResult, match=says):
         session(tmp_path, emulation, 1, lambda: emulation.inject("tracker", "disconnect", count=1))
     assert len(read(tmp_path / "r.mcap").samples) == 1

@@ -158,7 +158,7 @@ def test_offsets_alone_leave_what_lengths_and_axes_move_the_tip(tmp_path):
     lengths = {"link2.length": 8e-4}
     (whole,) = exported(tmp_path, of_make("kuka", chain=zeros), form_named("kuka-mastering"))[1]
     (none,) = exported(tmp_path, of_make("kuka", chain=lengths), form_named("kuka-mastering"))[1]
-    assert "the tip is off by 0.0 µm rms, at most 0.0 µm" in whole
+    assert "the tip differs from this model by 0.0 µm rms, at most 0.0 µm" in whole
     alone, without = (part.split("µm rms")[0].split()[-1] for part in none.split(";")[1:])
     assert float(alone) == float(without) > 50.0
 

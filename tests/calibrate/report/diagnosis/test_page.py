@@ -192,11 +192,11 @@ def test_a_cause_is_never_both_tested_and_not_tested():
     page = "".join(chapters_of(both, 6))
     assert "Not tested: columns that are missing" not in page
     assert "payload_kg" in page
-    assert missing_lines(both) == ["tested in part: payload-compliance (column payload_kg is missing)"]
+    assert missing_lines(both) == ["tested in part: payload compliance (column payload_kg is missing)"]
     other = msgspec.structs.replace(SMALLEST, physics="joint-compliance")
     neither = msgspec.structs.replace(consistent, smallest=(other,))
     assert "Not tested: columns that are missing" in "".join(chapters_of(neither, 6))
-    assert missing_lines(neither) == ["not tested: payload-compliance (column payload_kg is missing)"]
+    assert missing_lines(neither) == ["not tested: payload compliance (column payload_kg is missing)"]
 
 
 def test_no_cause_is_confused_with_itself():
