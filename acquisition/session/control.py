@@ -18,6 +18,7 @@ from collections.abc import Callable
 
 from acquisition.errors import StoppedError
 from drivers.clock import Clock, SystemClock
+from drivers.device import Floats
 from drivers.errors import DeviceError
 
 PAUSE_AGAIN_S = 10.0
@@ -257,6 +258,16 @@ class RunControl:
             self._raise_end()
         if self._state in BROKEN or self._eased or (begins and self._state is RunState.PAUSING):
             raise BrokenOffError
+
+    def move(self, move: Callable[[Floats], None], q_rad: Floats) -> None:
+        """A motion that a person may break off. Raises as `check`, and what `move` raises."""
+        self.check(begins=True)
+        try:
+            move(q_rad)
+        except DeviceError:
+            self.check()  # it was the pause that ended the motion
+            raise
+        self.check()  # an arm that arrived before the stop came counts as broken off all the same
 
     def _raise_end(self) -> None:
         if self._state in (RunState.ABORTED, RunState.HALTED):

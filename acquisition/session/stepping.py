@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from acquisition.bench import Bench, Look
 from acquisition.centring.navigator import GLANCE_S, Navigator
 from acquisition.session.control import BrokenOffError, RunControl
-from drivers.errors import DeviceError
 
 Floats = NDArray[np.float64]
 
@@ -26,13 +25,7 @@ class InterruptibleBench:
         self._bench, self._control = bench, control
 
     def move(self, q_rad: Floats) -> None:
-        self._control.check(begins=True)
-        try:
-            self._bench.move(q_rad)
-        except DeviceError:
-            self._control.check()  # it was the pause that ended the motion
-            raise
-        self._control.check()  # an arm that arrived before the stop came counts as broken off all the same
+        self._control.move(self._bench.move, q_rad)
 
     def look(self, dwell_s: float) -> Look:
         self._control.check()

@@ -27,7 +27,6 @@ from drivers.ur.control_link import (
     Ended,
     Link,
     MoveJoints,
-    MoveLine,
     Outcome,
     Ready,
     ServoJoints,
@@ -52,7 +51,6 @@ class Control(Protocol):
     """The part of rtde_control.RTDEControlInterface that is used here."""
 
     def moveJ(self, q: Sequence[float], speed: float, acceleration: float, asynchronous: bool) -> bool: ...
-    def moveL(self, pose: Sequence[float], speed: float, acceleration: float, asynchronous: bool) -> bool: ...
     def servoJ(self, q: Sequence[float], v: float, a: float, t: float, lookahead: float, gain: float) -> bool: ...
     def servoStop(self, a: float) -> bool: ...
     def stopJ(self, a: float) -> None: ...
@@ -127,8 +125,6 @@ class ControlChild:
             match call.request:
                 case MoveJoints(q, speed, acceleration):
                     return self._watch(self._control.moveJ(q, speed, acceleration, True))
-                case MoveLine(pose, speed, acceleration):
-                    return self._watch(self._control.moveL(pose, speed, acceleration, True))
                 case ServoJoints(q, period, lookahead, gain):
                     self._servoing = True
                     return self._judge(self._control.servoJ(q, 0.0, 0.0, period, lookahead, gain))
