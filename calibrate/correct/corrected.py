@@ -228,7 +228,11 @@ def _posture(
 ) -> tuple[Floats | None, tuple[str, str]]:
     """(joint,) nearest to `near_rad` on the wanted branch; or status and reason."""
     within = inverse_of.solutions(arm, goal, near_rad)
-    good = within if branch is None else within[branch(within)]
+    good = within
+    if branch is not None:
+        good = _in_every_turn(arm, within)
+        good = good[branch(good)]
+        good = good[np.argsort(np.linalg.norm(good - near_rad, axis=1), kind="stable")]
     if len(good):
         return good[0], (OK, "")
     if len(within):
@@ -241,6 +245,14 @@ def _posture(
     best = int(np.argmin(beyond.max(axis=1)))
     joint = int(np.argmax(beyond[best]))
     return None, (LIMIT, _beyond_limit(arm, joint, float(free[best, joint])))
+
+
+def _in_every_turn(arm: RigArm, q_rad: Floats) -> Floats:
+    """(solution, joint): also those that differ by whole turns, where the range of a joint has room for them."""
+    for turn_rad in 2.0 * np.pi * np.eye(arm.n_joints):
+        q_rad = np.concatenate([q_rad, q_rad - turn_rad, q_rad + turn_rad])
+        q_rad = q_rad[np.all((q_rad >= arm.lower_rad) & (q_rad <= arm.upper_rad), axis=1)]
+    return q_rad
 
 
 def _beyond_limit(arm: RigArm, joint: int, q_rad: float) -> str:

@@ -5,6 +5,7 @@ targets of PTP, LIN, SPTP and SLIN and declared points; tools, bases and relativ
 """
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,15 +13,19 @@ from numpy.typing import NDArray
 
 from calibrate.correct.corrected import Branch
 from calibrate.correct.programs.literal import (
+    EDGE_RAD,
     NUMBER,
     Dialect,
     Literal,
     Move,
+    NamedPose,
+    Places,
     Span,
     Targets,
+    Turns,
     blanked,
+    instruction,
     line_of,
-    line_start,
     moves_of,
 )
 from calibrate.correct.rotations import KUKA
@@ -28,7 +33,7 @@ from calibrate.correct.rotations import KUKA
 Floats = NDArray[np.float64]
 
 AGGREGATE = r"\{(?:\s*(?:E6POS|E6AXIS|POS|AXIS|FRAME)\s*:)?(?P<fields>[^{}\[\]]*)\}"
-FIELD = re.compile(rf"\b(?P<key>[A-Z]\w*)\s+(?P<number>{NUMBER})", re.IGNORECASE)
+FIELD = re.compile(rf"\b(?P<key>[A-Z]\w*)\s+(?P<number>{NUMBER}|'B[01]+')", re.IGNORECASE)
 INLINE = re.compile(rf"^[ \t]*S?(?:PTP|LIN)\s+{AGGREGATE}", re.IGNORECASE | re.MULTILINE)
 DECLARED = re.compile(
     rf"^[ \t]*(?:DECL\s+)?(?:GLOBAL\s+)?(?:CONST\s+)?(?:E6POS|E6AXIS|POS|AXIS)\s+(?P<name>\w+)\s*=\s*{AGGREGATE}",
@@ -36,26 +41,35 @@ DECLARED = re.compile(
 )
 MOVE = re.compile(r"^[ \t]*S?(?:PTP|LIN|CIRC)\s+(?P<target>[A-Za-z_]\w*)", re.IGNORECASE | re.MULTILINE)
 OTHER = re.compile(r"^[ \t]*S?(?:CIRC|PTP_REL|LIN_REL|CIRC_REL)\b", re.IGNORECASE | re.MULTILINE)
+ROUTINE = re.compile(r"^[ \t]*(?:GLOBAL\s+)?DEF(?:FCT)?\b", re.IGNORECASE | re.MULTILINE)
+SET = re.compile(
+    r"\$(?P<what>BASE|TOOL)(?:\.\w+)?\s*=\s*(?P<value>[^\n]*)|\bBAS\s*\(\s*#(?P<kind>BASE|TOOL)\s*,\s*(?P<number>\w+)\s*\)"
+    r"|\bFDAT_ACT\s*=\s*(?P<inline>\w+)",
+    re.IGNORECASE,
+)
+HELD = re.compile(rf"(?P<name>\$?\w+(?:[ \t]*\[[ \t]*\d+[ \t]*\])?)\s*=\s*{AGGREGATE}", re.IGNORECASE)
+INLINE_DATA = re.compile(r"\bFDAT\s+(?P<name>\w+)\s*=\s*\{(?P<fields>[^{}]*)\}", re.IGNORECASE)
+FIXED = re.compile(r"\$IPO_MODE\s*=\s*#TCP|IPO_FRAME\s+#TCP", re.IGNORECASE)
 POSE = ("X", "Y", "Z", "A", "B", "C")
 
 
 def find(text: str, n_joints: int) -> Targets:
     """Of .src and of .dat."""
     code = blanked(text, ";")
-    by_name = moves_of(text, code, MOVE)
+    places, inline_data = _places(code)
+    by_name = moves_of(text, code, MOVE, places)
     literals: list[Literal] = []
     skipped: list[str] = []
     for match in (*INLINE.finditer(code), *DECLARED.finditer(code)):
         inline = match.re is INLINE
         if inline:
-            start = line_start(text, match.end())
-            end = text.find("\n", match.end())
-            moves = (Move(start, text[start : len(text) if end < 0 else end]),)
+            moves = (instruction(text, match.start(), places),)
             name = f"line {line_of(text, match.start('fields'))}"
         else:
             name = match["name"]
             moves = tuple(by_name.get(name.lower(), ()))
-        one = _literal(text, match, name, moves, n_joints)
+        own = None if inline else inline_data.get("F" + name.upper().removeprefix("X"))
+        one = _literal(text, match, name, moves, n_joints, own)
         if one is None:
             skipped.append(f"{name}: an aggregate that does not state the whole target is not corrected")
         else:
@@ -74,27 +88,102 @@ def find(text: str, n_joints: int) -> Targets:
     return Targets(tuple(sorted(literals, key=lambda one: one.at)), tuple(dict.fromkeys(skipped)))
 
 
-def _literal(text: str, match: re.Match[str], name: str, moves: tuple[Move, ...], n_joints: int) -> Literal | None:
-    begin, end = match.span("fields")
-    spans: dict[str, Span] = {}
-    numbers: dict[str, float] = {}
-    for field in FIELD.finditer(text, begin, end):
-        key = field["key"].upper()
-        spans[key], numbers[key] = field.span("number"), float(field["number"])
+def _literal(
+    text: str,
+    match: re.Match[str],
+    name: str,
+    moves: tuple[Move, ...],
+    n_joints: int,
+    own: tuple[NamedPose, NamedPose] | None,
+) -> Literal | None:
+    begin = match.start("fields")
+    fields = _fields(text, *match.span("fields"))
     for keys, joints in ((POSE, False), (tuple(f"A{j + 1}" for j in range(n_joints)), True)):
-        if all(key in numbers for key in keys):
-            branch = None if joints or "T" not in numbers else _turn(int(numbers["T"]))
-            values, places = tuple(numbers[k] for k in keys), tuple(spans[k] for k in keys)
-            return Literal(name, begin, places, values, joints, moves, branch)
+        if all(key in fields for key in keys):
+            branch, turns = (None, None) if joints or "T" not in fields else _turn(*fields["T"])
+            spans, values = (tuple(part) for part in zip(*(fields[key] for key in keys), strict=True))
+            return Literal(name, begin, spans, values, joints, moves, branch, turns, own)
     return None
 
 
-def _turn(bits: int) -> Branch:
-    def asked(q_rad: Floats) -> NDArray[np.bool_]:
-        below = np.array([bool(bits >> j & 1) for j in range(q_rad.shape[1])])
-        return np.asarray(np.all((q_rad < 0.0) == below, axis=1), dtype=np.bool_)
+def _fields(text: str, begin: int, end: int) -> dict[str, tuple[Span, float]]:
+    """Numbers of an aggregate by key; bits may be written as 'B0110'."""
+    return {
+        field["key"].upper(): (
+            field.span("number"),
+            float(int(field["number"][2:-1], 2) if "'" in field["number"] else field["number"]),
+        )
+        for field in FIELD.finditer(text, begin, end)
+    }
 
-    return asked
+
+def _turn(span: Span, number: float) -> tuple[Branch, Turns]:
+    """An axis at 0 may be written with either bit."""
+    bits = int(number)
+
+    def within(q_rad: Floats) -> NDArray[np.bool_]:
+        below = np.array([bool(bits >> j & 1) for j in range(q_rad.shape[-1])])
+        return np.where(below, q_rad < EDGE_RAD, q_rad > -EDGE_RAD)
+
+    def asked(q_rad: Floats) -> NDArray[np.bool_]:
+        return np.asarray(np.all(within(q_rad), axis=1), dtype=np.bool_)
+
+    def turns(q_rad: Floats) -> list[tuple[Span, str]]:
+        other = [j for j, kept in enumerate(within(q_rad)) if not kept]
+        return [(span, str(bits ^ sum(1 << j for j in other)))] if other else []
+
+    return asked, turns
+
+
+def _places(code: str) -> tuple[Places, dict[str, tuple[NamedPose, NamedPose]]]:
+    """Frame and tool of an instruction, as its routine has set them last above; those of inline forms by FDAT name."""
+    held, times = dict[str, Floats](), Counter[str]()
+    for match in HELD.finditer(code):
+        fields, name = _fields(code, *match.span("fields")), _key(match["name"])
+        times[name] += 1
+        if all(key in fields for key in POSE):
+            held[name] = KRL.frame([fields[key][1] for key in POSE])
+    routines, events = [m.start() for m in ROUTINE.finditer(code)], list(SET.finditer(code))
+    fixed = "the tool is stationary (#TCP), which is not corrected" if FIXED.search(code) else ""
+
+    def place(what: str, value: str) -> NamedPose:
+        name = _key(value)
+        if name in ("$NULLFRAME", "$WORLD", f"{what}_DATA[0]"):
+            return NamedPose(name, np.eye(4), fixed)
+        fields = _fields(value, 0, len(value)) if value.lstrip().startswith("{") else {}
+        if all(key in fields for key in POSE):
+            return NamedPose(f"${what}", KRL.frame([fields[key][1] for key in POSE]), fixed)
+        return NamedPose(name, held.get(name) if times[name] == 1 else None, fixed)
+
+    inline = dict[str, tuple[NamedPose, NamedPose]]()
+    for match in INLINE_DATA.finditer(code):
+        numbers = _fields(code, *match.span("fields"))
+        base, tool = (
+            place(what, f"{what}_DATA[{numbers[f'{what}_NO'][1]:.0f}]")
+            if f"{what}_NO" in numbers
+            else NamedPose(refused=fixed)
+            for what in ("BASE", "TOOL")
+        )
+        inline[match["name"].upper()] = (base, tool)
+
+    def places(at: int) -> tuple[NamedPose, NamedPose]:
+        begin = max((start for start in routines if start <= at), default=0)
+        now = {"BASE": NamedPose(refused=fixed), "TOOL": NamedPose(refused=fixed)}
+        for event in (one for one in events if begin <= one.start() < at):
+            if event["inline"]:
+                form = event["inline"]
+                unknown = (NamedPose(f"FDAT {form}", None, fixed),) * 2
+                now["BASE"], now["TOOL"] = inline.get(form.upper(), unknown)
+            else:
+                what = (event["what"] or event["kind"]).upper()
+                now[what] = place(what, event["value"] or f"{what}_DATA[{event['number']}]")
+        return now["BASE"], now["TOOL"]
+
+    return places, inline
+
+
+def _key(name: str) -> str:
+    return re.sub(r"\s", "", name).upper()
 
 
 def overshoot(move: Move, joints: Sequence[str]) -> str:

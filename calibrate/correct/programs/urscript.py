@@ -7,15 +7,19 @@ movej and movel take either form; a comment begins with #.
 import re
 from collections.abc import Sequence
 
+import numpy as np
+
 from calibrate.correct.programs.literal import (
     NUMBER,
     Dialect,
     Literal,
     Move,
+    NamedPose,
+    Places,
     Targets,
     blanked,
+    instruction,
     line_of,
-    line_start,
     moves_of,
     numbers_in,
 )
@@ -25,16 +29,18 @@ LIST = rf"(?P<pose>p?)\[\s*{NUMBER}(?:\s*,\s*{NUMBER})*\s*\]"
 MOVE = re.compile(r"\b(?:movej|movel|movep|servoj|movec)\s*\(\s*(?P<target>p?\[|[A-Za-z_]\w*)")
 INLINE = re.compile(rf"\b(?:movej|movel|movep|servoj)\s*\(\s*(?:q\s*=\s*|pose\s*=\s*)?{LIST}")
 ASSIGNED = re.compile(rf"(?P<name>[A-Za-z_]\w*)\s*=\s*{LIST}")
+TCP = re.compile(rf"\bset_tcp\s*\(\s*(?P<literal>{LIST}\s*\))?")
 CIRCLE = re.compile(r"\bmovec\s*\(")
 
 
 def find(text: str, n_joints: int) -> Targets:
     """Literals of moves, and of variables that moves go to."""
     code = blanked(text, "#")
-    by_name = moves_of(text, code, MOVE)
+    places = _places(code)
+    by_name = moves_of(text, code, MOVE, places)
     literals: list[Literal] = []
     for match in INLINE.finditer(code):
-        literals.append(_literal(text, match, "", (_move(text, match.start()),), n_joints))
+        literals.append(_literal(text, match, "", (instruction(text, match.start(), places),), n_joints))
     for match in ASSIGNED.finditer(code):
         if match["name"].lower() in by_name:
             moves = tuple(by_name[match["name"].lower()])
@@ -51,10 +57,19 @@ def find(text: str, n_joints: int) -> Targets:
     return Targets(tuple(sorted(good, key=lambda one: one.at)), tuple(dict.fromkeys(skipped)))
 
 
-def _move(text: str, at: int) -> Move:
-    start = line_start(text, at)
-    end = text.find("\n", at)
-    return Move(start, text[start : len(text) if end < 0 else end])
+def _places(code: str) -> Places:
+    """Poses are in the base, with the tool centre point that was set last above."""
+    points = list(TCP.finditer(code))
+
+    def places(at: int) -> tuple[NamedPose, NamedPose]:
+        tool = NamedPose()
+        for match in (point for point in points if point.start() < at):
+            numbers = [v for _, v in numbers_in(code, *match.span("literal"))] if match["literal"] else []
+            line = f"set_tcp of line {line_of(code, match.start())}"
+            tool = NamedPose(line, URSCRIPT.frame(numbers) if len(numbers) == 6 else None)
+        return NamedPose("base", np.eye(4)), tool
+
+    return places
 
 
 def _literal(text: str, match: re.Match[str], name: str, moves: tuple[Move, ...], n_joints: int) -> Literal:
