@@ -242,8 +242,8 @@ def test_the_turn_is_the_one_that_the_program_states():
 
 
 def test_configurations_follow_an_axis_that_the_correction_takes_over_an_edge():
-    """0.065 degrees before 0 the correction by -0.13 degrees ends on the other side, in the same posture."""
-    q = angles_at(j6=0.065)
+    """0.055 degrees before 0 the correction by more than a tenth ends on the other side, in the same posture."""
+    q = angles_at(j6=0.055)
     T = drawn().frames(q[None])[0, -1]
     text = f"MoveL [{rapid_pose(T)},[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]], v50, fine, tool0;\n"
     assert "[0,0,-1,0]" in corrected(text, ".mod").text
