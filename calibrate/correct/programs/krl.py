@@ -12,28 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.correct.corrected import Branch
-from calibrate.correct.programs.literal import (
-    EDGE_RAD,
-    NUMBER,
-    Dialect,
-    Literal,
-    Move,
-    NamedPose,
-    Places,
-    Span,
-    Targets,
-    Turns,
-    blanked,
-    instruction,
-    line_of,
-    moves_of,
-)
+from calibrate.correct.programs import literal
 from calibrate.correct.rotations import KUKA
 
 Floats = NDArray[np.float64]
 
 AGGREGATE = r"\{(?:\s*(?:E6POS|E6AXIS|POS|AXIS|FRAME)\s*:)?(?P<fields>[^{}\[\]]*)\}"
-FIELD = re.compile(rf"\b(?P<key>[A-Z]\w*)\s+(?P<number>{NUMBER}|'B[01]+')", re.IGNORECASE)
+FIELD = re.compile(rf"\b(?P<key>[A-Z]\w*)\s+(?P<number>{literal.NUMBER}|'B[01]+')", re.IGNORECASE)
 INLINE = re.compile(rf"^[ \t]*S?(?:PTP|LIN)\s+{AGGREGATE}", re.IGNORECASE | re.MULTILINE)
 DECLARED = re.compile(
     rf"^[ \t]*(?:DECL\s+)?(?:GLOBAL\s+)?(?:CONST\s+)?(?:E6POS|E6AXIS|POS|AXIS)\s+(?P<name>\w+)\s*=\s*{AGGREGATE}",
@@ -53,18 +38,18 @@ FIXED = re.compile(r"\$IPO_MODE\s*=\s*#TCP|IPO_FRAME\s+#TCP", re.IGNORECASE)
 POSE = ("X", "Y", "Z", "A", "B", "C")
 
 
-def find(text: str, n_joints: int) -> Targets:
+def find(text: str, n_joints: int) -> literal.Targets:
     """Of .src and of .dat."""
-    code = blanked(text, ";")
+    code = literal.blanked(text, ";")
     places, inline_data = _places(code)
-    by_name = moves_of(text, code, MOVE, places)
-    literals: list[Literal] = []
+    by_name = literal.moves_of(text, code, MOVE, places)
+    literals: list[literal.Literal] = []
     skipped: list[str] = []
     for match in (*INLINE.finditer(code), *DECLARED.finditer(code)):
         inline = match.re is INLINE
         if inline:
-            moves = (instruction(text, match.start(), places),)
-            name = f"line {line_of(text, match.start('fields'))}"
+            moves = (literal.instruction(text, match.start(), places),)
+            name = f"line {literal.line_of(text, match.start('fields'))}"
         else:
             name = match["name"]
             moves = tuple(by_name.get(name.lower(), ()))
@@ -76,37 +61,37 @@ def find(text: str, n_joints: int) -> Targets:
             literals.append(one)
     known = {one.name.lower() for one in literals}
     skipped += [
-        f"line {line_of(text, move.line_start)}: {move.text.strip()}: its target is not declared in this file"
+        f"line {literal.line_of(text, move.line_start)}: {move.text.strip()}: its target is not declared in this file"
         for target, moves in by_name.items()
         if target not in known
         for move in moves
     ]
     skipped += [
-        f"line {line_of(text, m.end())}: {m.group().strip()}: circular and relative moves are not corrected"
+        f"line {literal.line_of(text, m.end())}: {m.group().strip()}: circular and relative moves are not corrected"
         for m in OTHER.finditer(code)
     ]
-    return Targets(tuple(sorted(literals, key=lambda one: one.at)), tuple(dict.fromkeys(skipped)))
+    return literal.Targets(tuple(sorted(literals, key=lambda one: one.at)), tuple(dict.fromkeys(skipped)))
 
 
 def _literal(
     text: str,
     match: re.Match[str],
     name: str,
-    moves: tuple[Move, ...],
+    moves: tuple[literal.Move, ...],
     n_joints: int,
-    own: tuple[NamedPose, NamedPose] | None,
-) -> Literal | None:
+    own: tuple[literal.NamedPose, literal.NamedPose] | None,
+) -> literal.Literal | None:
     begin = match.start("fields")
     fields = _fields(text, *match.span("fields"))
     for keys, joints in ((POSE, False), (tuple(f"A{j + 1}" for j in range(n_joints)), True)):
         if all(key in fields for key in keys):
             branch, turns = (None, None) if joints or "T" not in fields else _turn(*fields["T"])
             spans, values = (tuple(part) for part in zip(*(fields[key] for key in keys), strict=True))
-            return Literal(name, begin, spans, values, joints, moves, branch, turns, own)
+            return literal.Literal(name, begin, spans, values, joints, moves, branch, turns, own)
     return None
 
 
-def _fields(text: str, begin: int, end: int) -> dict[str, tuple[Span, float]]:
+def _fields(text: str, begin: int, end: int) -> dict[str, tuple[literal.Span, float]]:
     """Numbers of an aggregate by key; bits may be written as 'B0110'."""
     return {
         field["key"].upper(): (
@@ -117,25 +102,25 @@ def _fields(text: str, begin: int, end: int) -> dict[str, tuple[Span, float]]:
     }
 
 
-def _turn(span: Span, number: float) -> tuple[Branch, Turns]:
+def _turn(span: literal.Span, number: float) -> tuple[Branch, literal.Turns]:
     """An axis at 0 may be written with either bit."""
     bits = int(number)
 
     def within(q_rad: Floats) -> NDArray[np.bool_]:
         below = np.array([bool(bits >> j & 1) for j in range(q_rad.shape[-1])])
-        return np.where(below, q_rad < EDGE_RAD, q_rad > -EDGE_RAD)
+        return np.where(below, q_rad < literal.EDGE_RAD, q_rad > -literal.EDGE_RAD)
 
     def asked(q_rad: Floats) -> NDArray[np.bool_]:
         return np.asarray(np.all(within(q_rad), axis=1), dtype=np.bool_)
 
-    def turns(q_rad: Floats) -> list[tuple[Span, str]]:
+    def turns(q_rad: Floats) -> list[tuple[literal.Span, str]]:
         other = [j for j, kept in enumerate(within(q_rad)) if not kept]
         return [(span, str(bits ^ sum(1 << j for j in other)))] if other else []
 
     return asked, turns
 
 
-def _places(code: str) -> tuple[Places, dict[str, tuple[NamedPose, NamedPose]]]:
+def _places(code: str) -> tuple[literal.Places, dict[str, tuple[literal.NamedPose, literal.NamedPose]]]:
     """Frame and tool of an instruction, as its routine has set them last above; those of inline forms by FDAT name."""
     held, times = dict[str, Floats](), Counter[str]()
     for match in HELD.finditer(code):
@@ -146,33 +131,33 @@ def _places(code: str) -> tuple[Places, dict[str, tuple[NamedPose, NamedPose]]]:
     routines, events = [m.start() for m in ROUTINE.finditer(code)], list(SET.finditer(code))
     fixed = "the tool is stationary (#TCP), which is not corrected" if FIXED.search(code) else ""
 
-    def place(what: str, value: str) -> NamedPose:
+    def place(what: str, value: str) -> literal.NamedPose:
         name = _key(value)
         if name in ("$NULLFRAME", "$WORLD", f"{what}_DATA[0]"):
-            return NamedPose(name, np.eye(4), fixed)
+            return literal.NamedPose(name, np.eye(4), fixed)
         fields = _fields(value, 0, len(value)) if value.lstrip().startswith("{") else {}
         if all(key in fields for key in POSE):
-            return NamedPose(f"${what}", KRL.frame([fields[key][1] for key in POSE]), fixed)
-        return NamedPose(name, held.get(name) if times[name] == 1 else None, fixed)
+            return literal.NamedPose(f"${what}", KRL.frame([fields[key][1] for key in POSE]), fixed)
+        return literal.NamedPose(name, held.get(name) if times[name] == 1 else None, fixed)
 
-    inline = dict[str, tuple[NamedPose, NamedPose]]()
+    inline = dict[str, tuple[literal.NamedPose, literal.NamedPose]]()
     for match in INLINE_DATA.finditer(code):
         numbers = _fields(code, *match.span("fields"))
         base, tool = (
             place(what, f"{what}_DATA[{numbers[f'{what}_NO'][1]:.0f}]")
             if f"{what}_NO" in numbers
-            else NamedPose(refused=fixed)
+            else literal.NamedPose(refused=fixed)
             for what in ("BASE", "TOOL")
         )
         inline[match["name"].upper()] = (base, tool)
 
-    def places(at: int) -> tuple[NamedPose, NamedPose]:
+    def places(at: int) -> tuple[literal.NamedPose, literal.NamedPose]:
         begin = max((start for start in routines if start <= at), default=0)
-        now = {"BASE": NamedPose(refused=fixed), "TOOL": NamedPose(refused=fixed)}
+        now = {"BASE": literal.NamedPose(refused=fixed), "TOOL": literal.NamedPose(refused=fixed)}
         for event in (one for one in events if begin <= one.start() < at):
             if event["inline"]:
                 form = event["inline"]
-                unknown = (NamedPose(f"FDAT {form}", None, fixed),) * 2
+                unknown = (literal.NamedPose(f"FDAT {form}", None, fixed),) * 2
                 now["BASE"], now["TOOL"] = inline.get(form.upper(), unknown)
             else:
                 what = (event["what"] or event["kind"]).upper()
@@ -186,10 +171,10 @@ def _key(name: str) -> str:
     return re.sub(r"\s", "", name).upper()
 
 
-def overshoot(move: Move, joints: Sequence[str]) -> str:
+def overshoot(move: literal.Move, joints: Sequence[str]) -> str:
     """External axes that are not named stay where they are."""
     indent = move.text[: len(move.text) - len(move.text.lstrip())]
     return f"{indent}PTP {{{', '.join(f'A{j + 1} {angle}' for j, angle in enumerate(joints))}}}"
 
 
-KRL = Dialect("KRL", "KUKA", (".src", ".dat", ".sub"), find, KUKA, True, 4, 5, overshoot)
+KRL = literal.Dialect("KRL", "KUKA", (".src", ".dat", ".sub"), find, KUKA, True, 4, 5, overshoot)
