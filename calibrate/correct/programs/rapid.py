@@ -133,15 +133,14 @@ def _places(code: str) -> literal.Places:
     return places
 
 
-def _arguments(instruction: str) -> list[str]:
+def _arguments(move: str) -> list[str]:
     """Between the commas that stand in no brackets."""
     parts, depth = [""], 0
-    for letter in literal.instruction:
+    for letter in move:
         depth += (letter in "[(") - (letter in "])")
+        parts[-1] += letter
         if letter == "," and depth == 0:
-            parts.append("")
-        else:
-            parts[-1] += letter
+            parts[-1:] = [parts[-1][:-1], ""]
     return parts
 
 
