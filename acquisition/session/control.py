@@ -15,11 +15,14 @@ Source of words and keys: bluesky, "Interrupting" (first Ctrl-C: pause at the ne
 import enum
 import threading
 from collections.abc import Callable
+from typing import TypeVar
 
 from acquisition.errors import StoppedError
 from drivers.clock import Clock, SystemClock
 from drivers.device import Floats
 from drivers.errors import DeviceError
+
+Result = TypeVar("Result")
 
 PAUSE_AGAIN_S = 10.0
 REST_S = 1.0  # a motion that ends sooner is let arrive, and braked softly else
@@ -258,6 +261,22 @@ class RunControl:
             self._raise_end()
         if self._state in BROKEN or self._eased or (begins and self._state is RunState.PAUSING):
             raise BrokenOffError
+
+    def step(self, act: Callable[[], Result], come_back: Callable[[], None], astray: Callable[[], None]) -> Result:
+        """What `act` gives, once it was done without being broken off; before it is done again, and after every pause,
+        `come_back`; `astray` where it was broken off. Raises what ends a session.
+        """
+        waited = False
+        while True:
+            waited = self.checkpoint() or waited
+            try:
+                if waited:
+                    come_back()
+                    waited = False
+                return act()
+            except BrokenOffError:
+                astray()
+                waited = True
 
     def move(self, move: Callable[[Floats], None], q_rad: Floats) -> None:
         """A motion that a person may break off. Raises as `check`, and what `move` raises."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from acquisition.errors import AcquisitionError, RefusedMotionError
 from acquisition.recording.pose_plan import PlannedPose, PosePlan
 from acquisition.recording.samples import Cell
-from acquisition.session.control import BrokenOffError, EndedEarlyError, RunControl, RunEvent
+from acquisition.session.control import EndedEarlyError, RunControl, RunEvent
 from acquisition.session.stepping import ELSEWHERE_RAD
 from acquisition.wires.tracker_bench import TargetLook
 
@@ -146,15 +146,7 @@ class TrackedSession:
 
     def _step(self, act: Callable[[], None]) -> None:
         """Done again where a pause broke it off. Raises what ends a session."""
-        waited = False
-        while True:
-            waited = self._control.checkpoint() or waited
-            try:
-                if waited:
-                    self._look_where_it_stands()
-                return act()
-            except BrokenOffError:
-                waited = True
+        self._control.step(act, self._look_where_it_stands, lambda: None)
 
     def _look_where_it_stands(self) -> None:
         """A motion was broken off, or a person has moved the arm: the way of each joint begins there."""

@@ -24,7 +24,6 @@ from drivers.ur.control_link import (
     Motion,
     MoveJoints,
     Outcome,
-    Ready,
     ServoJoints,
     ServoStop,
 )
@@ -55,7 +54,6 @@ class UrControl:
     ) -> None:
         """`watchdog_hz`: the arm stops when this program was silent for one period of it."""
         self.name = name
-        self.ready: Ready | None = None  # how long the last connect took
         self._host, self._watchdog_hz = host, watchdog_hz
         self._clock: Clock = clock or SystemClock()
         self._dashboard = dashboard or UrDashboard(host)
@@ -90,7 +88,7 @@ class UrControl:
         with self._stopping:
             if self._holds != holds:  # held while connecting
                 child.hold()
-            self.ready, self._child = answer, child
+            self._child = child
 
     def move_joints(self, q_rad: ArrayLike, speed_rad_s: float, acceleration_rad_s2: float) -> None:
         """To joint readings (6,) in rad; blocks until the arm has arrived.

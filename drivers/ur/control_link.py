@@ -76,10 +76,7 @@ class Outcome(StrEnum):
 
 
 class Ready(msgspec.Struct, frozen=True, tag=True):
-    """First message of a child that has control; how long importing and connecting took."""
-
-    import_s: float
-    connect_s: float
+    """First message of a child that has control."""
 
 
 class Alive(msgspec.Struct, frozen=True, tag=True):

@@ -80,8 +80,6 @@ class UnevenPedestal(_Pedestal):
     share: float = 1.0
 
     KIND = "uneven-pedestal"
-    SIZE = "share"
-    TYPICAL = 1.0
 
     def base_motion(self, scene: Scene, load: Load) -> Floats:
         gives = np.array([self.about_x_rad_nm, self.about_y_rad_nm, 0.0])
@@ -100,8 +98,6 @@ class PedestalUnderWeights(_Pedestal):
     share: float = 1.0
 
     KIND = "pedestal-under-weights"
-    SIZE = "share"
-    TYPICAL = 1.0
 
     def base_motion(self, scene: Scene, load: Load) -> Floats:
         own, _ = loaded_by(load, self.weights, 0)

@@ -96,8 +96,6 @@ class CarriedPart(Defect):
     share: float = 1.0
 
     DRIVERS = ("t",)
-    SIZE = "share"
-    TYPICAL = 1.0
 
     def carried(self, scene: Scene) -> Floats:
         """Motion (row, 4, 4) of the part in its own frame."""

@@ -115,7 +115,6 @@ class CoupledWrist(DriveDefect):
     KIND = "coupled-wrist"
     PHYSICS = "joint-coupling"
     DRIVERS = ("q{other}",)
-    SIZE = "share"
     TYPICAL = 1e-4
 
     @property
@@ -341,8 +340,6 @@ class SpringUnderWeights(DriveDefect):
     KIND = "spring-under-weights"
     PHYSICS = "joint-compliance"
     DRIVERS = ("gravity_torque{joint}",)
-    SIZE = "share"
-    TYPICAL = 1.0
 
     def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
         own, _ = loaded_by(load, self.weights, self.joint)

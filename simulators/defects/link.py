@@ -91,8 +91,6 @@ class FlatLink(_LoadedLink):
     share: float = 1.0
 
     KIND = "flat-link"
-    SIZE = "share"
-    TYPICAL = 1.0
 
     def link_motion(self, link: int, end_m: Floats, angle_rad: Floats, scene: Scene, load: Load) -> Floats:
         sag_m, slope_rad = cantilever(end_m, load.beyond_nm[:, link], load.beyond_n[:, link])
@@ -115,8 +113,6 @@ class BeamUnderWeights(_LoadedLink):
     share: float = 1.0
 
     KIND = "beam-under-weights"
-    SIZE = "share"
-    TYPICAL = 1.0
 
     def link_motion(self, link: int, end_m: Floats, angle_rad: Floats, scene: Scene, load: Load) -> Floats:
         beyond = tuple(weight for weight in self.weights if weight.body > link)

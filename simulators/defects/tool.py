@@ -69,8 +69,6 @@ class ElasticMount(Defect):
     KIND = "elastic-mount"
     PHYSICS = "tool-sag"
     DRIVERS = ("gravity_tool",)
-    SIZE = "share"
-    TYPICAL = 1.0
     INSTRUMENTS = ROBOT
 
     @property

@@ -149,8 +149,6 @@ class ChangingScale(Defect):
     PHYSICS = "device-scale"
     PORT = "device.reading"
     DRIVERS = ("reading",)
-    SIZE = "share"
-    TYPICAL = 1.0
     INSTRUMENTS = ("position", "wire")
 
     def seen_position_m(self, position_m: Floats, scene: Scene) -> Floats:

@@ -59,18 +59,11 @@ def find(text: str, n_joints: int) -> literal.Targets:
             skipped.append(f"{name}: an aggregate that does not state the whole target is not corrected")
         else:
             literals.append(one)
-    known = {one.name.lower() for one in literals}
-    skipped += [
-        f"line {literal.line_of(text, move.line_start)}: {move.text.strip()}: its target is not declared in this file"
-        for target, moves in by_name.items()
-        if target not in known
-        for move in moves
-    ]
-    skipped += [
-        f"line {literal.line_of(text, m.end())}: {m.group().strip()}: circular and relative moves are not corrected"
-        for m in OTHER.finditer(code)
-    ]
-    return literal.Targets(tuple(sorted(literals, key=lambda one: one.at)), tuple(dict.fromkeys(skipped)))
+    others = (
+        (m.end(), f"{m.group().strip()}: circular and relative moves are not corrected") for m in OTHER.finditer(code)
+    )
+    skipped += literal.sentences(text, by_name, literals, others)
+    return literal.Targets(tuple(sorted(literals, key=lambda one: one.at)), tuple(skipped))
 
 
 def _literal(

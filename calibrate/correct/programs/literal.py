@@ -1,7 +1,7 @@
 """One target as it stands in the text of a program, and how a dialect describes such texts."""
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -145,3 +145,17 @@ def moves_of(text: str, code: str, pattern: re.Pattern[str], places: Places, end
     for match in pattern.finditer(code):
         found.setdefault(match["target"].lower(), []).append(instruction(text, match.start(), places, end))
     return found
+
+
+def sentences(
+    text: str, by_name: dict[str, list[Move]], literals: Sequence[Literal], others: Iterable[tuple[int, str]]
+) -> tuple[str, ...]:
+    """On moves whose target is not among the literals, and on `others`: where they stand, and why."""
+    known = {one.name.lower() for one in literals}
+    elsewhere = [
+        (move.line_start, f"{' '.join(move.text.split())}: its target is no literal of this file")
+        for target, moves in by_name.items()
+        if target not in known
+        for move in moves
+    ]
+    return tuple(dict.fromkeys(f"line {line_of(text, at)}: {why}" for at, why in (*elsewhere, *others)))

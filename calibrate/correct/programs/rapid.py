@@ -63,23 +63,15 @@ def find(text: str, n_joints: int) -> literal.Targets:
         else:
             continue
         literals.append(_literal(text, match, name, moves))
-    known = {one.name.lower() for one in literals}
-    skipped = [
-        f"line {literal.line_of(text, move.line_start)}: {' '.join(move.text.split())}: its target is not in this file"
-        for target, moves in by_name.items()
-        if target not in known
-        for move in moves
-    ]
-    skipped += [
-        f"line {literal.line_of(text, m.start())}: a circular move is not corrected" for m in CIRCLE.finditer(code)
-    ]
+    circles = ((m.start(), "a circular move is not corrected") for m in CIRCLE.finditer(code))
+    skipped = literal.sentences(text, by_name, literals, circles)
     if SHIFTED.search(code):
         return literal.Targets(
             (), ("the program displaces its targets (PDispSet, PDispOn), which is not corrected", *skipped)
         )
     if n_joints != 6:
         return literal.Targets((), (*skipped, f"RAPID targets have six axes, this arm has {n_joints}"))
-    return literal.Targets(tuple(literals), tuple(dict.fromkeys(skipped)))
+    return literal.Targets(tuple(literals), skipped)
 
 
 def _literal(text: str, match: re.Match[str], name: str, moves: tuple[literal.Move, ...]) -> literal.Literal:

@@ -33,17 +33,10 @@ def find(text: str, n_joints: int) -> literal.Targets:
             moves = tuple(by_name[match["name"].lower()])
             literals.append(_literal(text, match, match["name"], moves, n_joints))
     good = [one for one in literals if len(one.numbers) == (n_joints if one.joints else 6)]
-    named = {one.name.lower() for one in good}
-    skipped = [
-        f"{move.text.strip()}: its target is not a literal of {n_joints} joints or a pose"
-        for target, moves in by_name.items()
-        if target not in ("[", "p[") and target not in named
-        for move in moves
-    ]
-    skipped += [
-        f"line {literal.line_of(text, m.start())}: a circular move is not corrected" for m in CIRCLE.finditer(code)
-    ]
-    return literal.Targets(tuple(sorted(good, key=lambda one: one.at)), tuple(dict.fromkeys(skipped)))
+    named = {target: moves for target, moves in by_name.items() if target not in ("[", "p[")}
+    circles = ((m.start(), "a circular move is not corrected") for m in CIRCLE.finditer(code))
+    skipped = literal.sentences(text, named, good, circles)
+    return literal.Targets(tuple(sorted(good, key=lambda one: one.at)), skipped)
 
 
 def _places(code: str) -> literal.Places:
