@@ -268,28 +268,21 @@ class TwoSlopeFlexspline(DriveDefect):
 
 
 @dataclass(frozen=True)
-class PayloadOnSoftJoint(DriveDefect):
+class PayloadOnSoftJoint(SoftJoint):
     """A soft joint whose controller takes its own weight into account but knows nothing of the payload.
 
     The drive is a torsion spring; the feed-forward of the arm's own weight winds it back, so only the payload's torque
     is left to turn the output.
     """
 
-    compliance_rad_nm: float
     centre_m: Vector | None = None  # the payload's centre of mass in the flange frame; None: as the session has it
 
     KIND = "payload-on-soft-joint"
     PHYSICS = "payload-compliance"
     DRIVERS = ("payload",)
-    SIZE = "compliance_rad_nm"
     TYPICAL = 1e-5
     HABIT = "payload"
     NEEDS = ("payload_kg",)
-    FIGURES = ("compliance_rad_nm",)
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
-        return cls(site.loaded_joint(rng), cls.draw_size(rng))
 
     def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
         if self.centre_m is None:
