@@ -237,21 +237,17 @@ class SoftJoint(DriveDefect):
 
 
 @dataclass(frozen=True)
-class TwoSlopeFlexspline(DriveDefect):
+class TwoSlopeFlexspline(SoftJoint):
     """A strain-wave gear: soft up to `knee_nm` while the flexspline's teeth find their seat, stiffer beyond.
 
     Harmonic Drive, "Engineering data", torsional stiffness: K1 up to the torque T1, K2 = K1 / `hardening` beyond;
     deflection is T / K1 below and T1 / K1 + (T - T1) / K2 above, the same for both senses.
     """
 
-    compliance_rad_nm: float
     hardening: float
     knee_nm: float
 
     KIND = "two-slope-flexspline"
-    PHYSICS = "joint-compliance"
-    DRIVERS = ("gravity_torque{joint}",)
-    SIZE = "compliance_rad_nm"
     TYPICAL = 6e-6
     FIGURES = ("compliance_rad_nm", "knee_nm")
 
