@@ -36,23 +36,16 @@ __all__ = [
     "recover",
 ]
 
-_MODULE_OF = {
-    "Channel": "recording",
-    "Event": "recording",
-    "Finding": "check_recording",
-    "Gap": "recording",
-    "Recording": "recording",
-    "RecordingError": "errors",
-    "RecordingWriter": "mcap.writer",
-    "RigFileError": "errors",
-    "Samples": "samples",
-    "SamplesError": "errors",
-    "Stream": "recording",
-    "check": "check_recording",
-    "read": "mcap.read",
-    "readings_sha256": "samples",
-    "recover": "mcap.recover",
+_NAMES_IN = {
+    "recording": ("Channel", "Event", "Gap", "Recording", "Stream"),
+    "check_recording": ("Finding", "check"),
+    "errors": ("RecordingError", "RigFileError", "SamplesError"),
+    "mcap.writer": ("RecordingWriter",),
+    "samples": ("Samples", "readings_sha256"),
+    "mcap.read": ("read",),
+    "mcap.recover": ("recover",),
 }
+_MODULE_OF = {name: module for module, names in _NAMES_IN.items() for name in names}
 
 
 def __getattr__(name: str) -> object:

@@ -44,12 +44,6 @@ class ClockModel:
     delay_max_s: float | None = None
     wander_s: float | None = None  # farthest that the line of a minute is from that of the whole, at its middle
 
-    def host_of(self, device_s: Floats) -> Floats:
-        """When the host's clock showed that time, plus the least delay. ValueError unless FOUND."""
-        if self.offset_s is None or self.rate is None:
-            raise ValueError(f"clock: {self.status.value}; nothing can be converted")
-        return self.offset_s + self.rate * device_s
-
 
 def clock_model(stream: Stream) -> ClockModel:
     """Of the stamps of one stream; samples without a stamp are left out."""

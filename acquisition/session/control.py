@@ -15,10 +15,14 @@ Source of words and keys: bluesky, "Interrupting" (first Ctrl-C: pause at the ne
 import enum
 import threading
 from collections.abc import Callable
+from typing import TypeVar
 
 from acquisition.errors import StoppedError
 from drivers.clock import Clock, SystemClock
+from drivers.device import Floats
 from drivers.errors import DeviceError
+
+Result = TypeVar("Result")
 
 PAUSE_AGAIN_S = 10.0
 REST_S = 1.0  # a motion that ends sooner is let arrive, and braked softly else
@@ -257,6 +261,32 @@ class RunControl:
             self._raise_end()
         if self._state in BROKEN or self._eased or (begins and self._state is RunState.PAUSING):
             raise BrokenOffError
+
+    def step(self, act: Callable[[], Result], come_back: Callable[[], None], astray: Callable[[], None]) -> Result:
+        """What `act` gives, once it was done without being broken off; before it is done again, and after every pause,
+        `come_back`; `astray` where it was broken off. Raises what ends a session.
+        """
+        waited = False
+        while True:
+            waited = self.checkpoint() or waited
+            try:
+                if waited:
+                    come_back()
+                    waited = False
+                return act()
+            except BrokenOffError:
+                astray()
+                waited = True
+
+    def move(self, move: Callable[[Floats], None], q_rad: Floats) -> None:
+        """A motion that a person may break off. Raises as `check`, and what `move` raises."""
+        self.check(begins=True)
+        try:
+            move(q_rad)
+        except DeviceError:
+            self.check()  # it was the pause that ended the motion
+            raise
+        self.check()  # an arm that arrived before the stop came counts as broken off all the same
 
     def _raise_end(self) -> None:
         if self._state in (RunState.ABORTED, RunState.HALTED):

@@ -6,15 +6,13 @@ broken off by a pause apart from what has failed.
 """
 
 from collections.abc import Callable
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.bench import Bench, Look
 from acquisition.centring.navigator import GLANCE_S, Navigator
-from acquisition.session.control import BrokenOffError, RunControl
-from drivers.errors import DeviceError
+from acquisition.session.control import Result, RunControl
 
 Floats = NDArray[np.float64]
 
@@ -26,13 +24,7 @@ class InterruptibleBench:
         self._bench, self._control = bench, control
 
     def move(self, q_rad: Floats) -> None:
-        self._control.check(begins=True)
-        try:
-            self._bench.move(q_rad)
-        except DeviceError:
-            self._control.check()  # it was the pause that ended the motion
-            raise
-        self._control.check()  # an arm that arrived before the stop came counts as broken off all the same
+        self._control.move(self._bench.move, q_rad)
 
     def look(self, dwell_s: float) -> Look:
         self._control.check()
@@ -45,8 +37,6 @@ class InterruptibleBench:
         self._bench.stop()
 
 
-Result = TypeVar("Result")
-
 ELSEWHERE_RAD = 1e-3  # as acquisition/motion/gate.py: an arm further away was moved meanwhile
 
 
@@ -58,17 +48,7 @@ class Stepping:
 
     def step(self, act: Callable[[], Result]) -> Result:
         """What `act` gives, once it was done without being broken off. Raises what ends a session."""
-        waited = False
-        while True:
-            waited = self._control.checkpoint() or waited
-            try:
-                if waited:
-                    self._come_back()
-                    waited = False
-                return act()
-            except BrokenOffError:
-                self._astray()
-                waited = True
+        return self._control.step(act, self._come_back, self._astray)
 
     def _come_back(self) -> None:
         back_rad = self._navigator.q_rad - self._bench.look(GLANCE_S).q_rad

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from acquisition.errors import AcquisitionError, RefusedMotionError
 from acquisition.recording.pose_plan import PlannedPose, PosePlan
 from acquisition.recording.samples import Cell
-from acquisition.session.control import BrokenOffError, EndedEarlyError, RunControl, RunEvent
+from acquisition.session.control import EndedEarlyError, RunControl, RunEvent
 from acquisition.session.stepping import ELSEWHERE_RAD
 from acquisition.wires.tracker_bench import TargetLook
-from drivers.errors import DeviceError
 
 Floats = NDArray[np.float64]
 MOVED_RAD = 1e-6  # by which a joint counts as having moved
@@ -147,15 +146,7 @@ class TrackedSession:
 
     def _step(self, act: Callable[[], None]) -> None:
         """Done again where a pause broke it off. Raises what ends a session."""
-        waited = False
-        while True:
-            waited = self._control.checkpoint() or waited
-            try:
-                if waited:
-                    self._look_where_it_stands()
-                return act()
-            except BrokenOffError:
-                waited = True
+        self._control.step(act, self._look_where_it_stands, lambda: None)
 
     def _look_where_it_stands(self) -> None:
         """A motion was broken off, or a person has moved the arm: the way of each joint begins there."""
@@ -189,13 +180,7 @@ class TrackedSession:
         return None
 
     def _move(self, q_rad: Floats) -> None:
-        self._control.check(begins=True)
-        try:
-            self._bench.move(q_rad)
-        except DeviceError:
-            self._control.check()  # it was the pause that ended the motion
-            raise
-        self._control.check()  # an arm that arrived before the stop came counts as broken off all the same
+        self._control.move(self._bench.move, q_rad)
         if self._at_rad is not None:
             moved_rad = q_rad - self._at_rad
             self._approach = np.where(np.abs(moved_rad) > MOVED_RAD, np.sign(moved_rad), self._approach).astype(

@@ -75,9 +75,9 @@ def correct_command(
         Poses with a joint nearer than this to its limit are listed.
     tool
         Tool centre point in the flange as the controller has it: x y z in m, rotation vector in rad; it is taken to be
-        exact. Default: the rig file's point for the controller, the calibrated one for the real tool.
+        exact. Default: the program's; else the rig file's point for the controller, the model's for the real tool.
     frame
-        Frame of the poses in the base, x y z in m, rotation vector in rad: work object, $BASE, user frame.
+        Frame of the poses in the base, x y z in m, rotation vector in rad, where the program does not hold it.
     start
         Joint angles in degrees before the first pose; the nearest posture is taken. Default: middle of the range.
     condition

@@ -5,7 +5,7 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from acquisition.errors import StoppedError
 from acquisition.recording import Channel, Event, RecordingError, RecordingWriter, RigFileError
@@ -21,7 +21,7 @@ from calibeam.devices.encoders import emulated_encoders, encoder_driver
 from calibeam.devices.others import Other, emulated_others, other_drivers
 from calibeam.devices.psd import PsdInstrument, emulated_psd, psd_driver, psd_view
 from calibeam.devices.recorder import uninterrupted
-from calibeam.devices.robot import emulated_robot, robot_of
+from calibeam.devices.robot import Robot, emulated_robot, robot_of
 from calibeam.devices.tracker_of_rig import VIEWED as TRACKER_VIEWED
 from calibeam.devices.tracker_of_rig import emulated_tracker, tracker_driver
 from calibeam.live.feed import PAGE_STOP, SILENT, Feed
@@ -40,11 +40,14 @@ VIEWED = {
 }
 
 
+Instrument = TypeVar("Instrument", PsdDevice, TrackerDevice)
+
+
 @dataclass(frozen=True)
-class Addresses:
+class AddressesWith(Generic[Instrument]):
     """Where the devices are. `hurry`: device seconds in one second of this program's clock; 1 on site."""
 
-    psd: PsdDevice
+    instrument: Instrument
     robot: RobotDevice
     encoders: EncodersDevice | None
     hurry: float = 1.0
@@ -52,16 +55,8 @@ class Addresses:
     others: tuple[OtherDevice, ...] = ()
 
 
-@dataclass(frozen=True)
-class TrackerAddresses:
-    """The same of a session with a tracker."""
-
-    tracker: TrackerDevice
-    robot: RobotDevice
-    encoders: EncodersDevice | None
-    hurry: float = 1.0
-    emulated: bool = False
-    others: tuple[OtherDevice, ...] = ()
+Addresses = AddressesWith[PsdDevice]
+TrackerAddresses = AddressesWith[TrackerDevice]
 
 
 @dataclass(frozen=True)
@@ -92,18 +87,7 @@ def _check_driven(rig: Rig) -> None:
 
 def addresses_of(rig: Rig, emulated: Mapping[str, Any] | None = None, hurry: float = 1.0) -> Addresses:
     """The rig's [devices], or the same devices where emulators announced them. DeviceRefused when one is missing."""
-    psd, robot, encoders = rig.devices.psd, rig.devices.robot, rig.devices.encoders
-    if psd is None or robot is None:
-        missing = "psd" if psd is None else "robot"
-        raise DeviceRefused(f"rig {rig.name}: no [devices.{missing}]; a session needs the PSD box and the controller")
-    if emulated is None:
-        return Addresses(psd, robot, encoders, hurry, others=rig.devices.others)
-    psd = emulated_psd(psd, emulated["psd"])
-    robot = emulated_robot(robot, emulated["robot"])
-    if encoders is not None:
-        encoders = emulated_encoders(encoders, emulated["can"])
-    others = emulated_others(rig.devices.others, emulated)
-    return Addresses(psd, robot, encoders, hurry, emulated=True, others=others)
+    return _addresses(rig, rig.devices.psd, "psd", "the PSD box", emulated_psd, emulated, hurry)
 
 
 def is_tracked(rig: Rig) -> bool:
@@ -120,17 +104,28 @@ def check_tracked_session(rig: Rig) -> None:
 
 def tracker_addresses_of(rig: Rig, emulated: Mapping[str, Any] | None = None, hurry: float = 1.0) -> TrackerAddresses:
     """As `addresses_of`, of a rig with a tracker."""
-    tracker, robot, encoders = rig.devices.tracker, rig.devices.robot, rig.devices.encoders
-    if tracker is None or robot is None:
-        missing = "tracker" if tracker is None else "robot"
-        raise DeviceRefused(f"rig {rig.name}: no [devices.{missing}]; a session needs the tracker and the controller")
+    return _addresses(rig, rig.devices.tracker, "tracker", "the tracker", emulated_tracker, emulated, hurry)
+
+
+def _addresses(
+    rig: Rig,
+    instrument: Instrument | None,
+    key: str,
+    name: str,
+    place: Callable[[Instrument, Mapping[str, Any]], Instrument],
+    emulated: Mapping[str, Any] | None,
+    hurry: float,
+) -> AddressesWith[Instrument]:
+    robot, encoders, others = rig.devices.robot, rig.devices.encoders, rig.devices.others
+    if instrument is None or robot is None:
+        missing = key if instrument is None else "robot"
+        raise DeviceRefused(f"rig {rig.name}: no [devices.{missing}]; a session needs {name} and the controller")
     if emulated is None:
-        return TrackerAddresses(tracker, robot, encoders, hurry, others=rig.devices.others)
+        return AddressesWith(instrument, robot, encoders, hurry, others=others)
     if encoders is not None:
         encoders = emulated_encoders(encoders, emulated["can"])
-    tracker, robot = emulated_tracker(tracker, emulated["tracker"]), emulated_robot(robot, emulated["robot"])
-    others = emulated_others(rig.devices.others, emulated)
-    return TrackerAddresses(tracker, robot, encoders, hurry, emulated=True, others=others)
+    robot, others = emulated_robot(robot, emulated["robot"]), emulated_others(others, emulated)
+    return AddressesWith(place(instrument, emulated[key]), robot, encoders, hurry, emulated=True, others=others)
 
 
 @contextmanager
@@ -139,24 +134,30 @@ def connected_tracker(
 ) -> Generator[TrackerBench]:
     """The bench of a tracker on wires, its readers running. At the end the arm is stopped, every port released."""
     with ExitStack() as cleaning:
-        robot = robot_of(addresses.robot, clock, addresses.hurry)
-        arm = robot.arm()
-        supervisor = Supervisor(arm.hold, clock)
-        cleaning.callback(feed.stops_by, None)
-        feed.stops_by(partial(supervisor.stop, StoppedError(PAGE_STOP)))  # while connecting, too
-        kept = Kept(writer, clock, supervisor, feed)
-        beside = _others(other_drivers(addresses.others, clock), kept, cleaning)
-        tracker = tracker_driver(addresses.tracker, clock, addresses.hurry)
+        robot, arm, kept, beside = _begun(addresses, writer, clock, feed, cleaning)
+        tracker = tracker_driver(addresses.instrument, clock, addresses.hurry)
         pumps = TrackerPumps(
             tracker=cleaning.enter_context(_pumped(tracker, kept)),
             robot=cleaning.enter_context(_pumped(robot.reader, kept)),
             encoders=_encoders(addresses, kept, cleaning),
         )
         cleaning.callback(_released, arm)
-        _connect_arm(arm, supervisor)
+        _connect_arm(arm, kept.supervisor)
         speeds = Speeds(rig.motion.speed_rad_s, rig.motion.acceleration_rad_s2)
-        gated, rate_hz = gated_arm(arm, rig, pumps.robot), addresses.tracker.rate_hz
-        yield TrackerBench(gated, pumps, speeds, supervisor, clock, rate_hz, addresses.hurry, beside=beside)
+        gated, rate_hz = gated_arm(arm, rig, pumps.robot), addresses.instrument.rate_hz
+        yield TrackerBench(gated, pumps, speeds, kept.supervisor, clock, rate_hz, addresses.hurry, beside=beside)
+
+
+def _begun(
+    addresses: AddressesWith[Instrument], writer: RecordingWriter, clock: Clock, feed: Feed, cleaning: ExitStack
+) -> tuple[Robot, Movable, Kept, dict[str, Pump]]:
+    robot = robot_of(addresses.robot, clock, addresses.hurry)
+    arm = robot.arm()
+    supervisor = Supervisor(arm.hold, clock)
+    cleaning.callback(feed.stops_by, None)
+    feed.stops_by(partial(supervisor.stop, StoppedError(PAGE_STOP)))  # while connecting, too
+    kept = Kept(writer, clock, supervisor, feed)
+    return robot, arm, kept, _others(other_drivers(addresses.others, clock), kept, cleaning)
 
 
 def _connect_arm(arm: Movable, supervisor: Supervisor) -> None:
@@ -178,26 +179,20 @@ def connected(
 ) -> Generator[WiredBench]:
     """The bench on wires, its readers running. At the end the arm is stopped and every port released."""
     with ExitStack() as cleaning:
-        robot = robot_of(addresses.robot, clock, addresses.hurry)
-        arm = robot.arm()
-        supervisor = Supervisor(arm.hold, clock)
-        cleaning.callback(feed.stops_by, None)
-        feed.stops_by(partial(supervisor.stop, StoppedError(PAGE_STOP)))  # while connecting, too
-        psd = psd_driver(addresses.psd, rig, clock, addresses.hurry)
-        kept = Kept(writer, clock, supervisor, feed)
-        beside = _others(other_drivers(addresses.others, clock), kept, cleaning)
+        robot, arm, kept, beside = _begun(addresses, writer, clock, feed, cleaning)
+        psd = psd_driver(addresses.instrument, rig, clock, addresses.hurry)
         pumps = Pumps(
-            psd=cleaning.enter_context(_pumped(psd, kept, _spots_beside(psd, addresses.psd, writer))),
+            psd=cleaning.enter_context(_pumped(psd, kept, _spots_beside(psd, addresses.instrument, writer))),
             robot=cleaning.enter_context(_pumped(robot.reader, kept)),
             encoders=_encoders(addresses, kept, cleaning),
         )
-        feed.sees(psd_view(psd, addresses.psd))
+        feed.sees(psd_view(psd, addresses.instrument))
         cleaning.callback(_released, arm)
-        _connect_arm(arm, supervisor)
+        _connect_arm(arm, kept.supervisor)
         speeds = Speeds(rig.motion.speed_rad_s, rig.motion.acceleration_rad_s2)
         gated = gated_arm(arm, rig, pumps.robot)
-        view, hurry = psd_view(psd, addresses.psd), addresses.hurry
-        yield WiredBench(gated, pumps, view, speeds, supervisor, clock, place, hurry, beside=beside)
+        view, hurry = psd_view(psd, addresses.instrument), addresses.hurry
+        yield WiredBench(gated, pumps, view, speeds, kept.supervisor, clock, place, hurry, beside=beside)
 
 
 def _released(arm: Movable) -> None:

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from acquisition.recording.rig import Rig
+from calibeam.printing.tables import plain_table
 from calibrate.diagnose.diagnosis import Named
 from calibrate.diagnose.smallest_visible import Smallest
 from calibrate.pose_design.design import Design
@@ -51,16 +51,9 @@ def promise_lines(rig: Rig, made: Design) -> list[str]:
     return out
 
 
-def _table(title: str, *headings: str) -> Table:
-    table = Table(title=title, title_justify="left", box=None)
-    for i, heading in enumerate(headings):
-        table.add_column(heading, justify="left" if i == 0 else "right")
-    return table
-
-
 def _print_curve(console: Console, made: Design) -> None:
     curve = made.curve
-    table = _table("predicted error by number of poses", "poses", "added one by one", "random")
+    table = plain_table("predicted error by number of poses", "poses", "added one by one", "random")
     for i in np.unique(np.linspace(0, len(curve.poses) - 1, 8).astype(int)):
         table.add_row(str(curve.poses[i]), length(float(curve.chosen_m[i])), length(float(curve.random_m[i])))
     console.print(table)
@@ -77,7 +70,7 @@ def enough_line(made: Design) -> str:
 
 def _print_places(console: Console, rig: Rig, made: Design, places: Sequence[Places]) -> None:
     title = f"stations of the fixture, {made.asked.poses} poses shared out over them (numbers above the rig's: a grid)"
-    table = _table(title, "stations", "error", "scale", "with distances", "scale", "distances needed")
+    table = plain_table(title, "stations", "error", "scale", "with distances", "scale", "distances needed")
     for one in places:
         table.add_row(
             ", ".join(map(str, one.ids)),
@@ -108,7 +101,7 @@ def placement_lines(rig: Rig, ids: Sequence[int]) -> list[str]:
 
 
 def _print_smallest(console: Console, seen: Seen) -> None:
-    table = _table("causes that a diagnosis of this plan would find, from which size on", "cause", "at", "size")
+    table = plain_table("causes that a diagnosis of this plan would find, from which size on", "cause", "at", "size")
     best: dict[str, Smallest] = {}
     for one in seen.smallest:
         kept = best.get(one.name.physics)

@@ -122,7 +122,7 @@ def print_error_simulation(console: Console, s: Simulation) -> None:
         console.print(f"worst posture: {length(p.rms_m)} rms at ({joints})°", highlight=False, markup=False)
 
 
-def _errors_table(title: str, *headings: str) -> Table:
+def plain_table(title: str, *headings: str) -> Table:
     table = Table(title=title, title_justify="left", box=None)
     for i, heading in enumerate(headings):
         table.add_column(heading, justify="left" if i == 0 else "right")
@@ -130,7 +130,7 @@ def _errors_table(title: str, *headings: str) -> Table:
 
 
 def _print_budget(console: Console, s: Simulation) -> None:
-    table = _errors_table(
+    table = plain_table(
         "error budget, each group alone over the workspace", "group", "errors", "rms", "share of variance"
     )
     for line in s.budget:
@@ -140,7 +140,7 @@ def _print_budget(console: Console, s: Simulation) -> None:
 
 def _print_poses(console: Console, s: Simulation) -> None:
     title = f"linear propagation beside {s.drawn.arms:,} drawn arms at every pose"
-    table = _errors_table(title, "pose", "linear rms", "drawn rms", "linear sigma x y z, µm", "drawn, µm", "95 % below")
+    table = plain_table(title, "pose", "linear rms", "drawn rms", "linear sigma x y z, µm", "drawn, µm", "95 % below")
     p95 = s.drawn.quantile_m(SHARE)
     for i in range(len(s.drawn_at_rad)):
         sigmas = (" ".join(f"{1e6 * v:.1f}" for v in values[i]) for values in (s.linear.sigma_m, s.drawn.sigma_m))
@@ -154,7 +154,7 @@ def _print_ranking(console: Console, s: Simulation) -> None:
         f"the {min(SHOWN, len(s.sources))} most important errors: shares of the variance, linear over "
         f"{len(s.wide_rad)} poses, Sobol indices over {s.shares.poses} of them"
     )
-    table = _errors_table(title, "error", "alone, rms", "linear", "first order", "total")
+    table = plain_table(title, "error", "alone, rms", "linear", "first order", "total")
     for i in s.ranking[:SHOWN]:
         table.add_row(
             s.sources[i].name,

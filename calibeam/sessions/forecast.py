@@ -31,9 +31,9 @@ from calibrate.fit import Status
 from calibrate.identifiability import Identifiability, analyse
 from calibrate.identification.rounds import Fitted, coarse_start, settled_fit
 from calibrate.identification.session import instruments_for_fit
-from calibrate.parameters import Parameter, index_of, priors, start_values
+from calibrate.parameters import index_of, priors, start_values
 from calibrate.pose_design.candidates import Candidates
-from calibrate.pose_design.information import NO_OPINION, Information, target_of
+from calibrate.pose_design.information import Information, target_of, with_prior
 from calibrate.read_samples import SIGMA_COLUMNS
 from calibrate.uncertainty.free_space import FELT_M
 from calibrate.variance import VarianceFactors
@@ -166,7 +166,7 @@ def _information(
     for name, value in names.items():
         theta[column[name]] = value
     free = np.flatnonzero([p.free for p in every])
-    parameters = tuple(_believed(every[i]) for i in free)
+    parameters = tuple(with_prior(every[i]) for i in free)
     size = priors(parameters)
     J = weighting.problem(theta, factors).jacobian(theta)
     k = len(SPOTS)
@@ -213,11 +213,6 @@ def _table(taken: list[Sample], ahead: Candidates) -> Samples:
     for name in SIGMA_COLUMNS:
         joined[name] = np.concatenate([columns[name], np.full(len(ahead), np.median(columns[name]))])
     return Samples(joined, n_joints)
-
-
-def _believed(p: Parameter) -> Parameter:
-    """As in a design: nobody's opinion is many plausible sizes."""
-    return p if np.isfinite(p.prior) else replace(p, prior=NO_OPINION * p.plausible)
 
 
 def _short(combinations: list[str], count: int) -> str:

@@ -31,7 +31,11 @@ ROUNDS = 12
 CLOSE = 1e-9  # m and rad: far below what any arm repeats
 MOVED_RAD = 1e-4  # a joint that went less far has not moved, as in effects/conditions.py
 RANGE_SLACK = 1e-9  # of the recorded range: rounding
-OK, LIMIT, UNREACHABLE, OUTSIDE = "ok", "limit", "unreachable", "outside"
+OK, LIMIT, UNREACHABLE, OUTSIDE, SINGULAR = "ok", "limit", "unreachable", "outside", "singular"
+SINGULAR_GAIN = (
+    10.0  # joints turn about as far as the tool is off; in a wrist 2.6 degrees from its singularity ten times
+)
+SINGULAR_RAD = np.radians(0.5)  # a joint that turns less does so unseen
 
 
 class Inverse(Protocol):
@@ -128,7 +132,10 @@ def correct(model: ModelFile, wanted: Wanted, inverse_of: Inverse, options: Opti
     _refuse_beyond(arms, q_rad, via_rad, why)
     before, _, _ = predicted_errors(model, wanted, nominal_rad, conditions, options)
     after, beyond, notes = predicted_errors(model, wanted, q_rad, conditions, options)
-    status, says = _stated(arms, q_rad, why, beyond, options.margin_rad)
+    far_m = np.maximum(np.linalg.norm(wanted.T_base_tool[:, :3, 3], axis=1), 0.1)
+    off_rad = before.error_rad + before.error_m / far_m  # what joints of a regular posture turn by, about
+    singular = _near_singular(q_rad - nominal_rad, off_rad)
+    status, says = _stated(arms, q_rad, why, beyond, singular, options.margin_rad)
     told = np.full(wanted.T_base_tool.shape, np.nan)
     good: Bools = np.asarray(np.isfinite(q_rad).all(axis=1))
     told[good] = arms.drawn.frames(q_rad[good])[:, -1] @ arms.stated_tool
@@ -228,7 +235,11 @@ def _posture(
 ) -> tuple[Floats | None, tuple[str, str]]:
     """(joint,) nearest to `near_rad` on the wanted branch; or status and reason."""
     within = inverse_of.solutions(arm, goal, near_rad)
-    good = within if branch is None else within[branch(within)]
+    good = within
+    if branch is not None:
+        good = _in_every_turn(arm, within)
+        good = good[branch(good)]
+        good = good[np.argsort(np.linalg.norm(good - near_rad, axis=1), kind="stable")]
     if len(good):
         return good[0], (OK, "")
     if len(within):
@@ -241,6 +252,14 @@ def _posture(
     best = int(np.argmin(beyond.max(axis=1)))
     joint = int(np.argmax(beyond[best]))
     return None, (LIMIT, _beyond_limit(arm, joint, float(free[best, joint])))
+
+
+def _in_every_turn(arm: RigArm, q_rad: Floats) -> Floats:
+    """(solution, joint): also those that differ by whole turns, where the range of a joint has room for them."""
+    for turn_rad in 2.0 * np.pi * np.eye(arm.n_joints):
+        q_rad = np.concatenate([q_rad, q_rad - turn_rad, q_rad + turn_rad])
+        q_rad = q_rad[np.all((q_rad >= arm.lower_rad) & (q_rad <= arm.upper_rad), axis=1)]
+    return q_rad
 
 
 def _beyond_limit(arm: RigArm, joint: int, q_rad: float) -> str:
@@ -321,7 +340,12 @@ def _refuse_beyond(arms: Arms, q_rad: Floats, via_rad: Floats | None, why: dict[
 
 
 def _stated(
-    arms: Arms, q_rad: Floats, why: Mapping[int, tuple[str, str]], beyond: tuple[str, ...], margin_rad: float
+    arms: Arms,
+    q_rad: Floats,
+    why: Mapping[int, tuple[str, str]],
+    beyond: tuple[str, ...],
+    singular: list[str],
+    margin_rad: float,
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Status and reason of every row."""
     status: list[str] = []
@@ -332,12 +356,23 @@ def _stated(
         else:
             near = _near_limit(arms, q, margin_rad)
             outside = [name for name in beyond[row].split(",") if name] + _beyond_range(arms, q)
-            state = LIMIT if near else OUTSIDE if outside else OK
+            state = LIMIT if near else SINGULAR if singular[row] else OUTSIDE if outside else OK
             out = f"beyond the calibrated range: {', '.join(dict.fromkeys(outside))}" if outside else ""
-            reason = "; ".join(part for part in (near, out) if part)
+            reason = "; ".join(part for part in (near, singular[row], out) if part)
         status.append(state)
         says.append(reason)
     return tuple(status), tuple(says)
+
+
+def _near_singular(turned_rad: Floats, off_rad: Floats) -> list[str]:
+    """(pose) a sentence where a joint turns far for a small correction (pose, joint); empty elsewhere."""
+    most, joint = np.abs(turned_rad).max(axis=1), np.abs(turned_rad).argmax(axis=1)
+    return [
+        f"near a singular posture: the correction turns joint {j + 1} by {np.degrees(turn):.1f}°"
+        if turn > max(SINGULAR_RAD, SINGULAR_GAIN * off)
+        else ""
+        for turn, j, off in zip(most, joint, off_rad, strict=True)
+    ]
 
 
 def _near_limit(arms: Arms, q: Floats, margin_rad: float) -> str:

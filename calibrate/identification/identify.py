@@ -23,7 +23,6 @@ from calibrate.blunders.of_the_table import duplicated_rows, left_alone, rows_be
 from calibrate.blunders.other_session import sessions_apart
 from calibrate.blunders.spot_signs import mirrored_axes
 from calibrate.blunders.witness import by_target
-from calibrate.blunders.witnesses import witnesses_of
 from calibrate.errors import DataError
 from calibrate.estimator import Estimator
 from calibrate.fit_plan import DEFAULT, BesideName, FitPlan
@@ -38,6 +37,7 @@ from calibrate.identification.rounds import coarse_start, settled_fit
 from calibrate.identification.session import instruments_for_fit, standing_at
 from calibrate.instruments import Instruments
 from calibrate.parameters import start_values
+from calibrate.sensors.catalogue import witnesses_of
 from calibrate.weighting import Weighting
 
 Floats = NDArray[np.float64]

@@ -156,7 +156,7 @@ def information_of(rig: Rig, candidates: Candidates, rng: Generator) -> Informat
     found = instruments_for_fit(rig, candidates.samples())
     weighting, every = found.weighting, found.weighting.parameters
     free = np.flatnonzero([p.free for p in every])
-    parameters = tuple(_believed(every[i]) for i in free)
+    parameters = tuple(with_prior(every[i]) for i in free)
     size = priors(parameters)
     J = weighting.problem(found.start).jacobian(found.start)[:, free] * size
     k = candidates.reading.shape[1]
@@ -168,7 +168,7 @@ def information_of(rig: Rig, candidates: Candidates, rng: Generator) -> Informat
     return Information(parameters, rows, J[len(order) * k :], by_target, by_scale, target.says, _hidden(J))
 
 
-def _believed(p: Parameter) -> Parameter:
+def with_prior(p: Parameter) -> Parameter:
     """Nobody has an opinion: many plausible sizes, so that every information matrix has an inverse."""
     return p if np.isfinite(p.prior) else replace(p, prior=NO_OPINION * p.plausible)
 

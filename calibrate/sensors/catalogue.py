@@ -2,8 +2,13 @@
 
 from collections.abc import Iterable
 
+import numpy as np
+from numpy.typing import NDArray
+
 from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
 from calibrate import plug_ins
+from calibrate.blunders.witness import Witness
 from calibrate.plug_ins import loaded
 from calibrate.sensors import (
     bar,
@@ -18,6 +23,8 @@ from calibrate.sensors import (
     wire,
 )
 from calibrate.sensors.kind import NoiseSource, SensorKind, Trait
+
+Floats = NDArray[np.float64]
 
 SENSORS: tuple[SensorKind, ...] = (
     spots.KIND,
@@ -64,3 +71,9 @@ def used_with(asked: Iterable[str]) -> tuple[SensorKind, ...]:
     given = [kind for kind in SENSORS if (kind.instead_of or kind.only_asked) and kind.name in wanted]
     displaced = {name for kind in given for name in kind.instead_of}
     return tuple(k for k in SENSORS if k in given or not (k.instead_of or k.only_asked or k.name in displaced))
+
+
+def witnesses_of(rig: Rig, samples: Samples, q_rad: Floats) -> tuple[Witness, ...]:
+    """All that the columns allow, at `q_rad` (row, joint). DataError where spots have no fixture or laser."""
+    found = (kind.witness(rig, samples, q_rad) for kind in SENSORS)
+    return tuple(witness for witness in found if witness is not None)

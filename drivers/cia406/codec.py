@@ -154,11 +154,6 @@ class Scale:
         """Angle of one count, counter-clockwise positive."""
         return math.copysign(math.tau / self.units_per_turn, 1.0 if self.rises_counter_clockwise else -1.0)
 
-    @property
-    def multi_turn(self) -> bool:
-        """The position separates turns."""
-        return self.range_units > self.units_per_turn
-
 
 def scale_of(operating: int, units_per_turn: int, range_units: int, resolution: int, turns: int) -> Scale:
     """Scale from 6000h, 6001h, 6002h, 6501h, 6502h. ValueError for a scale that cannot be."""

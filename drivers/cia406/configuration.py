@@ -24,7 +24,6 @@ STOP_S = 5.0  # for its end, on a busy host: two readers of one bus would each g
 NMT_START, NMT_PRE_OPERATIONAL = 0x01, 0x80
 ANSWER_S = 0.5  # SDO answers come within some ms; the rest is for a busy host
 HEARTBEAT_MS = 400  # 1.5 of them are 0.6 s; a node that answers no SYNC is found after 0.5 s
-MULTI_TURN = 2
 POSITION_ENTRY = codec.POSITION << 16 | 32
 
 
@@ -86,11 +85,6 @@ class EncoderIdentity:
     pdo_id: int  # CAN identifier of its TPDO2
     mapping: tuple[MappedObject, ...]
     error_register: int  # 1001h when it was set up: not 0 while an emergency of before lasts
-
-    @property
-    def multi_turn(self) -> bool:
-        """As 1000h states in its high word: 1 single-turn, 2 multi-turn (CiA 406, 1000h)."""
-        return self.device_type >> 16 == MULTI_TURN
 
 
 class EncoderObjects:

@@ -26,7 +26,6 @@ from drivers.psd_daq.messages import (
     Message,
     MessageType,
     Nak,
-    Ping,
     Request,
     Samples,
     StartStream,
@@ -78,8 +77,6 @@ class PsdDaqCodec:
                 return frame(MessageType.START_STREAM, struct.pack("<H", rate_hz))
             case StopStream():
                 return frame(MessageType.STOP_STREAM)
-            case Ping():
-                return frame(MessageType.PING)
 
     def _end_frame(self, messages: list[Message]) -> None:
         encoded, offset = bytes(self._buffer), self._offset

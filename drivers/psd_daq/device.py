@@ -21,7 +21,6 @@ from drivers.psd_daq.messages import (
     Message,
     MessageType,
     Nak,
-    Ping,
     Request,
     Samples,
     StartStream,
@@ -139,10 +138,6 @@ class PsdDaq(StreamDevice[Transport]):
     def identify(self) -> Identity:
         """Ask the box again who it is; samples that come in between wait for the next `read`."""
         return self._ask(Identify(), MessageType.IDENTIFY, Identity)
-
-    def ping(self) -> None:
-        """DeviceStale unless the box answers within a second; the stream goes on."""
-        self._ask(Ping(), MessageType.PING, Ack)
 
     # --- commands
 

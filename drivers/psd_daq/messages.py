@@ -61,11 +61,6 @@ class StopStream:
 
 
 @dataclass(frozen=True)
-class Ping:
-    """Are you there? Answered by Ack, also while streaming."""
-
-
-@dataclass(frozen=True)
 class FaceIdentity:
     """One detector as the box knows it."""
 
@@ -124,5 +119,5 @@ class BadFrame:
     first: bytes
 
 
-Request = Identify | StartStream | StopStream | Ping
+Request = Identify | StartStream | StopStream
 Message = Identity | Ack | Nak | Samples | BadFrame

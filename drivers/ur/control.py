@@ -23,9 +23,7 @@ from drivers.ur.control_link import (
     Ended,
     Motion,
     MoveJoints,
-    MoveLine,
     Outcome,
-    Ready,
     ServoJoints,
     ServoStop,
 )
@@ -38,7 +36,6 @@ CONNECT_LIMIT_S = 15.0  # ur_rtde itself waits 5 s for its program to run
 MARGIN_S = 3.0  # settling, round trips, a busy machine
 SLOWEST_SPEED_SLIDER = 0.1  # an operator may slow the arm down to this without making a move fail
 FULL_RANGE_RAD = 4.0 * math.pi  # -360..360 deg: the longest way of a joint
-LONGEST_LINE_M = 2.7  # across the sphere that the longest arm of the series reaches (UR10e: 1.3 m)
 STOP_DECELERATION_RAD_S2 = 5.0  # from 1 rad/s within 0.1 rad; feels right for a laser on the flange
 N_JOINTS = 6
 
@@ -57,7 +54,6 @@ class UrControl:
     ) -> None:
         """`watchdog_hz`: the arm stops when this program was silent for one period of it."""
         self.name = name
-        self.ready: Ready | None = None  # how long the last connect took
         self._host, self._watchdog_hz = host, watchdog_hz
         self._clock: Clock = clock or SystemClock()
         self._dashboard = dashboard or UrDashboard(host)
@@ -92,7 +88,7 @@ class UrControl:
         with self._stopping:
             if self._holds != holds:  # held while connecting
                 child.hold()
-            self.ready, self._child = answer, child
+            self._child = child
 
     def move_joints(self, q_rad: ArrayLike, speed_rad_s: float, acceleration_rad_s2: float) -> None:
         """To joint readings (6,) in rad; blocks until the arm has arrived.
@@ -107,16 +103,6 @@ class UrControl:
         request = MoveJoints(target_rad.tolist(), speed_rad_s, acceleration_rad_s2)
         self._call(request, _limit_s(way_rad, speed_rad_s, acceleration_rad_s2))
         self._q_rad = target_rad
-
-    def move_linear(self, pose: ArrayLike, speed_m_s: float, acceleration_m_s2: float) -> None:
-        """The tool straight to [x, y, z, rx, ry, rz] (m, rotation vector, base frame). Raises as `move_joints`."""
-        target = _six_numbers(pose, "pose")
-        _check_rates(speed_m_s, acceleration_m_s2)
-        self._q_rad = None
-        way_m = max(LONGEST_LINE_M, speed_m_s * FULL_RANGE_RAD)  # a pure turn goes at about 1 rad/s
-        self._call(
-            MoveLine(target.tolist(), speed_m_s, acceleration_m_s2), _limit_s(way_m, speed_m_s, acceleration_m_s2)
-        )
 
     def servo_joints(
         self, q_rad: ArrayLike, period_s: float = 0.002, lookahead_s: float = 0.1, gain: float = 300.0

@@ -27,7 +27,6 @@ from drivers.ur.control_link import (
     Ended,
     Link,
     MoveJoints,
-    MoveLine,
     Outcome,
     Ready,
     ServoJoints,
@@ -52,7 +51,6 @@ class Control(Protocol):
     """The part of rtde_control.RTDEControlInterface that is used here."""
 
     def moveJ(self, q: Sequence[float], speed: float, acceleration: float, asynchronous: bool) -> bool: ...
-    def moveL(self, pose: Sequence[float], speed: float, acceleration: float, asynchronous: bool) -> bool: ...
     def servoJ(self, q: Sequence[float], v: float, a: float, t: float, lookahead: float, gain: float) -> bool: ...
     def servoStop(self, a: float) -> bool: ...
     def stopJ(self, a: float) -> None: ...
@@ -127,8 +125,6 @@ class ControlChild:
             match call.request:
                 case MoveJoints(q, speed, acceleration):
                     return self._watch(self._control.moveJ(q, speed, acceleration, True))
-                case MoveLine(pose, speed, acceleration):
-                    return self._watch(self._control.moveL(pose, speed, acceleration, True))
                 case ServoJoints(q, period, lookahead, gain):
                     self._servoing = True
                     return self._judge(self._control.servoJ(q, 0.0, 0.0, period, lookahead, gain))
@@ -225,7 +221,7 @@ def main(arguments: Sequence[str]) -> int:
     host, watchdog_hz = arguments[0], float(arguments[3])
     calls, stops = (Link(socket.socket(fileno=int(fd))) for fd in arguments[1:3])
     try:
-        control, ready = _take_control(host, watchdog_hz)
+        control = _take_control(host, watchdog_hz)
     except Exception as error:  # ur_rtde throws many types; each means that there is no control
         calls.send(Ended(Outcome.REFUSED, str(error)))
         return 1
@@ -233,7 +229,7 @@ def main(arguments: Sequence[str]) -> int:
     parent = partial(is_stopped, os.getppid())
     child = ControlChild(control, calls, stops, watchdog_hz, time.monotonic, pulse.silent, parent)
     try:
-        calls.send(ready)
+        calls.send(Ready())
         child.run()
     except (ParentGone, ConnectionError):
         signal.setitimer(signal.ITIMER_REAL, LAST_WORDS_S)  # its default action ends the process, whatever it waits for
@@ -244,17 +240,15 @@ def main(arguments: Sequence[str]) -> int:
     return 0
 
 
-def _take_control(host: str, watchdog_hz: float) -> tuple[Control, Ready]:
-    start_s = time.monotonic()
+def _take_control(host: str, watchdog_hz: float) -> Control:
     import rtde_control
 
-    imported_s = time.monotonic()
     interface: Any = rtde_control.RTDEControlInterface
     flags: int = interface.FLAGS_DEFAULT
     control: Control = interface(host, DEFAULT_FREQUENCY, flags, CAP_PORT, NO_REAL_TIME_PRIORITY)
     if not control.setWatchdog(watchdog_hz):
         raise RuntimeError("the control program does not take the watchdog")
-    return control, Ready(imported_s - start_s, time.monotonic() - imported_s)
+    return control
 
 
 if __name__ == "__main__":

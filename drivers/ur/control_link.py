@@ -23,14 +23,6 @@ class MoveJoints(msgspec.Struct, frozen=True, tag=True):
     acceleration_rad_s2: float
 
 
-class MoveLine(msgspec.Struct, frozen=True, tag=True):
-    """Answered as MoveJoints; `pose` is [m, m, m, rad, rad, rad], base frame, rotation vector."""
-
-    pose: list[float]
-    speed_m_s: float
-    acceleration_m_s2: float
-
-
 class ServoJoints(msgspec.Struct, frozen=True, tag=True):
     """Answered by Ended at once; the arm keeps following until ServoStop."""
 
@@ -50,7 +42,7 @@ class Call(msgspec.Struct, frozen=True, tag=True):
     """One request on the line of calls; numbers count up from 1."""
 
     number: int
-    request: MoveJoints | MoveLine | ServoJoints | ServoStop
+    request: MoveJoints | ServoJoints | ServoStop
 
 
 class Stop(msgspec.Struct, frozen=True, tag=True):
@@ -84,10 +76,7 @@ class Outcome(StrEnum):
 
 
 class Ready(msgspec.Struct, frozen=True, tag=True):
-    """First message of a child that has control; how long importing and connecting took."""
-
-    import_s: float
-    connect_s: float
+    """First message of a child that has control."""
 
 
 class Alive(msgspec.Struct, frozen=True, tag=True):
@@ -101,7 +90,7 @@ class Ended(msgspec.Struct, frozen=True, tag=True):
     text: str = ""
 
 
-Motion = MoveJoints | MoveLine | ServoJoints | ServoStop
+Motion = MoveJoints | ServoJoints | ServoStop
 Request = Call | Stop | Beat | Close
 Answer = Ready | Alive | Ended
 _requests = msgspec.json.Decoder[Request](Request)

@@ -15,13 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.drawing import origin_and_rotation
 from simulators.conceal.case import Case, HiddenMechanism
 from simulators.conceal.observe import at_the_flange
 from simulators.conceal.poses import free_poses
 from simulators.conceal.readings import stand, tip_m
 from simulators.conceal.rig import ENCODER_RAD, Artefacts, Device, DualPsd, TrueRig
-from simulators.conceal.rig_file import rig_document, toml_text
+from simulators.conceal.rig_file import pose_record, rig_document, toml_text
 from simulators.defects import Scene
 
 Floats = NDArray[np.float64]
@@ -69,7 +68,7 @@ def _defect(one: HiddenMechanism) -> dict[str, Any]:
 def _rig(rig: TrueRig) -> dict[str, Any]:
     arm, instrument = rig.arm, rig.instrument
     document: dict[str, Any] = {
-        "link": [_pose(part) for part in arm.fixed],
+        "link": [pose_record(part) for part in arm.fixed],
         "zero_rad": arm.zero_rad.tolist(),
         "mass_kg": arm.mass_kg.tolist(),
         "com_turning_m": arm.com_m.tolist(),
@@ -81,19 +80,14 @@ def _rig(rig: TrueRig) -> dict[str, Any]:
         document |= {
             "laser_origin_m": instrument.laser_origin_m.tolist(),
             "laser_direction": instrument.laser_direction.tolist(),
-            "psd2_in_psd1": _pose(instrument.psd2_in_psd1),
-            "psd1_in_base": [_pose(place) for place in instrument.places],
+            "psd2_in_psd1": pose_record(instrument.psd2_in_psd1),
+            "psd1_in_base": [pose_record(place) for place in instrument.places],
         }
     elif isinstance(instrument, Device):
-        document["device"] = _pose(instrument.pose)
+        document["device"] = pose_record(instrument.pose)
     else:
         document["seat_m"] = instrument.seat_m.tolist()
     return document
-
-
-def _pose(pose: Floats) -> dict[str, Any]:
-    origin_m, rotation_rad = origin_and_rotation(pose)
-    return {"origin_m": list(origin_m), "rotation_rad": list(rotation_rad)}
 
 
 def _free_space(case: Case) -> dict[str, Any]:

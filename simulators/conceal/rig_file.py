@@ -105,14 +105,14 @@ def rig_document(belief: Belief) -> dict[str, Any]:
     if isinstance(instrument, DualPsd):
         document["fixture"] = {
             "half_size_m": instrument.half_size_m,
-            "psd2_in_psd1": Inline(_pose(instrument.psd2_in_psd1)),
+            "psd2_in_psd1": Inline(pose_record(instrument.psd2_in_psd1)),
         }
         document["placement"] = [
-            {"id": number, "psd1_in_base": Inline(_pose(place))}
+            {"id": number, "psd1_in_base": Inline(pose_record(place))}
             for number, place in enumerate(instrument.places, start=1)
         ]
     if isinstance(instrument, Device) and belief.device_known:
-        document["device"] = _pose(instrument.pose)
+        document["device"] = pose_record(instrument.pose)
     if belief.distances:
         document["known_distance"] = [
             {"from": one.first, "to": one.second, "length_m": one.length_m, "sigma_m": one.sigma_m}
@@ -170,7 +170,7 @@ def _tool(belief: Belief) -> dict[str, Any]:
     return tool | {"point_m": belief.rig.tool_point_m.tolist()}
 
 
-def _pose(pose: Floats) -> dict[str, Any]:
+def pose_record(pose: Floats) -> dict[str, Any]:
     origin_m, rotation_rad = origin_and_rotation(pose)
     return {"origin_m": list(origin_m), "rotation_rad": list(rotation_rad)}
 

@@ -9,44 +9,47 @@ from numpy.typing import NDArray
 from simulators.arm.rigid import turned
 from simulators.arm.statics import Load, Weight, carried_by, loaded_by
 from simulators.defects.defect import ANY_INSTRUMENT, ROBOT, Defect
-from simulators.defects.displacement import Bump, CarriedPart, Settling
+from simulators.defects.displacement import Bump, CarriedPart, Displacement, Settling
 from simulators.defects.scene import Scene, Site
 
 Floats = NDArray[np.float64]
 
 
+class _MovedBase(Displacement):
+    PHYSICS = "base-moved"
+    PORT = "base.pose"
+    TURNS_RAD_M = (0.3, 1.5)
+    INSTRUMENTS = ("dual-psd", "seat")
+
+    def base_motion(self, scene: Scene, load: Load) -> Floats:
+        return self.motion(scene)
+
+
 @dataclass(frozen=True)
-class BumpedBase(Bump):
+class BumpedBase(_MovedBase, Bump):
     """A foot that was knocked."""
 
     KIND = "bumped-base"
-    PHYSICS = "base-moved"
-    PORT = "base.pose"
     TYPICAL = 4e-5
-    TURNS_RAD_M = (0.3, 1.5)
-    INSTRUMENTS = ("dual-psd", "seat")
-
-    def base_motion(self, scene: Scene, load: Load) -> Floats:
-        return self.motion(scene)
 
 
 @dataclass(frozen=True)
-class DriftingBase(Settling):
+class DriftingBase(_MovedBase, Settling):
     """A table or a foot that settles."""
 
     KIND = "drifting-base"
-    PHYSICS = "base-moved"
-    PORT = "base.pose"
     TYPICAL = 5e-5
-    TURNS_RAD_M = (0.3, 1.5)
-    INSTRUMENTS = ("dual-psd", "seat")
 
-    def base_motion(self, scene: Scene, load: Load) -> Floats:
-        return self.motion(scene)
+
+class _Pedestal(Defect):
+    PHYSICS = "base-compliance"
+    PORT = "base.pose"
+    DRIVERS = ("overturning_moment",)
+    INSTRUMENTS = ROBOT
 
 
 @dataclass(frozen=True)
-class SoftPedestal(Defect):
+class SoftPedestal(_Pedestal):
     """A pedestal that leans `compliance_rad_nm` per newton metre of the arm's overturning moment.
 
     A spring against tilting in two directions: tilt = moment / stiffness, about the foot. Twisting about the vertical
@@ -56,12 +59,8 @@ class SoftPedestal(Defect):
     compliance_rad_nm: float
 
     KIND = "soft-pedestal"
-    PHYSICS = "base-compliance"
-    PORT = "base.pose"
-    DRIVERS = ("overturning_moment",)
     SIZE = "compliance_rad_nm"
     TYPICAL = 2e-6
-    INSTRUMENTS = ROBOT
     FIGURES = ("compliance_rad_nm",)
 
     @classmethod
@@ -73,7 +72,7 @@ class SoftPedestal(Defect):
 
 
 @dataclass(frozen=True)
-class UnevenPedestal(Defect):
+class UnevenPedestal(_Pedestal):
     """A pedestal that leans more about one level axis than about the other: a spring for each."""
 
     about_x_rad_nm: float
@@ -81,12 +80,6 @@ class UnevenPedestal(Defect):
     share: float = 1.0
 
     KIND = "uneven-pedestal"
-    PHYSICS = "base-compliance"
-    PORT = "base.pose"
-    DRIVERS = ("overturning_moment",)
-    SIZE = "share"
-    TYPICAL = 1.0
-    INSTRUMENTS = ROBOT
 
     def base_motion(self, scene: Scene, load: Load) -> Floats:
         gives = np.array([self.about_x_rad_nm, self.about_y_rad_nm, 0.0])
@@ -94,7 +87,7 @@ class UnevenPedestal(Defect):
 
 
 @dataclass(frozen=True)
-class PedestalUnderWeights(Defect):
+class PedestalUnderWeights(_Pedestal):
     """A soft pedestal under weights that are none of the stated masses, each times its compliance (see `Weight`).
 
     To the payload, whose mass is known, it yields `payload_rad_nm`.
@@ -105,12 +98,6 @@ class PedestalUnderWeights(Defect):
     share: float = 1.0
 
     KIND = "pedestal-under-weights"
-    PHYSICS = "base-compliance"
-    PORT = "base.pose"
-    DRIVERS = ("overturning_moment",)
-    SIZE = "share"
-    TYPICAL = 1.0
-    INSTRUMENTS = ROBOT
 
     def base_motion(self, scene: Scene, load: Load) -> Floats:
         own, _ = loaded_by(load, self.weights, 0)

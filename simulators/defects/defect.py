@@ -51,8 +51,8 @@ class Mechanism:
 class Defect(Mechanism):
     """One hidden mechanism of the chain."""
 
-    SIZE: ClassVar[str]  # the field that scales it
-    TYPICAL: ClassVar[float]  # a plausible value of that field, in its unit
+    SIZE: ClassVar[str] = "share"  # the field that scales it: of what a model has found, all of it
+    TYPICAL: ClassVar[float] = 1.0  # a plausible value of that field, in its unit
     INSTRUMENTS: ClassVar[tuple[str, ...]]  # where it can occur
     HABIT: ClassVar[str] = ""  # how a session must be run to show it: "moving", "direct", "payload" or "" for any
     NEEDS: ClassVar[tuple[str, ...]] = ()  # see `needs`

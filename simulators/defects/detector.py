@@ -232,8 +232,6 @@ class StrainedFace(PsdDefect):
 
     KIND = "psd-strained"
     PHYSICS = "psd-gain"
-    SIZE = "share"
-    TYPICAL = 1.0
 
     def seen_m(self, own_m: Floats, light: Light, scene: Scene) -> Floats:
         half = 0.5 * self.shear
@@ -254,8 +252,6 @@ class UnevenLayer(PsdDefect):
 
     KIND = "psd-uneven-layer"
     PHYSICS = "psd-nonlinearity"
-    SIZE = "share"
-    TYPICAL = 1.0
 
     def seen_m(self, own_m: Floats, light: Light, scene: Scene) -> Floats:
         x, y = (own_m / self.half_size_m).T
@@ -276,8 +272,6 @@ class WavesOnFace(PsdDefect):
 
     KIND = "psd-waves"
     PHYSICS = UNKNOWN
-    SIZE = "share"
-    TYPICAL = 1.0
 
     def seen_m(self, own_m: Floats, light: Light, scene: Scene) -> Floats:
         turn_rad = 2.0 * np.pi * (own_m @ np.asarray(self.waves_per_m))

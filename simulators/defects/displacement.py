@@ -26,9 +26,13 @@ class Displacement(Defect):
     SIZE = "shift_m"
     TURNS_RAD_M: ClassVar[tuple[float, float]]  # range of `turn_rad_m`
 
-    def displaced(self, gone_m: Floats) -> Floats:
-        """Motion (row, 4, 4) of a part that has gone `gone_m` (row,) on its way."""
-        far_m = gone_m[:, np.newaxis]
+    def gone_m(self, scene: Scene) -> Floats:
+        """(row,) how far on its way."""
+        raise NotImplementedError
+
+    def motion(self, scene: Scene) -> Floats:
+        """(row, 4, 4) of the part in its own frame."""
+        far_m = self.gone_m(scene)[:, np.newaxis]
         return moved(far_m * np.asarray(self.along), self.turn_rad_m * far_m * np.asarray(self.about))
 
     @classmethod
@@ -49,9 +53,8 @@ class Bump(Displacement):
         at_s = site.middle_s(rng)
         return cls(*cls._draw_way(rng), at_s)
 
-    def motion(self, scene: Scene) -> Floats:
-        """(row, 4, 4) of the part in its own frame."""
-        return self.displaced(np.where(scene.t_s >= self.at_s, self.shift_m, 0.0))
+    def gone_m(self, scene: Scene) -> Floats:
+        return np.where(scene.t_s >= self.at_s, self.shift_m, 0.0)
 
 
 @dataclass(frozen=True)
@@ -67,9 +70,8 @@ class Settling(Displacement):
         time_constant_s = float(rng.uniform(0.2, 0.6) * site.duration_s)
         return cls(*cls._draw_way(rng), time_constant_s)
 
-    def motion(self, scene: Scene) -> Floats:
-        """(row, 4, 4) of the part in its own frame."""
-        return self.displaced(self.shift_m * (1.0 - np.exp(-scene.t_s / self.time_constant_s)))
+    def gone_m(self, scene: Scene) -> Floats:
+        return self.shift_m * (1.0 - np.exp(-scene.t_s / self.time_constant_s))
 
 
 Course = Literal["step", "settling", "steady", "warmth"]
@@ -94,8 +96,6 @@ class CarriedPart(Defect):
     share: float = 1.0
 
     DRIVERS = ("t",)
-    SIZE = "share"
-    TYPICAL = 1.0
 
     def carried(self, scene: Scene) -> Floats:
         """Motion (row, 4, 4) of the part in its own frame."""

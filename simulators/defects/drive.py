@@ -115,7 +115,6 @@ class CoupledWrist(DriveDefect):
     KIND = "coupled-wrist"
     PHYSICS = "joint-coupling"
     DRIVERS = ("q{other}",)
-    SIZE = "share"
     TYPICAL = 1e-4
 
     @property
@@ -238,21 +237,17 @@ class SoftJoint(DriveDefect):
 
 
 @dataclass(frozen=True)
-class TwoSlopeFlexspline(DriveDefect):
+class TwoSlopeFlexspline(SoftJoint):
     """A strain-wave gear: soft up to `knee_nm` while the flexspline's teeth find their seat, stiffer beyond.
 
     Harmonic Drive, "Engineering data", torsional stiffness: K1 up to the torque T1, K2 = K1 / `hardening` beyond;
     deflection is T / K1 below and T1 / K1 + (T - T1) / K2 above, the same for both senses.
     """
 
-    compliance_rad_nm: float
     hardening: float
     knee_nm: float
 
     KIND = "two-slope-flexspline"
-    PHYSICS = "joint-compliance"
-    DRIVERS = ("gravity_torque{joint}",)
-    SIZE = "compliance_rad_nm"
     TYPICAL = 6e-6
     FIGURES = ("compliance_rad_nm", "knee_nm")
 
@@ -269,28 +264,21 @@ class TwoSlopeFlexspline(DriveDefect):
 
 
 @dataclass(frozen=True)
-class PayloadOnSoftJoint(DriveDefect):
+class PayloadOnSoftJoint(SoftJoint):
     """A soft joint whose controller takes its own weight into account but knows nothing of the payload.
 
     The drive is a torsion spring; the feed-forward of the arm's own weight winds it back, so only the payload's torque
     is left to turn the output.
     """
 
-    compliance_rad_nm: float
     centre_m: Vector | None = None  # the payload's centre of mass in the flange frame; None: as the session has it
 
     KIND = "payload-on-soft-joint"
     PHYSICS = "payload-compliance"
     DRIVERS = ("payload",)
-    SIZE = "compliance_rad_nm"
     TYPICAL = 1e-5
     HABIT = "payload"
     NEEDS = ("payload_kg",)
-    FIGURES = ("compliance_rad_nm",)
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
-        return cls(site.loaded_joint(rng), cls.draw_size(rng))
 
     def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
         if self.centre_m is None:
@@ -341,8 +329,6 @@ class SpringUnderWeights(DriveDefect):
     KIND = "spring-under-weights"
     PHYSICS = "joint-compliance"
     DRIVERS = ("gravity_torque{joint}",)
-    SIZE = "share"
-    TYPICAL = 1.0
 
     def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
         own, _ = loaded_by(load, self.weights, self.joint)

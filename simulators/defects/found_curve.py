@@ -38,8 +38,6 @@ class FoundCurve(Defect):
     share: float = 1.0
 
     PHYSICS = UNKNOWN
-    SIZE = "share"
-    TYPICAL = 1.0
     INSTRUMENTS = ANY_INSTRUMENT
 
     @property

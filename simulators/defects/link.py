@@ -15,7 +15,27 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class BendingLink(Defect):
+class _OneLink(Defect):
+    link: int
+
+    @property
+    def links(self) -> tuple[int, ...]:
+        return (self.link,)
+
+
+@dataclass(frozen=True)
+class _LoadedLink(_OneLink):
+    PHYSICS = "link-bending"
+    PORT = "link{link}.tilt"
+    INSTRUMENTS = ROBOT
+
+    @property
+    def drivers(self) -> tuple[str, ...]:
+        return (f"gravity_torque{self.link}", f"gravity_torque{self.link + 1}")
+
+
+@dataclass(frozen=True)
+class BendingLink(_LoadedLink):
     """A link that bends like a clamped beam, with `bending_per_nm2` = 1 / (E I), under the weight at its end.
 
     End load F across it and moment M at the end: deflection F L^3 / 3EI + M L^2 / 2EI, slope F L^2 / 2EI + M L / EI
@@ -23,29 +43,17 @@ class BendingLink(Defect):
     own weight counts as hung at its end; a `light` link has none.
     """
 
-    link: int
     bending_per_nm2: float
     light: bool = False
 
     KIND = "bending-link"
-    PHYSICS = "link-bending"
-    PORT = "link{link}.tilt"
     SIZE = "bending_per_nm2"
     TYPICAL = 5e-5  # aluminium tube of 50 mm and 5 mm wall
-    INSTRUMENTS = ROBOT
     FIGURES = ("bending_per_nm2",)
-
-    @property
-    def drivers(self) -> tuple[str, ...]:
-        return (f"gravity_torque{self.link}", f"gravity_torque{self.link + 1}")
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:
         return cls(site.long_link(rng, carrying=True), cls.draw_size(rng))
-
-    @property
-    def links(self) -> tuple[int, ...]:
-        return (self.link,)
 
     def link_motion(self, link: int, end_m: Floats, angle_rad: Floats, scene: Scene, load: Load) -> Floats:
         moment_nm, force_n = (load.beyond_nm, load.beyond_n) if self.light else (load.moment_nm, load.force_n)
@@ -70,33 +78,19 @@ def cantilever(end_m: Floats, moment_nm: Floats, force_n: Floats) -> tuple[Float
 
 
 @dataclass(frozen=True)
-class FlatLink(Defect):
+class FlatLink(_LoadedLink):
     """A link of a flat section: a clamped beam that is softer about one axis across it than about the other.
 
     1 / (E I) is `about_u_per_nm2` for bending about `axis_u`, a direction across the link in the frame at its start,
     and `about_v_per_nm2` for bending about the third direction (principal axes of a section). It weighs nothing itself.
     """
 
-    link: int
     about_u_per_nm2: float
     about_v_per_nm2: float
     axis_u: Vector
     share: float = 1.0
 
     KIND = "flat-link"
-    PHYSICS = "link-bending"
-    PORT = "link{link}.tilt"
-    SIZE = "share"
-    TYPICAL = 1.0
-    INSTRUMENTS = ROBOT
-
-    @property
-    def drivers(self) -> tuple[str, ...]:
-        return (f"gravity_torque{self.link}", f"gravity_torque{self.link + 1}")
-
-    @property
-    def links(self) -> tuple[int, ...]:
-        return (self.link,)
 
     def link_motion(self, link: int, end_m: Floats, angle_rad: Floats, scene: Scene, load: Load) -> Floats:
         sag_m, slope_rad = cantilever(end_m, load.beyond_nm[:, link], load.beyond_n[:, link])
@@ -108,31 +102,17 @@ class FlatLink(Defect):
 
 
 @dataclass(frozen=True)
-class BeamUnderWeights(Defect):
+class BeamUnderWeights(_LoadedLink):
     """A clamped beam under weights that are none of the stated masses, each times L / (E I) (see `Weight`).
 
     To the payload, whose mass is known, it yields with the slope `payload_rad_nm` for a moment at its end.
     """
 
-    link: int
     weights: tuple[Weight, ...]
     payload_rad_nm: float = 0.0
     share: float = 1.0
 
     KIND = "beam-under-weights"
-    PHYSICS = "link-bending"
-    PORT = "link{link}.tilt"
-    SIZE = "share"
-    TYPICAL = 1.0
-    INSTRUMENTS = ROBOT
-
-    @property
-    def drivers(self) -> tuple[str, ...]:
-        return (f"gravity_torque{self.link}", f"gravity_torque{self.link + 1}")
-
-    @property
-    def links(self) -> tuple[int, ...]:
-        return (self.link,)
 
     def link_motion(self, link: int, end_m: Floats, angle_rad: Floats, scene: Scene, load: Load) -> Floats:
         beyond = tuple(weight for weight in self.weights if weight.body > link)
@@ -203,10 +183,9 @@ class Growth(Defect):
 
 
 @dataclass(frozen=True)
-class HeatedLink(Growth):
+class HeatedLink(_OneLink, Growth):
     """Link that its motor warms, and that grows by `expansion_per_k`."""
 
-    link: int
     expansion_per_k: float
     where: str = ""  # the thermometer that says how warm it is; "": its own
 
@@ -218,10 +197,6 @@ class HeatedLink(Growth):
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:
         return cls(site.long_link(rng), cls.draw_size(rng))
-
-    @property
-    def links(self) -> tuple[int, ...]:
-        return (self.link,)
 
     def link_motion(self, link: int, end_m: Floats, angle_rad: Floats, scene: Scene, load: Load) -> Floats:
         warmed_k = scene.warmed_k(self.where or f"link{link}")

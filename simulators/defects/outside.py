@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from simulators.arm.rigid import Vector, turned
 from simulators.arm.statics import Load
-from simulators.defects.defect import ANY_INSTRUMENT, ROBOT, UNKNOWN, Defect, direction, phase
+from simulators.defects.defect import ANY_INSTRUMENT, UNKNOWN, Defect, direction, phase
 from simulators.defects.detector import PsdDefect, either_psd
 from simulators.defects.drive import DriveDefect
 from simulators.defects.encoder import EncoderDefect
 from simulators.defects.scene import Light, Scene, Site
+from simulators.defects.tool import MountDefect
 
 Floats = NDArray[np.float64]
 
@@ -173,7 +174,7 @@ class UnevenSpring(DriveDefect):
 
 
 @dataclass(frozen=True)
-class FanOnBracket(Defect):
+class FanOnBracket(MountDefect):
     """A bracket of two metals in the draught of a cabinet fan turns the tool aside, as fast as the fan runs.
 
     By `turn_rad` per 1000 rpm.
@@ -188,12 +189,7 @@ class FanOnBracket(Defect):
     DRIVERS = ("fan_rpm",)
     SIZE = "turn_rad"
     TYPICAL = 5e-5
-    INSTRUMENTS = ROBOT
     NEEDS = ("fan_rpm",)
-
-    @property
-    def port(self) -> str:
-        return "laser.direction" if self.at_laser else "tool.point"
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:

@@ -17,8 +17,19 @@ ORIGIN: Vector = (0.0, 0.0, 0.0)
 TARGETS = ("position", "wire", "seat")
 
 
+class MountDefect(Defect):
+    """Of what carries the laser, or the point that is measured."""
+
+    INSTRUMENTS = ROBOT
+    at_laser: bool
+
+    @property
+    def port(self) -> str:
+        return "laser.direction" if self.at_laser else "tool.point"
+
+
 @dataclass(frozen=True)
-class SaggingMount(Defect):
+class SaggingMount(MountDefect):
     """A mount at the flange that gives way: it leans by `lean_rad` towards where gravity pulls when its axis is level.
 
     Cantilever with its mass on the axis of the flange: the lean is across axis and gravity, in proportion to the part
@@ -35,12 +46,7 @@ class SaggingMount(Defect):
     DRIVERS = ("gravity_tool",)
     SIZE = "lean_rad"
     TYPICAL = 6e-5
-    INSTRUMENTS = ROBOT
     FIGURES = ("lean_rad",)
-
-    @property
-    def port(self) -> str:
-        return "laser.direction" if self.at_laser else "tool.point"
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:
@@ -53,7 +59,7 @@ class SaggingMount(Defect):
 
 
 @dataclass(frozen=True)
-class ElasticMount(Defect):
+class ElasticMount(MountDefect):
     """A mount of any shape: it shifts and turns by a matrix times the direction of gravity in the flange frame.
 
     Hooke for a body on a spring: rows of `shift_m` and `turn_rad` are x, y, z of what one weight along x, y, z of the
@@ -69,13 +75,6 @@ class ElasticMount(Defect):
     KIND = "elastic-mount"
     PHYSICS = "tool-sag"
     DRIVERS = ("gravity_tool",)
-    SIZE = "share"
-    TYPICAL = 1.0
-    INSTRUMENTS = ROBOT
-
-    @property
-    def port(self) -> str:
-        return "laser.direction" if self.at_laser else "tool.point"
 
     def tool_motion(self, scene: Scene, load: Load) -> Floats:
         down = self.share * load.down_flange

@@ -8,40 +8,35 @@ from numpy.typing import NDArray
 
 from simulators.arm.rigid import turned
 from simulators.defects.defect import Defect, phase
-from simulators.defects.displacement import Bump, CarriedPart, Settling
+from simulators.defects.displacement import Bump, CarriedPart, Displacement, Settling
 from simulators.defects.scene import Scene, Site
 
 Floats = NDArray[np.float64]
 
 
+class _MovedDevice(Displacement):
+    PHYSICS = "device-drift"
+    PORT = "device.pose"
+    TYPICAL = 5e-5
+    TURNS_RAD_M = (0.1, 0.6)
+    INSTRUMENTS = ("position", "wire")
+
+    def device_motion(self, scene: Scene) -> Floats:
+        return self.motion(scene)
+
+
 @dataclass(frozen=True)
-class BumpedDevice(Bump):
+class BumpedDevice(_MovedDevice, Bump):
     """A tripod that was knocked."""
 
     KIND = "bumped-device"
-    PHYSICS = "device-drift"
-    PORT = "device.pose"
-    TYPICAL = 5e-5
-    TURNS_RAD_M = (0.1, 0.6)
-    INSTRUMENTS = ("position", "wire")
-
-    def device_motion(self, scene: Scene) -> Floats:
-        return self.motion(scene)
 
 
 @dataclass(frozen=True)
-class DriftingDevice(Settling):
+class DriftingDevice(_MovedDevice, Settling):
     """A tripod that settles."""
 
     KIND = "drifting-device"
-    PHYSICS = "device-drift"
-    PORT = "device.pose"
-    TYPICAL = 5e-5
-    TURNS_RAD_M = (0.1, 0.6)
-    INSTRUMENTS = ("position", "wire")
-
-    def device_motion(self, scene: Scene) -> Floats:
-        return self.motion(scene)
 
 
 @dataclass(frozen=True)
@@ -154,8 +149,6 @@ class ChangingScale(Defect):
     PHYSICS = "device-scale"
     PORT = "device.reading"
     DRIVERS = ("reading",)
-    SIZE = "share"
-    TYPICAL = 1.0
     INSTRUMENTS = ("position", "wire")
 
     def seen_position_m(self, position_m: Floats, scene: Scene) -> Floats:

@@ -29,20 +29,13 @@ __all__ = [
     "segments",
 ]
 
-_MODULE_OF = {
-    "EVENTS_TOPIC": "layout",
-    "GAPS_TOPIC": "layout",
-    "SAMPLES_TOPIC": "layout",
-    "VIEW_TOPIC": "layout",
-    "Rotation": "log_segments",
-    "Scan": "scan",
-    "SegmentStream": "log_segments",
-    "SegmentedRecording": "log_segments",
-    "differs": "session_parts",
-    "next_part": "session_parts",
-    "parts": "session_parts",
-    "segments": "log_segments",
+_NAMES_IN = {
+    "layout": ("EVENTS_TOPIC", "GAPS_TOPIC", "SAMPLES_TOPIC", "VIEW_TOPIC"),
+    "log_segments": ("Rotation", "SegmentStream", "SegmentedRecording", "segments"),
+    "scan": ("Scan",),
+    "session_parts": ("differs", "next_part", "parts"),
 }
+_MODULE_OF = {name: module for module, names in _NAMES_IN.items() for name in names}
 
 
 def __getattr__(name: str) -> object:

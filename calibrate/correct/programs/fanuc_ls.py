@@ -6,12 +6,24 @@ need a number of its own and new line numbers behind it, so overshoot points are
 
 import re
 
-from calibrate.correct.programs.literal import NUMBER, Dialect, Literal, Move, Span, Targets, line_of, line_start
+import numpy as np
+
+from calibrate.correct.programs.literal import (
+    NUMBER,
+    Dialect,
+    Literal,
+    Move,
+    NamedPose,
+    Span,
+    Targets,
+    instruction,
+    line_of,
+)
 from calibrate.correct.rotations import FANUC
 
 POSITION = re.compile(r"P\[\s*(?P<number>\d+)[^\]]*\]\s*\{(?P<body>[^}]*)\}")
 FIELD = re.compile(rf"\b(?P<key>X|Y|Z|W|P|R|J[1-9])\s*=\s*(?P<number>{NUMBER})\s*(?P<unit>mm|deg)")
-FRAME = re.compile(r"UF\s*:\s*(?P<frame>\w+)")
+FRAMES = (("user frame", re.compile(r"UF\s*:\s*(?P<n>\w+)")), ("tool frame", re.compile(r"UT\s*:\s*(?P<n>\w+)")))
 MOVE = re.compile(r"^[ \t]*\d*:\s*(?:J|L|(?P<arc>[CA]))\s+(?P<target>P(?:R)?\[\s*\d+)", re.MULTILINE)
 POSE = ("X", "Y", "Z", "W", "P", "R")
 
@@ -23,14 +35,14 @@ def find(text: str, n_joints: int) -> Targets:
     by_number: dict[str, list[Move]] = {}
     skipped: list[str] = []
     for match in MOVE.finditer(text, 0, body):
-        start = line_start(text, match.end())
-        end = text.find("\n", match.end())
         target = re.sub(r"\s", "", match["target"])
         if target.startswith("PR[") or match["arc"]:
             what = "circular moves" if match["arc"] else "position registers"
             skipped.append(f"line {line_of(text, match.end())}: {what} are not corrected")
             continue
-        by_number.setdefault(target[2:], []).append(Move(start, text[start:end]))
+        by_number.setdefault(target[2:], []).append(
+            instruction(text, match.start(), lambda at: (NamedPose(), NamedPose()))
+        )
     literals: list[Literal] = []
     for match in POSITION.finditer(text, body):
         one = _literal(text, match, tuple(by_number.get(match["number"], ())), n_joints)
@@ -48,14 +60,20 @@ def _literal(text: str, match: re.Match[str], moves: tuple[Move, ...], n_joints:
         if (field["unit"] == "mm") != (field["key"] in "XYZ"):
             return None
         spans[field["key"]], numbers[field["key"]] = field.span("number"), float(field["number"])
-    frame = FRAME.search(match["body"])
+    frame, tool = (_place(what, pattern.search(match["body"])) for what, pattern in FRAMES)
     for keys, joints in ((POSE, False), (tuple(f"J{j + 1}" for j in range(n_joints)), True)):
         if all(key in numbers for key in keys):
             values, places = tuple(numbers[k] for k in keys), tuple(spans[k] for k in keys)
             name = f"P[{match['number']}]"
-            used = "" if frame is None or joints else frame["frame"]
-            return Literal(name, match.start("body"), places, values, joints, moves, None, used)
+            return Literal(name, match.start("body"), places, values, joints, moves, own=(frame, tool))
     return None
+
+
+def _place(what: str, found: re.Match[str] | None) -> NamedPose:
+    """Frame 0 is the robot's own; of the others a listing holds the number only."""
+    if found is None:
+        return NamedPose()
+    return NamedPose(f"{what} {found['n']}", np.eye(4) if found["n"] == "0" else None)
 
 
 FANUC_LS = Dialect("FANUC LS", "FANUC", (".ls",), find, FANUC, True, 3, 3, None)

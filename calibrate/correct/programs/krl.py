@@ -5,30 +5,20 @@ targets of PTP, LIN, SPTP and SLIN and declared points; tools, bases and relativ
 """
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.correct.corrected import Branch
-from calibrate.correct.programs.literal import (
-    NUMBER,
-    Dialect,
-    Literal,
-    Move,
-    Span,
-    Targets,
-    blanked,
-    line_of,
-    line_start,
-    moves_of,
-)
+from calibrate.correct.programs import literal
 from calibrate.correct.rotations import KUKA
 
 Floats = NDArray[np.float64]
 
 AGGREGATE = r"\{(?:\s*(?:E6POS|E6AXIS|POS|AXIS|FRAME)\s*:)?(?P<fields>[^{}\[\]]*)\}"
-FIELD = re.compile(rf"\b(?P<key>[A-Z]\w*)\s+(?P<number>{NUMBER})", re.IGNORECASE)
+FIELD = re.compile(rf"\b(?P<key>[A-Z]\w*)\s+(?P<number>{literal.NUMBER}|'B[01]+')", re.IGNORECASE)
 INLINE = re.compile(rf"^[ \t]*S?(?:PTP|LIN)\s+{AGGREGATE}", re.IGNORECASE | re.MULTILINE)
 DECLARED = re.compile(
     rf"^[ \t]*(?:DECL\s+)?(?:GLOBAL\s+)?(?:CONST\s+)?(?:E6POS|E6AXIS|POS|AXIS)\s+(?P<name>\w+)\s*=\s*{AGGREGATE}",
@@ -36,71 +26,148 @@ DECLARED = re.compile(
 )
 MOVE = re.compile(r"^[ \t]*S?(?:PTP|LIN|CIRC)\s+(?P<target>[A-Za-z_]\w*)", re.IGNORECASE | re.MULTILINE)
 OTHER = re.compile(r"^[ \t]*S?(?:CIRC|PTP_REL|LIN_REL|CIRC_REL)\b", re.IGNORECASE | re.MULTILINE)
+ROUTINE = re.compile(r"^[ \t]*(?:GLOBAL\s+)?DEF(?:FCT)?\b", re.IGNORECASE | re.MULTILINE)
+SET = re.compile(
+    r"\$(?P<what>BASE|TOOL)(?:\.\w+)?\s*=\s*(?P<value>[^\n]*)|\bBAS\s*\(\s*#(?P<kind>BASE|TOOL)\s*,\s*(?P<number>\w+)\s*\)"
+    r"|\bFDAT_ACT\s*=\s*(?P<inline>\w+)",
+    re.IGNORECASE,
+)
+HELD = re.compile(rf"(?P<name>\$?\w+(?:[ \t]*\[[ \t]*\d+[ \t]*\])?)\s*=\s*{AGGREGATE}", re.IGNORECASE)
+INLINE_DATA = re.compile(r"\bFDAT\s+(?P<name>\w+)\s*=\s*\{(?P<fields>[^{}]*)\}", re.IGNORECASE)
+FIXED = re.compile(r"\$IPO_MODE\s*=\s*#TCP|IPO_FRAME\s+#TCP", re.IGNORECASE)
 POSE = ("X", "Y", "Z", "A", "B", "C")
 
 
-def find(text: str, n_joints: int) -> Targets:
+def find(text: str, n_joints: int) -> literal.Targets:
     """Of .src and of .dat."""
-    code = blanked(text, ";")
-    by_name = moves_of(text, code, MOVE)
-    literals: list[Literal] = []
+    code = literal.blanked(text, ";")
+    places, inline_data = _places(code)
+    by_name = literal.moves_of(text, code, MOVE, places)
+    literals: list[literal.Literal] = []
     skipped: list[str] = []
     for match in (*INLINE.finditer(code), *DECLARED.finditer(code)):
         inline = match.re is INLINE
         if inline:
-            start = line_start(text, match.end())
-            end = text.find("\n", match.end())
-            moves = (Move(start, text[start : len(text) if end < 0 else end]),)
-            name = f"line {line_of(text, match.start('fields'))}"
+            moves = (literal.instruction(text, match.start(), places),)
+            name = f"line {literal.line_of(text, match.start('fields'))}"
         else:
             name = match["name"]
             moves = tuple(by_name.get(name.lower(), ()))
-        one = _literal(text, match, name, moves, n_joints)
+        own = None if inline else inline_data.get("F" + name.upper().removeprefix("X"))
+        one = _literal(text, match, name, moves, n_joints, own)
         if one is None:
             skipped.append(f"{name}: an aggregate that does not state the whole target is not corrected")
         else:
             literals.append(one)
-    known = {one.name.lower() for one in literals}
-    skipped += [
-        f"line {line_of(text, move.line_start)}: {move.text.strip()}: its target is not declared in this file"
-        for target, moves in by_name.items()
-        if target not in known
-        for move in moves
-    ]
-    skipped += [
-        f"line {line_of(text, m.end())}: {m.group().strip()}: circular and relative moves are not corrected"
-        for m in OTHER.finditer(code)
-    ]
-    return Targets(tuple(sorted(literals, key=lambda one: one.at)), tuple(dict.fromkeys(skipped)))
+    others = (
+        (m.end(), f"{m.group().strip()}: circular and relative moves are not corrected") for m in OTHER.finditer(code)
+    )
+    skipped += literal.sentences(text, by_name, literals, others)
+    return literal.Targets(tuple(sorted(literals, key=lambda one: one.at)), tuple(skipped))
 
 
-def _literal(text: str, match: re.Match[str], name: str, moves: tuple[Move, ...], n_joints: int) -> Literal | None:
-    begin, end = match.span("fields")
-    spans: dict[str, Span] = {}
-    numbers: dict[str, float] = {}
-    for field in FIELD.finditer(text, begin, end):
-        key = field["key"].upper()
-        spans[key], numbers[key] = field.span("number"), float(field["number"])
+def _literal(
+    text: str,
+    match: re.Match[str],
+    name: str,
+    moves: tuple[literal.Move, ...],
+    n_joints: int,
+    own: tuple[literal.NamedPose, literal.NamedPose] | None,
+) -> literal.Literal | None:
+    begin = match.start("fields")
+    fields = _fields(text, *match.span("fields"))
     for keys, joints in ((POSE, False), (tuple(f"A{j + 1}" for j in range(n_joints)), True)):
-        if all(key in numbers for key in keys):
-            branch = None if joints or "T" not in numbers else _turn(int(numbers["T"]))
-            values, places = tuple(numbers[k] for k in keys), tuple(spans[k] for k in keys)
-            return Literal(name, begin, places, values, joints, moves, branch)
+        if all(key in fields for key in keys):
+            branch, turns = (None, None) if joints or "T" not in fields else _turn(*fields["T"])
+            spans, values = (tuple(part) for part in zip(*(fields[key] for key in keys), strict=True))
+            return literal.Literal(name, begin, spans, values, joints, moves, branch, turns, own)
     return None
 
 
-def _turn(bits: int) -> Branch:
+def _fields(text: str, begin: int, end: int) -> dict[str, tuple[literal.Span, float]]:
+    """Numbers of an aggregate by key; bits may be written as 'B0110'."""
+    return {
+        field["key"].upper(): (
+            field.span("number"),
+            float(int(field["number"][2:-1], 2) if "'" in field["number"] else field["number"]),
+        )
+        for field in FIELD.finditer(text, begin, end)
+    }
+
+
+def _turn(span: literal.Span, number: float) -> tuple[Branch, literal.Turns]:
+    """An axis at 0 may be written with either bit."""
+    bits = int(number)
+
+    def within(q_rad: Floats) -> NDArray[np.bool_]:
+        below = np.array([bool(bits >> j & 1) for j in range(q_rad.shape[-1])])
+        return np.where(below, q_rad < literal.EDGE_RAD, q_rad > -literal.EDGE_RAD)
+
     def asked(q_rad: Floats) -> NDArray[np.bool_]:
-        below = np.array([bool(bits >> j & 1) for j in range(q_rad.shape[1])])
-        return np.asarray(np.all((q_rad < 0.0) == below, axis=1), dtype=np.bool_)
+        return np.asarray(np.all(within(q_rad), axis=1), dtype=np.bool_)
 
-    return asked
+    def turns(q_rad: Floats) -> list[tuple[literal.Span, str]]:
+        other = [j for j, kept in enumerate(within(q_rad)) if not kept]
+        return [(span, str(bits ^ sum(1 << j for j in other)))] if other else []
+
+    return asked, turns
 
 
-def overshoot(move: Move, joints: Sequence[str]) -> str:
+def _places(code: str) -> tuple[literal.Places, dict[str, tuple[literal.NamedPose, literal.NamedPose]]]:
+    """Frame and tool of an instruction, as its routine has set them last above; those of inline forms by FDAT name."""
+    held, times = dict[str, Floats](), Counter[str]()
+    for match in HELD.finditer(code):
+        fields, name = _fields(code, *match.span("fields")), _key(match["name"])
+        times[name] += 1
+        if all(key in fields for key in POSE):
+            held[name] = KRL.frame([fields[key][1] for key in POSE])
+    routines, events = [m.start() for m in ROUTINE.finditer(code)], list(SET.finditer(code))
+    fixed = "the tool is stationary (#TCP), which is not corrected" if FIXED.search(code) else ""
+
+    def place(what: str, value: str) -> literal.NamedPose:
+        name = _key(value)
+        if name in ("$NULLFRAME", "$WORLD", f"{what}_DATA[0]"):
+            return literal.NamedPose(name, np.eye(4), fixed)
+        fields = _fields(value, 0, len(value)) if value.lstrip().startswith("{") else {}
+        if all(key in fields for key in POSE):
+            return literal.NamedPose(f"${what}", KRL.frame([fields[key][1] for key in POSE]), fixed)
+        return literal.NamedPose(name, held.get(name) if times[name] == 1 else None, fixed)
+
+    inline = dict[str, tuple[literal.NamedPose, literal.NamedPose]]()
+    for match in INLINE_DATA.finditer(code):
+        numbers = _fields(code, *match.span("fields"))
+        base, tool = (
+            place(what, f"{what}_DATA[{numbers[f'{what}_NO'][1]:.0f}]")
+            if f"{what}_NO" in numbers
+            else literal.NamedPose(refused=fixed)
+            for what in ("BASE", "TOOL")
+        )
+        inline[match["name"].upper()] = (base, tool)
+
+    def places(at: int) -> tuple[literal.NamedPose, literal.NamedPose]:
+        begin = max((start for start in routines if start <= at), default=0)
+        now = {"BASE": literal.NamedPose(refused=fixed), "TOOL": literal.NamedPose(refused=fixed)}
+        for event in (one for one in events if begin <= one.start() < at):
+            if event["inline"]:
+                form = event["inline"]
+                unknown = (literal.NamedPose(f"FDAT {form}", None, fixed),) * 2
+                now["BASE"], now["TOOL"] = inline.get(form.upper(), unknown)
+            else:
+                what = (event["what"] or event["kind"]).upper()
+                now[what] = place(what, event["value"] or f"{what}_DATA[{event['number']}]")
+        return now["BASE"], now["TOOL"]
+
+    return places, inline
+
+
+def _key(name: str) -> str:
+    return re.sub(r"\s", "", name).upper()
+
+
+def overshoot(move: literal.Move, joints: Sequence[str]) -> str:
     """External axes that are not named stay where they are."""
     indent = move.text[: len(move.text) - len(move.text.lstrip())]
     return f"{indent}PTP {{{', '.join(f'A{j + 1} {angle}' for j, angle in enumerate(joints))}}}"
 
 
-KRL = Dialect("KRL", "KUKA", (".src", ".dat", ".sub"), find, KUKA, True, 4, 5, overshoot)
+KRL = literal.Dialect("KRL", "KUKA", (".src", ".dat", ".sub"), find, KUKA, True, 4, 5, overshoot)

@@ -1,27 +1,44 @@
 """One target as it stands in the text of a program, and how a dialect describes such texts."""
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.correct.corrected import Branch
-from calibrate.correct.rotations import RotationForm
+from calibrate.correct.rotations import RotationForm, pose
 
 Floats = NDArray[np.float64]
 Span = tuple[int, int]
 
+EDGE_RAD = 1e-3  # across the edge of a quarter turn, or of the sign of an axis, an angle may be by rounding of its pose
+
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class NamedPose:
+    """A frame, or a tool, as a program names it. `T` (4, 4) in the base, or in the flange; None: not in this file."""
+
+    name: str = ""  # for a person; empty: the program names none
+    T: Floats | None = None
+    refused: str = ""  # why no target with it can be corrected
+
+
+@dataclass(frozen=True, eq=False)
 class Move:
-    """An instruction that goes to a target: where its line begins, and its text."""
+    """An instruction that goes to a target: where its line begins, its text, frame and tool."""
 
     line_start: int
     text: str
+    frame: NamedPose = NamedPose()
+    tool: NamedPose = NamedPose()
+
+
+Places = Callable[[int], tuple[NamedPose, NamedPose]]  # where an instruction begins -> its frame and tool
+Turns = Callable[[Floats], list[tuple[Span, str]]]  # joint angles (joint,) -> its configuration, where that changes
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +52,15 @@ class Literal:
     joints: bool
     moves: tuple[Move, ...] = ()
     branch: Branch | None = None
-    frame: str = ""  # the user frame that it names, where it does
+    turns: Turns | None = None
+    own: tuple[NamedPose, NamedPose] | None = None  # frame and tool that it names itself; None: those of its moves
+
+    @property
+    def used(self) -> tuple[tuple[NamedPose, ...], tuple[NamedPose, ...]]:
+        """Frames and tools with which it is used."""
+        uses = (self.own,) if self.own else tuple((move.frame, move.tool) for move in self.moves)
+        frames, tools = zip(*uses or ((NamedPose(), NamedPose()),), strict=True)
+        return frames, tools
 
 
 @dataclass(frozen=True)
@@ -74,11 +99,12 @@ class Dialect:
         q = np.array(numbers)
         return np.radians(q) if self.mm else q
 
-    def position_and_turn(self, numbers: Sequence[float]) -> tuple[Floats, Floats]:
-        """(3,) m and (3, 3)."""
+    def frame(self, numbers: Sequence[float]) -> Floats:
+        """(4, 4) of a pose as it is written."""
         turn = np.array(numbers[3:])
         angles = turn if len(turn) == 4 or not self.mm else np.radians(turn)
-        return np.array(numbers[:3]) * (1e-3 if self.mm else 1.0), self.rotation.to_matrix(angles[None])[0]
+        position_m = np.array(numbers[:3]) * (1e-3 if self.mm else 1.0)
+        return pose(position_m[None], self.rotation.to_matrix(angles[None]))[0]
 
 
 def fixed(value: float, digits: int) -> str:
@@ -107,12 +133,29 @@ def blanked(text: str, comment: str) -> str:
     return pattern.sub(lambda m: re.sub(r"[^\n]", " ", m.group()), text)
 
 
-def moves_of(text: str, code: str, pattern: re.Pattern[str]) -> dict[str, list[Move]]:
+def instruction(text: str, at: int, places: Places, end: str = "\n") -> Move:
+    """The one that begins at a place of the text, with what stands before it in its line."""
+    start, stop = line_start(text, at), text.find(end, at)
+    return Move(start, text[start : len(text) if stop < 0 else stop + len(end.strip())], *places(at))
+
+
+def moves_of(text: str, code: str, pattern: re.Pattern[str], places: Places, end: str = "\n") -> dict[str, list[Move]]:
     """By what an instruction moves to, the group `target` of the pattern."""
     found: dict[str, list[Move]] = {}
     for match in pattern.finditer(code):
-        start = line_start(text, match.start())
-        end = text.find("\n", match.start())
-        line = text[start : len(text) if end < 0 else end]
-        found.setdefault(match["target"].lower(), []).append(Move(start, line))
+        found.setdefault(match["target"].lower(), []).append(instruction(text, match.start(), places, end))
     return found
+
+
+def sentences(
+    text: str, by_name: dict[str, list[Move]], literals: Sequence[Literal], others: Iterable[tuple[int, str]]
+) -> tuple[str, ...]:
+    """On moves whose target is not among the literals, and on `others`: where they stand, and why."""
+    known = {one.name.lower() for one in literals}
+    elsewhere = [
+        (move.line_start, f"{' '.join(move.text.split())}: its target is no literal of this file")
+        for target, moves in by_name.items()
+        if target not in known
+        for move in moves
+    ]
+    return tuple(dict.fromkeys(f"line {line_of(text, at)}: {why}" for at, why in (*elsewhere, *others)))

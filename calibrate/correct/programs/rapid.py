@@ -11,89 +11,132 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.correct.corrected import Branch
-from calibrate.correct.programs.literal import (
-    NUMBER,
-    Dialect,
-    Literal,
-    Move,
-    Span,
-    Targets,
-    blanked,
-    line_of,
-    line_start,
-    moves_of,
-    numbers_in,
-)
+from calibrate.correct.programs import literal
 from calibrate.correct.rotations import QUATERNION
 
 Floats = NDArray[np.float64]
 
 
 def _list(count: int) -> str:
-    return rf"\[\s*{NUMBER}(?:\s*,\s*{NUMBER}){{{count - 1}}}\s*\]"
+    return rf"\[\s*{literal.NUMBER}(?:\s*,\s*{literal.NUMBER}){{{count - 1}}}\s*\]"
 
 
 ROBTARGET = rf"(?P<pose>\[\s*{_list(3)}\s*,\s*{_list(4)}\s*,\s*{_list(4)}\s*,\s*{_list(6)}\s*\])"
 JOINTTARGET = rf"(?P<joints>\[\s*{_list(6)}\s*,\s*{_list(6)}\s*\])"
 TARGET = re.compile(f"{ROBTARGET}|{JOINTTARGET}")
+POSE = rf"{_list(3)}\s*,\s*{_list(4)}"
+OBJECT = re.compile(
+    rf"\bwobjdata\s+(?P<name>\w+)\s*:=\s*\[\s*(?P<held>\w+)\s*,\s*(?P<fixed>\w+)\s*,[^,]*,"
+    rf"\s*\[\s*(?P<user>{POSE})\s*\]\s*,\s*\[\s*(?P<object>{POSE})\s*\]\s*\]",
+    re.IGNORECASE,
+)
+TOOL = re.compile(
+    rf"\btooldata\s+(?P<name>\w+)\s*:=\s*\[\s*(?P<held>\w+)\s*,\s*\[\s*(?P<frame>{POSE})\s*\]", re.IGNORECASE
+)
+USED = re.compile(r"\\WObj\s*:=\s*(?P<name>\w+)", re.IGNORECASE)
+SHIFTED = re.compile(r"\bPDisp(?:Set|On)\b", re.IGNORECASE)
 NAMED = re.compile(r"\b(?:robtarget|jointtarget)\s+(?P<name>\w+)\s*:=\s*$", re.IGNORECASE)
 INLINE = re.compile(r"\bMove(?:J|AbsJ|L)\s+$", re.IGNORECASE)
 MOVE = re.compile(r"\bMove(?:J|AbsJ|L|C|\w+)\s+(?P<target>[A-Za-z_]\w*)", re.IGNORECASE)
 CIRCLE = re.compile(r"\bMoveC\b", re.IGNORECASE)
 REST = re.compile(r"\bMove\w+\s+(?:\[.*\]\]|\w+)\s*(?P<rest>(?:\\[^,]*)?,.*;)", re.IGNORECASE)
+LONGEST = 200  # letters between the beginning of a declaration, or of a move, and its target
 QUARTER = np.pi / 2.0
 CF = ((0, 0), (1, 3), (2, 5))  # entry of confdata, joint from 0
 
 
-def find(text: str, n_joints: int) -> Targets:
+def find(text: str, n_joints: int) -> literal.Targets:
     """Of a module."""
-    code = blanked(text, "!")
-    by_name = moves_of(text, code, MOVE)
-    literals: list[Literal] = []
+    code = literal.blanked(text, "!")
+    places = _places(code)
+    by_name = literal.moves_of(text, code, MOVE, places, ";")
+    literals: list[literal.Literal] = []
     for match in TARGET.finditer(code):
-        start = line_start(text, match.start())
-        end = text.find("\n", match.end())
-        before = code[start : match.start()]
+        first = max(0, match.start() - LONGEST)
+        before = code[first : match.start()]
         named, inline = NAMED.search(before), INLINE.search(before)
         if inline:
-            moves = (Move(start, text[start : len(text) if end < 0 else end]),)
-            name = f"line {line_of(text, match.start())}"
+            moves = (literal.instruction(text, first + inline.start(), places, ";"),)
+            name = f"line {literal.line_of(text, match.start())}"
         elif named:
             name, moves = named["name"], tuple(by_name.get(named["name"].lower(), ()))
         else:
             continue
         literals.append(_literal(text, match, name, moves))
-    known = {one.name.lower() for one in literals}
-    skipped = [
-        f"line {line_of(text, move.line_start)}: {move.text.strip()}: its target is not a literal of this file"
-        for target, moves in by_name.items()
-        if target not in known
-        for move in moves
-    ]
-    skipped += [f"line {line_of(text, m.start())}: a circular move is not corrected" for m in CIRCLE.finditer(code)]
+    circles = ((m.start(), "a circular move is not corrected") for m in CIRCLE.finditer(code))
+    skipped = literal.sentences(text, by_name, literals, circles)
+    if SHIFTED.search(code):
+        return literal.Targets(
+            (), ("the program displaces its targets (PDispSet, PDispOn), which is not corrected", *skipped)
+        )
     if n_joints != 6:
-        return Targets((), (*skipped, f"RAPID targets have six axes, this arm has {n_joints}"))
-    return Targets(tuple(literals), tuple(dict.fromkeys(skipped)))
+        return literal.Targets((), (*skipped, f"RAPID targets have six axes, this arm has {n_joints}"))
+    return literal.Targets(tuple(literals), skipped)
 
 
-def _literal(text: str, match: re.Match[str], name: str, moves: tuple[Move, ...]) -> Literal:
+def _literal(text: str, match: re.Match[str], name: str, moves: tuple[literal.Move, ...]) -> literal.Literal:
     group = "pose" if match["pose"] else "joints"
-    found: list[tuple[Span, float]] = list(numbers_in(text, *match.span(group)))
+    found: list[tuple[literal.Span, float]] = list(literal.numbers_in(text, *match.span(group)))
     taken = found[:7] if group == "pose" else found[:6]
     spans, numbers = tuple(s for s, _ in taken), tuple(v for _, v in taken)
-    branch = _quarters([int(v) for _, v in found[7:11]]) if group == "pose" else None
-    return Literal(name, match.start(group), spans, numbers, group == "joints", moves, branch)
+    branch, turns = _quarters(found[7:11]) if group == "pose" else (None, None)
+    return literal.Literal(name, match.start(group), spans, numbers, group == "joints", moves, branch, turns)
 
 
-def _quarters(cf: Sequence[int]) -> Branch:
+def _quarters(confdata: Sequence[tuple[literal.Span, float]]) -> tuple[Branch, literal.Turns]:
+    """An angle on the edge of two quarters may be written as either."""
+
+    def within(q_rad: Floats, k: int) -> NDArray[np.bool_]:
+        begin_rad = QUARTER * confdata[k][1]
+        return (q_rad >= begin_rad - literal.EDGE_RAD) & (q_rad <= begin_rad + QUARTER + literal.EDGE_RAD)
+
     def asked(q_rad: Floats) -> NDArray[np.bool_]:
-        quarter = np.floor(q_rad / QUARTER)
-        return np.asarray(np.all([quarter[:, j] == cf[k] for k, j in CF], axis=0), dtype=np.bool_)
+        return np.asarray(np.all([within(q_rad[:, j], k) for k, j in CF], axis=0), dtype=np.bool_)
 
-    return asked
+    def turns(q_rad: Floats) -> list[tuple[literal.Span, str]]:
+        return [(confdata[k][0], f"{np.floor(q_rad[j] / QUARTER):.0f}") for k, j in CF if not within(q_rad[j], k)]
+
+    return asked, turns
 
 
-def overshoot(move: Move, joints: Sequence[str]) -> str:
+def _places(code: str) -> literal.Places:
+    """Work object and tool of an instruction; what the program assigns to is known to none before it runs."""
+    held = {"wobj0": literal.NamedPose("wobj0", np.eye(4)), "tool0": literal.NamedPose("tool0", np.eye(4))}
+    for match in (*OBJECT.finditer(code), *TOOL.finditer(code)):
+        name, is_object = match["name"], match.re is OBJECT
+        pose = np.eye(4)
+        for group in ("user", "object") if is_object else ("frame",):
+            pose = pose @ RAPID.frame([v for _, v in literal.numbers_in(code, *match.span(group))])
+        assigned = len(re.findall(rf"\b{name}(?:\.\w+)*\s*:=", code, re.IGNORECASE)) > 1
+        why = ""
+        if is_object and (match["held"].upper(), match["fixed"].upper()) != ("FALSE", "TRUE"):
+            why = f"work object {name} is held by a robot or moved by a unit, which is not corrected"
+        elif not is_object and match["held"].upper() != "TRUE":
+            why = f"tool {name} is stationary, which is not corrected"
+        held[name.lower()] = literal.NamedPose(name, None if assigned else pose, why)
+
+    def places(at: int) -> tuple[literal.NamedPose, literal.NamedPose]:
+        parts = _arguments(code[at : code.find(";", at)])
+        last = next((part for part in parts if USED.search(part)), parts[3] if len(parts) > 3 else "")
+        used, tool = USED.search(last), last.split("\\")[0].strip()
+        name = used["name"] if used else "wobj0"
+        return held.get(name.lower(), literal.NamedPose(name)), held.get(tool.lower(), literal.NamedPose(tool))
+
+    return places
+
+
+def _arguments(move: str) -> list[str]:
+    """Between the commas that stand in no brackets."""
+    parts, depth = [""], 0
+    for letter in move:
+        depth += (letter in "[(") - (letter in "])")
+        parts[-1] += letter
+        if letter == "," and depth == 0:
+            parts[-1:] = [parts[-1][:-1], ""]
+    return parts
+
+
+def overshoot(move: literal.Move, joints: Sequence[str]) -> str:
     """With the speed, zone and tool of the move that it stands before; the zone is `fine`, so that it is reached."""
     indent = move.text[: len(move.text) - len(move.text.lstrip())]
     match = REST.search(move.text)
@@ -105,4 +148,4 @@ def overshoot(move: Move, joints: Sequence[str]) -> str:
     return f"{indent}MoveAbsJ [[{', '.join(joints)}], [{nothing}]]{rest}"
 
 
-RAPID = Dialect("RAPID", "ABB", (".mod", ".prg", ".modx"), find, QUATERNION, True, 4, 8, overshoot)
+RAPID = literal.Dialect("RAPID", "ABB", (".mod", ".prg", ".modx"), find, QUATERNION, True, 4, 8, overshoot)

@@ -26,8 +26,8 @@ from calibrate.correct.programs.fanuc_ls import FANUC_LS
 from calibrate.correct.programs.krl import KRL
 from calibrate.correct.programs.literal import Dialect, Literal, Targets
 from calibrate.correct.programs.rapid import RAPID
+from calibrate.correct.programs.stated_frames import stated
 from calibrate.correct.programs.urscript import URSCRIPT
-from calibrate.correct.rotations import pose
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
 from calibrate.rigid import inverse
@@ -64,15 +64,17 @@ def correct_program(
     options: Options,
     name: str,
 ) -> CorrectedProgram:
-    """`frame` (4, 4): of the program's coordinates in the base; None: the base itself. `near_rad` (joint,): posture
+    """`frame` (4, 4): of coordinates in the base, where the program does not hold it. `near_rad` (joint,): posture
     before the first target. `every`: conditions of all targets.
 
-    DataError where there is no target, or the program names a frame that is not stated.
+    DataError where there is no target that could be corrected, or one `frame` or tool stands for several.
     """
     arms = Arms.of(model, options)
     targets = dialect.find(text, arms.n_joints)
-    _check(targets, dialect, frame, options, name)
-    base = np.eye(4) if frame is None else frame
+    targets, base, tool = stated(targets, text, frame, options.tool, arms.stated_tool, name)
+    options = replace(options, tool=tool)
+    arms = Arms.of(model, options)
+    _check(targets, dialect, options, name)
     wanted = _wanted(targets.literals, dialect, arms, base, near_rad, every)
     found = correct(model, wanted, inverse_of, options)
     pieces, q_rad = list[tuple[int, int, str]](), found.q_rad.copy()
@@ -85,8 +87,9 @@ def correct_program(
             q_rad[row] = dialect.joints_rad([float(v) for v in written])
         else:
             written = dialect.pose_numbers(told[row, :3, 3], told[row, :3, :3])
-            q_rad[row] = _commanded(arms, dialect, base, written, found.q_rad[row], inverse_of)
+            q_rad[row] = _commanded(arms, dialect, base[row], written, found.q_rad[row], inverse_of)
         pieces += [(*span, number) for span, number in zip(one.spans, written, strict=True)]
+        pieces += [(*span, number) for span, number in (one.turns(found.q_rad[row]) if one.turns else ())]
         if found.via_rad is not None and dialect.overshoot is not None:
             joints = dialect.joint_numbers(found.via_rad[row])
             ending = "\r\n" if "\r\n" in text else "\n"
@@ -99,7 +102,7 @@ def correct_program(
     return CorrectedProgram(new, tuple(changes), names, replace(found, q_rad=q_rad, after=after), targets.skipped)
 
 
-def _check(targets: Targets, dialect: Dialect, frame: Floats | None, options: Options, name: str) -> None:
+def _check(targets: Targets, dialect: Dialect, options: Options, name: str) -> None:
     if not targets.literals:
         why = f"; {targets.skipped[0]}" if targets.skipped else ""
         raise DataError(f"{name}: no target of {dialect.name} that could be corrected{why}")
@@ -107,17 +110,6 @@ def _check(targets: Targets, dialect: Dialect, frame: Floats | None, options: Op
         raise DataError(
             f"{name}: {shown(far.name, 40)} has a number beyond {LENGTH_M / 1e3:g} km or {ANGLE_RAD:g} rad; correct it"
         )
-    framed = sorted({one.frame for one in targets.literals if one.frame not in ("", "0")})
-    if framed and frame is None:
-        raise DataError(
-            f"{name}: positions are in user frame {', '.join(framed)}, whose place the program does not hold; give its "
-            "pose in the base with --frame"
-        )
-    named = sorted({one.frame for one in targets.literals if one.frame})
-    if len(named) > 1:
-        raise DataError(f"{name}: positions are in user frames {', '.join(named)}; correct one frame at a time")
-    if named == ["0"] and frame is not None:
-        raise DataError(f"{name}: positions are in user frame 0, which is the base; leave --frame out")
     idle = [one.name for one in targets.literals if not one.moves]
     if options.approach and idle:
         raise DataError(
@@ -156,8 +148,7 @@ def _wanted(
             joints[row] = dialect.joints_rad(one.numbers)
             T[row] = wanted_joints(arms, joints[[row]])[0]
         else:
-            position_m, R = dialect.position_and_turn(one.numbers)
-            T[row] = base @ pose(position_m[None], R[None])[0]
+            T[row] = base[row] @ dialect.frame(one.numbers)
     branches = tuple(one.branch for one in literals)
     return Wanted(T, joints, near, {c: np.full(n, v) for c, v in every.items()}, False, branches)
 
@@ -166,9 +157,8 @@ def _commanded(
     arms: Arms, dialect: Dialect, base: Floats, written: list[str], near_rad: Floats, inverse_of: Inverse
 ) -> Floats:
     """(joint,) to which a controller with the rig file's arm goes for a pose as it is written."""
-    position_m, R = dialect.position_and_turn([float(v) for v in written])
-    goal = base @ pose(position_m[None], R[None]) @ inverse(arms.stated_tool)
-    q_rad, found = inverse_of.refined(arms.drawn, goal, near_rad[None])
+    goal = base @ dialect.frame([float(v) for v in written]) @ inverse(arms.stated_tool)
+    q_rad, found = inverse_of.refined(arms.drawn, goal[None], near_rad[None])
     return q_rad[0] if found[0] else np.full_like(near_rad, np.nan)
 
 

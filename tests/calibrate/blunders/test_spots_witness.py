@@ -8,8 +8,8 @@ from acquisition.recording.rig import load_rig
 from calibrate.arms.catalogue import arm_of
 from calibrate.blunders.conventions import wrong_convention
 from calibrate.blunders.finding import BlunderKind
-from calibrate.blunders.witnesses import witnesses_of
 from calibrate.parameters import start_values
+from calibrate.sensors.catalogue import witnesses_of
 from calibrate.sensors.spots import SpotsWitness
 
 SPOTS = ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")

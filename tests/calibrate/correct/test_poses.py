@@ -57,6 +57,21 @@ def test_what_cannot_be_commanded_is_named_and_not_clipped():
     assert np.isfinite(found.q_rad[2]).all()
 
 
+def test_a_pose_near_a_singular_posture_is_listed_with_what_its_correction_turns():
+    """A straight wrist turns its two outer axes by many degrees, against each other, for a small correction."""
+    q = np.repeat(Q[:1], 4, axis=0)
+    q[:, 4] = np.radians([0.0, 0.5, 2.0, 20.0])
+    found = correct(model(), wanted(drawn().frames(q)[:, -1], q), inverse(), Options())
+    assert found.status == ("singular", "singular", "singular", "ok")
+    for row in range(3):
+        turned_deg = np.degrees(np.abs(found.q_rad[row] - found.nominal_rad[row]))
+        joint = int(np.argmax(turned_deg))
+        assert joint in (3, 5)
+        assert found.says[row] == (
+            f"near a singular posture: the correction turns joint {joint + 1} by {turned_deg[joint]:.1f}°"
+        )
+
+
 def test_backlash_is_corrected_by_the_side_that_the_joints_come_from():
     """Two joints in a plane cannot turn freely, so the poses are some of the arm's own."""
     known, q = two_joints(), np.array([[0.3, 0.4], [0.6, 0.9]])

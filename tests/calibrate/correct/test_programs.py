@@ -29,6 +29,7 @@ end
 KRL = """&ACCESS RVP\r
 DEF weld()\r
   $TOOL = {{X 0.000, Y 0.000, Z 0.000, A 0.000, B 0.000, C 0.000}}\r
+  $BASE = $NULLFRAME\r
   PTP {{{q}}} C_PTP\r
   LIN {{E6POS: {0}, S 2, T {t0}, E1 12.500}} C_DIS ; X 99.999\r
   PTP_REL {{X 10.000}}\r
@@ -193,16 +194,9 @@ def test_overshoot_points_stand_before_their_moves(suffix):
 def test_what_cannot_be_done_is_refused():
     with pytest.raises(DataError, match="overshoot points cannot be inserted"):
         corrected(fanuc(), ".ls", Options(tool=TOOL, approach=1))
-    with pytest.raises(DataError, match="user frame 3"):
-        corrected(fanuc(3), ".ls")
-    with pytest.raises(DataError, match="user frame 0, which is the base"):
-        corrected(fanuc(), ".ls", frame=np.eye(4))
-    two = fanuc(3).replace("/END", fanuc().split("/POS")[1].replace("P[1]", "P[5]").replace("P[2]", "P[6]"))
-    with pytest.raises(DataError, match="user frames 0, 3"):
-        corrected(two, ".ls", frame=np.eye(4))
     declared = krl().replace("  LIN {E6POS: ", "  DECL E6POS XP1 = {")
     with pytest.raises(DataError, match="no move in this file goes to XP1"):
-        corrected(declared, ".src", Options(tool=TOOL, approach=1))
+        corrected(declared, ".src", Options(tool=TOOL, approach=1), frame=np.eye(4))
     with pytest.raises(DataError, match="no target"):
         corrected("DEF a()\nEND\n", ".src")
 
@@ -221,7 +215,7 @@ def test_a_configuration_that_no_posture_has_leaves_its_target_as_it_was():
     done = corrected(text, ".src")
     assert done.found.status[-1] == "unreachable"
     assert "configuration" in done.found.says[-1]
-    assert done.text.splitlines()[6] == text.splitlines()[6]
+    assert done.text.splitlines()[7] == text.splitlines()[7]
 
 
 def test_a_target_without_a_command_has_no_error_on_the_terminal(tmp_path, capsys):

@@ -9,13 +9,13 @@ from numpy.testing import assert_allclose
 
 from acquisition.recording.rig import load_rig
 from calibrate.blunders.finding import BlunderKind
-from calibrate.blunders.witnesses import witnesses_of
 from calibrate.errors import DataError
 from calibrate.identification.identify import identify
 from calibrate.identification.rounds import settled_fit
 from calibrate.identification.session import about_of, instruments_for_fit
 from calibrate.instruments import instruments_of
 from calibrate.predict import Predictor, predict
+from calibrate.sensors.catalogue import witnesses_of
 from tests.calibrate.sensors.camera_sessions import BODY, CAMERA, PLACE, SIGMA, TURN, CameraSession, table
 
 AS_TRACKER = ("x_m", "y_m", "z_m"), ("rx_rad", "ry_rad", "rz_rad")

@@ -189,8 +189,6 @@ def test_a_single_turn_encoder(memory):
         node.dictionary.put(0x6001, 0, 1 << 20)
         node.dictionary.put(0x6002, 0, 1 << 20)
     memory.encoders.connect()
-    assert [identity.multi_turn for identity in memory.encoders.identities] == [False, False]
-    assert [identity.scale.multi_turn for identity in memory.encoders.identities] == [False, False]
     np.testing.assert_allclose(
         memory.encoders.read(1.0).values["position_rad"][-1], [math.tau / 4, -math.tau / 4], atol=1e-5
     )

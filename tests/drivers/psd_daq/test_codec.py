@@ -18,7 +18,6 @@ from drivers.psd_daq.messages import (
     Message,
     MessageType,
     Nak,
-    Ping,
     Refusal,
     Samples,
     StartStream,
@@ -53,7 +52,6 @@ def test_every_message_has_an_example():
         ("IDENTIFY", Identify()),
         ("START_STREAM 1000", StartStream(1000)),
         ("STOP_STREAM", StopStream()),
-        ("PING", Ping()),
     ],
 )
 def test_requests_are_the_documented_bytes(example, request_):

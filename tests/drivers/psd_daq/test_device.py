@@ -103,7 +103,6 @@ def test_commands_while_streaming_lose_no_sample(psd_box):
     try:
         blocks = [daq.read(READ_S)]
         for _ in range(3):
-            daq.ping()
             assert daq.identify() == daq.identity
             blocks.append(daq.read(READ_S))
     finally:
