@@ -61,7 +61,7 @@ def test_what_would_be_ignored_is_refused(
     assert run(["session", str(RIG_FILE.with_name(file)), "--out", str(tmp_path / "out"), *options]) == 1
     said = " ".join(capsys.readouterr().err.split())
     named = ["--live"] if "--live-port" in options else [word for word in options if word.startswith("--")]
-    assert all(word in said for word in [*named, "leave out"])
+    assert all(word in said for word in [*named, "leave these options out"])
     assert not (tmp_path / "out").exists()
 
 
