@@ -99,7 +99,7 @@ def form_named(name: str) -> ExportForm:
     found = next((form for form in brought if form.name == name), None)
     if found is None:
         known = ", ".join(form.name for form in (*FORMS, *brought))
-        raise DataError(f"no form of export is called '{name}'; there are {known}; install the package that brings it")
+        raise DataError(f"no form of export is called '{name}'; choose one of {known}")
     return found
 
 

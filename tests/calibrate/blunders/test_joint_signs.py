@@ -54,7 +54,7 @@ def test_a_kuka_is_named_by_its_joints_and_not_by_a_left_handed_tracker(point):
     assert "joints 1, 4 and 6 turn against the rig's sense" in found.says
     assert found.remedy == "in the rig file, write sign = -1 for joints 1, 4 and 6, as for KUKA, or remove it there"
     assert found.says.endswith(found.remedy)  # a terminal cuts long messages in the middle
-    assert "less likely: one of x_m, y_m, z_m is negated in the device's file, or two exchanged" in found.what
+    assert "less likely: one of x_m, y_m, z_m is negated, or two are exchanged" in found.what
 
 
 @pytest.mark.parametrize("mirror", [[-1, 1, 1], [1, -1, 1], [1, 1, -1]])
@@ -62,7 +62,7 @@ def test_a_negated_column_of_the_device_is_named_second_where_joint_signs_fit_as
     q, position_m = session(POINT)
     found = judged(q, position_m * mirror)
     assert found.column == "columns q1_rad, q4_rad, q6_rad"
-    assert "less likely: one of x_m, y_m, z_m is negated in the device's file, or two exchanged" in found.what
+    assert "less likely: one of x_m, y_m, z_m is negated, or two are exchanged" in found.what
     assert "mm off its drawing then" in found.what  # drawn 30 mm beside the plane, which tells the two apart
 
 
