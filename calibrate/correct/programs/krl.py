@@ -149,9 +149,8 @@ def _places(code: str) -> tuple[literal.Places, dict[str, tuple[literal.NamedPos
         now = {"BASE": literal.NamedPose(refused=fixed), "TOOL": literal.NamedPose(refused=fixed)}
         for event in (one for one in events if begin <= one.start() < at):
             if event["inline"]:
-                form = event["inline"]
-                unknown = (literal.NamedPose(f"FDAT {form}", None, fixed),) * 2
-                now["BASE"], now["TOOL"] = inline.get(form.upper(), unknown)
+                unknown = (literal.NamedPose(f"FDAT {event['inline']}", None, fixed),) * 2
+                now["BASE"], now["TOOL"] = inline.get(event["inline"].upper(), unknown)
             else:
                 what = (event["what"] or event["kind"]).upper()
                 now[what] = place(what, event["value"] or f"{what}_DATA[{event['number']}]")
