@@ -135,13 +135,8 @@ def _places(code: str) -> tuple[literal.Places, dict[str, tuple[literal.NamedPos
 
     inline = dict[str, tuple[literal.NamedPose, literal.NamedPose]]()
     for match in INLINE_DATA.finditer(code):
-        numbers = _fields(code, *match.span("fields"))
-        base, tool = (
-            place(what, f"{what}_DATA[{numbers[f'{what}_NO'][1]:.0f}]")
-            if f"{what}_NO" in numbers
-            else literal.NamedPose(refused=fixed)
-            for what in ("BASE", "TOOL")
-        )
+        numbers = {key: f"{number:.0f}" for key, (_, number) in _fields(code, *match.span("fields")).items()}
+        base, tool = (place(what, f"{what}_DATA[{numbers.get(what + '_NO')}]") for what in ("BASE", "TOOL"))
         inline[match["name"].upper()] = (base, tool)
 
     def places(at: int) -> tuple[literal.NamedPose, literal.NamedPose]:
