@@ -58,7 +58,7 @@ def stated(
         bases.append(base)
     if any(not _same(poses[0], other) for other in poses):
         raise DataError(
-            f"{name}: targets have the tools {_listed(set(names))}; give one of them with --tool, the rest is left alone"
+            f"{name}: targets have tools {_listed(set(names))}; give one of them with --tool, the rest is left alone"
         )
     if tool is None and poses and not _same(poses[0], rig_tool):
         tool = poses[0]
