@@ -41,7 +41,6 @@ class ClockModel:
     rate: float | None = None  # host seconds in one second of the device
     delay_median_s: float | None = None
     delay_p99_s: float | None = None
-    delay_max_s: float | None = None
     wander_s: float | None = None  # farthest that the line of a minute is from that of the whole, at its middle
 
 
@@ -64,7 +63,6 @@ def clock_model(stream: Stream) -> ClockModel:
         rate,
         float(np.median(delay_s)),
         float(np.quantile(delay_s, 0.99)),
-        float(delay_s.max()),
         _wander(device_s, host_s, line),
     )
 

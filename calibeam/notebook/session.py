@@ -131,13 +131,13 @@ def session_of_arrays(
     from acquisition.recording.rig import load_rig, rig_text
     from acquisition.recording.session_folder import check_header, parse_csv
 
-    loaded, q = load_rig(rig), np.asarray(q_rad, dtype=np.float64)
+    loaded, q = load_rig(rig), _numbers(q_rad, "q_rad")
     if q.ndim != 2 or q.shape[1] != loaded.n_joints:
         raise SamplesError(f"q_rad of shape {q.shape}: give (row, {loaded.n_joints}), as {rig} has that many joints")
     table: dict[str, NDArray[np.generic]] = {"t_s": np.arange(len(q), dtype=np.float64)}
     table |= {f"q{i + 1}_rad": column for i, column in enumerate(q.T)}
     if positions_m is not None:
-        positions = np.asarray(positions_m, dtype=np.float64)
+        positions = _numbers(positions_m, "positions_m")
         if positions.shape != (len(q), 3):
             raise SamplesError(f"positions_m of shape {positions.shape}: give ({len(q)}, 3), one place a row of q_rad")
         table |= dict(zip(("x_m", "y_m", "z_m"), positions.T, strict=True))
@@ -149,6 +149,13 @@ def session_of_arrays(
     lines = [",".join(table), *(",".join(map(_cell, row)) for row in zip(*table.values(), strict=True))]
     samples = parse_csv("\n".join(lines) + "\n", "the arrays", loaded)
     return Session(Recording(path=Path(rig), rig_text=rig_text(rig), rig=loaded, samples=samples, complete=True))
+
+
+def _numbers(values: object, name: str) -> Floats:
+    try:
+        return np.asarray(values).astype(np.float64, casting="same_kind")
+    except (TypeError, ValueError):
+        raise SamplesError(f"{name} is no array of real numbers; give rows of equal length") from None
 
 
 def _cell(value: Any) -> str:

@@ -135,13 +135,8 @@ def _places(code: str) -> tuple[literal.Places, dict[str, tuple[literal.NamedPos
 
     inline = dict[str, tuple[literal.NamedPose, literal.NamedPose]]()
     for match in INLINE_DATA.finditer(code):
-        numbers = _fields(code, *match.span("fields"))
-        base, tool = (
-            place(what, f"{what}_DATA[{numbers[f'{what}_NO'][1]:.0f}]")
-            if f"{what}_NO" in numbers
-            else literal.NamedPose(refused=fixed)
-            for what in ("BASE", "TOOL")
-        )
+        numbers = {key: f"{number:.0f}" for key, (_, number) in _fields(code, *match.span("fields")).items()}
+        base, tool = (place(what, f"{what}_DATA[{numbers.get(what + '_NO')}]") for what in ("BASE", "TOOL"))
         inline[match["name"].upper()] = (base, tool)
 
     def places(at: int) -> tuple[literal.NamedPose, literal.NamedPose]:
@@ -149,9 +144,8 @@ def _places(code: str) -> tuple[literal.Places, dict[str, tuple[literal.NamedPos
         now = {"BASE": literal.NamedPose(refused=fixed), "TOOL": literal.NamedPose(refused=fixed)}
         for event in (one for one in events if begin <= one.start() < at):
             if event["inline"]:
-                form = event["inline"]
-                unknown = (literal.NamedPose(f"FDAT {form}", None, fixed),) * 2
-                now["BASE"], now["TOOL"] = inline.get(form.upper(), unknown)
+                unknown = (literal.NamedPose(f"FDAT {event['inline']}", None, fixed),) * 2
+                now["BASE"], now["TOOL"] = inline.get(event["inline"].upper(), unknown)
             else:
                 what = (event["what"] or event["kind"]).upper()
                 now[what] = place(what, event["value"] or f"{what}_DATA[{event['number']}]")

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from calibrate.correct.corrected import Branch
 from calibrate.correct.rotations import RotationForm, pose
+from calibrate.errors import DataError
 
 Floats = NDArray[np.float64]
 Span = tuple[int, int]
 
+UNIT = 1e-2  # by which the length of a quaternion may differ from 1: rounding of two decimals
 EDGE_RAD = 1e-3  # across the edge of a quarter turn, or of the sign of an axis, an angle may be by rounding of its pose
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -102,6 +104,8 @@ class Dialect:
     def frame(self, numbers: Sequence[float]) -> Floats:
         """(4, 4) of a pose as it is written."""
         turn = np.array(numbers[3:])
+        if len(turn) == 4 and abs(float(np.linalg.norm(turn)) - 1.0) > UNIT:
+            raise DataError(f"quaternion {turn.tolist()}: its length is not 1; correct it")
         angles = turn if len(turn) == 4 or not self.mm else np.radians(turn)
         position_m = np.array(numbers[:3]) * (1e-3 if self.mm else 1.0)
         return pose(position_m[None], self.rotation.to_matrix(angles[None]))[0]

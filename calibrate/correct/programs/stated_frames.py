@@ -40,7 +40,8 @@ def stated(
     of_poses = [one.used for one in targets.literals if not one.joints]
     _check_given(FRAME, frame, [place for frames, _ in of_poses for place in frames], name)
     _check_given(TOOL, tool, [place for _, tools in of_poses for place in tools], name)
-    kept, bases, tools, skipped = list[Literal](), list[Floats](), dict[str, Floats](), list(targets.skipped)
+    kept, bases, skipped = list[Literal](), list[Floats](), list(targets.skipped)
+    names, poses = list[str](), list[Floats]()  # of the tools
     for one in targets.literals:
         base = np.eye(4)
         if not one.joints:
@@ -51,14 +52,13 @@ def stated(
                 skipped.append(f"{line}: {'' if one.name == line else one.name + ': '}{why}; not corrected")
                 continue
             base = _pose(used_frames[0], frame, base)
-            tools[used_tools[0].name] = _pose(used_tools[0], tool, rig_tool)
+            names.append(used_tools[0].name)
+            poses.append(_pose(used_tools[0], tool, rig_tool))
         kept.append(one)
         bases.append(base)
-    poses = list(tools.values())
     if any(not _same(poses[0], other) for other in poses):
         raise DataError(
-            f"{name}: targets are used with the tools {_listed(tools)}; give one of them with --tool, and the targets "
-            "of the others are left as they are"
+            f"{name}: targets have tools {_listed(set(names))}; give one of them with --tool, the rest is left alone"
         )
     if tool is None and poses and not _same(poses[0], rig_tool):
         tool = poses[0]
@@ -107,5 +107,5 @@ def _same(one: Floats, other: Floats) -> bool:
     return bool(np.allclose(one, other, rtol=0.0, atol=SAME))
 
 
-def _listed(names: Sequence[str] | set[str] | dict[str, Floats]) -> str:
+def _listed(names: set[str]) -> str:
     return ", ".join(sorted(name or "not named" for name in names))

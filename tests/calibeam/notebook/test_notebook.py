@@ -49,6 +49,12 @@ def test_arrays_that_do_not_fit_are_refused_with_the_shape_they_need(q_shape, po
         calibeam.session(TRACKER / "rig.toml", np.zeros(q_shape), np.zeros(positions_shape), **more)
 
 
+@pytest.mark.parametrize("q_rad", ["joints.csv", [[0.1, 0.2, 0.3], [0.1]], np.zeros((5, 3)) + 1j, None])
+def test_what_is_no_array_of_numbers_is_refused_with_its_name(q_rad) -> None:
+    with pytest.raises(calibeam.SamplesError, match="q_rad is no array of real numbers"):
+        calibeam.session(TRACKER / "rig.toml", q_rad, np.zeros((5, 3)))
+
+
 def test_a_line_and_a_screen_say_what_it_is(opened, model) -> None:
     assert "\n" not in repr(opened) + repr(model)
     assert len(repr(model)) < 300

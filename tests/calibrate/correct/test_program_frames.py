@@ -137,6 +137,17 @@ def test_two_tools_of_a_file_are_corrected_one_at_a_time():
     assert "the tool tool0, as the file declares it, is not the one of --tool" in done.skipped[-1]
 
 
+def test_two_tools_that_are_set_one_after_the_other_are_two():
+    lines = krl("  $BASE = $NULLFRAME\n  $TOOL = {{{tool}}}\n").replace("END", "").replace("DEF weld()", "")
+    other = lines.replace(krl_pose(TORCH), krl_pose(TABLE))
+    assert "give one of them with --tool" in skipped(lines + other, ".src")
+
+
+def test_a_quaternion_that_is_none_is_refused():
+    text = f"MoveL [[300,0,400],[0,0,0,0],[{CONF},0],[9E9,9E9,9E9,9E9,9E9,9E9]], v50, fine, tool0;\n"
+    assert "quaternion [0.0, 0.0, 0.0, 0.0]: its length is not 1" in skipped(text, ".mod")
+
+
 KRL_FRAMES = {
     "literal": "  $BASE = {{{base}}}\n  $TOOL = {{{tool}}}\n",
     "data": "  BASE_DATA[2] = {{{base}}}\n  TOOL_DATA[3] = {{FRAME: {tool}}}\n"
