@@ -86,7 +86,7 @@ def run(arguments: list[str]) -> int:
         errors.print(f"stopped by {interruption(interrupt)}")
         return 1
     except TOLD as error:
-        errors.print("error:", "\n".join(map(brief, str(error).splitlines())), markup=False)
+        errors.print("error:", brief(str(error)), markup=False)
         return 1
     except BrokenPipeError:  # `calibeam rig list | head`: who reads has had enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

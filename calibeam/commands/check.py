@@ -68,7 +68,7 @@ def _clock(stream: Stream) -> str:
     wander = "" if model.wander_s is None else f", clock wanders {_ms(model.wander_s)}"
     rate = model.rate or 1.0
     if abs(rate - 1.0) > EMULATED:
-        return f"recorded at {1.0 / rate:.3g} x real time, {delays}{wander}"
+        return f"recorded at {1.0 / rate:.3g} x real time by emulators, so that delays have no meaning"
     return f"clock {1e6 * (rate - 1.0):+z.1f} µs/s against the host, {delays}{wander}"
 
 

@@ -122,7 +122,9 @@ def _simulated(
     try:
         return given, (*found, *(by_hand(text, plain) for text in hide))
     except WrittenError as wrong:
-        raise DataError(str(wrong)) from wrong
+        says, _, listed = str(wrong).partition("\n")  # a list of all mechanisms is longer than an error may be
+        print(listed, end="\n" * bool(listed), file=sys.stderr, flush=True)
+        raise DataError(says) from wrong
 
 
 def _print_json(where: dict[str, dict[str, Any]]) -> None:

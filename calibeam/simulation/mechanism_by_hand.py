@@ -52,7 +52,7 @@ def by_hand(text: str, rig: Mapping[str, Any]) -> Defect:
     name, *words = text.split() or [""]
     kind = next((kind for kind in BY_HAND if name == kind.KIND), None)
     if kind is None:
-        raise WrittenError(f"--hide {name!r}: no mechanism of this name; there are\n{listing()}")
+        raise WrittenError(f"--hide {name!r}: no mechanism of this name; take one of the list\n{listing()}")
     given = _given(kind, words)
     known = {field.name for field in _fields(kind)}
     wrong = sorted(given.keys() - known)

@@ -51,8 +51,7 @@ def _named(shots: Shots, i: int, misfit: Floats, scale: float) -> Blunder:
     best = suspects[0]
     alone = len(suspects) == 1 or suspects[1].left > CLEARER * max(best.left, scale)
     if len(misfit) > 1 and best.left < EXPLAINED * scale and alone:
-        per, unit = (np.degrees(1.0), "°") if best.unit == "rad" else (1.0, f" {best.unit}")
-        what = f"reads {per * best.written:.9g}{unit} where the other rows give about {per * best.meant:.6g}{unit}"
+        what = f"reads {best.written:.9g} where the other rows give about {best.meant:.6g} {best.unit}"
         return Blunder(BlunderKind.WRONG_VALUE, rows, best.column, what, "correct the cell, or remove the row")
     away = float(np.linalg.norm(misfit * shots.sigma))
     unit = "mrad" if _unit(shots.columns[0]) == "rad" else "mm"

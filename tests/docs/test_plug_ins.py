@@ -215,7 +215,7 @@ def test_a_model_of_a_sensor_that_is_not_installed_is_refused_with_the_name(expo
 
 
 def test_a_form_that_nobody_brings_is_named_with_those_there_are(site_packages: Path) -> None:
-    with pytest.raises(DataError, match=r"no form of export is called 'pykdl'; there are urdf, .*table; install"):
+    with pytest.raises(DataError, match=r"no form of export is called 'pykdl'; choose one of urdf, .*table"):
         form_named("pykdl")
 
 

@@ -8,6 +8,7 @@ import pytest
 from msgspec import structs
 
 from acquisition.recording.rig import parse_rig
+from calibeam.cli import run
 from calibeam.simulation.emulated import emulated
 from calibeam.simulation.mechanism_by_hand import BY_HAND, by_hand, form, unit_of
 from calibrate.errors import DataError
@@ -123,6 +124,14 @@ def test_a_wrong_name_lists_every_mechanism_with_its_unit() -> None:
     assert "soft-joint jointN SIZE (compliance_rad_nm, rad/Nm)" in str(failed.value)
     assert all(form(kind) in str(failed.value) for kind in BY_HAND)
     assert unit_of("expansion_per_k") == "1/K"
+    assert unit_of("hardening_rad_nm3") == "rad/Nm³"
+
+
+def test_the_command_prints_the_whole_list_and_a_short_error(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["emulate", str(RIG), "--hide", "spring"]) == 1
+    *listed, error = capsys.readouterr().err.strip().splitlines()
+    assert [line.strip() for line in listed] == [form(kind) for kind in BY_HAND]
+    assert error == "error: --hide 'spring': no mechanism of this name; take one of the list"
 
 
 def test_a_soft_joint_by_hand_bends_the_emulated_beam() -> None:
