@@ -32,9 +32,7 @@ CLOSE = 1e-9  # m and rad: far below what any arm repeats
 MOVED_RAD = 1e-4  # a joint that went less far has not moved, as in effects/conditions.py
 RANGE_SLACK = 1e-9  # of the recorded range: rounding
 OK, LIMIT, UNREACHABLE, OUTSIDE, SINGULAR = "ok", "limit", "unreachable", "outside", "singular"
-SINGULAR_GAIN = (
-    10.0  # joints turn about as far as the tool is off; in a wrist 2.6 degrees from its singularity ten times
-)
+SINGULAR_GAIN = 10.0  # joints of a regular posture turn about as far as the tool is off: 1
 SINGULAR_RAD = np.radians(0.5)  # a joint that turns less does so unseen
 
 
@@ -132,7 +130,7 @@ def correct(model: ModelFile, wanted: Wanted, inverse_of: Inverse, options: Opti
     _refuse_beyond(arms, q_rad, via_rad, why)
     before, _, _ = predicted_errors(model, wanted, nominal_rad, conditions, options)
     after, beyond, notes = predicted_errors(model, wanted, q_rad, conditions, options)
-    far_m = np.maximum(np.linalg.norm(wanted.T_base_tool[:, :3, 3], axis=1), 0.1)
+    far_m = np.maximum(np.abs(wanted.T_base_tool[:, :3, 3]).max(axis=1), 0.1)
     off_rad = before.error_rad + before.error_m / far_m  # what joints of a regular posture turn by, about
     singular = _near_singular(q_rad - nominal_rad, off_rad)
     status, says = _stated(arms, q_rad, why, beyond, singular, options.margin_rad)

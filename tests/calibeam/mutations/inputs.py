@@ -67,6 +67,7 @@ POSES = """x_m,y_m,z_m,rx_rad,ry_rad,rz_rad
 0.35,-0.2,0.4,2.9,0.2,0.1
 """
 WELD = """DEF weld()
+$BASE = {X 0.0, Y 0.0, Z 0.0, A 0.0, B 0.0, C 0.0}
 PTP {A1 0, A2 -90, A3 90, A4 0, A5 90, A6 0}
 LIN {X 400.0, Y 100.0, Z 300.0, A 180.0, B 0.0, C 180.0}
 END
