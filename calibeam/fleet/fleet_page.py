@@ -267,8 +267,8 @@ def _now(fleet: Fleet) -> Html | None:
         return None
     lead = (
         "The last recording of each robot, a whole one where there is one. Unseen rows: rms error on rows that the fit "
-        "has not seen. Tool error: rms over the workspace, nominal against calibrated, and the predicted "
-        "error of the calibrated arm."
+        "has not seen. Geometry error: rms of the tool between the joint limits, nominal against calibrated, then one "
+        "sigma of the calibrated geometry; the tool error in a report also has the scatter of a single pose."
     )
     rows = [
         (
@@ -281,7 +281,7 @@ def _now(fleet: Fleet) -> Html | None:
         )
         for row in newest[:LISTED]
     ]
-    head = ("Robot", "recorded", "unseen rows", "tool error", "diagnosis", "trust")
+    head = ("Robot", "recorded", "unseen rows", "geometry error", "diagnosis", "trust")
     return section("now", CONTENTS["now"], lead, table(head, rows), *_more(len(newest)))
 
 

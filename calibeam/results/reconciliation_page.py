@@ -16,7 +16,7 @@ from calibrate.report.tones import Tone
 
 CONTENTS = {
     "before": "Before",
-    "left-out": "What the simulation left out",
+    "left-out": "What the simulation lacks",
     "after": "After",
     "remains": "What remains",
 }
@@ -45,7 +45,7 @@ def reconciliation_html(found: Reconciled) -> str:
 
 def _before(found: Reconciled) -> Html:
     file, first = found.file, found.before.first_link
-    where = f" They part first at the {first}." if first else ""
+    where = f" They differ first at the {first}." if first else ""
     lead = (
         f"Measured less simulated on {len(file.unseen_rows)} rows that nothing was fitted to; where the measuring "
         f"device stands is taken into account.{where}"
