@@ -6,6 +6,7 @@ So that the table is never typed, and always that of a file.
 import re
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -18,8 +19,6 @@ from calibeam.prove.tally import (
     by_enr,
     by_instrument,
     figures,
-    in_streams,
-    over_the_wire,
     plain,
     rivals,
 )
@@ -73,8 +72,8 @@ def _findings(cases: Sequence[CaseScore]) -> list[str]:
         plain(cases, f"all of {PLAIN:g} and more"),
         at_once(cases, "three"),
         at_once(cases, "eighteen"),
-        over_the_wire(cases),
-        in_streams(cases),
+        plain([c for c in cases if c.path == "on wires"], "of these, over the emulated wires"),
+        replace(at_once(cases, "streams"), label="faults found in streams"),
     ]
     head = (
         "hidden, effect over noise",

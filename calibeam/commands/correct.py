@@ -208,6 +208,9 @@ def _print_found(
         f"{UM * found.before.rms_m:.0f} µm before, {UM * found.after.rms_m:.1f} µm after"
     )
     say(f"{commanded} of {len(names)} poses corrected{rms if commanded else ''}")
+    if (far_mm := 1e3 * np.nanmax(found.before.error_m, initial=0.0)) > 10.0:  # seldom is geometry off by more
+        remedy = "check the mastering, and the tool of the poses: [tool] point_m of the rig file, or --tool"
+        say(f"CHECK BEFORE YOU RUN IT: corrections of up to {far_mm:.0f} mm; {remedy}")
     if model.covariance is None:
         say("the model has no covariance: the predicted errors have no uncertainty")
     bad = [f"{name}: {status}: {why}" for name, status, why in zip(names, found.status, found.says, strict=True) if why]

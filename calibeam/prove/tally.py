@@ -152,12 +152,6 @@ def plain(cases: Sequence[CaseScore], label: str) -> TallyLine:
     return _line(label, [c for c in cases if c.kind in SINGLE and _enr(c) >= PLAIN])
 
 
-def over_the_wire(cases: Sequence[CaseScore]) -> TallyLine:
-    """Plain single effects of sessions that went over the emulated wires; they count above, too."""
-    ones = [c for c in cases if c.kind in SINGLE and _enr(c) >= PLAIN and c.path == "on wires"]
-    return _line("of these, over the emulated wires", ones)
-
-
 def by_effect(cases: Sequence[CaseScore]) -> list[TallyLine]:
     """Plain effects, single or several at once, by mechanism."""
     kept = [c for c in cases if c.kind in (*SINGLE, "three", "eighteen")]
@@ -173,11 +167,6 @@ def by_effect(cases: Sequence[CaseScore]) -> list[TallyLine]:
 def at_once(cases: Sequence[CaseScore], kind: str) -> TallyLine:
     """Several effects at once: each counts."""
     return _line(kind, [c for c in cases if c.kind == kind])
-
-
-def in_streams(cases: Sequence[CaseScore]) -> TallyLine:
-    """All faults that streams show, together."""
-    return _line("faults found in streams", [c for c in cases if c.kind == "streams"])
 
 
 def between_encoders(cases: Sequence[CaseScore]) -> list[TallyLine]:

@@ -37,7 +37,8 @@ USED = re.compile(r"\\WObj\s*:=\s*(?P<name>\w+)", re.IGNORECASE)
 SHIFTED = re.compile(r"\bPDisp(?:Set|On)\b", re.IGNORECASE)
 NAMED = re.compile(r"\b(?:robtarget|jointtarget)\s+(?P<name>\w+)\s*:=\s*$", re.IGNORECASE)
 INLINE = re.compile(r"\bMove(?:J|AbsJ|L)\s+$", re.IGNORECASE)
-MOVE = re.compile(r"\bMove(?:J|AbsJ|L|C|\w+)\s+(?P<target>[A-Za-z_]\w*)", re.IGNORECASE)
+PROCESS = r"(?:Arc|Cap|Cut|Disp|Paint|Spot|Trigg)[JLC]\w*"  # moves of the options: their target comes first, too
+MOVE = re.compile(rf"\b(?:Move\w+|{PROCESS})\s+(?:\\\w+\s*,\s*)?(?P<target>[A-Za-z_]\w*)", re.IGNORECASE)
 CIRCLE = re.compile(r"\bMoveC\b", re.IGNORECASE)
 REST = re.compile(r"\bMove\w+\s+(?:\[.*\]\]|\w+)\s*(?P<rest>(?:\\[^,]*)?,.*;)", re.IGNORECASE)
 LONGEST = 200  # letters between the beginning of a declaration, or of a move, and its target

@@ -1,6 +1,7 @@
 """Tables of poses: what is read and refused, and where the real tool stands at the commands."""
 
 import csv
+import re
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from calibrate.model_file import write_model
 from calibrate.physics.predicting import placed
 
 from ..physics.two_joints import PLAY_RAD, two_joints
-from .six_joints import SIGMA, drawn, inverse, model, postures, real
+from .six_joints import CHAIN, SIGMA, drawn, inverse, model, postures, real
 
 Q = postures(4)
 T = drawn().frames(Q)[:, -1]
@@ -154,6 +155,7 @@ def test_the_command_writes_a_row_for_every_pose_and_ends_as_partial_where_one_h
     assert run([*arguments, str(tmp_path / "c.csv"), "--approach", "negative", "--condition", "payload_kg=2"]) == 3
     printed = capsys.readouterr().out
     assert "1 of 2 poses corrected" in printed
+    assert "CHECK" not in printed
     assert "pose 2: unreachable: out of reach of the nominal arm" in printed
     assert "payload_kg is given; no effect of the model depends on it" in printed
     with (tmp_path / "c.csv").open() as file:
@@ -166,3 +168,14 @@ def test_the_command_writes_a_row_for_every_pose_and_ends_as_partial_where_one_h
     assert rows[2]["q1_rad"] == rows[2]["error_after_m"] == ""
     assert float(rows[0]["q1_rad"]) - float(rows[1]["q1_rad"]) == pytest.approx(np.radians(2.0))
     assert run([*arguments, str(tmp_path / "poses.csv")]) == 1
+
+
+def test_corrections_larger_than_an_arm_is_off_are_to_be_checked_first(tmp_path, capsys):
+    """As with another tool than that of the rig file, or after the mastering was lost: here joint 2 by 2.9 degrees."""
+    write_model(tmp_path / "model.json", model(chain={**CHAIN, "joint2.zero": 0.05}))
+    row = [*T[0, :3, 3].tolist(), *Rotation.from_matrix(T[0, :3, :3]).as_rotvec().tolist()]
+    (tmp_path / "poses.csv").write_text("x_m,y_m,z_m,rx_rad,ry_rad,rz_rad\n" + ",".join(map(repr, row)))
+    arguments = ["correct", str(tmp_path / "model.json"), str(tmp_path / "poses.csv"), "--out", str(tmp_path / "c.csv")]
+    assert run(arguments) in (0, 3)
+    printed = " ".join(capsys.readouterr().out.split())
+    assert re.search(r"CHECK BEFORE YOU RUN IT: corrections of up to \d\d mm; check .* --tool", printed)

@@ -117,6 +117,7 @@ def test_what_a_rapid_file_only_names_is_not_corrected_in_the_base():
         (rapid(tool_held="FALSE"), "tool torch is stationary"),
         (rapid(more="    PDispSet shift;\n"), "the program displaces its targets"),
         (rapid(more="    MoveL p10, v50, fine, torch;\n"), "it is used in several frames (table, wobj0)"),
+        (rapid(more="    ArcL p10, v50, seam, bead, fine, torch\\WObj:=jig;\n"), "the pose of jig is not in this file"),
     ],
 )
 def test_work_objects_that_move_and_targets_of_two_frames_are_refused(text, says):
