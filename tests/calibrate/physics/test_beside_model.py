@@ -183,7 +183,7 @@ def test_a_known_structure_is_refitted_to_another_recording(soft, capsys):
     folder, model, defect = soft
     recording, out = later(folder, "refit", folder / "unseen.csv"), folder / "refit.json"
     assert run(["identify", str(recording), "--model", str(folder / "model.json"), "--out", str(out)]) == 0
-    assert "1 effects refitted" in capsys.readouterr().out
+    assert "1 effect refitted" in capsys.readouterr().out
     refitted = json.loads(out.read_text())
     assert refitted["schema"] == 2
     assert refitted["readings_sha256"] != model["readings_sha256"]
