@@ -71,7 +71,7 @@ def test_the_check_tries_the_camera_too(site, capsys) -> None:
     assert run(["check", str(site[0])]) == 0
     (line,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("camera")]
     assert re.search(
-        r"camera +good +960 x 720 from http.*image.jpg, \d+ Hz, board (in \d of 3|not in the) picture", line
+        r"camera +ok +960 x 720 from http.*image.jpg, \d+ Hz, board (in \d of 3|not in the) picture", line
     )
 
 

@@ -24,7 +24,7 @@ from drivers.errors import DeviceError
 def emulated(rig: Rig, emulation: Emulation) -> Rig:
     """The shipped rig with its devices where the emulators are."""
     where = addresses_of(rig, emulation.address)
-    devices = structs.replace(rig.devices, psd=where.psd, robot=where.robot, encoders=where.encoders)
+    devices = structs.replace(rig.devices, psd=where.instrument, robot=where.robot, encoders=where.encoders)
     return structs.replace(rig, devices=devices)
 
 
