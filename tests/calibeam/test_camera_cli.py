@@ -70,9 +70,7 @@ def test_a_session_comes_to_light_by_camera(site, tmp_path: Path) -> None:
 def test_the_check_tries_the_camera_too(site, capsys) -> None:
     assert run(["check", str(site[0])]) == 0
     (line,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("camera")]
-    assert re.search(
-        r"camera +ok +960 x 720 from http.*image.jpg, \d+ Hz, board (in \d of 3|not in the) picture", line
-    )
+    assert re.search(r"camera +ok +960 x 720 from http.*image.jpg, \d+ Hz, board (in \d of 3|not in the) picture", line)
 
 
 def test_a_camera_that_was_not_measured_is_refused_with_the_remedy() -> None:

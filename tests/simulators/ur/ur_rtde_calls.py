@@ -241,6 +241,8 @@ CONTROL = [
     Row("control", "moveL", (NOW.pose, 0.2, 2.0), gives=True),
     Row("control", "startContactDetection", (ZEROS,), gives=True),
     Row("control", "moveL", (shifted(NOW.pose, -0.1), 0.1, 2.0, True), gives=True),
+    # The way back begins between two commands, and counts its cycles from the contact: none delays it for 0.8 s.
+    *[Row("receive", "getTimestamp", gives=lambda time_s: time_s > 0.0, again=True)] * 4,
     Row("control", "readContactDetection", gives=True, until="true"),
     Row("control", "stopContactDetection", gives=True),
     Row("control", "isSteady", gives=True, until="true"),
