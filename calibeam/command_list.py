@@ -79,10 +79,6 @@ GROUPS: dict[str, tuple[ListedCommand, ...]] = {
             "Export a model to another program, or to its controller.",
         ),
         ListedCommand("recover", "recover:recover_command", "Save what is readable of a damaged recording."),
-        ListedCommand("layouts", "layouts:layouts_command", "Write Foxglove and PlotJuggler layouts for a recording."),
-    ),
-    "Development": (
-        ListedCommand("completion", "completion:completion_command", "Print the completion script of a shell."),
     ),
 }
 

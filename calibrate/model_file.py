@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.files import JsonKind, read_json, shown, write_json
+from acquisition.recording.files import JsonKind, json_output, read_json, shown, write_json
 from acquisition.recording.files.bounds import (
     Correction,
     Count,
@@ -26,7 +26,6 @@ from acquisition.recording.files.bounds import (
     Whole,
 )
 from calibrate.errors import DataError
-from calibrate.older_models import with_present_names
 from calibrate.parameters import Parameter
 from calibrate.physics.records import Effect, SessionRecord, check_physics
 from calibrate.sensors.catalogue import BY_NAME, FRAMES
@@ -38,6 +37,7 @@ Fields = dict[Name, Statistic | Whole | Sentence | bool | None]
 ArmName = Annotated[str, msgspec.Meta(pattern="^(dh|mdh|local-poe)$")]
 About = dict[Name, tuple[Metres, ...]]
 SCHEMA, WITH_PHYSICS = 1, 2
+MODEL = json_output("calibeam-model", "model.json")
 KIND = JsonKind("model.json", "give the model.json of an identification", "identify the recording again", DataError)
 
 
@@ -215,7 +215,7 @@ def write_model(path: Path, model: ModelFile) -> None:
 
 def read_model(path: Path) -> ModelFile:
     """Read model.json. DataError naming file, place and remedy where it is none or of another version."""
-    return read_json(path, KIND, ModelFile, _other, with_present_names)
+    return read_json(path, KIND, ModelFile, _other)
 
 
 def _other(content: dict[str, Any]) -> str | None:

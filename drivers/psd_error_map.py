@@ -60,8 +60,9 @@ class ErrorMap:
         true_x, true_y = _columns(u, v) @ np.array(self.x_m), _columns(v, u) @ np.array(self.y_m)
         return np.where(known, true_x, np.nan), np.where(known, true_y, np.nan)
 
-    def save(self, path: Path) -> None:
-        path.write_text(json.dumps({"format": FORMAT, **asdict(self)}, indent=1) + "\n")
+    def text(self) -> str:
+        """The content of its file."""
+        return json.dumps({"format": FORMAT, **asdict(self)}, indent=1) + "\n"
 
     @staticmethod
     def load(path: Path) -> "ErrorMap":

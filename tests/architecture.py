@@ -25,9 +25,13 @@ class Module:
     """One file: its dotted name, its lines, its tree, and which modules of ours it imports when it is loaded."""
 
     name: str
-    lines: int
+    text: str
     tree: ast.Module
     imports: frozenset[str]
+
+    @property
+    def lines(self) -> int:
+        return len(self.text.splitlines())
 
     @property
     def is_face(self) -> bool:
@@ -44,7 +48,7 @@ def modules() -> dict[str, Module]:
         text = path.read_text(encoding="utf-8")
         tree = tree_of(path)
         imports = frozenset(m for m in _imported(tree.body, named.keys()) if m != name)
-        found[name] = Module(name, len(text.splitlines()), tree, imports)
+        found[name] = Module(name, text, tree, imports)
     return found
 
 
@@ -75,6 +79,19 @@ def function_lengths() -> list[int]:
         for f in ast.walk(m.tree)
         if isinstance(f, ast.FunctionDef | ast.AsyncFunctionDef)
     )
+
+
+def code_lines(module: Module) -> int:
+    """Without blank lines, comments and docstrings: an explanation costs nothing."""
+    holders = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    explained = {
+        line
+        for node in ast.walk(module.tree)
+        if isinstance(node, holders) and ast.get_docstring(node, clean=False) is not None
+        for line in range(node.body[0].lineno, (node.body[0].end_lineno or 0) + 1)
+    }
+    numbered = enumerate(module.text.splitlines(), start=1)
+    return sum(bool(line.strip()) and not line.lstrip().startswith("#") and n not in explained for n, line in numbered)
 
 
 def _lines_of(node: ast.stmt) -> int:
@@ -142,7 +159,9 @@ def figures() -> tuple[Figure, ...]:
     """Nothing is counted yet: who collects the tests does not read the whole source."""
     return (
         Figure("product files", lambda: len(modules()), TODAY["files"], 550),
-        Figure("product lines", lambda: sum(m.lines for m in modules().values()), TODAY["lines"], 78_000),
+        Figure(
+            "code lines of the product", lambda: sum(code_lines(m) for m in modules().values()), TODAY["code"], 72_500
+        ),
         Figure("lines of the file in nine of ten files, at most", lambda: _nine_of_ten(lengths()), 400, 400),
         Figure("lines of nine of ten functions, at most", lambda: _nine_of_ten(function_lengths()), 40, 40),
         Figure("lines of the longest function", lambda: function_lengths()[-1], TODAY["longest_function"], 80),
@@ -155,7 +174,7 @@ def figures() -> tuple[Figure, ...]:
 
 TODAY = {
     "files": 809,
-    "lines": 110_690,
+    "code": 77_500,
     "longest_function": 54,
     "one_importer": 15,
     "classes": 26,

@@ -11,10 +11,12 @@ from msgspec import Meta, Struct
 from acquisition.recording.errors import RigFileError, shown
 from acquisition.recording.files.bounds import Identity, Kilograms, Many, Metres, Name, PerJoint, Radians, Sentence
 from acquisition.recording.files.explain import KeyPath
+from acquisition.recording.files.output import toml_output, write_output
 from acquisition.recording.files.toml_file import parse_toml, read_text
 from acquisition.recording.rig import Rig
 
 Way = Annotated[int, Meta(ge=-1, le=1)]
+POSE_PLAN = toml_output(("schema", "rig", "purpose"), "pose plan")
 Spots = tuple[Metres, Metres, Metres, Metres]
 
 
@@ -60,9 +62,8 @@ def read_pose_plan(path: Path, rig: Rig) -> PosePlan:
 
 
 def write_pose_plan(path: Path, plan: PosePlan) -> None:
-    """Write the file. OSError where it cannot be written."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text("\n".join(_lines(plan)) + "\n", encoding="utf-8")
+    """Write the file. OutputError, OSError as `write_output`."""
+    write_output(path, "\n".join(_lines(plan)) + "\n", POSE_PLAN)
 
 
 def _contradictions(plan: PosePlan, rig: Rig) -> Iterator[tuple[KeyPath, str]]:

@@ -10,6 +10,7 @@ from rich.console import Console
 
 from calibeam.fleet.recordings import PAGE, TABLE, Engine, Workers
 from calibeam.outcome import PartialResult
+from calibeam.overwriting import writes
 from calibeam.printing.progress import progress_bar
 from calibrate.errors import DataError
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from calibeam.fleet.summary import Fleet
 
 
+@writes("out")
 def batch_command(
     folder: Path,
     *,

@@ -10,9 +10,11 @@ from calibeam.asking import YES, at_terminal, someone
 from calibeam.devices.recorder import new_recording
 from calibeam.devices.site import addresses_of, check_session, connected
 from calibeam.outcome import CheckFailed
+from calibeam.overwriting import writes
 from drivers.clock import SystemClock
 
 
+@writes("out")
 def camera_command(
     rig: Path, *, out: Path = Path("camera"), placement: int | None = None, time_scale: float = 1.0, yes: bool = False
 ) -> None:

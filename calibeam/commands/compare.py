@@ -6,7 +6,8 @@ import msgspec
 from rich.console import Console
 
 from acquisition.recording import Recording, read
-from acquisition.recording.files import write_json
+from acquisition.recording.files import json_output, write_json
+from calibeam.overwriting import writes
 from calibeam.printing.comparison_lines import print_comparison
 from calibeam.results.comparison import compare
 from calibeam.results.identification import naming_source
@@ -15,6 +16,7 @@ from calibrate.errors import DataError
 from calibrate.model_file import ModelFile, read_model
 
 
+@writes(out=json_output("calibeam-comparison"))
 def compare_command(
     measured: Path,
     simulated: Path | None = None,

@@ -1,6 +1,5 @@
 """`calibeam correct`: joint commands and corrected programs that bring the real tool where it is wanted."""
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -11,9 +10,11 @@ from numpy.typing import NDArray
 from rich.console import Console
 from scipy.spatial.transform import Rotation
 
+from acquisition.recording.files import OutputKind, csv_text, table_output, write_output
 from acquisition.recording.rig import parse_rig
 from calibeam.motion.motion_inverse import MotionInverse
 from calibeam.outcome import PartialResult
+from calibeam.overwriting import writes
 from calibrate.arms.rig_arm import RigArm
 from calibrate.correct.corrected import Corrected, Options, Wanted, correct
 from calibrate.correct.programs.rewriting import correct_program, dialect_of
@@ -29,8 +30,11 @@ LONGEST = 10_000  # letters of a line; controllers end at some hundred
 LISTED = 12  # poses that are not ok, before the rest is counted
 SIDES = {"positive": 1, "negative": -1}
 UM = 1e6
+CORRECTED = table_output(("status", "says"), "table of corrected poses")
+CORRECTED_PROGRAM = OutputKind("file that can be made again", lambda _: False)  # a program has no mark of ours
 
 
+@writes("out")
 def correct_command(
     model: Path,
     poses: Path,
@@ -143,7 +147,8 @@ def _table(job: _Job, poses: Path, out: Path, options: Options) -> tuple[Correct
     place = np.eye(4) if job.frame is None else job.frame
     wanted = _begun(read_poses(_text(poses, "utf-8"), str(poses), job.n_joints, place, job.every), job.near_rad)
     found = correct(job.known, wanted, job.solver, options)
-    _write_table(out, *corrected_rows(found, place))
+    header, rows = corrected_rows(found, place)
+    write_output(out, csv_text([header, *rows]), CORRECTED)
     given = tuple(
         f"column {c} is no condition that the model depends on"
         for c in wanted.conditions
@@ -162,8 +167,7 @@ def _program(
     done = correct_program(
         job.known, text, dialect, job.frame, job.near_rad, job.every, job.solver, options, poses.name
     )
-    out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_bytes(done.text.encode("latin-1"))
+    write_output(out, done.text.encode("latin-1"), CORRECTED_PROGRAM)
     names = list(done.names)
     _print_program(console, done.diff, done.found, names, verbose)
     return done.found, names, done.skipped
@@ -220,12 +224,6 @@ def _print_found(
         say(f"... {len(bad) - LISTED} more (--verbose lists all; so does the column 'says')")
     for note in notes:
         say(note)
-
-
-def _write_table(out: Path, header: list[str], rows: list[list[str]]) -> None:
-    out.parent.mkdir(parents=True, exist_ok=True)
-    with out.open("w", encoding="utf-8", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerows([header, *rows])
 
 
 def _text(path: Path, encoding: str) -> str:

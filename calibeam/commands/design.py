@@ -9,10 +9,12 @@ import numpy as np
 from cyclopts import Parameter, validators
 from rich.console import Console
 
-from acquisition.recording.pose_plan import write_pose_plan
+from acquisition.recording.pose_plan import POSE_PLAN, write_pose_plan
 from acquisition.recording.rig import Rig, load_rig
+from calibeam.overwriting import writes
 from calibeam.printing.progress import progress_bar
 from calibeam.software import SOFTWARE
+from calibrate.report.elements import page_output
 
 if TYPE_CHECKING:  # loaded when it is needed: it takes a second
     from calibrate.pose_design.places import Places
@@ -24,6 +26,7 @@ PER_BLOCK, PER_GRID_PLACE = 120, 16  # candidates: of a place and order of the r
 DISTANCE_SIGMA_M = 20e-6  # of a distance between places, where the rig states none: docs/formats.md
 
 
+@writes(out=POSE_PLAN, report=page_output("pose design"))
 def design_command(
     rig: Path,
     *,

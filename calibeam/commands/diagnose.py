@@ -7,16 +7,20 @@ import msgspec
 from rich.console import Console
 
 from acquisition.recording import Recording, read
+from acquisition.recording.pose_plan import POSE_PLAN
+from calibeam.overwriting import writes
 from calibeam.printing.progress import stages_shown
 from calibeam.printing.results import print_diagnosis, print_streams
 from calibeam.results.diagnosis import diagnose_recording, diagnose_streams, plan_next, refuse_wrong_file
 from calibeam.results.identification import naming_source
-from calibrate.diagnose.file import write_diagnosis
-from calibrate.model_file import read_model, write_model
+from calibrate.diagnose.file import DIAGNOSIS, write_diagnosis
+from calibrate.model_file import MODEL, read_model, write_model
 from calibrate.physics.from_diagnosis import model_of_diagnosis
 from calibrate.report.diagnosis.diagnosis_page import write_diagnosis_report
+from calibrate.report.elements import page_output
 
 
+@writes(out=DIAGNOSIS, model_out=MODEL, report=page_output("diagnosis"), plan_out=POSE_PLAN)
 def diagnose_command(
     recording: Path,
     *,

@@ -9,13 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from acquisition.recording.files import text_output
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
+from calibeam.overwriting import writes
 
 if TYPE_CHECKING:
     from simulators.defects import Defect
     from simulators.world.truth import Given
 
 
+@writes(truth=text_output('"joint_zero_rad"', "truth file"))
 def emulate(
     rig: Path,
     *,

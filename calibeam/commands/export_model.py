@@ -3,12 +3,14 @@
 from pathlib import Path
 
 from acquisition.recording.rig import ArmModel, parse_rig
+from calibeam.overwriting import writes
 from calibrate.converted_rig import rig_in_model
 from calibrate.errors import DataError
 from calibrate.export.export import FormName, export_model, form_named
 from calibrate.model_file import read_model
 
 
+@writes("out")
 def export_model_command(model: Path, *, to: FormName | str, out: Path | None = None) -> None:
     """Export a model to another program, or to its controller.
 

@@ -9,6 +9,7 @@ from rich.console import Console
 
 from acquisition.recording import read
 from acquisition.recording.rig import Rig
+from calibeam.overwriting import writes
 from calibeam.printing.identification import print_identification, refitted_lines
 from calibeam.results.identification import (
     Planned,
@@ -22,11 +23,12 @@ from calibrate.errors import DataError
 from calibrate.export.export import ExportForm, FormName, export_model, form_named
 from calibrate.fit import Status
 from calibrate.identification.planned import rig_as_planned
-from calibrate.model_file import ModelFile, read_model, write_model
+from calibrate.model_file import MODEL, ModelFile, read_model, write_model
 from calibrate.report.session_evidence import session_evidence
 from calibrate.sensors.catalogue import unused_columns
 
 
+@writes(out=MODEL)
 def identify_command(
     recording: Path,
     *,

@@ -1,6 +1,5 @@
 """`calibeam iso9283`: a pose test after ISO 9283 as a plan, and what a recording of it shows."""
 
-import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,13 +13,21 @@ from rich.console import Console
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Samples, read
-from acquisition.recording.files import write_json
-from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan, read_pose_plan, write_pose_plan
+from acquisition.recording.files import csv_text, json_output, table_output, write_json, write_output
+from acquisition.recording.pose_plan import (
+    POSE_PLAN,
+    PlannedBlock,
+    PlannedPose,
+    PosePlan,
+    read_pose_plan,
+    write_pose_plan,
+)
 from acquisition.recording.rig import Rig, load_rig, parse_rig
 from acquisition.recording.session_folder import read_csv
 from calibeam.motion.cube_in_reach import CubeInReach, cube_in_reach, ways_to
 from calibeam.motion.motion_inverse import MotionInverse
 from calibeam.outcome import taken_back
+from calibeam.overwriting import writes
 from calibeam.printing.pose_test import print_pose_test
 from calibeam.software import SOFTWARE
 from calibrate.arms.rig_arm import RigArm
@@ -34,6 +41,7 @@ from calibrate.model_file import ModelFile, read_model
 Floats = NDArray[np.float64]
 Count = Annotated[int, Parameter(validator=validators.Number(gte=2, lte=1000))]
 Length = Annotated[float, Parameter(validator=validators.Number(gt=0.0))]
+POSE_COLUMNS = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
 
 STANDARD = "ISO 9283:1998, Manipulating industrial robots - Performance criteria and related test methods"
 FORMULAS = {
@@ -76,6 +84,7 @@ class PoseTestFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 @iso9283.command
+@writes(out=POSE_PLAN, corrected=POSE_PLAN)
 def plan(
     rig: Path,
     *,
@@ -150,6 +159,7 @@ def plan(
 
 
 @iso9283.command(name="evaluate")
+@writes(out=json_output("calibeam-iso9283"))
 def evaluate_test(
     recording: Path,
     *,
@@ -301,9 +311,8 @@ def _corrected(known: ModelFile, cube: CubeInReach, visits: Sequence[_Visit]) ->
 
 def _write_poses(path: Path, cube: CubeInReach) -> None:
     turn = Rotation.from_matrix(cube.T_base_tool[:, :3, :3]).as_rotvec()
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        joints = [f"q{j + 1}_rad" for j in range(cube.q_rad.shape[1])]
-        writer.writerow(["x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad", *joints])
-        table = np.concatenate([cube.T_base_tool[:, :3, 3], turn, cube.q_rad], axis=1)
-        writer.writerows((table.round(12) + 0.0).tolist())  # no -0.0
+    header = [*POSE_COLUMNS, *(f"q{j + 1}_rad" for j in range(cube.q_rad.shape[1]))]
+    table = np.concatenate([cube.T_base_tool[:, :3, 3], turn, cube.q_rad], axis=1)
+    write_output(
+        path, csv_text([header, *(table.round(12) + 0.0).tolist()]), table_output(header, "table of poses")
+    )  # no -0.0

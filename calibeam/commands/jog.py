@@ -12,6 +12,7 @@ from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.kinematics import transform
 from acquisition.motion.paths.segments import By, Place, Segment
 from acquisition.recording.rig import load_rig
+from calibeam.overwriting import writes
 
 Floats = NDArray[np.float64]
 
@@ -19,6 +20,7 @@ AXES = "xyz"
 LARGEST_MM, LARGEST_DEG = 100.0, 30.0  # a step by hand; what is further is a motion: `calibeam move`
 
 
+@writes("out")
 def jog_command(
     rig: Path,
     *,

@@ -10,12 +10,15 @@ from rich.table import Table
 
 from acquisition.errors import TaskError
 from acquisition.motion.plan import Plan
+from acquisition.recording.files import json_output, write_output
 from acquisition.recording.rig import load_rig
 from calibeam.commands.demo import RIG, ShippedRig
 from calibeam.emulation import Emulation
+from calibeam.overwriting import writes
 from drivers.clock import SystemClock
 
 
+@writes("out")
 def motion_command(
     *,
     out: Path = Path("out/motion"),
@@ -70,7 +73,8 @@ def motion_command(
             shown = EXAMPLES[name](stage)
             plot(shown, solver, out)
             told[name] = numbers_of(shown, solver)
-    (out / "motion.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+    figures = {"schema": 1, "kind": "calibeam-motion", "examples": told}
+    write_output(out / "motion.json", json.dumps(figures, indent=1) + "\n", json_output("calibeam-motion"))
     if json_:
         print(json.dumps(told))
     else:

@@ -13,10 +13,12 @@ from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.paths.segments import By, Place, Segment
 from acquisition.motion.task.task_file import read_task
 from acquisition.recording.rig import Rig, load_rig
+from calibeam.overwriting import writes
 
 Floats = NDArray[np.float64]
 
 
+@writes("out")
 def move_command(
     rig: Path,
     *,

@@ -3,7 +3,6 @@
 predicted.csv has one row per sample, the shortest text of every number, nothing where there is none.
 """
 
-import csv
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,25 +11,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import Samples, read
+from acquisition.recording.files import csv_text, table_output, write_output
 from acquisition.recording.rig import Rig
 from acquisition.recording.session_folder import read_csv, read_parquet
+from calibeam.overwriting import writes
 from calibrate.errors import DataError
 from calibrate.model_file import read_model
 from calibrate.physics.predicting import predict_with_physics
 from calibrate.predict import Predictor
 
+PREDICTED = table_output(("outside",), "table of predictions")
+
 
 def write_predicted(path: Path, columns: Mapping[str, NDArray[np.float64]], outside: Sequence[str]) -> None:
     """Write columns (row,), NaN as an empty cell, and the drivers of each row that are beyond their recorded range.
 
-    OSError where the folder cannot be written.
+    OutputError, OSError as `write_output`.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*columns, "outside"])
-        for *row, beyond in zip(*(values.tolist() for values in columns.values()), outside, strict=True):
-            writer.writerow([*("" if math.isnan(value) else repr(value) for value in row), beyond])
+    rows = (
+        [*("" if math.isnan(value) else repr(value) for value in row), beyond]
+        for *row, beyond in zip(*(values.tolist() for values in columns.values()), outside, strict=True)
+    )
+    write_output(path, csv_text([[*columns, "outside"], *rows]), PREDICTED)
 
 
 def _table(path: Path, rig: Rig) -> Samples:
@@ -46,6 +48,7 @@ def _table(path: Path, rig: Rig) -> Samples:
     return read_parquet(path, rig) if path.suffix == ".parquet" else read_csv(path, rig)
 
 
+@writes(out=PREDICTED)
 def predict_command(
     model: Path, samples: Path, *, out: Path = Path("predicted.csv"), same_session: bool = False
 ) -> None:

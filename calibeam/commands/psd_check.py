@@ -10,16 +10,17 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from acquisition.recording import SamplesError
-from acquisition.recording.files import shown
+from acquisition.recording.files import shown, text_output, write_output
 from acquisition.recording.rig import load_rig
 from acquisition.recording.rig.devices import PsdDevice
 from acquisition.wires.psd_view import psd_window
 from calibeam.asking import Asking, NotAgreedError, at_terminal, someone
 from calibeam.devices.psd import PsdInstrument, psd_driver
+from calibeam.overwriting import writes
 from drivers.clock import SystemClock
 from drivers.device import Block
 from drivers.errors import DeviceRefused
-from drivers.psd_error_map import MapFit, MapStatus, fit_error_map
+from drivers.psd_error_map import FORMAT, MapFit, MapStatus, fit_error_map
 from drivers.psd_faces import Face
 from drivers.psd_kpa101.pair import counts_of
 from drivers.psd_kpa101.selfcheck import CheckStatus, UnitCheck, check_unit
@@ -40,6 +41,7 @@ class Seen:
     counts: Floats | None
 
 
+@writes(out=text_output(FORMAT, "error map"))
 def psd_check_command(rig: Path, *, points: Path, unit: int = 1, out: Path | None = None, wait: bool = True) -> None:
     """Check a detector against known spot positions.
 
@@ -91,7 +93,7 @@ def psd_check_command(rig: Path, *, points: Path, unit: int = 1, out: Path | Non
         # A map of spots that the rig mirrors or scales would do so a second time once the rig is put right.
         raise SamplesError(f"{out}: not written; correct {rig} first, then measure the map again")
     if out is not None and fit.map is not None:
-        fit.map.save(out)
+        write_output(out, fit.map.text(), text_output(FORMAT, "error map"))
         print(f"{out}: written; name it in error_maps of [devices.psd]")
 
 

@@ -10,12 +10,14 @@ from typing import Literal
 import msgspec
 
 from acquisition.recording import Recording, read
+from calibeam.overwriting import writes
 from calibeam.printing.identification import verdict_words
 from calibeam.results.identification import identify_and_judge, naming_source
 from calibeam.results.session_results import write_recording_report
 from calibrate.diagnose.file import read_diagnosis
 from calibrate.model_file import read_model
 from calibrate.report.drift.two_calibrations import Calibration
+from calibrate.report.elements import page_output
 from calibrate.report.verdict import Answers
 
 MODEL, DIAGNOSIS = "model.json", "diagnosis.json"  # as sessions name them
@@ -79,6 +81,7 @@ def summary_of(answers: Answers, path: Path) -> SummaryRecord:
     )
 
 
+@writes(out=page_output("report"))
 def report_command(
     recording: Path,
     *,

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from acquisition.recording.files import shown
+from acquisition.recording.files import shown, toml_output, write_output
 from acquisition.recording.rig import Rig, parse_rig, rig_text
 from calibeam.new_rig.from_dh import dh_table_text
 from calibrate.errors import DataError
@@ -77,8 +77,7 @@ def rig_command(
     else:
         text = _of_model(from_urdf, from_mjcf, base_link, tip_link)
     rig = parse_rig(text, str(out))
-    out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_text(text, encoding="utf-8")
+    write_output(out, text, toml_output(("schema", "arm"), "rig file"))
     print(f"rig: {out} ({_in_words(rig)})")
 
 

@@ -9,6 +9,7 @@ from rich.console import Console
 
 from acquisition.recording.rig import Rig, load_rig
 from calibeam.geometry_only import read_geometry
+from calibeam.overwriting import writes
 from calibeam.printing.progress import progress_bar
 from calibeam.printing.tables import print_error_simulation
 from calibeam.software import SOFTWARE
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 Count = Annotated[int, Parameter(validator=validators.Number(gte=1))]
 
 
+@writes("out")
 def simulate_errors_command(
     rig: Path,
     *,

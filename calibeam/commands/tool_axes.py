@@ -9,10 +9,11 @@ from rich.console import Console
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Recording, read
-from acquisition.recording.files import si_value, write_json
+from acquisition.recording.files import json_output, si_value, write_json
 from acquisition.recording.rig import Rig, rig_sha256
 from acquisition.recording.samples import ORIENTATION, POSITION
 from calibeam.outcome import PartialResult
+from calibeam.overwriting import writes
 from calibeam.printing.tables import print_tool_axes
 from calibeam.software import SOFTWARE
 from calibrate.arms.catalogue import arm_of
@@ -29,6 +30,7 @@ TARGET = "target"  # column: which target of the tool a row is of, a whole numbe
 MOST_TARGETS = 1000
 
 
+@writes(out=json_output("calibeam-tool"))
 def tool_axes_command(
     recording: Path,
     *,

@@ -9,15 +9,18 @@ from rich.console import Console
 from rich.table import Table
 
 from acquisition.recording import read
-from acquisition.recording.files import write_json
+from acquisition.recording.files import json_output, write_json
 from calibeam.geometry_only import read_geometry
 from calibeam.outcome import CheckFailed
+from calibeam.overwriting import writes
 from calibeam.software import SOFTWARE
+from calibrate.report.elements import page_output
 from calibrate.report.quantities import DASH, length
 from calibrate.report.verification_page import SAYS, write_verification_page
 from calibrate.verification.verify import Verification, verification_file, verify
 
 
+@writes(out=json_output("calibeam-verification"), report=page_output("verification"))
 def verify_command(
     recording: Path,
     *,

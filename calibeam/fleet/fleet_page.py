@@ -152,7 +152,7 @@ def fleet_html(fleet: Fleet, title: str) -> str:
     chapters = [_short(fleet), _drift(fleet), _causes(fleet), _now(fleet), _failed(fleet), _all(fleet)]
     kept = [(anchor, chapter) for anchor, chapter in zip(CONTENTS, chapters, strict=True) if chapter is not None]
     contents = {anchor: CONTENTS[anchor] for anchor, _ in kept}
-    return page(f"Fleet: {title}", _masthead(fleet, title), contents, [c for _, c in kept], SOFTWARE)
+    return page(f"Fleet: {title}", _masthead(fleet, title), contents, [c for _, c in kept], SOFTWARE, kind="fleet")
 
 
 def _masthead(fleet: Fleet, title: str) -> Html:

@@ -5,6 +5,7 @@ begins, its lines are merged into the table. One run at a time has the folder.
 """
 
 import fcntl
+import io
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import IO, Annotated, Any, Self, get_args, get_origin
@@ -14,7 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from acquisition.recording import RecordingError
-from acquisition.recording.files import shown
+from acquisition.recording.files import OutputKind, shown, write_output
 from calibeam.devices.recorder import uninterrupted
 from calibeam.fleet.recordings import JOURNAL, TABLE
 from calibeam.fleet.row import Row
@@ -56,12 +57,19 @@ def write_rows(path: Path, rows: Sequence[Row]) -> None:
         for key, name, kind in (*ZERO, STATUS, DRAWN):
             columns[f"joint{joint}_{name}"] = pa.array([z.get(key) for z in zeros], type=kind)
     table = pa.table(columns).replace_schema_metadata({KEY: VERSION})
-    partial = path.with_name(path.name + ".partial")
+    content = io.BytesIO()
+    pq.write_table(table, content)
     try:
-        pq.write_table(table, partial)
-        partial.replace(path)
+        write_output(path, content.getvalue(), OutputKind("table of a batch", _is_table))
     except OSError as error:
         raise RecordingError(f"{path}: cannot be written ({error.strerror or error}); make room on its disk") from error
+
+
+def _is_table(path: Path) -> bool:
+    try:
+        return (pq.read_schema(path).metadata or {}).get(KEY) == VERSION
+    except (OSError, ValueError):  # pyarrow.ArrowInvalid is a ValueError
+        return False
 
 
 def read_rows(path: Path) -> list[Row]:

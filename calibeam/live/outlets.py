@@ -1,7 +1,7 @@
 """What the live page shows as curves, sent on to people's own viewers: the views of a recording, while it happens.
 
 Foxglove connects to a WebSocket server of the Foxglove SDK and gets protobuf messages; PlotJuggler's "UDP Server" gets
-JSON. Topics and fields are those of a recording's `view/...`, so that the layouts of `calibeam layouts` fit both.
+JSON. Topics and fields are those of a recording's `view/...`: a layout that fits the one fits the other.
 Source: Foxglove SDK, "WebSocket server"; PlotJuggler 3, plugin "DataStreamUDP", message protocol "json", port 9870.
 """
 

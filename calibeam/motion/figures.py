@@ -1,5 +1,6 @@
 """Drawings of motion: planned and reported positions on top of each other, and the cell around them."""
 
+import io
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -13,12 +14,15 @@ from acquisition.motion.cell import Box, Cell
 from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.plan import Plan
 from acquisition.motion.setpoints import SolvedPath
+from acquisition.recording.files import text_output, write_output
 from calibeam.motion.examples import TOOL, ExampleResult
 from calibrate.report.svg import house_style
 from calibrate.report.tones import Tone
 
 Floats = NDArray[np.float64]
 
+CREATOR = "calibeam, drawn with Matplotlib"
+FIGURE = text_output(CREATOR, "drawing")
 PRINTED = {
     Tone.INK: "#111111", Tone.SOFT: "#555555", Tone.FAINT: "#dddddd", Tone.PAPER: "#ffffff", Tone.BEAM: "#cc3311",
     Tone.PLACE_1: "#0072b2", Tone.PLACE_2: "#e69f00", Tone.PLACE_3: "#009e73", Tone.PLACE_4: "#cc79a7",
@@ -108,11 +112,12 @@ def write_figure(path: Path, width_in: float, height_in: float, paint: Callable[
     with house_style():
         figure = Figure(figsize=(width_in, height_in), layout="constrained", facecolor="white")
         paint(figure)
-        figure.savefig(path, format="svg", metadata={"Date": None}, facecolor="white")
-    text = path.read_text(encoding="utf-8")
+        drawn = io.StringIO()
+        figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": CREATOR}, facecolor="white")
+    text = drawn.getvalue()
     for tone, printed in PRINTED.items():
         text = text.replace(tone.value, printed)
-    path.write_text(text, encoding="utf-8")
+    write_output(path, text, FIGURE)
 
 
 def draw_joints(figure: Figure, shown: ExampleResult) -> None:

@@ -22,7 +22,7 @@ from acquisition.motion.task.program import unrolled
 from acquisition.motion.task.ready import missing, taught_text
 from acquisition.motion.task.task_file import Task, read_task
 from acquisition.motion.task.transforms import Untaught
-from acquisition.recording.files import read_text
+from acquisition.recording.files import read_text, toml_output, write_output
 from acquisition.recording.rig import Rig
 from calibeam.asking import YES, NotAgreedError, at_terminal, someone
 from calibeam.motion.by_hand import draw_plan_file, keys_of, said
@@ -34,6 +34,8 @@ from drivers.clock import SystemClock
 Floats = NDArray[np.float64]
 MOVED_RAD = 1e-3  # as the gate allows between a plan and its motion
 Placed = Callable[[str], Floats]  # from a position's name to the readings (joint,) of the arm placed there
+
+TASK = toml_output(("teach",), "task file")
 
 
 def teach_by_hand(rig: Rig, file: Path, out: Path, poses: Path | None, model: Path | None, console: Console) -> None:
@@ -56,8 +58,7 @@ def teach_by_hand(rig: Rig, file: Path, out: Path, poses: Path | None, model: Pa
             q_rad = placed(step.at)
             graph = graph.taught(step.transform, step.at, solver.flange(q_rad))
             text = taught_text(text, step.transform, graph.value(step.transform))
-            out.parent.mkdir(parents=True, exist_ok=True)
-            out.write_text(text, encoding="utf-8")
+            write_output(out, text, TASK)
             mm = np.round(1e3 * graph.value(step.transform)[:3, 3], 2).tolist()
             console.print(f"{number} of {len(todo)}: {step.transform} at '{step.at}', origin {mm} mm", soft_wrap=True)
     read_task(out).graph.check()

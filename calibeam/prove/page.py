@@ -190,6 +190,7 @@ def proof_html(proof: ProofFile) -> str:
         {anchor: CONTENTS[anchor] for anchor, _ in kept},
         [chapter for _, chapter in kept],
         proof.software,
+        kind="proof",
     )
 
 

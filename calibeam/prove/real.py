@@ -270,7 +270,7 @@ def real_html(sets: Sequence[RealScore], software: str) -> str:
         tag("p", software, cls="byline"),
     )
     contents = {"sets": "All sets", **{one.name: one.name for one in sets}}
-    return page("Real recordings", masthead, contents, [_all(sets), *map(_set, sets)], software)
+    return page("Real recordings", masthead, contents, [_all(sets), *map(_set, sets)], software, kind="real recordings")
 
 
 def _all(sets: Sequence[RealScore]) -> Html:

@@ -40,7 +40,7 @@ def reconciliation_html(found: Reconciled) -> str:
     )
     verdict = tag("div", tag("strong", file.says), cls=f"verdict {'good' if file.verdict == 'agree' else 'care'}")
     chapters = (verdict, _before(found), _left_out(found), _after(file), _remains(file))
-    return page(f"Reconciliation of {file.measured}", masthead, CONTENTS, chapters, SOFTWARE)
+    return page(f"Reconciliation of {file.measured}", masthead, CONTENTS, chapters, SOFTWARE, kind="reconciliation")
 
 
 def _before(found: Reconciled) -> Html:

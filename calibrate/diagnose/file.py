@@ -3,10 +3,11 @@
 from pathlib import Path
 from typing import Any
 
-from acquisition.recording.files import JsonKind, read_json, shown, write_json
+from acquisition.recording.files import JsonKind, json_output, read_json, shown, write_json
 from calibrate.diagnose.schema import SCHEMA, DiagnosisFile
 from calibrate.errors import DataError
 
+DIAGNOSIS = json_output("calibeam-diagnosis", "diagnosis.json")
 KIND = JsonKind("diagnosis.json", "give the diagnosis.json of a diagnosis", "diagnose the recording again", DataError)
 
 

@@ -18,6 +18,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from acquisition.recording.files import json_output, write_output
 from calibrate.error_simulation.machine import Machine
 from calibrate.error_simulation.monte_carlo import Drawn, draw_arms
 from calibrate.error_simulation.sensitivity import (
@@ -218,9 +219,10 @@ def record_of(simulation: Simulation, software: str) -> dict[str, Any]:
 
 
 def write_record(path: Path, simulation: Simulation, software: str) -> None:
-    """Over what may be there. DataError where it cannot be written."""
+    """In place of an older one. OutputError; DataError where the disk refuses."""
+    text = msgspec.json.format(msgspec.json.encode(record_of(simulation, software)), indent=1) + b"\n"
     try:
-        path.write_bytes(msgspec.json.format(msgspec.json.encode(record_of(simulation, software)), indent=1) + b"\n")
+        write_output(path, text, json_output("calibeam-errors"))
     except OSError as error:
         raise DataError(f"{path}: cannot be written ({error.strerror}); choose another --out") from error
 

@@ -8,13 +8,22 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+from acquisition.recording.files import OutputKind, text_output, write_output
 from acquisition.recording.rig import Make, Rig
 from acquisition.recording.rig.devices import RobotDriver
 from calibrate.errors import DataError
 from calibrate.export.dh_csv import dh_csv_text
 from calibrate.export.identified import IdentifiedArm, identified_arm
 from calibrate.export.json_text import json_text
-from calibrate.export.mastering import abb_moc_text, fanuc_mastering_text, kuka_mastering_text, refused
+from calibrate.export.mastering import (
+    ABB,
+    FANUC,
+    KUKA,
+    abb_moc_text,
+    fanuc_mastering_text,
+    kuka_mastering_text,
+    refused,
+)
 from calibrate.export.matlab import matlab_text
 from calibrate.export.mjcf import mjcf_text
 from calibrate.export.nominal_table import nominal_table_text
@@ -38,6 +47,7 @@ class ExportForm:
     name: str  # the word of the command line
     suffix: str  # of the file beside the model
     text: Callable[[IdentifiedArm], str]
+    mark: str = ""  # stands near the beginning of each file of this form; "": an older file needs --force
     make: Make | None = None  # whose controllers it is for; None: any
     offsets: bool = False  # it holds zeros, no geometry
     springs: bool = False  # it carries joints that yield in proportion to their torque
@@ -52,27 +62,57 @@ TOGETHER = "identified together with lengths and axes: for offsets alone, identi
 NO_UR = "no arm of Universal Robots has one; take another form, or correct the rig"
 GUESSED = "the rig file does not hold how its motors are coupled: offsets of motors would be guesses"
 FORMS: tuple[ExportForm, ...] = (
-    ExportForm(name="urdf", suffix=".urdf", text=urdf_text),
-    ExportForm(name="dh-csv", suffix=".dh.csv", text=dh_csv_text),
+    ExportForm(name="urdf", suffix=".urdf", text=urdf_text, mark="Identified by calibeam. m and rad"),
+    ExportForm(name="dh-csv", suffix=".dh.csv", text=dh_csv_text, mark="table, identified by calibeam"),
     ExportForm(  # YAML of the ROS description
-        name="ur-kinematics", suffix=".kinematics.yaml", text=ur_kinematics_text, make=Make.UR, uncoupled=NO_UR
+        name="ur-kinematics",
+        suffix=".kinematics.yaml",
+        text=ur_kinematics_text,
+        mark="rad; roll, pitch, yaw",
+        make=Make.UR,
+        uncoupled=NO_UR,
     ),
     ExportForm(  # lists of the controller's calibration.conf
-        name="ur-calibration", suffix=".calibration.conf", text=ur_calibration_text, make=Make.UR, uncoupled=NO_UR
+        name="ur-calibration",
+        suffix=".calibration.conf",
+        text=ur_calibration_text,
+        mark="true = drawn + delta",
+        make=Make.UR,
+        uncoupled=NO_UR,
     ),
-    ExportForm(name="json", suffix=".arm.json", text=json_text),
-    ExportForm(name="matlab", suffix=".m", text=matlab_text),
-    ExportForm(name="mjcf", suffix=".mjcf.xml", text=mjcf_text, springs=True),  # MuJoCo
+    ExportForm(name="json", suffix=".arm.json", text=json_text, mark='"kind": "calibeam-arm"'),
+    ExportForm(name="matlab", suffix=".m", text=matlab_text, mark="% Identified by calibeam"),
     ExportForm(
-        name="kuka-mastering", suffix=".kuka-mastering.csv", text=kuka_mastering_text, make=Make.KUKA, offsets=True
+        name="mjcf", suffix=".mjcf.xml", text=mjcf_text, mark="Identified by calibeam. m, rad, kg", springs=True
+    ),  # MuJoCo
+    ExportForm(
+        name="kuka-mastering",
+        suffix=".kuka-mastering.csv",
+        text=kuka_mastering_text,
+        mark=KUKA,
+        make=Make.KUKA,
+        offsets=True,
     ),
     ExportForm(
-        name="abb-moc", suffix=".abb-moc.csv", text=abb_moc_text, make=Make.ABB, offsets=True, uncoupled=GUESSED
+        name="abb-moc",
+        suffix=".abb-moc.csv",
+        text=abb_moc_text,
+        mark=ABB,
+        make=Make.ABB,
+        offsets=True,
+        uncoupled=GUESSED,
     ),
     ExportForm(
-        name="fanuc-mastering", suffix=".fanuc-mastering.csv", text=fanuc_mastering_text, make=Make.FANUC, offsets=True
+        name="fanuc-mastering",
+        suffix=".fanuc-mastering.csv",
+        text=fanuc_mastering_text,
+        mark=FANUC,
+        make=Make.FANUC,
+        offsets=True,
     ),
-    ExportForm(name="table", suffix=".table.csv", text=nominal_table_text),  # nominal, correction, calibrated
+    ExportForm(
+        name="table", suffix=".table.csv", text=nominal_table_text, mark="# Nominal, correction, calibrated"
+    ),  # nominal, correction, calibrated
 )
 # The words of FORMS, for the command line: what a help page lists and a shell completes before anything is loaded.
 FormName = Literal[
@@ -116,7 +156,7 @@ def export_model(path: Path, rig: Rig, model: ModelFile, form: ExportForm) -> tu
     """Write the arm of a model, whole or not at all. Sentences about what the file cannot carry, as they stand in it.
 
     `rig` is in the arm model of `model`. DataError as `export_text`, for an arm of another make than the form's, and
-    where effects cannot be evaluated; OSError where the folder cannot be written.
+    where effects cannot be evaluated; OutputError, OSError as `write_output`.
     """
     refuse_other_make(rig, form)
     _refuse_coupled(rig, form)
@@ -132,10 +172,13 @@ def export_model(path: Path, rig: Rig, model: ModelFile, form: ExportForm) -> tu
     if form.offsets and freed:
         says = (*says, NO_OFFSETS if all(refused(zero) for zero in arm.zeros) else TOGETHER)
         arm = replace(arm, not_carried=says)
-    partial = path.with_name(path.name + ".partial")
-    partial.write_text(form.text(arm), encoding="utf-8")
-    partial.replace(path)
+    write_output(path, form.text(arm), export_output(form))
     return says
+
+
+def export_output(form: ExportForm) -> OutputKind:
+    """The kind of file that a form makes."""
+    return text_output(form.mark, f"{form.name} export") if form.mark else OutputKind(form.name, lambda _: False)
 
 
 def refuse_other_make(rig: Rig, form: ExportForm) -> None:

@@ -13,6 +13,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from acquisition.recording import Recording
+from acquisition.recording.files import OutputKind, text_output, write_output
 from acquisition.recording.rig import rig_sha256
 from calibrate.errors import DataError
 from calibrate.report.quantities import significant
@@ -128,10 +129,13 @@ def page(
     chapters: Sequence[Html],
     software: str,
     *,
+    kind: str,
     scripts: bool = False,
     running: str = "",
 ) -> Html:
     """The whole document; `contents` are headings by the anchor of their chapter. `scripts`: those of chapters may run.
+
+    `kind` decides which older page it may replace (`write_page`).
 
     `running` stands at the head of every printed page, the title where it is empty.
 
@@ -141,6 +145,7 @@ def page(
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
+        _generator(kind),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
         tag("meta", http_equiv="Content-Security-Policy", content=POLICY + _allowed(chapters) if scripts else POLICY),
         tag("title", title),
@@ -167,13 +172,22 @@ def _allowed(chapters: Sequence[Html]) -> str:
     return f"; script-src {listed}; img-src data: blob:"
 
 
+def page_output(kind: str) -> OutputKind:
+    """Pages of this kind, as `page` marks them."""
+    return text_output(_generator(kind), f"page of the kind '{kind}'")
+
+
 def write_page(path: Path | str, text: str) -> Path:
-    """Over what may be there; returns the path. DataError where it cannot be written."""
+    """In place of an older page of the same kind; returns the path. OutputError; DataError where the disk refuses."""
+    found = re.search(_generator("(.*?)"), text)
     try:
-        Path(path).write_text(text, encoding="utf-8")
+        return write_output(path, text, page_output(found[1] if found else ""))
     except OSError as error:
         raise DataError(f"{path}: the report cannot be written ({error.strerror}); give another place") from error
-    return Path(path)
+
+
+def _generator(kind: str) -> Html:
+    return tag("meta", name="generator", content=f"calibeam {kind}")
 
 
 PROVENANCE_TITLE = "Provenance"

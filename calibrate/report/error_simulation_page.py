@@ -191,7 +191,9 @@ def write_page_of(path: Path, simulation: Simulation, software: str) -> Path:
         _tiles(s),
     )
     chapters = (_budget(s), _each(s), _linear(s), _ranking(s), _worst(s))
-    return write_page(path, page(f"Errors of {s.machine.name}", masthead, CONTENTS, chapters, software))
+    return write_page(
+        path, page(f"Errors of {s.machine.name}", masthead, CONTENTS, chapters, software, kind="error simulation")
+    )
 
 
 def _tiles(s: Simulation) -> Html:

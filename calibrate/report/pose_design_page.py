@@ -107,7 +107,7 @@ def write_page_of(path: Path, rig: Rig, made: Design, seen: Seen, places: Sequen
     chapters = [_promise(made), _plan(made), _places(places), _causes(seen)]
     contents = CONTENTS if places else {k: v for k, v in CONTENTS.items() if k != "places"}
     kept = chapters if places else [chapters[0], chapters[1], chapters[3]]
-    return write_page(path, page(f"Design for {rig.name}", masthead, contents, kept, software))
+    return write_page(path, page(f"Design for {rig.name}", masthead, contents, kept, software, kind="pose design"))
 
 
 def _tiles(made: Design, seen: Seen) -> Html:

@@ -56,7 +56,9 @@ def session_page(
     running = " · ".join(
         part for part in (recording.rig.name, recording.rig.arm.serial_number, when(recording)) if part
     )
-    return page(title, head, contents, (first, *parts), model.software, scripts=interactive, running=running)
+    return page(
+        title, head, contents, (first, *parts), model.software, scripts=interactive, running=running, kind="report"
+    )
 
 
 def session_answers(

@@ -41,7 +41,14 @@ def verification_html(recording: Recording, found: Verification, software: str) 
         _measurements(found),
         elements.provenance(recording, found.samples, "were read", software),
     )
-    return page(f"Verification of {recording.rig.name}", _masthead(recording, found), CONTENTS, chapters, software)
+    return page(
+        f"Verification of {recording.rig.name}",
+        _masthead(recording, found),
+        CONTENTS,
+        chapters,
+        software,
+        kind="verification",
+    )
 
 
 def _masthead(recording: Recording, found: Verification) -> Html:

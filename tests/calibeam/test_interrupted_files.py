@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import can
+import msgspec
 import numpy as np
 import pytest
 
@@ -134,17 +135,23 @@ def test_what_stood_there_before_stays(tmp_path) -> None:
     assert new.exists()
 
 
+class Some(msgspec.Struct):
+    number: int
+    schema: int = 1
+    kind: str = "calibeam-some"
+
+
 def test_a_json_file_is_as_it_was_until_the_new_one_is_whole(tmp_path, monkeypatch) -> None:
     path = tmp_path / "some.json"
-    write_json(path, {"first": 1})
+    write_json(path, Some(1))
 
     def interrupted(*_) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(Path, "replace", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        write_json(path, {"second": 2})
-    assert (left(tmp_path), path.read_text()) == (["some.json"], '{\n "first": 1\n}\n')
+        write_json(path, Some(2))
+    assert (left(tmp_path), msgspec.json.decode(path.read_bytes(), type=Some)) == (["some.json"], Some(1))
 
 
 # The console command with Ctrl-C at the fifth sample that is written.

@@ -119,9 +119,8 @@ def test_the_view_of_a_pair_uses_the_maps_of_the_rig(bench, tmp_path):
     from msgspec import structs
 
     rig = load_rig(RIG)
-    ErrorMap(0.01, (1e-3, 0.01, 0.0, 0.0, 0.0), (0.0, 0.01, 0.0, 0.0, 0.0), (0.0,) * 5, (0.0,) * 5, 1.0).save(
-        tmp_path / "psd1.json"
-    )
+    held = ErrorMap(0.01, (1e-3, 0.01, 0.0, 0.0, 0.0), (0.0, 0.01, 0.0, 0.0, 0.0), (0.0,) * 5, (0.0,) * 5, 1.0)
+    (tmp_path / "psd1.json").write_text(held.text())
     device = structs.replace(rig.devices.psd, error_maps=("psd1.json", ""))
     psd = psd_driver(emulated_psd(device, {"ports": ["out/emulated/psd1", "out/emulated/psd2"]}), rig, SystemClock())
     with pytest.raises(DeviceRefused, match="connect it first"):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from acquisition.errors import AcquisitionError
 from acquisition.motion.kinematics import rotation_vector, transform
-from acquisition.recording.files import JsonKind, read_json, shown
+from acquisition.recording.files import JsonKind, json_output, read_json, shown, write_output
 from acquisition.recording.files.bounds import Correction, Count, Label, Pixels, Statistic, Vector
 from acquisition.recording.rig import Camera, Pose
 
@@ -83,7 +83,7 @@ def drawn(camera: Camera) -> CameraModel:
 
 
 def write_model(path: Path, model: CameraModel, fit: CameraFit, rig: str, software: str) -> None:
-    """OSError where it cannot be written."""
+    """OutputError, OSError as `write_output`."""
     R, origin_m = model.T_flange_camera[:3, :3], model.T_flange_camera[:3, 3]
     text = {
         "schema": 1,
@@ -103,8 +103,7 @@ def write_model(path: Path, model: CameraModel, fit: CameraFit, rig: str, softwa
         "beam_m": fit.beam_m,
         "beam_rad": fit.beam_rad,
     }
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(text, indent=1) + "\n", encoding="utf-8")
+    write_output(path, json.dumps(text, indent=1) + "\n", json_output(KIND))
 
 
 def read_model(path: Path, camera: Camera) -> CameraModel:

@@ -1,6 +1,6 @@
 """Writes records as a JSON file, and reads them with one clear error that names file, key, value and remedy."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -9,12 +9,12 @@ import msgspec
 
 from acquisition.recording.errors import shown
 from acquisition.recording.files.explain import located, plain
+from acquisition.recording.files.output import json_output, write_output
 
 T = TypeVar("T")
 
 LARGEST_BYTES = 32_000_000  # a model of 1,000 parameters has a covariance of 20 MB
 Check = Callable[[dict[str, Any]], str | None]
-Renewal = Callable[[dict[str, Any]], dict[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,10 @@ class JsonKind:
     fault: type[Exception]
 
 
-def read_json(path: Path, kind: JsonKind, records: type[T], other: Check, renewed: Renewal | None = None) -> T:
+def read_json(path: Path, kind: JsonKind, records: type[T], other: Check) -> T:
     """The records of a file. `kind.fault` where it cannot be read, is damaged, or out of the bounds of its records.
 
     `other` is given the top level and returns what is wrong with it as a whole: another kind, another version.
-    `renewed` gives the top level of an earlier version its present keys.
     """
     data = _read(path, kind)
     try:
@@ -49,8 +48,6 @@ def read_json(path: Path, kind: JsonKind, records: type[T], other: Check, renewe
     content = cast("dict[str, Any]", document)
     if (says := other(content)) is not None:
         raise kind.fault(f"{path}: {says}")
-    if renewed is not None:
-        content = renewed(content)
     try:
         return msgspec.convert(content, type=records)
     except msgspec.ValidationError as error:
@@ -64,14 +61,10 @@ def read_json(path: Path, kind: JsonKind, records: type[T], other: Check, renewe
 
 
 def write_json(path: Path, records: object) -> None:
-    """Whole or not at all; what was there before stays until then. OSError where the folder cannot be written."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(path.name + ".partial")
-    try:
-        partial.write_bytes(msgspec.json.format(msgspec.json.encode(records), indent=1) + b"\n")
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    """Records with `kind` and `schema`, or a sequence of them. OutputError, OSError as `write_output`."""
+    first: Any = cast("Sequence[object]", records)[0] if isinstance(records, list | tuple) else records
+    text = msgspec.json.format(msgspec.json.encode(records), indent=1)
+    write_output(path, text + b"\n", json_output(first.kind))
 
 
 def _read(path: Path, kind: JsonKind) -> bytes:

@@ -103,4 +103,4 @@ def diagnosis_report_html(recording: Recording, file: DiagnosisFile) -> str:
         provenance(recording, file.samples, "took part in the diagnosis", file.software),
     )
     contents = {**contents_of(file), "provenance": PROVENANCE}
-    return page(f"Diagnosis of {recording.rig.name}", masthead, contents, chapters, file.software)
+    return page(f"Diagnosis of {recording.rig.name}", masthead, contents, chapters, file.software, kind="diagnosis")

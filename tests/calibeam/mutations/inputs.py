@@ -288,7 +288,7 @@ def _ur(folder: Path) -> None:
         errors = errors.replace(*narrower)
     (folder / "errors.toml").write_text(errors, encoding="utf-8")
     gain = (0.0, 0.01, 0.0, 0.0, 0.0)
-    ErrorMap(0.01, gain, gain, (1e-6,) * 5, (1e-6,) * 5, 0.9).save(folder / "psd1.json")
+    (folder / "psd1.json").write_text(ErrorMap(0.01, gain, gain, (1e-6,) * 5, (1e-6,) * 5, 0.9).text())
     (folder / "camera.json").write_text(json.dumps(_camera(), indent=1), encoding="utf-8")
     _drawn_model(folder / "arm.json", folder / "rig.toml")
     poses = "".join(

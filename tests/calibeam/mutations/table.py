@@ -130,7 +130,6 @@ OTHER_SESSIONS = (
     Pair("streams.mcap", "export streams.mcap --out made --streams"),
     Pair("streams.mcap", "export streams.mcap --out made --streams --table parquet"),
     Pair("streams.mcap", "export streams.mcap --out made.blf"),
-    Pair("streams.mcap", "layouts streams.mcap"),
     Pair("streams.mcap", "compare streams.mcap streams.mcap"),
     Pair("streamed/streams/streams.json", "import streamed --out made.mcap"),
     Pair("streamed/streams/encoders.csv", "import streamed --out made.mcap"),
@@ -243,7 +242,7 @@ DEVICES = (
 TABLE = (*SESSIONS, *OTHER_SESSIONS, *MODELS, *RIGS, *PLANS, *DEVICES)
 
 # Commands that read no file, and files that no command reads from outside.
-EXEMPT = {"completion": "prints a script of the shell; it reads nothing"}
+EXEMPT: dict[str, str] = {}
 UNREAD = {
     "truth.json": "demo writes it and reads it again in the same run, in a folder that it has emptied before",
     "proof.json": "prove writes it for the page and for its own table; no command takes one",

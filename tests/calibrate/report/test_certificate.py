@@ -61,7 +61,7 @@ def test_without_a_site_it_is_for_paper_alone(recorded):
 
 
 def test_the_head_of_a_printed_page_cannot_leave_its_string():
-    text = page("t", Html(""), {}, (), "calibeam", running='</style><script>"x')
+    text = page("t", Html(""), {}, (), "calibeam", kind="t", running='</style><script>"x')
     assert "<script" not in text
     assert r"\00003c\00002fstyle" in text
 

@@ -26,7 +26,7 @@ def known(arm_session):
 @pytest.fixture(scope="module")
 def page(known):
     chapter = interactive_chapter(session_figures(known))
-    return shell(known.recording.rig.name, Html(""), {}, (chapter,), "calibeam", scripts=True)
+    return shell(known.recording.rig.name, Html(""), {}, (chapter,), "calibeam", kind="t", scripts=True)
 
 
 def test_the_library_is_imported_by_the_function_that_needs_it_and_nowhere_else():
