@@ -25,11 +25,11 @@ from acquisition.recording.foreign.heading_units import unit_of
 SUFFIXES = (".xlsx", ".xlsm", ".csv", ".tsv", ".txt", ".parquet")
 SEPARATORS = (";", "\t", ",")  # in this order: a table with decimal commas has them inside its cells
 TITLE_ROWS = 50  # above the headings, at most
-LONGEST_HEADING = 1000  # letters
+LONGEST_HEADING = 200  # letters
 GRID_CELLS = 200_000_000  # with the empty ones: of 12,000 rows with something in the last column of a spreadsheet
 SHEETS = 100
 BESIDE_BYTES = 2_000_000  # of a part of a workbook that is neither a sheet nor the table of its texts
-NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+NUMBER = re.compile(r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d+)?", re.ASCII)
 COMMA_NUMBER = re.compile(r"[+-]?(?:\d+,\d*|,\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 ERRORS = re.compile(r"#[A-Z/0!?]+")  # of a spreadsheet: #REF!, #DIV/0!, #N/A
 NOT_THERE = ("", "nan", "na", "n/a", "null", "none", "-", "--")  # texts for a reading that is missing
