@@ -117,12 +117,12 @@ def _check_element(path: Path, element: Element, times: int, left: list[int]) ->
 
 
 def _size(path: Path, element: Element, name: str) -> int:
-    """The product of the whole numbers of an attribute; units of memory as MuJoCo has them; 1 where it is not there."""
+    """The product of an attribute's whole numbers, with units of memory as MuJoCo has them; 1 where there is none."""
     out = 1
     for word in element.get(name, "").split():
         if (match := _SIZE.fullmatch(word)) is None:
             raise DataError(f"{path}: <{element.tag} {name}={shown(word, 20)}>: no whole number; correct it")
-        out *= max(1, int(match[1])) * 1024 ** " KMGTPE".index((match[2] or " ").upper())
+        out *= max(1, int(match[1] or 1)) * 1024 ** " KMGTPE".index((match[2] or " ").upper())
     return out
 
 

@@ -13,6 +13,7 @@ from acquisition.recording.files.explain import located, plain
 T = TypeVar("T")
 
 LARGEST_BYTES = 32_000_000  # a model of 1,000 parameters has a covariance of 20 MB
+MOST_OBJECTS = 500_000  # each takes 64 bytes for two in the file
 Check = Callable[[dict[str, Any]], str | None]
 Renewal = Callable[[dict[str, Any]], dict[str, Any]]
 
@@ -34,6 +35,8 @@ def read_json(path: Path, kind: JsonKind, records: type[T], other: Check, renewe
     `renewed` gives the top level of an earlier version its present keys.
     """
     data = _read(path, kind)
+    if (count := data.count(b"{") + data.count(b"[")) > MOST_OBJECTS:
+        raise kind.fault(f"{path}: {count} lists and objects, which no {kind.name} has; {kind.again}")
     try:
         data.decode("utf-8")
         document: Any = msgspec.json.decode(data)

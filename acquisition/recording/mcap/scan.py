@@ -120,6 +120,15 @@ class Scan:
                 yield record
 
 
+def check_batches(path: Path) -> None:
+    """ValueError for an MCAP file of which a batch, or all together, unpack to more than the bounds."""
+    left = max(UNPACKED_BYTES, 8 * path.stat().st_size)
+    with path.open("rb") as file:
+        for record in StreamReader(file, emit_chunks=True, record_size_limit=path.stat().st_size).records:
+            if isinstance(record, Chunk):
+                left -= len(unpacked(record, min(BATCH_BYTES, left)).data)
+
+
 def unpacked(chunk: Chunk, most: int) -> Chunk:
     """The batch without its compression; ValueError, before it is unpacked, where it is larger than `most` bytes."""
     size, data = max(chunk.uncompressed_size, len(chunk.data)), chunk.data

@@ -310,6 +310,7 @@ def _rows(folder: Path, name: str, wanted: tuple[str, ...]) -> list[dict[str, An
     missing = [column for column in wanted if column not in table.column_names]
     if missing:
         raise RecordingError(f"{path}: no column '{missing[0]}'; {KIND.again}")
+    check_cells(str(path), 0, 8 * table.num_rows + table.nbytes // 2, RecordingError)  # as much as their objects take
     return table.to_pylist()
 
 
