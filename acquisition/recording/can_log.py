@@ -39,7 +39,7 @@ from acquisition.recording.can_frames import (
     stream_names,
 )
 from acquisition.recording.errors import RecordingError, shown
-from acquisition.recording.files.bounds import BATCH_BYTES, MESSAGES, TIME_S, UNPACKED_BYTES
+from acquisition.recording.files.bounds import BATCH_BYTES, FEW, MESSAGES, TIME_S, UNPACKED_BYTES
 from acquisition.recording.mcap.writer import RecordingWriter, StreamWriter
 from acquisition.recording.recording import Recording
 
@@ -265,6 +265,8 @@ def _surveyed(source: Path) -> _Survey:
         start_s = message.timestamp if math.isnan(start_s) else start_s
         longest = max(longest, len(message.data))
         buses.setdefault(_bus(message))
+        if len(buses) > FEW:
+            raise RecordingError(f"{source}: more than {FEW} channels, which no log has; check the file")
     if not buses:
         raise RecordingError(f"{source}: no CAN frame in it ({log.damage or 'it is empty'}); check the file")
     return _Survey(start_s, FD_BYTES if longest > CLASSIC_BYTES else CLASSIC_BYTES, stream_names(buses))

@@ -418,7 +418,8 @@ def urscript_tools(data: bytes) -> bytes:
 
 def fanuc_poses(data: bytes) -> bytes:
     moves = _numbered("", " {0}:L P[{0}] 50mm/sec FINE    ;\n", 14_000)
-    pose = "P[{0}]{{\n   GP1:\n\tUF : 0, UT : 1,\n\tX = 400.0 mm, Y = 100.0 mm, Z = 300.0 mm,\n\tW = 180.0 deg, P = 0.0 deg, R = 0.0 deg\n}};\n"
+    pose = "P[{0}]{{\n   GP1:\n\tUF : 0, UT : 1,\n"
+    pose += "\tX = 400.0 mm, Y = 100.0 mm, Z = 300.0 mm,\n\tW = 180.0 deg, P = 0.0 deg, R = 0.0 deg\n}};\n"
     return data.replace(b"/POS\n", moves + b"/POS\n").replace(b"/END", _numbered("", pose, 14_000, "/END"))
 
 

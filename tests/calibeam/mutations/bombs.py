@@ -118,6 +118,13 @@ RECORDS = (
 )  # fmt: skip
 BOMBS = (*_of_sessions(), *TABLES, *IMPORTED, *RECORDS)
 
+OPEN = {  # not yet within the bounds, and why
+    "weld.mod-rapid_poses-correct": "an inverse takes 10 to 20 ms a pose: 3,000 to 6,000 poses a minute",
+    "cycled/samples.csv-csv_50_000_rows-iso9283": "repeats of one pose are left out one by one, each time over all",
+    "other/samples.csv-csv_rows-compare": "rows of two recordings are compared all with all",
+    "psd1.json-json_objects-check": "the driver reads an error map of any size",
+}
+
 
 def run_bomb(
     server: Server, good: Path, bomb: Bomb, folder: Path, limit_s: float = LIMIT_S, limit_bytes: int = LIMIT_BYTES
@@ -125,7 +132,7 @@ def run_bomb(
     """How the command ends, and what it should not have done."""
     lay_out(good, Pair(bomb.file, bomb.words), range(1), folder)
     data = bomb.made((good / bomb.file).read_bytes())
-    len(data) > LARGEST_BYTES and print("TOO LARGE", bomb.name, len(data))
+    assert len(data) <= LARGEST_BYTES
     (folder / bomb.file).write_bytes(data)
     ran = server.run(bomb.words.split(), folder, limit_s, limit_bytes)
     either = Pair(bomb.file, bomb.words, together=1)  # it may be taken or refused

@@ -1,5 +1,6 @@
 """Programs of thousands of targets: the work for one does not grow with the number of the others."""
 
+import re
 from collections import Counter
 from typing import Any
 
@@ -68,8 +69,6 @@ def test_lines_are_counted_from_one(at: int) -> None:
 )
 def test_a_number_is_read_once(text: str, whole: bool) -> None:
     """Not again from every digit on, which would take minutes."""
-    import re
-
     assert bool(re.fullmatch(rf"(?:{NUMBER})+", text) if len(text) < 10 else re.match(rf"{NUMBER}\s*,", text)) is whole
 
 
