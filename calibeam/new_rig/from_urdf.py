@@ -78,7 +78,7 @@ def xml_root(path: Path, what: str) -> ElementTree.Element:
     try:
         return ElementTree.fromstring(text)  # noqa: S314
     except (ElementTree.ParseError, ValueError) as error:
-        raise DataError(f"{path}: no XML: {error}; give a {what}") from error
+        raise DataError(f"{path}: no XML: {error}; give a whole {what}") from error
 
 
 def _root(path: Path) -> ElementTree.Element:

@@ -44,9 +44,7 @@ def test_sizes_of_mjcf_are_asked_before_it_is_loaded(
 
 
 def test_sizes_that_an_arm_has_are_taken(tmp_path: Path) -> None:
-    before = '<size memory="4M" nuserdata="-1"/>' + ASSET.format(
-        "texture", 'type="2d" builtin="flat" width="512" height="512"'
-    )
+    before = '<size memory="4M"/>' + ASSET.format("texture", 'type="2d" builtin="flat" width="512" height="512"')
     inside = '<replicate count="4" offset="0 0 1"><geom size="0.1" mass="0"/></replicate>'
     assert len(mjcf_arm(_drawing(tmp_path, before, inside), tip="tip").joints) == 2
 

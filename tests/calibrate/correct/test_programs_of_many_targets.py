@@ -47,14 +47,17 @@ def test_the_frame_is_the_one_set_last_above_in_the_routine() -> None:
 def test_assignments_of_a_module_are_counted_in_one_pass(monkeypatch: pytest.MonkeyPatch) -> None:
     tool = "PERS tooldata t{}:=[TRUE,[[0,0,0],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];\n"
     text = "".join(tool.format(k) for k in range(MANY)) + "t7.tframe := t8.tframe;\n"
-    searched: list[int] = []
-    monkeypatch.setattr("re.findall", lambda *_: searched.append(1) or [])
-    rapid.find(text, 6)
-    assert not searched
+    monkeypatch.setattr("re.findall", None)
+    assert rapid.find(text, 6).literals == ()
 
 
 def test_a_move_without_an_end_does_not_take_the_rest_of_the_program() -> None:
-    moves = literal.moves_of(*2 * ("MoveL a\n" * MANY,), rapid.MOVE, lambda at: (literal.NamedPose(),) * 2, ";")
+    text, nothing = "MoveL a\n" * MANY, (literal.NamedPose(), literal.NamedPose())
+
+    def places(at: int) -> tuple[literal.NamedPose, literal.NamedPose]:
+        return nothing
+
+    moves = literal.moves_of(text, text, rapid.MOVE, places, ";")
     assert max(len(move.text) for move in moves["a"]) <= LONGEST_MOVE + len("MoveL a\n")
 
 
