@@ -39,7 +39,7 @@ from acquisition.recording.can_frames import (
     stream_names,
 )
 from acquisition.recording.errors import RecordingError, shown
-from acquisition.recording.files.bounds import TIME_S
+from acquisition.recording.files.bounds import BATCH_BYTES, FEW, MESSAGES, TIME_S, UNPACKED_BYTES
 from acquisition.recording.mcap.writer import RecordingWriter, StreamWriter
 from acquisition.recording.recording import Recording
 
@@ -213,17 +213,40 @@ class _Log:
     def __iter__(self) -> Iterator[can.Message]:
         count = 0
         try:
+            most = max(MESSAGES, self._path.stat().st_size // 12)
+            if self._mode == "rb":
+                _check_containers(self._path)
             # opened here: python-can leaves a file open whose beginning it does not know
             with self._path.open(self._mode) as file, self._open(file) as messages:
                 for message in messages:
                     if not 0.0 <= message.timestamp <= TIME_S:
                         raise ValueError(f"time stamp {message.timestamp}")
+                    if count == most:
+                        raise ValueError("more frames than a log of this size holds; import it in parts")
                     yield message
                     count += 1
         except OSError as error:
             raise RecordingError(f"{self._path}: cannot read it ({error.strerror or error}); check the path") from error
         except MALFORMED as error:
             self.damage = f"after {count} frames the file makes no sense ({shown(f'{type(error).__name__}: {error}')})"
+
+
+def _check_containers(path: Path) -> None:
+    """ValueError for a BLF file of which a container, or all together, unpack to more than the bounds.
+
+    A container is an object of type 10: sizes and zlib as python-can's reader has them (can/io/blf.py).
+    """
+    with path.open("rb") as file:
+        left = max(UNPACKED_BYTES, 8 * path.stat().st_size)
+        file.seek(int.from_bytes(file.read(8)[4:], "little"))
+        while len(head := file.read(16)) == 16 and head.startswith(b"LOBJ"):
+            size, kind = struct.unpack("<LL", head[8:])
+            body = file.read(max(0, size - 16) + size % 4)
+            if kind == 10 and body[:2] == b"\2\0":
+                made = len(zlib.decompressobj().decompress(body[16:], BATCH_BYTES + 1))
+                left -= made
+                if made > BATCH_BYTES or left < 0:
+                    raise ValueError(f"byte {file.tell() - len(body)}: too much when unpacked; use a copy of the file")
 
 
 @dataclass(frozen=True)
@@ -242,6 +265,8 @@ def _surveyed(source: Path) -> _Survey:
         start_s = message.timestamp if math.isnan(start_s) else start_s
         longest = max(longest, len(message.data))
         buses.setdefault(_bus(message))
+        if len(buses) > FEW:
+            raise RecordingError(f"{source}: more than {FEW} channels, which no log has; check the file")
     if not buses:
         raise RecordingError(f"{source}: no CAN frame in it ({log.damage or 'it is empty'}); check the file")
     return _Survey(start_s, FD_BYTES if longest > CLASSIC_BYTES else CLASSIC_BYTES, stream_names(buses))

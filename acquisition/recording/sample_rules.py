@@ -33,6 +33,7 @@ Fault = tuple[int | None, str, str]  # row from 0, column, what is wrong and wha
 Place = Callable[[int | None], str]  # row from 0, None for the whole table -> where that is, for a person
 
 LONGEST_NAME = 200  # characters, as of all names
+LONGEST_TEXT = 40  # characters: the texts that a column of samples may hold have one
 _WHOLE_LIMIT = 2.0**53  # beyond, float64 has no unit step
 
 
@@ -109,7 +110,8 @@ def _incomplete(names: tuple[str, ...], group: tuple[str, ...]) -> Iterator[Faul
 
 def _array(name: str, cells: Sequence[Cell]) -> NDArray[Any]:
     if kind_of(name) is Kind.TEXT:
-        return np.array(["" if cell is None else str(cell) for cell in cells], dtype=np.str_)
+        texts = ("" if cell is None else str(cell) for cell in cells)
+        return np.array([text[:LONGEST_TEXT] for text in texts], dtype=np.str_)  # all as wide as the longest
     numbers = [float("nan") if cell is None else _number(row, cell) for row, cell in enumerate(cells)]
     array = np.array(numbers, dtype=np.float64)
     if infinite := np.flatnonzero(np.isinf(array)).tolist():

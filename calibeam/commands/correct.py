@@ -25,7 +25,7 @@ from calibrate.physics.applied import conditions_of_effects
 
 Floats = NDArray[np.float64]
 
-LARGEST_BYTES = 32_000_000  # a program of 300,000 targets
+LARGEST_BYTES = 4_000_000  # a program of 20,000 targets
 LONGEST = 10_000  # letters of a line; controllers end at some hundred
 LISTED = 12  # poses that are not ok, before the rest is counted
 SIDES = {"positive": 1, "negative": -1}

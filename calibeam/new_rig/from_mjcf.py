@@ -5,8 +5,11 @@ parent, then its joints in order, each about `axis` through `pos`, with angle ze
 """
 
 import importlib
+import math
+import re
 from pathlib import Path
 from typing import Any
+from xml.etree.ElementTree import Element
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +18,22 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording.files import shown
 from acquisition.recording.files.bounds import ANGLE_RAD, LENGTH_M
 from calibeam.new_rig.drawn import ANY_TURN_RAD, DrawnArm, DrawnJoint, onto_axis
+from calibeam.new_rig.from_urdf import xml_root
 from calibrate.errors import DataError
 from calibrate.rigid import inverse, transform
 
 Floats = NDArray[np.float64]
 
 WORLD = 0
+MOST_PARTS = 20_000  # elements of a file, each as often as it is replicated
+MOST_NUMBERS = 10_000_000  # of a field of heights or a picture, and bytes of the sizes that a file asks for
+DEEPEST = 8  # files within files
+SIZES = {  # numbers of which the product is made
+    "hfield": ("nrow", "ncol"), "texture": ("width", "height"), "replicate": ("count",), "flexcomp": ("count",),
+    "composite": ("count",),
+}  # fmt: skip
+REPEATING = ("replicate", "flexcomp", "composite")
+_SIZE = re.compile(r"\+?([0-9]{1,18})\.?0*([KMGTPEkmgtpe]?)|-1", re.ASCII)
 
 
 def mjcf_arm(path: Path, base_body: str | None = None, tip: str | None = None) -> DrawnArm:
@@ -29,6 +42,7 @@ def mjcf_arm(path: Path, base_body: str | None = None, tip: str | None = None) -
 
     if not path.is_file():
         raise DataError(f"{path}: no such file; give an MJCF file")
+    _check_sizes(path)
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
     except (ValueError, mujoco.FatalError) as error:
@@ -69,6 +83,47 @@ def mjcf_arm(path: Path, base_body: str | None = None, tip: str | None = None) -
     if free:
         notes.append(f"Joints without limits there, taken as one turn either way: {', '.join(free)}.")
     return DrawnArm(path.stem, tuple(drawn), behind @ T_end, tuple(notes))
+
+
+def _check_sizes(path: Path, depth: int = 0) -> None:
+    """DataError for what would make MuJoCo ask for memory without end; files that it includes are read, too."""
+    root = xml_root(path, "MJCF file")
+    _check_element(path, root, 1, [MOST_PARTS])
+    for element in root.iter():
+        name = element.get("file", "")
+        if element.tag not in ("include", "model") or not name:
+            continue
+        if depth == DEEPEST:
+            raise DataError(f"{path}: files include each other more than {DEEPEST} deep; write one file")
+        if (other := path.parent / name).is_file():
+            _check_sizes(other, depth + 1)
+
+
+def _check_element(path: Path, element: Element, times: int, left: list[int]) -> None:
+    """`times`: how often it is made; `left`: how many parts may still be made."""
+    counts = [_size(path, element, name) for name in SIZES.get(element.tag, ())]
+    if element.tag == "size":
+        counts = [sum(_size(path, element, name) for name in element.attrib)]
+    most = MOST_PARTS if element.tag in REPEATING else MOST_NUMBERS
+    if (count := math.prod(counts)) > most:
+        said = " ".join(f'{name}="{shown(value, 20)}"' for name, value in element.attrib.items() if name != "name")
+        raise DataError(f"{path}: <{element.tag} {shown(said, 80)}>: at most {most} are read; make it smaller")
+    times *= count if element.tag in REPEATING else 1
+    left[0] -= times
+    if left[0] < 0:
+        raise DataError(f"{path}: more than {MOST_PARTS} parts, replicated ones counted; give the arm alone")
+    for child in element:
+        _check_element(path, child, times, left)
+
+
+def _size(path: Path, element: Element, name: str) -> int:
+    """The product of an attribute's whole numbers, with units of memory as MuJoCo has them; 1 where there is none."""
+    out = 1
+    for word in element.get(name, "").split():
+        if (match := _SIZE.fullmatch(word)) is None:
+            raise DataError(f"{path}: <{element.tag} {name}={shown(word, 20)}>: no whole number; correct it")
+        out *= max(1, int(match[1] or 1)) * 1024 ** " KMGTPE".index((match[2] or " ").upper())
+    return out
 
 
 def _check_bounds(path: Path, model: Any) -> None:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording.files import read_text, shown
+from acquisition.recording.files.bounds import FEW
 from calibeam.new_rig.drawn import ANY_TURN_RAD, DrawnArm, DrawnJoint, onto_axis
 from calibrate.errors import DataError
 from calibrate.rigid import inverse
@@ -48,6 +49,8 @@ def urdf_arm(path: Path, base_link: str | None = None, tip_link: str | None = No
     """The arm of a URDF file. DataError naming file, element and remedy."""
     root = _root(path)
     links = {_name(path, link): _link(path, link) for link in root.findall("link")}
+    if (count := len(root.findall("joint"))) > FEW:
+        raise DataError(f"{path}: {count} joints; at most {FEW} are read, give the part of the robot with the arm")
     joints = [_joint(path, joint) for joint in root.findall("joint")]
     to_link = {joint.child: joint for joint in joints}
     if len(to_link) != len(joints):
@@ -66,15 +69,20 @@ def urdf_arm(path: Path, base_link: str | None = None, tip_link: str | None = No
     return _arm(root.get("name") or path.stem, chain, joints, links, tuple(notes))
 
 
-def _root(path: Path) -> ElementTree.Element:
-    text = read_text(path, "URDF file", DataError)
+def xml_root(path: Path, what: str) -> ElementTree.Element:
+    """The outer element of a file of a kind such as "URDF file". DataError for what is no XML, or has entities."""
+    text = read_text(path, what, DataError)
     for word in ("<!DOCTYPE", "<!ENTITY"):
         if word in text:
-            raise DataError(f"{path}: {word} is refused: a URDF needs no document type and no entities; remove it")
+            raise DataError(f"{path}: {word} is refused: no {what} needs a document type or entities; remove it")
     try:
-        root = ElementTree.fromstring(text)  # noqa: S314
+        return ElementTree.fromstring(text)  # noqa: S314
     except (ElementTree.ParseError, ValueError) as error:
-        raise DataError(f"{path}: no XML: {error}; give a URDF file") from error
+        raise DataError(f"{path}: no XML: {error}; give a whole {what}") from error
+
+
+def _root(path: Path) -> ElementTree.Element:
+    root = xml_root(path, "URDF file")
     if root.tag != "robot":
         raise DataError(f"{path}: the outer element is <{shown(root.tag)}>, not <robot>; give a URDF file")
     if any("xacro" in element.tag or "${" in "".join(element.attrib.values()) for element in root.iter()):

@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording import Samples
 from acquisition.recording.rig import parse_rig
 from calibrate.arms.rig_arm import RigArm
+from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
 from calibrate.physics.applied import BY_JOINT
 from calibrate.physics.predicting import POSTURES, SEED, flange_with_physics, mean_motion, placed
@@ -28,6 +29,7 @@ Bools = NDArray[np.bool_]
 Branch = Callable[[Floats], Bools]  # joint readings (solution, joint) -> which of them a program asks for
 
 ROUNDS = 12
+MOST_POSES = 20_000
 CLOSE = 1e-9  # m and rad: far below what any arm repeats
 MOVED_RAD = 1e-4  # a joint that went less far has not moved, as in effects/conditions.py
 RANGE_SLACK = 1e-9  # of the recorded range: rounding
@@ -113,6 +115,8 @@ def correct(model: ModelFile, wanted: Wanted, inverse_of: Inverse, options: Opti
 
     DataError for a model without its rig, and where an effect of the model cannot be evaluated.
     """
+    if len(wanted) > MOST_POSES:
+        raise DataError(f"{len(wanted)} poses; at most {MOST_POSES} are corrected at a time, give them in parts")
     arms = Arms.of(model, options)
     nominal_rad, why = _nominal(arms, wanted, inverse_of)
     reached = np.isfinite(nominal_rad).all(axis=1)

@@ -194,14 +194,19 @@ def _runs(q_rad: Floats) -> tuple[Segment, ...]:
             found.append(best)
             first = int(best.rows[-1])
         else:
-            first += 1
+            first += max(1, len(best.rows) // 8)  # what stands for long is not looked at from every row
     return tuple(found)
 
 
 def _run(q_rad: Floats, first: int, joint: int) -> Segment:
-    others = np.delete(q_rad[first:] - q_rad[first], joint, axis=1)
-    moved = np.any(np.abs(others) > STILL_RAD, axis=1)
-    end = first + int(np.argmax(moved)) if moved.any() else len(q_rad)
+    end, length = len(q_rad), 64  # rows that are looked at, ever more: a run is far shorter than a recording
+    while first + length < 8 * len(q_rad):
+        others = np.delete(q_rad[first : first + length] - q_rad[first], joint, axis=1)
+        moved = np.any(np.abs(others) > STILL_RAD, axis=1)
+        if moved.any():
+            end = first + int(np.argmax(moved))
+            break
+        length *= 8
     return Segment(joint + 1, np.arange(first, end))
 
 

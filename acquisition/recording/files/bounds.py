@@ -30,6 +30,14 @@ COUNT = 10**15  # a thousand samples a second for 30,000 years
 JOINTS = 16  # serial arms have 5 to 9
 FEW = 1_000  # places, boxes, cones: what a person measures one by one
 MANY = 1_000_000  # poses, rows, names of parameters: what a program lists
+# Of what one file holds when it is unpacked: any of 32 MB is read in 1 GB and 60 s
+TABLE_BYTES = 32_000_000  # of a table as text: 10,000 rows of 60 columns have 12 MB
+TABLE_CELLS = 4_000_000  # that become objects of 60 bytes
+TABLE_COLUMNS = 4_000
+TABLE_TEXT = 20_000  # bytes of a cell
+UNPACKED_BYTES = 256_000_000
+BATCH_BYTES = 64_000_000  # of a compressed piece: a writer that waits for the disk has as much, else 1 MB
+MESSAGES = 1_000_000  # of a recording, a bag or a log; an hour of five streams has 720,000
 SMALLEST_M = 1e-9  # of a length that a body has
 SMALLEST_SIGMA = 1e-15  # m or rad: a thousandth of what the best interferometers resolve; weights stay finite
 SMALLEST_RATE = 1e-9  # rad/s, m/s, Hz: below, a motion has no end

@@ -14,6 +14,7 @@ from acquisition.recording.files.output import json_output, write_output
 T = TypeVar("T")
 
 LARGEST_BYTES = 32_000_000  # a model of 1,000 parameters has a covariance of 20 MB
+MOST_OBJECTS = 500_000  # each takes 64 bytes for two in the file
 Check = Callable[[dict[str, Any]], str | None]
 
 
@@ -33,6 +34,8 @@ def read_json(path: Path, kind: JsonKind, records: type[T], other: Check) -> T:
     `other` is given the top level and returns what is wrong with it as a whole: another kind, another version.
     """
     data = _read(path, kind)
+    if (count := data.count(b"{") + data.count(b"[")) > MOST_OBJECTS:
+        raise kind.fault(f"{path}: {count} lists and objects, which no {kind.name} has; {kind.again}")
     try:
         data.decode("utf-8")
         document: Any = msgspec.json.decode(data)

@@ -7,8 +7,10 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from types import MappingProxyType
 
+from acquisition.recording.files.bounds import TABLE_COLUMNS
 from acquisition.recording.files.quantity import UNITS
 
 
@@ -74,6 +76,7 @@ def symbols(suffix: str) -> tuple[str, ...]:
     return usual.get(suffix, tuple(_FACTORS.get(suffix, ())))
 
 
+@lru_cache(maxsize=TABLE_COLUMNS)
 def split_heading(heading: str) -> tuple[str, str]:
     """Name and unit: `q1 [deg]`, `X/mm`, `X in mm`, `X (mm)`, `x_mm`. "" where none stands.
 

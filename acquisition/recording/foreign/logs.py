@@ -33,6 +33,7 @@ from acquisition.recording.foreign.conversion import (
 )
 from acquisition.recording.foreign.heading_units import unit_of
 from acquisition.recording.foreign.sheet import Raw, Sheet, read_sheet
+from acquisition.recording.mcap.scan import check_batches
 from acquisition.recording.recording import Channel, Recording, Stream, check_declaration
 from acquisition.recording.sample_rules import no_samples
 
@@ -55,6 +56,7 @@ _JOINT_CHANNELS: Mapping[str, str] = {
 }
 _NUMBERED = re.compile(r".*?(\d+)\D*")
 DEVICE_S = "device_s"
+OBJECT_BYTES, MESSAGE_BYTES = 400_000_000, 1500  # of all messages of a bag in memory, of a short one
 
 
 @dataclass(frozen=True)
@@ -242,11 +244,18 @@ def _bag(path: Path) -> list[Sheet]:
         raise RecordingError(f"{path}: no such bag; check the path")
     try:
         store = types.get_typestore(types.Stores.ROS2_HUMBLE)
+        files = path.iterdir() if path.is_dir() else (path,)
+        for file in (one for one in files if one.suffix == ".mcap"):
+            check_batches(file)
         with reader.Reader(path) as bag:
             there = sorted({f"{c.topic} ({c.msgtype})" for c in bag.connections})
             wanted = [c for c in bag.connections if c.msgtype in (JOINT_STATE, POSE_STAMPED)]
             rows: dict[str, list[tuple[int, Any]]] = {c.topic: [] for c in wanted}
+            left = max(OBJECT_BYTES, 16 * sum(one.stat().st_size for one in path.parent.rglob(f"{path.name}/*")))
             for connection, received_ns, raw in bag.messages(connections=wanted):
+                left -= MESSAGE_BYTES + 2 * len(raw)
+                if left < 0:
+                    raise ValueError(f"more than {len(rows[connection.topic])} messages of '{connection.topic}'")
                 rows[connection.topic].append((received_ns, store.deserialize_cdr(raw, connection.msgtype)))
     except Exception as error:  # of damaged bytes the libraries below raise whatever they stumble over
         raise RecordingError(

@@ -9,6 +9,7 @@ import importlib
 import io
 import math
 import re
+import zipfile
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime, time
@@ -17,12 +18,18 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.recording.errors import SamplesError, shown
+from acquisition.recording.files.bounds import UNPACKED_BYTES
+from acquisition.recording.files.table_file import check_cells, parquet_table, table_bytes
 from acquisition.recording.foreign.heading_units import unit_of
 
 SUFFIXES = (".xlsx", ".xlsm", ".csv", ".tsv", ".txt", ".parquet")
 SEPARATORS = (";", "\t", ",")  # in this order: a table with decimal commas has them inside its cells
 TITLE_ROWS = 50  # above the headings, at most
-NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+LONGEST_HEADING = 200  # letters
+GRID_CELLS = 200_000_000  # with the empty ones: of 12,000 rows with something in the last column of a spreadsheet
+SHEETS = 100
+BESIDE_BYTES = 2_000_000  # of a part of a workbook that is neither a sheet nor the table of its texts
+NUMBER = re.compile(r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d+)?", re.ASCII)
 COMMA_NUMBER = re.compile(r"[+-]?(?:\d+,\d*|,\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 ERRORS = re.compile(r"#[A-Z/0!?]+")  # of a spreadsheet: #REF!, #DIV/0!, #N/A
 NOT_THERE = ("", "nan", "na", "n/a", "null", "none", "-", "--")  # texts for a reading that is missing
@@ -110,21 +117,44 @@ def read_sheet(path: Path, sheet: str | None = None) -> Sheet:
 
 
 def _text(path: Path) -> Sheet:
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise SamplesError(f"{path}: cannot read the table ({error.strerror}); check the path") from error
+    content = table_bytes(path, "table", SamplesError)
     if b"\0" in content[:4096] and not content.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise SamplesError(f"{path}: not a text file; save the table as CSV or xlsx")
     text = _decoded(content, path)
     separator = _separator(text)
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True)
-    rows: list[tuple[int, list[Raw]]] = []
+    held = _Rows()
     try:
-        rows.extend((reader.line_num, [cell.strip() or None for cell in cells]) for cells in reader)
+        for cells in reader:
+            held.take(f"{path} line {reader.line_num}", reader.line_num, cells)
     except csv.Error as error:
         raise SamplesError(f"{path} line {reader.line_num}: not CSV: {error}; correct the line") from error
-    return _tabled(path, "", rows)
+    return _tabled(path, "", held.rows)
+
+
+class _Rows:
+    """Rows of a table with something in them, as they come, without the empty cells at their ends.
+
+    `rows` may be begun anew; what was taken before still counts.
+    """
+
+    def __init__(self) -> None:
+        self.rows: list[tuple[int, list[Raw]]] = []
+        self._cells = self._seen = 0
+
+    def take(self, place: str, line: int, row: Sequence[Raw]) -> None:
+        """One row. SamplesError for more than the bounds: of cells, and of empty ones as a program pads them."""
+        self._seen += len(row)
+        check_cells(place, 0, self._seen, SamplesError, GRID_CELLS)
+        if len(row) > TITLE_ROWS and row.count(None) == len(row):
+            return
+        cells = [c.strip() or None if isinstance(c, str) else c for c in row]
+        while cells and cells[-1] is None:
+            cells.pop()
+        if cells:
+            self._cells += len(cells)
+            check_cells(place, len(cells), self._cells, SamplesError)
+            self.rows.append((line, cells))
 
 
 def _decoded(content: bytes, path: Path) -> str:
@@ -141,13 +171,14 @@ def _decoded(content: bytes, path: Path) -> str:
 
 def _separator(text: str) -> str:
     """The first of `;`, tab and comma that parts the most filled of the first rows alike."""
-    lines = [line for line in text.splitlines()[:200] if line.strip()]
+    lines = [line for line in io.StringIO(text[:1_000_000]) if line.strip()][:200]
     counts = {mark: [line.count(mark) for line in lines] for mark in SEPARATORS}
     return max(SEPARATORS, key=lambda mark: (sum(1 for n in counts[mark] if n), mark != ","))
 
 
 def _workbook(path: Path, wanted: str | None) -> Sheet:
     books = _openpyxl(path)
+    _check_parts(path)
     try:
         book = books.load_workbook(path, read_only=True, data_only=True)
     except OSError as error:
@@ -155,7 +186,10 @@ def _workbook(path: Path, wanted: str | None) -> Sheet:
     except Exception as error:  # of a damaged archive or its XML the library raises whatever it stumbles over
         raise SamplesError(f"{path}: no workbook ({shown(str(error), 80)}); save it again as xlsx") from error
     try:
-        sheets = {str(one.title): _sheet_rows(path, one) for one in book.worksheets}
+        if (count := len(book.worksheets)) > SHEETS:
+            raise SamplesError(f"{path}: {count} sheets; at most {SHEETS} are read, save the table alone, or as CSV")
+        held = _Rows()
+        sheets = {str(one.title): _sheet_rows(path, one, held) for one in book.worksheets}
     finally:
         book.close()
     if wanted is not None and wanted not in sheets:
@@ -169,16 +203,36 @@ def _workbook(path: Path, wanted: str | None) -> Sheet:
     return _without_formulas(_tabled(path, name, rows), books)
 
 
-def _sheet_rows(path: Path, sheet: Any) -> list[tuple[int, list[Raw]]]:
+def _check_parts(path: Path) -> None:
+    """SamplesError for a workbook whose parts, by the directory of the archive, are larger than one to be read."""
     try:
-        cells = [
-            [c.strip() or None if isinstance(c, str) else c for c in row] for row in sheet.iter_rows(values_only=1)
-        ]
+        with zipfile.ZipFile(path) as archive:
+            parts = [part for part in archive.infolist() if part.filename.endswith((".xml", ".rels"))]
+    except (OSError, ValueError, zipfile.BadZipFile, NotImplementedError):
+        return  # said by who opens it
+    large = [part for part in parts if part.filename.startswith(("xl/worksheets/", "xl/sharedStrings"))]
+    for those, most in ((large, UNPACKED_BYTES // 2), ([p for p in parts if p not in large], BESIDE_BYTES)):
+        for part in those:
+            if part.file_size > most:
+                raise SamplesError(
+                    f"{path}: '{shown(part.filename, 60)}' has {part.file_size / 1e6:.0f} MB when unpacked, more than "
+                    f"{most / 1e6:g} MB; save the table alone, or as CSV"
+                )
+
+
+def _sheet_rows(path: Path, sheet: Any, held: "_Rows") -> list[tuple[int, list[Raw]]]:
+    held.rows, where = [], f"{path} sheet '{shown(sheet.title, 40)}'"
+    sheet.reset_dimensions()  # as stated they may be far larger than the table
+    try:
+        for line, row in enumerate(sheet.iter_rows(values_only=True), start=1):
+            held.take(f"{where} row {line}", line, row)
+    except SamplesError:
+        raise
     except Exception as error:  # as above: the sheet is read while its rows are asked for
         raise SamplesError(
             f"{path}: sheet '{shown(sheet.title, 40)}' is damaged ({shown(str(error), 80)}); save it again"
         ) from error
-    return list(enumerate(cells, start=1))
+    return held.rows
 
 
 def _without_formulas(sheet: Sheet, books: Any) -> Sheet:
@@ -187,12 +241,14 @@ def _without_formulas(sheet: Sheet, books: Any) -> Sheet:
         return sheet
     book = books.load_workbook(sheet.path, read_only=True, data_only=False)
     try:
-        written = dict(enumerate(book[sheet.name].iter_rows(values_only=True), start=1))
+        rows = book[sheet.name].iter_rows(max_col=len(sheet.headings), max_row=sheet.lines[-1], values_only=True)
+        wanted = set(sheet.lines)
+        written = {line: row for line, row in enumerate(rows, start=1) if line in wanted}
     finally:
         book.close()
     for row, (line, cells) in enumerate(zip(sheet.lines, sheet.rows, strict=True)):
         for column, cell in enumerate(cells):
-            formula = written[line][column] if cell is None and column < len(written[line]) else None
+            formula = written[line][column] if cell is None else None
             if isinstance(formula, str) and formula.startswith("="):
                 raise SamplesError(
                     f"{sheet.place(row, column)}: the formula '{shown(formula, 40)}' has no stored result; open the "
@@ -202,10 +258,10 @@ def _without_formulas(sheet: Sheet, books: Any) -> Sheet:
 
 
 def _parquet(path: Path) -> Sheet:
+    table = parquet_table(path, SamplesError)
     try:
-        table = importlib.import_module("pyarrow.parquet").read_table(path)
         columns = [table[i].to_pylist() for i in range(table.num_columns)]
-    except (OSError, ValueError, NotImplementedError) as error:  # pyarrow.ArrowInvalid is a ValueError
+    except (ValueError, NotImplementedError) as error:  # pyarrow.ArrowInvalid is a ValueError
         raise SamplesError(f"{path}: cannot read the Parquet file ({shown(str(error))}); write it again") from error
     units = [(field.metadata or {}).get(b"unit", b"").decode(errors="replace") for field in table.schema]
     rows = tuple(zip(*columns, strict=True))
@@ -222,6 +278,10 @@ def _tabled(path: Path, name: str, rows: Sequence[tuple[int, Sequence[Raw]]]) ->
         )
     wide = max(i for i, cell in enumerate(rows[at][1]) if cell is not None) + 1
     headings = tuple("" if cell is None else str(cell) for cell in _padded(rows[at][1], wide))
+    if (longest := max(headings, key=len)) and len(longest) > LONGEST_HEADING:
+        raise SamplesError(
+            f"{where} row {rows[at][0]}: heading '{shown(longest, 40)}' has {len(longest)} letters; shorten it"
+        )
     below = [(line, tuple(_padded(cells, wide)), cells[wide:]) for line, cells in rows[at + 1 :] if any(_filled(cells))]
     units = [""] * wide
     if below and _is_unit_row(below[0][1]):

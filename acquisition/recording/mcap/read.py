@@ -15,7 +15,7 @@ from mcap.records import Channel as McapChannel
 from mcap.records import Header, Message, Metadata, Schema
 
 from acquisition.recording.errors import RecordingError
-from acquisition.recording.files.bounds import TIME_S, Label, Name, Statistic
+from acquisition.recording.files.bounds import FEW, TABLE_CELLS, TIME_S, Label, Name, Statistic
 from acquisition.recording.mcap.layout import (
     CHECKSUM,
     END_METADATA,
@@ -61,6 +61,26 @@ class _ChannelRow(msgspec.Struct):
     full_scale: Statistic = float("inf")
 
 
+class _Growing:
+    """One field of a stream, batch after batch, without an object for each."""
+
+    def __init__(self) -> None:
+        self._bytes, self._kind = bytearray(), np.dtype(np.float64)
+
+    def append(self, values: np.ndarray[Any, Any]) -> None:
+        if values.size:  # of an empty list the kind is not known
+            self._kind = values.dtype
+            self._bytes += values.tobytes()
+
+    def takes(self, values: np.ndarray[Any, Any]) -> bool:
+        """Whether they are numbers, and of the kind that is there."""
+        known = values.dtype.kind in "fiu"
+        return known and (not values.size or not self._bytes or values.dtype == self._kind)
+
+    def array(self) -> np.ndarray[Any, Any]:
+        return np.frombuffer(self._bytes, self._kind)
+
+
 class Content:
     """Collects what a file holds, record by record; the owner of the reading."""
 
@@ -73,7 +93,8 @@ class Content:
         self._types: dict[int, MessageType] = {}
         self._channels: dict[int, tuple[McapChannel, Callable[[McapChannel, Any], None] | None]] = {}
         self._declared: dict[str, tuple[Channel, ...]] = {}
-        self._pieces: dict[str, list[dict[str, np.ndarray[Any, Any]]]] = {}
+        self._pieces: dict[str, dict[str, _Growing]] = {}
+        self._cells = TABLE_CELLS  # of samples and events, that may still be taken
         self._gaps: dict[str, list[Gap]] = {}
 
     def take(self, record: object) -> None:
@@ -82,7 +103,7 @@ class Content:
             if isinstance(record, Metadata):
                 self._take_metadata(record)
             elif isinstance(record, Schema):
-                self._types[record.id] = embedded_type(record.name, record.data)
+                self._take_type(record)
             elif isinstance(record, McapChannel):
                 self._take_channel(record)
             elif isinstance(record, Message):
@@ -106,6 +127,14 @@ class Content:
         rows = msgspec.json.decode(channels_json, type=list[_ChannelRow])
         channels = (Channel(row.name, row.unit, row.shape, row.full_scale, row.resolution) for row in rows)
         self._declared[name] = tuple(channels)
+
+    def _take_type(self, record: Schema) -> None:
+        """Other programs repeat a description in every batch."""
+        known = self._types.get(record.id)
+        if known is None or (known.name, known.descriptor_set) != (record.name, record.data):
+            if len(self._types) >= FEW:
+                raise ValueError(f"more than {FEW} descriptions of messages")
+            self._types[record.id] = embedded_type(record.name, record.data)
 
     def _take_channel(self, record: McapChannel) -> None:
         self._channels[record.id] = record, self._taker(record.topic)
@@ -132,25 +161,39 @@ class Content:
             raise ValueError("the arrays of one batch are of different lengths")
         if not np.all(np.abs(piece["host_s"]) <= TIME_S) or np.any(np.abs(piece["device_s"]) > TIME_S):
             raise ValueError("a time stamp of the batch is beyond what 64 bits of nanoseconds hold")
-        self._pieces.setdefault(name, []).append(piece)
+        pieces = self._pieces.setdefault(name, {})
+        growing = {field: pieces.setdefault(field, _Growing()) for field in piece}
+        if not all(growing[field].takes(values) for field, values in piece.items()):
+            raise ValueError("the arrays of a field are of different kinds, or of none that are numbers")
+        for field, values in piece.items():
+            growing[field].append(values)
 
     def _take_sample(self, channel: McapChannel, sample: Any) -> None:
         fields = msgspec.json.decode(channel.metadata["columns"], type=dict[str, str])
+        self._spend(max(len(fields), 8))
         self.columns |= dict.fromkeys(fields)
         self.rows.append(
             {column: getattr(sample, field) if sample.HasField(field) else None for column, field in fields.items()}
         )
 
     def _take_event(self, channel: McapChannel, event: Any) -> None:
+        self._spend(8 + len(event.detail_json) // 2)
         self.events.append(Event(event.host_s, event.kind, msgspec.json.decode(event.detail_json, type=dict[str, Any])))
 
     def _take_gap(self, channel: McapChannel, gap: Any) -> None:
+        self._spend(8)
         self._gaps.setdefault(gap.stream, []).append(Gap(gap.from_s, gap.to_s, gap.missing, gap.reason))
 
+    def _spend(self, cells: int) -> None:
+        """Objects take far more memory than bytes in a file. ValueError where there are too many."""
+        if self._cells < cells:
+            raise ValueError(f"more than {TABLE_CELLS} cells of samples, events and gaps")
+        self._cells -= cells
+
     def _stream(self, name: str, channels: tuple[Channel, ...]) -> Stream:
-        pieces = self._pieces.get(name, [])
+        pieces = self._pieces.get(name, {})
         joined = {
-            field: np.concatenate([piece[field] for piece in pieces]) if pieces else np.empty(0)
+            field: pieces[field].array() if field in pieces else np.empty(0)
             for field in (*_CLOCKS, *(channel.name for channel in channels))
         }
         return Stream(

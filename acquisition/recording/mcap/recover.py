@@ -32,6 +32,7 @@ from acquisition.recording.mcap.scan import Scan
 from acquisition.recording.rig import rig_sha256
 
 FLUSH_BYTES = 4 * 2**20
+MESSAGE_BYTES = 31  # of an empty one
 
 
 @dataclass(frozen=True)
@@ -154,7 +155,7 @@ class _Copy:
             return
         self.file.write(topic, record.log_time, record.data)
         self.messages += 1
-        self._unsaved += len(record.data)
+        self._unsaved += len(record.data) + MESSAGE_BYTES
         if self._unsaved > FLUSH_BYTES:
             self.file.flush()
             self._unsaved = 0

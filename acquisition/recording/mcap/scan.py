@@ -12,15 +12,18 @@ found is proved or refused by its checksum.
 import struct
 from collections.abc import Generator, Iterator
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import IO
 
+import lz4.frame
 import zstandard
 from mcap.exceptions import EndOfFile, McapError
 from mcap.records import Channel, Chunk, DataEnd, Header, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 from acquisition.recording.errors import RecordingError
+from acquisition.recording.files.bounds import BATCH_BYTES, MESSAGES, UNPACKED_BYTES
 
 # What the parser raises on bytes that make no sense; CRC errors are ValueErrors. OSError: the disk refuses to read.
 DAMAGE = (
@@ -36,6 +39,7 @@ DAMAGE = (
 )
 
 
+METADATA_TIMES = 16  # as much memory as bytes, where keys and values are short
 ContentRecord = Header | Schema | Channel | Message | Metadata
 
 
@@ -44,6 +48,7 @@ class Scan:
 
     def __init__(self, path: Path) -> None:
         self._path = path
+        self._bytes, self._messages = UNPACKED_BYTES, MESSAGES  # that may still be read
         self.damage: list[str] = []
         self.whole = False
 
@@ -55,6 +60,7 @@ class Scan:
         try:
             with self._path.open("rb") as file:
                 size = file.seek(0, 2)
+                self._bytes, self._messages = max(UNPACKED_BYTES, 8 * size), max(MESSAGES, size // 32)
                 file.seek(0)
                 _check_magic(self._path, file.read(8), size)
                 file.seek(0)
@@ -92,17 +98,58 @@ class Scan:
             elif isinstance(record, DataEnd):
                 in_summary = True
             elif isinstance(record, Header | Metadata) and not in_summary:
+                self._bytes -= METADATA_TIMES * (file.tell() - at)
+                if self._bytes < 0:
+                    self.damage.append(f"byte {at} of {size}: metadata of more than a recording has; it was left out")
+                    continue
                 yield record
 
     def _chunk(self, chunk: Chunk, at: int) -> Iterator[Schema | Channel | Message]:
         try:
-            records: list[McapRecord] = breakup_chunk(chunk, validate_crc=True)
+            plain = unpacked(chunk, min(BATCH_BYTES, self._bytes))
+            self._bytes -= len(plain.data)
+            self._messages -= _count(plain.data)
+            if self._messages < 0:
+                raise ValueError("the batches up to here hold more messages than a recording of this size")
+            records: list[McapRecord] = breakup_chunk(plain, validate_crc=True)
         except DAMAGE as error:
             self.damage.append(f"byte {at}: a batch is damaged ({_says(error)}) and was left out")
             return
         for record in records:
             if isinstance(record, Schema | Channel | Message):
                 yield record
+
+
+def check_batches(path: Path) -> None:
+    """ValueError for an MCAP file of which a batch, or all together, unpack to more than the bounds."""
+    left = max(UNPACKED_BYTES, 8 * path.stat().st_size)
+    with path.open("rb") as file:
+        for record in StreamReader(file, emit_chunks=True, record_size_limit=path.stat().st_size).records:
+            if isinstance(record, Chunk):
+                left -= len(unpacked(record, min(BATCH_BYTES, left)).data)
+
+
+def unpacked(chunk: Chunk, most: int) -> Chunk:
+    """The batch without its compression; ValueError, before it is unpacked, where it is larger than `most` bytes."""
+    size, data = max(chunk.uncompressed_size, len(chunk.data)), chunk.data
+    if chunk.compression == "zstd":
+        size = max(size, zstandard.frame_content_size(data))  # what the library goes by, where the frame states one
+    if size > most:
+        raise ValueError(f"{size / 1e6:.0f} MB when unpacked, at most {most / 1e6:.0f} MB are read here")
+    if chunk.compression == "zstd":
+        data = zstandard.decompress(data, max_output_size=chunk.uncompressed_size)
+    elif chunk.compression == "lz4":
+        data = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=chunk.uncompressed_size)
+    return replace(chunk, compression="", data=data)
+
+
+def _count(data: bytes) -> int:
+    """Records of an unpacked batch, each 9 bytes and its content."""
+    at = count = 0
+    while at + 9 <= len(data):
+        at += 9 + int.from_bytes(data[at + 1 : at + 9], "little")
+        count += 1
+    return count
 
 
 def _check_magic(path: Path, start: bytes, size: int) -> None:

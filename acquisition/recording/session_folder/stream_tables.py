@@ -32,6 +32,7 @@ from acquisition.recording.files.bounds import (
     Sentence,
 )
 from acquisition.recording.files.json_file import JsonKind, read_json
+from acquisition.recording.files.table_file import check_cells, parquet_table
 from acquisition.recording.recording import Channel, Event, Gap, Recording, Stream, check_declaration, scalar_names
 from acquisition.recording.session_folder.tables import EVENTS, GAPS, TableFormat, table_name, write_tables
 
@@ -225,7 +226,7 @@ def _table(path: Path, empty: tuple[str, ...] = ("",)) -> Any:
     """A pyarrow table; of CSV all columns as text, since guessed types lose digits and kinds of numbers."""
     try:
         if path.suffix == ".parquet":
-            table = importlib.import_module("pyarrow.parquet").read_table(path)
+            table = parquet_table(path, RecordingError, plain=False)
             _check_once(path, table.column_names)  # names that are no UTF-8 are an error only here
             return table
         text = importlib.import_module("pyarrow.csv")
@@ -239,6 +240,7 @@ def _table(path: Path, empty: tuple[str, ...] = ("",)) -> Any:
 def _header(path: Path) -> list[str]:
     with path.open(encoding="utf-8", newline="") as file:
         names = next(csv.reader(file), [])
+    check_cells(f"{path} line 1", len(names), 0, RecordingError)
     _check_once(path, names)
     return names
 
@@ -308,6 +310,7 @@ def _rows(folder: Path, name: str, wanted: tuple[str, ...]) -> list[dict[str, An
     missing = [column for column in wanted if column not in table.column_names]
     if missing:
         raise RecordingError(f"{path}: no column '{missing[0]}'; {KIND.again}")
+    check_cells(str(path), 0, 8 * table.num_rows + table.nbytes // 2, RecordingError)  # as much as their objects take
     return table.to_pylist()
 
 

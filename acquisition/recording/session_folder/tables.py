@@ -17,6 +17,8 @@ import msgspec
 import numpy as np
 
 from acquisition.recording.errors import RecordingError, SamplesError, shown
+from acquisition.recording.files.bounds import TABLE_CELLS
+from acquisition.recording.files.table_file import check_cells, parquet_table, table_bytes
 from acquisition.recording.recording import Channel, Recording, Stream, scalar_names
 from acquisition.recording.rig import Rig
 from acquisition.recording.sample_rules import checked_samples
@@ -116,9 +118,7 @@ def read_csv(path: Path | str, rig: Rig) -> Samples:
     SamplesError naming file, row, column, value and remedy.
     """
     try:
-        text = Path(path).read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise SamplesError(f"{path}: cannot read the samples ({error.strerror}); check the path") from error
+        text = table_bytes(path, "samples", SamplesError).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise SamplesError(f"{path}: byte {error.start} is not UTF-8; save the file as UTF-8") from error
     return parse_csv(text, str(path), rig)
@@ -135,6 +135,8 @@ def parse_csv(text: str, name: str, rig: Rig) -> Samples:
         for cells in reader:
             if cells:  # a blank line, as at the end of many files, has no cells at all
                 lines.append(reader.line_num)
+                if (count := len(lines) * len(header)) > TABLE_CELLS:
+                    check_cells(f"{name} line {reader.line_num}", len(header), count, SamplesError)
                 _append(columns, cells, f"{name} row {len(lines)} (line {reader.line_num})")
     except csv.Error as error:
         raise SamplesError(f"{name} line {reader.line_num}: not CSV: {error}; correct the line") from error
@@ -177,6 +179,7 @@ def _header(names: list[str], file: str) -> list[str]:
         raise SamplesError(f"{file}: the file is empty; it needs a header row with t_s, q1_rad, ...")
     if len(names) == 1 and (";" in names[0] or "\t" in names[0]):
         raise SamplesError(f"{file} line 1: columns are not separated by commas; save as comma-separated")
+    check_cells(f"{file} line 1", len(names), 0, SamplesError)
     check_header(names, file)
     return names
 
@@ -196,11 +199,12 @@ def _text(cell: Cell) -> str:
 
 def read_parquet(path: Path, rig: Rig) -> Samples:
     """The samples of a Parquet file; null is a missing cell. SamplesError naming file, row, column and remedy."""
-    parquet = _pyarrow_parquet(path)
     try:
-        table = parquet.read_table(path)
-    except (OSError, ValueError) as error:  # pyarrow.ArrowInvalid is a ValueError
-        raise SamplesError(f"{path}: cannot read the Parquet file ({shown(str(error))}); write it again") from error
+        table = parquet_table(path, SamplesError)
+    except ImportError as error:
+        raise SamplesError(
+            f"{path}: reading Parquet needs pyarrow; pip install pyarrow, or give samples.csv"
+        ) from error
     check_header(table.column_names, str(path))
     columns = {name: table.column(name).to_pylist() for name in table.column_names}
     return checked_samples(columns, rig, lambda row: str(path) if row is None else f"{path} row {row + 1}")
@@ -210,12 +214,3 @@ def write_parquet(samples: Samples, path: Path) -> None:
     """Every cell so that it reads back bit for bit, null for a missing one. RecordingError when the disk refuses."""
     columns = {name: cells_of(name, values) for name, values in samples.columns.items()}
     write_table(columns, path, TableFormat.PARQUET)
-
-
-def _pyarrow_parquet(path: Path) -> Any:
-    try:
-        return importlib.import_module("pyarrow.parquet")
-    except ImportError as error:
-        raise SamplesError(
-            f"{path}: reading Parquet needs pyarrow; pip install pyarrow, or give samples.csv"
-        ) from error

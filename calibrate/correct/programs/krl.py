@@ -32,7 +32,7 @@ SET = re.compile(
     r"|\bFDAT_ACT\s*=\s*(?P<inline>\w+)",
     re.IGNORECASE,
 )
-HELD = re.compile(rf"(?P<name>\$?\w+(?:[ \t]*\[[ \t]*\d+[ \t]*\])?)\s*=\s*{AGGREGATE}", re.IGNORECASE)
+HELD = re.compile(rf"(?<!\w)(?P<name>\$?\w+(?:[ \t]*\[[ \t]*\d+[ \t]*\])?)\s*=\s*{AGGREGATE}", re.IGNORECASE)
 INLINE_DATA = re.compile(r"\bFDAT\s+(?P<name>\w+)\s*=\s*\{(?P<fields>[^{}]*)\}", re.IGNORECASE)
 FIXED = re.compile(r"\$IPO_MODE\s*=\s*#TCP|IPO_FRAME\s+#TCP", re.IGNORECASE)
 POSE = ("X", "Y", "Z", "A", "B", "C")
@@ -121,7 +121,7 @@ def _places(code: str) -> tuple[literal.Places, dict[str, tuple[literal.NamedPos
         times[name] += 1
         if all(key in fields for key in POSE):
             held[name] = KRL.frame([fields[key][1] for key in POSE])
-    routines, events = [m.start() for m in ROUTINE.finditer(code)], list(SET.finditer(code))
+    events = sorted((*ROUTINE.finditer(code), *SET.finditer(code)), key=lambda event: event.start())
     fixed = "the tool is stationary (#TCP), which is not corrected" if FIXED.search(code) else ""
 
     def place(what: str, value: str) -> literal.NamedPose:
@@ -139,19 +139,21 @@ def _places(code: str) -> tuple[literal.Places, dict[str, tuple[literal.NamedPos
         base, tool = (place(what, f"{what}_DATA[{numbers.get(what + '_NO')}]") for what in ("BASE", "TOOL"))
         inline[match["name"].upper()] = (base, tool)
 
-    def places(at: int) -> tuple[literal.NamedPose, literal.NamedPose]:
-        begin = max((start for start in routines if start <= at), default=0)
-        now = {"BASE": literal.NamedPose(refused=fixed), "TOOL": literal.NamedPose(refused=fixed)}
-        for event in (one for one in events if begin <= one.start() < at):
-            if event["inline"]:
-                unknown = (literal.NamedPose(f"FDAT {event['inline']}", None, fixed),) * 2
-                now["BASE"], now["TOOL"] = inline.get(event["inline"].upper(), unknown)
-            else:
-                what = (event["what"] or event["kind"]).upper()
-                now[what] = place(what, event["value"] or f"{what}_DATA[{event['number']}]")
-        return now["BASE"], now["TOOL"]
-
-    return places, inline
+    nothing = (literal.NamedPose(refused=fixed), literal.NamedPose(refused=fixed))
+    states, base, tool = list[tuple[literal.NamedPose, literal.NamedPose]](), *nothing
+    for event in events:
+        if event.re is ROUTINE:
+            base, tool = nothing
+        elif event["inline"]:
+            unknown = (literal.NamedPose(f"FDAT {event['inline']}", None, fixed),) * 2
+            base, tool = inline.get(event["inline"].upper(), unknown)
+        else:
+            what = (event["what"] or event["kind"]).upper()
+            pose = place(what, event["value"] or f"{what}_DATA[{event['number']}]")
+            base, tool = (pose, tool) if what == "BASE" else (base, pose)
+        states.append((base, tool))
+    starts = [event.start() for event in events]
+    return lambda at: literal.last_before(states, starts, at, nothing), inline
 
 
 def _key(name: str) -> str:

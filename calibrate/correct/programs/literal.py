@@ -1,8 +1,11 @@
 """One target as it stands in the text of a program, and how a dialect describes such texts."""
 
 import re
+from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +16,13 @@ from calibrate.errors import DataError
 
 Floats = NDArray[np.float64]
 Span = tuple[int, int]
+T = TypeVar("T")
 
 UNIT = 1e-2  # by which the length of a quaternion may differ from 1: rounding of two decimals
 EDGE_RAD = 1e-3  # across the edge of a quarter turn, or of the sign of an axis, an angle may be by rounding of its pose
 
-NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+NUMBER = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?"  # no number is tried again, digit by digit
+LONGEST_MOVE = 500  # letters that are read of an instruction; with a target in it one has some 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +123,18 @@ def fixed(value: float, digits: int) -> str:
 
 
 def line_of(text: str, at: int) -> int:
-    return text.count("\n", 0, at) + 1
+    return bisect_left(_line_ends(text), at) + 1
+
+
+@lru_cache(maxsize=2)  # the program, and the same without its comments
+def _line_ends(text: str) -> list[int]:
+    return [match.start() for match in re.finditer("\n", text)]
+
+
+def last_before(states: Sequence[T], starts: Sequence[int], at: int, otherwise: T) -> T:
+    """The state since the last of the ascending `starts` before a place."""
+    k = bisect_left(starts, at)
+    return states[k - 1] if k else otherwise
 
 
 def line_start(text: str, at: int) -> int:
@@ -139,8 +155,8 @@ def blanked(text: str, comment: str) -> str:
 
 def instruction(text: str, at: int, places: Places, end: str = "\n") -> Move:
     """The one that begins at a place of the text, with what stands before it in its line."""
-    start, stop = line_start(text, at), text.find(end, at)
-    return Move(start, text[start : len(text) if stop < 0 else stop + len(end.strip())], *places(at))
+    start, stop = line_start(text, at), text.find(end, at, at + LONGEST_MOVE)
+    return Move(start, text[start : at + LONGEST_MOVE if stop < 0 else stop + len(end.strip())], *places(at))
 
 
 def moves_of(text: str, code: str, pattern: re.Pattern[str], places: Places, end: str = "\n") -> dict[str, list[Move]]:

@@ -5,6 +5,7 @@ cf1, cf4 and cf6 are the quarter turns in which axes 1, 4 and 6 stand, 0 from 0 
 """
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -33,6 +34,7 @@ OBJECT = re.compile(
 TOOL = re.compile(
     rf"\btooldata\s+(?P<name>\w+)\s*:=\s*\[\s*(?P<held>\w+)\s*,\s*\[\s*(?P<frame>{POSE})\s*\]", re.IGNORECASE
 )
+ASSIGNED = re.compile(r"\b(?P<name>\w++)(?:\.\w++)*+\s*+:=")
 USED = re.compile(r"\\WObj\s*:=\s*(?P<name>\w+)", re.IGNORECASE)
 SHIFTED = re.compile(r"\bPDisp(?:Set|On)\b", re.IGNORECASE)
 NAMED = re.compile(r"\b(?:robtarget|jointtarget)\s+(?P<name>\w+)\s*:=\s*$", re.IGNORECASE)
@@ -102,13 +104,14 @@ def _quarters(confdata: Sequence[tuple[literal.Span, float]]) -> tuple[Branch, l
 
 def _places(code: str) -> literal.Places:
     """Work object and tool of an instruction; what the program assigns to is known to none before it runs."""
+    times = Counter(match["name"].lower() for match in ASSIGNED.finditer(code))
     held = {"wobj0": literal.NamedPose("wobj0", np.eye(4)), "tool0": literal.NamedPose("tool0", np.eye(4))}
     for match in (*OBJECT.finditer(code), *TOOL.finditer(code)):
         name, is_object = match["name"], match.re is OBJECT
         pose = np.eye(4)
         for group in ("user", "object") if is_object else ("frame",):
             pose = pose @ RAPID.frame([v for _, v in literal.numbers_in(code, *match.span(group))])
-        assigned = len(re.findall(rf"\b{name}(?:\.\w+)*\s*:=", code, re.IGNORECASE)) > 1
+        assigned = times[name.lower()] > 1
         why = ""
         if is_object and (match["held"].upper(), match["fixed"].upper()) != ("FALSE", "TRUE"):
             why = f"work object {name} is held by a robot or moved by a unit, which is not corrected"
@@ -117,7 +120,8 @@ def _places(code: str) -> literal.Places:
         held[name.lower()] = literal.NamedPose(name, None if assigned else pose, why)
 
     def places(at: int) -> tuple[literal.NamedPose, literal.NamedPose]:
-        parts = _arguments(code[at : code.find(";", at)])
+        end = code.find(";", at, at + literal.LONGEST_MOVE)
+        parts = _arguments(code[at : at + literal.LONGEST_MOVE if end < 0 else end])
         last = next((part for part in parts if USED.search(part)), parts[3] if len(parts) > 3 else "")
         used, tool = USED.search(last), last.split("\\")[0].strip()
         name = used["name"] if used else "wobj0"

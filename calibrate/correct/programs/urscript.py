@@ -15,7 +15,7 @@ from calibrate.correct.rotations import VECTOR
 LIST = rf"(?P<pose>p?)\[\s*{literal.NUMBER}(?:\s*,\s*{literal.NUMBER})*\s*\]"
 MOVE = re.compile(r"\b(?:movej|movel|movep|servoj|movec)\s*\(\s*(?P<target>p?\[|[A-Za-z_]\w*)")
 INLINE = re.compile(rf"\b(?:movej|movel|movep|servoj)\s*\(\s*(?:q\s*=\s*|pose\s*=\s*)?{LIST}")
-ASSIGNED = re.compile(rf"(?P<name>[A-Za-z_]\w*)\s*=\s*{LIST}")
+ASSIGNED = re.compile(rf"(?<!\w)(?P<name>[A-Za-z_]\w*)\s*=\s*{LIST}")
 TCP = re.compile(rf"\bset_tcp\s*\(\s*(?P<literal>{LIST}\s*\))?")
 CIRCLE = re.compile(r"\bmovec\s*\(")
 
@@ -41,17 +41,14 @@ def find(text: str, n_joints: int) -> literal.Targets:
 
 def _places(code: str) -> literal.Places:
     """Poses are in the base, with the tool centre point that was set last above."""
-    points = list(TCP.finditer(code))
-
-    def places(at: int) -> tuple[literal.NamedPose, literal.NamedPose]:
-        tool = literal.NamedPose()
-        for match in (point for point in points if point.start() < at):
-            numbers = [v for _, v in literal.numbers_in(code, *match.span("literal"))] if match["literal"] else []
-            line = f"set_tcp of line {literal.line_of(code, match.start())}"
-            tool = literal.NamedPose(line, URSCRIPT.frame(numbers) if len(numbers) == 6 else None)
-        return literal.NamedPose("base", np.eye(4)), tool
-
-    return places
+    base = literal.NamedPose("base", np.eye(4))
+    starts, tools = list[int](), list[literal.NamedPose]()
+    for match in TCP.finditer(code):
+        numbers = [v for _, v in literal.numbers_in(code, *match.span("literal"))] if match["literal"] else []
+        line = f"set_tcp of line {literal.line_of(code, match.start())}"
+        starts.append(match.start())
+        tools.append(literal.NamedPose(line, URSCRIPT.frame(numbers) if len(numbers) == 6 else None))
+    return lambda at: (base, literal.last_before(tools, starts, at, literal.NamedPose()))
 
 
 def _literal(

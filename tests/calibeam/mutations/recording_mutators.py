@@ -29,12 +29,12 @@ class _Content:
 
 def rewritten(data: bytes, change: Callable[[bytes], bytes]) -> bytes:
     """The same recording with every message changed."""
-    content = _content(data)
+    content = content_of(data)
     content.messages = [(s, c, replace(m, data=change(m.data))) for s, c, m in content.messages]
     return _written(content)
 
 
-def _content(data: bytes) -> _Content:
+def content_of(data: bytes) -> _Content:
     records = StreamReader(io.BytesIO(data)).records
     return _Content(
         [one for one in records if isinstance(one, Metadata)],
@@ -44,7 +44,7 @@ def _content(data: bytes) -> _Content:
 
 def _rewritten(change: Callable[[Rng, _Content], None]) -> Mutator:
     def made(rng: Rng, data: bytes) -> bytes:
-        content = _content(data)
+        content = content_of(data)
         change(rng, content)
         return _written(content)
 

@@ -62,6 +62,9 @@ def test_what_mujoco_cannot_load_and_a_slide_are_refused(file):
     with pytest.raises(DataError, match="c is no hinge"):
         mjcf_arm(file)
     file.write_text("<mujoco>")
+    with pytest.raises(DataError, match=r"no XML: .*; give a whole MJCF file"):
+        mjcf_arm(file)
+    file.write_text("<mujoco><nothing/></mujoco>")
     with pytest.raises(DataError, match="MuJoCo cannot load it"):
         mjcf_arm(file)
     with pytest.raises(DataError, match="no such file"):
