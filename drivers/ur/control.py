@@ -121,8 +121,7 @@ class UrControl:
 
         DeviceLost when no way to the controller is left: press the emergency stop.
         """
-        with self._stopping:
-            self._brake(deceleration_rad_s2)
+        self._brake(deceleration_rad_s2)
 
     def hold(self) -> None:
         """As `stop`; every motion from now on ends with DeviceRefused, until `connect`."""
@@ -130,7 +129,7 @@ class UrControl:
             self._holds += 1
             if self._child is not None:
                 self._child.hold()
-            self._brake()
+        self._brake()
 
     def close(self) -> None:
         """Ends the control program and the child; safe in every state and more than once."""
@@ -151,9 +150,12 @@ class UrControl:
     # --- inside
 
     def _brake(self, deceleration_rad_s2: float = STOP_DECELERATION_RAD_S2) -> None:
-        child = self._child
-        if child is None or not child.stop(deceleration_rad_s2):
-            self._stop_independently(child)
+        with self._stopping:  # the child answers one at a time; the dashboard is asked by each for itself
+            child = self._child
+            if child is not None and child.stop(deceleration_rad_s2):
+                return
+            self._child = None  # who waits here finds it given up, and does not wait for it again
+        self._stop_independently(child)
 
     def _call(self, request: Motion, limit_s: float) -> None:
         with self._calling:
@@ -236,7 +238,7 @@ class UrControl:
             ) from error
         finally:
             if child is not None:
-                self._forget(child)
+                child.kill()
                 if self._calling.acquire(blocking=False):  # otherwise the thread whose call has just ended does it
                     child.release()
                     self._calling.release()
