@@ -106,8 +106,8 @@ class SupervisedChild:
                 raise DeviceStale(f"{self._place}: {name} has not ended within {limit_s:.3g} s; see its pendant")
             if answer is None and is_stopped(self._process.pid):
                 raise DeviceStale(
-                    f"{self._place}: {name}: the control process of this program ({self.pid}) was frozen, and the arm was stopped "
-                    "through the dashboard; connect again"
+                    f"{self._place}: {name}: the control process of this program ({self.pid}) was frozen, and the "
+                    "arm was stopped through the dashboard; connect again"
                 )
             if now_s - heard_s >= SILENCE_LIMIT_S:
                 raise DeviceStale(f"{self._place}: {name} is silent for {SILENCE_LIMIT_S:.3g} s; connect again")
