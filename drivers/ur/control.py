@@ -70,12 +70,17 @@ class UrControl:
     def connect(self, limit_s: float = CONNECT_LIMIT_S) -> None:
         """Starts the child and the control program.
 
-        DeviceRefused: stopped, switched off, or not in remote control. DeviceLost, DeviceStale: no controller there.
+        Ends the program that runs there. DeviceRefused: stopped, switched off, or not in remote control. DeviceLost,
+        DeviceStale: no controller there.
         """
         self.close()
         holds = self._holds
         self._check_state()
         check_stream(self._host, self.place, self._clock)
+        with contextlib.suppress(
+            DeviceRefused
+        ):  # none runs; to end one whose client died ur_rtde would wait for minutes
+            self._dashboard.stop()
         child = SupervisedChild(self._host, self._watchdog_hz, self.place, self._clock)
         try:
             answer = child.wait_ready(limit_s)
