@@ -52,6 +52,8 @@ class Followed:
     missed: int = 0  # cycles in which no set-point could be sent in time
     worst_late_s: float = 0.0
     restarts: int = 0  # the stream was silent so long that the arm came to rest
+    from_s: float = 0.0  # host time of the first set-point, and of the last
+    to_s: float = 0.0
     cut_short: bool = False  # a stop ended it before the end of its path
 
 
@@ -179,10 +181,12 @@ class Following:
         return late_s
 
     def _send(self, q_rad: Floats) -> None:
-        self._checked.check(q_rad, self._clock.now_s())
+        now_s = self._clock.now_s()
+        self._checked.check(q_rad, now_s)
         self._arm.servo_joints(q_rad, self._period_s, self._stream.lookahead_s, self._stream.gain)
         self._speed_rad_s, self._q_rad = (q_rad - self._q_rad) / self._period_s, q_rad
         self._cycle += 1
+        self.followed.from_s, self.followed.to_s = self.followed.from_s if self.followed.sent else now_s, now_s
         self.followed.sent += 1
 
 

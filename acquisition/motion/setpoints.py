@@ -60,6 +60,7 @@ class OnPath:
 
 
 PER_STRUCTURAL = 10.0  # solutions per period of the lowest structural resonance: steps then excite none
+SERVO_PER_STRUCTURAL = 15.0  # of the joint servos, at which set-points are sent
 
 
 def solve_rate_hz(structural_hz: float, stream_hz: float) -> float:

@@ -14,7 +14,7 @@ from drivers.transports.serial_port import SerialAddress, open_serial
 from drivers.transports.transport import TcpLine, Transport, UdpReceiver
 
 VIEWED = ("position_m", "good")  # channels that viewers show at once
-EVERYWHERE = "0.0.0.0"  # noqa: S104 - where datagrams are awaited when the rig file names no address of this machine
+LOOPBACK = "127.0.0.1"  # where datagrams are awaited when the rig file names no address of this machine
 
 
 def tracker_driver(device: TrackerDevice, clock: Clock, hurry: float = 1.0) -> LineTracker:
@@ -56,7 +56,7 @@ def _line(device: TrackerDevice) -> Callable[[], Transport]:
         return lambda: open_serial(address, device.baud)
     port = device.port or 0  # there is one: acquisition/recording/rig/rules.py
     if device.transport == "udp":
-        return lambda: UdpReceiver(device.host or EVERYWHERE, port)
+        return lambda: UdpReceiver(device.host or LOOPBACK, port)
     return lambda: TcpLine(device.host or "", port)
 
 
@@ -64,4 +64,4 @@ def place_of(device: TrackerDevice) -> str:
     """Where it is, for a person."""
     if device.is_serial:
         return device.serial_port or f"USB serial number {device.serial_number}"
-    return f"{'UDP ' if device.transport == 'udp' else ''}{device.host or EVERYWHERE}:{device.port}"
+    return f"{'UDP ' if device.transport == 'udp' else ''}{device.host or LOOPBACK}:{device.port}"

@@ -12,6 +12,7 @@ import asyncio
 import hmac
 import ipaddress
 from collections.abc import AsyncGenerator, Callable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
 from http.cookies import CookieError, SimpleCookie
@@ -33,6 +34,7 @@ from calibeam.live.messages import Picture
 from calibeam.live.stopping import ON_THE_WAY, Stop, Viewer, Viewers
 
 LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
+PRESSES = 64  # of STOP at one time, each until the controller has taken it or is known not to
 NO_TOKEN = "This page needs its token: open the whole address that calibeam has printed, ?token=... included.\n"  # noqa: S105 - no password
 ELSEWHERE = "Refused: asked by a page of another site, or under a name that is not this machine's.\n"
 HEADERS = {
@@ -188,6 +190,7 @@ STATIC = Path(__file__).parent / "static"
 def live_app(composer: Composer, stop: Stop, viewers: Viewers, rules: Rules, limits: Limits) -> ASGIApp:
     """Everything behind its guard. `viewers` must be made in the event loop that serves."""
     pulse = Pulse(viewers, composer)
+    presses = ThreadPoolExecutor(PRESSES, "stop")
 
     async def page(request: Request) -> Response:
         return FileResponse(STATIC / "index.html")
@@ -195,7 +198,7 @@ def live_app(composer: Composer, stop: Stop, viewers: Viewers, rules: Rules, lim
     async def press(request: Request) -> Response:
         """Blocks this request alone: the controller may take its time, and a second press must not wait for it."""
         who = "a page" if request.client is None else f"the page at {request.client.host}"
-        stopped = await asyncio.to_thread(stop.press, who)
+        stopped = await asyncio.get_running_loop().run_in_executor(presses, stop.press, who)
         pulse.hurry()
         return JSONResponse({"delivered": stopped.delivered, "says": stopped.says})
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from acquisition.errors import RefusedMotionError, TaskError
+from acquisition.motion.deviation import Deviation, deviation, rates_text
 from acquisition.motion.following import Followed
 from acquisition.motion.plan import Plan
 from acquisition.motion.run_task import Around, next_sweep, run_task
@@ -26,7 +27,7 @@ from acquisition.recording.files import read_text, toml_output, write_output
 from acquisition.recording.rig import Rig
 from calibeam.asking import YES, NotAgreedError, at_terminal, someone
 from calibeam.motion.by_hand import draw_plan_file, keys_of, said
-from calibeam.motion.gate_of_rig import cell_of, gate_of, solver_of
+from calibeam.motion.gate_of_rig import UR_STREAM_HZ, cell_of, gate_of, solver_of
 from calibeam.motion.robot import streamed_robot, watched_joints
 from calibeam.motion.task_devices import beside
 from drivers.clock import SystemClock
@@ -145,7 +146,10 @@ def run_by_hand(
             watch = keys.beside(robot.supervisor.check)
             around = Around(robot.joints, devices.read, devices.act, devices.belt, watch, plans.show)
             ran = run_task(gate, task, around)
+    (_, q_rad), host_s = robot.track.joints(), robot.track.host_s()
+    seen = [(made, q_rad[(host_s >= one.from_s) & (host_s <= one.to_s)]) for made, one in ran.sweeps]
     console.print(_ran([followed for _, followed in ran.sweeps]), soft_wrap=True)
+    console.print(_off(deviation(seen)), rates_text(rig.motion.structural_hz, UR_STREAM_HZ), sep="\n", soft_wrap=True)
 
 
 @dataclass
@@ -175,6 +179,12 @@ def _unplanned(task: Task, count: int) -> str:
     rest = len(tuple(unrolled(task.program))) - count
     behind = f"; {rest} steps from the first READ on are planned once it has been read" if rest else ""
     return f"nothing was moved{behind}"
+
+
+def _off(found: Deviation | None) -> str:
+    if found is None:
+        return "off the plan: not compared, the whole way was led by a belt, or the controller reported nothing"
+    return f"off the plan: largest {1e3 * found.largest_m:.3f} mm, rms {1e3 * found.rms_m:.3f} mm, square to its way"
 
 
 def _ran(sweeps: list[Followed]) -> str:

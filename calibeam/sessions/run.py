@@ -4,19 +4,16 @@ What a person decides is asked where there is one; a script gets what is safe: n
 devices are emulated, and a fixture that nobody vouches for counts as moved.
 """
 
-from collections.abc import Generator, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import nullcontext
 from dataclasses import replace
 
 from rich.console import Console
 
-from acquisition.errors import AcquisitionError
 from acquisition.recording.mcap import next_part, parts
 from acquisition.recording.rig import Placement
 from acquisition.session.planned import check_planned
 from acquisition.session.session import Summary
 from calibeam.asking import Asking
-from calibeam.devices.check import DeviceCheck, check_devices
 from calibeam.interrupts import INTERRUPTS
 from calibeam.learner import FittedLearner
 from calibeam.live.feed import SILENT, Feed
@@ -37,13 +34,12 @@ from calibeam.sessions.job import (
     with_place,
 )
 from calibeam.sessions.measure import Measuring, measuring
-from calibeam.sessions.person import Person
+from calibeam.sessions.person import Person, devices_ready
 from calibeam.sessions.reporter import StatusReporter
 from calibeam.sessions.status import Listener, clock_words
 from calibeam.sessions.views import NAME, LogFile, PageView, PlainView, TerminalView
 from calibrate.pose_design.candidates import POSE_S
 from drivers.clock import Clock, SystemClock
-from drivers.errors import DeviceError, DeviceRefused
 
 FINISH, MORE, PLACE = "f", "m", "n"
 
@@ -67,10 +63,10 @@ class OnSite:
 
         `stands`: the fixture has not been touched since the earlier parts.
         """
-        self._devices()
+        devices_ready(self._job.rig, self._job.addresses.hurry, self._clock, self._person)
         earlier, agreed, broken = self._since(earlier, stands=stands), False, False
         while True:
-            with self._kept() if broken else nullcontext():
+            with self._person.keeping(self._job.out) if broken else nullcontext():
                 part = part_of(self._job, earlier, self._half_size_m)
                 if part.left == 0:
                     self.reporter.report("everything that was planned is taken")
@@ -83,9 +79,9 @@ class OnSite:
             try:
                 place = self._measure(part)
             except PartialResult as early:
-                if not self._goes_on(early):
+                if not self._person.goes_on(early):
                     raise
-                with self._kept():
+                with self._person.keeping(self._job.out):
                     agreed, broken, earlier = False, True, self._again()
                 continue
             if place is None:
@@ -99,71 +95,10 @@ class OnSite:
 
         write_session_results(files[0] if len(files) == 1 else self._job.out, self._console)
 
-    @contextmanager
-    def _kept(self) -> Generator[None]:
-        """After a first part there is something to keep: what ends the session ends it in part."""
-        try:
-            yield
-        except (AcquisitionError, DeviceError, KeyboardInterrupt) as why:
-            INTERRUPTS.close()
-            reason = interruption(why) if isinstance(why, KeyboardInterrupt) else str(why)
-            raise PartialResult(f"{reason}; what was taken is kept in {self._job.out}; {GO_ON}") from why
-
-    def _devices(self) -> None:
-        """One line each; goes on when all are good, or a person decides so. DeviceRefused where one cannot be had."""
-        self.reporter.step("device check")
-        if self._job.addresses.hurry != 1.0:
-            self.reporter.report("emulators at another pace than real time: their devices are not judged")
-            return
-        while True:
-            checks = list(self._told())
-            missing = [check.line for check in checks if check.wrong and not check.what]
-            if not any(check.wrong for check in checks):
-                return
-            answer = self._person.choose(
-                "something is wrong:",
-                {"r": "it is mended: try again", "g": "go on all the same", "e": "end"},
-                default="e" if missing else "g",
-                at_end="e",
-            )
-            if answer == "e":
-                raise DeviceRefused("; ".join(check.line for check in checks if check.wrong))
-            if answer == "g":
-                return
-
-    def _goes_on(self, early: PartialResult) -> bool:
-        """A device failed, and the arm was stopped: whether to go on is a person's decision, never the program's."""
-        if not isinstance(early.__cause__, DeviceError):
-            return False
-        INTERRUPTS.heed()
-        self.reporter.asked("the arm was stopped; answer at the terminal whether the session goes on")
-        try:
-            answer = self._person.choose(
-                "the arm was stopped, and the recording is closed:",
-                {
-                    "g": "go on: check the devices, then ask before the arm moves",
-                    "e": "end here; --continue goes on later",
-                },
-                default="e",
-                at_end="e",
-            )
-        except KeyboardInterrupt:
-            return False
-        finally:
-            self.reporter.asked("")
-        if answer != "g":
-            INTERRUPTS.close()  # the exit code is decided
-        return answer == "g"
-
     def _again(self) -> EarlierParts:
         """After a failure every device is connected again, and asked for, into a further recording."""
-        self._devices()
+        devices_ready(self._job.rig, self._job.addresses.hurry, self._clock, self._person)
         return self._since(read_earlier_parts(self._job.out, self._job.rig), stands=False)
-
-    def _told(self) -> Iterator[DeviceCheck]:
-        for check in check_devices(self._job.rig, self._clock):
-            self.reporter.report(check.line)
-            yield check
 
     def _since(self, earlier: EarlierParts, *, stands: bool) -> EarlierParts:
         """Where the fixture stands now, as far as it matters: a place that was left half done."""

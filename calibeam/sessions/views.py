@@ -74,6 +74,13 @@ class PageView:
         self._feed.progress(PageProgress(shown.head, done, total, shown.left_s, note))
 
 
+class PageLines(PageView):
+    """Of a session that reports its progress itself."""
+
+    def shows(self, shown: SessionStatus) -> None:
+        """Nothing more."""
+
+
 NAME = "session.log"
 
 

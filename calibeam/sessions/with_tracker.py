@@ -4,7 +4,8 @@ Without a plan poses are drawn evenly over the joints' ranges, ordered by short 
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +21,7 @@ from acquisition.recording.rig import Rig
 from acquisition.session.control import RunControl, RunState
 from acquisition.session.tracked import TrackedOptions, TrackedSession, TrackedSummary, check_tracked_plan
 from acquisition.wires.tracker_bench import TrackerBench
-from calibeam.asking import YES, Asking, someone
-from calibeam.devices.check import check_devices
+from calibeam.asking import Asking
 from calibeam.devices.recorder import Earlier, RecordingJournal, kept, new_recording
 from calibeam.devices.site import TrackerAddresses, connected_tracker
 from calibeam.interrupts import INTERRUPTS
@@ -31,9 +31,11 @@ from calibeam.outcome import PartialResult
 from calibeam.printing.progress import progress_bar
 from calibeam.sessions.job import GO_ON, PLAN_NOTE, SEED_NOTE, plan_sha256
 from calibeam.sessions.keys import Keys
+from calibeam.sessions.person import Person, devices_ready
+from calibeam.sessions.reporter import StatusReporter
+from calibeam.sessions.views import NAME, LogFile, PageLines, PlainView
 from calibrate.arms.rig_arm import RigArm
 from drivers.clock import Clock, SystemClock
-from drivers.errors import DeviceError, DeviceRefused
 
 Floats = NDArray[np.float64]
 POSES_NOTE = "plan_poses"
@@ -103,42 +105,58 @@ def run_tracked(job: TrackedJob, console: Console, feed: Feed = SILENT, *, askin
     """
     if job.plan is not None:
         check_tracked_plan(job.plan)
-    clock = SystemClock()
-    if job.addresses.hurry == 1.0:
-        _check(job.rig, console, clock)
-    before = taken_before(job)
-    taken = f", {before.samples} taken before" if before.samples else ""
-    console.print(f"session with a tracker, readings: {before.left}, repeats among them{taken}", highlight=False)
-    if before.left:
-        if not agrees:
-            someone(asking, "whether the arm may move", YES).may_move()
-        job.out.mkdir(parents=True, exist_ok=True)
-        path = next_part(job.out)
-        with (
-            new_recording(path, job.text, clock, before.notes) as writer,
-            connected_tracker(job.rig, job.addresses, writer, clock, feed) as bench,
-        ):
-            terminal, earlier = None if asking is None else asking.fd, Earlier(job.out, before.samples)
-            summary = record_tracked(
-                bench,
-                job.rig,
-                writer,
-                before,
-                clock,
-                progress_bar(console),
-                feed=feed,
-                terminal=terminal,
-                earlier=earlier,
-            )
-        console.print(f"samples {len(summary.samples)}, skipped {summary.skipped}; recording: {path}", highlight=False)
-    else:
-        console.print("everything that was planned is taken", highlight=False)
+    clock, broken = SystemClock(), False
+    job.out.mkdir(parents=True, exist_ok=True)
+    reporter = StatusReporter(job.rig, clock, (LogFile(job.out / NAME), PlainView(console), PageLines(feed)))
+    person = Person(console, reporter, asking, agrees=agrees)
+    while True:
+        with person.keeping(job.out) if broken else nullcontext():
+            devices_ready(job.rig, job.addresses.hurry, clock, person)
+            before = taken_before(replace(job, go_on=job.go_on or broken))
+            if not before.left:
+                reporter.report("everything that was planned is taken")
+                break
+            taken = f", {before.samples} taken before" if before.samples else ""
+            reporter.report(f"session with a tracker, readings: {before.left}, repeats among them{taken}")
+            person.arm()
+        try:
+            _take(job, before, clock, console, feed, person)
+            break
+        except PartialResult as early:
+            reporter.ended_early(early)
+            if not person.goes_on(early):
+                raise
+            broken = True
+    reporter.step("results")
     files = parts(job.out)
     from calibeam.results.session_results import (
         write_session_results,  # a second of libraries that no device waits for
     )
 
     write_session_results(files[0] if len(files) == 1 else job.out, console)
+
+
+def _take(job: TrackedJob, before: TakenBefore, clock: Clock, console: Console, feed: Feed, person: Person) -> None:
+    """What is left, into a further recording."""
+    path, reporter = next_part(job.out), person.reporter
+    reporter.step("measurement")
+    with (
+        new_recording(path, job.text, clock, before.notes) as writer,
+        connected_tracker(job.rig, job.addresses, writer, clock, feed) as bench,
+    ):
+        summary = record_tracked(
+            bench,
+            job.rig,
+            writer,
+            before,
+            clock,
+            progress_bar(console),
+            feed=feed,
+            terminal=person.keyboard,
+            earlier=Earlier(job.out, before.samples),
+            reporter=reporter,
+        )
+    reporter.report(f"samples {len(summary.samples)}, skipped {summary.skipped}; recording: {path}")
 
 
 def record_tracked(
@@ -152,29 +170,28 @@ def record_tracked(
     feed: Feed = SILENT,
     terminal: int | None = None,
     earlier: Earlier | None = None,
+    reporter: StatusReporter | None = None,
 ) -> TrackedSummary:
     """Take the poses that are left. PartialResult when it ended early: the arm stands, samples are kept.
 
     `terminal`: file descriptor that keys are read from: SPACE or Ctrl-C pauses, as in a session with detectors.
     """
-    plan = before.plan
+    plan, reporter = before.plan, reporter or StatusReporter(rig, clock, ())
     with bar:
         task = bar.add_task("measuring", total=plan.poses, completed=len(before.done))
 
         def tell(done: int, total: int) -> None:
             bar.update(task, completed=done)
             feed.progress(Progress("measure", done, total))
+            reporter.report(f"{done} of {total} poses", on_screen=False)
 
         def told(state: RunState) -> None:
             bar.update(task, description=state.value)
             if state in (RunState.PAUSED, RunState.RUNNING):
                 writer.event(Event(clock.now_s(), "run state", {"state": state.value}))
+            reporter.state(state)
             if state is RunState.PAUSED:
-                bar.console.print("paused, the arm stands; r goes on, s ends here, a aborts", highlight=False)
-
-        def undelivered(trouble: DeviceError | None) -> None:
-            if trouble is not None:
-                bar.console.print(f"STOP NOT DELIVERED, press the emergency stop: {trouble}", highlight=False)
+                reporter.report("r goes on, s ends here, a aborts")
 
         control = RunControl(
             bench.stop,
@@ -182,7 +199,7 @@ def record_tracked(
             lambda: bench.supervisor.failure,
             told,
             hold_arm=bench.hold,
-            undelivered=undelivered,
+            undelivered=reporter.undelivered,
             rests_in_s=bench.rests_in_s,
             ease_arm=bench.ease,
         )
@@ -210,15 +227,6 @@ def nominal_target(rig: Rig) -> Callable[[Floats], Floats]:
         return flange[:, :3, :3] @ point_m + flange[:, :3, 3]
 
     return at
-
-
-def _check(rig: Rig, console: Console, clock: Clock) -> None:
-    """One line a device; DeviceRefused where one is not fit for a session."""
-    checks = list(check_devices(rig, clock))
-    for check in checks:
-        console.print(check.line, highlight=False, markup=False, soft_wrap=True)
-    if wrong := [check.line for check in checks if check.wrong]:
-        raise DeviceRefused("; ".join(wrong))
 
 
 SPARE = 3  # candidates for each pose that is wanted: of many the next one is near

@@ -73,7 +73,8 @@ class TcpLine:
 class UdpReceiver:
     """Datagrams that an instrument sends to a port of this machine; each counts as a whole number of lines.
 
-    Bound to `host`, an address of this machine; no multicast. DeviceLost when the port cannot be had.
+    Bound to `host`, an address of this machine; no multicast. Who sends first is the instrument: what others send to
+    the port is left out. DeviceLost when the port cannot be had.
     """
 
     def __init__(self, host: str, port: int) -> None:
@@ -89,13 +90,17 @@ class UdpReceiver:
         self.port = int(self._socket.getsockname()[1])
         self.name = f"UDP {host}:{self.port}"
         self._rest = b""
+        self._sender: object = None  # address of the first
 
     def read(self, max_bytes: int, timeout_s: float) -> bytes:
         if not self._rest:
             with _lost(self.name, "reading"):
                 if not select.select([self._socket], [], [], max(timeout_s, 0.0))[0]:
                     return b""
-                data = self._socket.recv(DATAGRAM)
+                data, sender = self._socket.recvfrom(DATAGRAM)
+            self._sender = self._sender or sender
+            if sender != self._sender:
+                return b""
             self._rest = data if data.endswith((b"\n", b"\r")) else data + b"\n"
         data, self._rest = self._rest[:max_bytes], self._rest[max_bytes:]
         return data

@@ -70,12 +70,17 @@ class UrControl:
     def connect(self, limit_s: float = CONNECT_LIMIT_S) -> None:
         """Starts the child and the control program.
 
-        DeviceRefused: stopped, switched off, or not in remote control. DeviceLost, DeviceStale: no controller there.
+        Ends the program that runs there. DeviceRefused: stopped, switched off, or not in remote control. DeviceLost,
+        DeviceStale: no controller there.
         """
         self.close()
         holds = self._holds
         self._check_state()
         check_stream(self._host, self.place, self._clock)
+        with contextlib.suppress(
+            DeviceRefused
+        ):  # none runs; to end one whose client died ur_rtde would wait for minutes
+            self._dashboard.stop()
         child = SupervisedChild(self._host, self._watchdog_hz, self.place, self._clock)
         try:
             answer = child.wait_ready(limit_s)
@@ -121,8 +126,7 @@ class UrControl:
 
         DeviceLost when no way to the controller is left: press the emergency stop.
         """
-        with self._stopping:
-            self._brake(deceleration_rad_s2)
+        self._brake(deceleration_rad_s2)
 
     def hold(self) -> None:
         """As `stop`; every motion from now on ends with DeviceRefused, until `connect`."""
@@ -130,7 +134,7 @@ class UrControl:
             self._holds += 1
             if self._child is not None:
                 self._child.hold()
-            self._brake()
+        self._brake()
 
     def close(self) -> None:
         """Ends the control program and the child; safe in every state and more than once."""
@@ -151,9 +155,12 @@ class UrControl:
     # --- inside
 
     def _brake(self, deceleration_rad_s2: float = STOP_DECELERATION_RAD_S2) -> None:
-        child = self._child
-        if child is None or not child.stop(deceleration_rad_s2):
-            self._stop_independently(child)
+        with self._stopping:  # the child answers one at a time; the dashboard is asked by each for itself
+            child = self._child
+            if child is not None and child.stop(deceleration_rad_s2):
+                return
+            self._child = None  # who waits here finds it given up, and does not wait for it again
+        self._stop_independently(child)
 
     def _call(self, request: Motion, limit_s: float) -> None:
         with self._calling:
@@ -236,7 +243,7 @@ class UrControl:
             ) from error
         finally:
             if child is not None:
-                self._forget(child)
+                child.kill()
                 if self._calling.acquire(blocking=False):  # otherwise the thread whose call has just ended does it
                     child.release()
                     self._calling.release()

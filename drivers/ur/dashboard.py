@@ -15,7 +15,7 @@ from drivers.errors import DeviceLost, DeviceRefused, DeviceStale, WireError
 
 DASHBOARD_PORT = 29999
 TIMEOUT_S = 1.0  # for a whole conversation; replies come within tenths
-STOP_TIMEOUT_S = 0.6  # who stops wants to know soon that this way is closed
+STOP_TIMEOUT_S = 0.5  # who stops wants to know soon that this way is closed
 BANNER = "Connected: Universal Robots Dashboard Server"
 MAX_LINE_BYTES = 4096
 

@@ -34,6 +34,7 @@ STOP_NOTICE_S = 0.3  # the child checks its stop line every millisecond; a busy 
 STOP_LIMIT_S = 1.0  # braking from full speed at 5 rad/s2 takes 0.63 s; after this the other way is taken
 UNREACHED = (Outcome.DISCONNECTED, Outcome.SILENT)  # then it is unknown whether the arm brakes
 CLOSE_LIMIT_S = 1.0
+FROM_OUTSIDE = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGINT)  # a crash has other signals
 CHILD_MODULE = "drivers.ur.control_child"
 SHOWN_BYTES = 300  # of what ur_rtde printed last
 
@@ -105,8 +106,8 @@ class SupervisedChild:
                 raise DeviceStale(f"{self._place}: {name} has not ended within {limit_s:.3g} s; see its pendant")
             if answer is None and is_stopped(self._process.pid):
                 raise DeviceStale(
-                    f"{self._place}: {name}: the control process was frozen, and the arm was stopped "
-                    "through the dashboard; connect again"
+                    f"{self._place}: {name}: the control process of this program ({self.pid}) was frozen, and the "
+                    "arm was stopped through the dashboard; connect again"
                 )
             if now_s - heard_s >= SILENCE_LIMIT_S:
                 raise DeviceStale(f"{self._place}: {name} is silent for {SILENCE_LIMIT_S:.3g} s; connect again")
@@ -186,9 +187,12 @@ class SupervisedChild:
             if code < 0
             else f"exit code {code}"
         )
+        remedy = "see the pendant and that line, then connect again"
+        if code is not None and -code in FROM_OUTSIDE:
+            remedy = "not the controller: see who ended it, or whether this machine was out of memory; connect again"
         return DeviceLost(
-            f"{self._place}: the control process has gone ({how}){self._last_words()}; "
-            "the controller was probably switched off or restarted: check it, then connect again"
+            f"{self._place}: the control process of this program ({self.pid}) has gone ({how})"
+            f"{self._last_words()}; {remedy}"
         )
 
     def _last_words(self) -> str:

@@ -1,7 +1,8 @@
 """What ur_rtde's uploaded control script does: a command register in, a state register out, once per cycle.
 
 The script itself (URScript, 42 kB) is not interpreted: this is its behaviour, for PolyScope 5.12 to 5.25. Not
-imitated: its text messages, and its threads (a new motion replaces the one before, where two threads would fight).
+imitated: its text messages, its threads (a new motion replaces the one before, where two threads would fight), and that
+it ignores a stop sent while a command of a client that has died is still carried out: it ends after that command.
 Source: the control script of ur_rtde 1.6.5: main loop, `process_cmd`, `exec_stopl_stopj`, `contact_thread`,
 `write_async_progress_register`.
 """
@@ -216,10 +217,10 @@ class ControlScript:
         elif command == IDLE_COMMAND:
             self._executing = False
             self._say(READY)
+        elif command == STOP_SCRIPT_COMMAND:  # even if who died never took its command back: else the next waits 300 s
+            return False
         elif not self._executing:
             self._executing = True
-            if command == STOP_SCRIPT_COMMAND:
-                return False
             self._wait = self._process(command)
             if self._wait is None:
                 self._say(DONE)

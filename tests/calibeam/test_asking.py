@@ -18,6 +18,7 @@ from calibeam.asking import Asking, NotAgreedError
 from calibeam.cli import run
 from calibeam.commands import centre, psd_check
 from calibeam.motion import by_hand, task_by_hand
+from calibeam.sessions import run as on_site
 from calibeam.sessions import with_tracker
 from calibeam.sessions.run import OnSite
 
@@ -97,12 +98,12 @@ def command(monkeypatch, tmp_path, quick) -> Callable[[str], list[str]]:
     ):  # fmt: skip
         monkeypatch.setattr(by_hand, name, stand_in)
         monkeypatch.setattr(task_by_hand, name, stand_in)
-    for step in ("_devices", "_plan"):
-        monkeypatch.setattr(OnSite, step, lambda *_: None)
+    for session in (on_site, with_tracker):
+        monkeypatch.setattr(session, "devices_ready", lambda *_: None)
+    monkeypatch.setattr(OnSite, "_plan", lambda *_: None)
     monkeypatch.setattr(OnSite, "_measure", moves)
     monkeypatch.setattr("calibeam.devices.camera.open_camera", moves)
     monkeypatch.setattr(centre, "connected", moves)
-    monkeypatch.setattr(with_tracker, "_check", lambda *_: None)
     monkeypatch.setattr(with_tracker, "connected_tracker", moves)
     write_pose_plan(tmp_path / "plan.toml", PosePlan(1, "ur5e-tracker", (PlannedBlock((PlannedPose((0.0,) * 6),)),)))
     psd = SimpleNamespace(connect=lambda: None, close=lambda: None)

@@ -151,7 +151,12 @@ def test_a_task_is_taught_run_and_gripped(rig: Path, belt: str, tmp_path: Path, 
     assert "nothing was moved" in capsys.readouterr().out
     assert outputs_and_joints(rig)[0] & 1 << 5 == 0
     assert run(command) == 0
-    assert "the program ran to its end: 1 motion," in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "the program ran to its end: 1 motion," in told
+    off = re.search(r"off the plan: largest ([0-9.]+) mm, rms ([0-9.]+) mm", told)
+    assert off is not None
+    assert 0.0 < float(off[2]) < float(off[1]) < 5.0
+    assert "solved at 100 Hz (10 x structural_hz 10 Hz of the rig file), sent at 500 Hz (15 x: 150 Hz, enough)" in told
     word, q_rad = outputs_and_joints(rig)
     assert word & 1 << 5
     tool = solver.flange(q_rad) @ transform((0.0, 0.0, 0.15))

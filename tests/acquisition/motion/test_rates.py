@@ -3,12 +3,15 @@
 import numpy as np
 import pytest
 
+from acquisition.motion.cell import Cell
+from acquisition.motion.deviation import deviation, rates_text
 from acquisition.motion.inverse.closed_form import closed_form
 from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.kinematics import inverse, transform
 from acquisition.motion.paths.path import BeltState, Path
 from acquisition.motion.paths.segments import By, Pace, Place, Segment
-from acquisition.motion.setpoints import LookAhead, solve_rate_hz
+from acquisition.motion.plan import plan
+from acquisition.motion.setpoints import SERVO_PER_STRUCTURAL, LookAhead, solve_rate_hz
 from tests.acquisition.motion.conftest import ur5e
 
 SOLVER = Solver(ur5e(), closed_form(ur5e()))
@@ -96,3 +99,33 @@ def test_a_lag_of_the_arm_that_is_known_does_not_leave_it_behind_a_belt(lag_s: f
 def test_solutions_come_ten_times_as_fast_as_the_structure_shakes() -> None:
     assert solve_rate_hz(10.0, 500.0) == 100.0
     assert solve_rate_hz(80.0, 500.0) == 500.0
+
+
+def test_example_5_1_as_far_as_its_numbers_survive() -> None:
+    """Track and belt at 50 Hz are the tests above; the servo's 300 Hz are those of a structure of 20 Hz."""
+    assert SERVO_PER_STRUCTURAL * 20.0 == 300.0
+    assert solve_rate_hz(20.0, 300.0) == 200.0
+    assert solve_rate_hz(5.0, 300.0) == SOLVE_HZ  # the rule, for which 50 Hz are enough
+    assert "solved at 200 Hz (10 x" in rates_text(20.0, 300.0)
+    assert "(15 x: 300 Hz, enough)" in rates_text(20.0, 300.0)
+    assert "TOO SLOW" in rates_text(20.0, 299.0)
+    assert "all that the stream takes" in rates_text(40.0, 300.0)
+
+
+def test_how_far_off_its_plan_an_arm_was_is_square_to_its_way() -> None:
+    T = SOLVER.flange(POSTURE_RAD)
+    goal = T.copy()
+    goal[1, 3] += 0.1
+    made = plan(SOLVER, POSTURE_RAD, [Segment("aside", By.LINE, Place("aside", goal, np.eye(4)))], PACE, Cell())
+    on_it, aside = made.q_rad[5:30], transform((3e-4, 0.0, 4e-4))
+    beside = [SOLVER.kept(aside @ SOLVER.flange(q_rad), q_rad) for q_rad in on_it]
+    exact = deviation([(made, on_it)])
+    off = deviation([(made, np.array(beside))])
+    assert exact is not None
+    assert exact.largest_m < 1e-8
+    assert off is not None
+    assert (off.largest_m, off.rms_m) == pytest.approx((5e-4, 5e-4), rel=1e-3)
+    half = deviation([(made, np.concatenate([on_it, beside]))])
+    assert half is not None
+    assert (half.largest_m, half.rms_m) == pytest.approx((5e-4, 5e-4 / np.sqrt(2.0)), rel=1e-3)
+    assert deviation([(made, np.empty((0, 6)))]) is None

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Generator, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from http.client import HTTPConnection
 from pathlib import Path
@@ -203,6 +204,14 @@ def test_a_stop_under_way_is_not_closed_for_others(rig) -> None:
         press.join()
         slow[3].close()
     assert delivered == [True]
+
+
+def test_stops_pressed_together_are_all_under_way_at_once(rig) -> None:
+    together = threading.Barrier(12)  # more than the threads that asyncio gives to everything else on a small machine
+    with served(rig) as page:
+        page.feed.stops_by(lambda: together.wait(PATIENCE_S) and None)
+        with ThreadPoolExecutor(together.parties) as pages:
+            assert all(pages.map(stopped_by, [page] * together.parties))
 
 
 def close_code(viewer: ClientConnection) -> int:

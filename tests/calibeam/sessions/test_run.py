@@ -11,7 +11,9 @@ from calibeam.asking import Asking
 from calibeam.devices.check import DeviceCheck
 from calibeam.devices.site import addresses_of
 from calibeam.live.feed import SILENT
+from calibeam.sessions import person
 from calibeam.sessions.job import EarlierParts, Job, part_of
+from calibeam.sessions.person import devices_ready
 from calibeam.sessions.run import OnSite
 from drivers.clock import SystemClock
 from drivers.errors import DeviceRefused
@@ -46,8 +48,9 @@ def test_a_terminal_that_goes_instead_of_the_numbers_of_a_place_finishes(rig, tm
 def test_devices_that_are_wrong_end_the_session_where_the_input_ends(rig, tmp_path, typist, monkeypatch) -> None:
     job = Job(rig, RIG_FILE.read_text(), tmp_path, addresses_of(rig), PlanOptions())
     site = OnSite(job, Console(quiet=True), SystemClock(), SILENT, Asking(typist.terminal), agrees=False)
-    monkeypatch.setattr(OnSite, "_told", lambda _: [DeviceCheck("psd", "PSD2001-E", wrong="too few samples")])
+    checks = [DeviceCheck("psd", "PSD2001-E", wrong="too few samples")]
+    monkeypatch.setattr(person, "check_devices", lambda *_: checks)
     typist.ahead("g\n")
     typist.answers("something is wrong: [r/g/e, ENTER: g] ", "\x04")
     with pytest.raises(DeviceRefused, match="too few samples"):
-        site._devices()
+        devices_ready(rig, 1.0, SystemClock(), site._person)

@@ -26,6 +26,7 @@ from calibeam.sessions.with_tracker import (
     taken_before,
 )
 from drivers.clock import SystemClock
+from drivers.ur.supervised import SupervisedChild
 from simulators.world.truth import read_truth
 
 RIG_FILE = Path(__file__).parents[3] / "rigs" / "ur5e-tracker.toml"
@@ -132,3 +133,51 @@ def test_paused_by_one_interrupt_ended_by_three_and_gone_on_with(tmp_path: Path,
     assert taken_before(job).left == 0
     twice, once = (read(tmp_path / name).samples.joints() for name in ("paused.mcap", "recording-0002.mcap"))
     np.testing.assert_allclose(once, twice[2:], atol=1e-4)
+
+
+class Person:
+    """At the terminal: agrees to every motion, and goes on."""
+
+    fd = None
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+
+    def may_move(self) -> None:
+        self.asked.append("may it move")
+
+    def choice(self, question: str, choices: dict[str, str], default: str) -> str:
+        self.asked.append(question)
+        return "g"
+
+
+@pytest.mark.parametrize(
+    ("number", "says"), [(signal.SIGKILL, "has gone (signal SIGKILL)"), (signal.SIGSTOP, "was frozen")]
+)
+def test_a_control_child_that_dies_or_freezes_is_reported_and_a_person_decides(
+    tmp_path, monkeypatch, number, says
+) -> None:
+    children, person, plain = list[int](), Person(), RecordingWriter.sample
+    started = SupervisedChild.__init__
+    monkeypatch.setattr(
+        SupervisedChild, "__init__", lambda child, *about: (started(child, *about), children.append(child.pid))[0]
+    )
+
+    def struck(writer: RecordingWriter, *sample) -> None:
+        plain(writer, *sample)
+        if len(children) == 1:
+            os.kill(children[0], number)
+
+    monkeypatch.setattr(RecordingWriter, "sample", struck)
+    monkeypatch.setattr("calibeam.results.session_results.write_session_results", lambda path, console: None)
+    with Emulation(RIG_FILE, seed=5, time_scale=PACE) as emulation:
+        wires = tracker_addresses_of(RIG, emulation.address, PACE)
+        job = TrackedJob(RIG, rig_text(RIG_FILE), tmp_path, wires, PLAN)
+        run_tracked(job, Console(quiet=True), asking=person, agrees=False)
+    assert person.asked == ["may it move", "the arm was stopped, and the recording is closed:", "may it move"]
+    log = (tmp_path / "session.log").read_text()
+    assert f"of this program ({children[0]}) {says}" in log
+    assert "THE ARM WAS STOPPED" in log
+    assert "switched off" not in log
+    recordings = [read(tmp_path / name) for name in ("recording.mcap", "recording-0002.mcap")]
+    assert [(one.complete, len(one.samples)) for one in recordings] == [(False, 1), (True, 5)]

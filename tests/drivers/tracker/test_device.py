@@ -220,3 +220,21 @@ def test_rates_that_count_as_silence_are_refused() -> None:
     slow = msgspec.convert({**ASCII, "rate_hz": 1.0}, TrackerDevice)
     with pytest.raises(DeviceRefused, match="counts as silent"):
         tracker_driver(slow, SystemClock())
+
+
+def test_datagrams_are_of_their_first_sender() -> None:
+    receiver = UdpReceiver("127.0.0.1", 0)
+    first, other = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
+    with first, other:
+        for sender, line in ((first, b"1\n"), (other, b"2\n"), (first, b"3\n")):
+            sender.sendto(line, ("127.0.0.1", receiver.port))
+        assert [receiver.read(100, 2.0) for _ in range(3)] == [b"1\n", b"", b"3\n"]
+    receiver.close()
+
+
+def test_datagrams_are_awaited_on_this_machine_alone_where_no_address_is_stated() -> None:
+    device = {**ASCII, "transport": "udp", "host": None, "port": 0}
+    line = tracker_driver(msgspec.convert(device, TrackerDevice), SystemClock())._open_line()
+    assert isinstance(line, UdpReceiver)
+    assert line._socket.getsockname()[0] == "127.0.0.1"
+    line.close()

@@ -265,3 +265,37 @@ def test_close_ends_the_child_and_is_safe_more_than_once(control) -> None:
     control.close()
     assert not child.alive
     control.close()
+
+
+TOGETHER = 12
+
+
+class FrozenDashboard:
+    """Answers nobody until all have asked."""
+
+    def __init__(self) -> None:
+        self._asked = threading.Barrier(TOGETHER)
+
+    def stop(self) -> None:
+        self._asked.wait(PATIENCE_S)
+
+
+def test_stops_of_a_frozen_controller_do_not_wait_for_each_other() -> None:
+    control, answered = UrControl("127.0.0.1", dashboard=FrozenDashboard()), []
+    presses = [threading.Thread(target=lambda: answered.append(control.hold())) for _ in range(TOGETHER)]
+    for press in presses:
+        press.start()
+    for press in presses:
+        press.join()
+    assert len(answered) == TOGETHER
+
+
+@pytest.mark.parametrize(
+    ("number", "says"), [(signal.SIGKILL, "not the controller"), (signal.SIGSEGV, "see the pendant")]
+)
+def test_a_child_that_has_gone_is_this_programs_own(control, number, says) -> None:
+    assert control._child is not None
+    pid = control._child.pid
+    os.kill(pid, number)
+    with pytest.raises(DeviceLost, match=rf"control process of this program \({pid}\) has gone .*{says}"):
+        control.move_joints(FAR, SLOW_RAD_S, 3.0)

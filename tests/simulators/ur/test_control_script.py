@@ -176,3 +176,15 @@ def test_stop_script_ends_the_program(bench) -> None:
     client.send(255)
     bench.run(0.004)
     assert bench.controller.runner.state is RuntimeState.STOPPED
+
+
+def test_a_stop_behind_a_command_that_nobody_took_back_ends_the_program(bench) -> None:
+    """As the next client sends it, when the one before died in the middle of a motion."""
+    client = Client(bench)
+    client.send(1, *(START + 0.3), 1.0, 3.0)
+    bench.run(0.1)
+    client.memory.write_int(0, 0)
+    client.memory.write_int(0, 255)
+    bench.run_until(lambda: bench.controller.runner.state is RuntimeState.STOPPED, 5.0)
+    assert bench.controller.runner.state is RuntimeState.STOPPED
+    assert np.array_equal(bench.world.joints().q_rad, START + 0.3)

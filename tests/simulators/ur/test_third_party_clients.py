@@ -1,5 +1,7 @@
 """Unmodified ur_rtde (receive, control, dashboard) against the emulator in another process, at twice real time."""
 
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from itertools import pairwise
@@ -9,6 +11,8 @@ from dashboard_client import DashboardClient
 from rtde_control import RTDEControlInterface
 from rtde_io import RTDEIOInterface
 from rtde_receive import RTDEReceiveInterface
+
+from drivers.ur.control import UrControl
 
 HOME = [0.0, -1.5, 1.5, -1.5, -1.5, 0.0]
 
@@ -142,3 +146,40 @@ def test_dashboard_switches_off_and_on(dashboard) -> None:
     wait_for(lambda: "RUNNING" in dashboard.robotmode())
     assert dashboard.isInRemoteControl()
     assert dashboard.polyscopeVersion() == "5.12.0.1101"
+
+
+TRAVELS = """
+import sys
+from rtde_control import RTDEControlInterface
+control = RTDEControlInterface(sys.argv[1], rt_priority=-1)
+home = [0.0, -1.5, 1.5, -1.5, -1.5, 0.0]
+control.moveJ(home, 2.0, 6.0)
+print("begins", flush=True)
+control.moveJ([[base, *home[1:], 1.0, 6.0, 0.02] for base in (1.0, 0.2, 1.0)] + [[0.0, *home[1:], 1.0, 6.0, 0.0]])
+"""
+
+
+@pytest.fixture
+def killed_in_mid_path(emulated, receive) -> None:
+    """A client in a process of its own that waits for the end of its path."""
+    with subprocess.Popen([sys.executable, "-c", TRAVELS, emulated.host], stdout=subprocess.PIPE, text=True) as client:
+        assert client.stdout is not None
+        assert client.stdout.readline() == "begins\n"
+        wait_for(lambda: receive.getActualQ()[0] > 0.2)
+        client.kill()
+
+
+def test_a_client_killed_in_mid_path_keeps_the_next_one_out_no_longer_than_its_path(
+    killed_in_mid_path, control, receive
+) -> None:
+    assert control.moveJ(HOME, 2.0, 6.0)
+    assert receive.getActualQ() == pytest.approx(HOME, abs=2e-5)
+
+
+def test_a_client_killed_in_mid_path_is_stopped_by_our_own_control(killed_in_mid_path, emulated, receive) -> None:
+    control = UrControl(emulated.host)
+    control.connect()
+    assert receive.getActualQ()[0] > 0.1  # in the middle: its path ends at 0
+    control.move_joints(HOME, 2.0, 6.0)
+    control.close()
+    assert receive.getActualQ() == pytest.approx(HOME, abs=2e-5)
