@@ -192,6 +192,14 @@ def alternatives(whole: Quadratic, chosen: Sequence[Part]) -> dict[Part, tuple[N
     return {part: tuple(_standing_in(whole, chosen, part, kept)) for part in chosen}
 
 
+def told_apart(whole: Quadratic, chosen: Sequence[Part]) -> tuple[Part, ...]:
+    """The other parts that the readings tell apart from the chosen ones: beside those alone, each number is found to
+    better than its plausible size. Of what is not told apart the chosen part is the sum, by convention.
+    """
+    others = [(part, at) for part, at in whole.parts if part not in chosen]
+    return tuple(p for p, at in others if np.all(np.diag(_among(whole, (*chosen, p)).covariance)[at] < 1.0))
+
+
 def _standing_in(whole: Quadratic, chosen: Sequence[Part], part: Part, kept: float) -> Iterator[Named]:
     own = len(part.names)
     for other, at in whole.parts:
