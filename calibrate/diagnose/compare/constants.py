@@ -36,6 +36,7 @@ FRAMES = {
     seat.POINTS: ("seat.position", "seat-moved"),
     "psd2": ("psd2.reading", "psd-moved"),  # in the frame of PSD 1
 }
+LOST = 1e-12  # of a plausible size squared: a variance below is rounding, and the plausible size stands in for it
 TIED = 2.0  # of BIC: no more than a bare mention (Kass, Raftery 1995)
 RIVAL = 6.0  # of BIC: strong evidence against what is farther off (Kass, Raftery 1995)
 
@@ -199,7 +200,8 @@ def undetected(whole: Quadratic, chosen: Sequence[Part]) -> dict[Part, Floats]:
     readings do not tell apart from the chosen ones is left out: these are the sum, by convention.
     """
     alone = {p: np.diag(_among(whole, (*chosen, p)).covariance)[at] for p, at in whole.parts if p not in chosen}
-    return {p: np.sqrt(np.minimum(whole.price * own, 1.0)) for p, own in alone.items() if np.all(own < 1.0)}
+    seen = {p: np.where(own > LOST, own, 1.0 / whole.price) for p, own in alone.items() if np.all(own < 1.0)}
+    return {p: np.sqrt(np.minimum(whole.price * own, 1.0)) for p, own in seen.items()}
 
 
 def _standing_in(whole: Quadratic, chosen: Sequence[Part], part: Part, kept: float) -> Iterator[Named]:
