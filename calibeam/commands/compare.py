@@ -7,11 +7,13 @@ from rich.console import Console
 
 from acquisition.recording import Recording, read
 from acquisition.recording.files import json_output, write_json
+from calibeam.outcome import CheckFailed
 from calibeam.overwriting import writes
 from calibeam.printing.comparison_lines import print_comparison
 from calibeam.results.comparison import compare
 from calibeam.results.identification import naming_source
 from calibeam.results.simulator import TIMEOUT_S, Simulator, simulated_by
+from calibrate.diagnose.diagnosis import Verdict
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile, read_model
 
@@ -26,12 +28,13 @@ def compare_command(
     timeout_s: float = TIMEOUT_S,
     out: Path = Path("compare.json"),
     diagnose: bool = True,
+    exit_code: bool = False,
     json: bool = False,
     verbose: bool = False,
 ) -> None:
     """Find where a simulation and a measurement disagree.
 
-    From the outside in: rig files, frames, zeros, links, effects, streams; each difference with its size and sigma.
+    Causes first, then constants by level: zeros, links, frames; each difference with its size and sigma.
 
     Samples are matched by plan, order, repeat and station, and by joint angles only where these are missing.
 
@@ -59,10 +62,13 @@ def compare_command(
         Where to write the comparison.
     diagnose
         Explain what differs; without it the links of the chain are compared only.
+    exit_code
+        End with exit code 1 at a mismatch, after the comparison has been written and printed; 0 where the two agree or
+        nothing can be decided. Without it a mismatch ends with 0, too.
     json
         Print the comparison as it stands in the file, on one line, and nothing else.
     verbose
-        Print also the links of the chain, the streams and the diagnosis.
+        Print also alternatives of constants, the readings, the links of the chain, the streams and the diagnosis.
 
     """
     source = read(measured)
@@ -73,10 +79,12 @@ def compare_command(
     write_json(out, file)
     if json:
         print(msgspec.json.encode(file).decode())
-        return
-    console = Console()
-    print_comparison(console, file, verbose=verbose)
-    console.print(f"comparison: {out}", markup=False)
+    else:
+        console = Console()
+        print_comparison(console, file, verbose=verbose)
+        console.print(f"comparison: {out}", markup=False)
+    if exit_code and file.verdict == Verdict.MISMATCH.value:
+        raise CheckFailed("measured and simulated differ; the comparison has been written")
 
 
 def _simulation(

@@ -1,6 +1,7 @@
 """A comparison and a reconciliation in a terminal: the verdict, the differences, what was left out, what remains."""
 
 from collections.abc import Iterator, Sequence
+from itertools import groupby
 
 from rich.console import Console
 from rich.table import Table
@@ -10,26 +11,30 @@ from calibeam.results.comparison import (
     SAYS,
     ComparisonFile,
     DifferenceRecord,
+    DroppedRecord,
     LinkRecord,
     ReadingRecord,
     StreamRecord,
 )
 from calibeam.results.reconciliation import ReconcileFile
-from calibrate.effects.term import with_sigma
+from calibrate.diagnose.compare import mismatches
+from calibrate.diagnose.compare.mismatches import Level, in_words
+from calibrate.effects.term import Size, with_sigma
 from calibrate.report.quantities import length, significant
 
-MOST_DIFFERENCES = 14  # differences in a terminal; all of them stand in the file
 FEW = 3  # alternatives of one
+CAUSES = frozenset(level.value for level in mismatches.CAUSES)
+SHORT = (Level.JOINT_ZEROS.value, Level.LINKS.value)
 
 
 def print_comparison(console: Console, file: ComparisonFile, *, verbose: bool = False) -> None:
-    """The verdict first; `verbose`: also the links of the chain, the streams and the diagnosis of what differs."""
+    """The verdict first, then every cause, then constants; `verbose`: also alternatives of constants, the readings, the
+    links of the chain, the streams and the diagnosis of what differs.
+    """
     console.print(f"[bold]{file.verdict}[/bold]: {file.says}", highlight=False)
     console.print(_rows(file), highlight=False)
-    for line in _differences(file.differences):
+    for line in (*_causes(file), *_constants(file), *_dropped(file.dropped)):
         console.print(line, highlight=False, markup=False)
-    if file.readings:
-        console.print(_readings(file.readings))
     for note in file.notes:
         console.print(note, highlight=False, markup=False)
     if verbose:
@@ -37,6 +42,10 @@ def print_comparison(console: Console, file: ComparisonFile, *, verbose: bool = 
 
 
 def _print_details(console: Console, file: ComparisonFile) -> None:
+    for one in file.differences:
+        if one.alternatives and one.level not in CAUSES:
+            console.print(f"{one.where}: {_alternatives(one)}", highlight=False, markup=False)
+    console.print(_readings(file.readings))
     console.print(_chain(file.links))
     if file.streams:
         console.print(_streams(file.streams))
@@ -47,22 +56,47 @@ def _print_details(console: Console, file: ComparisonFile) -> None:
         print_diagnosis(console, file.diagnosis)
 
 
-def _differences(found: tuple[DifferenceRecord, ...]) -> Iterator[str]:
-    deciding = [one for one in found if one.decides]
-    anew = [one for one in found if not one.decides]
-    for number, one in enumerate(deciding[:MOST_DIFFERENCES], start=1):
-        yield f"{number}. {one.says}"
+def _causes(file: ComparisonFile) -> Iterator[str]:
+    """All of them: what is one of many differences is seldom the least."""
+    found = (one for one in file.differences if one.decides and one.level in CAUSES)
+    for number, one in enumerate(found, start=1):
+        yield f"{number}. {one.says}{_simulated(one)}"
         if one.alternatives:
-            listed = ", ".join(f"{a.physics} at {a.where}" for a in one.alternatives[:FEW])
-            more = "" if len(one.alternatives) <= FEW else f" and {len(one.alternatives) - FEW} more"
-            yield f"   alternative: {listed}{more}"
-        for name, value in one.simulated.items():
-            yield f"   in the simulation: {name} {value:.6g}"
-    if len(deciding) > MOST_DIFFERENCES:
-        yield f"{len(deciding) - MOST_DIFFERENCES} more differences stand in the file"
-    if anew:
-        yield "set up or stated otherwise, no mismatch:"
-        yield from (f"   {one.says}" for one in anew[:MOST_DIFFERENCES])
+            yield f"   {_alternatives(one)}"
+
+
+def _alternatives(one: DifferenceRecord) -> str:
+    listed = ", ".join(f"{a.physics} at {a.where}" for a in one.alternatives[:FEW])
+    more = "" if len(one.alternatives) <= FEW else f" and {len(one.alternatives) - FEW} more"
+    return f"alternative: {listed}{more}"
+
+
+def _constants(file: ComparisonFile) -> Iterator[str]:
+    """One line a level, in the order of the file, where the target on the flange is last; then what is no mismatch."""
+    rest = [one for one in file.differences if one.decides and one.level not in CAUSES]
+    for level, found in groupby(rest, key=lambda one: one.level):
+        yield f"{level.replace('-', ' ')}: {'; '.join(_short(one) + _simulated(one) for one in found)}"
+    if anew := [_short(one) for one in file.differences if not one.decides]:
+        yield f"set up or stated otherwise, no mismatch: {'; '.join(anew)}"
+
+
+def _short(one: DifferenceRecord) -> str:
+    """Place and size; of a frame and of a rig key the sentence."""
+    if one.level not in SHORT:
+        return one.says
+    (size,) = (in_words(name, Size(s.value or 0.0, s.sigma or 0.0)) for name, s in one.sizes.items())
+    return f"{one.where.removesuffix('.angle')} {size}"
+
+
+def _simulated(one: DifferenceRecord) -> str:
+    listed = ", ".join(f"{name} {value:.6g}" for name, value in one.simulated.items())
+    return f" (in the simulation: {listed})" if listed else ""
+
+
+def _dropped(dropped: tuple[DroppedRecord, ...]) -> Iterator[str]:
+    if dropped:
+        listed = ", ".join(name for one in dropped for name in one.sizes)
+        yield f"no difference found, which the sigmas allow for (sizes in the file): {listed}"
 
 
 def _readings(readings: tuple[ReadingRecord, ...]) -> Table:

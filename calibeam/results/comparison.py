@@ -16,7 +16,7 @@ from acquisition.recording import Recording, Samples
 from calibeam.results.diagnosis import SEED
 from calibeam.results.simulator import simulated_by_model
 from calibeam.software import SOFTWARE
-from calibrate.diagnose.compare.beside import Beside, begin, beside, beside_structure, set_alike
+from calibrate.diagnose.compare.beside import Beside, Constant, begin, beside, beside_structure, set_alike
 from calibrate.diagnose.compare.chain import READINGS, Difference, Pair, columns_of, differences, of_rig
 from calibrate.diagnose.compare.corrected import compared_session, corrected_samples, simulated_of
 from calibrate.diagnose.compare.matched import Key, Matched, match, zeros_between
@@ -80,6 +80,14 @@ class DifferenceRecord(msgspec.Struct, frozen=True):
     says: str
     alternatives: tuple[NameOfCause, ...]
     simulated: dict[str, float]  # with the structure of the simulation: its own values of these parameters
+
+
+class DroppedRecord(msgspec.Struct, frozen=True):
+    """A constant that is no difference: left as in the simulation, to within these sizes, which widen the others'."""
+
+    where: str
+    physics: str
+    sizes: dict[str, SizeRecord]  # by the names of model.json
 
 
 class ReadingRecord(msgspec.Struct, frozen=True):
@@ -150,6 +158,7 @@ class ComparisonFile(msgspec.Struct, frozen=True):
     says: str
     rig: tuple[RigRecord, ...]
     differences: tuple[DifferenceRecord, ...]
+    dropped: tuple[DroppedRecord, ...]
     readings: tuple[ReadingRecord, ...]
     first_link: str | None
     links: tuple[LinkRecord, ...]
@@ -210,8 +219,7 @@ def compare(
     found += [*_zeros_alone(asked, zeros_rad), *asked.left]
     streams = stream_pairs(devices_of(measured), devices_of(simulated))
     found += _streams_apart(measured, simulated, asked, streams)
-    order = list(Level)
-    found.sort(key=lambda one: order.index(one.level))
+    found.sort(key=lambda one: one.order)
     explained = any(one.decides and one.level not in (Level.RIG, Level.STREAMS) for one in found)
     parted = tuple(_as_explained(one, asked, explained) for one in parted)
     verdict = _verdict(found, parted, asked)
@@ -227,6 +235,7 @@ def compare(
         _says(verdict, found, asked),
         tuple(_rig_record(one) for one in rig),
         tuple(_record(one, structure or made_of) for one in found),
+        () if asked.beside is None else tuple(_dropped(one) for one in asked.beside.dropped),
         asked.readings,
         next((one.link for one in parted if one.parts), None),
         tuple(_link(one, pair[0]) for one in parted),
@@ -513,12 +522,20 @@ def _rig_record(one: RigKey) -> RigRecord:
     return RigRecord(one.key, one.measured, one.simulated, one.difference, one.geometry)
 
 
+def _dropped(one: Constant) -> DroppedRecord:
+    return DroppedRecord(one.where, one.physics, _sizes(dict(zip(one.names, one.sizes, strict=True))))
+
+
+def _sizes(sizes: Mapping[str, Size]) -> dict[str, SizeRecord]:
+    return {name: SizeRecord(_number(size.value), _number(size.sigma)) for name, size in sizes.items()}
+
+
 def _record(one: Mismatch, structure: ModelFile | None) -> DifferenceRecord:
-    sizes = {name: SizeRecord(_number(size.value), _number(size.sigma)) for name, size in one.sizes.items()}
     others = tuple(_cause(name) for name in one.alternatives)
     own = {} if structure is None else _own(one, structure)
+    sizes, side = _sizes(one.sizes), one.side.value
     return DifferenceRecord(
-        one.level.value, one.where, one.physics, sizes, one.side.value, one.decides, one.p, one.says, others, own
+        one.level.value, one.where, one.physics, sizes, side, one.decides, one.p, one.says, others, own
     )
 
 

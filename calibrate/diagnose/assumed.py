@@ -27,6 +27,7 @@ class Assumed:
     at: Ints  # (k,) index of each value in the fit
     mean: Floats  # (k,)
     root: Floats  # (row, k) root' root is the inverse covariance
+    of_difference: bool = False  # what is sought beside it is of either sign: of two recordings either may have more
 
     @classmethod
     def of(cls, at: Ints, mean: Floats, covariance: Floats, plausible: Floats) -> "Assumed":

@@ -21,6 +21,7 @@ from calibrate.diagnose.scatter import Scatter, likelihood_of
 from calibrate.diagnose.session import Session
 from calibrate.effects.catalogue import terms_of
 from calibrate.effects.drivers import Drivers
+from calibrate.effects.form import Form
 from calibrate.effects.ports import Port
 from calibrate.effects.since_model import changes
 from calibrate.effects.term import Term
@@ -191,8 +192,12 @@ class Fitted:
     @cached_property
     def _candidates(self) -> tuple[Term, ...]:
         """Closed and open menus and the ports ask for them in turn."""
-        since = () if self.problem.assumed is None else changes(self.drivers)
-        return (*terms_of(self.drivers), *since)
+        assumed, every = self.problem.assumed, terms_of(self.drivers)
+        if assumed is None:
+            return every
+        if assumed.of_difference:
+            every = tuple(term.of_a_difference() if isinstance(term, Form) else term for term in every)
+        return (*every, *changes(self.drivers))
 
     def refitted(self, accepted: Sequence[Accepted]) -> "Fitted":
         kept = {a.term.key for a in self.accepted}

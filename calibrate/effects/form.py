@@ -1,7 +1,7 @@
 """The usual form of a term: functions of drivers, one column each, along fixed directions of the port."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +59,16 @@ class Form(Term):
         if self.believable is not None and not self.believable(coefficients, inner):
             return False
         return bool(np.max(np.abs(coefficients), initial=0.0) <= max(self.limit, NOISE_ALLOWS * noise_rad))
+
+    def of_a_difference(self) -> "Form":
+        """The same where it may be of either sign: one of two recordings has more of it."""
+        if (one := self.believable) is None:
+            return self
+
+        def either(values: Floats, inner: Floats) -> bool:
+            return one(values, inner) or one(-values, inner)
+
+        return replace(self, believable=either)
 
     def says(self, sizes: Mapping[str, Size]) -> str:
         sentence, (first, *_) = self.sentence, self.names

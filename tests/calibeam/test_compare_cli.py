@@ -80,7 +80,7 @@ def test_a_detector_that_sits_elsewhere_beside_the_other_is_named(sessions, tmp_
 
 
 def test_sessions_that_differ_by_noise_agree(sessions, tmp_path):
-    said = compared(sessions[1], rewritten(sessions[1], tmp_path / "noisy", noisy), tmp_path)
+    said = compared(sessions[1], rewritten(sessions[1], tmp_path / "noisy", noisy), tmp_path, "--exit-code")
     assert said["first_link"] is None
     assert said["verdict"] == "consistent"
     assert said["differences"] == []

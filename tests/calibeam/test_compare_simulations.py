@@ -84,7 +84,7 @@ def names_both(said):
     zero, link = found["joint3.angle"]["sizes"]["zero_rad"], found["link2.length"]["sizes"]["length_m"]
     assert near(zero, 2e-3)
     assert near(link, 4e-4)
-    assert zero["sigma"] < 2e-5
+    assert 1.2e-5 < zero["sigma"] < 2.5e-5  # 1.0e-5 where the constants that were dropped count as exact
     assert link["sigma"] < 2e-5
     (position,) = said["readings"]
     assert position["rms_coordinate_before"] > 10.0 * NOISE_M
@@ -96,8 +96,9 @@ def test_nominal_geometry_against_an_arm_that_is_off_names_both_constants(off, t
     said = compared(tmp_path, off, simulated)
     names_both(said)
     printed = capsys.readouterr().out
-    assert printed.index("mismatch") < printed.index("Link 2 differs")
-    assert "The zero of joint 3 differs by" in printed
+    assert printed.index("mismatch") < printed.index("joint3 ") < printed.index("link2.length")
+    assert {one["where"] for one in said["dropped"]}.isdisjoint(deciding(said))
+    assert all(size["sigma"] > 0.0 for one in said["dropped"] for size in one["sizes"].values())
 
 
 def test_a_program_of_thirty_lines_is_a_simulation(off, tmp_path):
@@ -191,6 +192,18 @@ def test_another_zero_of_degrees_does_not_break_a_match_and_is_sized(tmp_path):
     found = deciding(said)
     assert set(found) == {"joint2.angle"}
     assert near(found["joint2.angle"]["sizes"]["zero_rad"], -2.6)
+
+
+def test_a_mismatch_ends_with_1_where_that_is_asked_for(off, tmp_path, capsys):
+    simulated, out = session(tmp_path / "simulated", poses(), poses(), arm()), tmp_path / "compare.json"
+    asked = ["--no-diagnose", "--out", str(out)]
+    assert run(["compare", str(off), str(simulated), *asked]) == 0
+    said = out.read_bytes()
+    out.unlink()
+    assert run(["compare", str(off), str(simulated), *asked, "--exit-code"]) == 1
+    assert out.read_bytes() == said
+    assert json.loads(said)["verdict"] == "mismatch"
+    assert "differ" in capsys.readouterr().err
 
 
 ANSWERS = {

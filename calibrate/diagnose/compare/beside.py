@@ -6,7 +6,7 @@ tool and stations compete with the whole catalogue of effects in one search, so 
 and one test prices all of them (calibrate/diagnose/searching.py).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,6 +30,7 @@ from calibrate.diagnose.compare.constants import (
     fewest,
     outermost,
     parts_of,
+    undetected,
 )
 from calibrate.diagnose.compare.corrected import (
     Simulated,
@@ -62,7 +63,8 @@ WIDE = 3.0  # plausible sizes: one sigma of a constant that may differ; no opini
 ROUNDS = 4  # of searches; usually the first one is the last
 SURE = 1e-3  # chance of a constant by noise alone, beside the effects found
 SET_UP = 1e-3  # chance of a device's difference by noise alone, below which it stands elsewhere
-NOTHING = Assumed(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros((0, 0)))  # the values are held, not assumed
+NO_VALUES = np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros((0, 0))
+NOTHING = Assumed(*NO_VALUES, of_difference=True)  # the values are held, not assumed
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,8 @@ class Beside:
     device: Constant | None  # None: no device, or it stands where it stood
     T_simulated_measured: Floats  # (4, 4) the measuring device of the one recording in that of the other
     blind: tuple[Part, ...] = ()  # zeros that these readings do not show
+    dropped: tuple[Constant, ...] = ()  # not worth their numbers: as in the simulation, to within these sizes
+    wide: Fitted | None = None  # the model with those free, too: what every size and sigma is taken from
 
 
 def beside(simulated: Simulated, pair: Pair, rng: Generator, differing: Sequence[str] = ()) -> Beside:
@@ -118,13 +122,17 @@ def beside(simulated: Simulated, pair: Pair, rng: Generator, differing: Sequence
         found = _asked(simulated, samples, rng, freed)
     if found.physics is None:
         return Beside(simulated, found, (), None, T, blind)
-    model, others = found.physics.model, alternatives(quadratic, freed)
+    others, back = alternatives(quadratic, freed), undetected(quadratic, freed)
+    limits = {name: float(x) for part, off in back.items() for name, x in zip(part.names, off, strict=True)}
+    model = _with_free(simulated, found.physics.model, limits)
     covariance = _covariance(model)
     constants = tuple(_constant(simulated, model, covariance, part, others[part]) for part in freed)
+    dropped = tuple(_constant(simulated, model, covariance, part) for part in back)
     at, here = device_of(predictor_of(model.session, model.geometry)), device_of(simulated.model)
     if at is None or here is None:
-        return Beside(simulated, found, constants, None, T, blind)
-    return Beside(simulated, found, constants, _device(here, at, model, covariance), inverse(here) @ at, blind)
+        return Beside(simulated, found, constants, None, T, blind, dropped, model)
+    device = _device(here, at, model, covariance)
+    return Beside(simulated, found, constants, device, inverse(here) @ at, blind, dropped, model)
 
 
 def beside_structure(simulated: Simulated, pair: Pair, rng: Generator, structure: ModelFile) -> Beside:
@@ -134,7 +142,13 @@ def beside_structure(simulated: Simulated, pair: Pair, rng: Generator, structure
     model without a covariance, and where an effect of it cannot be evaluated here.
     """
     known = Known(structure, same_recording=False)
-    found = diagnose_samples(simulated.rig, pair[0], rng, known.begin)
+
+    def begun(session: Session) -> Fitted:
+        fit = known.begin(session)
+        assumed = None if fit.problem.assumed is None else replace(fit.problem.assumed, of_difference=True)
+        return replace(fit, problem=replace(fit.problem, assumed=assumed))
+
+    found = diagnose_samples(simulated.rig, pair[0], rng, begun)
     T = device_between(simulated, pair)
     at, here = None, device_of(simulated.model)
     if found.physics is not None:
@@ -143,6 +157,20 @@ def beside_structure(simulated: Simulated, pair: Pair, rng: Generator, structure
         return Beside(simulated, found, (), None, T)
     model = found.physics.model
     return Beside(simulated, found, (), _device(here, at, model, _covariance(model)), inverse(here) @ at)
+
+
+def _with_free(simulated: Simulated, model: Fitted, limits: Mapping[str, float]) -> Fitted:
+    """The model with these constants free, one sigma each in plausible sizes: at the simulation's values they would be
+    taken as known, and what is correlated with them as surer than it is.
+    """
+    session, values = model.session, _values(simulated, model.session)
+    chosen = tuple(
+        replace(p, free=True, start=value, prior=limits[p.name] * p.plausible) if p.name in limits else p
+        for p, value in zip(session.weighting.parameters, values, strict=True)
+    )
+    session = replace(session, weighting=replace(session.weighting, chosen=chosen))
+    problem = replace(model.problem, session=session, last={}, slopes={}, kept=[], added={})
+    return replace(model, session=session, problem=problem).refitted(model.accepted)
 
 
 def _asked(simulated: Simulated, samples: Samples, rng: Generator, freed: Sequence[Part]) -> Diagnosed:

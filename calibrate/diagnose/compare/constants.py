@@ -36,6 +36,7 @@ FRAMES = {
     seat.POINTS: ("seat.position", "seat-moved"),
     "psd2": ("psd2.reading", "psd-moved"),  # in the frame of PSD 1
 }
+LOST = 1e-12  # of a plausible size squared: a variance below is rounding, and the plausible size stands in for it
 TIED = 2.0  # of BIC: no more than a bare mention (Kass, Raftery 1995)
 RIVAL = 6.0  # of BIC: strong evidence against what is farther off (Kass, Raftery 1995)
 
@@ -190,6 +191,17 @@ def alternatives(whole: Quadratic, chosen: Sequence[Part]) -> dict[Part, tuple[N
     """Of each chosen part the others that could stand in its place, the remaining chosen ones being fitted again."""
     kept = _reduced(whole, chosen)
     return {part: tuple(_standing_in(whole, chosen, part, kept)) for part in chosen}
+
+
+def undetected(whole: Quadratic, chosen: Sequence[Part]) -> dict[Part, Floats]:
+    """Of each other part how far its numbers (n,) may be off without having been found, in plausible sizes.
+
+    That is where a number is worth its price beside the chosen parts, at most its plausible size. A part that the
+    readings do not tell apart from the chosen ones is left out: these are the sum, by convention.
+    """
+    alone = {p: np.diag(_among(whole, (*chosen, p)).covariance)[at] for p, at in whole.parts if p not in chosen}
+    seen = {p: np.where(own > LOST, own, 1.0 / whole.price) for p, own in alone.items() if np.all(own < 1.0)}
+    return {p: np.sqrt(np.minimum(whole.price * own, 1.0)) for p, own in seen.items()}
 
 
 def _standing_in(whole: Quadratic, chosen: Sequence[Part], part: Part, kept: float) -> Iterator[Named]:

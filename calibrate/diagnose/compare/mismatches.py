@@ -1,8 +1,8 @@
-"""What two recordings differ by, as a list from the outside in: each with place, size, sigma, unit and one sentence.
+"""What two recordings differ by, as a list, causes before constants: each with place, size, sigma, unit, one sentence.
 
-Outside are the frames in which things stand, then zeros of encoders and joints, links, then physics. A measuring device
-that stands elsewhere, and the zeros of second encoders, are set up again for every recording: they are stated with
-their size, and decide nothing.
+First physics, then zeros of joints, links, zeros of encoders and the frames in which things stand; last the target on
+the flange, which takes up what trades against the links. A measuring device that stands elsewhere, and the zeros of
+second encoders, are set up again for every recording: they are stated with their size, and decide nothing.
 """
 
 from collections.abc import Mapping
@@ -12,12 +12,15 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.compare.beside import Beside, Constant
 from calibrate.diagnose.compare.constants import LINK, ZERO
 from calibrate.diagnose.compare.corrected import Simulated
 from calibrate.diagnose.diagnosis import Finding, Named
 from calibrate.diagnose.findings import named
+from calibrate.diagnose.fitted import Fitted
 from calibrate.diagnose.linearised import Accepted
+from calibrate.diagnose.stated_sizes import sizes_of
 from calibrate.effects.since_model import RECORDING
 from calibrate.effects.term import Size, with_sigma
 
@@ -29,17 +32,17 @@ RANK = 1e-10  # of the largest singular value
 
 
 class Level(Enum):
-    """From the outside in; words of docs/formats.md."""
+    """Causes, then constants, in this order; words of docs/formats.md."""
 
-    RIG = "rig"
-    FRAMES = "frames"
-    ENCODER_ZEROS = "encoder-zeros"
+    EFFECTS = "effects"
+    UNEXPLAINED = "unexplained"
+    STREAMS = "streams"
     JOINTS = "joints"
+    RIG = "rig"
     JOINT_ZEROS = "joint-zeros"
     LINKS = "links"
-    EFFECTS = "effects"
-    STREAMS = "streams"
-    UNEXPLAINED = "unexplained"
+    ENCODER_ZEROS = "encoder-zeros"
+    FRAMES = "frames"
 
 
 class Side(Enum):
@@ -66,10 +69,17 @@ class Mismatch:
     alternatives: tuple[Named, ...] = ()
     names: tuple[str, ...] = ()  # parameters of model.json that differ by these sizes, in their order
 
+    @property
+    def order(self) -> tuple[int, bool]:
+        """Place in the list: the target on the flange is the last of the frames."""
+        return list(Level).index(self.level), self.physics == TARGET
 
+
+CAUSES = (Level.EFFECTS, Level.UNEXPLAINED, Level.STREAMS, Level.JOINTS)
+TARGET = "tool-moved"
 LEVELS = {ZERO: Level.JOINT_ZEROS, LINK: Level.LINKS}  # all other constants are frames
 PARTS = {
-    "tool-moved": "The target on the flange",
+    TARGET: "The target on the flange",
     "laser-moved": "The laser on the flange",
     "fixture-moved": "The fixture",
     "seat-moved": "Seat",
@@ -86,14 +96,12 @@ def mismatches(found: Beside, zeros_rad: Floats) -> tuple[Mismatch, ...]:
     out += [] if encoders is None else [encoders]
     if found.diagnosed.physics is not None:
         said = found.diagnosed.physics.diagnosis
-        accepted = {named(a.term): a for a in found.diagnosed.physics.model.accepted}
-        out += [_of_finding(f, accepted.get(f.name), found.simulated) for f in said.findings]
+        out += [_of_finding(f, found, found.wide or found.diagnosed.physics.model) for f in said.findings]
         out += [
             Mismatch(Level.UNEXPLAINED, u.where, "unknown", {}, f"Something is left over{_at(u.where)}: {u.why}", p=u.p)
             for u in said.unexplained
         ]
-    order = list(Level)
-    return tuple(sorted(out, key=lambda one: order.index(one.level)))
+    return tuple(out)
 
 
 def _at(where: str) -> str:
@@ -107,20 +115,17 @@ def _of_constant(one: Constant, zeros_rad: Floats) -> Mismatch:
     (name,), (size,) = one.names, one.sizes
     owner, _, what = name.partition(".")
     if level is Level.JOINT_ZEROS:
-        joint = int(owner.removeprefix("joint"))
-        size = Size(size.value - float(zeros_rad[joint - 1]), size.sigma)
-        says = f"The zero of joint {joint} differs by {_words('zero_rad', size)}"
-        return Mismatch(
-            level, one.where, one.physics, {"zero_rad": size}, says, p=one.p, alternatives=one.rivals, names=one.names
-        )
-    unit = "m" if what in ("length", "offset") else "rad"
-    says = f"Link {owner.removeprefix('link')} differs: {what} by {_words(f'{what}_{unit}', size)}"
-    return Mismatch(
-        level, one.where, one.physics, {f"{what}_{unit}": size}, says, p=one.p, alternatives=one.rivals, names=one.names
-    )
+        joint = owner.removeprefix("joint")
+        size = Size(size.value - float(zeros_rad[int(joint) - 1]), size.sigma)
+        key, says = "zero_rad", f"The zero of joint {joint} differs by"
+    else:
+        key = f"{what}_{'m' if what in ('length', 'offset') else 'rad'}"
+        says = f"Link {owner.removeprefix('link')} differs: {what} by"
+    sizes, says = {key: size}, f"{says} {in_words(key, size)}"
+    return Mismatch(level, one.where, one.physics, sizes, says, p=one.p, alternatives=one.rivals, names=one.names)
 
 
-def _words(name: str, size: Size) -> str:
+def in_words(name: str, size: Size) -> str:
     """In the unit of the name: 2.0153 ± 0.0078 mrad."""
     unit = "rad" if name.endswith("_rad") else "m"
     steps = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"))
@@ -149,8 +154,8 @@ def _unit(name: str) -> str:
 
 def _six(sizes: Mapping[str, Size]) -> str:
     """Lengths, then angles, each with its sigma."""
-    lengths = [_words(n, s) for n, s in sizes.items() if n.endswith("_m")]
-    angles = [_words(n, s) for n, s in sizes.items() if n.endswith("_rad")]
+    lengths = [in_words(n, s) for n, s in sizes.items() if n.endswith("_m")]
+    angles = [in_words(n, s) for n, s in sizes.items() if n.endswith("_rad")]
     parts = [f"moved by {', '.join(lengths)}"] if lengths else []
     return " and ".join(parts + ([f"turned by {', '.join(angles)}"] if angles else []))
 
@@ -170,32 +175,43 @@ def _encoder_zeros(found: Beside) -> Mismatch | None:
             sizes[f"{p.name.partition('.')[0]}_rad"] = Size(apart, sigma)
     if not sizes:
         return None
-    named_joints = ((n.removeprefix("encoder").removesuffix("_rad"), _words(n, s)) for n, s in sizes.items())
+    named_joints = ((n.removeprefix("encoder").removesuffix("_rad"), in_words(n, s)) for n, s in sizes.items())
     listed = ", ".join(f"joint {joint}: {words}" for joint, words in named_joints)
     says = f"The zeros of the second encoders are others, as they may be ({listed})"
     return Mismatch(Level.ENCODER_ZEROS, "encoders", "encoder-zero", sizes, says, decides=False)
 
 
-def _of_finding(finding: Finding, accepted: Accepted | None, simulated: Simulated) -> Mismatch:
-    """A constant that is no parameter of the model is a frame; what is left is physics."""
-    rivals = tuple(r.name for r in finding.rivals)
+def _of_finding(finding: Finding, found: Beside, model: Fitted) -> Mismatch:
+    """A constant that is no parameter of the model is a frame; what is left is physics. `model`: sizes are of this."""
+    where, physics, rivals = finding.name.where, finding.name.physics, tuple(r.name for r in finding.rivals)
+    sizes, says, accepted = finding.parameters, finding.says, None
+    for i, one in enumerate(model.accepted):
+        if named(one.term) == finding.name:
+            accepted = one
+            if says == one.term.says(sizes):  # of this term alone, and not of several that are one cause
+                sizes = sizes_of(Bench(model), i)
+                says = one.term.says(sizes)
     if finding.name.depends_on == (RECORDING,):
-        level, says = LEVELS.get(finding.name.physics, Level.FRAMES), finding.says.replace("moved", "differs")
-        return Mismatch(
-            level, finding.name.where, finding.name.physics, finding.parameters, says, p=finding.p, alternatives=rivals
-        )
-    side = Side.NEITHER if accepted is None else _side(accepted, simulated)
-    says = f"{finding.says}{SIDES[side]}"
-    return Mismatch(
-        Level.EFFECTS, finding.name.where, finding.name.physics, finding.parameters, says, side=side, p=finding.p,
-        alternatives=rivals,
-    )  # fmt: skip
+        level, says = LEVELS.get(physics, Level.FRAMES), says.replace("moved", "differs")
+        return Mismatch(level, where, physics, sizes, says, p=finding.p, alternatives=rivals)
+    side = Side.NEITHER if accepted is None else _side(accepted, found.simulated)
+    if side is Side.SIMULATED and accepted is not None:
+        says = f"Only the simulation has it: {physics} at {where}. {_of_the_other(accepted, sizes)}"
+    says = f"{says}{SIDES[side]}"
+    return Mismatch(Level.EFFECTS, where, physics, sizes, says, side=side, p=finding.p, alternatives=rivals)
+
+
+def _of_the_other(accepted: Accepted, sizes: Mapping[str, Size]) -> str:
+    """The effect as it is in the simulation: of the opposite sign."""
+    m, k = len(accepted.coefficients), len(accepted.inner)
+    there = accepted.term.sizes(-accepted.coefficients, np.zeros((m, m)), accepted.inner, np.zeros(k))
+    return accepted.term.says({name: Size(one.value, sizes[name].sigma) for name, one in there.items()})
 
 
 SIDES = {
     Side.NEITHER: "",
     Side.MEASURED: "; the simulation lacks it",
-    Side.SIMULATED: " (measured less simulated); only the simulation has it",
+    Side.SIMULATED: "",
     Side.BOTH: " (measured less simulated); both have it, in another size",
 }
 
