@@ -20,10 +20,9 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 
-from rich.console import Console
-
 from acquisition.errors import AcquisitionError
 from acquisition.wires.streams import FROZEN_S
+from calibeam.console import Console
 from drivers.clock import Clock, SystemClock
 
 GO, REFUSALS = "go", ("n", "no", "q")

@@ -9,13 +9,13 @@ import sys
 from importlib.metadata import version
 
 from cyclopts import App, CycloptsError, Group, Parameter
-from rich.console import Console
-from rich.markup import escape
+from rich.text import Text
 
 from acquisition.errors import AcquisitionError
 from acquisition.recording import RecordingError, RigFileError, SamplesError
 from acquisition.recording.files import brief
 from calibeam.command_list import COMMANDS, GROUPS
+from calibeam.console import Console, clean_streams
 from calibeam.emulation import EmulationError
 from calibeam.interrupts import INTERRUPTS
 from calibeam.outcome import CheckFailed, PartialResult, interruption
@@ -48,6 +48,8 @@ def _new_app() -> App:
         version=version("calibeam"),
         help="Record, calibrate and diagnose robot arms, from laser spots, a tracker, a wire, cones or your tables.",
         default_parameter=Parameter(negative_iterable=(), consume_multiple=True),  # several values: --only a b
+        console=Console(),
+        error_console=Console(stderr=True),
         suppress_keyboard_interrupt=False,  # cyclopts would end with 130 and no message
     )
 
@@ -73,6 +75,11 @@ def main() -> None:
 
 def run(arguments: list[str]) -> int:
     """The exit code of one command line."""
+    with clean_streams():
+        return _run(arguments)
+
+
+def _run(arguments: list[str]) -> int:
     errors = Console(stderr=True, soft_wrap=True, highlight=False)
     asked = _list_of_commands() if not arguments or arguments[0] in app.help_flags else app
     try:
@@ -80,7 +87,7 @@ def run(arguments: list[str]) -> int:
     except CycloptsError:
         return 2  # cyclopts has printed what was wrong
     except PartialResult as partial:
-        errors.print(f"[bold]stopped:[/bold] {escape(brief(str(partial)))}")
+        errors.print(Text.assemble(("stopped:", "bold"), f" {brief(str(partial))}"))
         return 3
     except KeyboardInterrupt as interrupt:
         errors.print(f"stopped by {interruption(interrupt)}")

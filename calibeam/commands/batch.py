@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import msgspec
 from cyclopts import Parameter, validators
-from rich.console import Console
 
+from calibeam.console import Console
 from calibeam.fleet.recordings import PAGE, TABLE, Engine, Workers
 from calibeam.outcome import PartialResult
 from calibeam.overwriting import writes

@@ -2,11 +2,10 @@
 
 from pathlib import Path
 
-from rich.console import Console
-
 from acquisition.recording import RigFileError
 from acquisition.recording.rig import load_rig, rig_text
 from calibeam.asking import YES, at_terminal, someone
+from calibeam.console import Console
 from calibeam.devices.recorder import new_recording
 from calibeam.devices.site import addresses_of, check_session, connected
 from calibeam.outcome import CheckFailed

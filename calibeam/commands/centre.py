@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from cyclopts import Parameter
-from rich.console import Console
 from rich.table import Table
 
 from acquisition.centring.strategies import CentringBy, CentringChoice
 from acquisition.errors import AcquisitionError
 from acquisition.recording.rig import Rig, load_rig, rig_text
 from calibeam.asking import YES, at_terminal, someone
+from calibeam.console import Console
 from calibeam.devices.recorder import RecordingJournal, new_recording
 from calibeam.devices.site import addresses_of, check_session, connected
 from calibeam.outcome import CheckFailed, PartialResult, interruption

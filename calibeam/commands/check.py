@@ -8,13 +8,13 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 from cyclopts import Parameter
-from rich.console import Console
 
 from acquisition.recording import Finding, Recording, Stream, check, read
 from acquisition.recording.device_clock import ClockModel, ClockStatus, clock_model
 from acquisition.recording.mcap import segments
 from acquisition.recording.rig import load_rig
 from acquisition.recording.samples import Floats
+from calibeam.console import Console
 from calibeam.devices.check import check_devices
 from calibeam.outcome import CheckFailed
 from drivers.clock import SystemClock

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import msgspec
-from rich.console import Console
 
 from acquisition.recording import Recording, read
 from acquisition.recording.files import json_output, write_json
+from calibeam.console import Console
 from calibeam.outcome import CheckFailed
 from calibeam.overwriting import writes
 from calibeam.printing.comparison_lines import print_comparison

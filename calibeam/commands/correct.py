@@ -7,11 +7,11 @@ from typing import Annotated, Literal
 import numpy as np
 from cyclopts import Parameter, validators
 from numpy.typing import NDArray
-from rich.console import Console
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording.files import OutputKind, csv_text, table_output, write_output
 from acquisition.recording.rig import parse_rig
+from calibeam.console import Console
 from calibeam.motion.motion_inverse import MotionInverse
 from calibeam.outcome import PartialResult
 from calibeam.overwriting import writes

@@ -12,12 +12,12 @@ from typing import Annotated
 
 import numpy as np
 from cyclopts import Parameter
-from rich.console import Console
 from rich.table import Table
 
 from acquisition.recording import RecordingError
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.session.plan import PlanOptions
+from calibeam.console import Console
 from calibeam.devices.recorder import new_recording, record_session
 from calibeam.devices.site import addresses_of, check_session, connected
 from calibeam.emulation import Emulation

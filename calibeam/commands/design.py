@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 import msgspec
 import numpy as np
 from cyclopts import Parameter, validators
-from rich.console import Console
 
 from acquisition.recording.pose_plan import POSE_PLAN, write_pose_plan
 from acquisition.recording.rig import Rig, load_rig
+from calibeam.console import Console
 from calibeam.overwriting import writes
 from calibeam.printing.progress import progress_bar
 from calibeam.software import SOFTWARE

@@ -4,10 +4,10 @@ from functools import partial
 from pathlib import Path
 
 import msgspec
-from rich.console import Console
 
 from acquisition.recording import Recording, read
 from acquisition.recording.pose_plan import POSE_PLAN
+from calibeam.console import Console
 from calibeam.overwriting import writes
 from calibeam.printing.progress import stages_shown
 from calibeam.printing.results import print_diagnosis, print_streams

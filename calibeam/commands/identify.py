@@ -5,10 +5,10 @@ from typing import Annotated
 
 import msgspec
 from cyclopts import Parameter, validators
-from rich.console import Console
 
 from acquisition.recording import read
 from acquisition.recording.rig import Rig
+from calibeam.console import Console
 from calibeam.overwriting import writes
 from calibeam.printing.identification import print_identification, refitted_lines
 from calibeam.results.identification import (

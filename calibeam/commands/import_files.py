@@ -7,7 +7,6 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
@@ -37,6 +36,7 @@ from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.session_folder import CSV, PARQUET, RIG
 from acquisition.recording.session_folder.folder_import import import_folder, write_recording
 from calibeam.asking import NotAgreedError, at_terminal, someone
+from calibeam.console import Console
 from calibeam.outcome import PartialResult, taken_back
 from calibeam.software import SOFTWARE
 from calibrate.report.quantities import counted, significant

@@ -9,7 +9,6 @@ import msgspec
 import numpy as np
 from cyclopts import App, Parameter, validators
 from numpy.typing import NDArray
-from rich.console import Console
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Samples, read
@@ -24,6 +23,7 @@ from acquisition.recording.pose_plan import (
 )
 from acquisition.recording.rig import Rig, load_rig, parse_rig
 from acquisition.recording.session_folder import read_csv
+from calibeam.console import Console
 from calibeam.motion.cube_in_reach import CubeInReach, cube_in_reach, ways_to
 from calibeam.motion.motion_inverse import MotionInverse
 from calibeam.outcome import taken_back

@@ -5,13 +5,13 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 
 from acquisition.errors import TaskError
 from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.kinematics import transform
 from acquisition.motion.paths.segments import By, Place, Segment
 from acquisition.recording.rig import load_rig
+from calibeam.console import Console
 from calibeam.overwriting import writes
 
 Floats = NDArray[np.float64]

@@ -7,11 +7,11 @@ from typing import Annotated, Any
 
 import msgspec
 from cyclopts import App, Parameter
-from rich.console import Console
 
 from acquisition.recording import RecordingError
 from acquisition.recording.mcap import Rotation
 from acquisition.recording.rig import load_rig, rig_text
+from calibeam.console import Console
 from calibeam.devices.encoder_log import EncoderLog, LogState
 from calibeam.outcome import PartialResult
 from drivers.clock import Clock, SystemClock

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
-from rich.console import Console
 from rich.table import Table
 
 from acquisition.errors import TaskError
@@ -13,6 +12,7 @@ from acquisition.motion.plan import Plan
 from acquisition.recording.files import json_output, write_output
 from acquisition.recording.rig import load_rig
 from calibeam.commands.demo import RIG, ShippedRig
+from calibeam.console import Console
 from calibeam.emulation import Emulation
 from calibeam.overwriting import writes
 from drivers.clock import SystemClock

@@ -6,13 +6,13 @@ from typing import Annotated
 import numpy as np
 from cyclopts import Parameter
 from numpy.typing import NDArray
-from rich.console import Console
 
 from acquisition.errors import TaskError
 from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.paths.segments import By, Place, Segment
 from acquisition.motion.task.task_file import read_task
 from acquisition.recording.rig import Rig, load_rig
+from calibeam.console import Console
 from calibeam.overwriting import writes
 
 Floats = NDArray[np.float64]

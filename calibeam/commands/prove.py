@@ -6,8 +6,8 @@ from typing import Annotated
 
 import msgspec
 from cyclopts import Parameter
-from rich.console import Console
 
+from calibeam.console import Console
 from calibeam.printing.proof import print_proof, print_real
 from calibeam.prove.loop import prove_loop, summary
 from calibeam.prove.prove import Plan, ending_early, fresh, prove

@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import msgspec
-from rich.console import Console
 
 from acquisition.recording import Recording, read
 from acquisition.recording.files import write_json
 from acquisition.recording.rig import rig_text
+from calibeam.console import Console
 from calibeam.outcome import taken_back
 from calibeam.printing.comparison_lines import print_reconciliation
 from calibeam.results.identification import naming_source

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import Parameter
-from rich.console import Console
 
 from acquisition.centring.strategies import CentringBy, CentringChoice
 from acquisition.errors import AcquisitionError
@@ -19,6 +18,7 @@ from acquisition.recording.pose_plan import read_pose_plan
 from acquisition.recording.rig import Rig, load_rig, rig_text
 from acquisition.session.plan import PlanOptions
 from calibeam.asking import at_terminal
+from calibeam.console import Console
 from calibeam.devices.site import (
     addresses_of,
     check_session,

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import msgspec
 from cyclopts import Parameter, validators
-from rich.console import Console
 
 from acquisition.recording.rig import Rig, load_rig
+from calibeam.console import Console
 from calibeam.geometry_only import read_geometry
 from calibeam.overwriting import writes
 from calibeam.printing.progress import progress_bar

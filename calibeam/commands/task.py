@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
-from rich.console import Console
 
 from acquisition.errors import TaskError
 from acquisition.recording.rig import load_rig
+from calibeam.console import Console
 
 
 def task_command(

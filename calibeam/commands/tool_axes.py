@@ -5,13 +5,13 @@ from pathlib import Path
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Recording, read
 from acquisition.recording.files import json_output, si_value, write_json
 from acquisition.recording.rig import Rig, rig_sha256
 from acquisition.recording.samples import ORIENTATION, POSITION
+from calibeam.console import Console
 from calibeam.outcome import PartialResult
 from calibeam.overwriting import writes
 from calibeam.printing.tables import print_tool_axes

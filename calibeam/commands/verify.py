@@ -5,11 +5,11 @@ from typing import Annotated
 
 import msgspec
 from cyclopts import Parameter
-from rich.console import Console
 from rich.table import Table
 
 from acquisition.recording import read
 from acquisition.recording.files import json_output, write_json
+from calibeam.console import Console
 from calibeam.geometry_only import read_geometry
 from calibeam.outcome import CheckFailed
 from calibeam.overwriting import writes

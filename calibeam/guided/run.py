@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console, Group
+from rich.console import Group
 from rich.live import Live
 from rich.table import Table
 from rich.text import Text
@@ -17,6 +17,7 @@ from rich.text import Text
 from acquisition.guided.guide import Guide, GuidedProgress, Request
 from acquisition.guided.plan import GuidedOptions, GuidedVisit, by_kind, calibration_plan, verification_plan
 from acquisition.recording.rig import Rig
+from calibeam.console import Console
 from calibeam.devices.recorder import new_recording
 from calibeam.guided.hand import EmulatedHand
 from calibeam.guided.recorded import EncoderAddress, record_guided, watching

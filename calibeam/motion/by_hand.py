@@ -17,7 +17,6 @@ from typing import TextIO
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 
 from acquisition.errors import InterruptedMotionError
 from acquisition.motion.cell import Cell
@@ -28,6 +27,7 @@ from acquisition.motion.plan import Plan
 from acquisition.motion.states import OVER, MotionState
 from acquisition.recording.rig import Rig
 from calibeam.asking import YES, Asking, at_terminal, someone
+from calibeam.console import Console
 from calibeam.interrupts import INTERRUPTS
 from calibeam.motion.gate_of_rig import cell_of, gate_of, solver_of
 from calibeam.motion.robot import streamed_robot

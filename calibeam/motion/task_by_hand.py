@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 
 from acquisition.errors import RefusedMotionError, TaskError
 from acquisition.motion.deviation import Deviation, deviation, rates_text
@@ -26,6 +25,7 @@ from acquisition.motion.task.transforms import Untaught
 from acquisition.recording.files import read_text, toml_output, write_output
 from acquisition.recording.rig import Rig
 from calibeam.asking import YES, NotAgreedError, at_terminal, someone
+from calibeam.console import Console
 from calibeam.motion.by_hand import draw_plan_file, keys_of, said
 from calibeam.motion.gate_of_rig import UR_STREAM_HZ, cell_of, gate_of, solver_of
 from calibeam.motion.robot import streamed_robot, watched_joints

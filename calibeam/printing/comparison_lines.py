@@ -3,9 +3,10 @@
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 
-from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
+from calibeam.console import Console
 from calibeam.printing.results import print_diagnosis
 from calibeam.results.comparison import (
     SAYS,
@@ -31,7 +32,7 @@ def print_comparison(console: Console, file: ComparisonFile, *, verbose: bool = 
     """The verdict first, then every cause, then constants; `verbose`: also alternatives of constants, the readings, the
     links of the chain, the streams and the diagnosis of what differs.
     """
-    console.print(f"[bold]{file.verdict}[/bold]: {file.says}", highlight=False)
+    console.print(Text.assemble((file.verdict, "bold"), f": {file.says}"), highlight=False)
     console.print(_rows(file), highlight=False)
     for line in (*_causes(file), *_constants(file), *_dropped(file.dropped)):
         console.print(line, highlight=False, markup=False)
@@ -162,7 +163,7 @@ MOST_LINES = 5  # lines of a list, cut at the width of the terminal; all of them
 
 def print_reconciliation(console: Console, file: ReconcileFile) -> None:
     """At most 25 lines at usual widths."""
-    console.print(f"[bold]{file.verdict}[/bold]: {file.says}", highlight=False)
+    console.print(Text.assemble((file.verdict, "bold"), f": {file.says}"), highlight=False)
     for one in file.unseen:
         parts = (
             f"{what} {length(value)} ({significant(over)} times the noise)"

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
-from rich.console import Console
 
 from acquisition.recording.rig import Rig
+from calibeam.console import Console
 from calibeam.printing.tables import plain_table
 from calibrate.diagnose.diagnosis import Named
 from calibrate.diagnose.smallest_visible import Smallest

@@ -3,9 +3,9 @@
 from typing import Any
 
 import msgspec
-from rich.console import Console
 from rich.table import Table
 
+from calibeam.console import Console
 from calibeam.fleet.run import RunResult
 from calibeam.fleet.summary import Fleet, drift_words, shared_words
 from calibrate.report.quantities import counted, length

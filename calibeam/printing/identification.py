@@ -6,9 +6,9 @@ The verdict is the first sentence of the report. A model that was refitted by --
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
+from calibeam.console import Console
 from calibrate.default_belief import said_of
 from calibrate.effects.term import Size, decimals_of, plain
 from calibrate.identification.estimates import ONLY_BELIEVED, JointZero

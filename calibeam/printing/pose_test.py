@@ -3,9 +3,9 @@
 import math
 from collections.abc import Callable, Sequence
 
-from rich.console import Console
 from rich.table import Table
 
+from calibeam.console import Console
 from calibrate.effects.term import with_sigma
 from calibrate.iso9283.attained import EvaluatedTest
 from calibrate.iso9283.cube import CYCLES

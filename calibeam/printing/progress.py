@@ -9,9 +9,9 @@ import time
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from calibeam.console import Console
 from calibrate.diagnose.stages import Stage
 
 TERMINAL_S, LINE_S = 1.0, 10.0
@@ -29,7 +29,7 @@ SHARES = {  # of the usual time; a stage that is not here takes next to none
 
 def progress_bar(console: Console) -> Progress:
     return Progress(
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),

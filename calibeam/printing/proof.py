@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from rich.console import Console
 from rich.table import Table
 
+from calibeam.console import Console
 from calibeam.prove.real import HiddenAngle, RealScore
 from calibeam.prove.record import CaseScore, ProofFile
 from calibeam.prove.tally import (

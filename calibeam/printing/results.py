@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator
 
-from rich.console import Console
 from rich.table import Table
 
+from calibeam.console import Console
 from calibrate.diagnose.schema import ClockRecord, DiagnosisFile, FindingRecord
 from calibrate.effects.term import with_sigma
 from calibrate.report.diagnosis.words import (
@@ -29,7 +29,7 @@ def print_diagnosis(console: Console, file: DiagnosisFile, *, verbose: bool = Fa
     """Verdict first, then what decides; `verbose`: all causes and alternatives, clocks, what was not recorded, the
     proof.
     """
-    console.print(f"[bold]{verdict_words(file)}[/bold]", highlight=False)
+    console.print(verdict_words(file), style="bold", highlight=False)
     if verbose:
         _print_details(console, file)
         return
@@ -99,7 +99,7 @@ def print_streams(console: Console, file: DiagnosisFile) -> None:
     """Of a recording without samples: each clock with its uncertainty, findings, and what the streams do not show."""
     count = len(file.findings)
     found = f"{counted(count, 'cause')} found" if count else "no fault found"
-    console.print(f"\n[bold]Streams only: {found}. The recording has no samples.[/bold]", highlight=False)
+    console.print(f"\nStreams only: {found}. The recording has no samples.", style="bold", highlight=False)
     lines = [line for number, finding in enumerate(file.findings, start=1) for line in _finding(number, finding)]
     if file.streams is not None:
         lines += [line for clock in file.streams.clocks for line in _clock(clock)]

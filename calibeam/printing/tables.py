@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
+from calibeam.console import Console
 from calibrate.error_simulation.simulate import SHARE, Simulation
 from calibrate.report.quantities import DASH, angle, decimals_of, fixed, length, significant
 from calibrate.tool_axes.tool_file import ArmErrorsRecord, AxisRecord, TargetRecord, ToolFile

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 
 from acquisition.recording import Channel, Event, Recording, RecordingWriter, read
 from acquisition.recording.rig import parse_rig, plain_rig, rig_text
 from acquisition.session.plan import PlanOptions
+from calibeam.console import Console
 from calibeam.devices.recorder import new_recording, record_session
 from calibeam.devices.site import addresses_of, connected
 from calibeam.emulation import EmulationError

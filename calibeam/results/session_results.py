@@ -7,9 +7,8 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
-from rich.console import Console
-
 from acquisition.recording import Recording, read
+from calibeam.console import Console
 from calibeam.outcome import PartialResult, interruption
 from calibeam.printing.identification import print_identification
 from calibeam.printing.results import print_diagnosis

@@ -4,11 +4,10 @@ from collections.abc import Callable, Generator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 
-from rich.console import Console
-
 from acquisition.errors import AcquisitionError
 from acquisition.recording.rig import Rig
 from calibeam.asking import YES, Asking, someone
+from calibeam.console import Console
 from calibeam.devices.check import DeviceCheck, check_devices
 from calibeam.interrupts import INTERRUPTS
 from calibeam.outcome import PartialResult, interruption

@@ -7,13 +7,12 @@ devices are emulated, and a fixture that nobody vouches for counts as moved.
 from contextlib import nullcontext
 from dataclasses import replace
 
-from rich.console import Console
-
 from acquisition.recording.mcap import next_part, parts
 from acquisition.recording.rig import Placement
 from acquisition.session.planned import check_planned
 from acquisition.session.session import Summary
 from calibeam.asking import Asking
+from calibeam.console import Console
 from calibeam.interrupts import INTERRUPTS
 from calibeam.learner import FittedLearner
 from calibeam.live.feed import SILENT, Feed

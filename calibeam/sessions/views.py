@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console, Group, RenderableType
+from rich.console import Group, RenderableType
 from rich.live import Live
 from rich.padding import Padding
 from rich.table import Table
@@ -18,6 +18,7 @@ from rich.text import Text
 
 from acquisition.session.control import RunState
 from acquisition.session.records import Progress
+from calibeam.console import Console
 from calibeam.live.feed import Feed
 from calibeam.live.feed import Progress as PageProgress
 from calibeam.sessions.status import Quality, SessionStatus, clock_words
@@ -158,7 +159,7 @@ class TerminalView:
     def shows(self, shown: SessionStatus) -> None:
         asks = bool(shown.asked) and not self._shown.asked
         if shown.step != self._shown.step:
-            self._console.rule(f"[bold]{shown.step}[/bold]", align="left", style="bold")
+            self._console.rule(shown.step, align="left", style="bold")
         self._shown = shown
         if asks:
             self._console.bell()

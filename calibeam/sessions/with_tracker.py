@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 from rich.progress import Progress as Bar
 
 from acquisition.errors import AcquisitionError
@@ -22,6 +21,7 @@ from acquisition.session.control import RunControl, RunState
 from acquisition.session.tracked import TrackedOptions, TrackedSession, TrackedSummary, check_tracked_plan
 from acquisition.wires.tracker_bench import TrackerBench
 from calibeam.asking import Asking
+from calibeam.console import Console
 from calibeam.devices.recorder import Earlier, RecordingJournal, kept, new_recording
 from calibeam.devices.site import TrackerAddresses, connected_tracker
 from calibeam.interrupts import INTERRUPTS
