@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
+from calibrate.effects.drivers import Drivers
 from calibrate.effects.term import Inner
 
 Floats = NDArray[np.float64]
@@ -15,9 +16,10 @@ PLACES = 16  # of a bump over the range
 WIDTHS = (0.02, 0.05, 0.12)  # of a bump, shares of the range, one sigma; wider ones are seen by splines
 
 
-def splines(x: Floats) -> Floats:
-    """(pose, SPLINES) cubic B-splines over the range of x, their sum (a constant) left out."""
-    low, high = float(x.min()), float(x.max())
+def splines(drivers: Drivers, x: Floats) -> Floats:
+    """(pose, SPLINES) cubic B-splines over the session's range of x, their sum (a constant) left out."""
+    own = drivers.of_session(x)
+    low, high = float(own.min()), float(own.max())
     knots = np.concatenate([[low] * 3, np.linspace(low, high, PIECES + 1), [high] * 3])
     return np.asarray(BSpline.design_matrix(np.clip(x, low, high), knots, 3).toarray(), dtype=np.float64)[:, 1:]
 
@@ -44,6 +46,7 @@ def periods(x: Floats, name: str) -> Inner:
     return Inner(name, grid, grid[0] * 0.9, grid[-1] * 1.1)
 
 
-def centred(x: Floats) -> Floats:
-    """(pose,) mean 0, rms 1."""
-    return (x - x.mean()) / max(float(np.std(x)), 1e-12)
+def centred(drivers: Drivers, x: Floats) -> Floats:
+    """(pose,) mean 0, rms 1 over the session."""
+    own = drivers.of_session(x)
+    return (x - own.mean()) / max(float(np.std(own)), 1e-12)

@@ -6,6 +6,7 @@ Drivers come from the record or from the model, never from what was measured: a 
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from calibrate.sensors.kind import Trait
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Values = TypeVar("Values", Floats, NDArray[np.bool_])
 
 MOVED_RAD = 1e-4  # a joint that went less far has not moved: two readings of one standstill
 SMOOTHING = 0.01  # of the samples, at least 3: thermometers are noisy, what they measure is slow
@@ -205,11 +207,16 @@ class Readout:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Drivers(Conditions):
-    """Of the whole session, in the order of its samples."""
+    """Of the whole session, in the order of its samples; rows to be predicted stand behind them."""
 
     rig: Rig
     frames: Floats  # (pose, joint + 1, 4, 4) B_0 ... B_n of the model with its terms
     readouts: Mapping[str, Readout]
+    session_rows: int | None = None  # where others stand behind: their number must not change what a basis means
+
+    def of_session(self, values: Values) -> Values:
+        """Those of values (pose, ...) that means, largest values and ranges are taken of."""
+        return values[: self.session_rows]
 
     def having(self, trait: Trait) -> tuple[str, ...]:
         """Names of the instruments of the session that have it, in the order of the catalogue."""

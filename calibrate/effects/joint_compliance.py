@@ -87,7 +87,8 @@ def _stiffening(drivers: Drivers, joint: int) -> Term:
 
     def function(drivers: Drivers, inner: Floats) -> Floats:
         torque = stated_torque_nm(drivers, joint)
-        return np.stack([torque, torque * (torque / np.abs(torque).max()) ** 2], axis=1)
+        largest = np.abs(drivers.of_session(torque)).max()
+        return np.stack([torque, torque * (torque / largest) ** 2], axis=1)
 
     return Form(
         port,

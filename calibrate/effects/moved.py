@@ -51,7 +51,7 @@ def motion(
     def function(drivers: Drivers, values: Floats) -> Floats:
         amount = law(drivers, values) * (1.0 if among is None else among(drivers, values))
         directions = np.eye(6)[:, :width]
-        middle = drivers.frames[:, -1, :3, 3].mean(axis=0)
+        middle = drivers.of_session(drivers.frames)[:, -1, :3, 3].mean(axis=0)
         if width == 6:
             directions[:3, 3:] = np.cross(middle, np.eye(3)).T
         return amount[:, :, None] * directions

@@ -33,7 +33,7 @@ def _leaning(port: Port, what: str, joint: int, most: int) -> Term:
     """Turns about axes at rest in front of the joint, by powers of its angle to `most`: a hose, a spring."""
 
     def function(drivers: Drivers, inner: Floats) -> Floats:
-        x = centred(drivers.q_rad[:, joint - 1])
+        x = centred(drivers, drivers.q_rad[:, joint - 1])
         return np.stack([x**power for power in range(1, most + 1)], axis=1)
 
     names = tuple(f"turn_{axis}_c{power}_rad" for power in range(1, most + 1) for axis in "xyz")
@@ -46,7 +46,7 @@ def _winding(port: Port, what: str, joint: int) -> Term:
 
     def function(drivers: Drivers, inner: Floats) -> Floats:
         q = drivers.q_rad[:, joint - 1]
-        grown = centred(q)[:, None, None]
+        grown = centred(drivers, q)[:, None, None]
         c, s, none = np.cos(q), np.sin(q), np.zeros_like(q)
         turned = [np.stack(row, axis=1) for row in ((c, -s, none), (s, c, none), (none, none, none + 1.0))]
         out = np.zeros((len(q), 6, 3))
@@ -61,7 +61,7 @@ def _tilting(port: Port, what: str, joint: int) -> Term:
     """Two tilts across the axis of the joint, each by any smooth function of its angle."""
 
     def function(drivers: Drivers, inner: Floats) -> Floats:
-        return splines(drivers.q_rad[:, joint - 1])
+        return splines(drivers, drivers.q_rad[:, joint - 1])
 
     names = tuple(f"tilt_c{k}_{axis}_rad" for k in range(1, SPLINES + 1) for axis in "xy")
     return _open(port, what, joint, Shape.SMOOTH, "tilt", function, TURNS[:, :2], names)

@@ -27,7 +27,7 @@ def _terms(drivers: Drivers) -> tuple[Term, ...]:
             out += _of_two(drivers, joint, a, b)
         if loaded(drivers, joint):
             out += _of_load(drivers, joint)
-        out.append(_open(drivers, joint, ("t",), Shape.SMOOTH, lambda d, inner: splines(d.t_s)))
+        out.append(_open(drivers, joint, ("t",), Shape.SMOOTH, lambda d, inner: splines(d, d.t_s)))
     return tuple(out)
 
 
@@ -35,7 +35,7 @@ def _of_itself(drivers: Drivers, joint: int) -> list[Term]:
     own, q = (f"q{joint}",), drivers.q_rad[:, joint - 1]
 
     def smooth(drivers: Drivers, inner: Floats) -> Floats:
-        return splines(drivers.q_rad[:, joint - 1])
+        return splines(drivers, drivers.q_rad[:, joint - 1])
 
     def periodic(drivers: Drivers, inner: Floats) -> Floats:
         angle = inner[0] * drivers.q_rad[:, joint - 1]
@@ -63,7 +63,7 @@ def _of_two(drivers: Drivers, joint: int, a: int, b: int) -> list[Term]:
         return _waves(x + 2.0 * y, x - 2.0 * y, 2.0 * x + y, 2.0 * x - y)
 
     def products(drivers: Drivers, inner: Floats) -> Floats:
-        x, y = (centred(drivers.q_rad[:, k - 1]) for k in (a, b))
+        x, y = (centred(drivers, drivers.q_rad[:, k - 1]) for k in (a, b))
         return np.stack([x * y, x**2 * y, x * y**2, x**2 * y**2], axis=1)
 
     return [
@@ -80,11 +80,11 @@ def _of_load(drivers: Drivers, joint: int) -> list[Term]:
     """
 
     def smooth(drivers: Drivers, inner: Floats) -> Floats:
-        return splines(stated_torque_nm(drivers, joint))
+        return splines(drivers, stated_torque_nm(drivers, joint))
 
     def uneven(drivers: Drivers, inner: Floats) -> Floats:
         torque, q = stated_torque_nm(drivers, joint), drivers.q_rad[:, joint - 1]
-        share = torque / max(float(np.abs(torque).max()), 1e-12)
+        share = torque / max(float(np.abs(drivers.of_session(torque)).max()), 1e-12)
         return share[:, None] * np.concatenate([np.ones((len(q), 1)), _waves(q, 2.0 * q, 3.0 * q, 4.0 * q)], axis=1)
 
     torque = f"gravity_torque{joint}"

@@ -134,7 +134,7 @@ def _reading(name: str, shape: Shape, variant: str, function: Functions, names: 
 
 def _down(drivers: Drivers, name: str) -> Floats:
     """(3,) unit vector of gravity in the device's frame, from where the model sees the target in either frame."""
-    seen = drivers.readouts[name].seen
+    seen = np.flatnonzero(drivers.of_session(drivers.readouts[name].seen))
     in_device = drivers.readouts[name].predicted[seen, :3]
     in_base = point_of(drivers, drivers.n_joints, drivers.rig.tool.point_m or (0.0, 0.0, 0.0))[seen]
     turned = Rotation.align_vectors(in_device - in_device.mean(axis=0), in_base - in_base.mean(axis=0))[0]

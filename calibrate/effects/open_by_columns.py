@@ -35,7 +35,7 @@ class Column:
     temperature: bool  # named effects have it at base, device, laser and links
 
     def law(self, drivers: Drivers, inner: Floats) -> Floats:
-        return centred(self.values)[:, None]
+        return centred(drivers, self.values)[:, None]
 
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:

@@ -12,9 +12,9 @@ from calibrate.effects.time_laws import varies
 LIMIT = 0.5  # of the light: with more, no detector would be used
 
 
-def _pull(sum_v: Floats, spot: Floats) -> Floats:
+def _pull(drivers: Drivers, sum_v: Floats, spot: Floats) -> Floats:
     """(o - x) s0 / sum: two coordinates of the light's centre, and its share."""
-    weaker = np.median(sum_v) / np.maximum(sum_v, 1e-9)
+    weaker = np.median(drivers.of_session(sum_v)) / np.maximum(sum_v, 1e-9)
     out = np.zeros((len(spot), 2, 3))
     out[:, 0, 0] = out[:, 1, 1] = weaker
     out[:, :, 2] = -spot * weaker[:, None]
@@ -31,7 +31,7 @@ def _terms(drivers: Drivers) -> tuple[Term, ...]:
             k,
             "psd-ambient-light",
             Shape.PRODUCT,
-            lambda d, detector, spot: _pull(total[:, detector - 1], spot),
+            lambda d, detector, spot: _pull(d, total[:, detector - 1], spot),
             ("pull_x_m", "pull_y_m", "ambient_share"),
             LIMIT,
             f"PSD {k} sees {{ambient_share}} of foreign light",

@@ -23,19 +23,19 @@ def step(drivers: Drivers, inner: Floats) -> Floats:
 
 def towards(drivers: Drivers, inner: Floats) -> Floats:
     """(pose, 1) 1 - exp(-t / time constant), from the session's start."""
-    return 1.0 - np.exp(-(drivers.t_s - drivers.t_s.min()) / inner[0])[:, None]
+    return 1.0 - np.exp(-(drivers.t_s - drivers.of_session(drivers.t_s).min()) / inner[0])[:, None]
 
 
 def steadily(drivers: Drivers, inner: Floats) -> Floats:
     """(pose, 1) share of the session that has gone by."""
-    t = drivers.t_s
-    return ((t - t.min()) / max(float(np.ptp(t)), 1e-9))[:, None]
+    own = drivers.of_session(drivers.t_s)
+    return ((drivers.t_s - own.min()) / max(float(np.ptp(own)), 1e-9))[:, None]
 
 
 def with_temperature(where: str, drivers: Drivers, inner: Floats) -> Floats:
     """(pose, 1) K above the session's mean."""
     T = drivers.temperatures_degC[where]
-    return (T - T.mean())[:, None]
+    return (T - drivers.of_session(T).mean())[:, None]
 
 
 def step_inner(drivers: Drivers, among: NDArray[np.bool_] | None = None) -> tuple[Inner, ...]:

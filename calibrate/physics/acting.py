@@ -104,7 +104,8 @@ def acting(carried: Sequence[Carried], predictor: Predictor, recorded: Samples, 
     by_old, by_new = Perturbation.none(n, joints), Perturbation.none(len(both), joints)
     out: tuple[Acting, ...] = ()
     for _ in range(TURNS):
-        old, new = drivers_under(predictor, recorded, by_old), drivers_under(predictor, both, by_new)
+        old = drivers_under(predictor, recorded, by_old)
+        new = replace(drivers_under(predictor, both, by_new), session_rows=n)
         amounts = [_amount(c, old) for c in carried]
         out = tuple(_acting(c, old, new, amount) for c, amount in zip(carried, amounts, strict=True))
         by_old, by_new = Perturbation.none(n, joints), Perturbation.none(len(both), joints)

