@@ -1,4 +1,4 @@
-"""For every effect of the catalogue: a row is predicted alike alone and among others, and under one steady condition."""
+"""For every effect of the catalogue: a row is predicted alike alone, among others, and under a steady condition."""
 
 import numpy as np
 import pytest
