@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording import Samples
-from calibrate.effects.catalogue import EFFECTS
+from calibrate.effects.catalogue import EFFECTS, terms_of
 from calibrate.physics.applied import recorded_conditions
 from calibrate.physics.predicting import predict_with_physics
 
@@ -29,7 +29,8 @@ def steady(fit, samples):
 def check_every_term_of(physics, family, *, every_place):
     model, fit, samples = known(family)
     asked, warm = steady(fit, samples)
-    for term in listed(fit, every_place=every_place):
+    whole_arm = [t for t in terms_of(fit.drivers) if t.variant == "whole arm"]  # named as its longest link is
+    for term in (*listed(fit, every_place=every_place), *whole_arm):
         if term.physics != physics:
             continue
         whole, _ = carrying(model, fit, samples, term)
