@@ -95,6 +95,9 @@ def _run(arguments: list[str]) -> int:
     except TOLD as error:
         errors.print("error:", brief(str(error)), markup=False)
         return 1
+    except MemoryError:
+        errors.print("error: this machine has not enough memory for these files; give fewer rows, or close programs")
+        return 1
     except BrokenPipeError:  # `calibeam rig list | head`: who reads has had enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0

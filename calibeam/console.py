@@ -13,15 +13,7 @@ import rich.console
 from rich.console import ConsoleOptions, RenderableType
 from rich.segment import Segment
 
-KEPT = "\n\t"
-# Control characters of ASCII and Latin-1, and those of Unicode that turn the direction of what follows
-CONTROLS = [*range(0x20), *range(0x7F, 0xA0), *range(0x202A, 0x202F), *range(0x2066, 0x206A)]
-REPLACED = {code: "\ufffd" for code in CONTROLS if chr(code) not in KEPT}
-
-
-def cleaned(text: str) -> str:
-    """Without control characters, each replaced by U+FFFD; line ends and tabs stay."""
-    return text if text.isprintable() else text.translate(REPLACED)
+from acquisition.recording.files import cleaned
 
 
 class Console(rich.console.Console):

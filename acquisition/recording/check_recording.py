@@ -68,6 +68,7 @@ def _file(recording: Recording) -> Iterator[Finding]:
             Problem.INCOMPLETE,
             "file",
             "the session was cut short or its end is missing; what is here is good",
+            Severity.ERROR if recording.damage else Severity.WARNING,
         )
 
 

@@ -5,6 +5,10 @@ RecordingError      file missing, damaged, of another kind, or the disk refuses
 `-- SamplesError    the settled samples: file, row, column, value, remedy
 """
 
+KEPT = "\n\t"
+# Control characters of ASCII and Latin-1, and those of Unicode that turn the direction of what follows
+CONTROLS = [*range(0x20), *range(0x7F, 0xA0), *range(0x202A, 0x202F), *range(0x2066, 0x206A)]
+REPLACED = {code: "\ufffd" for code in CONTROLS if chr(code) not in KEPT}
 VALUE_LENGTH, MESSAGE_LENGTH = 120, 300  # characters: a line of a terminal; what a person reads of an error
 
 
@@ -18,6 +22,11 @@ class RigFileError(RecordingError):
 
 class SamplesError(RecordingError):
     """A table of settled samples that cannot be taken as it is; the message holds the file, the row and the column."""
+
+
+def cleaned(text: str) -> str:
+    """Without control characters, each replaced by U+FFFD; line ends and tabs stay."""
+    return text if text.isprintable() else text.translate(REPLACED)
 
 
 def shown(value: object, most: int = VALUE_LENGTH) -> str:

@@ -8,12 +8,14 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording.errors import RecordingError, shown
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import Floats, Samples
 
@@ -106,3 +108,13 @@ class Recording:
     notes: Mapping[str, str] = field(default_factory=dict[str, str])
     streams: Mapping[str, Stream] = field(default_factory=dict[str, Stream])
     events: tuple[Event, ...] = ()
+
+    @property
+    def started(self) -> datetime | None:
+        """When it began, by its own statement. RecordingError where that is no time."""
+        try:
+            return datetime.fromisoformat(self.started_utc) if self.started_utc else None
+        except ValueError as error:
+            raise RecordingError(
+                f"{self.path}: started_utc = '{shown(self.started_utc)}' is no time; write it as 2026-11-24T08:30:00"
+            ) from error

@@ -10,6 +10,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from acquisition.recording import Finding, Recording, Stream, check, read
+from acquisition.recording.check_recording import Severity
 from acquisition.recording.device_clock import ClockModel, ClockStatus, clock_model
 from acquisition.recording.mcap import segments
 from acquisition.recording.rig import load_rig
@@ -47,7 +48,10 @@ def lines(recording: Recording, findings: tuple[Finding, ...]) -> list[str]:
     if len(findings) > MOST_LINES:
         told.append(f"  and {len(findings) - MOST_LINES} more findings; --json prints all")
     errors = any(finding.is_error for finding in findings)
-    return [*told, "  not fit for use: errors above"] if errors else [*told, "  no errors"]
+    if errors:
+        return [*told, "  not fit for use: errors above"]
+    warned = any(f.severity is Severity.WARNING for f in findings)
+    return [*told, "  no errors; see the warnings above" if warned else "  no errors"]
 
 
 def _rate(stream: Stream) -> str:

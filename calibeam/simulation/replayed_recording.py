@@ -92,7 +92,7 @@ def write_replayed(path: Path, found: Replayed, source: Recording, notes: Mappin
         clock=_Begun(),
         notes={**source.notes, **notes},
         host_s0=source.host_s0,
-        started_utc=datetime.fromisoformat(source.started_utc) if source.started_utc else datetime.now(UTC),
+        started_utc=source.started or datetime.now(UTC),
     ) as writer:
         for row in found.samples.rows():
             writer.sample(row)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from acquisition.recording.files import OutputKind, text_output, write_output
+from acquisition.recording.files import OutputKind, cleaned, text_output, write_output
 from acquisition.recording.rig import Make, Rig
 from acquisition.recording.rig.devices import RobotDriver
 from calibrate.errors import DataError
@@ -149,7 +149,7 @@ def export_text(rig: Rig, values: Mapping[str, float], form: ExportForm) -> str:
     DataError for a correction of no parameter, or an arm that the form cannot hold.
     """
     _refuse_coupled(rig, form)
-    return form.text(identified_arm(rig, values))
+    return cleaned(form.text(identified_arm(rig, values)))
 
 
 def export_model(path: Path, rig: Rig, model: ModelFile, form: ExportForm) -> tuple[str, ...]:
@@ -172,7 +172,7 @@ def export_model(path: Path, rig: Rig, model: ModelFile, form: ExportForm) -> tu
     if form.offsets and freed:
         says = (*says, NO_OFFSETS if all(refused(zero) for zero in arm.zeros) else TOGETHER)
         arm = replace(arm, not_carried=says)
-    write_output(path, form.text(arm), export_output(form))
+    write_output(path, cleaned(form.text(arm)), export_output(form))
     return says
 
 

@@ -5,8 +5,9 @@ import shutil
 
 import pytest
 
+from acquisition.recording.files import cleaned
 from calibeam.cli import run
-from calibeam.console import Console, cleaned
+from calibeam.console import Console
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted

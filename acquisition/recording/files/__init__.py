@@ -5,7 +5,7 @@ file; both name file, place, value and remedy. A new kind of file is a record of
 `bounds`, and a call of one of the two.
 """
 
-from acquisition.recording.errors import brief, shown
+from acquisition.recording.errors import brief, cleaned, shown
 from acquisition.recording.files.explain import KeyPath
 from acquisition.recording.files.json_file import JsonKind, read_json, write_json
 from acquisition.recording.files.output import (
@@ -24,7 +24,7 @@ from acquisition.recording.files.quantity import si_value
 from acquisition.recording.files.toml_file import TomlFile, parse_toml, read_text
 
 __all__ = [
-    "JsonKind", "KeyPath", "OutputError", "OutputKind", "TomlFile", "brief", "command_files", "csv_text", "json_output",
-    "parse_toml", "read_json", "read_text", "refuse_output", "shown", "si_value", "table_output", "text_output",
-    "toml_output", "write_json", "write_output",
+    "JsonKind", "KeyPath", "OutputError", "OutputKind", "TomlFile", "brief", "cleaned", "command_files", "csv_text",
+    "json_output", "parse_toml", "read_json", "read_text", "refuse_output", "shown", "si_value", "table_output",
+    "text_output", "toml_output", "write_json", "write_output",
 ]  # fmt: skip

@@ -164,11 +164,13 @@ def write_csv(samples: Samples, path: Path) -> None:
 
 
 def check_header(names: Iterable[str], file: str) -> None:
-    """SamplesError for a column without a name or a name that stands twice."""
+    """SamplesError for a column without a name, one that a spreadsheet computes, or a name that stands twice."""
     seen: set[str] = set()
     for number, column in enumerate(names, start=1):
         if not column:
             raise SamplesError(f"{file}: column {number} has no name; name it or remove it")
+        if column[0] in "=+-@":
+            raise SamplesError(f"{file}: column '{shown(column)}' would be a formula in a spreadsheet; rename it")
         if column in seen:
             raise SamplesError(f"{file}: column '{shown(column)}' stands twice; rename or remove one")
         seen.add(column)

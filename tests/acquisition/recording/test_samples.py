@@ -92,6 +92,7 @@ def test_marks_of_spreadsheets_do_no_harm(parse: Callable[[str], Samples], rig: 
         (",3,a,", ",,a,", "row 2 (line 3), column 'bar': the value is missing"),
         ("1.5,-0.1", "1.5,-0,1", "row 2 (line 3): 15 cells under 14 columns; give every column a cell"),
         ("q2_rad", "q1_rad", "column 'q1_rad' stands twice"),
+        ("q2_rad", "=cmd|calc", "column '=cmd|calc' would be a formula"),
         ("q2_rad", "q2_deg", "column 'q2_rad': the column is missing; the rig's arm has 2 joints; is it 'q2_deg'?"),
         ("enc2_rad", "enc3_rad", "column 'enc3_rad': there is no joint 3: the rig's arm has 2 joints"),
         ("temp_room_degC", "q3_rad", "column 'q3_rad': there is no joint 3: the rig's arm has 2 joints"),

@@ -6,6 +6,7 @@ import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
+import msgspec
 import mujoco
 import numpy as np
 import pytest
@@ -213,3 +214,9 @@ def test_a_ur_kinematics_file_of_the_drawing_is_the_published_one():
 def test_a_correction_of_a_joint_that_is_not_there_is_refused():
     with pytest.raises(DataError, match=r"no parameter joint9\.zero .* 6 joints"):
         export_text(UR5E, {"joint9.zero": 1e-3}, form_named("json"))
+
+
+@pytest.mark.parametrize("form", ["urdf", "mjcf"])
+def test_a_name_with_control_characters_leaves_the_xml_well_formed(form):
+    named = msgspec.structs.replace(UR5E, name='a\x1b[2J\x00 -- "<b>')
+    ET.fromstring(export_text(named, {}, form_named(form)))
