@@ -48,8 +48,6 @@ def _new_app() -> App:
         version=version("calibeam"),
         help="Record, calibrate and diagnose robot arms, from laser spots, a tracker, a wire, cones or your tables.",
         default_parameter=Parameter(negative_iterable=(), consume_multiple=True),  # several values: --only a b
-        console=Console(),
-        error_console=Console(stderr=True),
         suppress_keyboard_interrupt=False,  # cyclopts would end with 130 and no message
     )
 
@@ -82,6 +80,7 @@ def run(arguments: list[str]) -> int:
 def _run(arguments: list[str]) -> int:
     errors = Console(stderr=True, soft_wrap=True, highlight=False)
     asked = _list_of_commands() if not arguments or arguments[0] in app.help_flags else app
+    asked.console, asked.error_console = Console(), Console(stderr=True)
     try:
         asked(arguments, exit_on_error=False, print_error=True, result_action="return_value")
     except CycloptsError:

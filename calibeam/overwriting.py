@@ -12,7 +12,7 @@ from typing import Annotated, Any, ParamSpec, TypeVar
 
 from cyclopts import Parameter
 
-from acquisition.recording.files import OutputKind, command_files, refuse_output
+from acquisition.recording.output import OutputKind, command_files, refuse_output
 
 P = ParamSpec("P")
 R = TypeVar("R")

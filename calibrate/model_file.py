@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.files import JsonKind, json_output, read_json, shown, write_json
+from acquisition.recording.files import JsonKind, read_json, shown, write_json
 from acquisition.recording.files.bounds import (
     Correction,
     Count,
@@ -25,7 +25,9 @@ from acquisition.recording.files.bounds import (
     Statistic,
     Whole,
 )
+from acquisition.recording.output import json_output
 from calibrate.errors import DataError
+from calibrate.older_models import with_present_names
 from calibrate.parameters import Parameter
 from calibrate.physics.records import Effect, SessionRecord, check_physics
 from calibrate.sensors.catalogue import BY_NAME, FRAMES
@@ -215,7 +217,7 @@ def write_model(path: Path, model: ModelFile) -> None:
 
 def read_model(path: Path) -> ModelFile:
     """Read model.json. DataError naming file, place and remedy where it is none or of another version."""
-    return read_json(path, KIND, ModelFile, _other)
+    return read_json(path, KIND, ModelFile, _other, with_present_names)
 
 
 def _other(content: dict[str, Any]) -> str | None:

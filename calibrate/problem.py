@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky_banded, solve_banded
 
-from calibrate.errors import DataError
+from calibrate.errors import UndeterminedError
 from calibrate.observation_model import ObservationModel
 from calibrate.parameters import Parameter
 
@@ -108,11 +108,11 @@ class Problem:
 
 
 def whitener_of(covariance: Floats) -> Floats:
-    """(..., k, k) inverse of the lower Cholesky factor of a covariance. DataError for what is none."""
+    """(..., k, k) inverse of the lower Cholesky factor of a covariance. UndeterminedError for what is none."""
     try:
         return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)), dtype=np.float64)
     except np.linalg.LinAlgError as error:
-        raise DataError(
+        raise UndeterminedError(
             "the readings and this rig cannot be weighed together: expected readings are out of all proportion; "
             "check the lengths and angles of the rig file, and their units"
         ) from error

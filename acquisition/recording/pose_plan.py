@@ -11,8 +11,8 @@ from msgspec import Meta, Struct
 from acquisition.recording.errors import RigFileError, shown
 from acquisition.recording.files.bounds import Identity, Kilograms, Many, Metres, Name, PerJoint, Radians, Sentence
 from acquisition.recording.files.explain import KeyPath
-from acquisition.recording.files.output import toml_output, write_output
 from acquisition.recording.files.toml_file import parse_toml, read_text
+from acquisition.recording.output import toml_output, write_output
 from acquisition.recording.rig import Rig
 
 Way = Annotated[int, Meta(ge=-1, le=1)]

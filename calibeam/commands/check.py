@@ -10,7 +10,6 @@ import numpy as np
 from cyclopts import Parameter
 
 from acquisition.recording import Finding, Recording, Stream, check, read
-from acquisition.recording.check_recording import Severity
 from acquisition.recording.device_clock import ClockModel, ClockStatus, clock_model
 from acquisition.recording.mcap import segments
 from acquisition.recording.rig import load_rig
@@ -50,7 +49,7 @@ def lines(recording: Recording, findings: tuple[Finding, ...]) -> list[str]:
     errors = any(finding.is_error for finding in findings)
     if errors:
         return [*told, "  not fit for use: errors above"]
-    warned = any(f.severity is Severity.WARNING for f in findings)
+    warned = any(f.severity.value == "warning" for f in findings)
     return [*told, "  no errors; see the warnings above" if warned else "  no errors"]
 
 

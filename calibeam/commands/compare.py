@@ -5,7 +5,8 @@ from pathlib import Path
 import msgspec
 
 from acquisition.recording import Recording, read
-from acquisition.recording.files import json_output, write_json
+from acquisition.recording.files import write_json
+from acquisition.recording.output import json_output
 from calibeam.console import Console
 from calibeam.outcome import CheckFailed
 from calibeam.overwriting import writes

@@ -9,7 +9,7 @@ from cyclopts import Parameter, validators
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording.files import OutputKind, csv_text, table_output, write_output
+from acquisition.recording.output import OutputKind, csv_text, table_output, write_output
 from acquisition.recording.rig import parse_rig
 from calibeam.console import Console
 from calibeam.motion.motion_inverse import MotionInverse

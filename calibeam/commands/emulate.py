@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from acquisition.recording.files import text_output
+from acquisition.recording.output import text_output
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
 from calibeam.overwriting import writes
 

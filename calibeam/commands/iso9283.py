@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Samples, read
-from acquisition.recording.files import csv_text, json_output, table_output, write_json, write_output
+from acquisition.recording.files import write_json
+from acquisition.recording.output import csv_text, json_output, table_output, write_output
 from acquisition.recording.pose_plan import (
     POSE_PLAN,
     PlannedBlock,

@@ -9,7 +9,7 @@ from rich.table import Table
 
 from acquisition.errors import TaskError
 from acquisition.motion.plan import Plan
-from acquisition.recording.files import json_output, write_output
+from acquisition.recording.output import json_output, write_output
 from acquisition.recording.rig import load_rig
 from calibeam.commands.demo import RIG, ShippedRig
 from calibeam.console import Console

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import Samples, read
-from acquisition.recording.files import csv_text, table_output, write_output
+from acquisition.recording.output import csv_text, table_output, write_output
 from acquisition.recording.rig import Rig
 from acquisition.recording.session_folder import read_csv, read_parquet
 from calibeam.overwriting import writes

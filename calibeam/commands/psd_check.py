@@ -10,7 +10,8 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from acquisition.recording import SamplesError
-from acquisition.recording.files import shown, text_output, write_output
+from acquisition.recording.files import shown
+from acquisition.recording.output import text_output, write_output
 from acquisition.recording.rig import load_rig
 from acquisition.recording.rig.devices import PsdDevice
 from acquisition.wires.psd_view import psd_window

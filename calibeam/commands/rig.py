@@ -10,7 +10,8 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from acquisition.recording.files import shown, toml_output, write_output
+from acquisition.recording.files import shown
+from acquisition.recording.output import toml_output, write_output
 from acquisition.recording.rig import Rig, parse_rig, rig_text
 from calibeam.new_rig.from_dh import dh_table_text
 from calibrate.errors import DataError

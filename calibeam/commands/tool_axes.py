@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Recording, read
-from acquisition.recording.files import json_output, si_value, write_json
+from acquisition.recording.files import si_value, write_json
+from acquisition.recording.output import json_output
 from acquisition.recording.rig import Rig, rig_sha256
 from acquisition.recording.samples import ORIENTATION, POSITION
 from calibeam.console import Console

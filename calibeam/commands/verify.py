@@ -8,7 +8,8 @@ from cyclopts import Parameter
 from rich.table import Table
 
 from acquisition.recording import read
-from acquisition.recording.files import json_output, write_json
+from acquisition.recording.files import write_json
+from acquisition.recording.output import json_output
 from calibeam.console import Console
 from calibeam.geometry_only import read_geometry
 from calibeam.outcome import CheckFailed

@@ -15,7 +15,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from acquisition.recording import RecordingError
-from acquisition.recording.files import OutputKind, shown, write_output
+from acquisition.recording.files import shown
+from acquisition.recording.output import OutputKind, write_output
 from calibeam.devices.recorder import uninterrupted
 from calibeam.fleet.recordings import JOURNAL, TABLE
 from calibeam.fleet.row import Row

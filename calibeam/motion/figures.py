@@ -14,7 +14,7 @@ from acquisition.motion.cell import Box, Cell
 from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.plan import Plan
 from acquisition.motion.setpoints import SolvedPath
-from acquisition.recording.files import text_output, write_output
+from acquisition.recording.output import text_output, write_output
 from calibeam.motion.examples import TOOL, ExampleResult
 from calibrate.report.svg import house_style
 from calibrate.report.tones import Tone

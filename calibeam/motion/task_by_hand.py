@@ -22,7 +22,8 @@ from acquisition.motion.task.program import unrolled
 from acquisition.motion.task.ready import missing, taught_text
 from acquisition.motion.task.task_file import Task, read_task
 from acquisition.motion.task.transforms import Untaught
-from acquisition.recording.files import read_text, toml_output, write_output
+from acquisition.recording.files import read_text
+from acquisition.recording.output import toml_output, write_output
 from acquisition.recording.rig import Rig
 from calibeam.asking import YES, NotAgreedError, at_terminal, someone
 from calibeam.console import Console

@@ -3,7 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from acquisition.recording.files import JsonKind, json_output, read_json, shown, write_json
+from acquisition.recording.files import JsonKind, read_json, shown, write_json
+from acquisition.recording.output import json_output
 from calibrate.diagnose.schema import SCHEMA, DiagnosisFile
 from calibrate.errors import DataError
 

@@ -18,7 +18,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from acquisition.recording.files import json_output, write_output
+from acquisition.recording.output import json_output, write_output
 from calibrate.error_simulation.machine import Machine
 from calibrate.error_simulation.monte_carlo import Drawn, draw_arms
 from calibrate.error_simulation.sensitivity import (

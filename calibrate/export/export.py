@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from acquisition.recording.files import OutputKind, cleaned, text_output, write_output
+from acquisition.recording.files import cleaned
+from acquisition.recording.output import OutputKind, text_output, write_output
 from acquisition.recording.rig import Make, Rig
 from acquisition.recording.rig.devices import RobotDriver
 from calibrate.errors import DataError

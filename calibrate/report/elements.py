@@ -13,7 +13,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from acquisition.recording import Recording
-from acquisition.recording.files import OutputKind, text_output, write_output
+from acquisition.recording.output import OutputKind, text_output, write_output
 from acquisition.recording.rig import rig_sha256
 from calibrate.errors import DataError
 from calibrate.report.quantities import significant

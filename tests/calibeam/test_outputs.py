@@ -8,7 +8,7 @@ import stat
 import msgspec
 import pytest
 
-from acquisition.recording.files import OutputError, command_files, text_output, write_output
+from acquisition.recording.output import OutputError, command_files, text_output, write_output
 from calibeam.cli import run
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import write_case

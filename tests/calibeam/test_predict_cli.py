@@ -1,11 +1,11 @@
 """`predict` with every instrument: a row for a row, observed columns' own names, empty where nothing can be said."""
 
 import csv
-import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
+import pyarrow
+import pyarrow.parquet
 import pytest
 
 from calibeam.cli import run
@@ -142,12 +142,10 @@ def test_several_instruments_at_once_and_samples_without_any(model):
     assert list(predicted(model, {"note": ["1", "2", "3"]})) == ["t_s", *XYZ, *(f"s_{c}" for c in XYZ), "outside"]
 
 
-def test_a_parquet_table_is_read_as_well(model, monkeypatch):
+def test_a_parquet_table_is_read_as_well(model):
     columns = {"t_s": [0, 1, 2], "q1_rad": [q[0] for q in Q], "q2_rad": [q[1] for q in Q], "wire_m": [1.0, None, 1.0]}
-    table = SimpleNamespace(
-        column_names=list(columns), column=lambda name: SimpleNamespace(to_pylist=lambda: columns[name])
-    )
-    monkeypatch.setitem(sys.modules, "pyarrow.parquet", SimpleNamespace(read_table=lambda path: table))
+    parquet = model.parent / "samples.parquet"
+    pyarrow.parquet.write_table(pyarrow.table(columns), parquet)
     from_csv = predicted(model, {"wire_m": ["1.0", "", "1.0"]})
     assert predicted(model, {"wire_m": ["1.0", "", "1.0"]}, ".parquet") == from_csv
 

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from acquisition.errors import AcquisitionError
 from acquisition.motion.kinematics import rotation_vector, transform
-from acquisition.recording.files import JsonKind, json_output, read_json, shown, write_output
+from acquisition.recording.files import JsonKind, read_json, shown
 from acquisition.recording.files.bounds import Correction, Count, Label, Pixels, Statistic, Vector
+from acquisition.recording.output import json_output, write_output
 from acquisition.recording.rig import Camera, Pose
 
 Floats = NDArray[np.float64]

@@ -8,23 +8,10 @@ file; both name file, place, value and remedy. A new kind of file is a record of
 from acquisition.recording.errors import brief, cleaned, shown
 from acquisition.recording.files.explain import KeyPath
 from acquisition.recording.files.json_file import JsonKind, read_json, write_json
-from acquisition.recording.files.output import (
-    OutputError,
-    OutputKind,
-    command_files,
-    csv_text,
-    json_output,
-    refuse_output,
-    table_output,
-    text_output,
-    toml_output,
-    write_output,
-)
 from acquisition.recording.files.quantity import si_value
 from acquisition.recording.files.toml_file import TomlFile, parse_toml, read_text
 
 __all__ = [
-    "JsonKind", "KeyPath", "OutputError", "OutputKind", "TomlFile", "brief", "cleaned", "command_files", "csv_text",
-    "json_output", "parse_toml", "read_json", "read_text", "refuse_output", "shown", "si_value", "table_output",
-    "text_output", "toml_output", "write_json", "write_output",
+    "JsonKind", "KeyPath", "TomlFile", "brief", "cleaned", "parse_toml", "read_json", "read_text", "shown", "si_value",
+    "write_json",
 ]  # fmt: skip

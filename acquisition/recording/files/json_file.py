@@ -9,13 +9,14 @@ import msgspec
 
 from acquisition.recording.errors import shown
 from acquisition.recording.files.explain import located, plain
-from acquisition.recording.files.output import json_output, write_output
+from acquisition.recording.output import json_output, write_output
 
 T = TypeVar("T")
 
 LARGEST_BYTES = 32_000_000  # a model of 1,000 parameters has a covariance of 20 MB
 MOST_OBJECTS = 500_000  # each takes 64 bytes for two in the file
 Check = Callable[[dict[str, Any]], str | None]
+Renewal = Callable[[dict[str, Any]], dict[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -28,10 +29,11 @@ class JsonKind:
     fault: type[Exception]
 
 
-def read_json(path: Path, kind: JsonKind, records: type[T], other: Check) -> T:
+def read_json(path: Path, kind: JsonKind, records: type[T], other: Check, renewed: Renewal | None = None) -> T:
     """The records of a file. `kind.fault` where it cannot be read, is damaged, or out of the bounds of its records.
 
     `other` is given the top level and returns what is wrong with it as a whole: another kind, another version.
+    `renewed` gives the top level of an earlier version its present keys.
     """
     data = _read(path, kind)
     if (count := data.count(b"{") + data.count(b"[")) > MOST_OBJECTS:
@@ -51,6 +53,8 @@ def read_json(path: Path, kind: JsonKind, records: type[T], other: Check) -> T:
     content = cast("dict[str, Any]", document)
     if (says := other(content)) is not None:
         raise kind.fault(f"{path}: {says}")
+    if renewed is not None:
+        content = renewed(content)
     try:
         return msgspec.convert(content, type=records)
     except msgspec.ValidationError as error:

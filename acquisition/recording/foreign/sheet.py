@@ -135,7 +135,7 @@ def _text(path: Path) -> Sheet:
 class _Rows:
     """Rows of a table with something in them, as they come, without the empty cells at their ends.
 
-    `rows` may be begun anew; what was taken before still counts.
+    `rows` may be begun a second time; what was taken before still counts.
     """
 
     def __init__(self) -> None:

@@ -197,7 +197,7 @@ def undetected(whole: Quadratic, chosen: Sequence[Part]) -> dict[Part, Floats]:
     """Of each other part how far its numbers (n,) may be off without having been found, in plausible sizes.
 
     That is where a number is worth its price beside the chosen parts, at most its plausible size. A part that the
-    readings do not tell apart from the chosen ones is left out: these are the sum, by convention.
+    readings do not separate from the chosen ones is left out: these are the sum, by convention.
     """
     alone = {p: np.diag(_among(whole, (*chosen, p)).covariance)[at] for p, at in whole.parts if p not in chosen}
     seen = {p: np.where(own > LOST, own, 1.0 / whole.price) for p, own in alone.items() if np.all(own < 1.0)}

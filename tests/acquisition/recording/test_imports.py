@@ -24,7 +24,7 @@ def test_reading_loads_no_library_of_ports() -> None:
 
 ROOT = Path(__file__).parents[3]
 PACKAGE = "acquisition.recording"
-FACES = (PACKAGE, *(f"{PACKAGE}.{name}" for name in ("files", "foreign", "mcap", "rig", "session_folder")))
+FACES = (PACKAGE, *(f"{PACKAGE}.{name}" for name in ("files", "foreign", "mcap", "output", "rig", "session_folder")))
 DOORS = {  # single modules that are open beside the faces: vocabularies, and what loads a library of its own
     *FACES,
     *(

@@ -58,7 +58,7 @@ def test_the_interactive_report_is_drawn_from_the_file_alone(tab, wire_and_posit
     opened, asked, wrong, _ = tab  # WebGL in software says on the console that it is slow
     path = tmp_path / "report.html"
     chapter = interactive_chapter(session_figures(session_evidence(*wire_and_positions)))
-    path.write_text(page("an arm", Html(""), {}, (chapter,), "calibeam", scripts=True), encoding="utf-8")
+    path.write_text(page("an arm", Html(""), {}, (chapter,), "calibeam", kind="t", scripts=True), encoding="utf-8")
     opened.goto(path.as_uri())
     opened.wait_for_selector("#plot-space canvas", state="attached")
     opened.wait_for_selector("#plot-residuals .scatterlayer .trace", state="attached")
