@@ -82,7 +82,7 @@ def test_more_poses_than_are_corrected_at_a_time_are_refused() -> None:
     wanted = Wanted(np.broadcast_to(np.eye(4), (n, 4, 4)), empty, empty, {}, source="weld.mod")
     nothing: Any = None
     with pytest.raises(
-        DataError, match="weld.mod: 3001 poses; at most 3000 are corrected at a time, split it into parts"
+        DataError, match=r"weld\.mod: 3001 poses; at most 3000 are corrected at a time, split it into parts"
     ):
         correct(nothing, wanted, nothing, Options())
 
@@ -91,5 +91,5 @@ def test_a_table_of_too_many_poses_is_named() -> None:
     text = "x_m,y_m,z_m,rx_rad,ry_rad,rz_rad\n" + "0.4,0.1,0.3,0,0,0\n" * (MOST_POSES + 1)
     wanted = read_poses(text, "poses.csv", 6, np.eye(4), {})
     nothing: Any = None
-    with pytest.raises(DataError, match="poses.csv: 3001 poses; at most 3000"):
+    with pytest.raises(DataError, match=r"poses\.csv: 3001 poses; at most 3000"):
         correct(nothing, wanted, nothing, Options())
