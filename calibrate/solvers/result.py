@@ -16,7 +16,9 @@ class Status(Enum):
 
     CONVERGED = "predicted gain is below tolerance"
     OUT_OF_STEPS = "step limit reached; improve the start, or raise kmax of [dog-leg] in the fit plan"
-    STALLED = "no step makes the residual smaller, although the slope promises it; check derivatives, the start, e1 and e2"
+    STALLED = (
+        "no step makes the residual smaller, although the slope promises it; check derivatives, the start, e1 and e2"
+    )
     RANK_DEFICIENT = "data cannot fix some combinations of parameters; they are held and named"
     AT_BOUND = "a parameter is at its bound: the question is not answered by these data"
     NOT_FINITE = "residual became infinite or undefined; check joint signs, the order of reflection and the rig"
