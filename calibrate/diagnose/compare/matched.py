@@ -126,8 +126,8 @@ def _nearness(measured: Samples, simulated: Samples) -> Floats:
     for name, samples in (("measured", measured), ("simulated", simulated)):
         if len(samples) > MOST_ROWS:
             raise DataError(
-                f"{name}: {len(samples)} rows, and the recordings are not the same motion row by row; rows are found by "
-                f"joint angles among at most {MOST_ROWS}: compare a part of the recordings"
+                f"{name}: {len(samples)} rows, and the recordings are not the same motion row by row; rows are found "
+                f"by joint angles among at most {MOST_ROWS}: compare a part of the recordings"
             )
     one, two = _poses(measured, simulated), _poses(simulated, measured)
     same_rad = _reach(two)
