@@ -72,7 +72,7 @@ class DogLeg(Struct, frozen=True, forbid_unknown_fields=True):
     e3: Limit = DogLegRules.e3
     kmax: Annotated[int, Meta(ge=1, le=100_000)] = DogLegRules.kmax
     delta0: Annotated[float, Meta(ge=1e-12, le=1e12)] = DogLegRules.radius
-    sigma: Annotated[float, Meta(ge=0.0, le=0.25)] = DogLegRules.sigma  # above 1/4 a refused step would be tried again
+    sigma: Annotated[float, Meta(ge=0.0, le=0.75)] = DogLegRules.sigma  # above 3/4 the radius grows
 
 
 class FitPlan(Struct, frozen=True, forbid_unknown_fields=True):

@@ -21,6 +21,7 @@ TERMS = ("offset", "gain", "cross", "cushion", "cubic")
 RANK_LIMIT = 1e-2  # of singular values of scaled columns: a grid of 4 x 4 points has 0.12, one of 3 x 3 none: u^3 = u
 LEAST, MOST = 1e-9, 1e3  # m: no face is smaller than a nanometre or larger than a kilometre
 FORMAT = "calibeam-psd-error-map-1"
+LARGEST_BYTES = 1_000_000  # a map has a thousand; what is parsed takes many times its size
 
 
 class MapStatus(Enum):
@@ -68,7 +69,11 @@ class ErrorMap:
     def load(path: Path) -> "ErrorMap":
         """ValueError naming the file when it is not an error map; OSError when it cannot be read."""
         try:
-            held: Any = json.loads(path.read_text(encoding="utf-8"))
+            with path.open("rb") as file:
+                data = file.read(LARGEST_BYTES + 1)
+            if len(data) > LARGEST_BYTES:
+                raise ValueError(f"larger than {LARGEST_BYTES / 1e6:g} MB")
+            held: Any = json.loads(data.decode("utf-8"))
             if held.pop("format") != FORMAT:
                 raise ValueError("another format")
             rows = {name: tuple(map(float, held.pop(name))) for name in ("x_m", "y_m", "x_sigma_m", "y_sigma_m")}

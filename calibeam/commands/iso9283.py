@@ -301,7 +301,7 @@ def _corrected(known: ModelFile, cube: CubeInReach, visits: Sequence[_Visit]) ->
             continue
         come = {f"approach{j + 1}": sides[rows, j] for j in range(n)} if directed else {}
         wanted = Wanted(cube.T_base_tool[at[rows]], np.full((len(rows), n), np.nan), cube.q_rad[at[rows]], come)
-        found = correct(known, wanted, MotionInverse(RigArm.of_rig(rig)), Options())
+        found = correct(known, wanted, MotionInverse(RigArm.of_rig(rig)), Options(), len(rows))  # --cycles bounds them
         for row, why in enumerate(found.says):
             if not np.isfinite(found.q_rad[row]).all():
                 raise DataError(f"P{at[rows[row]] + 1}: {why}; give another --centre-m or --edge-m")

@@ -18,6 +18,7 @@ from calibrate.identification.result import Evidence, FreeSpace, Identification,
 from calibrate.model_file import ModelFile, ModelParameter
 from calibrate.observability import Observability
 from calibrate.physics.records import Effect
+from calibrate.report.model_tests import fit_end
 from calibrate.report.quantities import angle, counted, length
 from calibrate.report.session_evidence import SessionEvidence
 from calibrate.report.session_verdict import session_verdict
@@ -131,6 +132,9 @@ def print_identification(
         console.print(assumed, highlight=False, markup=False)
     if verbose:
         _print_details(console, result, of_spots=of_spots)
+        if (end := fit_end(evidence.model)) is not None:
+            says = f"fit by {end[0]}: {counted(end[1], 'iteration')} in all rounds, ended by {end[2]}"
+            console.print(says, highlight=False, markup=False)
         return
     for line in _brief(result):
         console.print(line, highlight=False, markup=False)

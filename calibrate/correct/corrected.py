@@ -29,7 +29,7 @@ Bools = NDArray[np.bool_]
 Branch = Callable[[Floats], Bools]  # joint readings (solution, joint) -> which of them a program asks for
 
 ROUNDS = 12
-MOST_POSES = 20_000
+MOST_POSES = 3_000  # an inverse takes 10 to 20 ms a pose: more would take over a minute
 CLOSE = 1e-9  # m and rad: far below what any arm repeats
 MOVED_RAD = 1e-4  # a joint that went less far has not moved, as in effects/conditions.py
 RANGE_SLACK = 1e-9  # of the recorded range: rounding
@@ -60,6 +60,7 @@ class Wanted:
     conditions: Mapping[str, Floats]  # column of samples.csv -> (pose,)
     in_order: bool = True  # whether each pose is reached from the one before
     branches: tuple[Branch | None, ...] = ()  # one a pose; empty: none asks for one
+    source: str = "poses"  # the file, in errors
 
     def __len__(self) -> int:
         return len(self.T_base_tool)
@@ -110,13 +111,17 @@ class Corrected:
     notes: tuple[str, ...]
 
 
-def correct(model: ModelFile, wanted: Wanted, inverse_of: Inverse, options: Options) -> Corrected:
+def correct(
+    model: ModelFile, wanted: Wanted, inverse_of: Inverse, options: Options, most: int = MOST_POSES
+) -> Corrected:
     """Commands for every pose that can be reached; what cannot is named, nothing is clipped.
 
     DataError for a model without its rig, and where an effect of the model cannot be evaluated.
     """
-    if len(wanted) > MOST_POSES:
-        raise DataError(f"{len(wanted)} poses; at most {MOST_POSES} are corrected at a time, give them in parts")
+    if len(wanted) > most:
+        raise DataError(
+            f"{wanted.source}: {len(wanted)} poses; at most {most} are corrected at a time, split it into parts"
+        )
     arms = Arms.of(model, options)
     nominal_rad, why = _nominal(arms, wanted, inverse_of)
     reached = np.isfinite(nominal_rad).all(axis=1)

@@ -48,6 +48,7 @@ def read_poses(text: str, name: str, n_joints: int, frame: Floats, every: Mappin
         np.full((n, n_joints), np.nan),
         near_rad,
         conditions,
+        source=name,
     )
 
 

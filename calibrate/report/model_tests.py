@@ -54,6 +54,12 @@ def _distance(held: Fields, key: str) -> float | None:
     return next((value for unit in ("m", "rad") if (value := _number(held, f"{key}_{unit}")) is not None), None)
 
 
+def fit_end(model: ModelFile) -> tuple[str, int, str] | None:
+    """Solver and loss, iterations of all rounds, the rule that ended it; None in models of earlier versions."""
+    end = model.fit
+    return None if end is None else (f"{end.method}, {end.loss}", end.iterations, f"{end.ended_by}: {end.says}")
+
+
 def scatter(model: ModelFile) -> Scatter | None:
     """None in a model that was written before there was this test."""
     chi2, dof = _number(model.noise, "chi2_stated"), _number(model.noise, "dof")

@@ -27,7 +27,7 @@ class DogLegRules:
     e3: float = 1e-13  # of the 2-norm of the residual: a ten-trillionth of the noise of one reading
     kmax: int = 100
     radius: float = 1.0  # initial; 1 = the deviation to be expected
-    sigma: float = 0.0  # a step is taken where its gain ratio is above this: 0 in the source, below 1/4 in theory
+    sigma: float = 0.25  # the radius is halved where the gain ratio of a step is below this
 
 
 def dogleg(rows: Rows, theta: Floats, rules: DogLegRules) -> Ended:
@@ -52,10 +52,10 @@ def dogleg(rows: Rows, theta: Floats, rules: DogLegRules) -> Ended:
         trial = rows.moved(theta, step)
         new = rows.residual(trial)
         gain = gain_ratio(residual, new, local.slope @ rows.taken(theta, trial))
-        if gain > rules.sigma:
+        if gain > 0.0:
             theta, residual = trial, new
             local = _Local.at(rows, theta, residual)
-        radius = next_radius(radius, gain, length)
+        radius = next_radius(radius, gain, length, rules.sigma)
     return Ended(theta, residual, local.slope, Stop.STEPS, rules.kmax)
 
 
@@ -102,11 +102,11 @@ def second_leg(cauchy: Floats, newton: Floats, radius: float) -> float:
     return (root - along) / square if along <= 0.0 else room / (along + root)
 
 
-def next_radius(radius: float, gain: float, length: float) -> float:
-    """Radius after a step of this length with this gain ratio."""
+def next_radius(radius: float, gain: float, length: float, sigma: float = DogLegRules.sigma) -> float:
+    """Radius after a step of this length with this gain ratio; a refused step always halves it, or it would recur."""
     if gain > 0.75:
         return max(radius, 3.0 * length)
-    return radius / 2.0 if gain < 0.25 else radius
+    return radius / 2.0 if gain < sigma or gain <= 0.0 else radius
 
 
 def _stop_before(rules: DogLegRules, gradient: Floats, residual: Floats, radius: float, small: float) -> Stop | None:

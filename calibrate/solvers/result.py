@@ -15,8 +15,10 @@ class Status(Enum):
     """How a fit ended; the value is the sentence for a person."""
 
     CONVERGED = "predicted gain is below tolerance"
-    OUT_OF_STEPS = "step limit reached; raise max_steps or improve the start"
-    STALLED = "no step makes the residual smaller, although the slope promises it; check derivatives and the start"
+    OUT_OF_STEPS = "step limit reached; improve the start, or raise kmax of [dog-leg] in the fit plan"
+    STALLED = (
+        "no step makes the residual smaller, although the slope promises it; check derivatives, the start, e1 and e2"
+    )
     RANK_DEFICIENT = "data cannot fix some combinations of parameters; they are held and named"
     AT_BOUND = "a parameter is at its bound: the question is not answered by these data"
     NOT_FINITE = "residual became infinite or undefined; check joint signs, the order of reflection and the rig"
@@ -32,7 +34,7 @@ class Stop(Enum):
     RESIDUAL = "2-norm of the residual is at most e3"
     RADIUS = "trust radius shrank to e2 of the parameters"
     STEP = "step is no longer than e2 of the parameters"
-    STEPS = "all allowed steps were made"
+    STEPS = "all allowed steps (kmax of Dog-Leg) were made"
     LIKELIHOOD = "a further round of weights changes -2 log L by less than 0.1"
     ROUNDS = "all allowed rounds of weights were made"
     NOT_FINITE = "residual or derivative is not finite"

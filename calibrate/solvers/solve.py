@@ -102,7 +102,8 @@ def _status(rows: Rows, ended: Ended, dependent: bool, bounded: bool, tolerance:
         return Status.OUT_OF_STEPS
     if dependent:
         return Status.RANK_DEFICIENT
-    if ended.stop is not Stop.GAIN and _left_to_gain(rows, ended, ended.slope) > max(tolerance, STALL):
+    settled = ended.stop in (Stop.GAIN, Stop.RESIDUAL)  # e3: residuals as small as were asked for
+    if not settled and _left_to_gain(rows, ended, ended.slope) > max(tolerance, STALL):
         return Status.STALLED
     return Status.AT_BOUND if bounded else Status.CONVERGED
 

@@ -49,7 +49,7 @@ def unstuff(encoded: bytes) -> bytes:
     while at < len(encoded):
         code = encoded[at]
         end = at + code
-        if code == 0 or end > len(encoded):
+        if code == 0 or end > len(encoded) or 0 in encoded[at + 1 : end]:
             raise StuffingError(f"code byte 0x{code:02X} at {at} of {len(encoded)} bytes")
         out += encoded[at + 1 : end]
         at = end

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from calibeam.cli import app
+from calibeam.cli import app, run
 from calibeam.command_list import COMMANDS
 
 
@@ -23,7 +23,7 @@ LOADED = commands()
 
 
 def printed(name: str, capsys: pytest.CaptureFixture[str]) -> str:
-    app([*name.split(), "--help"], result_action="return_value")
+    assert run([*name.split(), "--help"]) == 0
     return capsys.readouterr().out
 
 

@@ -241,3 +241,16 @@ def test_a_fit_that_came_to_no_end_is_partial_and_its_model_is_kept(folder, tmp_
     assert "No usable model: step limit reached" in " ".join(told.out.split())
     assert f"what was found so far is in {model}" in " ".join(told.err.split())
     assert read_model(model).status == "OUT_OF_STEPS"
+
+
+def test_the_rule_that_ended_a_fit_and_its_iterations_are_on_the_screen_and_in_the_report(folder, tmp_path, capsys):
+    plan, model, page = tmp_path / "fit.toml", tmp_path / "model.json", tmp_path / "report.html"
+    plan.write_text('schema = 1\nshare = 0\nsolver = "dog-leg"\n[dog-leg]\nkmax = 2\ne1 = 0\ne2 = 0\ne3 = 0\n')
+    run(["identify", str(folder), "--plan", str(plan), "--out", str(model), "--verbose"])
+    told = " ".join(capsys.readouterr().out.split())
+    iterations = read_model(model).fit.iterations
+    assert f"fit by dog-leg, least-squares: {iterations} iterations in all rounds, ended by STEPS" in told
+    assert "kmax" in told
+    run(["report", str(folder), "--model", str(model), "--out", str(page)])
+    assert "Fit by dog-leg, least-squares" in page.read_text()
+    assert "ended by STEPS" in page.read_text()

@@ -129,7 +129,7 @@ def test_what_makes_no_sense_is_told_before_any_line_is_opened(arguments: list[s
 
 def test_the_examples_leave_plots_and_figures(tmp_path: Path) -> None:
     assert run(["motion", "--only", "joint", "--out", str(tmp_path)]) == 0
-    told = json.loads((tmp_path / "motion.json").read_text())
+    told = json.loads((tmp_path / "motion.json").read_text())["examples"]
     assert told["joint"]["hand off its planned track at most, m"] < 3e-3  # the controller smooths over 30 ms
     assert (tmp_path / "joint.svg").stat().st_size > 10_000
     drawn_s, said_s = ((tmp_path / name).stat().st_mtime for name in ("plan-joint.svg", "joint.svg"))

@@ -56,7 +56,7 @@ def test_a_plan_that_says_nothing_is_the_default():
         ('solver = "dog-leg"\n[dog-leg]\ne3 = -1.0', r"line 4: e3 = -1.0 in \[dog-leg\]: expected float >= 0.0"),
         ('solver = "dog-leg"\n[dog-leg]\nkmax = 0', r"line 4: kmax = 0 in \[dog-leg\]: expected int >= 1"),
         ('solver = "dog-leg"\n[dog-leg]\ndelta0 = 0', r"line 4: delta0 = 0 in \[dog-leg\]: expected float >= 1e-12"),
-        ('solver = "dog-leg"\n[dog-leg]\nsigma = 0.5', r"line 4: sigma = 0.5 in \[dog-leg\]: expected float <= 0.25"),
+        ('solver = "dog-leg"\n[dog-leg]\nsigma = 0.8', r"line 4: sigma = 0.8 in \[dog-leg\]: expected float <= 0.75"),
         (
             'solver = "dog-leg"\n[dog-leg]\ne2 = "small"',
             r"line 4: e2 = 'small' in \[dog-leg\]: expected float, got str",

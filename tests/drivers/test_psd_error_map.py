@@ -84,3 +84,10 @@ def test_a_file_that_is_no_map_is_named(tmp_path, spoil):
     path.write_text(json.dumps(spoil(json.loads(path.read_text()))))
     with pytest.raises(ValueError, match=r"psd1.json: no error map of format"):
         ErrorMap.load(path)
+
+
+def test_a_file_far_larger_than_a_map_is_refused_before_it_is_parsed(tmp_path):
+    path = tmp_path / "psd1.json"
+    path.write_text("[" + "{}," * 400_000 + "{}]")
+    with pytest.raises(ValueError, match=r"psd1\.json: no error map .*larger than 1 MB.*measure one"):
+        ErrorMap.load(path)

@@ -76,7 +76,7 @@ def correct_program(
     arms = Arms.of(model, options)
     _check(targets, dialect, options, name)
     wanted = _wanted(targets.literals, dialect, arms, base, near_rad, every)
-    found = correct(model, wanted, inverse_of, options)
+    found = correct(model, replace(wanted, source=name), inverse_of, options)
     pieces, q_rad = list[tuple[int, int, str]](), found.q_rad.copy()
     told = inverse(base) @ found.T_base_tool
     for row, one in enumerate(targets.literals):

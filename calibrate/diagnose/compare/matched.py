@@ -29,6 +29,7 @@ FAR_RAD = 0.15  # at most: no servo moves the arm so far
 NEAREST = 0.4  # of the distance between neighbouring poses of the plan
 SPREAD = 0.1  # rad: joints of one plan, but for a constant of each joint, keep to within so much in most rows
 MOST = 0.9
+MOST_ROWS = 5_000  # of a table whose rows are found by joint angles: two tables of so many take half a gigabyte
 # A constant of a joint beyond any servo, that hardly varies: another zero of degrees.
 CONSTANT_RAD, VARIES = 0.05, 0.2
 WHAT = ("placement", "first_psd", SEAT, BAR, BAR_END, "target")  # where both state it, it must be the same
@@ -121,22 +122,37 @@ def _same_rows(measured: Samples, simulated: Samples) -> bool:
 
 
 def _nearness(measured: Samples, simulated: Samples) -> Floats:
-    """(row, row) 1 to 2 where they may be one pose, 0 elsewhere."""
+    """(row, row) 1 to 2 where they may be one pose, 0 elsewhere. DataError for tables that are too large for this."""
+    for name, samples in (("measured", measured), ("simulated", simulated)):
+        if len(samples) > MOST_ROWS:
+            raise DataError(
+                f"{name}: {len(samples)} rows, and the recordings are not the same motion row by row; rows are found "
+                f"by joint angles among at most {MOST_ROWS}: compare a part of the recordings"
+            )
     one, two = _poses(measured, simulated), _poses(simulated, measured)
     same_rad = _reach(two)
-    apart = np.abs(one[:, None] - two[None]).max(axis=2)
+    apart = np.array([_off(pose, two) for pose in one])
     may = apart < same_rad
     for name in WHAT:
         if name in measured and name in simulated:
             mine, theirs = _labels(measured, name)[:, None], _labels(simulated, name)[None]
             may &= (mine == theirs) | np.isnan(mine) | np.isnan(theirs)
-    return np.where(may, 2.0 - apart / same_rad, 0.0)
+    np.subtract(2.0, np.divide(apart, same_rad, out=apart), out=apart)
+    apart[~may] = 0.0
+    return apart
+
+
+def _off(pose: Floats, poses: Floats) -> Floats:
+    """(row,) the largest difference of a joint."""
+    return np.abs(poses - pose).max(axis=1)
 
 
 def _reach(poses: Floats) -> float:
     """Rad of every joint within which a pose is the same: less than half the way to the poses around it."""
-    apart = np.abs(poses[:, None] - poses[None]).max(axis=2)
-    nearest = np.where(apart > SAME_RAD, apart, np.inf).min(axis=1)  # repeats are the same pose
+    apart = (_off(pose, poses) for pose in poses)
+    nearest = np.array(
+        [np.min(one, where=one > SAME_RAD, initial=np.inf) for one in apart]
+    )  # repeats are the same pose
     nearest = nearest[np.isfinite(nearest)]
     if not len(nearest):
         return SAME_RAD

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from acquisition.recording.rig import Rig
 from calibrate.model_file import FreeSpaceRecord, ModelFile, UnseenRows
 from calibrate.report.elements import Html, bullets, section, table, tag
-from calibrate.report.model_tests import proofs, repeated, scatter
+from calibrate.report.model_tests import fit_end, proofs, repeated, scatter
 from calibrate.report.quantities import DASH, angle, doubted_angle, doubted_length, fixed, length, significant
 from calibrate.report.session_evidence import SessionEvidence
 from calibrate.sensors.catalogue import SOURCES, kind_of
@@ -135,6 +135,8 @@ def _noise(model: ModelFile, rig: Rig) -> Html:
 
 def _tests(model: ModelFile) -> Iterator[tuple[str, ...]]:
     found, repeats = scatter(model), repeated(model)
+    if (end := fit_end(model)) is not None:
+        yield f"Fit by {end[0]}", str(end[1]), f"iterations in all rounds; ended by {end[2]}"
     if found is not None:
         ratio = fixed(found.chi2 / found.dof, 2) if found.dof > 0 else DASH
         said = f"alarm: {found.alarm.value}" if found.alarm is not Alarm.NONE else found.alarm.value

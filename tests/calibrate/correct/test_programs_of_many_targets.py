@@ -11,6 +11,7 @@ from calibrate.correct.corrected import MOST_POSES, Options, Wanted, correct
 from calibrate.correct.programs import krl, literal, rapid, urscript
 from calibrate.correct.programs.literal import LONGEST_MOVE, NUMBER, Dialect, line_of
 from calibrate.correct.programs.rewriting import DIALECTS
+from calibrate.correct.tables import read_poses
 from calibrate.errors import DataError
 
 MANY = 300
@@ -78,7 +79,17 @@ def test_a_number_is_read_once(text: str, whole: bool) -> None:
 def test_more_poses_than_are_corrected_at_a_time_are_refused() -> None:
     n = MOST_POSES + 1
     empty = np.empty((n, 0))
-    wanted = Wanted(np.broadcast_to(np.eye(4), (n, 4, 4)), empty, empty, {})
+    wanted = Wanted(np.broadcast_to(np.eye(4), (n, 4, 4)), empty, empty, {}, source="weld.mod")
     nothing: Any = None
-    with pytest.raises(DataError, match="20001 poses; at most 20000 are corrected at a time, give them in parts"):
+    with pytest.raises(
+        DataError, match=r"weld\.mod: 3001 poses; at most 3000 are corrected at a time, split it into parts"
+    ):
+        correct(nothing, wanted, nothing, Options())
+
+
+def test_a_table_of_too_many_poses_is_named() -> None:
+    text = "x_m,y_m,z_m,rx_rad,ry_rad,rz_rad\n" + "0.4,0.1,0.3,0,0,0\n" * (MOST_POSES + 1)
+    wanted = read_poses(text, "poses.csv", 6, np.eye(4), {})
+    nothing: Any = None
+    with pytest.raises(DataError, match=r"poses\.csv: 3001 poses; at most 3000"):
         correct(nothing, wanted, nothing, Options())

@@ -6,9 +6,11 @@ from scipy.spatial.transform import Rotation
 
 from calibrate.iso9283.cube import cube_corners_m, cube_poses_m
 from calibrate.iso9283.performance import (
+    MOST_PARTS,
     AttainedPoses,
     distance_accuracy,
     distance_repeatability,
+    jackknifed,
     performance_of,
     pose_accuracy,
     pose_accuracy_variation,
@@ -146,3 +148,16 @@ def test_the_poses_lie_in_a_diagonal_plane_of_the_cube(plane):
 
 def test_pose_accuracy_is_of_barycentres():
     assert pose_accuracy(np.array([[1e-3, 0, 0], [-1e-3, 0, 0]]), np.zeros((2, 3))) == pytest.approx(0.0, abs=1e-18)
+
+
+def test_the_work_for_a_sigma_does_not_grow_with_the_square_of_the_cycles():
+    calls, values = [], np.random.default_rng(3).normal(0.0, 1.0, 5 * MOST_PARTS + 7)
+
+    def mean(one):
+        calls.append(len(one))
+        return float(np.mean(one))
+
+    found = jackknifed(mean, [values])
+    assert len(calls) == MOST_PARTS + 1
+    assert sum(len(values) - left for left in calls[:-1]) == len(values)  # each is left out once
+    assert found.sigma == pytest.approx(np.std(values) / np.sqrt(len(values)), rel=0.1)

@@ -68,12 +68,23 @@ def test_e3_is_a_bound_of_the_2_norm_as_in_the_source():
     assert shorter.steps == 1  # the largest of the four is below the limit, their norm is not
 
 
-def test_sigma_refuses_a_step_that_gains_too_little():
+def test_sigma_is_the_threshold_of_the_radius_and_every_gain_is_taken():
     kink = Kink((Parameter("p0", "1", 1.0, start=0.01),))
-    taken = stops(kink, kmax=1, radius=0.015, sigma=0.0)  # across the kink: 0.4 of what the slope promises
-    refused = stops(kink, kmax=1, radius=0.015, sigma=0.5)
-    assert taken.theta[0] == pytest.approx(-0.005)
-    assert refused.theta[0] == 0.01
+    for sigma in (0.0, 0.5):  # across the kink: 0.4 of what the slope promises
+        assert stops(kink, kmax=1, radius=0.015, sigma=sigma).theta[0] == pytest.approx(-0.005)
+    assert (next_radius(2.0, 0.4, 1.0, sigma=0.5), next_radius(2.0, 0.4, 1.0, sigma=0.25)) == (1.0, 2.0)
+    assert next_radius(2.0, 0.0, 1.0, sigma=0.0) == 1.0  # else a refused step would be tried again
+
+
+def test_e3_is_a_success_whatever_a_further_step_would_gain():
+    fit = stops(line([[1.0]], [2.0], start=1.0), e3=5.0)
+    assert (fit.stop, fit.status, fit.steps) == (Stop.RESIDUAL, Status.CONVERGED, 0)
+
+
+def test_messages_name_the_keys_of_a_plan():
+    assert "kmax" in Stop.STEPS.value
+    assert "kmax" in Status.OUT_OF_STEPS.value
+    assert "max_steps" not in Status.OUT_OF_STEPS.value
 
 
 def test_a_small_step_stops_by_e2():

@@ -1,10 +1,12 @@
 """Rows of two sessions of one motion find each other by pose and order."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
 from acquisition.recording import Samples
-from calibrate.diagnose.compare.matched import SAME_RAD, match, zeros_between
+from calibrate.diagnose.compare.matched import MOST_ROWS, SAME_RAD, match, zeros_between
 from calibrate.errors import DataError
 
 
@@ -72,3 +74,19 @@ def test_other_zeros_of_degrees_do_not_break_a_match_of_rows(poses):
 def test_a_servo_moves_no_zero(poses):
     moved = session(poses + 4e-3)
     assert np.array_equal(zeros_between(moved, session(poses)), np.zeros(3))
+
+
+def test_rows_that_are_found_by_joints_are_bounded(poses):
+    many = session(np.tile(poses, (MOST_ROWS // len(poses) + 1, 1)))
+    with pytest.raises(DataError, match=f"simulated: {len(many)} rows, .*at most {MOST_ROWS}: compare a part"):
+        match(session(poses), many)
+    assert len(match(many, many).measured) == len(many)  # row by row as they stand: any number
+
+
+def test_finding_rows_by_joints_takes_no_more_than_three_numbers_a_pair():
+    q = np.random.default_rng(2).uniform(-1.0, 1.0, (1000, 6))
+    tracemalloc.start()
+    assert len(match(session(q[1:]), session(q)).measured) == 999
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 3 * 8 * 1000**2
