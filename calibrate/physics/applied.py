@@ -18,7 +18,7 @@ from acquisition.recording import Samples
 from acquisition.recording.samples import SEAT, required
 from calibrate.diagnose.augmented import encoder_channels
 from calibrate.diagnose.ported import look
-from calibrate.effects.drivers import Drivers, moves_of, temperatures_of
+from calibrate.effects.drivers import Drivers, moves_of
 from calibrate.effects.loads import UNSTATED_CENTRE_M
 from calibrate.effects.payload_compliance import UNKNOWN_CENTRE
 from calibrate.effects.ports import Perturbation, Port
@@ -86,14 +86,12 @@ def kept_conditions(every: Mapping[str, Floats], needs: Iterable[str]) -> dict[s
 
 
 def completed(asked: Samples, recorded: Samples, needs: Iterable[str], same_session: bool) -> Completed:
-    """`needs` filled in: by the order in time and by smoothing among the session's own rows, if they are of it; else
-    with the middle of what was recorded, where `missing` has the row.
+    """`needs` filled in: by what the session recorded about that time, if they are rows of it; else with the middle of
+    what was recorded, where `missing` has the row. How many rows are asked for changes nothing that they state.
     """
     columns, missing = dict(asked.columns), dict[str, Bools]()
     if same_session:
         columns |= _among(asked, recorded)
-    else:
-        columns |= {f"temp_{place}_degC": values for place, values in temperatures_of(asked).items()}
     for name in needs:
         values = np.asarray(columns.get(name, np.full(len(asked), np.nan)), dtype=np.float64)
         given = np.isfinite(asked.column(name)) if name in asked else np.isfinite(values)
@@ -123,12 +121,16 @@ def joined(recorded: Samples, asked: Samples) -> Samples:
 
 
 def _among(asked: Samples, recorded: Samples) -> dict[str, Floats]:
-    """Columns of the asked rows as rows of the recorded session: temperatures smoothed with its own, moves from
-    the row before.
+    """Columns of the asked rows as rows of the recorded session: its smoothed temperatures at their times, before and
+    after it what they state; moves from the row before.
     """
-    both, first = joined(recorded, asked), len(recorded)
-    temperatures = {f"temp_{place}_degC": values[first:] for place, values in temperatures_of(both).items()}
-    n = asked.n_joints
+    both, first, n = joined(recorded, asked), len(recorded), asked.n_joints
+    t, own = asked.column("t_s"), recorded.column("t_s")
+    order, within = np.argsort(own), (t >= own.min()) & (t <= own.max())
+    temperatures = {c: both.column(c)[first:] for c in recorded.names if c.startswith("temp_")}
+    for c, stated in temperatures.items():
+        of_session = np.interp(t, own[order], recorded.column(c)[order])
+        temperatures[c] = np.where(within | ~np.isfinite(stated), of_session, stated)
     plain = Samples({c: v for c, v in both.columns.items() if not c.startswith("last_move")}, n)
     moves, direction = moves_of(plain)
     derived = _joints(BY_JOINT["last_move"], moves[first:]) | _joints(BY_JOINT["approach"], direction[first:])
@@ -296,6 +298,9 @@ def _of_centres(
     at = {name: filled.samples.columns.get(name, np.zeros(len(asked))) for name in CENTRE}
     if zero:
         at = {name: np.zeros(len(asked)) for name in CENTRE}  # the session did not record it: not used
+    if PAYLOAD[0] in filled.missing:  # of an unknown load no less is unknown than of the heaviest that was recorded
+        heaviest = np.nanmax(recorded.column(PAYLOAD[0]))
+        at[PAYLOAD[0]] = np.where(filled.missing[PAYLOAD[0]], heaviest, filled.samples.column(PAYLOAD[0]))
 
     def added(by: Predictor, centre: Mapping[str, Floats]) -> list[Floats]:
         new = Samples({**filled.samples.columns, **centre}, recorded.n_joints)
@@ -317,7 +322,7 @@ def _of_centres(
     if rows.any():
         off = np.where(rows, UNSTATED_CENTRE_M, 0.0)
         names, doubts = felt([added(predictor, {**at, name: at[name] + off}) for name in CENTRE])
-        where = "at the flange" if zero or not np.any(list(at.values())) else "where it was in the session"
+        where = "at the flange" if zero or not np.any([at[name] for name in CENTRE]) else "where it was in the session"
         if doubts:
             yield (
                 f"{', '.join(CENTRE)} are missing in {int(rows.sum())} of {int(carries.sum())} rows with a payload "
