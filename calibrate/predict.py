@@ -118,8 +118,13 @@ def predict(predictor: Predictor, samples: Samples) -> Columns:
 def readings(
     predictor: Predictor, T_base_flange: Floats, samples: Samples, instruments: Collection[str] | None = None
 ) -> Columns:
-    """What each instrument should read at flange poses (row, 4, 4) of the samples; those named, or as in `predict`."""
+    """What each instrument should read at flange poses (row, 4, 4) of the samples; those named, or as in `predict`.
+
+    A model that knows readings only as another kind uses them, positions as distances, predicts that kind.
+    """
     asked = [k for k in SENSORS if any(c in samples for c in k.asks)] if instruments is None else []
+    other = [k for k in SENSORS if k.name in predictor.instruments and k.instead_of]
+    asked = list(dict.fromkeys(next((o for o in other if k.name in o.instead_of), k) for k in asked))
     if not asked:
         named = set(predictor.instruments if instruments is None else instruments)
         asked = [kind for kind in SENSORS if kind.name in named]

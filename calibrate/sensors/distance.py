@@ -5,19 +5,22 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording import Samples
 from acquisition.recording.samples import POSITION
+from calibrate.blunders.witness import stacked
 from calibrate.errors import DataError
 from calibrate.sample_table import SampleTable
 from calibrate.sensors import full_pose, position
-from calibrate.sensors.kind import SensorKind, Trait
+from calibrate.sensors.kind import Columns, Found, SensorKind, Trait
 from calibrate.sensors.pair import PairChain
-from calibrate.sensors.position import NOISE, position_sigma_m, predicted_positions
+from calibrate.sensors.position import NOISE, position_sigma_m, seen_at
 from calibrate.sensors.tip_distance import TipDistance
 from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
+COLUMN = "distance_m"  # from the row before; no session holds it, it follows from the positions
 SHORTEST_M = 1e-3  # shorter distances hardly depend on the arm, and one of zero has no direction
 
 
@@ -56,6 +59,20 @@ def _build(table: SampleTable) -> Measured | None:
     return replace(measured, own_correlation=shared_correlation(table.position_m, pairs))
 
 
+def _predict(found: Found, T_base_flange: Floats, samples: Samples) -> Columns:
+    """From the row before to each row; none at the first."""
+    return {COLUMN: _from_row_before(seen_at(found, T_base_flange, samples))}
+
+
+def _observed(found: Found, samples: Samples) -> Columns | None:
+    return {COLUMN: _from_row_before(stacked(samples, POSITION))} if all(c in samples for c in POSITION) else None
+
+
+def _from_row_before(position_m: Floats) -> Floats:
+    """(row,) of positions (row, 3)."""
+    return np.append(np.nan, np.linalg.norm(np.diff(position_m, axis=0), axis=1))
+
+
 KIND = SensorKind(
     name="distance",
     columns=POSITION,
@@ -64,6 +81,8 @@ KIND = SensorKind(
     noise=(NOISE,),
     traits=frozenset({Trait.TARGET}),
     instead_of=(position.KIND.name, full_pose.KIND.name),
+    reads=(COLUMN,),
     build=_build,
-    predict=predicted_positions,
+    predict=_predict,
+    observed=_observed,
 )

@@ -151,10 +151,10 @@ def device_of(found: Found) -> Floats:
 def predicted_positions(found: Found, T_base_flange: Floats, samples: Samples) -> Columns:
     """The target in the device's frame."""
     T = device_of(found)
-    return dict(zip(POSITION, ((_seen_at(found, T_base_flange, samples) - T[:3, 3]) @ T[:3, :3]).T, strict=True))
+    return dict(zip(POSITION, ((seen_at(found, T_base_flange, samples) - T[:3, 3]) @ T[:3, :3]).T, strict=True))
 
 
-def _seen_at(found: Found, T_base_flange: Floats, samples: Samples) -> Floats:
+def seen_at(found: Found, T_base_flange: Floats, samples: Samples) -> Floats:
     """(row, 3) the target of each row in the base: NaN in a row that names none where others do."""
     named = samples.integers(TARGET, 0)
     if not found.rig.targets or not named.any():

@@ -90,6 +90,17 @@ def test_a_wire_is_the_distance_from_the_origin_of_the_device(predictor, tips):
     np.testing.assert_allclose(out["wire_m"], np.linalg.norm(tips - place[:3, 3], axis=1), atol=1e-12)
 
 
+def test_a_model_that_knows_only_distances_predicts_those_between_rows(rig, tips):
+    only = Predictor(rig, {"tool.x": 1e-3}, {"tool": (0.02, -0.01, 0.08)}, ("distance",))
+    moved = Rotation.from_rotvec(TURN).apply(tips) + [5.0, -2.0, 1.0]  # in a frame that nobody knows
+    out = predict(only, table(**dict(zip(("x_m", "y_m", "z_m"), moved.T, strict=True))))
+    assert list(out) == ["t_s", "distance_m", "r_distance_m"]
+    spans = np.linalg.norm(np.diff(tips, axis=0), axis=1)
+    np.testing.assert_allclose(out["distance_m"], [np.nan, *spans], atol=1e-12)
+    np.testing.assert_allclose(out["r_distance_m"], [np.nan, 0.0, 0.0], atol=1e-12)
+    assert list(predict(only, table())) == ["t_s", "distance_m"]
+
+
 def test_seat_and_bar_rows_get_the_tip_in_the_base_and_others_none(predictor, tips):
     out = predict(predictor, table(seat=np.array([1.0, np.nan, np.nan]), bar=np.array([np.nan, np.nan, 1.0])))
     found = np.stack([out[c] for c in ("tip_x_m", "tip_y_m", "tip_z_m")], axis=1)
