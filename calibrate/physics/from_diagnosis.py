@@ -219,7 +219,7 @@ def _records(fit: Fitted, covariance: Floats, seen: Identifiability) -> tuple[Mo
 def _conditions(fit: Fitted) -> tuple[dict[str, Floats], tuple[str, ...]]:
     every = recorded_conditions(fit.drivers, fit.session.samples)
     needs = needed_columns((d for a in fit.accepted for d in ",".join(a.term.depends_on).split(",")), every)
-    return kept_conditions(every, needs) if fit.accepted else {}, needs
+    return kept_conditions(every, needs), needs
 
 
 def _effects(
