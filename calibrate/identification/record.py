@@ -67,6 +67,7 @@ def fit_record(end: FitEnd) -> FitRecord:
         end.stop.name,
         end.stop.value,
         value if np.isfinite(value) else None,
+        "normal",  # whatever the loss
     )
 
 

@@ -146,6 +146,7 @@ def _fit_record(fit: Fitted) -> FitRecord:
         fit.stop.name,
         fit.stop.value,
         _number(value),
+        LossName.STUDENT_T.value,
     )
 
 

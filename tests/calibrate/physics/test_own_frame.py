@@ -72,6 +72,11 @@ def test_a_model_without_effects_holds_the_joint_range_of_its_recording(tmp_path
     assert (arms.low_rad, arms.high_rad) == (pytest.approx(q_rad.min(axis=0)), pytest.approx(q_rad.max(axis=0)))
 
 
+def test_the_likelihood_of_a_diagnosed_model_names_the_law_it_is_of(tmp_path):
+    _, model = drawn(tmp_path, "tracker", 7100)
+    assert model.file.fit.law == "student-t"
+
+
 def test_a_frame_of_another_name_is_refused(tmp_path):
     _, model = drawn(tmp_path, "tracker", 7100)
     with pytest.raises(ValueError, match="frame 'device': give one of robot, world"):
