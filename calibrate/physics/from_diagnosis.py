@@ -30,6 +30,7 @@ from calibrate.effects.ports import Perturbation, Place
 from calibrate.effects.second_encoders import SECOND
 from calibrate.effects.term import Shape, Size
 from calibrate.errors import DataError
+from calibrate.fit import Status, Stop
 from calibrate.fit_plan import LossName, SolverName
 from calibrate.identifiability import Identifiability, analyse
 from calibrate.identification.record import left_out
@@ -87,21 +88,25 @@ def model_of_fit(
     says: str,
     findings: tuple[Finding, ...] = (),
 ) -> ModelFile:
-    """The record of geometry and effects fitted together; `before`: geometry alone. DataError as above."""
+    """The record of geometry and effects fitted together; `before`: geometry alone; `says`: of a fit that converged.
+
+    DataError as above.
+    """
     fit = replace(fit, problem=replace(fit.problem, given=0))
     names = _names(fit.accepted)
     parameters = _parameters(fit, names)
     covariance = _covariance(fit)
     seen = _seen(fit, names)
     conditions, needs = _conditions(fit)
+    status = _status(fit, seen)
     model = ModelFile(
         schema=WITH_PHYSICS,
         kind="calibeam-model",
         software=SOFTWARE,
         rig=RigIdentity(recording.rig.name, rig_sha256(recording.rig_text), recording.rig_text),
         arm_model=recording.rig.arm.model.value,
-        status="CONVERGED",
-        says=says,
+        status=status.name,
+        says=says if status is Status.CONVERGED else status.value,
         poses=fit.samples,
         rank=seen.rank,
         free=seen.n_free,
@@ -134,6 +139,13 @@ def model_of_fit(
         ),
     )
     return _as_listed(model, fit, parameters, covariance, conditions)
+
+
+def _status(fit: Fitted, seen: Identifiability) -> Status:
+    """As the solver gives it for the same ends."""
+    if fit.stop is Stop.ROUNDS:
+        return Status.OUT_OF_STEPS
+    return Status.RANK_DEFICIENT if seen.combinations else Status.CONVERGED
 
 
 def _fit_record(fit: Fitted) -> FitRecord:
