@@ -153,7 +153,8 @@ class FitRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     iterations: Count
     ended_by: Label  # name of the rule
     says: Sentence
-    minus_2_log_likelihood: Statistic | None  # of the readings, normal law, noise found
+    minus_2_log_likelihood: Statistic | None  # of the readings, noise found
+    law: Label | None = None  # of the likelihood: "normal", "student-t"; null in models of earlier versions
 
 
 class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

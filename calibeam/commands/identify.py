@@ -80,13 +80,11 @@ def identify_command(
         if plan is not None or bootstrap:
             raise DataError("--model refits a known structure; give it without --plan and --bootstrap")
         with naming_source(recording):
-            _refit(Console(quiet=json), recording, read_model(model), out, forms)
-        if json:
-            print(msgspec.json.encode(read_model(out)).decode())
-        return
-    planned = Planned.read(plan)
-    with naming_source(recording):
-        status = _identify(Console(quiet=json), recording, planned, bootstrap, out, forms, verbose=verbose)
+            status = _refit(Console(quiet=json), recording, read_model(model), out, forms)
+    else:
+        planned = Planned.read(plan)
+        with naming_source(recording):
+            status = _identify(Console(quiet=json), recording, planned, bootstrap, out, forms, verbose=verbose)
     if json:
         print(msgspec.json.encode(read_model(out)).decode())
     report_unfinished(status, out)
@@ -114,7 +112,7 @@ def _identify(
     return result.status
 
 
-def _refit(console: Console, recording: Path, known: ModelFile, out: Path, export: tuple[ExportForm, ...]) -> None:
+def _refit(console: Console, recording: Path, known: ModelFile, out: Path, export: tuple[ExportForm, ...]) -> Status:
     from calibrate.physics.beside_known import refit  # a third of a second of imports that few runs need
 
     source = read(recording)
@@ -124,6 +122,7 @@ def _refit(console: Console, recording: Path, known: ModelFile, out: Path, expor
     for line in (*refitted_lines(found.model), *found.notes, f"model: {out}"):
         console.print(line, markup=False, highlight=False)
     _export(console, source.rig, out, export)
+    return Status[found.model.status]
 
 
 def _export(console: Console, rig: Rig, out: Path, export: tuple[ExportForm, ...]) -> None:

@@ -30,7 +30,8 @@ from calibrate.problem import LeastSquares
 from calibrate.solvers.linear import triangle_of
 from calibrate.uncertainty.fit_statistics import RepeatNoise, against_repeats, against_stated, minus_2_log_likelihood
 from calibrate.unseen_along import analyse_along, points_along
-from calibrate.weighting import JOINT
+from calibrate.variance import VarianceFactors
+from calibrate.weighting import JOINT, Weighting
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -54,7 +55,7 @@ def result_of(
     status = fit.status
     if status is Status.CONVERGED and seen.combinations:
         status = Status.RANK_DEFICIENT
-    noise = _noise(fitted)
+    noise, stated = sizes_of_noise(fitted.weighting, fitted.factors), _as_stated(fitted)
     return Identification(
         status,
         blunders,
@@ -63,7 +64,7 @@ def result_of(
         tuple(_found(fitted, i, before.theta) for i in range(len(fitted.weighting.measured))),
         noise,
         fitted.factors.converged,
-        against_stated(_as_stated(fitted)),
+        against_stated(stated.chi2, stated.dof),
         _repeats(fitted, samples.integers("repeat", -1) if "repeat" in samples else None),
         evidence_of(fitted, seen, before, noise, rig, samples, asked, rng),
         fitted.problem.parameters,
@@ -130,9 +131,8 @@ def _widening(fitted: Fitted) -> Floats:
     return out
 
 
-def _noise(fitted: Fitted) -> tuple[Noise, ...]:
-    """Every source that was asked for its size."""
-    weighting, factors = fitted.weighting, fitted.factors
+def sizes_of_noise(weighting: Weighting, factors: VarianceFactors) -> tuple[Noise, ...]:
+    """Every source of noise that was asked for its size: one sigma in m or rad, as assumed and as `factors` have it."""
     believed = {
         source: float(np.median(sigma[sigma > 0.0]))
         for m in reversed(weighting.measured)

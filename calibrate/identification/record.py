@@ -1,11 +1,13 @@
 """An identification as model.json."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from calibrate.blunders.finding import Blunder
 from calibrate.fit_plan import LOSSES, METHODS
 from calibrate.identification.evidence_record import evidence_fields, parameter_records
-from calibrate.identification.result import FitEnd, Identification
+from calibrate.identification.result import FitEnd, Identification, Noise
 from calibrate.model_file import (
     WITH_PHYSICS,
     Fields,
@@ -18,6 +20,7 @@ from calibrate.model_file import (
     fields_of,
 )
 from calibrate.sensors.catalogue import kind_of
+from calibrate.uncertainty.fit_statistics import StatedNoise
 
 
 def record_of(result: Identification, rig: RigIdentity, arm_model: str, plan: str | None = None) -> ModelFile:
@@ -40,7 +43,7 @@ def record_of(result: Identification, rig: RigIdentity, arm_model: str, plan: st
         parameters=parameter_records(result.estimates, seen, result.evidence.bootstrap),
         chain={p.name: float(v) for p, v in zip(result.parameters, result.theta, strict=True)},
         covariance=covariance_record(result.parameters, result.covariance),
-        noise=_noise(result),
+        noise=noise_fields(result.noise, result.stated_noise, settled=result.noise_settled),
         repeats=None if result.repeats is None else _plain(fields_of(result.repeats)),
         held_out=_held_out(result),
         rms_coordinate_before_m=first.rms_coordinate_before_m,
@@ -67,21 +70,21 @@ def fit_record(end: FitEnd) -> FitRecord:
         end.stop.name,
         end.stop.value,
         value if np.isfinite(value) else None,
+        "normal",  # whatever the loss
     )
 
 
-def _noise(result: Identification) -> Fields:
+def noise_fields(found: Iterable[Noise], stated: StatedNoise, *, settled: bool) -> Fields:
     """Flat: `<source>_believed`, `<source>`, `<source>_sigma`, `<source>_at_zero`, and chi-square as stated."""
     out: Fields = {}
-    for noise in result.noise:
+    for noise in found:
         out |= {f"{noise.source}_believed": noise.believed, noise.source: noise.found}
         out |= {f"{noise.source}_sigma": noise.sigma, f"{noise.source}_at_zero": noise.at_zero}
-    stated = result.stated_noise
     p = stated.p_above if np.isfinite(stated.p_above) else None
     return (
         out
         | {"chi2_stated": stated.chi2, "dof": stated.dof, "p_stated": p, "alarm": stated.alarm.name}
-        | {"settled": result.noise_settled}
+        | {"settled": settled}
     )
 
 

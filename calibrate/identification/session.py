@@ -41,9 +41,13 @@ def instruments_for_fit(rig: Rig, samples: Samples, plan: FitPlan = DEFAULT) -> 
     links = links_of(rig) if rig.tolerance is not None or holds_spots(planned) else FREE
     found = instruments_of(planned, rig, arm=with_discs(arm_of(rig, links), rig), asked=plan.instruments)
     found = as_planned(chosen_instruments(found, plan), plan)
-    if all(m.name in OUTSIDE for m in found.weighting.measured):
-        return replace(found, weighting=replace(found.weighting, joint_rad=NEGLIGIBLE_RAD))
-    return found
+    return replace(found, weighting=joints_apart(found.weighting))
+
+
+def joints_apart(weighting: Weighting) -> Weighting:
+    """Noise of the joints is left to that of the instruments where all of these look at the arm from outside."""
+    outside = all(m.name in OUTSIDE for m in weighting.measured)
+    return replace(weighting, joint_rad=NEGLIGIBLE_RAD) if outside else weighting
 
 
 def holds_spots(samples: Samples) -> bool:

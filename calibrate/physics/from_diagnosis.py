@@ -3,10 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from importlib.metadata import version
+from typing import Any
 
 import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 from scipy.stats import chi2
 
 from acquisition.recording import Recording, Samples, readings_sha256
@@ -30,11 +32,13 @@ from calibrate.effects.ports import Perturbation, Place
 from calibrate.effects.second_encoders import SECOND
 from calibrate.effects.term import Shape, Size
 from calibrate.errors import DataError
+from calibrate.fit import Status, Stop
 from calibrate.fit_plan import LossName, SolverName
 from calibrate.identifiability import Identifiability, analyse
-from calibrate.identification.record import left_out
-from calibrate.identification.result import POSE, POSITION
-from calibrate.identification.session import about_of
+from calibrate.identification.fit_report import sizes_of_noise
+from calibrate.identification.record import left_out, noise_fields
+from calibrate.identification.result import POSE, POSITION, alarms_of
+from calibrate.identification.session import NEGLIGIBLE_RAD, about_of, joints_apart
 from calibrate.model_file import (
     WITH_PHYSICS,
     Fields,
@@ -50,8 +54,12 @@ from calibrate.physics.acting import drivers_under, listed, range_of
 from calibrate.physics.applied import kept_conditions, needed_columns, recorded_conditions
 from calibrate.physics.records import Effect, EffectCurve, EffectParameter, SessionRecord
 from calibrate.predict import Predictor
+from calibrate.problem import whitener_of
 from calibrate.sensors.catalogue import kind_of
 from calibrate.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
+from calibrate.uncertainty.fit_statistics import against_stated
+from calibrate.variance import TOLD, VarianceFactors
+from calibrate.weighting import JOINT, Weighting
 
 Floats = NDArray[np.float64]
 
@@ -60,6 +68,8 @@ CUT = 0.99
 STEP = 1e-6  # m, rad or a factor
 INNER_STEP = 1e-2  # of a plausible size, of what enters non-linearly
 LEAST_CURVED = 0.1  # of a t law: with more outlying rows than good ones nothing is known
+LEAST_VARIANCE = 1e-6  # of the assumed one, of a source that is not there
+SAME_VARIANCE = 1e-3  # of itself, 0.05 % of a sigma
 TURNS = 30
 KNOTS = 33  # of a curve: a wave of the finest of eight eigenfunctions has eight of them
 UNITS = ("rad_nm", "per_k", "rad", "m", "s", "nm", "share", "k")
@@ -87,21 +97,21 @@ def model_of_fit(
     says: str,
     findings: tuple[Finding, ...] = (),
 ) -> ModelFile:
-    """The record of geometry and effects fitted together; `before`: geometry alone. DataError as above."""
+    """Geometry and effects fitted together; `before`: geometry alone; `says`: if it converged. DataError as above."""
     fit = replace(fit, problem=replace(fit.problem, given=0))
     names = _names(fit.accepted)
-    parameters = _parameters(fit, names)
-    covariance = _covariance(fit)
+    parameters, covariance = _parameters(fit, names), _covariance(fit)
     seen = _seen(fit, names)
-    conditions, needs = _conditions(fit)
+    (conditions, needs), (noise, alarms) = _conditions(fit), _noise(fit, seen.rank)
+    status = _status(fit, seen)
     model = ModelFile(
         schema=WITH_PHYSICS,
         kind="calibeam-model",
         software=SOFTWARE,
         rig=RigIdentity(recording.rig.name, rig_sha256(recording.rig_text), recording.rig_text),
         arm_model=recording.rig.arm.model.value,
-        status="CONVERGED",
-        says=says,
+        status=status.name,
+        says=says if status is Status.CONVERGED else status.value,
         poses=fit.samples,
         rank=seen.rank,
         free=seen.n_free,
@@ -111,16 +121,15 @@ def model_of_fit(
         parameters=_records(fit, covariance, seen),
         chain={p.name: float(v) for p, v in zip(fit.session.parameters, fit.geometry, strict=True)},
         covariance=covariance_record(parameters, covariance),
-        noise=_noise(fit),
+        noise=noise,
         repeats=None,
         held_out=None,
-        rms_coordinate_before_m=_rms(before)[0],
-        rms_coordinate_after_m=_rms(fit)[0],
-        rms_distance_before_m=_rms(before)[1],
-        rms_distance_after_m=_rms(fit)[1],
+        **_rms(before, "before"),
+        **_rms(fit, "after"),
         instruments=tuple(m.name for m in fit.session.measured),
         about=about_of(fit.session.weighting),
         blunders=tuple(left_out(b) for b in cleared.blunders),
+        alarms=alarms,
         readings_sha256=readings_sha256(recording.samples),
         fit=_fit_record(fit),
         effects=_effects(fit, findings, names, covariance),
@@ -136,6 +145,13 @@ def model_of_fit(
     return _as_listed(model, fit, parameters, covariance, conditions)
 
 
+def _status(fit: Fitted, seen: Identifiability) -> Status:
+    """As the solver gives it for the same ends."""
+    if fit.stop is Stop.ROUNDS:
+        return Status.OUT_OF_STEPS
+    return Status.RANK_DEFICIENT if seen.combinations else Status.CONVERGED
+
+
 def _fit_record(fit: Fitted) -> FitRecord:
     """Diagnosis has one estimator: Student's t with the noise found, by Levenberg and Marquardt."""
     value = float(sum(s.minus_two_log_likelihood for s in fit.scatters))
@@ -146,6 +162,7 @@ def _fit_record(fit: Fitted) -> FitRecord:
         fit.stop.name,
         fit.stop.value,
         _number(value),
+        LossName.STUDENT_T.value,
     )
 
 
@@ -219,7 +236,7 @@ def _records(fit: Fitted, covariance: Floats, seen: Identifiability) -> tuple[Mo
 def _conditions(fit: Fitted) -> tuple[dict[str, Floats], tuple[str, ...]]:
     every = recorded_conditions(fit.drivers, fit.session.samples)
     needs = needed_columns((d for a in fit.accepted for d in ",".join(a.term.depends_on).split(",")), every)
-    return kept_conditions(every, needs) if fit.accepted else {}, needs
+    return kept_conditions(every, needs), needs
 
 
 def _effects(
@@ -336,18 +353,70 @@ def _curve(a: Accepted, drivers: Drivers, covariance: Floats) -> EffectCurve | N
     return EffectCurve(a.term.depends_on[0], unit, *(tuple(v.tolist()) for v in (knots, values, doubt)))
 
 
-def _noise(fit: Fitted) -> Fields:
-    """One sigma of a reading by column; of joint noise seen through the arm, at the middle row."""
+def _noise(fit: Fitted, rank: int) -> tuple[Fields, tuple[str, ...]]:
+    """As of an identification, and one sigma of a reading by column, joints included, at the middle row; alarms."""
     out: Fields = {}
+    covariances = _normal_covariances(fit)
+    for m, covariance in zip(fit.session.measured, covariances, strict=True):
+        sigma = np.sqrt(np.median(np.diagonal(covariance, axis1=1, axis2=2), axis=0))
+        names = kind_of(m.name).reads or m.problem.chain.sensor.own_columns() or (m.name,)
+        out |= {name: float(s) for name, s in zip(names, sigma, strict=True)}
+    weighting = joints_apart(fit.session.weighting)
+    parts = _assumed_parts(fit, weighting)
+    found = sizes_of_noise(weighting, _factors(parts, covariances, settled=fit.stop is not Stop.ROUNDS))
+    under = fit.problem.under(tuple(whitener_of(part.sum(axis=0)) for part in parts))
+    away = [
+        (value - p.start) / p.prior
+        for p, value in zip(without_assumed(weighting.parameters), fit.geometry.tolist(), strict=True)
+        if p.free and np.isfinite(p.prior)
+    ]
+    misfit = np.concatenate([under.residual(fit.values), away])
+    stated = against_stated(float(misfit @ misfit), len(misfit) - rank)
+    return out | noise_fields(found, stated, settled=fit.stop is not Stop.ROUNDS), alarms_of(stated, None)
+
+
+def _normal_covariances(fit: Fitted) -> list[Floats]:
+    """Of each instrument (row, k, k) noise of a reading by the normal law, joints included."""
+    out: list[Floats] = []
     larger = freedom(fit.problem, fit.values, fit.covariance)
     for i, (m, scatter) in enumerate(zip(fit.session.measured, fit.noise.whole(fit.problem.rows), strict=True)):
         misfit = m.problem.observed[fit.problem.rows[i]] - fit.around.expected[i][fit.problem.rows[i]]
         white = np.linalg.solve(np.linalg.cholesky(scatter.covariance), misfit[..., None])[..., 0]
-        size = larger[i] * _normal_size(np.sum(white**2, axis=1), misfit.shape[1])
-        sigma = np.sqrt(size * np.median(np.diagonal(scatter.covariance, axis1=1, axis2=2), axis=0))
-        names = kind_of(m.name).reads or m.problem.chain.sensor.own_columns() or (m.name,)
-        out |= {name: float(s) for name, s in zip(names, sigma, strict=True)}
+        out.append(larger[i] * _normal_size(np.sum(white**2, axis=1), misfit.shape[1]) * scatter.covariance)
     return out
+
+
+def _assumed_parts(fit: Fitted, weighting: Weighting) -> list[Floats]:
+    """Of each instrument (source, row, k, k) covariance as assumed, by every source of the weighting."""
+    joint_rad = weighting.joint_rad if weighting.joint_rad > NEGLIGIBLE_RAD else 0.0
+    out: list[Floats] = []
+    for i, (m, rows) in enumerate(zip(weighting.measured, fit.problem.rows, strict=True)):
+        own = m.select(rows).parts(weighting.unweighted.of_block(i, fit.geometry), joint_rad)
+        every = np.zeros((len(weighting.sources), *own.shape[1:]))
+        every[[weighting.sources.index(source) for source in (JOINT, *m.own_sigma)]] = own
+        out.append(every)
+    return out
+
+
+def _factors(parts: list[Floats], covariances: list[Floats], *, settled: bool) -> VarianceFactors:
+    """Sizes of the sources of which normal readings of these covariances would be most likely, by Fisher's scoring."""
+    factor, sigma, last = np.ones(len(parts[0])), np.zeros(len(parts[0])), covariances
+    for _ in range(TURNS):
+        columns, aims, before = list[Floats](), list[Floats](), factor
+        for part, covariance, V in zip(parts, covariances, last, strict=True):
+            W = whitener_of(V)
+            columns.append((W @ part @ np.swapaxes(W, 1, 2)).reshape(len(part), -1))
+            aims.append((W @ covariance @ np.swapaxes(W, 1, 2)).ravel())
+        A = np.concatenate(columns, axis=1).T
+        size = np.maximum(np.linalg.norm(A, axis=0), np.finfo(np.float64).tiny)
+        factor = np.maximum(nnls(A / size, np.concatenate(aims))[0] / size, LEAST_VARIANCE)
+        sigma = np.sqrt(2.0 * np.diag(np.linalg.pinv((A / size).T @ (A / size), hermitian=True))) / size
+        if np.allclose(factor, before, rtol=SAME_VARIANCE):
+            break
+        last = [np.einsum("s,snij->nij", factor, part) for part in parts]
+    at_zero = (factor < TOLD * sigma) & (factor < 1.0)
+    log_sigma = sigma / np.maximum(factor, sigma)
+    return VarianceFactors(np.log(factor), np.diag(log_sigma**2), settled, tuple(at_zero.tolist()))
 
 
 def _normal_size(squares: Floats, k: int) -> float:
@@ -363,13 +432,14 @@ def _normal_size(squares: Floats, k: int) -> float:
     return size
 
 
-def _rms(fit: Fitted) -> tuple[float, float]:
+def _rms(fit: Fitted, state: str) -> dict[str, Any]:
     """Of single coordinates and of the lengths of the misfits, of the first instrument."""
     m, rows = fit.session.measured[0], fit.problem.rows[0]
     misfit = m.problem.observed[rows] - fit.around.expected[0][rows]
     misfit = misfit[:, :POSITION] if misfit.shape[1] == POSE else misfit
     distance = float(np.sqrt(np.mean(np.sum(misfit**2, axis=1))))
-    return distance / float(np.sqrt(misfit.shape[1])), distance
+    coordinate = distance / float(np.sqrt(misfit.shape[1]))
+    return {f"rms_coordinate_{state}_m": coordinate, f"rms_distance_{state}_m": distance}
 
 
 def _as_listed(

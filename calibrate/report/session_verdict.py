@@ -149,7 +149,12 @@ def _doubts(evidence: SessionEvidence) -> Iterator[Doubt]:
             f"What remains {along} ({worst.share:.0%} of it, F = {significant(worst.f)}): the model lacks something.",
             "The figures along the joints, below, show where physics is missing; `calibeam diagnose` finds what it is.",
         )
-    yield from _doubts_of_proofs(proofs(model), by_diagnosis=model.session is not None)
+    if model.session is None and not proofs(model):  # a diagnosis keeps its proof in diagnosis.json
+        yield (
+            "There is no proof on unseen rows: too few rows, or it was not asked for.",
+            "Measure at least 15 poses, better 50, so that some can be kept for the proof.",
+        )
+    yield from _doubts_of_proofs(proofs(model))
     share = evidence.left_out / max(len(recording.samples), 1)
     if share > MANY_LEFT_OUT:
         yield (
@@ -230,14 +235,7 @@ def _noisy_sources(noise: Fields) -> Iterator[Doubt]:
             yield f"The noise of {name} is {times} times the assumed one.", f"Check the instrument: {name}."
 
 
-def _doubts_of_proofs(found: tuple[UnseenRows, ...], *, by_diagnosis: bool) -> Iterator[Doubt]:
-    if by_diagnosis:
-        yield "The model is of a diagnosis: its proof on unseen rows is in diagnosis.json.", ""
-    elif not found:
-        yield (
-            "There is no proof on unseen rows: too few rows, or it was not asked for.",
-            "Measure at least 15 poses, better 50, so that some can be kept for the proof.",
-        )
+def _doubts_of_proofs(found: tuple[UnseenRows, ...]) -> Iterator[Doubt]:
     told = set[str]()
     for proof in found:
         # rows elsewhere than the others are missed by what these leave open, too: no fault of the model

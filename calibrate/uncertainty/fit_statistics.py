@@ -67,14 +67,14 @@ class RepeatNoise:
     alarm: Alarm
 
 
-def against_stated(fit: Fit) -> StatedNoise:
+def against_stated(chi2: float, dof: int) -> StatedNoise:
     """Chi-square of the whole fit; `ABOVE_STATED` or `BELOW_STATED` beyond one in a thousand."""
-    if fit.dof <= 0:
-        return StatedNoise(fit.chi2, fit.dof, float("nan"), Alarm.NO_REDUNDANCY)
-    above = float(chdtrc(fit.dof, fit.chi2))
-    below = float(chdtr(fit.dof, fit.chi2))
+    if dof <= 0:
+        return StatedNoise(chi2, dof, float("nan"), Alarm.NO_REDUNDANCY)
+    above = float(chdtrc(dof, chi2))
+    below = float(chdtr(dof, chi2))
     alarm = Alarm.ABOVE_STATED if above < ALARM_P else Alarm.BELOW_STATED if below < ALARM_P else Alarm.NONE
-    return StatedNoise(fit.chi2, fit.dof, above, alarm)
+    return StatedNoise(chi2, dof, above, alarm)
 
 
 def against_repeats(fit: Fit, residual: Floats, repeat: Ints) -> RepeatNoise | None:

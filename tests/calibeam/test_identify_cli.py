@@ -243,6 +243,20 @@ def test_a_fit_that_came_to_no_end_is_partial_and_its_model_is_kept(folder, tmp_
     assert read_model(model).status == "OUT_OF_STEPS"
 
 
+def test_a_refit_that_came_to_no_end_is_partial_and_its_model_is_kept(folder, tmp_path, capsys, monkeypatch):
+    known, model = tmp_path / "known.json", tmp_path / "model.json"
+    assert run(["identify", str(folder), "--out", str(known)]) == 0
+    refit = ["identify", str(folder), "--model", str(known), "--out", str(model)]
+    assert run(refit) == 0
+    assert read_model(model).status == read_model(known).status == "RANK_DEFICIENT"
+    monkeypatch.setattr("calibrate.diagnose.fitted.TURNS", 2)
+    capsys.readouterr()
+    assert run(refit) == 3
+    said = f"kmax of [dog-leg] in the fit plan; what was found so far is in {model}"
+    assert said in " ".join(capsys.readouterr().err.split())
+    assert (read_model(model).status, read_model(model).fit.ended_by) == ("OUT_OF_STEPS", "ROUNDS")
+
+
 def test_the_rule_that_ended_a_fit_and_its_iterations_are_on_the_screen_and_in_the_report(folder, tmp_path, capsys):
     plan, model, page = tmp_path / "fit.toml", tmp_path / "model.json", tmp_path / "report.html"
     plan.write_text('schema = 1\nshare = 0\nsolver = "dog-leg"\n[dog-leg]\nkmax = 2\ne1 = 0\ne2 = 0\ne3 = 0\n')

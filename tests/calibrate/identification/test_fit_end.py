@@ -72,6 +72,9 @@ def test_the_model_file_holds_the_end_of_the_fit_and_older_ones_are_read(tracked
     content = json.loads(path.read_text())
     assert content["fit"]["method"] == "levenberg-marquardt"
     assert content["fit"]["loss"] == "least-squares"
+    assert content["fit"].pop("law") == "normal"
+    path.write_text(json.dumps(content))
+    assert read_model(path).fit == msgspec.structs.replace(model.fit, law=None)  # an earlier version
     assert content["fit"]["iterations"] == result.end.iterations > 0
     assert content["fit"]["ended_by"] in {stop.name for stop in Stop}
     del content["fit"]

@@ -9,6 +9,7 @@ import pytest
 
 from acquisition.recording import read
 from calibeam.notebook import Model
+from calibrate.correct.corrected import Arms, Options
 from calibrate.diagnose.blunders_first import blunders_first
 from calibrate.diagnose.fitted import fit_geometry
 from calibrate.diagnose.session import session_of
@@ -62,6 +63,18 @@ def test_the_robots_own_frame_leaves_out_where_the_base_stands(tmp_path):
     assert np.median(model.tip_sigma(q, frame="world")) > 100.0 * np.median(sigma)
     assert np.array_equal(model.tip_sigma(q[:3]), sigma[:3])  # of a posture, whatever else is asked
     assert np.all(model.flange_sigma(q, frame="world")[:, :3].max(axis=1) > model.flange_sigma(q)[:, :3].max(axis=1))
+
+
+def test_a_model_without_effects_holds_the_joint_range_of_its_recording(tmp_path):
+    _, model = drawn(tmp_path, "tracker", 7100)
+    arms = Arms.of(model.file, Options())
+    q_rad = read(tmp_path / "recording").samples.joints()
+    assert (arms.low_rad, arms.high_rad) == (pytest.approx(q_rad.min(axis=0)), pytest.approx(q_rad.max(axis=0)))
+
+
+def test_the_likelihood_of_a_diagnosed_model_names_the_law_it_is_of(tmp_path):
+    _, model = drawn(tmp_path, "tracker", 7100)
+    assert model.file.fit.law == "student-t"
 
 
 def test_a_frame_of_another_name_is_refused(tmp_path):

@@ -37,6 +37,7 @@ def test_the_file_says_how_the_fit_was_made(slipped):
     assert fit["iterations"] > 0
     assert fit["ended_by"] in ("LIKELIHOOD", "ROUNDS")
     assert np.isfinite(fit["minus_2_log_likelihood"])
+    assert fit["law"] == "student-t"
 
 
 def test_unseen_rows_are_predicted_to_the_noise(slipped):

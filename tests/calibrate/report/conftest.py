@@ -10,9 +10,13 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording import Recording, Samples
 from acquisition.recording.rig import parse_rig, rig_sha256, rig_text
 from calibeam.results.identification import identify_session, session_model
+from calibrate.diagnose.blunders_first import blunders_first
+from calibrate.diagnose.fitted import fit_geometry
+from calibrate.diagnose.session import session_of
 from calibrate.identification.identify import identify
 from calibrate.identification.record import record_of
 from calibrate.model_file import ModelFile, RigIdentity
+from calibrate.physics.from_diagnosis import model_of_fit
 from calibrate.report.session_evidence import SessionEvidence, session_evidence
 from calibrate.report.session_report import session_page
 from tests.support.recorded_session import recorded_session
@@ -80,6 +84,12 @@ class ArmSession:
         found = identify(rig, recording.samples, rng=np.random.default_rng(1))
         identity = RigIdentity(rig.name, rig_sha256(recording.rig_text), recording.rig_text)
         return record_of(found, identity, rig.arm.model.value)
+
+    def model_of_diagnosis(self, recording: Recording) -> ModelFile:
+        """As of a diagnosis that has found no effect."""
+        cleared = blunders_first(recording.rig, recording.samples)
+        fit = fit_geometry(session_of(recording.rig, cleared.samples))
+        return model_of_fit(fit, fit, cleared, recording, "geometry alone")
 
 
 @pytest.fixture(scope="session")

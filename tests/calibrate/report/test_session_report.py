@@ -1,6 +1,7 @@
 """The report of any session: whole, self-contained, every parameter a number with sigma or a reason, never both."""
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import msgspec
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording import RecordingError
+from acquisition.recording.rig import parse_rig
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
 from calibrate.report.elements import write_page
@@ -86,6 +88,22 @@ def test_every_instrument_has_its_errors_before_and_after(page, wire_and_positio
     model = wire_and_positions[1]
     assert np.sqrt(np.mean(first.error_after**2)) == pytest.approx(model.rms_distance_after_m, rel=1e-9)
     assert np.sqrt(np.mean(first.error_before**2)) == pytest.approx(model.rms_distance_before_m, rel=1e-3)
+
+
+@pytest.mark.parametrize("assumed", ["20e-6", "4e-6"])
+def test_residuals_of_a_diagnosed_model_are_whitened_by_the_noise_that_was_found(arm_session, assumed):
+    session = arm_session(120)
+    recording = session.recording(session.positions())
+    text = recording.rig_text.replace("position_m = 20e-6", f"position_m = {assumed}")
+    recording = replace(recording, rig_text=text, rig=parse_rig(text, "rig"))
+    model = session.model_of_diagnosis(recording)
+    assert model.noise["position_believed"] == float(assumed)
+    assert model.noise["position"] == pytest.approx(20e-6, abs=3.0 * model.noise["position_sigma"])
+    assert model.noise["position_sigma"] < 2e-6
+    (readings,) = session_evidence(recording, model).readings
+    assert 0.8 < np.sqrt(np.mean(readings.whitened**2)) < 1.1
+    assert set(session.model(recording).noise) <= set(model.noise)
+    assert bool(model.alarms) == (assumed == "4e-6")
 
 
 def test_residuals_are_whitened_by_the_noise_that_was_found(poses):

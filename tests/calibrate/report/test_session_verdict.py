@@ -88,6 +88,13 @@ def test_without_a_proof_the_sentence_says_what_it_was_fitted_to(healthy):
     assert "no proof on unseen rows" in judged.reasons[0]
 
 
+def test_a_model_of_a_diagnosis_is_trusted_as_any_other(arm_session):
+    session = arm_session(120)
+    recording = session.recording(session.positions())
+    judged = session_verdict(session_evidence(recording, session.model_of_diagnosis(recording)))
+    assert (judged.trust, judged.reasons) == (Trust.GOOD, ())
+
+
 def test_the_one_noisy_source_of_several_is_named(healthy):
     noise = healthy.model.noise | {"wire_believed": 1e-5, "wire": 1e-4, "wire_sigma": 1e-5}
     judged = session_verdict(changed(healthy, noise=noise))

@@ -9,14 +9,16 @@ from calibrate.uncertainty.fit_statistics import ALARM_P, Alarm, against_repeats
 
 
 def test_noise_as_stated_is_no_alarm(fitted):
-    found = against_stated(fitted(1).fit)
+    fit = fitted(1).fit
+    found = against_stated(fit.chi2, fit.dof)
     assert found.alarm is Alarm.NONE
     assert ALARM_P < found.p_above < 1.0 - ALARM_P
     assert found.noise_factor == pytest.approx(1.0, abs=0.25)
 
 
 def test_noise_twice_the_stated_is_an_alarm_and_its_size_is_said(fitted):
-    found = against_stated(fitted(1, noise=2.0).fit)
+    fit = fitted(1, noise=2.0).fit
+    found = against_stated(fit.chi2, fit.dof)
     assert found.alarm is Alarm.ABOVE_STATED
     assert found.p_above < 1e-6
     assert 1.5 < found.noise_factor < 2.2  # drawn links and frames take up a little
@@ -26,12 +28,12 @@ def test_overstated_noise_is_an_alarm_too(fitted):
     one = fitted(1)
     timid = replace(one.problem, whitener=one.problem.whitener / 3.0)
     residual = timid.residual(one.fit.theta)
-    found = against_stated(replace(one.fit, chi2=float(residual @ residual)))
+    found = against_stated(float(residual @ residual), one.fit.dof)
     assert found.alarm is Alarm.BELOW_STATED
 
 
 def test_without_redundancy_nothing_is_said_about_noise(fitted):
-    found = against_stated(replace(fitted(1).fit, dof=0))
+    found = against_stated(fitted(1).fit.chi2, 0)
     assert found.alarm is Alarm.NO_REDUNDANCY
     assert np.isnan(found.p_above)
     assert np.isnan(found.noise_factor)
