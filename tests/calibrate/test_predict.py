@@ -92,7 +92,8 @@ def test_a_wire_is_the_distance_from_the_origin_of_the_device(predictor, tips):
 
 def test_a_model_that_knows_only_distances_predicts_those_between_rows(rig, tips):
     only = Predictor(rig, {"tool.x": 1e-3}, {"tool": (0.02, -0.01, 0.08)}, ("distance",))
-    moved = Rotation.from_rotvec(TURN).apply(tips) + [5.0, -2.0, 1.0]  # in a frame that nobody knows
+    elsewhere = pose((5.0, -2.0, 1.0), TURN)  # a frame that nobody knows
+    moved = tips @ elsewhere[:3, :3].T + elsewhere[:3, 3]
     out = predict(only, table(**dict(zip(("x_m", "y_m", "z_m"), moved.T, strict=True))))
     assert list(out) == ["t_s", "distance_m", "r_distance_m"]
     spans = np.linalg.norm(np.diff(tips, axis=0), axis=1)
