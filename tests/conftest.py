@@ -6,10 +6,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TextIO
 
+import hypothesis
 import pytest
 
 import calibeam  # noqa: F401 - sets the thread count before numpy is loaded
 
+hypothesis.settings.register_profile("untimed", deadline=None)  # beside other work any example may take long
+hypothesis.settings.load_profile("untimed")
 HERE = Path(__file__).parent
 # Several processes talk in real time here: beside hard work they starve, and rightly say that a device is silent. Two
 # files of drivers and simulators at a time leave each other room enough, for most of their time is waiting; those of

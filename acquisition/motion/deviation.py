@@ -12,6 +12,7 @@ from acquisition.motion.setpoints import PER_STRUCTURAL, SERVO_PER_STRUCTURAL, s
 
 Floats = NDArray[np.float64]
 STEP_S = 0.002  # of the planned way: half a millimetre at reduced speed, so that its chords count for nothing
+ROWS = 50_000  # whose frames are held at a time: 40 MB
 
 
 @dataclass(frozen=True)
@@ -38,8 +39,8 @@ def _off_m(made: Plan, q_rad: Floats) -> Floats:
     tool, path = np.append(made.segments[-1].place.tool[:3, 3], 1.0), made.path()
 
     def tips_m(joints_rad: Floats) -> Floats:
-        out: Floats = (made.solver.arm.frames(joints_rad)[:, -1] @ tool)[:, :3]
-        return out
+        parts = np.array_split(joints_rad, 1 + len(joints_rad) // ROWS)
+        return np.concatenate([(made.solver.arm.frames(part)[:, -1] @ tool)[:, :3] for part in parts])
 
     way_m = tips_m(np.array([path.at(t_s, STANDING) for t_s in np.arange(0.0, made.t_s[-1] + STEP_S, STEP_S)]))
     seen_m = tips_m(q_rad)

@@ -8,7 +8,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,12 @@ from acquisition.recording.samples import Floats, Samples
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _STREAM_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 _RESERVED = ("host_s", "device_s", "sequence")
+
+
+def time_utc(text: str) -> datetime:
+    """Of an ISO 8601 time; one without a zone is UTC. ValueError for what is no time."""
+    time = datetime.fromisoformat(text)
+    return time if time.tzinfo else time.replace(tzinfo=UTC)
 
 
 @dataclass(frozen=True)
@@ -113,8 +119,9 @@ class Recording:
     def started(self) -> datetime | None:
         """When it began, by its own statement. RecordingError where that is no time."""
         try:
-            return datetime.fromisoformat(self.started_utc) if self.started_utc else None
+            return time_utc(self.started_utc) if self.started_utc else None
         except ValueError as error:
             raise RecordingError(
-                f"{self.path}: started_utc = '{shown(self.started_utc)}' is no time; write it as 2026-11-24T08:30:00"
+                f"{self.path}: started_utc = '{shown(self.started_utc)}' is no time; "
+                "write it as 2026-11-24T08:30:00+00:00"
             ) from error

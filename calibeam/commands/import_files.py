@@ -4,7 +4,6 @@ import math
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from datetime import datetime
 from pathlib import Path
 
 from rich.table import Table
@@ -32,6 +31,7 @@ from acquisition.recording.foreign import (
     write_columns,
     write_session,
 )
+from acquisition.recording.recording import time_utc
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.session_folder import CSV, PARQUET, RIG
 from acquisition.recording.session_folder.folder_import import import_folder, write_recording
@@ -146,7 +146,7 @@ def _can(source: Path, out: Path, rig: Path) -> None:
         done, frames = _frames(source, rig, out)
         rows = encoder_rows(frames, encoders)
         whole = replace(frames, streams={**frames.streams, ENCODERS: encoder_stream(rows)})
-        started_utc = datetime.fromisoformat(frames.started_utc)
+        started_utc = time_utc(frames.started_utc)
         with taken_back(out):
             write_recording(whole, out, software=SOFTWARE, imported_from=source.name, started_utc=started_utc)
         print(f"{out}: {done.frames} CAN frames in {', '.join(done.streams)}, {len(rows)} rows of {ENCODERS}")

@@ -97,7 +97,7 @@ def plan(
     edge_m: Length | None = None,
     turn_deg: tuple[float, float, float] | None = None,
     model: Path | None = None,
-    corrected: Path = Path("iso9283-corrected.toml"),
+    corrected: Path | None = None,
 ) -> None:
     """Choose the test cube and write its five poses as a pose plan.
 
@@ -134,7 +134,7 @@ def plan(
     model
         A model.json: also write the same poses with its corrected joint commands.
     corrected
-        Where to write the plan with the corrected commands.
+        Where to write the plan with the corrected commands; default: iso9283-corrected.toml.
 
     """
     loaded = load_rig(rig)
@@ -152,6 +152,7 @@ def plan(
     if model is not None:
         known = _model(model, loaded)
         commands, why = _corrected(known, cube, visits)
+        corrected = corrected or Path("iso9283-corrected.toml")
         with taken_back(corrected):
             write_pose_plan(corrected, _plan_of(loaded, cube, visits, commands, f"corrected by {model.name}"))
         for line in why:

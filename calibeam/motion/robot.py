@@ -48,7 +48,7 @@ class Track:
 
     def host_s(self) -> Floats:
         """Host time (sample,) of the same."""
-        return np.concatenate([block.host_s for block in list(self.blocks)])
+        return np.concatenate([np.empty(0), *(block.host_s for block in list(self.blocks))])
 
 
 @dataclass(frozen=True)

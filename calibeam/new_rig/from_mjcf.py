@@ -26,7 +26,9 @@ Floats = NDArray[np.float64]
 
 WORLD = 0
 MOST_PARTS = 20_000  # elements of a file, each as often as it is replicated
-MOST_NUMBERS = 10_000_000  # of a field of heights or a picture, and bytes of the sizes that a file asks for
+MOST_NUMBERS = 10_000_000  # of a field of heights, and elements that a file asks for by its sizes
+MOST_PIXELS = 8192**2
+MOST_MEMORY = 4 * 1024**3  # bytes of a simulation's working memory, which loading a model does not take
 DEEPEST = 8  # files within files
 SIZES = {  # numbers of which the product is made
     "hfield": ("nrow", "ncol"), "texture": ("width", "height"), "replicate": ("count",), "flexcomp": ("count",),
@@ -103,8 +105,10 @@ def _check_element(path: Path, element: Element, times: int, left: list[int]) ->
     """`times`: how often it is made; `left`: how many parts may still be made."""
     counts = [_size(path, element, name) for name in SIZES.get(element.tag, ())]
     if element.tag == "size":
-        counts = [sum(_size(path, element, name) for name in element.attrib)]
-    most = MOST_PARTS if element.tag in REPEATING else MOST_NUMBERS
+        counts = [sum(_size(path, element, name) for name in element.attrib if name != "memory")]
+        if _size(path, element, "memory") > MOST_MEMORY:
+            raise DataError(f"{path}: <size memory>: more than {MOST_MEMORY >> 30} GB; make it smaller")
+    most = {"texture": MOST_PIXELS, **dict.fromkeys(REPEATING, MOST_PARTS)}.get(element.tag, MOST_NUMBERS)
     if (count := math.prod(counts)) > most:
         said = " ".join(f'{name}="{shown(value, 20)}"' for name, value in element.attrib.items() if name != "name")
         raise DataError(f"{path}: <{element.tag} {shown(said, 80)}>: at most {most} are read; make it smaller")

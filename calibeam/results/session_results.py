@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from acquisition.recording import Recording, read
+from acquisition.recording.output import OutputError
 from calibeam.console import Console
 from calibeam.outcome import PartialResult, interruption
 from calibeam.printing.identification import print_identification
@@ -69,7 +70,7 @@ def recording_kept(recording_path: Path) -> Generator[None]:
     """Whatever ends what follows a recording, the recording is whole: PartialResult states it and how to go on."""
     try:
         yield
-    except (KeyboardInterrupt, DataError, OSError) as why:
+    except (KeyboardInterrupt, DataError, OutputError, OSError) as why:
         reason = interruption(why) if isinstance(why, KeyboardInterrupt) else str(why)
         raise PartialResult(
             f"{reason}; the recording is whole: {recording_path}; "

@@ -45,7 +45,7 @@ def instruments_for_fit(rig: Rig, samples: Samples, plan: FitPlan = DEFAULT) -> 
 
 
 def joints_apart(weighting: Weighting) -> Weighting:
-    """Noise of the joints is left to that of the instruments where all of these look at the arm from outside."""
+    """Noise of the joints is left to that of the instruments where all of these measure the arm from outside."""
     outside = all(m.name in OUTSIDE for m in weighting.measured)
     return replace(weighting, joint_rad=NEGLIGIBLE_RAD) if outside else weighting
 

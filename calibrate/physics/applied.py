@@ -18,7 +18,7 @@ from acquisition.recording import Samples
 from acquisition.recording.samples import SEAT, required
 from calibrate.diagnose.augmented import encoder_channels
 from calibrate.diagnose.ported import look
-from calibrate.effects.drivers import Drivers, moves_of
+from calibrate.effects.drivers import MOVED_RAD, Drivers, moves_of
 from calibrate.effects.loads import UNSTATED_CENTRE_M
 from calibrate.effects.payload_compliance import UNKNOWN_CENTRE
 from calibrate.effects.ports import Perturbation, Port
@@ -122,19 +122,27 @@ def joined(recorded: Samples, asked: Samples) -> Samples:
 
 def _among(asked: Samples, recorded: Samples) -> dict[str, Floats]:
     """Columns of the asked rows as rows of the recorded session: its smoothed temperatures at their times, before and
-    after it what they state; moves from the row before.
+    after it what they state; moves from the recorded row before, and of a row that was recorded its own.
     """
-    both, first, n = joined(recorded, asked), len(recorded), asked.n_joints
-    t, own = asked.column("t_s"), recorded.column("t_s")
-    order, within = np.argsort(own), (t >= own.min()) & (t <= own.max())
-    temperatures = {c: both.column(c)[first:] for c in recorded.names if c.startswith("temp_")}
-    for c, stated in temperatures.items():
+    t, own, q_rad = asked.column("t_s"), recorded.column("t_s"), asked.joints()
+    order, within = np.argsort(own, kind="stable"), (t >= own.min()) & (t <= own.max())
+    columns: dict[str, Floats] = {}
+    for c in (c for c in recorded.names if c.startswith("temp_")):
         of_session = np.interp(t, own[order], recorded.column(c)[order])
-        temperatures[c] = np.where(within | ~np.isfinite(stated), of_session, stated)
-    plain = Samples({c: v for c, v in both.columns.items() if not c.startswith("last_move")}, n)
-    moves, direction = moves_of(plain)
-    derived = _joints(BY_JOINT["last_move"], moves[first:]) | _joints(BY_JOINT["approach"], direction[first:])
-    return temperatures | {c: v for c, v in derived.items() if c not in asked}
+        stated = asked.column(c) if c in asked else of_session
+        columns[c] = np.where(within | ~np.isfinite(stated), of_session, stated)
+    before = np.searchsorted(own[order], t, side="left")
+    earlier, same = order[np.maximum(before - 1, 0)], order[np.minimum(before, len(order) - 1)]
+    moves, direction = moves_of(recorded)
+    for joint, name in enumerate(_joints(BY_JOINT["approach"], direction)):
+        direction[:, joint] = recorded.column(name) if name in recorded else direction[:, joint]
+    later = (before > 0)[:, None]
+    moved = np.where(later, q_rad - recorded.joints()[earlier], 0.0)
+    twin = ((own[same] == t) & (np.abs(q_rad - recorded.joints()[same]).max(axis=1) <= MOVED_RAD))[:, None]
+    turned = np.where(np.abs(moved) > MOVED_RAD, np.sign(moved), np.where(later, direction[earlier], 0.0))
+    derived = _joints(BY_JOINT["last_move"], np.where(twin, moves[same], moved))
+    derived |= _joints(BY_JOINT["approach"], np.where(twin, direction[same], turned))
+    return columns | {c: v for c, v in derived.items() if c not in asked}
 
 
 def _columns_of(driver: str) -> tuple[str, ...]:

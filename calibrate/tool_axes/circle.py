@@ -200,7 +200,7 @@ def _runs(q_rad: Floats) -> tuple[Segment, ...]:
 
 def _run(q_rad: Floats, first: int, joint: int) -> Segment:
     end, length = len(q_rad), 64  # rows that are looked at, ever more: a run is far shorter than a recording
-    while first + length < 8 * len(q_rad):
+    while length == 64 or first + length < 8 * len(q_rad):
         others = np.delete(q_rad[first : first + length] - q_rad[first], joint, axis=1)
         moved = np.any(np.abs(others) > STILL_RAD, axis=1)
         if moved.any():

@@ -59,6 +59,13 @@ def test_the_plan_holds_the_poses_of_the_cube(folder):
     assert np.allclose(table[:, :3], wanted, atol=1e-9)
 
 
+def test_a_plan_without_a_model_asks_nothing_of_a_corrected_one(folder, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "iso9283-corrected.toml").write_text("mine = 1\n")
+    assert run(["iso9283", "plan", str(folder / "rig.toml"), "--cycles", "10", *CUBE]) == 0
+    assert (tmp_path / "iso9283-corrected.toml").read_text() == "mine = 1\n"
+
+
 def test_the_corrected_plan_brings_the_real_tool_to_the_poses(folder):
     poses = read_pose_plan(folder / "corrected.toml", RIG_HERE).block[0].pose
     there_m = REAL.tip_m(np.array([pose.q_rad for pose in poses[1:6]]))

@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from datetime import UTC, datetime
 
 import pytest
 
@@ -37,6 +38,8 @@ def test_a_start_that_is_no_time_is_named_with_its_file(drawn):
         _ = wrong.started
     assert str(drawn) in str(error.value)
     assert source.started is None
+    without_zone = Recording(**{**fields, "started_utc": "2026-11-24T08:30:00"})
+    assert without_zone.started == datetime(2026, 11, 24, 8, 30, tzinfo=UTC)
 
 
 def test_an_interrupted_recording_of_which_nothing_is_lost_is_a_warning(drawn):

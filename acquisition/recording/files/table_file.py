@@ -4,6 +4,7 @@ A larger file may hold more: a byte a cell is what no table of measurements come
 """
 
 import importlib
+import re
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +52,7 @@ def parquet_table(path: Path, fault: type[Exception], *, plain: bool = True) -> 
         if (size := sum(group.total_byte_size for group in groups)) > max(UNPACKED_BYTES, 8 * most):
             raise fault(f"{path}: {size / 1e6:.0f} MB when unpacked; {REMEDY}")
         # As dictionaries, equal texts take the place of one
-        texts = [field.name for field in schema if str(field.type) in ("string", "binary")]
+        texts = [f.name for f in schema if re.search("string|binary", str(f.type)) and not f.type.num_fields]
         table = parquet.read_table(path, read_dictionary=texts)
         return _plain_texts(table, texts, str(path), fault)
     except (OSError, ValueError, NotImplementedError) as error:  # pyarrow.ArrowInvalid is a ValueError

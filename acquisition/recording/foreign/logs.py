@@ -244,18 +244,20 @@ def _bag(path: Path) -> list[Sheet]:
         raise RecordingError(f"{path}: no such bag; check the path")
     try:
         store = types.get_typestore(types.Stores.ROS2_HUMBLE)
-        files = path.iterdir() if path.is_dir() else (path,)
+        files = [one for one in path.rglob("*") if one.is_file()] if path.is_dir() else [path]
         for file in (one for one in files if one.suffix == ".mcap"):
             check_batches(file)
         with reader.Reader(path) as bag:
             there = sorted({f"{c.topic} ({c.msgtype})" for c in bag.connections})
             wanted = [c for c in bag.connections if c.msgtype in (JOINT_STATE, POSE_STAMPED)]
             rows: dict[str, list[tuple[int, Any]]] = {c.topic: [] for c in wanted}
-            left = max(OBJECT_BYTES, 16 * sum(one.stat().st_size for one in path.parent.rglob(f"{path.name}/*")))
+            left = max(OBJECT_BYTES, 16 * sum(one.stat().st_size for one in files))
             for connection, received_ns, raw in bag.messages(connections=wanted):
                 left -= MESSAGE_BYTES + 2 * len(raw)
                 if left < 0:
-                    raise ValueError(f"more than {len(rows[connection.topic])} messages of '{connection.topic}'")
+                    raise ValueError(
+                        f"more than {len(rows[connection.topic])} messages of '{connection.topic}': take a part of it"
+                    )
                 rows[connection.topic].append((received_ns, store.deserialize_cdr(raw, connection.msgtype)))
     except Exception as error:  # of damaged bytes the libraries below raise whatever they stumble over
         raise RecordingError(

@@ -3,13 +3,12 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from datetime import datetime
 from pathlib import Path
 
 import numpy as np
 
 from acquisition.recording.errors import RecordingError
-from acquisition.recording.recording import Recording
+from acquisition.recording.recording import Recording, time_utc
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import Kind, Samples, kind_of
 
@@ -69,7 +68,7 @@ def joined(each: Sequence[Recording], folder: Path) -> Recording:
 
 def _later_s(first: Recording, other: Recording) -> float:
     try:
-        return (datetime.fromisoformat(other.started_utc) - datetime.fromisoformat(first.started_utc)).total_seconds()
+        return (time_utc(other.started_utc) - time_utc(first.started_utc)).total_seconds()
     except ValueError as error:
         raise RecordingError(f"{other.path}: started_utc '{other.started_utc}' is no date ({error})") from error
 

@@ -43,7 +43,7 @@ class OutputKind:
 @dataclass(frozen=True)
 class _CommandFiles:
     inputs: tuple[tuple[Path, tuple[int, int]], ...] = ()  # each with its device and inode
-    force: bool = field(default=False)
+    force: bool | None = field(default=None)  # None: outside a command that has the option
 
 
 _COMMAND: ContextVar[_CommandFiles] = ContextVar("command_files", default=_CommandFiles())  # noqa: B039 - frozen
@@ -80,9 +80,8 @@ def refuse_output(path: Path, kind: OutputKind) -> None:
     if _head(path).startswith(MCAP_MAGIC):
         raise OutputError(f"{path}: is a recording, and no recording is written over; {REMEDY}")
     if not command.force and found.st_size and not kind.is_one(path):
-        raise OutputError(
-            f"{path}: the file is there already and is no {kind.name}; {REMEDY}, or replace it with --force"
-        )
+        remedy = "move it away" if command.force is None else f"{REMEDY}, or replace it with --force"
+        raise OutputError(f"{path}: the file is there already and is no {kind.name}; {remedy}")
 
 
 def write_output(path: Path | str, content: bytes | str, kind: OutputKind) -> Path:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from acquisition.recording.errors import RecordingError, shown
 from acquisition.recording.mcap.writer import RecordingWriter
-from acquisition.recording.recording import Recording, Stream
+from acquisition.recording.recording import Recording, Stream, time_utc
 from acquisition.recording.session_folder.folder import read_folder
 
 WAITING = 16 * 2**20  # bytes given to the writer before it is waited for: a quarter of what may wait (write_thread.py)
@@ -80,7 +80,7 @@ def _started(source: Recording, folder: Path) -> datetime | None:
     if not source.started_utc:
         return None
     try:
-        return datetime.fromisoformat(source.started_utc)
+        return time_utc(source.started_utc)
     except ValueError as error:
         raise RecordingError(
             f"{folder}: streams.json: started_utc = {shown(source.started_utc)} is no ISO 8601 time; correct it"

@@ -114,6 +114,8 @@ EQUAL = {
     "c": pa.repeat(0, 2_000_000),
 }
 TEXTS = {"t_s": pa.repeat(0.0, 50), "note": pa.repeat("a" * 100_000, 50)}
+LARGE_TEXTS = {"t_s": pa.repeat(0.0, 50), "note": pa.repeat("a" * 100_000, 50).cast(pa.large_string())}
+DICTIONARY = {"t_s": pa.repeat(0.0, 50), "note": pa.repeat("a" * 100_000, 50).dictionary_encode()}
 LISTS = {"t_s": pa.repeat(0.0, 1000), "x_m": pa.repeat(pa.scalar([0.0] * 5000), 1000)}
 WIDE = {f"c{k}": pa.array([0.0]) for k in range(TABLE_COLUMNS + 1)}
 
@@ -124,10 +126,12 @@ WIDE = {f"c{k}": pa.array([0.0]) for k in range(TABLE_COLUMNS + 1)}
     [
         (EQUAL, r"6000000 cells up to here; at most 4000000 of a table are read, give a part of it"),
         (TEXTS, r"column 'note': a text of 100000 bytes; shorten it"),
+        (LARGE_TEXTS, r"column 'note': a text of 100000 bytes; shorten it"),
+        (DICTIONARY, r"column 'note': a text of 100000 bytes; shorten it"),
         (LISTS, r"5001000 cells up to here"),
         (WIDE, r"4001 columns; at most 4000 are read"),
     ],
-    ids=["rows", "texts", "lists", "columns"],
+    ids=["rows", "texts", "large texts", "dictionary", "lists", "columns"],
 )
 def test_parquet_is_refused_by_what_its_directory_states(
     columns: dict[str, Any], told: str, read: Callable[[Path, Rig], Any], rig: Rig, tmp_path: Path
@@ -184,6 +188,13 @@ def test_a_grid_of_too_many_cells_is_refused(tmp_path: Path, monkeypatch: pytest
     cells = b"".join(b'<row r="%d"><c r="XFD%d" s="0"/></row>' % (k, k) for k in range(4, 500))
     with pytest.raises(SamplesError, match=r"a\.xlsx sheet 'Sheet' row 65: 1015820 cells up to here"):
         read_sheet(_workbook(tmp_path / "a.xlsx", sheet1=cells + b"</sheetData>"))
+
+
+def test_parts_that_nobody_reads_may_be_large(tmp_path: Path) -> None:
+    path = _workbook(tmp_path / "a.xlsx")
+    with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as book:
+        book.writestr("xl/charts/chart1.xml", bytes(3_000_000))
+    assert len(read_sheet(path).rows) == 2
 
 
 def test_a_part_of_a_workbook_that_unpacks_to_more_than_one_has_is_refused(tmp_path: Path) -> None:
@@ -250,6 +261,19 @@ def test_a_container_of_a_can_log_is_unpacked_within_its_bound(tmp_path: Path) -
     path.write_bytes(path.read_bytes()[:144] + head + packed + bytes(size % 4))
     with pytest.raises(RecordingError, match=r"bus\.blf: no CAN frame in it \(.*byte 160: too much when unpacked"):
         import_can(path, tmp_path / "a.mcap", rig_text=RIG_FILE.read_text("utf-8"), software="test")
+
+
+def test_every_frame_of_a_binary_log_is_taken_however_small_it_is_packed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("acquisition.recording.can_log.MESSAGES", 100)
+    path = tmp_path / "bus.blf"
+    with can.BLFWriter(path) as writer:
+        for k in range(2000):
+            writer.on_message_received(can.Message(timestamp=1.79e9 + 1e-3 * k, arbitration_id=1, data=bytes(8)))
+    assert path.stat().st_size < 12 * 2000
+    done = import_can(path, tmp_path / "a.mcap", rig_text=RIG_FILE.read_text("utf-8"), software="test")
+    assert (done.frames, done.damage) == (2000, None)
 
 
 # --- JSON ---

@@ -187,8 +187,8 @@ def test_the_page_is_dark_where_the_system_is(browser: Browser, living: LivingRi
             page.goto(living.url)
             is_live(page)
             grounds.append(page.evaluate("getComputedStyle(document.querySelector('.robot')).backgroundColor"))
-            drawn = page.evaluate(GROUND_OF_FACE)
-            assert sum(drawn) > 600 if scheme == "light" else sum(drawn) < 200
+            drawn = f"({GROUND_OF_FACE})().reduce((a, b) => a + b)"
+            page.wait_for_function(f"() => {drawn} {'> 600' if scheme == 'light' else '< 200'}")
     assert grounds == ["rgb(255, 255, 255)", "rgb(23, 29, 35)"]
 
 

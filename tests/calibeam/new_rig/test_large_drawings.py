@@ -23,7 +23,7 @@ def _drawing(folder: Path, before: str = "", inside: str = "") -> Path:
     ("before", "inside", "told"),
     [
         ('<size nuserdata="400000000"/>', "", r'<size nuserdata="400000000">: at most 10000000 are read; make it smal'),
-        ('<size memory="8G"/>', "", r'<size memory="8G">: at most 10000000'),
+        ('<size memory="8G"/>', "", r"<size memory>: more than 4 GB; make it smaller"),
         (ASSET.format("hfield", 'nrow="20000" ncol="20000" size="1 1 1 1"'), "", r'<hfield nrow="20000" ncol="20000"'),
         (ASSET.format("texture", 'type="2d" builtin="flat" width="9999" height="9999"'), "", r"<texture type"),
         ("", '<replicate count="30000"><geom size="1"/></replicate>', r'<replicate count="30000">: at most 20000'),
@@ -44,7 +44,7 @@ def test_sizes_of_mjcf_are_asked_before_it_is_loaded(
 
 
 def test_sizes_that_an_arm_has_are_taken(tmp_path: Path) -> None:
-    before = '<size memory="4M"/>' + ASSET.format("texture", 'type="2d" builtin="flat" width="512" height="512"')
+    before = '<size memory="1G"/>' + ASSET.format("texture", 'type="2d" builtin="flat" width="4096" height="4096"')
     inside = '<replicate count="4" offset="0 0 1"><geom size="0.1" mass="0"/></replicate>'
     assert len(mjcf_arm(_drawing(tmp_path, before, inside), tip="tip").joints) == 2
 

@@ -45,6 +45,12 @@ def check_every_term_of(physics, family, *, every_place):
             found = predict_with_physics(whole, alone, same_session)
             for c, v in found.columns.items():
                 np.testing.assert_allclose(v[0], together.columns[c][row], rtol=0.0, atol=1e-9, err_msg=f"{term.key}")
+        moves = [c for c in needs if c.startswith(("last_move", "approach"))]
+        if moves:  # of rows of the session itself, which knows how they were reached
+            plain = Samples({c: v for c, v in asked.columns.items() if c not in moves}, asked.n_joints)
+            found, stated = (predict_with_physics(whole, rows, True).columns for rows in (plain, asked))
+            for c, v in found.items():
+                np.testing.assert_allclose(v, stated[c], rtol=0.0, atol=1e-9, err_msg=f"{term.key}")
         for gone in (warm, *([name] for name in needs)):
             without = Samples({c: v for c, v in asked.columns.items() if c not in gone}, asked.n_joints)
             less = predict_with_physics(whole, without, same_session)

@@ -32,6 +32,11 @@ def test_a_row_is_looked_at_a_bounded_number_of_times(readings: Any, monkeypatch
     assert sum(seen) < 3 * 80 * MANY
 
 
+@pytest.mark.parametrize("rows", [5, 6, 7, 8, 9])
+def test_a_few_rows_of_which_every_joint_moves_are_no_run(rows: int) -> None:
+    assert single_axis_segments(np.random.default_rng(rows).uniform(-2.0, 2.0, (rows, 6))) == ()
+
+
 def test_a_turn_after_a_long_stand_is_found() -> None:
     q_rad = np.zeros((600, 3))
     q_rad[500:550, 2] = np.linspace(0.0, 1.0, 50)
