@@ -21,8 +21,9 @@ $(READY): requirements/all.txt pyproject.toml
 demo: $(READY)
 	$(BIN)/calibeam demo --out out/demo
 
+# FAST=1: what the change of the last hour touches, and the laws. PHASE=calculating, devices or sessions: that one.
 test: $(READY) $(CLIENTS)/.ready
-	$(BIN)/python tests/phases.py daily
+	$(BIN)/python tests/phases.py $(if $(FAST),fast,daily) $(if $(PHASE),--phase $(PHASE))
 
 # What takes too long for every day: a million mutated inputs a codec, a hundred plugs pulled, mutated files for every
 # command, and the calculating tests again with other kernels of linear algebra and another number of threads.
