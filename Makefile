@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 BENCH := .venv-bench
 CLIENTS := .venv-clients
 
-.PHONY: setup demo test clients endure lint docs prove prove-table mutate bench pins clean
+.PHONY: setup demo test coverage clients endure lint docs prove prove-table mutate bench pins clean
 
 setup: $(READY)
 
@@ -21,8 +21,17 @@ $(READY): requirements/all.txt pyproject.toml
 demo: $(READY)
 	$(BIN)/calibeam demo --out out/demo
 
+# FAST=1: what the change of the last hour touches, and the laws. PHASE=calculating, devices or sessions: that one.
 test: $(READY) $(CLIENTS)/.ready
-	$(BIN)/python tests/phases.py daily
+	$(BIN)/python tests/phases.py $(if $(FAST),fast,daily) $(if $(PHASE),--phase $(PHASE))
+
+# Lines that the daily tests reach: a figure a package, and the ten files least reached. Twice the time of `make test`.
+coverage: $(READY) $(CLIENTS)/.ready
+	rm -rf out/coverage
+	PYTEST_ADDOPTS="--timeout 600" $(BIN)/coverage run tests/phases.py daily $(if $(PHASE),--phase $(PHASE))
+	$(BIN)/coverage combine --quiet
+	$(BIN)/coverage json --quiet -o out/coverage/coverage.json
+	$(BIN)/python tests/coverage_table.py out/coverage/coverage.json
 
 # What takes too long for every day: a million mutated inputs a codec, a hundred plugs pulled, mutated files for every
 # command, and the calculating tests again with other kernels of linear algebra and another number of threads.

@@ -1,7 +1,10 @@
 """Runs every phase of the tests, also after one that fails, and sums them up on the last line.
 
 python tests/phases.py daily     what `make test` runs
+python tests/phases.py fast      what the change of the last hour touches, and the laws: `make test FAST=1`
 python tests/phases.py endure    what takes too long for every day, and the calculations as other processors round
+
+With --phase WORD only the phases whose name has the word: `make test PHASE=calculating`.
 """
 
 import argparse
@@ -15,6 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT))  # this file is run as a script
 TWO_AT_A_TIME = ("-n", "2", "--dist", "loadfile")  # what the tests of a file share is made once
 ENDURING, MUTATIONS = ("-m", "endure", "--timeout", "3600"), "tests/calibeam/mutations"  # half of the time of all
 ON_WIRES = ("-m", "wired and not endure")
@@ -55,6 +59,15 @@ DAILY = (
 )
 
 
+def fast() -> tuple[Phase, ...]:
+    """One phase; what it leaves out is printed."""
+    from tests.fast import fast_files
+
+    files, left_out = fast_files()
+    print(left_out)
+    return (Phase("fast", (*CALCULATING, *files)),)
+
+
 def endure() -> tuple[Phase, ...]:
     """The marked tests, then the calculating phase with other linear algebra and other vector units.
 
@@ -80,9 +93,14 @@ def endure() -> tuple[Phase, ...]:
 def main() -> int:
     """0 when every phase passed, otherwise 1."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("which", choices=("daily", "endure"))
-    phases = DAILY if parser.parse_args().which == "daily" else endure()
-    outcomes = [run(phase, ROOT / "out" / "tests" / f"{number}.xml") for number, phase in enumerate(phases, 1)]
+    parser.add_argument("which", choices=("daily", "fast", "endure"))
+    parser.add_argument("--phase", default="", help="only phases whose name has this word")
+    asked = parser.parse_args()
+    every = {"daily": lambda: DAILY, "fast": fast, "endure": endure}[asked.which]()
+    phases = [phase for phase in every if asked.phase in phase.name]
+    if not phases:
+        parser.error(f"--phase {asked.phase}: no phase of {asked.which} has this word in its name")
+    outcomes = [run(phase, ROOT / "out" / "tests" / f"{phase.name.replace(' ', '-')}.xml") for phase in phases]
     print(*table(outcomes), sep="\n")
     return int(any(outcome.exit_code for outcome in outcomes))
 

@@ -2,12 +2,15 @@
 
 import os
 import re
+import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from tests import phases
+from tests import fast, phases
+from tests.conftest import on_wires
+from tests.fast import distances
 
 ROOT = Path(__file__).parents[1]
 BODIES = {"fails": "def test_it(): assert False\n", "passes": "def test_it(): pass\n", "nothing": ""}
@@ -61,10 +64,53 @@ def test_no_test_falls_between_the_phases(request):
         assert beside_others is not alone, path
 
 
+@pytest.mark.parametrize(
+    ("phase", "names"), [("devices", ["devices on wires"]), ("wires", ["devices on wires", "sessions on wires"])]
+)
+def test_a_phase_can_be_run_alone(phase, names, monkeypatch):
+    ran = []
+    monkeypatch.setattr(phases, "run", lambda p, results: ran.append(p.name) or phases.Outcome(p.name, 0, 1, 0, 0, 1.0))
+    monkeypatch.setattr(sys, "argv", ["phases.py", "daily", "--phase", phase])
+    assert phases.main() == 0
+    assert ran == names
+
+
+IMPORTERS = {"calibrate.rigid": {"calibrate.predict"}, "calibrate.predict": {"calibeam.cli"}, "calibeam.cli": set()}
+OF_TESTS = {
+    "tests/calibrate/test_rigid.py": {"calibrate.rigid"},
+    "tests/calibrate/test_predict.py": {"calibrate.predict", "numpy"},
+    "tests/calibeam/test_cli.py": {"calibeam.cli"},
+    "tests/drivers/test_port.py": {"drivers.port"},
+}
+
+
+def test_near_is_counted_along_imports_and_what_does_not_reach_the_change_is_left_out():
+    near = distances({"calibrate/rigid.py"}, IMPORTERS, OF_TESTS)
+    assert near == dict(zip(OF_TESTS, (1, 2, 3), strict=False))
+    assert distances({"tests/drivers/conftest.py"}, IMPORTERS, OF_TESTS) == {"tests/drivers/test_port.py": 0}
+    assert distances({"docs/index.md"}, IMPORTERS, OF_TESTS) == {}
+
+
+def test_what_a_change_touches_is_taken_from_the_nearest_on_and_the_laws_always(monkeypatch):
+    monkeypatch.setattr(fast, "changed", lambda since: {"calibrate/predict.py"})
+    monkeypatch.setattr(fast, "durations", lambda: {"tests/calibrate/test_predict.py": 3.0})
+    files, left_out = fast.fast_files()
+    assert files[: len(fast.LAWS)] == list(fast.LAWS)
+    assert "tests/calibrate/test_predict.py" in files
+    assert "farther off" in left_out
+    assert not [path for path in files if on_wires(ROOT / path)]
+
+
 @pytest.mark.parametrize("path", [".ci/run", "README.md"])
 def test_it_is_what_ci_and_newcomers_run(path):
     assert re.search(r"make[ \w]* test\b", (ROOT / path).read_text())
-    assert "tests/phases.py daily" in (ROOT / "Makefile").read_text()
+    for words, phases_of in (
+        ("test", "daily"),
+        ("test FAST=1", "fast"),
+        ("test PHASE=devices", "daily --phase devices"),
+    ):
+        shown = subprocess.run(["make", "-n", *words.split()], cwd=ROOT, capture_output=True, text=True, check=True)
+        assert f"tests/phases.py {phases_of}" in shown.stdout
 
 
 def test_other_rounding_is_asked_for_by_environment():
