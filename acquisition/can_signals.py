@@ -14,7 +14,6 @@ import numpy as np
 from acquisition.recording import Channel, Recording, RecordingError, Stream
 from acquisition.recording.can_frames import Frame, FrameFlag, frames_of, is_frames
 from acquisition.recording.foreign import Sheet
-from acquisition.recording.recording import time_utc
 from acquisition.recording.rig.devices import EncoderDriver, EncodersDevice
 from drivers.can_dbc.description import JointSignal, joint_signals
 from drivers.cia406.codec import SPEED_LIMIT_RAD_S, ContinuousAngle
@@ -63,7 +62,8 @@ def encoder_stream(rows: list[Row]) -> Stream:
 
 def encoder_sheet(rows: list[Row], recording: Recording, source: Path) -> Sheet:
     """The same as a table beside other logs: times since 1970, as in the CAN log."""
-    start_s = (time_utc(recording.started_utc) - datetime.fromtimestamp(0, UTC)).total_seconds()
+    epoch = datetime.fromtimestamp(0, UTC)
+    start_s = ((recording.started or epoch) - epoch).total_seconds()
     headings = ("host [s]", *(f"enc{joint} [rad]" for joint in range(1, len(rows[0][1]) + 1)))
     cells = tuple((start_s + time_s, *angles) for time_s, angles in rows)
     return Sheet(source, "", headings, ("",) * len(headings), cells, tuple(range(1, len(rows) + 1)))

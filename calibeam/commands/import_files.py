@@ -31,7 +31,6 @@ from acquisition.recording.foreign import (
     write_columns,
     write_session,
 )
-from acquisition.recording.recording import time_utc
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.session_folder import CSV, PARQUET, RIG
 from acquisition.recording.session_folder.folder_import import import_folder, write_recording
@@ -146,9 +145,8 @@ def _can(source: Path, out: Path, rig: Path) -> None:
         done, frames = _frames(source, rig, out)
         rows = encoder_rows(frames, encoders)
         whole = replace(frames, streams={**frames.streams, ENCODERS: encoder_stream(rows)})
-        started_utc = time_utc(frames.started_utc)
         with taken_back(out):
-            write_recording(whole, out, software=SOFTWARE, imported_from=source.name, started_utc=started_utc)
+            write_recording(whole, out, software=SOFTWARE, imported_from=source.name, started_utc=frames.started)
         print(f"{out}: {done.frames} CAN frames in {', '.join(done.streams)}, {len(rows)} rows of {ENCODERS}")
     if done.damage is not None:
         raise PartialResult(f"{source}: {done.damage}; everything before it is in {out}")

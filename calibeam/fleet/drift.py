@@ -15,12 +15,12 @@ Stat. 6, 1979), so that of a hundred fleets in which nothing drifts at most five
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from acquisition.recording.recording import time_utc
 from calibeam.fleet.row import Row
 
 Floats = NDArray[np.float64]
@@ -69,9 +69,10 @@ def _series(robot: str, joint: int, points: Iterable[tuple[float, float, float]]
 def year_of(started_utc: str) -> float | None:
     """Years since 1970, None for what is no ISO date."""
     try:
-        return time_utc(started_utc).timestamp() / YEAR_S
+        started = datetime.fromisoformat(started_utc)
     except ValueError:
         return None
+    return (started if started.tzinfo else started.replace(tzinfo=UTC)).timestamp() / YEAR_S
 
 
 FEWEST = 3  # dates: two always lie on a line
