@@ -123,7 +123,7 @@ def readings(
     A model that knows readings only as another kind uses them, positions as distances, predicts that kind.
     """
     asked = [k for k in SENSORS if any(c in samples for c in k.asks)] if instruments is None else []
-    other = [k for k in SENSORS if k.name in predictor.instruments and k.instead_of]
+    other = [k for k in SENSORS if k.name in predictor.instruments and k.instead_of and k.predict is not None]
     asked = list(dict.fromkeys(next((o for o in other if k.name in o.instead_of), k) for k in asked))
     if not asked:
         named = set(predictor.instruments if instruments is None else instruments)

@@ -1,5 +1,7 @@
 """A model alone predicts what every instrument would read, under the columns' own names, a row for a row."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -124,6 +126,8 @@ def test_spots_come_from_the_model_file_alone(sessions, rig, rig_path):
     residual = np.stack([out[f"r_{c}"] for c in names], axis=1)
     assert np.all(np.isnan(residual[3]))
     assert np.sqrt(np.nanmean(residual**2)) < 5e-6
+    by_points = predict(replace(predictor, instruments=("point",)), samples)  # predicts none itself
+    assert list(by_points) == list(out)
 
 
 def test_a_model_without_its_rig_is_refused(sessions, rig):
