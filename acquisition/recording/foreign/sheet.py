@@ -28,9 +28,9 @@ TITLE_ROWS = 50  # above the headings, at most
 LONGEST_HEADING = 200  # letters
 GRID_CELLS = 200_000_000  # with the empty ones: of 12,000 rows with something in the last column of a spreadsheet
 SHEETS = 100
-TEXTS = ("xl/worksheets/", "xl/sharedStrings")
-READ_PARTS = re.compile(r".*\.rels$|\[Content_Types\]\.xml$|xl/(worksheets|sharedStrings|theme|workbook|styles)")
-BESIDE_BYTES = 2_000_000  # of one of them
+# Parts that are large in good workbooks: tables, texts, and what nobody reads unless a workbook names it as a sheet
+LARGE = ("xl/worksheets/", "xl/sharedStrings", "xl/charts/", "xl/drawings/", "xl/calcChain", "xl/pivotCache/")
+BESIDE_BYTES = 2_000_000  # of any other part
 NUMBER = re.compile(r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d+)?", re.ASCII)
 COMMA_NUMBER = re.compile(r"[+-]?(?:\d+,\d*|,\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 ERRORS = re.compile(r"#[A-Z/0!?]+")  # of a spreadsheet: #REF!, #DIV/0!, #N/A
@@ -209,10 +209,10 @@ def _check_parts(path: Path) -> None:
     """SamplesError for a workbook whose parts, by the directory of the archive, are larger than one to be read."""
     try:
         with zipfile.ZipFile(path) as archive:
-            parts = [part for part in archive.infolist() if READ_PARTS.match(part.filename)]
+            parts = [part for part in archive.infolist() if part.filename.endswith((".xml", ".rels"))]
     except (OSError, ValueError, zipfile.BadZipFile, NotImplementedError):
         return  # said by who opens it
-    large = [part for part in parts if part.filename.startswith(TEXTS)]
+    large = [part for part in parts if part.filename.startswith(LARGE)]
     for those, most in ((large, UNPACKED_BYTES // 2), ([p for p in parts if p not in large], BESIDE_BYTES)):
         for part in those:
             if part.file_size > most:

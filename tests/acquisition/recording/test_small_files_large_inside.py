@@ -197,11 +197,17 @@ def test_parts_that_nobody_reads_may_be_large(tmp_path: Path) -> None:
     assert len(read_sheet(path).rows) == 2
 
 
-def test_a_part_of_a_workbook_that_unpacks_to_more_than_one_has_is_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("part", "unpacked", "most"),
+    [("xl/theme/theme2.xml", 3_000_000, 2), ("xl/elsewhere.xml", 3_000_000, 2), ("xl/charts/c.xml", 129_000_000, 128)],
+)
+def test_a_part_of_a_workbook_that_unpacks_to_more_than_one_has_is_refused(
+    part: str, unpacked: int, most: int, tmp_path: Path
+) -> None:
     path = _workbook(tmp_path / "a.xlsx")
     with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as book:
-        book.writestr("xl/theme/theme2.xml", bytes(3_000_000))
-    with pytest.raises(SamplesError, match=r"a\.xlsx: 'xl/theme/theme2\.xml' has 3 MB when unpacked, more than 2 MB"):
+        book.writestr(part, bytes(unpacked))
+    with pytest.raises(SamplesError, match=rf"a\.xlsx: '{part}' has \d+ MB when unpacked, more than {most} MB"):
         read_sheet(path)
 
 
