@@ -25,10 +25,11 @@ demo: $(READY)
 test: $(READY) $(CLIENTS)/.ready
 	$(BIN)/python tests/phases.py $(if $(FAST),fast,daily) $(if $(PHASE),--phase $(PHASE))
 
-# Lines that the daily tests reach: a figure a package, and the ten files least reached. Twice the time of `make test`.
+# Lines that the daily tests reach: a figure a package, and the ten files least reached. Twice the time of `make test`;
+# a test on wires that is too slow under the tracer does not take the table away.
 coverage: $(READY) $(CLIENTS)/.ready
 	rm -rf out/coverage
-	PYTEST_ADDOPTS="--timeout 600" $(BIN)/coverage run tests/phases.py daily $(if $(PHASE),--phase $(PHASE))
+	-PYTEST_ADDOPTS="--timeout 600" $(BIN)/coverage run tests/phases.py daily $(if $(PHASE),--phase $(PHASE))
 	$(BIN)/coverage combine --quiet
 	$(BIN)/coverage json --quiet -o out/coverage/coverage.json
 	$(BIN)/python tests/coverage_table.py out/coverage/coverage.json

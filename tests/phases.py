@@ -19,16 +19,23 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))  # this file is run as a script
-TWO_AT_A_TIME = ("-n", "2", "--dist", "loadfile")  # what the tests of a file share is made once
+# Each worker takes one half in the order of the files, so that what a file shares is made once; whoever is through
+# takes from the other's rest.
+TWO_AT_A_TIME = ("-n", "2", "--dist", "worksteal")
 ENDURING, MUTATIONS = ("-m", "endure", "--timeout", "3600"), "tests/calibeam/mutations"  # half of the time of all
 ON_WIRES = ("-m", "wired and not endure")
 CALCULATING = ("-m", "not endure and not wired", *TWO_AT_A_TIME)
 
 
-# Of the program's tests on wires those without a servo loop: pages, workers, refusals. They leave others room, too.
+# Of the program's tests on wires those without a session: pages, workers, refusals, logs, checks, single motions, the
+# camera. They leave others room, too.
 PATIENT = tuple(
-    f"tests/calibeam/{name}" for name in ("fleet", "live/test_browser.py", "live/test_page.py", "test_cli.py")
-)
+    f"tests/calibeam/{name}"
+    for name in (
+        "fleet", "live/test_browser.py", "live/test_page.py", "test_camera_cli.py", "test_check_cli.py", "test_cli.py",
+        "test_log_cli.py", "test_motion_cli.py", "test_psd_check_cli.py",
+    )
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

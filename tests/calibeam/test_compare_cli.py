@@ -67,6 +67,7 @@ def test_what_the_simulation_lacks_is_named(sessions, tmp_path):
     assert abs(amplitude["value"] - truth["figures"]["amplitude_rad"]) < 4.0 * amplitude["sigma"]
 
 
+@pytest.mark.endure  # daily: test_what_the_simulation_lacks_is_named
 def test_a_detector_that_sits_elsewhere_beside_the_other_is_named(sessions, tmp_path):
     def elsewhere(columns):
         columns["psd2_x_m"] -= SHIFT_M  # in its own plane: the beam meets it where it did

@@ -34,6 +34,7 @@ def test_a_design_says_what_it_promises(tmp_path, capsys):
     assert "causes that a diagnosis of this plan would find" in said
 
 
+@pytest.mark.endure  # daily: of a small arm, below
 def test_errors_of_the_reference_arm_leave_a_folder(tmp_path, capsys):
     errors = ["--errors", str(RIGS / "errors" / "arm-cmm.toml"), "--arms", "20000", "--poses", "3"]
     errors += ["--only", "link*.x", "joint*.zero", "joint3.*", "heat.arm"]

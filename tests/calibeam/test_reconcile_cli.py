@@ -89,6 +89,7 @@ def test_too_few_rows_and_a_full_folder_are_one_sentence(tmp_path, capsys):
     assert "not an empty folder" in capsys.readouterr().err
 
 
+@pytest.mark.endure  # five seconds
 def test_few_rows_that_carry_what_remains_are_listed(tmp_path):
     q_rad = poses()[:FEW]
     folder = session(tmp_path / "measured", q_rad, q_rad, arm())

@@ -26,7 +26,7 @@ def size(finding, name):
     return finding["parameters"][name]["value"]
 
 
-@pytest.mark.endure  # daily: the healthy devices beside faulty ones below, and streams/test_examine.py
+@pytest.mark.endure  # daily: streams/test_examine.py, and tests/calibeam/test_diagnose_streams.py
 def test_healthy_devices_are_left_in_peace_and_their_clocks_known_to_a_tenth_of_a_millisecond(tmp_path):
     told, file = diagnosed(tmp_path, Trouble(), Clocks())
     assert told == {}
@@ -35,6 +35,7 @@ def test_healthy_devices_are_left_in_peace_and_their_clocks_known_to_a_tenth_of_
     assert clocks["encoders"]["offset_s"] == pytest.approx(20.0 - 1000.0, abs=1e-4)
 
 
+@pytest.mark.endure  # daily: streams/test_examine.py, and tests/calibeam/test_diagnose_streams.py
 def test_a_late_encoder_a_slip_a_drifting_clock_and_lost_frames_in_one_session(tmp_path):
     trouble = Trouble(slip_joint=5, slip_rad=4e-4, slip_s=18.0, lag_joint=3, lag_s=8e-3)
     told, file = diagnosed(tmp_path, trouble, Clocks(drift=4e-4, lost_at_s=9.0, lost_samples=30, doubled_at_s=11.0))

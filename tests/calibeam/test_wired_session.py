@@ -78,6 +78,7 @@ def arm_speed_rad_s(emulation: Emulation) -> float:
         reader.close()
 
 
+@pytest.mark.endure  # daily: in process, tests/acquisition/session/test_session.py
 def test_a_protective_stop_ends_the_session_and_keeps_the_samples(takes: Takes) -> None:
     takes.trouble = (2, lambda: takes.emulation.ask("robot.protective_stop"))
     with pytest.raises(PartialResult, match=r"PROTECTIVE_STOP; clear the cause.*samples kept in"):
@@ -94,6 +95,7 @@ def test_a_silent_psd_box_stops_the_arm_and_is_named(takes: Takes) -> None:
     assert any(event.kind == "device failed" for event in takes.recording().events)
 
 
+@pytest.mark.endure  # daily: every device of a motion, test_device_faults.py
 def test_a_silent_encoder_is_named(takes: Takes) -> None:
     takes.trouble = (2, lambda: takes.emulation.ask("encoders.silence", node=3))
     with pytest.raises(PartialResult, match="3"):
@@ -101,6 +103,7 @@ def test_a_silent_encoder_is_named(takes: Takes) -> None:
     assert len(takes.recording().samples) >= 2
 
 
+@pytest.mark.endure  # daily: every device of a motion, test_device_faults.py
 def test_a_controller_that_goes_quiet_ends_the_session(takes: Takes) -> None:
     takes.trouble = (2, lambda: takes.emulation.ask("robot.silence", on=True))
     with pytest.raises(PartialResult, match="robot"):

@@ -159,6 +159,7 @@ def test_law_8_with_a_guess_wrong_by_25_deg_converges_with_ripple(rig, plain_rig
     assert run.status is CentringStatus.CENTRED
 
 
+@pytest.mark.endure  # hundreds of starts; daily: those below
 def test_centring_from_anywhere_keeps_its_promise(rig, plain_rig) -> None:
     """The benchmark in small: 10 random starts, fixture pose wrong by up to 80 deg and 50 mm, both orders."""
     runs = benchmark(rig, plain_rig, cases=range(10), seed=77, strategies=("registered (sessions use it)",))

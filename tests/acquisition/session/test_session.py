@@ -64,7 +64,7 @@ def test_centred_poses_are_within_5_um(taken) -> None:
     assert np.max(np.abs(centred)) < 6e-6
 
 
-@pytest.mark.parametrize("by", [CentringBy.MEASURED, CentringBy.LAW8])
+@pytest.mark.parametrize("by", [CentringBy.MEASURED, pytest.param(CentringBy.LAW8, marks=pytest.mark.endure)])
 def test_another_strategy_centres_as_well_and_the_recording_says_which(rig, plain_rig, by) -> None:
     few = PlanOptions(centred=2, off_centre=1, repeats=0, roll_rad=(-0.5, 0.5), centring=CentringChoice(by))
     kept = Kept()
@@ -136,6 +136,7 @@ def test_no_fixture_is_light_lost_for_good(rig, bench_of) -> None:
         run(rig, Empty(bench.world, bench.half_size_m))
 
 
+@pytest.mark.endure  # daily: without a fixture from the start, below
 def test_a_fixture_taken_away_in_mid_session_is_light_lost_for_good(rig, bench_of) -> None:
     bench = bench_of(2)
 

@@ -31,9 +31,9 @@ MUTATORS: dict[str, tuple[Mutator, ...]] = {
 OTHERS = {"bus.csv": "lines", "lab.csv": "others' csv", "bag-mcap/bag-mcap.mcap": "binary"}  # of their suffix
 REFUSED = {"bad_utf8": ("toml", "json", "csv")}  # what no reader of these kinds may take
 SMALL = "--arms 500 --poses 2"  # of an error simulation
-DAILY, ENDURE = 20, 300
-SOME = 6  # daily, of a format whose first command is slow on a valid input
-FEW, FEWER, TWO = 4, 3, 2  # daily, where another command has read the format; of commands slow on a valid input
+DAILY, ENDURE = 8, 300
+SOME = 3  # daily, of a format whose first command is slow on a valid input
+FEW, FEWER, TWO = 2, 1, 1  # daily, where another command has read the format; of commands slow on a valid input
 SLOW = dict.fromkeys(("diagnose", "compare", "design", "simulate-errors", "iso9283"), FEWER) | {
     "report": TWO,
     "reconcile": TWO,

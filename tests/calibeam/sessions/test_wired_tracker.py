@@ -96,6 +96,7 @@ def test_a_closed_connection_is_told(tmp_path: Path) -> None:
     assert len(read(tmp_path / "r.mcap").samples) == 1
 
 
+@pytest.mark.endure  # daily: of a session with detectors, test_wired_pause.py
 def test_paused_by_one_interrupt_ended_by_three_and_gone_on_with(tmp_path: Path, monkeypatch) -> None:
     """The pause ends by SIGCONT, for there is no keyboard; what is left is taken into a further recording."""
     states: list[str] = []
@@ -151,6 +152,7 @@ class Person:
         return "g"
 
 
+@pytest.mark.endure  # daily: test_wired_stops.py; of the driver: tests/drivers/ur/test_frozen.py
 @pytest.mark.parametrize(
     ("number", "says"), [(signal.SIGKILL, "has gone (signal SIGKILL)"), (signal.SIGSTOP, "was frozen")]
 )

@@ -8,7 +8,7 @@ from .mixed_sessions import full_pose, spots_and_bar, tracker_and_cones, truth_o
 
 CASES = [
     pytest.param(full_pose, 3, "encoder-eccentricity", marks=pytest.mark.endure),
-    (full_pose, 9, "worn-bearing"),
+    pytest.param(full_pose, 9, "worn-bearing", marks=pytest.mark.endure),  # daily: tests/golden
     (tracker_and_cones, 6, "soft-joint"),
     pytest.param(spots_and_bar, 4, "encoder-eccentricity", marks=pytest.mark.endure),  # daily: tests/golden
 ]

@@ -25,7 +25,7 @@ CASES = {
     "second-encoder-eccentricity": ("link", 5),
     "second-encoder-slip": ("link", 6),
 }
-DAILY = ("slack-drive", "second-encoder-eccentricity")  # of either side; a soft joint: the report by its model
+DAILY = ("slack-drive",)  # the others, and the report by their model: under endure
 
 
 def diagnosed(folder, **wanted):
@@ -50,6 +50,7 @@ def test_a_fault_of_machine_like_size_is_found_between_the_encoders(mechanism, t
             assert abs(said.value - true) < 4.0 * said.sigma + 0.1 * abs(true)
 
 
+@pytest.mark.endure  # daily: tests/calibeam/test_compare_simulations.py
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize(("side", "seed"), [pytest.param("link", 2, marks=pytest.mark.endure), ("motor", 10)])
 def test_arbitrary_zeros_of_second_encoders_are_no_mismatch(side, seed, tmp_path):
@@ -58,6 +59,7 @@ def test_arbitrary_zeros_of_second_encoders_are_no_mismatch(side, seed, tmp_path
     assert physics.diagnosis.findings == ()
 
 
+@pytest.mark.endure  # two diagnoses and a report; daily: a fault below
 @pytest.mark.timeout(300)
 def test_a_report_by_the_model_takes_effects_out_of_both_encoders(tmp_path):
     case = {"seed": 11, "defects": ("soft-joint",), "encoders": "link", "side_stated": True}

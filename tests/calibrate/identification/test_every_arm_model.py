@@ -50,7 +50,7 @@ def bars(session):
     return table(q[both], bar=np.ones(both.sum()), bar_end=end[both])
 
 
-@pytest.mark.parametrize("samples", [positions, wire, cones, bars])
+@pytest.mark.parametrize("samples", [positions, wire, cones, pytest.param(bars, marks=pytest.mark.endure)])
 def test_identified_predicted_and_exported_alike(rig, session, samples):
     seen, left, told = samples(session), {}, {}
     for model in ArmModel:

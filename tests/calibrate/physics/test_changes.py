@@ -105,7 +105,7 @@ def test_each_change_is_named_with_its_size_and_nothing_else(tmp_path, family):
     [
         ("dual-psd", 100, ("the laser",)),
         pytest.param("dual-psd", 100, ("the fixture turned",), marks=pytest.mark.endure),
-        ("cones", 100, ("a cone",)),
+        pytest.param("cones", 100, ("a cone",), marks=pytest.mark.endure),
     ],
 )
 def test_what_stands_around_the_arm_is_named_by_the_parameters_of_the_model(tmp_path, family, samples, some):

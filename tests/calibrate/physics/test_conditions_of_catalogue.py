@@ -123,6 +123,7 @@ def check_each_missing_column(family, *, every_place):
     return missed
 
 
+@pytest.mark.endure  # daily: test_rows_apart.py, and a dropped driver in tests/calibrate/effects
 def test_a_missing_column_is_named_and_widens_the_sigma_of_every_effect():
     assert check_each_missing_column("dual-psd", every_place=False) >= 20
 

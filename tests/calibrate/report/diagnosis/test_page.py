@@ -211,6 +211,7 @@ def with_parameters(model, names):
     return msgspec.structs.replace(model, parameters=found)
 
 
+@pytest.mark.endure  # a whole diagnosis of second encoders for one sentence
 def test_discs_that_the_calibrated_arm_holds_are_no_findings_about_it(spots):
     file = msgspec.structs.replace(FILE, unexplained=None)
     discs = with_parameters(spots.model, ["joint3.disc_sine", "joint3.disc_cosine"])
