@@ -303,8 +303,7 @@ def _session_by_hand(wanted: Wanted, hand: HandOptions, console: Console) -> Non
     options = GuidedOptions(hand.postures, hand.lengths, wanted.seed)
     poses = None if plan is None else read_pose_plan(plan, rig)
     visits = plan_of(rig, options, verify=verify) if poses is None else planned_visits(poses, rig)
-    emulated = wanted.emulators.control is not None
-    encoders = encoder_address(rig, hurry=wanted.emulators.time_scale, emulated=emulated)
+    encoders = encoder_address(rig, hurry=wanted.emulators.time_scale)
     control = wanted.emulators.address()
     ask = None if control is None else partial(_asked, *control)
     run_guided(rig, wanted.text, wanted.out, encoders, visits, console, seed=wanted.seed, ask=ask, conclude=not verify)

@@ -79,13 +79,10 @@ def bus_trouble(block: Block, error_registers: Mapping[int, int]) -> str:
     return f"{errors} error frames on the bus: check termination, bit rate and cables" if errors else ""
 
 
-EMULATED_PATIENCE = 10.0  # an emulator on a busy machine was seen at a seventh of the speed asked for
 VIEWED = ("position_rad",)  # channels worth a plot
 
 
-def encoder_driver(
-    device: EncodersDevice, clock: Clock, tap: Tap | None = None, *, emulated: bool = False, hurry: float = 1.0
-) -> Device:
+def encoder_driver(device: EncodersDevice, clock: Clock, tap: Tap | None = None, *, hurry: float = 1.0) -> Device:
     """Not connected yet; `tap` is shown every frame on the bus. DeviceRefused for values that no driver takes.
 
     `hurry`: device seconds in one second of this program's clock.
@@ -104,7 +101,6 @@ def encoder_driver(
             device.sync_hz,
             clock=clock,
             acceleration_limit_rad_s2=(device.acceleration_limit_rad_s2 or math.inf) * hurry**2,
-            patience=EMULATED_PATIENCE if emulated else 1.0,
         )
     except ValueError as error:
         raise DeviceRefused(f"[devices.encoders] of the rig file: {error}") from error

@@ -51,7 +51,6 @@ class AddressesWith(Generic[Instrument]):
     robot: RobotDevice
     encoders: EncodersDevice | None
     hurry: float = 1.0
-    emulated: bool = False
     others: tuple[OtherDevice, ...] = ()
 
 
@@ -125,7 +124,7 @@ def _addresses(
     if encoders is not None:
         encoders = emulated_encoders(encoders, emulated["can"])
     robot, others = emulated_robot(robot, emulated["robot"]), emulated_others(others, emulated)
-    return AddressesWith(place(instrument, emulated[key]), robot, encoders, hurry, emulated=True, others=others)
+    return AddressesWith(place(instrument, emulated[key]), robot, encoders, hurry, others=others)
 
 
 @contextmanager
@@ -204,7 +203,7 @@ def _encoders(addresses: Addresses | TrackerAddresses, kept: Kept, cleaning: Exi
     device = addresses.encoders
     if device is None:
         return None
-    driver = encoder_driver(device, kept.clock, emulated=addresses.emulated, hurry=addresses.hurry)
+    driver = encoder_driver(device, kept.clock, hurry=addresses.hurry)
     return cleaning.enter_context(_pumped(driver, kept))
 
 

@@ -49,7 +49,6 @@ class EncoderAddress:
 
     device: EncodersDevice
     hurry: float = 1.0
-    emulated: bool = False
 
 
 def is_guided(rig: Rig) -> bool:
@@ -59,22 +58,20 @@ def is_guided(rig: Rig) -> bool:
     return probed and devices.encoders is not None and devices.robot is None and devices.psd is None
 
 
-def encoder_address(
-    rig: Rig, announced: Mapping[str, Any] | None = None, hurry: float = 1.0, *, emulated: bool = False
-) -> EncoderAddress:
+def encoder_address(rig: Rig, announced: Mapping[str, Any] | None = None, hurry: float = 1.0) -> EncoderAddress:
     """The rig's encoders, or the same where emulators announced their adapter. RigFileError where there are none."""
     device = rig.devices.encoders
     if device is None:
         raise RigFileError(f"rig {rig.name}: no [devices.encoders]; a measuring arm is read by its encoders")
     if announced is not None:
-        return EncoderAddress(emulated_encoders(device, announced), hurry, emulated=True)
-    return EncoderAddress(device, hurry, emulated)
+        return EncoderAddress(emulated_encoders(device, announced), hurry)
+    return EncoderAddress(device, hurry)
 
 
 @contextmanager
 def watching(address: EncoderAddress, writer: RecordingWriter, clock: Clock) -> Generator[WiredEncoderWatch]:
     """The encoders connected and read into the recording until left; then the port is released."""
-    driver = encoder_driver(address.device, clock, emulated=address.emulated, hurry=address.hurry)
+    driver = encoder_driver(address.device, clock, hurry=address.hurry)
     driver.connect()
     supervisor = Supervisor(lambda: None, clock)  # nothing to stop: a person moves the arm
 

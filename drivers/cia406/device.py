@@ -60,12 +60,8 @@ class Cia406Encoders(StreamDevice[can.BusABC]):
         clock: Clock | None = None,
         speed_limit_rad_s: float = SPEED_LIMIT_RAD_S,
         acceleration_limit_rad_s2: float = math.inf,
-        patience: float = 1.0,
     ) -> None:
-        """`patience` stretches the wait for a heartbeat, for emulators, whose clock a busy machine slows down.
-
-        ValueError for a rate beyond 1 to 1000 Hz, no nodes, one twice, or one that CANopen does not have.
-        """
+        """ValueError for a rate beyond 1 to 1000 Hz, no nodes, one twice, or one that CANopen does not have."""
         _check(name, nodes, sync_hz)
         super().__init__(name, clock)
         self.nodes = tuple(nodes)
@@ -79,7 +75,7 @@ class Cia406Encoders(StreamDevice[can.BusABC]):
         self._angles: tuple[ContinuousAngle, ...] = ()
         self._positions: tuple[MappedNumber, ...] = ()
         self._node_of_pdo: dict[int, int] = {}  # CAN identifier to place in `nodes`
-        self._watch = NodeWatch(name, self.nodes, HEARTBEAT_MS * 1e-3 * patience)
+        self._watch = NodeWatch(name, self.nodes, HEARTBEAT_MS * 1e-3)
         self._faults = BusFaults(name)
         self._bad_lines = 0
         self._rows: list[WatchedRow] = []
@@ -129,6 +125,7 @@ class Cia406Encoders(StreamDevice[can.BusABC]):
                 due_s = max(now_s, min(self._cycle.wakes_s, deadline_s))
                 messages = self._receive(due_s - now_s)
                 now_s = self._clock.now_s()
+                self._watch.heartbeats.woke(now_s - due_s)
                 if now_s - due_s > HELD_UP_S:  # this thread sent no SYNC meanwhile: no silence of the encoders
                     deadline_s += now_s - due_s
                 # Before the work on what came, which is of earlier SYNCs: it would delay this one, and its answers.
@@ -246,7 +243,7 @@ class Cia406Encoders(StreamDevice[can.BusABC]):
             self._watch.check_heartbeats()
             self._add(self._cycle.give_up(now_s))
             return
-        self._watch.look(now_s)
+        self._watch.heartbeats.look(now_s)
         for message in messages:
             place = self._node_of_pdo.get(message.arbitration_id)
             if place is None or message.is_extended_id or message.is_remote_frame or message.is_error_frame:

@@ -129,9 +129,9 @@ class PsdDaq(StreamDevice[Transport]):
         refused_before = self.bad_frame_count
         while not self._pending:
             left_s = self._left_s(deadline_s)
-            if left_s <= 0.0:
+            self._receive(max(left_s, 0.0))  # also at the end: what waits there shows that it was this program
+            if left_s <= 0.0 and not self._pending:
                 raise self._no_samples(timeout_s, refused_before)
-            self._receive(left_s)
         arrived, self._pending = self._pending, []
         return to_block(arrived, self._count)
 

@@ -1,7 +1,9 @@
 """A whole session over wires: what the recording holds, and that at any pace the wires show what the world shows."""
 
+import subprocess
+import sys
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -84,3 +86,18 @@ def test_a_whole_session_is_recorded_and_its_spots_are_those_of_the_world(path: 
     # 3 urad of every joint is 1 to 2 um at the faces; the average of 200 readings adds 0.14 um.
     assert 0.5e-6 < np.sqrt(np.mean(off_m**2)) < 4e-6
     assert np.max(np.abs(off_m)) < 12e-6
+
+
+@pytest.fixture
+def eight_busy_loops() -> Iterator[None]:
+    loops = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(8)]
+    yield
+    for loop in loops:
+        loop.kill()
+        loop.wait()
+
+
+@pytest.mark.endure  # minutes: the session has a fraction of the machine
+@pytest.mark.usefixtures("eight_busy_loops")
+def test_a_session_beside_eight_busy_loops_is_completed(tmp_path: Path) -> None:
+    assert len(on_wires(1.0, tmp_path)) == 10
