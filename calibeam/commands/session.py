@@ -19,13 +19,7 @@ from acquisition.recording.rig import Rig, load_rig, rig_text
 from acquisition.session.plan import PlanOptions
 from calibeam.asking import at_terminal
 from calibeam.console import Console
-from calibeam.devices.site import (
-    addresses_of,
-    check_session,
-    check_tracked_session,
-    is_tracked,
-    tracker_addresses_of,
-)
+from calibeam.devices.site import addresses_of, check_session, check_tracked_session, is_tracked, tracker_addresses_of
 from calibeam.emulation import ask_emulators, moves_nothing_real
 from calibeam.guided.recorded import encoder_address, is_guided
 from calibeam.guided.run import plan_of, run_guided
