@@ -26,6 +26,7 @@ from calibeam.guided.run import plan_of, run_guided
 from calibeam.live.feed import SILENT, Feed
 from calibeam.sessions.job import EarlierParts, Job, new_place, read_earlier_parts, with_place, with_places
 from calibeam.sessions.run import run_session
+from calibeam.site_log import logged
 from drivers.clock import SystemClock
 
 ACCURACY_UM = 20.0  # as Job.goal_m
@@ -182,6 +183,7 @@ class Wanted:
     emulators: EmulatorOptions
 
 
+@logged
 def session(
     rig: Path,
     *,

@@ -22,6 +22,7 @@ from calibeam.devices.recorder import uninterrupted
 from calibeam.devices.tracker_of_rig import VIEWED as TRACKER_VIEWED
 from calibeam.devices.tracker_of_rig import tracker_driver
 from calibeam.interrupts import ENDING, heard_by
+from calibeam.site_log import SITE_LOG
 from calibeam.software import SOFTWARE
 from drivers.clock import Clock
 from drivers.device import Block
@@ -91,6 +92,7 @@ class EncoderLog:
     def run(self, stopped: Callable[[], bool], tell: Callable[[LogState], None]) -> None:
         """DeviceError when the encoders are not there at the start, and then nothing is left behind; RecordingError."""
         pump = self._start()
+        SITE_LOG.begin(self._recording.folder / f"{self._device.name}.log")
         with _asked_to_end() as asked, _rarely_looking_for_cycles():
             try:
                 while not (asked.is_set() or stopped()) and pump.failure is None:

@@ -23,6 +23,7 @@ from calibeam.console import Console
 from calibeam.devices.recorder import new_recording
 from calibeam.emulation import EmulationError
 from calibeam.guided.recorded import EncoderAddress, record_guided, watching
+from calibeam.site_log import SESSION_LOG, SITE_LOG
 from drivers.clock import SystemClock
 
 CLOSE_RAD = 0.35  # a joint this near the wanted posture is good: nobody copies a picture better
@@ -150,6 +151,7 @@ def run_guided(
     """Record the plan into `out`; `ask` moves an emulated hand, else a person is guided. `conclude`: identify, too."""
     clock, recording = SystemClock(), out / "recording.mcap"
     out.mkdir(parents=True, exist_ok=True)
+    SITE_LOG.begin(out / SESSION_LOG)
     person = PersonGuide(console)
     guide: Guide = person if ask is None else EmulatedHand(ask, person.tell)
     opened: AbstractContextManager[None] = person.open() if console.is_terminal else nullcontext()
