@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from acquisition.guided.guide import GuidedProgress, Request
 from acquisition.guided.stillness import Window
-from calibeam.guided.hand import wish
+from calibeam.guided.run import wish
 from simulators.hand.held_arm import CannotReachError
 from simulators.hand.world import HandWorld
 

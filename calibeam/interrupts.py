@@ -8,6 +8,8 @@ hear them instead (calibeam/sessions/keys.py).
 import os
 import signal
 import time
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager
 from types import FrameType
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -67,6 +69,20 @@ class Interrupts:
         """The exit code is decided: no signal changes it while the interpreter ends."""
         for number in ENDING:
             signal.signal(number, signal.SIG_IGN)
+
+
+Handler = Callable[[int, FrameType | None], None]
+
+
+@contextmanager
+def heard_by(handlers: Mapping[int, Handler]) -> Generator[None]:
+    """Inside, these signals go to these handlers; then to whoever had them before. Of the main thread only."""
+    before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _leave(number: int, frame: FrameType | None) -> None:

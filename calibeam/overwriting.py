@@ -46,13 +46,19 @@ def writes(*folders: str, **kinds: OutputKind) -> Callable[[Callable[P, R]], Cal
                         refuse_output(given.arguments[name], kind)
                 return command(*args, **kwargs)
 
-        *before, last = signature.parameters.values()
-        ends = [FORCE, last] if last.kind is inspect.Parameter.VAR_KEYWORD else [last, FORCE]
-        guarded.__signature__ = signature.replace(parameters=[*before, *ends])  # pyright: ignore[reportAttributeAccessIssue]
-        guarded.__annotations__ = {**command.__annotations__, "force": FORCE.annotation}
-        return guarded
+        return with_option(guarded, command, FORCE)
 
     return decorated
+
+
+def with_option(guarded: Callable[P, R], command: Callable[P, R], option: inspect.Parameter) -> Callable[P, R]:
+    """`guarded`, which takes `option` beside what `command` takes, with that signature."""
+    signature = inspect.signature(command, eval_str=True)
+    *before, last = signature.parameters.values()
+    ends = [option, last] if last.kind is inspect.Parameter.VAR_KEYWORD else [last, option]
+    guarded.__signature__ = signature.replace(parameters=[*before, *ends])  # pyright: ignore[reportAttributeAccessIssue,reportFunctionMemberAccess]
+    guarded.__annotations__ = {**command.__annotations__, option.name: option.annotation}
+    return guarded
 
 
 def _paths(values: Iterable[Any]) -> Iterator[Path]:

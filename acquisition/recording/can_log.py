@@ -103,12 +103,7 @@ _READERS: Mapping[str, Callable[[Any], MessageReader]] = MappingProxyType(
     }
 )
 _WRITERS: Mapping[str, Callable[[Path], MessageWriter]] = MappingProxyType(
-    {
-        ".blf": can.BLFWriter,
-        ".asc": can.ASCWriter,
-        ".csv": can.CSVWriter,
-        ".log": can.CanutilsLogWriter,
-    }
+    {".blf": can.BLFWriter, ".asc": can.ASCWriter, ".csv": can.CSVWriter, ".log": can.CanutilsLogWriter}
 )
 SUFFIXES = tuple(_READERS)
 

@@ -4,6 +4,7 @@ The latter is for logs of days, in which a cable may be pulled and put back. A s
 device stops the arm, and a person decides.
 """
 
+import logging
 import threading
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
@@ -12,6 +13,8 @@ from itertools import zip_longest
 from drivers.clock import Clock
 from drivers.device import Block, Channel, Device
 from drivers.errors import DeviceError, DeviceLost, DeviceRefused, DeviceStale
+
+log = logging.getLogger(__name__)
 
 
 class Guarded:
@@ -24,6 +27,7 @@ class Guarded:
     def connect(self) -> None:
         with one_error_tree(self.name, "connecting"):
             self._device.connect()
+        log.info("%s: connected", self.name)
 
     def describe(self) -> tuple[Channel, ...]:
         return self._device.describe()

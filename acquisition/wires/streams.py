@@ -4,6 +4,7 @@ A thread ends in one of two ways: it is asked to, or the device failed; then the
 The supervisor stops the arm when any device fails or falls silent, and lets the session know at its next step.
 """
 
+import logging
 import threading
 from collections import deque
 from collections.abc import Callable, Generator
@@ -14,6 +15,8 @@ from drivers.clock import Clock, SystemClock
 from drivers.device import Block, Device
 from drivers.errors import DeviceError, DeviceStale
 
+log = logging.getLogger(__name__)
+log.addHandler(logging.NullHandler())  # as in acquisition/recording/mcap/writer.py
 FROZEN_S = 1.0  # in which this program did nothing at all: stopped by a signal, or the machine hung
 STALE_S = 1.0  # twice what a reader itself waits: this is for one that hangs in a library and reports nothing
 LOOK_S = 0.05
@@ -54,6 +57,7 @@ class Supervisor:
         if first:
             with suppress(DeviceError):
                 self._hold_arm()
+            log.warning("the arm was stopped: %s", failure)
 
     def stop(self, why: Exception) -> None:
         """A person commands it, from any thread and in every state: the arm is held, whatever was before.
@@ -62,7 +66,10 @@ class Supervisor:
         """
         with self._lock:
             self._failure = self._failure or why
-        self._hold_arm()
+        try:
+            self._hold_arm()
+        finally:  # the arm first, then the log
+            log.warning("STOP: %s", why)
 
     def check(self) -> None:
         """Raise the first failure, if there was one; called before every motion."""

@@ -10,10 +10,12 @@ from calibeam.devices.recorder import new_recording
 from calibeam.devices.site import addresses_of, check_session, connected
 from calibeam.outcome import CheckFailed
 from calibeam.overwriting import writes
+from calibeam.site_log import SITE_LOG, logged
 from drivers.clock import SystemClock
 
 
 @writes("out")
+@logged
 def camera_command(
     rig: Path, *, out: Path = Path("camera"), placement: int | None = None, time_scale: float = 1.0, yes: bool = False
 ) -> None:
@@ -35,7 +37,7 @@ def camera_command(
     rig
         The rig file; [camera] holds how it is reached and roughly how it is mounted.
     out
-        Folder for camera.json and recording.mcap; nothing in it is overwritten.
+        Folder for camera.json, recording.mcap and camera.log; nothing in it is overwritten.
     placement
         Where the fixture stands now; default: the first one of the rig file.
     time_scale
@@ -60,6 +62,7 @@ def camera_command(
     from calibeam.software import SOFTWARE
 
     out.mkdir(parents=True, exist_ok=True)
+    SITE_LOG.begin(out / "camera.log")
     with (
         open_camera(loaded.camera, clock) as eye,
         new_recording(out / "recording.mcap", text, clock, {"purpose": "camera"}) as writer,

@@ -15,6 +15,7 @@ from calibeam.console import Console
 from calibeam.devices.recorder import RecordingJournal, new_recording
 from calibeam.devices.site import addresses_of, check_session, connected
 from calibeam.outcome import CheckFailed, PartialResult, interruption
+from calibeam.site_log import SITE_LOG, beside, logged
 from drivers.clock import SystemClock
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 SETTLE_S = 0.05
 
 
+@logged
 def centre_command(
     rig: Path,
     *,
@@ -67,7 +69,7 @@ def centre_command(
     aim
         First go before the fixture, as a session does: through the rig's home_rad.
     out
-        The recording, with every step as an event; it is not written over.
+        The recording, with every step as an event; it is not written over. Its log stands beside it.
     time_scale
         Of the emulators, if it is not 1.
     yes
@@ -86,6 +88,7 @@ def centre_command(
     from calibeam.learner import FittedLearner
 
     out.parent.mkdir(parents=True, exist_ok=True)
+    SITE_LOG.begin(beside(out))
     try:
         with (
             new_recording(out, rig_text(rig), clock, {"purpose": "centring"}) as writer,

@@ -23,6 +23,7 @@ from calibeam.devices.site import addresses_of, check_session, connected
 from calibeam.emulation import Emulation
 from calibeam.printing.progress import progress_bar
 from calibeam.rig_files import RIGS
+from calibeam.site_log import SESSION_LOG, SITE_LOG, logged
 from calibrate.identification.estimates import JointZero
 from drivers.clock import SystemClock
 from simulators.world.truth import read_truth
@@ -81,6 +82,7 @@ RECORDING, TRUTH = "recording.mcap", "truth.json"
 RESULTS = (RECORDING, "model.json", "diagnosis.json", "report.html", TRUTH)
 
 
+@logged
 def demo(*, out: Path = Path("out/demo"), rig: ShippedRig = RIG, seed: int = 1, time_scale: float = 8.0) -> None:
     """Run a whole session on emulated devices and show the truth.
 
@@ -110,6 +112,7 @@ def demo(*, out: Path = Path("out/demo"), rig: ShippedRig = RIG, seed: int = 1, 
     loaded, text = load_rig(rig), rig_text(rig)
     check_session(loaded)
     _clear(out)
+    SITE_LOG.begin(out / SESSION_LOG)
     console.print(f"starting the emulators of {rig.name} ({time_scale:g} x real time)")
     # two seconds of libraries that are wanted in the end, loaded while the emulators load theirs
     threading.Thread(target=import_module, args=("calibeam.results.session_results",), daemon=True).start()

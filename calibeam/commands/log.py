@@ -14,6 +14,7 @@ from acquisition.recording.rig import load_rig, rig_text
 from calibeam.console import Console
 from calibeam.devices.encoder_log import EncoderLog, LogState
 from calibeam.outcome import PartialResult
+from calibeam.site_log import logged
 from drivers.clock import Clock, SystemClock
 from drivers.errors import DeviceError, DeviceRefused
 
@@ -26,6 +27,7 @@ MEGABYTE = 1e6
 
 
 @log.command
+@logged
 def encoders(
     rig: Path,
     *,
@@ -75,6 +77,7 @@ def encoders(
 
 
 @log.command
+@logged
 def tracker(
     rig: Path,
     *,

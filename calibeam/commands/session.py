@@ -19,19 +19,14 @@ from acquisition.recording.rig import Rig, load_rig, rig_text
 from acquisition.session.plan import PlanOptions
 from calibeam.asking import at_terminal
 from calibeam.console import Console
-from calibeam.devices.site import (
-    addresses_of,
-    check_session,
-    check_tracked_session,
-    is_tracked,
-    tracker_addresses_of,
-)
+from calibeam.devices.site import addresses_of, check_session, check_tracked_session, is_tracked, tracker_addresses_of
 from calibeam.emulation import ask_emulators, moves_nothing_real
 from calibeam.guided.recorded import encoder_address, is_guided
 from calibeam.guided.run import plan_of, run_guided
 from calibeam.live.feed import SILENT, Feed
 from calibeam.sessions.job import EarlierParts, Job, new_place, read_earlier_parts, with_place, with_places
 from calibeam.sessions.run import run_session
+from calibeam.site_log import logged
 from drivers.clock import SystemClock
 
 ACCURACY_UM = 20.0  # as Job.goal_m
@@ -188,6 +183,7 @@ class Wanted:
     emulators: EmulatorOptions
 
 
+@logged
 def session(
     rig: Path,
     *,

@@ -1,7 +1,6 @@
 """Logging of encoders (raw frames, too) or a tracker for days, until stopped; what is lost is attached again."""
 
 import gc
-import signal
 import threading
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
@@ -22,7 +21,8 @@ from calibeam.devices.encoders import VIEWED, encoder_driver, identities_of, nam
 from calibeam.devices.recorder import uninterrupted
 from calibeam.devices.tracker_of_rig import VIEWED as TRACKER_VIEWED
 from calibeam.devices.tracker_of_rig import tracker_driver
-from calibeam.interrupts import ENDING
+from calibeam.interrupts import ENDING, heard_by
+from calibeam.site_log import SITE_LOG
 from calibeam.software import SOFTWARE
 from drivers.clock import Clock
 from drivers.device import Block
@@ -92,6 +92,7 @@ class EncoderLog:
     def run(self, stopped: Callable[[], bool], tell: Callable[[LogState], None]) -> None:
         """DeviceError when the encoders are not there at the start, and then nothing is left behind; RecordingError."""
         pump = self._start()
+        SITE_LOG.begin(self._recording.folder / f"{self._device.name}.log")
         with _asked_to_end() as asked, _rarely_looking_for_cycles():
             try:
                 while not (asked.is_set() or stopped()) and pump.failure is None:
@@ -166,12 +167,8 @@ def _asked_to_end() -> Generator[threading.Event]:
     def ask(number: int, frame: FrameType | None) -> None:
         asked.set()
 
-    before = {number: signal.signal(number, ask) for number in ENDING}
-    try:
+    with heard_by(dict.fromkeys(ENDING, ask)):
         yield asked
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 @contextmanager

@@ -3,7 +3,6 @@
 The journal writes samples and events of the session into the recording.
 """
 
-import signal
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -28,7 +27,7 @@ from acquisition.session.records import Progress, Sample
 from acquisition.session.session import Session, Summary
 from acquisition.session.tracked import TrackedSample
 from calibeam.emulation import EmulationError
-from calibeam.interrupts import ENDING
+from calibeam.interrupts import ENDING, heard_by
 from calibeam.learner import FittedLearner
 from calibeam.outcome import PartialResult, interruption
 from calibeam.software import SOFTWARE
@@ -200,9 +199,5 @@ def uninterrupted() -> Generator[None, None, None]:
     def ignore(number: int, frame: FrameType | None) -> None:
         return
 
-    before = {number: signal.signal(number, ignore) for number in ENDING}
-    try:
+    with heard_by(dict.fromkeys(ENDING, ignore)):
         yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

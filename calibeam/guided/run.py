@@ -3,12 +3,13 @@
 A person at the arm sees where to put the probe next, each joint's way, coverage, and repeatability so far.
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from rich.console import Group
 from rich.live import Live
 from rich.table import Table
@@ -16,11 +17,13 @@ from rich.text import Text
 
 from acquisition.guided.guide import Guide, GuidedProgress, Request
 from acquisition.guided.plan import GuidedOptions, GuidedVisit, by_kind, calibration_plan, verification_plan
+from acquisition.guided.reading import BarEnd, Cone, Target
 from acquisition.recording.rig import Rig
 from calibeam.console import Console
 from calibeam.devices.recorder import new_recording
-from calibeam.guided.hand import EmulatedHand
+from calibeam.emulation import EmulationError
 from calibeam.guided.recorded import EncoderAddress, record_guided, watching
+from calibeam.site_log import SESSION_LOG, SITE_LOG
 from drivers.clock import SystemClock
 
 CLOSE_RAD = 0.35  # a joint this near the wanted posture is good: nobody copies a picture better
@@ -93,6 +96,38 @@ def _way(now_rad: float, wanted_rad: float) -> str:
     return arrow * min(3, 1 + int(abs(left_rad) / np.radians(45.0)))
 
 
+def wish(target: Target, posture_rad: NDArray[np.float64]) -> Mapping[str, Any]:
+    """What the emulated hand is asked for, in the words of its verb "hand.put"."""
+    posture = [float(q) for q in posture_rad]
+    if isinstance(target, Cone):
+        return {"what": "seat", "id": target.id, "posture_rad": posture}
+    if isinstance(target, BarEnd):
+        return {"what": "bar", "id": target.position, "end": target.end, "posture_rad": posture}
+    return {"what": "sphere", "id": target.id, "direction": list(target.direction), "posture_rad": posture}
+
+
+CANNOT = "cannot put the probe"  # how simulators/hand/held_arm.py reports that the arm has no such posture
+
+
+class EmulatedHand:
+    """Implements acquisition.guided.guide.Guide; what is reported goes on to `show`."""
+
+    def __init__(self, ask: Callable[..., Any], show: Callable[[GuidedProgress], None]) -> None:
+        self._ask, self._show = ask, show
+
+    def ask(self, request: Request) -> bool:
+        try:
+            self._ask("hand.put", **wish(request.target, request.posture_rad))
+        except EmulationError as refused:
+            if CANNOT in str(refused):
+                return False
+            raise
+        return True
+
+    def tell(self, progress: GuidedProgress) -> None:
+        self._show(progress)
+
+
 HAND_PATIENCE_S = 30.0  # of emulated time: the longest reach takes 8 s
 
 
@@ -116,6 +151,7 @@ def run_guided(
     """Record the plan into `out`; `ask` moves an emulated hand, else a person is guided. `conclude`: identify, too."""
     clock, recording = SystemClock(), out / "recording.mcap"
     out.mkdir(parents=True, exist_ok=True)
+    SITE_LOG.begin(out / SESSION_LOG)
     person = PersonGuide(console)
     guide: Guide = person if ask is None else EmulatedHand(ask, person.tell)
     opened: AbstractContextManager[None] = person.open() if console.is_terminal else nullcontext()

@@ -14,15 +14,7 @@ from math import isfinite
 from typing import Any, Protocol
 
 from acquisition.errors import AcquisitionError
-from acquisition.recording.mcap.layout import (
-    VIEW_S,
-    VIEW_TOPIC,
-    MessageType,
-    element_names,
-    log_ns,
-    packed,
-    view_type,
-)
+from acquisition.recording.mcap.layout import VIEW_S, VIEW_TOPIC, MessageType, element_names, log_ns, packed, view_type
 from acquisition.recording.samples import SPOTS
 from acquisition.wires.psd_view import PsdView, psd_window
 from calibeam.devices.site import VIEWED

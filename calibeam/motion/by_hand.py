@@ -28,7 +28,7 @@ from acquisition.motion.states import OVER, MotionState
 from acquisition.recording.rig import Rig
 from calibeam.asking import YES, Asking, at_terminal, someone
 from calibeam.console import Console
-from calibeam.interrupts import INTERRUPTS
+from calibeam.interrupts import INTERRUPTS, heard_by
 from calibeam.motion.gate_of_rig import cell_of, gate_of, solver_of
 from calibeam.motion.robot import streamed_robot
 from drivers.clock import SystemClock
@@ -127,19 +127,12 @@ def keys_of(gate: Gate) -> Generator[MotionKeys]:
             INTERRUPTS.leave_terminal()
         keys.ended()
 
-    before = {
-        signal.SIGINT: signal.signal(signal.SIGINT, interrupt),
-        signal.SIGTERM: signal.signal(signal.SIGTERM, end),
-        signal.SIGHUP: signal.signal(signal.SIGHUP, end),
-    }
-    try:
-        yield keys
-    except BaseException:
-        INTERRUPTS.close()  # the arm stands, or has the stop command; what is left is to release it
-        raise
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    with heard_by({signal.SIGINT: interrupt, signal.SIGTERM: end, signal.SIGHUP: end}):
+        try:
+            yield keys
+        except BaseException:
+            INTERRUPTS.close()  # the arm stands, or has the stop command; what is left is to release it
+            raise
 
 
 Floats = NDArray[np.float64]

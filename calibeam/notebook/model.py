@@ -140,13 +140,7 @@ class Model:
         options = Options(None if tool is None else np.asarray(tool, dtype=np.float64), side, overshoot_rad)
         return correct(self.file, wanted, MotionInverse(RigArm.of_rig(rig)), options)
 
-    def _placed(
-        self,
-        q_rad: Floats,
-        conditions: Conditions,
-        same_session: bool,
-        frame: Frame = "robot",
-    ) -> "Placed":
+    def _placed(self, q_rad: Floats, conditions: Conditions, same_session: bool, frame: Frame = "robot") -> "Placed":
         """ValueError for a frame of another name."""
         from calibrate.physics.predicting import placed
 

@@ -14,12 +14,7 @@ from calibrate.report.quantities import length, significant
 from calibrate.report.svg import drawn, log_axis
 from calibrate.report.tones import Tone
 
-CONTENTS = {
-    "before": "Before",
-    "left-out": "What the simulation lacks",
-    "after": "After",
-    "remains": "What remains",
-}
+CONTENTS = {"before": "Before", "left-out": "What the simulation lacks", "after": "After", "remains": "What remains"}
 SMALLEST_M = 1e-12  # of a row that a logarithmic axis can show
 CHAINS = 3  # pictures of the chain: the first differences
 

@@ -29,7 +29,7 @@ from acquisition.errors import StoppedError
 from acquisition.session.control import BROKEN, OVER, RunControl, RunState
 from acquisition.wires.streams import FROZEN_S
 from calibeam.asking import in_foreground
-from calibeam.interrupts import INTERRUPTS
+from calibeam.interrupts import INTERRUPTS, heard_by
 from drivers.clock import Clock, SystemClock
 
 ESC = "\x1b"
@@ -246,12 +246,10 @@ def _written_to(wake: int, *, continued: bool) -> Generator[None]:
     numbers = [signal.SIGINT, signal.SIGTSTP, signal.SIGTERM, signal.SIGHUP]
     numbers += [signal.SIGCONT] if continued else []
     earlier = signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
-    before = {number: signal.signal(number, _nothing_more) for number in numbers}
     try:
-        yield
+        with heard_by(dict.fromkeys(numbers, _nothing_more)):
+            yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
         signal.set_wakeup_fd(earlier)
 
 

@@ -1,5 +1,6 @@
 """Reports how a session stands to everybody who listens; the owner of what is shown."""
 
+import logging
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -19,6 +20,7 @@ from drivers.clock import Clock
 from drivers.errors import DeviceError
 
 STEPS = ("device check", "plan preview", "confirmation", "measurement", "review", "results")
+log = logging.getLogger(__name__)
 WORKING = (RunState.RUNNING, RunState.PAUSING, RunState.ENDING)
 
 
@@ -40,6 +42,7 @@ class StatusReporter:
 
     def report(self, text: str, *, on_screen: bool = True) -> None:
         """One line for a person."""
+        log.info("%s", text)
         with self._turn:
             for listener in self._listeners:
                 with suppress(OSError):  # a terminal that was closed ends no session
@@ -120,7 +123,7 @@ class StatusReporter:
 
 
 class ReportingJournal:
-    """Implements acquisition.session.records.Journal: what goes into the recording is reported as well."""
+    """Implements acquisition.session.records.Journal: what a person has to know of it is reported as well."""
 
     def __init__(self, journal: Journal, reporter: StatusReporter, took: Callable[[list[Sample]], None]) -> None:
         """`took`: all samples so far, after each."""
@@ -135,8 +138,8 @@ class ReportingJournal:
 
     def event(self, kind: str, detail: Mapping[str, Any]) -> None:
         self._journal.event(kind, detail)
-        if text := _of_event(kind, detail):
-            self._reporter.report(text, on_screen=kind == "skipped")
+        if kind == "skipped":
+            self._reporter.report(f"pose left out at station {detail.get('placement')}: {detail.get('why')}")
 
 
 def _up(seconds: float) -> str:
@@ -153,15 +156,3 @@ def _of_sample(sample: Sample, progress: Progress | None) -> str:
         f"pose{count}: station {sample.placement}, PSD {sample.first} first, {settled}{after}; spots "
         f"({x1:+z.3f}, {y1:+z.3f}) ({x2:+z.3f}, {y2:+z.3f}) mm"
     )
-
-
-def _of_event(kind: str, detail: Mapping[str, Any]) -> str:
-    """What is worth a line of the log."""
-    if kind == "skipped":
-        return f"pose left out at station {detail.get('placement')}: {detail.get('why')}"
-    if kind == "search":
-        return f"search for the light: {detail.get('found')} after {detail.get('motions')} motions"
-    if kind == "centring":
-        steps = len(detail.get("purpose", ())) - 1
-        return f"centring at station {detail.get('placement')}: {detail.get('status')} after {steps} motions"
-    return "" if kind == "sample" else f"{kind}: {', '.join(f'{k} {v}' for k, v in detail.items())}"

@@ -36,7 +36,8 @@ from calibeam.sessions.measure import Measuring, measuring
 from calibeam.sessions.person import Person, devices_ready
 from calibeam.sessions.reporter import StatusReporter
 from calibeam.sessions.status import Listener, clock_words
-from calibeam.sessions.views import NAME, LogFile, PageView, PlainView, TerminalView
+from calibeam.sessions.views import PageView, PlainView, TerminalView
+from calibeam.site_log import SESSION_LOG, SITE_LOG
 from calibrate.pose_design.candidates import POSE_S
 from drivers.clock import Clock, SystemClock
 
@@ -50,9 +51,10 @@ class OnSite:
         self, job: Job, console: Console, clock: Clock, feed: Feed, asking: Asking | None, *, agrees: bool
     ) -> None:
         self._job, self._console, self._clock, self._feed = job, console, clock, feed
+        SITE_LOG.begin(job.out / SESSION_LOG)
         terminal = TerminalView(console) if asking is not None and console.is_terminal else None
         view: Listener = PlainView(console) if terminal is None else terminal
-        self.reporter = StatusReporter(job.rig, clock, (LogFile(job.out / NAME), view, PageView(feed)))
+        self.reporter = StatusReporter(job.rig, clock, (view, PageView(feed)))
         opened = {} if terminal is None else {"view": terminal.opened}
         self._person = Person(console, self.reporter, asking, agrees=agrees, **opened)
         self._half_size_m = FittedLearner(job.rig).optics.half_size_m

@@ -1,13 +1,11 @@
-"""Who follows a session: a terminal, plain lines where there is none, the live page, and session.log.
+"""Who follows a session: a terminal, plain lines where there is none, and the live page.
 
 The terminal is for somebody with gloves a step away: what is going on in colour and capitals, few words. The view
-stays at the bottom; what is reported scrolls by above it. The log has one line a happening, with its time.
+stays at the bottom; what is reported scrolls by above it, and stands in the log (calibeam/site_log.py).
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from contextlib import contextmanager, suppress
-from datetime import UTC, datetime
-from pathlib import Path
 
 import numpy as np
 from rich.console import Group, RenderableType
@@ -80,29 +78,6 @@ class PageLines(PageView):
 
     def shows(self, shown: SessionStatus) -> None:
         """Nothing more."""
-
-
-NAME = "session.log"
-
-
-def utc_now() -> datetime:
-    return datetime.now(UTC)
-
-
-class LogFile:
-    """Implements status.Listener. A disk that takes no line ends no session: the recording reports it."""
-
-    def __init__(self, path: Path, now: Callable[[], datetime] = utc_now) -> None:
-        self.path, self._now = path, now
-
-    def report(self, text: str, on_screen: bool) -> None:
-        stamp = self._now().isoformat(timespec="milliseconds").replace("+00:00", "Z")
-        lines = "".join(f"{stamp} {line}\n" for line in text.splitlines())
-        with suppress(OSError), self.path.open("a", encoding="utf-8") as file:
-            file.write(lines)
-
-    def shows(self, shown: SessionStatus) -> None:
-        """A log holds what was reported."""
 
 
 REFRESH_HZ = 4.0

@@ -33,7 +33,8 @@ from calibeam.sessions.job import GO_ON, PLAN_NOTE, SEED_NOTE, plan_sha256
 from calibeam.sessions.keys import Keys
 from calibeam.sessions.person import Person, devices_ready
 from calibeam.sessions.reporter import StatusReporter
-from calibeam.sessions.views import NAME, LogFile, PageLines, PlainView
+from calibeam.sessions.views import PageLines, PlainView
+from calibeam.site_log import SESSION_LOG, SITE_LOG
 from calibrate.arms.rig_arm import RigArm
 from drivers.clock import Clock, SystemClock
 
@@ -107,7 +108,8 @@ def run_tracked(job: TrackedJob, console: Console, feed: Feed = SILENT, *, askin
         check_tracked_plan(job.plan)
     clock, broken = SystemClock(), False
     job.out.mkdir(parents=True, exist_ok=True)
-    reporter = StatusReporter(job.rig, clock, (LogFile(job.out / NAME), PlainView(console), PageLines(feed)))
+    SITE_LOG.begin(job.out / SESSION_LOG)
+    reporter = StatusReporter(job.rig, clock, (PlainView(console), PageLines(feed)))
     person = Person(console, reporter, asking, agrees=agrees)
     while True:
         with person.keeping(job.out) if broken else nullcontext():

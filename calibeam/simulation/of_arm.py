@@ -25,16 +25,8 @@ from simulators.defects.drive import (
 )
 from simulators.defects.encoder import RADIUS_M, EccentricDisc, EncoderSlip, OvalRing
 from simulators.defects.fixture import CarriedFixture, MovedCone
-from simulators.defects.link import (
-    FlatLink,
-    HeatedLink,
-    WarmingUp,
-    WornBearing,
-    cantilever,
-)
-from simulators.defects.tracker import (
-    CarriedDevice,
-)
+from simulators.defects.link import FlatLink, HeatedLink, WarmingUp, WornBearing, cantilever
+from simulators.defects.tracker import CarriedDevice
 
 Floats = NDArray[np.float64]
 WHEEL_M = 0.05  # pitch radius of the wheel of a simulated gear; only runout over radius shows

@@ -18,20 +18,10 @@ from simulators.arm.drawing import origin_and_rotation
 from simulators.arm.rigid import Vector
 from simulators.defects import Defect
 from simulators.defects.defect import as_vector
-from simulators.defects.detector import (
-    StrainedFace,
-    StrayLight,
-    UnevenLayer,
-    WavesOnFace,
-)
+from simulators.defects.detector import StrainedFace, StrayLight, UnevenLayer, WavesOnFace
 from simulators.defects.found_curve import CurveAtBase, CurveAtJoints, CurveAtLink, CurveInReading
 from simulators.defects.tool import CarriedLaser, CarriedTarget, ElasticMount, LaserWarmUp, SaggingMount, WarmLaser
-from simulators.defects.tracker import (
-    CircleOffCentre,
-    DrumOutOfRound,
-    TrackerScale,
-    WireScale,
-)
+from simulators.defects.tracker import CircleOffCentre, DrumOutOfRound, TrackerScale, WireScale
 
 Floats = NDArray[np.float64]
 LEAST = 1e-9  # of a share or a stiffness that another quantity is divided by

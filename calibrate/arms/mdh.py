@@ -59,13 +59,7 @@ class MdhArm(SerialArm):
         zero, one = np.zeros_like(d), np.ones_like(d)
         x, y = np.stack([np.cos(tilt), zero, np.sin(tilt)], axis=-1), np.stack([zero, one, zero], axis=-1)
         z, foot_m = np.stack([zero, zero, one], axis=-1), np.stack([zero, zero, -d], axis=-1)
-        by_kind = [
-            turn_twist(z, foot_m),
-            slide_twist(z),
-            slide_twist(x),
-            turn_twist(x, foot_m),
-            turn_twist(y, foot_m),
-        ]
+        by_kind = [turn_twist(z, foot_m), slide_twist(z), slide_twist(x), turn_twist(x, foot_m), turn_twist(y, foot_m)]
         return np.stack(by_kind, axis=1).reshape(-1, 6)
 
     def _rows(self, theta: Floats) -> Floats:

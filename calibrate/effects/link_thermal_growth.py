@@ -40,13 +40,7 @@ def _over_time(drivers: Drivers, link: int) -> Term:
 
 
 def _term(
-    link: int,
-    driver: str,
-    shape: Shape,
-    law: time_laws.Law,
-    inner: tuple[Inner, ...],
-    name: str,
-    limit: float,
+    link: int, driver: str, shape: Shape, law: time_laws.Law, inner: tuple[Inner, ...], name: str, limit: float
 ) -> Term:
     def function(drivers: Drivers, values: Floats) -> Floats:
         out = np.zeros((len(drivers.t_s), 6, 1))

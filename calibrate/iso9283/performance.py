@@ -202,11 +202,7 @@ def _distance(attained: AttainedPoses, numbers: Sequence[int]) -> DistancePerfor
         return distance_accuracy(a, b, command_m)
 
     return DistancePerformance(
-        pair,
-        cycles,
-        command_m,
-        jackknifed(off, [rows], _pairs),
-        jackknifed(distance_repeatability, [rows], _pairs),
+        pair, cycles, command_m, jackknifed(off, [rows], _pairs), jackknifed(distance_repeatability, [rows], _pairs)
     )
 
 
@@ -264,9 +260,7 @@ def _whole(rows: Floats) -> tuple[Floats, ...]:
 
 
 def jackknifed(
-    figure: Callable[..., float],
-    sets: Sequence[Floats],
-    columns: Callable[[Floats], tuple[Floats, ...]] = _whole,
+    figure: Callable[..., float], sets: Sequence[Floats], columns: Callable[[Floats], tuple[Floats, ...]] = _whole
 ) -> Performance:
     """The figure of independent sets (cycle, ...), with one sigma by leaving out one part after the other.
 

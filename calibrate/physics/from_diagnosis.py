@@ -90,12 +90,7 @@ def model_of_diagnosis(found: Diagnosed, recording: Recording) -> ModelFile:
 
 
 def model_of_fit(
-    fit: Fitted,
-    before: Fitted,
-    cleared: Cleared,
-    recording: Recording,
-    says: str,
-    findings: tuple[Finding, ...] = (),
+    fit: Fitted, before: Fitted, cleared: Cleared, recording: Recording, says: str, findings: tuple[Finding, ...] = ()
 ) -> ModelFile:
     """Geometry and effects fitted together; `before`: geometry alone; `says`: if it converged. DataError as above."""
     fit = replace(fit, problem=replace(fit.problem, given=0))
@@ -267,12 +262,7 @@ def _aftermath(effect: Effect) -> Effect:
 
 
 def _effect(
-    a: Accepted,
-    name: str,
-    finding: Finding | None,
-    drivers: Drivers,
-    own: Floats,
-    stated: Mapping[str, Size] | None,
+    a: Accepted, name: str, finding: Finding | None, drivers: Drivers, own: Floats, stated: Mapping[str, Size] | None
 ) -> Effect:
     """`own` (value, value) covariance of its coefficients and smooth inner values; `stated` sizes without a finding."""
     m, term = len(a.coefficients), a.term

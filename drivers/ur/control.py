@@ -19,14 +19,7 @@ from numpy.typing import ArrayLike
 from drivers.clock import Clock, SystemClock
 from drivers.device import Floats
 from drivers.errors import DeviceError, DeviceLost, DeviceRefused, DeviceStale
-from drivers.ur.control_link import (
-    Ended,
-    Motion,
-    MoveJoints,
-    Outcome,
-    ServoJoints,
-    ServoStop,
-)
+from drivers.ur.control_link import Ended, Motion, MoveJoints, Outcome, ServoJoints, ServoStop
 from drivers.ur.dashboard import UrDashboard
 from drivers.ur.pulse import check_stream
 from drivers.ur.supervised import SupervisedChild

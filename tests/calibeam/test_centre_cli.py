@@ -36,6 +36,10 @@ def test_the_beam_is_centred_where_asked_and_every_step_is_kept(rig: Path, tmp_p
         last = [event.detail for event in read(out).events if event.kind == "centring"][-1]
         assert np.allclose(last["spots_m"][-1], last["target_m"], atol=5e-6)
     assert last["strategy"] == "measured"
+    said = (tmp_path / "1.log").read_text()
+    assert 'INFO acquisition.recording.mcap.writer: centring {"placement":1' in said
+    assert "robot: connected" in said
+    assert "recording closed" in said
     assert last["target_m"] == pytest.approx([2e-3, -1e-3, 0.5e-3, 3e-3])
 
 

@@ -4,6 +4,7 @@ import dataclasses
 import errno
 import math
 import os
+import re
 import signal
 import struct
 import threading
@@ -24,6 +25,7 @@ from calibeam.cli import run
 from calibeam.devices import encoder_log
 from calibeam.devices.encoder_log import EncoderLog, LogState
 from calibeam.devices.encoders import names_of
+from calibeam.site_log import SITE_LOG
 from drivers.cia406.codec import Scale
 from drivers.cia406.configuration import EncoderIdentity
 from drivers.cia406.device import Cia406Encoders
@@ -165,13 +167,18 @@ def test_a_bus_that_is_pulled_and_put_back_is_a_gap(new_log, bus: Bus, tmp_path:
             rows[0] = state.rows
             bus.plug()
 
-    until(log, lambda state: rows[0] > 0 and state.rows >= rows[0] + 10, pull_and_put_back)
+    with SITE_LOG.heard("info"):
+        until(log, lambda state: rows[0] > 0 and state.rows >= rows[0] + 10, pull_and_put_back)
     recording = only(tmp_path / "log")
     assert [event.kind for event in recording.events] == ["encoders", "device lost", "device back"]
     unknown = [gap for gap in recording.streams["encoders"].gaps if gap.missing < 0]
     assert len(unknown) == 1
     assert "encoders" in unknown[0].reason
     assert recording.complete
+    said = (tmp_path / "log" / "encoders.log").read_text()
+    assert re.search(r"^\S+Z WARNING \S+: device lost .*encoders", said, re.MULTILINE)
+    order = ["encoders: connected", "recorded from now on", "device lost", "device back", "recording closed"]
+    assert sorted(map(said.index, order)) == [said.index(words) for words in order]
 
 
 def test_a_full_disk_ends_a_log_and_keeps_what_was_written(
@@ -193,12 +200,13 @@ def test_a_full_disk_ends_a_log_and_keeps_what_was_written(
     recording = only(tmp_path / "log")
     assert recording.streams["encoders"].sequence.size > 10
     assert not recording.complete
+    assert "WARNING calibeam.site_log: PartialResult" in (tmp_path / "log" / "encoders.log").read_text()
 
 
 def test_encoders_that_are_not_there_leave_nothing_behind(new_log, bus: Bus, tmp_path: Path) -> None:
     for node in (1, 2, 3, 4, 5, 6):
         bus.verbs["encoders.silence"](node)
-    with pytest.raises(DeviceStale, match="no answer from encoder node 1, 2"):
+    with pytest.raises(DeviceStale, match="no answer from encoder node 1, 2"), SITE_LOG.heard("info"):
         until(new_log(), lambda state: False)
     assert not (tmp_path / "log").exists()
 

@@ -9,6 +9,7 @@ A reader thread holds a `StreamWriter`, which takes its device's samples, notice
 the disk.
 """
 
+import logging
 import math
 import platform
 import threading
@@ -54,6 +55,10 @@ from acquisition.recording.sample_rules import checked_samples
 from acquisition.recording.samples import Cell, Floats
 
 ANSWER_S = 30.0  # a disk that takes longer than this for what waits is reported, not waited for
+LONGEST = 300  # characters of an event's detail in the log; the recording has it all
+LOUD = ("device failed", "device lost", "ended early", "skipped")  # kinds of event that are warnings in the log
+log = logging.getLogger(__name__)
+log.addHandler(logging.NullHandler())  # a program without a log of its own prints none of these
 LARGEST = np.iinfo(np.int64).max
 
 
@@ -235,6 +240,7 @@ class RecordingWriter:
             self.path.unlink(missing_ok=True)
             raise RecordingError(f"{self.path}: cannot begin the recording ({error.strerror}); free space") from error
         self._scribe.start()
+        log.info("recording begun: %s, rig %s", self.path, self.rig.name)
 
     def stream(
         self,
@@ -263,6 +269,7 @@ class RecordingWriter:
             encoder = StreamEncoder(name, channels, names if viewer is None else viewer)
             self._spool.put(partial(self._begin_stream, name=name, channels=channels, encoder=encoder), 0)
             self._streams.add(name)
+            log.info("%s: recorded from now on: %s", name, ", ".join(names))
             put = partial(self._put_piece, encoder)
             return StreamWriter(name, channels, put, partial(self._put_gap, name), after, find_gaps=find_gaps)
 
@@ -284,6 +291,8 @@ class RecordingWriter:
     def event(self, event: Event) -> None:
         """Something that happened. TypeError if its detail cannot be written as JSON."""
         detail = msgspec.json.encode(event.detail, enc_hook=_plain_json).decode()
+        level = logging.DEBUG if event.kind == "sample" else logging.WARNING if event.kind in LOUD else logging.INFO
+        log.log(level, "%s %s", event.kind, detail if len(detail) <= LONGEST else f"{detail[:LONGEST]}...")
         values = {"host_s": event.host_s, "kind": event.kind, "detail_json": detail}
         self._put_message(EVENTS_TOPIC, EVENT, event.host_s, values)
 
@@ -297,6 +306,8 @@ class RecordingWriter:
         RecordingError if the last of it could not be written; what is on the disk stays readable.
         """
         self._scribe.end(complete, ANSWER_S)
+        how = "complete" if complete else "cut short"
+        log.info("recording closed: %s, settled samples: %d, %s", self.path, self._n_samples, how)
 
     def __enter__(self) -> Self:
         return self

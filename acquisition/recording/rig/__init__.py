@@ -6,18 +6,7 @@ reached over a wire), and a rule in `rules` where it depends on other keys.
 """
 
 from acquisition.recording.rig.read import load_rig, parse_rig, plain_rig, rig_sha256, rig_text
-from acquisition.recording.rig.schema import (
-    Arm,
-    ArmModel,
-    Camera,
-    Joint,
-    Make,
-    Placement,
-    Pose,
-    Rig,
-    Sphere,
-    Tolerance,
-)
+from acquisition.recording.rig.schema import Arm, ArmModel, Camera, Joint, Make, Placement, Pose, Rig, Sphere, Tolerance
 
 __all__ = [
     "Arm",

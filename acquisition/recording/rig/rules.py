@@ -80,10 +80,7 @@ def _sense_faults(rig: Rig) -> Iterator[Fault]:
                 "the base",
             )
         if abs(joint.follows.by) != 1.0:
-            yield (
-                (*path, "by"),
-                f"by = {joint.follows.by!r}: controllers couple joints one to one; give 1.0 or -1.0",
-            )
+            yield ((*path, "by"), f"by = {joint.follows.by!r}: controllers couple joints one to one; give 1.0 or -1.0")
     if rig.arm.model is ArmModel.LOCAL_POE and rig.arm.base != Pose():
         yield ("arm", "base"), "'base' belongs to a D-H table; write it into origin_m and rotation_rad of joint 1"
 
@@ -157,10 +154,7 @@ def _laser_faults(rig: Rig) -> Iterator[Fault]:
 
 def _placement_faults(rig: Rig) -> Iterator[Fault]:
     if rig.camera is not None and rig.fixture is None:
-        yield (
-            ("camera", "board"),
-            "[camera.board] places the board on the fixture, but there is no [fixture]; add it",
-        )
+        yield (("camera", "board"), "[camera.board] places the board on the fixture, but there is no [fixture]; add it")
     yield from _twice(("placement",), tuple(placement.id for placement in rig.placement_list))
     if rig.placement_list and rig.fixture is None:
         yield ("placement",), "[[placement]] places the fixture, but there is no [fixture]; add it"
@@ -235,10 +229,7 @@ def _psd_faults(psd: PsdDevice) -> Iterator[Fault]:
     pair = psd.driver is PsdDriver.KPA101
     yield from _strangers(PSD, psd, DAQ_ONLY if pair else PAIR_ONLY, psd.driver.value)
     if pair and (psd.ports is None) == (psd.serial_numbers is None):
-        yield (
-            PSD,
-            "[devices.psd] needs either 'ports' (two paths) or 'serial_numbers' (of two units), and one only",
-        )
+        yield (PSD, "[devices.psd] needs either 'ports' (two paths) or 'serial_numbers' (of two units), and one only")
     if not pair and (psd.port is None) == (psd.serial_number is None):
         yield PSD, "[devices.psd] needs either 'port' (a path) or 'serial_number' (of its USB), and one only"
     if pair and psd.rate_hz > KPA101_MOST_HZ:
@@ -247,10 +238,7 @@ def _psd_faults(psd: PsdDevice) -> Iterator[Fault]:
             f"rate_hz = {psd.rate_hz:g}: a pair of KPA101 gives at most {KPA101_MOST_HZ:g}; write rate_hz = 200",
         )
     if pair and psd.head is PsdHead.QUADRANT and psd.spot_radius_m is None:
-        yield (
-            PSD,
-            "[devices.psd] with head = \"quadrant\" needs 'spot_radius_m': its ratio alone gives no metres",
-        )
+        yield (PSD, "[devices.psd] with head = \"quadrant\" needs 'spot_radius_m': its ratio alone gives no metres")
 
 
 def _tracker_faults(tracker: TrackerDevice) -> Iterator[Fault]:
@@ -374,7 +362,4 @@ def _modbus_faults(robot: RobotDevice) -> Iterator[Fault]:
         if register.name in names[:index]:
             yield (*path, "name"), f"register {register.name} stands twice in the map; keep one"
         if register.scale == 0.0:
-            yield (
-                (*path, "scale"),
-                f"register {register.name}: scale 0 loses the value; give what one count is in SI",
-            )
+            yield ((*path, "scale"), f"register {register.name}: scale 0 loses the value; give what one count is in SI")

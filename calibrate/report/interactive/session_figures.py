@@ -60,11 +60,7 @@ def _beams(session: SpotSession, rig: FittedRig) -> Iterator[Trace]:
     data = session.data
     parts = [
         np.concatenate(
-            [
-                rig.believed.beam(q)[0][None],
-                rig.struck_m(int(place), int(first), spots),
-                np.full((1, 3), np.nan),
-            ]
+            [rig.believed.beam(q)[0][None], rig.struck_m(int(place), int(first), spots), np.full((1, 3), np.nan)]
         )
         for q, place, first, spots in zip(data.q_rad, data.placement, data.first_psd, data.spots_m, strict=True)
     ]
@@ -79,13 +75,7 @@ def _lasers(session: SpotSession, rig: FittedRig) -> Trace:
         "mode": "markers",
         **coordinates(np.array([rig.believed.beam(q)[0] for q in session.data.q_rad])),
         "name": "laser",
-        "marker": {
-            "size": 4,
-            "color": numbers(error),
-            "colorscale": "Cividis",
-            "reversescale": True,
-            "colorbar": bar,
-        },
+        "marker": {"size": 4, "color": numbers(error), "colorscale": "Cividis", "reversescale": True, "colorbar": bar},
         "text": _spot_labels(session),
         "hoverinfo": "text",
     }

@@ -136,14 +136,7 @@ def _errors(evidence: SessionEvidence) -> tuple[Number, Number]:
         on = f"rms distance of {proof.observations} {_what(first)} that the fit has not seen"
     gain = f"; {significant(before / after)} times smaller" if after > 0.0 else ""
     return (
-        Number(
-            "as_drawn",
-            "Unseen readings, nominal",
-            before,
-            first.unit,
-            first.says(before),
-            f"{on}; nominal arm",
-        ),
+        Number("as_drawn", "Unseen readings, nominal", before, first.unit, first.says(before), f"{on}; nominal arm"),
         Number("now", "Unseen readings, calibrated", after, first.unit, first.says(after), on + gain),
     )
 

@@ -16,9 +16,8 @@ from acquisition.guided.session import GuidedSummary
 from acquisition.recording import RecordingWriter, read
 from acquisition.recording.rig import load_rig, rig_text
 from calibeam.emulation import Emulation
-from calibeam.guided.hand import EmulatedHand
 from calibeam.guided.recorded import BelievedGuidedArm, encoder_address, record_guided, watching
-from calibeam.guided.run import PersonGuide
+from calibeam.guided.run import EmulatedHand, PersonGuide
 from calibeam.outcome import PartialResult
 from drivers.clock import SystemClock
 from simulators.hand.hand_rig import HandTruth

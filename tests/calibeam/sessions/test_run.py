@@ -15,24 +15,22 @@ from calibeam.sessions import person
 from calibeam.sessions.job import EarlierParts, Job, part_of
 from calibeam.sessions.person import devices_ready
 from calibeam.sessions.run import OnSite
+from calibeam.site_log import SITE_LOG
 from drivers.clock import SystemClock
 from drivers.errors import DeviceRefused
 
 from .conftest import RIG_FILE
 
 
-@pytest.fixture
-def site(rig, tmp_path) -> OnSite:
-    job = Job(rig, RIG_FILE.read_text(), tmp_path, addresses_of(rig), PlanOptions())
-    return OnSite(job, Console(quiet=True), SystemClock(), SILENT, None, agrees=True)
-
-
-def test_a_forecast_that_cannot_be_made_is_said_and_ends_nothing(site, tmp_path) -> None:
+def test_a_forecast_that_cannot_be_made_is_said_and_ends_nothing(rig, tmp_path) -> None:
     def fails() -> None:
         raise ZeroDivisionError("no pose ahead")
 
-    part = part_of(site._job, EarlierParts(), 0.01)
-    site._look(SimpleNamespace(forecast_now=fails), Summary((), (), 2), part)
+    job = Job(rig, RIG_FILE.read_text(), tmp_path, addresses_of(rig), PlanOptions())
+    part = part_of(job, EarlierParts(), 0.01)
+    with SITE_LOG.heard("info"):
+        site = OnSite(job, Console(quiet=True), SystemClock(), SILENT, None, agrees=True)
+        site._look(SimpleNamespace(forecast_now=fails), Summary((), (), 2), part)
     log = (tmp_path / "session.log").read_text()
     assert "0 poses; 2 left out" in log
     assert "no forecast: ZeroDivisionError: no pose ahead" in log

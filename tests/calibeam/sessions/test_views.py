@@ -2,7 +2,6 @@
 
 import os
 import threading
-from datetime import UTC, datetime
 from io import StringIO
 
 import numpy as np
@@ -20,7 +19,7 @@ from calibeam.sessions.keys import Keys
 from calibeam.sessions.person import Person
 from calibeam.sessions.reporter import ReportingJournal, StatusReporter
 from calibeam.sessions.status import Pace, SessionStatus, clock_words
-from calibeam.sessions.views import KEYS, LogFile, PageView, PlainView, TerminalView, drawn
+from calibeam.sessions.views import KEYS, PageView, PlainView, TerminalView, drawn
 from drivers.errors import DeviceLost
 
 PATIENCE_S = 30.0
@@ -191,16 +190,6 @@ def test_every_sample_and_everything_left_out_stands_in_the_log(reporter, heard,
     assert heard.lines[1][0].startswith("pose 1 of 78: station 1, PSD 1 first, settled in 0.10 s; spots (")
     assert heard.lines[2] == ("pose left out at station 1: no light, or saturated, when read", True)
     assert len(heard.lines) == 3
-
-
-def test_the_log_has_a_time_in_every_line_and_outlives_a_disk_that_is_full(tmp_path) -> None:
-    log = LogFile(tmp_path / "session.log", lambda: datetime(2026, 11, 21, 16, 30, tzinfo=UTC))
-    log.report("one\ntwo", True)
-    log.report("three", False)
-    assert (tmp_path / "session.log").read_text().splitlines() == [
-        f"2026-11-21T16:30:00.000Z {word}" for word in ("one", "two", "three")
-    ]
-    LogFile(tmp_path / "missing" / "session.log").report("nobody hears it", True)
 
 
 def test_plain_output_is_a_line_every_ten_poses(heard) -> None:

@@ -25,6 +25,7 @@ from calibeam.sessions.with_tracker import (
     run_tracked,
     taken_before,
 )
+from calibeam.site_log import SITE_LOG
 from drivers.clock import SystemClock
 from drivers.ur.supervised import SupervisedChild
 from simulators.world.truth import read_truth
@@ -175,7 +176,8 @@ def test_a_control_child_that_dies_or_freezes_is_reported_and_a_person_decides(
     with Emulation(RIG_FILE, seed=5, time_scale=PACE) as emulation:
         wires = tracker_addresses_of(RIG, emulation.address, PACE)
         job = TrackedJob(RIG, rig_text(RIG_FILE), tmp_path, wires, PLAN)
-        run_tracked(job, Console(quiet=True), asking=person, agrees=False)
+        with SITE_LOG.heard("info"):
+            run_tracked(job, Console(quiet=True), asking=person, agrees=False)
     assert person.asked == ["may it move", "the arm was stopped, and the recording is closed:", "may it move"]
     log = (tmp_path / "session.log").read_text()
     assert f"of this program ({children[0]}) {says}" in log

@@ -17,7 +17,7 @@ OWN = ROOT / "calibrate" / "sensors"
 # Why a file may spell a sensor's name.
 SPELLED = {
     "calibeam/prove": "families of the simulator's scenarios, which have the proof's own names",
-    "calibeam/guided/hand.py": "verbs of the emulated hand",
+    "calibeam/guided/run.py": "verbs of the emulated hand",
     "calibrate/older_models.py": "keys of model files of version 1",
     "calibrate/model_file.py": "what a model file of version 1 without the key holds",
     "calibeam/simulation/mechanism_by_hand.py": "instruments that a mechanism acts on: words of the simulators",
