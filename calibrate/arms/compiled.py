@@ -51,11 +51,6 @@ class ArmConstants:
             arm.by_reading,
         )
 
-    def of_columns(self, columns: Indices) -> Self:
-        """The same arm, where only these parameters are asked for, in this order."""
-        moves, twists = self.moves_frame[columns], self.body_twists[columns]
-        return type(self)(self.fixed, self.offset_rad, moves, twists, self.by_reading)
-
     def half_tangents(self, q_rad: Floats) -> Floats:
         """(pose, joint) tangent of half of every joint angle, what fast.py makes sine and cosine of."""
         half = np.add(uncoupled(self.by_reading, q_rad), self.offset_rad, order="C")

@@ -84,15 +84,6 @@ def test_a_point_and_its_derivatives_are_the_same_by_loops_and_by_numpy(arm, mon
         np.testing.assert_allclose(one, other, atol=1e-12)
 
 
-def test_some_columns_in_any_order_are_those_of_the_whole(arm):
-    theta, q = drawn(arm, 70)
-    chosen = np.random.default_rng(1).permutation(len(arm.parameters))[:3]
-    whole, tool = compiled.ArmConstants.of(arm, theta), np.array([0.1, 0.2, 0.3])
-    _, some = compiled.point_and_jacobian(whole.of_columns(chosen), tool, q)
-    _, all_columns = compiled.point_and_jacobian(whole, tool, q)
-    np.testing.assert_array_equal(some, all_columns[:, :, chosen])
-
-
 def test_no_poses_give_empty_answers(arm):
     theta, q = drawn(arm, 0)
     constants = compiled.ArmConstants.of(arm, theta)
