@@ -37,7 +37,6 @@ SILENT_S = 0.5  # a node that answers no SYNC for so long is gone
 HEARTBEAT_GOES_ON_S = 0.49  # of SILENT_S: a heartbeat this fresh is one of after the silence began
 BATCH_S = 0.02  # rows gathered in one block; more only delays a reader
 TOGETHER_S = 1.1e-3  # answers wait so long for the next SYNC: at 1 kHz one waking a row in place of two or more
-HELD_UP_S = 0.05  # a thread that waits so much longer than it asked to was kept from running
 SYNC = can.Message(arbitration_id=codec.SYNC_ID, is_extended_id=False)
 
 
@@ -125,9 +124,8 @@ class Cia406Encoders(StreamDevice[can.BusABC]):
                 due_s = max(now_s, min(self._cycle.wakes_s, deadline_s))
                 messages = self._receive(due_s - now_s)
                 now_s = self._clock.now_s()
-                self._watch.heartbeats.woke(now_s - due_s)
-                if now_s - due_s > HELD_UP_S:  # this thread sent no SYNC meanwhile: no silence of the encoders
-                    deadline_s += now_s - due_s
+                # This thread sent no SYNC meanwhile: no silence of the encoders.
+                deadline_s += self._watch.heartbeats.woke(now_s - due_s)
                 # Before the work on what came, which is of earlier SYNCs: it would delay this one, and its answers.
                 sent = now_s >= self._cycle.wakes_s and self._keep_pace(now_s)
                 self._take_all(messages, now_s)
@@ -269,14 +267,16 @@ class Cia406Encoders(StreamDevice[can.BusABC]):
                 self._add(rows)
 
     def _check_silence(self, now_s: float) -> None:
-        silent = self._cycle.silent(SILENT_S, now_s)
+        # No more than twice as long: benches stop their arm after 1 s.
+        silent = self._cycle.silent(SILENT_S + min(self._watch.heartbeats.busy_s, SILENT_S), now_s)
         if not silent:
             return
         self._faults.check(self._opened())
         alive = self._watch.heard_within(silent, HEARTBEAT_GOES_ON_S, now_s)
+        busy = self._watch.heartbeats.excuse()
         remedy = "its heartbeat goes on: check SYNC and TPDO2" if alive else "check its power, cable and termination"
         mute = ", ".join(str(self.nodes[place]) for place in silent)
-        raise DeviceStale(f"{self.name}: encoder {mute} has answered no SYNC for {SILENT_S:g} s; {remedy}")
+        raise DeviceStale(f"{self.name}: encoder {mute} has answered no SYNC for {SILENT_S:g} s; {busy}{remedy}")
 
     def _add(self, rows: Sequence[Row]) -> None:
         for row in rows:

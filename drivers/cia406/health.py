@@ -22,7 +22,6 @@ PAUSE_S = 0.05  # longer than any node at 20 SYNCs a second is silent
 ALLOWED = 10.0  # an emulator on a busy machine was seen at a seventh of its speed
 MOST = 15.0  # periods
 LATE_S = 0.002  # on a quiet machine a thread wakes within 0.3 ms
-BUSY_S = 0.05  # of lateness: less explains nothing
 
 
 class Heartbeats:
@@ -34,9 +33,9 @@ class Heartbeats:
     def __init__(self, nodes: Sequence[int], period_s: float) -> None:
         self._nodes = tuple(nodes)
         self._period_s = period_s
-        self._alive_s = 0.0
+        # `since_any`: since the last heartbeat of anybody, alive time as this host counts it
+        self._alive_s = self._since_any_s = self.busy_s = 0.0
         self._looked_s: float | None = None
-        self._since_any_s = self.busy_s = 0.0  # since the last heartbeat of anybody: as this host counts alive time
         self._heard_s: dict[int, float] = {}  # in alive time
 
     def begin(self, now_s: float) -> None:
@@ -45,9 +44,15 @@ class Heartbeats:
         self._since_any_s = self.busy_s = 0.0
         self._heard_s = dict.fromkeys(self._nodes, 0.0)
 
-    def woke(self, late_s: float) -> None:
-        """A wait of this program ended so much later than it was to; less than LATE_S is no lateness."""
-        self.busy_s += late_s if late_s > LATE_S else 0.0
+    def woke(self, late_s: float) -> float:
+        """A wait of this program ended so much later than it was to; returns what of it counts (s): from LATE_S on."""
+        self.busy_s += (late_s := late_s if late_s > LATE_S else 0.0)
+        return late_s
+
+    def excuse(self) -> str:
+        """The beginning of a remedy, where it may be this computer; else nothing."""
+        text = f"this computer was busy for {self.busy_s:.1f} s, end other programs; else "
+        return text if self.busy_s >= PAUSE_S else ""
 
     def look(self, now_s: float) -> None:
         """A frame came."""
@@ -103,10 +108,9 @@ class NodeWatch:
 
     def check_heartbeats(self) -> None:
         """DeviceStale naming the nodes whose heartbeat stays away; call when nothing waits to be received."""
-        busy_s = self.heartbeats.busy_s
+        busy = self.heartbeats.excuse()
         late = self.heartbeats.late() if self._operational else ()
         if late:
-            busy = "" if busy_s < BUSY_S else f"this computer was busy for {busy_s:.1f} s, end other programs; else "
             raise DeviceStale(
                 f"{self._name}: no heartbeat from encoder {', '.join(map(str, late))} for 1.5 periods; {busy}"
                 "check its power and cable, and whether another master changed its 1017h"

@@ -145,6 +145,27 @@ def test_who_was_late_is_said(memory, monkeypatch):
         read_for(memory, 10.0)
 
 
+def test_a_node_that_is_silent_on_a_busy_machine_is_found_within_a_second_and_the_message_says_busy(
+    memory, monkeypatch
+):
+    memory.encoders.connect()
+    read_for(memory, 1.0)
+    for node in memory.nodes:
+        node.silent = True
+    recv, since_s = memory.bus.recv, memory.clock.now_s()
+
+    def late(timeout=None):
+        if timeout:
+            memory.clock.sleep_s(0.03)
+        return recv(timeout)
+
+    monkeypatch.setattr(memory.bus, "recv", late)
+    busy = r"encoder 1, 2 has answered no SYNC for 0.5 s; this computer was busy for \d\.\d s, end other programs; else"
+    with pytest.raises(DeviceStale, match=busy):
+        read_for(memory, 10.0)
+    assert 0.5 < memory.clock.now_s() - since_s < 1.3
+
+
 # --- the bus itself
 
 

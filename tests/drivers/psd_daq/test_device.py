@@ -9,7 +9,7 @@ import pytest
 
 from drivers.device import Block
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale, WireError
-from drivers.psd_daq.codec import frame
+from drivers.psd_daq.codec import DATA_HEAD, SAMPLE, frame
 from drivers.psd_daq.device import BAUD, PsdDaq
 from drivers.psd_daq.messages import Flag, MessageType
 from drivers.transports.serial_port import SerialAddress, open_serial
@@ -248,6 +248,22 @@ def test_only_damaged_frames_are_a_wire_error():
     daq._line._waiting += b"\x07\x07\x07\x00"
     with pytest.raises(WireError, match=r"1 damaged frames .* 07 07 07"):
         daq.read(1.0)
+
+
+def test_what_waits_when_this_program_comes_late_is_no_silence():
+    """The time is over before the first look at the line."""
+
+    def answer(data: bytes) -> bytes:
+        if data[2] == MessageType.START_STREAM:
+            return frame(MessageType.ACK, b"\x02")
+        return documented_identity() if data[2] == MessageType.IDENTIFY else b""
+
+    daq, line = in_memory(answer)
+    daq.connect()
+    line._waiting += frame(MessageType.DATA, DATA_HEAD.pack(7, 1_000_000, 1_000_000, 1, 2500) + bytes(SAMPLE.itemsize))
+    assert daq.read(0.0).device_s == pytest.approx([1.0])
+    with pytest.raises(DeviceStale, match="no sample within 0 s"):
+        daq.read(0.0)
 
 
 @pytest.mark.parametrize("rate_hz", [99.0, 4001.0, 1000.5, float("nan")])
