@@ -222,7 +222,7 @@ def travelling(s: Staged) -> bool:
 
 def centring(s: Staged) -> bool:
     """The light was found, and the arm makes the small motions that bring it to the middle."""
-    return _agreed(s) and s.until(lambda: "search for the light" in s.log) and s.until(
+    return _agreed(s) and s.until(lambda: ": search {" in s.log) and s.until(
         lambda: s.watch.newest()[1] > 0.02
     )  # fmt: skip
 
