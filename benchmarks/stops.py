@@ -222,7 +222,7 @@ def travelling(s: Staged) -> bool:
 
 def centring(s: Staged) -> bool:
     """The light was found, and the arm makes the small motions that bring it to the middle."""
-    return _agreed(s) and s.until(lambda: "search for the light" in s.log) and s.until(
+    return _agreed(s) and s.until(lambda: ": search {" in s.log) and s.until(
         lambda: s.watch.newest()[1] > 0.02
     )  # fmt: skip
 
@@ -434,7 +434,7 @@ def measured(rig: Path, state: str, event: str) -> Cell | None:
         late_s = SETTLED_S + (0.0 if event.startswith("controller and") else frozen_s)
         after = speeds[stamps - begin_s > late_s]
         text = s.log[said:].splitlines()
-        says = next((line.partition("Z ")[2] for line in text if "Z pause: " in line or "STOPPED" in line), "")
+        says = next((line.partition(": ")[2] for line in text if ": pause: " in line or "STOPPED" in line), "")
         return Cell(
             state,
             event,
@@ -442,7 +442,7 @@ def measured(rig: Path, state: str, event: str) -> Cell | None:
             float(after.max()) if len(after) else 0.0,
             s.process.poll(),
             "goes on" in s.screen and "the recording is closed" in s.screen,
-            says or (text[-1].partition("Z ")[2] if text else ""),
+            says or (text[-1].partition(": ")[2] if text else ""),
             _samples(s.folder / "out"),
             ended_s,
             max((path.stat().st_mtime - unix_s for path in (s.folder / "out").glob("*.mcap")), default=float("nan")),

@@ -55,7 +55,7 @@ from acquisition.recording.sample_rules import checked_samples
 from acquisition.recording.samples import Cell, Floats
 
 ANSWER_S = 30.0  # a disk that takes longer than this for what waits is reported, not waited for
-LONGEST = 300  # characters of an event's detail in the log; the recording has it all
+LONGEST = 160  # characters of an event's detail in the log; the recording has it all
 LOUD = ("device failed", "device lost", "ended early", "skipped")  # kinds of event that are warnings in the log
 log = logging.getLogger(__name__)
 log.addHandler(logging.NullHandler())  # a program without a log of its own prints none of these
