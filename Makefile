@@ -86,7 +86,7 @@ $(BENCH)/.ready: requirements/all.txt requirements/bench.txt pyproject.toml
 
 # Renew the pins after changing pyproject.toml (needs pip-tools). Hashes only: no address enters the file.
 pins:
-	pip-compile --quiet --generate-hashes --strip-extras --extra dev --extra fleet --extra viewers --allow-unsafe \
+	pip-compile --quiet --generate-hashes --strip-extras --extra camera --extra dev --extra fleet --extra ros --extra viewers --allow-unsafe \
 	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host -o requirements/all.txt pyproject.toml
 	pip-compile --quiet --generate-hashes --strip-extras --allow-unsafe \
 	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host -o requirements/bench.txt requirements/bench.in

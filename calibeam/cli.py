@@ -40,6 +40,8 @@ TOLD = (
     SamplesError,
     WorldError,
 )
+# Libraries that not every job needs, and the extra of the installation that brings each.
+EXTRAS = {"cv2": "camera", "distributed": "fleet", "foxglove": "viewers", "rosbags": "ros"}
 
 
 def _new_app() -> App:
@@ -93,6 +95,12 @@ def _run(arguments: list[str]) -> int:
         return 1
     except TOLD as error:
         errors.print("error:", brief(str(error)), markup=False)
+        return 1
+    except ModuleNotFoundError as missing:
+        if (library := (missing.name or "").partition(".")[0]) not in EXTRAS:
+            raise
+        remedy = f'pip install "calibeam[{EXTRAS[library]}]", which brings it'
+        errors.print(f"error: this needs the library {library}, which is not installed; {remedy}", markup=False)
         return 1
     except MemoryError:
         errors.print("error: this machine has not enough memory for these files; give fewer rows, or close programs")

@@ -36,7 +36,6 @@ OF_OUR_OWN: dict[str, Any] = {
 WAIT_S = 30.0  # for the first worker of a cluster
 MARGIN_S = 60.0  # beyond what any recording may take, for a cluster to start and to move a task
 LOST = f"the worker that had it died or stopped answering {ROUNDS} times"
-NEEDS_DASK = "--engine dask needs Dask, which is not installed; pip install 'calibeam[fleet]', or take --engine loky"
 NEEDS_LIMIT = (  # Dask gives up what killed its workers, and joblib is not informed
     "--timeout 0 is not for --engine dask: a file that kills its workers would never end; "
     "give seconds, or take --engine loky"
@@ -127,10 +126,8 @@ def _check(client: Any, where: str) -> None:
 
 @contextmanager
 def _client(workers: Workers) -> Generator[Any]:
-    try:
-        from distributed import Client, LocalCluster
-    except ImportError as error:
-        raise DataError(NEEDS_DASK) from error
+    from distributed import Client, LocalCluster
+
     if workers.scheduler is not None:
         try:
             client = Client(workers.scheduler, set_as_default=False, timeout=10)

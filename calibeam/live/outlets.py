@@ -65,15 +65,10 @@ class LiveViews:
 
 
 class FoxgloveOutlet:
-    """A WebSocket server on this machine only. OutletError where the SDK or the port is not to be had."""
+    """A WebSocket server on this machine only. OutletError where the port is not to be had."""
 
     def __init__(self, port: int, name: str) -> None:
-        try:
-            self._sdk: Any = importlib.import_module("foxglove")
-        except ImportError as error:
-            raise OutletError(
-                "--foxglove needs the Foxglove SDK: install it with `pip install foxglove-sdk`, or open the recording"
-            ) from error
+        self._sdk: Any = importlib.import_module("foxglove")
         self._context = self._sdk.Context()
         try:
             self._server = self._sdk.start_server(name=name, host=LOOPBACK, port=port, context=self._context)

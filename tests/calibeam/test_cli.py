@@ -1,5 +1,9 @@
 """The command line: exit codes, and one clear sentence for everything that is wrong with the user's world."""
 
+import json
+import subprocess
+import sys
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -7,14 +11,15 @@ import pytest
 from rich.console import Console
 
 from acquisition.recording import read
-from calibeam.cli import run
+from calibeam.cli import EXTRAS, run
 from calibeam.devices.recorder import new_recording
 from calibeam.emulation import Emulation
 from calibeam.outcome import PartialResult
 from calibeam.results.session_results import write_session_results
 from drivers.clock import SystemClock
 
-RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
+ROOT = Path(__file__).parents[2]
+RIG = ROOT / "rigs" / "ur5e-dual-psd.toml"
 
 
 @pytest.fixture
@@ -202,3 +207,64 @@ def test_a_missing_input_is_not_answered_with_another_out(tmp_path: Path, capsys
     assert str(missing) in said
     assert "check the path" in said
     assert "--out" not in said
+
+
+WITHOUT = """
+import importlib, json, sys
+blocked = json.loads(sys.argv[1])
+sys.modules.update(dict.fromkeys(blocked))
+from calibeam.cli import run
+from calibeam.command_list import COMMANDS
+for place in COMMANDS.values():
+    importlib.import_module("calibeam.commands." + place.partition(":")[0])
+for place in ("acquisition.session.session", "calibeam.devices.recorder", "calibeam.live.outlets"):
+    importlib.import_module(place)
+sys.exit(run(sys.argv[2:]))
+"""
+
+
+def _without_extras(*arguments: str | Path) -> tuple[int, str]:
+    """Exit code and standard error of a command line in a process that has no library of an extra."""
+    command = [sys.executable, "-c", WITHOUT, json.dumps(sorted(EXTRAS)), *map(str, arguments)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
+    return done.returncode, " ".join(done.stderr.split())
+
+
+@pytest.mark.parametrize("command", ["emulate --json --no-links", "camera --yes --out"])
+def test_a_camera_without_opencv_names_the_extra_and_nothing_else_loads_it(command: str, tmp_path: Path) -> None:
+    rig = ROOT / "rigs" / "ur5e-dual-psd-camera.toml"
+    name, *options = command.split()
+    more = [tmp_path / "out"] if options[-1] == "--out" else []
+    code, said = _without_extras(name, rig, *options, *more)
+    needs = 'this needs the library cv2, which is not installed; pip install "calibeam[camera]", which brings it'
+    assert (code, said) == (1, f"error: {needs}")
+
+
+@pytest.fixture
+def bag_import(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """An import of a ROS 2 bag where its reader is not installed."""
+    monkeypatch.setitem(sys.modules, "rosbags.rosbag2", None)
+    (tmp_path / "bag").mkdir()
+    (tmp_path / "bag" / "metadata.yaml").touch()
+    return ["import", str(tmp_path / "bag"), "--streams", "--rig", str(RIG), "--out", str(tmp_path / "x.mcap"), "--yes"]
+
+
+def test_a_bag_without_its_reader_names_the_extra(bag_import: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(bag_import) == 1
+    said = " ".join(capsys.readouterr().err.split())
+    assert said.endswith('the library rosbags, which is not installed; pip install "calibeam[ros]", which brings it')
+
+
+def test_a_library_that_no_extra_brings_is_a_fault_of_ours(
+    bag_import: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delitem(EXTRAS, "rosbags")
+    with pytest.raises(ModuleNotFoundError):
+        run(bag_import)
+
+
+def test_every_library_of_an_extra_is_in_the_installation_of_that_name() -> None:
+    packages = {"cv2": "opencv-python-headless", "distributed": "distributed", "foxglove": "foxglove-sdk"}
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    for library, extra in EXTRAS.items():
+        assert any(entry.startswith(packages.get(library, library)) for entry in extras[extra])

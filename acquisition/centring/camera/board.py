@@ -1,13 +1,13 @@
 """The printed board on the fixture as a camera sees it: its markers in a picture, and from these where the fixture is.
 
 The arm's zeros are wrong by degrees, so this is where the fixture must be assumed to be *for the arm as it stands*:
-right for what is near, and taken again after every longer way.
+right for what is near, and taken again after every longer way. OpenCV, of the extra "camera", is loaded where a picture
+is read: sessions without a camera do without.
 """
 
 from dataclasses import dataclass
 from typing import Protocol
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,7 +29,7 @@ class Eye(Protocol):
 
 Floats = NDArray[np.float64]
 
-DICTIONARIES = {"aruco-4x4-50": cv2.aruco.DICT_4X4_50, "apriltag-36h11": cv2.aruco.DICT_APRILTAG_36h11}
+DICTIONARIES = {"aruco-4x4-50": "DICT_4X4_50", "apriltag-36h11": "DICT_APRILTAG_36h11"}
 # Corners are refined within this share of a marker's module, and not nearer to the next edge.
 REFINE_MODULES = 0.4
 
@@ -47,7 +47,9 @@ class Board:
 
     def __init__(self, drawing: CameraBoard) -> None:
         """ValueError where the dictionary has no such markers."""
-        dictionary = cv2.aruco.getPredefinedDictionary(DICTIONARIES[drawing.dictionary])
+        import cv2
+
+        dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, DICTIONARIES[drawing.dictionary]))
         count = drawing.columns * drawing.rows
         if drawing.first_id + count > len(dictionary.bytesList):
             raise ValueError(
@@ -99,6 +101,8 @@ def board_poses(model: CameraModel, seen: Seen) -> list[tuple[Floats, float]]:
     Source: T. Collins, A. Bartoli, "Infinitesimal plane-based pose estimation", IJCV 109 (2014) 252; refined by
     Levenberg-Marquardt.
     """
+    import cv2
+
     given = (seen.points_m, seen.pixels, model.matrix_px, model.distortion)
     count, turns, shifts, _ = cv2.solvePnPGeneric(*given, flags=cv2.SOLVEPNP_IPPE)
     found: list[tuple[Floats, float]] = []

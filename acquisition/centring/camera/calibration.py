@@ -1,7 +1,7 @@
 """Lens and mount of the camera from one short tour: the board seen from many sides, the arm's readings beside it.
 
-Lens: Z. Zhang, "A flexible new technique for camera calibration", IEEE PAMI 22 (2000) 1330, by OpenCV. Mount: F. Park,
-B. Martin, "Robot sensor calibration: solving AX = XB on the Euclidean group", IEEE Trans. Robot. Autom. 10 (1994) 717.
+Lens: Z. Zhang, "A flexible new technique for camera calibration", IEEE PAMI 22 (2000) 1330, by OpenCV.
+Mount: `hand_eye`.
 """
 
 from collections.abc import Sequence
@@ -59,15 +59,15 @@ def calibrate_camera(views: Sequence[View], start: CameraModel) -> Calibration:
     """`start`: the nominal camera. Never raises for bad views."""
     if len(views) < LEAST_VIEWS:
         return Calibration(CameraStatus.TOO_FEW_VIEWS)
-    if _turn_rad(views) < LEAST_TURN_RAD:
+    T_base_flange = np.array([view.T_base_flange for view in views])
+    if _turn_rad(T_base_flange) < LEAST_TURN_RAD:
         return Calibration(CameraStatus.TOO_LITTLE_TURN)
     model, reprojection_px = _lens(views, start)
     poses = [board_poses(model, view.seen) for view in views]
     if reprojection_px > WORST_PX or not all(poses):
         return Calibration(CameraStatus.POOR_LENS, fit=CameraFit(len(views), reprojection_px, np.nan, np.nan))
     T_camera_board = np.array([pose[0][0] for pose in poses])
-    T_base_flange = np.array([view.T_base_flange for view in views])
-    model = replace(model, T_flange_camera=_mount(T_base_flange, T_camera_board))
+    model = replace(model, T_flange_camera=hand_eye(T_base_flange, T_camera_board))
     board_m, board_rad = _scatter(T_base_flange @ model.T_flange_camera @ T_camera_board)
     fit = CameraFit(len(views), reprojection_px, board_m, board_rad)
     if board_m > WORST_M or board_rad > WORST_RAD:
@@ -87,25 +87,39 @@ def _lens(views: Sequence[View], start: CameraModel) -> tuple[CameraModel, float
     return model, float(rms) / np.sqrt(2.0)  # OpenCV's is of a point, this of a coordinate
 
 
-def _mount(T_base_flange: Floats, T_camera_board: Floats) -> Floats:
-    R, t = cv2.calibrateHandEye(
-        list(T_base_flange[:, :3, :3]),
-        list(T_base_flange[:, :3, 3]),
-        list(T_camera_board[:, :3, :3]),
-        list(T_camera_board[:, :3, 3]),
-        method=cv2.CALIB_HAND_EYE_PARK,
-    )
+def hand_eye(T_base_flange: Floats, T_camera_board: Floats) -> Floats:
+    """T_flange_camera (4, 4), in m, from poses (view, 4, 4) of the flange and of a board that stands still.
+
+    Each pair of views gives A X = X B, with A the motion of the flange and B that of the camera. The rotation is the
+    direction that is least changed by the linear system A R - R B = 0 in its nine elements, and the rotation nearest to
+    it; the translation is the least-squares solution of (A - 1) t = R t_B - t_A. No logarithm is taken, so half turns
+    need no care. ValueError where the flange turned about one axis only: the shift along it would be free.
+
+    Source: N. Andreff, R. Horaud, B. Espiau, "Robot hand-eye calibration using structure-from-motion", Int. J. Robotics
+    Research 20 (2001) 228; the equation: Y. Shiu, S. Ahmad, IEEE Trans. Robot. Autom. 5 (1989) 16.
+    """
+    if (turn_rad := _turn_rad(T_base_flange)) < LEAST_TURN_RAD:
+        raise ValueError(
+            f"flange: turned {turn_rad:.3f} rad about a second axis, not {LEAST_TURN_RAD}; take views from more sides"
+        )
+    one, other = np.triu_indices(len(T_base_flange), 1)
+    A = inverse(T_base_flange[other]) @ T_base_flange[one]
+    B = T_camera_board[other] @ inverse(T_camera_board[one])
+    changed = np.einsum("pij,kl->pikjl", A[:, :3, :3], np.eye(3)) - np.einsum("ij,plk->pikjl", np.eye(3), B[:, :3, :3])
+    nearly = np.linalg.svd(changed.reshape(-1, 9), full_matrices=False)[2][-1].reshape(3, 3)
+    U, _, V = np.linalg.svd(nearly * np.sign(np.linalg.det(nearly)))
     T = np.eye(4)
-    T[:3, :3], T[:3, 3] = R, np.ravel(t)
+    T[:3, :3] = U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V
+    along = B[:, :3, 3] @ T[:3, :3].T - A[:, :3, 3]
+    T[:3, 3] = np.linalg.lstsq((A[:, :3, :3] - np.eye(3)).reshape(-1, 3), along.reshape(-1), rcond=None)[0]
     return T
 
 
-def _turn_rad(views: Sequence[View]) -> float:
+def _turn_rad(T_base_flange: Floats) -> float:
     """The second largest extent of the turns between the flange's postures, as rotation vectors from the first."""
-    first = inverse(views[0].T_base_flange)
-    turns = rotation_vector(np.array([(first @ view.T_base_flange)[:3, :3] for view in views]))
+    turns = rotation_vector((inverse(T_base_flange[0]) @ T_base_flange)[:, :3, :3])
     spread = np.linalg.svd(turns - turns.mean(axis=0), compute_uv=False)
-    return float(spread[1]) / np.sqrt(len(views))
+    return float(spread[1]) / np.sqrt(len(turns))
 
 
 def _scatter(T_base_board: Floats) -> tuple[float, float]:

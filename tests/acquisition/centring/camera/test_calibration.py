@@ -8,10 +8,10 @@ import pytest
 
 from acquisition.centring.camera import measuring
 from acquisition.centring.camera.board import Board
-from acquisition.centring.camera.calibration import CameraStatus, calibrate_camera
+from acquisition.centring.camera.calibration import CameraStatus, calibrate_camera, hand_eye
 from acquisition.centring.camera.model import CameraFit, drawn, read_model, write_model
 from acquisition.errors import AcquisitionError
-from acquisition.motion.kinematics import apart, transform
+from acquisition.motion.kinematics import apart, inverse, transform
 from benchmarks.coarse_aim import measured_world
 from tests.support.direct_bench import DirectEye
 
@@ -42,6 +42,53 @@ def test_lens_and_mount_are_found(toured) -> None:
     assert off_rad < 5e-3
     assert found.fit.reprojection_px < 0.3
     assert found.fit.board_m < 1e-3
+
+
+def _poses(rng: np.random.Generator, count: int, turn_rad: float) -> np.ndarray:
+    return np.array([transform(rng.normal(0.0, 0.5, 3), rng.normal(0.0, turn_rad, 3)) for _ in range(count)])
+
+
+def _seen(T_base_flange: np.ndarray, mount: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """T_camera_board of a board that stands anywhere."""
+    return inverse(T_base_flange @ mount) @ _poses(rng, 1, 1.0)[0]
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize(("count", "turn_rad"), [(5, 1.0), (10, 0.7), (12, 2.5)])
+def test_the_mount_comes_out_exactly_of_exact_poses(seed: int, count: int, turn_rad: float) -> None:
+    rng = np.random.default_rng(seed)
+    mount, T_base_flange = _poses(rng, 1, 1.5)[0], _poses(rng, count, turn_rad)
+    off_m, off_rad = apart(hand_eye(T_base_flange, _seen(T_base_flange, mount, rng)), mount)
+    assert off_m < 1e-10
+    assert off_rad < 1e-10
+
+
+def test_half_turns_between_views_do_no_harm() -> None:
+    rng = np.random.default_rng(4)
+    half = [transform(rng.normal(0.0, 0.5, 3), turn) for turn in np.pi * np.vstack([np.eye(3), -np.eye(3)])]
+    T_base_flange, mount = np.array([np.eye(4), *half, *_poses(rng, 3, 0.7)]), _poses(rng, 1, 1.5)[0]
+    assert apart(hand_eye(T_base_flange, _seen(T_base_flange, mount, rng)), mount) == pytest.approx(
+        (0.0, 0.0), abs=1e-9
+    )
+
+
+def test_the_mount_is_off_by_about_what_the_pictures_are() -> None:
+    """Over 200 tours of ten views, 1 mm and 2 mrad off each: rms within what ten views leave of these."""
+    off = []
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        mount, T_base_flange = transform((0.05, 0.0, 0.08), (0.1, 0.2, 1.5)), _poses(rng, 10, 0.7)
+        noise = np.array([transform(rng.normal(0.0, 1e-3, 3), rng.normal(0.0, 2e-3, 3)) for _ in T_base_flange])
+        off.append(apart(hand_eye(T_base_flange, _seen(T_base_flange, mount, rng) @ noise), mount))
+    rms_m, rms_rad = np.sqrt(np.mean(np.square(off), axis=0))
+    assert 2e-4 < rms_m < 3e-3
+    assert 5e-4 < rms_rad < 3e-3
+
+
+def test_turns_about_one_axis_have_no_mount() -> None:
+    T_base_flange = np.array([transform((0.1 * k, 0.0, 0.0), (0.0, 0.0, 0.3 * k)) for k in range(9)])
+    with pytest.raises(ValueError, match=r"turned 0\.000 rad about a second axis, not 0\.3; take views from more"):
+        hand_eye(T_base_flange, _seen(T_base_flange, np.eye(4), np.random.default_rng(1)))
 
 
 def test_few_views_are_refused(rig, toured) -> None:
