@@ -19,12 +19,13 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))  # this file is run as a script
+TWO_AT_A_TIME = ("-n", "2", "--dist", "loadfile")  # a file's tests share their emulators, in their order
 # Each worker takes one half in the order of the files, so that what a file shares is made once; whoever is through
 # takes from the other's rest.
-TWO_AT_A_TIME = ("-n", "2", "--dist", "worksteal")
+EVENLY = ("-n", "2", "--dist", "worksteal")
 ENDURING, MUTATIONS = ("-m", "endure", "--timeout", "3600"), "tests/calibeam/mutations"  # half of the time of all
 ON_WIRES = ("-m", "wired and not endure")
-CALCULATING = ("-m", "not endure and not wired", *TWO_AT_A_TIME)
+CALCULATING = ("-m", "not endure and not wired", *EVENLY)
 
 
 # Of the program's tests on wires those without a session: pages, workers, refusals, logs, checks, single motions, the
