@@ -28,13 +28,12 @@ ON_WIRES = ("-m", "wired and not endure")
 CALCULATING = ("-m", "not endure and not wired", *EVENLY)
 
 
-# Of the program's tests on wires those without a session: pages, workers, refusals, logs, checks, single motions, the
-# camera. They leave others room, too.
+# Of the program's tests on wires those without a motion: pages, workers, refusals, logs, checks. They leave others
+# room, too.
 PATIENT = tuple(
     f"tests/calibeam/{name}"
     for name in (
-        "fleet", "live/test_browser.py", "live/test_page.py", "test_camera_cli.py", "test_check_cli.py", "test_cli.py",
-        "test_log_cli.py", "test_motion_cli.py", "test_psd_check_cli.py",
+        "fleet", "live/test_browser.py", "live/test_page.py", "test_check_cli.py", "test_cli.py", "test_log_cli.py",
     )
 )  # fmt: skip
 
