@@ -94,4 +94,4 @@ pins:
 	  --no-emit-index-url --no-emit-find-links --no-emit-trusted-host -o requirements/clients.txt requirements/clients.in
 
 clean:
-	rm -rf $(VENV) $(BENCH) $(CLIENTS) out .pytest_cache .ruff_cache
+	rm -rf $(VENV) $(VENV)-python* $(BENCH) $(CLIENTS) out .pytest_cache .ruff_cache

@@ -9,6 +9,7 @@ With --phase WORD only the phases whose name has the word: `make test PHASE=calc
 
 import argparse
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -26,6 +27,7 @@ EVENLY = ("-n", "2", "--dist", "worksteal")
 ENDURING, MUTATIONS = ("-m", "endure", "--timeout", "3600"), "tests/calibeam/mutations"  # half of the time of all
 ON_WIRES = ("-m", "wired and not endure")
 CALCULATING = ("-m", "not endure and not wired", *EVENLY)
+PYTHONS = ("python3.11", "python3.12", "python3.13")
 
 
 # Of the program's tests on wires those without a motion: pages, workers, refusals, logs, checks. They leave others
@@ -40,11 +42,12 @@ PATIENT = tuple(
 
 @dataclass(frozen=True)
 class Phase:
-    """One run of pytest: its arguments, and what its environment has beside that of the caller."""
+    """One run of pytest: its arguments, what its environment has beside that of the caller, and another Python."""
 
     name: str
     arguments: tuple[str, ...]
     environment: Mapping[str, str] = field(default_factory=dict[str, str])
+    interpreter: str = ""  # a command; empty: the Python that runs this file
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,7 @@ def fast() -> tuple[Phase, ...]:
 
 
 def endure() -> tuple[Phase, ...]:
-    """The marked tests, then the calculating phase with other linear algebra and other vector units.
+    """The marked tests, then the calculating phase with other linear algebra, other vector units, other Pythons.
 
     OPENBLAS_CORETYPE chooses the kernels of OpenBLAS, NPY_DISABLE_CPU_FEATURES the loops of numpy, and NUMBA_CPU_NAME
     what numba compiles for: together they round as another processor does. Kernels that this processor cannot run are
@@ -94,7 +97,15 @@ def endure() -> tuple[Phase, ...]:
             for name, flag, more in kernels
             if flag in able
         ),
+        *(Phase(f"calculating, {name}", CALCULATING, interpreter=name) for name in other_pythons()),
     )
+
+
+def other_pythons() -> list[str]:
+    """Commands of PYTHONS that are here, but for the version that runs this file."""
+    own = "python{}.{}".format(*sys.version_info)
+    found = (name for name in PYTHONS if name != own and shutil.which(name))
+    return [name for name in found if subprocess.run([name, "--version"], capture_output=True).returncode == 0]
 
 
 def main() -> int:
@@ -118,9 +129,19 @@ def run(phase: Phase, results: Path) -> Outcome:
     results.unlink(missing_ok=True)
     print(f"\n===== {phase.name} =====", flush=True)
     begin_s = time.monotonic()
-    command = [sys.executable, "-m", "pytest", *phase.arguments, f"--junitxml={results}"]
-    code = subprocess.run(command, cwd=ROOT, env=_environment(phase), check=False).returncode
+    interpreter, code = _prepared(phase)
+    command = [interpreter, "-m", "pytest", *phase.arguments, f"--junitxml={results}"]
+    code = code or subprocess.run(command, cwd=ROOT, env=_environment(phase), check=False).returncode
     return Outcome(phase.name, code, *_counts(results, code), time.monotonic() - begin_s)
+
+
+def _prepared(phase: Phase) -> tuple[str, int]:
+    """The interpreter of this phase, and what its set-up ended with; another Python has its own environment."""
+    if not phase.interpreter:
+        return sys.executable, 0
+    environment = ROOT / f".venv-{phase.interpreter}"
+    words = ["make", "setup", f"VENV={environment.name}", f"PYTHON={phase.interpreter}"]
+    return str(environment / "bin" / "python"), subprocess.run(words, cwd=ROOT, check=False).returncode
 
 
 def _environment(phase: Phase) -> dict[str, str]:

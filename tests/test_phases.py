@@ -123,3 +123,13 @@ def test_other_rounding_is_asked_for_by_environment():
     threads = {phase.environment.get("OPENBLAS_NUM_THREADS") for phase in phases.endure()}
     assert {"2"} < threads
     assert kernels - {None} <= {"Haswell", "Zen", "SkylakeX"}
+
+
+def test_other_pythons_are_tried_where_they_are(monkeypatch, tmp_path):
+    own = "python{}.{}".format(*sys.version_info)
+    for name, code in (("python3.12", 0), ("python3.13", 127), (own, 0)):  # a shim without its version ends with 127
+        (tmp_path / name).write_text(f"#!/bin/sh\nexit {code}\n")
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert phases.other_pythons() == [name for name in ("python3.12",) if name != own]
+    assert {phase.interpreter for phase in phases.endure()} == {"", *phases.other_pythons()}

@@ -74,7 +74,7 @@ class Cia406Encoders(StreamDevice[can.BusABC]):
         self._angles: tuple[ContinuousAngle, ...] = ()
         self._positions: tuple[MappedNumber, ...] = ()
         self._node_of_pdo: dict[int, int] = {}  # CAN identifier to place in `nodes`
-        self._watch = NodeWatch(name, self.nodes, HEARTBEAT_MS * 1e-3)
+        self._watch = NodeWatch(name, self.nodes, HEARTBEAT_MS * 1e-3, self._period_s)
         self._faults = BusFaults(name)
         self._bad_lines = 0
         self._rows: list[WatchedRow] = []

@@ -1,12 +1,13 @@
 """What encoders report of their own health: emergencies, heartbeats, a restart that nobody ordered.
 
 A heartbeat that stays away is found within one and a half periods, without blaming nodes for a pause of the host: time
-counts only while the bus is heard, between two frames of anybody at most PAUSE_S. A host that slept, an adapter that
-was held up, an emulator that fell behind shows as a gap and makes nobody late. A bus on which nothing is heard at all
-is no question of heartbeats: then SYNC is without answer.
+counts only while the bus is heard, between two frames of anybody one and a half SYNCs, at most PAUSE_S. A host that
+slept, an adapter that was held up, an emulator that fell behind shows as a gap and makes nobody late. A bus on which
+nothing is heard at all is no question of heartbeats: then SYNC is without answer.
 
 Nodes send heartbeats by their own clocks, so between two heartbeats of anybody at most a period has passed for them,
-however long it took here: no more than that makes a single node late. Where no heartbeat comes at all, what remains
+however long it took here: no more than that makes a single node late. Where nodes send one after another each of these
+gaps counts, so a period is what the slowest of the others last took. Where no heartbeat comes at all, what remains
 is how late this program itself was: each second of it excuses ALLOWED seconds, up to MOST periods. Measured with ten
 busy loops on two cores: emulators answer every SYNC, and send their heartbeats at a third to a seventh of the rate.
 """
@@ -19,6 +20,7 @@ from drivers.errors import DeviceLost, DeviceRefused, DeviceStale
 
 LATE = 1.5  # periods
 PAUSE_S = 0.05  # longer than any node at 20 SYNCs a second is silent
+SHORTEST_PAUSE_S = 0.005  # USB adapters hand frames over in bursts
 ALLOWED = 10.0  # an emulator on a busy machine was seen at a seventh of its speed
 MOST = 15.0  # periods
 LATE_S = 0.002  # on a quiet machine a thread wakes within 0.3 ms
@@ -30,19 +32,23 @@ class Heartbeats:
     `busy_s`: how late this program woke, in sum (s), since the last heartbeat of anybody.
     """
 
-    def __init__(self, nodes: Sequence[int], period_s: float) -> None:
+    def __init__(self, nodes: Sequence[int], period_s: float, sync_s: float) -> None:
+        """The periods (s) of heartbeats and of SYNC."""
         self._nodes = tuple(nodes)
         self._period_s = period_s
+        self._pause_s = min(max(LATE * sync_s, SHORTEST_PAUSE_S), PAUSE_S)
         # `since_any`: since the last heartbeat of anybody, alive time as this host counts it
         self._alive_s = self._since_any_s = self.busy_s = 0.0
         self._looked_s: float | None = None
         self._heard_s: dict[int, float] = {}  # in alive time
+        self._took_s: dict[int, float] = {}  # between the newest two heartbeats of a node, in alive time
 
     def begin(self, now_s: float) -> None:
         """All nodes start to send heartbeats now."""
         self._alive_s, self._looked_s = 0.0, now_s
         self._since_any_s = self.busy_s = 0.0
         self._heard_s = dict.fromkeys(self._nodes, 0.0)
+        self._took_s = {}
 
     def woke(self, late_s: float) -> float:
         """A wait of this program ended so much later than it was to; returns what of it counts (s): from LATE_S on."""
@@ -57,13 +63,14 @@ class Heartbeats:
     def look(self, now_s: float) -> None:
         """A frame came."""
         if self._looked_s is not None:
-            step_s = min(max(now_s - self._looked_s, 0.0), PAUSE_S)
+            step_s = min(max(now_s - self._looked_s, 0.0), self._pause_s)
             self._alive_s += min(step_s, max(self._period_s - self._since_any_s, 0.0))
             self._since_any_s += step_s
             self._looked_s = now_s
 
     def heard(self, node: int) -> None:
         if node in self._heard_s:
+            self._took_s[node] = self._alive_s - self._heard_s[node]
             self._heard_s[node] = self._alive_s
             self._since_any_s = self.busy_s = 0.0
 
@@ -71,10 +78,16 @@ class Heartbeats:
         """Nodes whose heartbeat is overdue; each is reported once, and again after as long."""
         limit_s = LATE * self._period_s
         nobody = self._since_any_s > min(limit_s + ALLOWED * self.busy_s, MOST * self._period_s)
-        found = tuple(n for n, heard_s in self._heard_s.items() if nobody or self._alive_s - heard_s > limit_s)
+        found = tuple(n for n, s in self._heard_s.items() if nobody or self._alive_s - s > LATE * self._expected_s(n))
         for node in found:
             self.heard(node)
+            del self._took_s[node]  # it was not heard
         return found
+
+    def _expected_s(self, node: int) -> float:
+        """The period in alive time, by the other nodes."""
+        slowest_s = max((took_s for other, took_s in self._took_s.items() if other != node), default=0.0)
+        return min(max(slowest_s, self._period_s), MOST / LATE * self._period_s)
 
 
 EMERGENCIES_KEPT = 256
@@ -83,8 +96,8 @@ EMERGENCIES_KEPT = 256
 class NodeWatch:
     """Takes every frame that is not a position. `codes` holds each node's last emergency code, 0 for none."""
 
-    def __init__(self, name: str, nodes: Sequence[int], heartbeat_s: float) -> None:
-        """`heartbeat_s`: the period set at the nodes, in host time."""
+    def __init__(self, name: str, nodes: Sequence[int], heartbeat_s: float, sync_s: float) -> None:
+        """`heartbeat_s`: the period set at the nodes, `sync_s`: that of SYNC, in host time."""
         self.emergencies: tuple[Emergency, ...] = ()  # the newest EMERGENCIES_KEPT, in the order they came
         self.codes = tuple(0 for _ in nodes)
         self.bad_frames = 0
@@ -93,7 +106,7 @@ class NodeWatch:
         self._heard_s: dict[int, float] = {}  # last heartbeat
         self._operational = False
         self._started: set[int] = set()  # nodes that have reported that they are operational
-        self.heartbeats = Heartbeats(nodes, heartbeat_s)
+        self.heartbeats = Heartbeats(nodes, heartbeat_s, sync_s)
 
     def set_operational(self, operational: bool, now_s: float) -> None:
         """From now on a boot-up, or another state than operational, is a fault; or no longer.

@@ -65,7 +65,7 @@ def test_a_host_that_slept_blames_nobody(memory):
 
 
 def test_alive_time_leaves_pauses_out():
-    heartbeats = Heartbeats([1, 2], 0.4)
+    heartbeats = Heartbeats([1, 2], 0.4, 0.01)
     heartbeats.begin(0.0)
     heartbeats.look(100.0)
     assert heartbeats.late() == ()
@@ -79,11 +79,14 @@ def test_alive_time_leaves_pauses_out():
 class Slow:
     """Nodes answer every SYNC, 100 a second, and send a heartbeat each `beats_s`: an emulator on a busy machine."""
 
-    def __init__(self, late_s: float, beats_s: float, nodes: tuple[int, ...] = (1, 2)) -> None:
-        self.heartbeats = Heartbeats(nodes, 0.4)
+    def __init__(
+        self, late_s: float, beats_s: float, nodes: tuple[int, ...] = (1, 2), *, in_turn: bool = False
+    ) -> None:
+        self.heartbeats = Heartbeats(nodes, 0.4, 0.01)
         self.heartbeats.begin(0.0)
         self.late_s, self.beats_s, self.nodes, self.now_s = late_s, beats_s, nodes, 0.0
-        self._beat_s = beats_s
+        after_s = beats_s / len(nodes) if in_turn else 0.0  # node after node, else all at once
+        self._beat_s = {node: beats_s + after_s * n for n, node in enumerate(nodes)}
 
     def found(self, until_s: float) -> tuple[int, ...]:
         """The first nodes that are called late."""
@@ -91,9 +94,9 @@ class Slow:
             self.now_s += 0.01
             self.heartbeats.woke(self.late_s)
             self.heartbeats.look(self.now_s)
-            if self.now_s >= self._beat_s:
-                self._beat_s += self.beats_s
-                for node in self.nodes:
+            for node in self.nodes:
+                if self.now_s >= self._beat_s[node]:
+                    self._beat_s[node] += self.beats_s
                     self.heartbeats.heard(node)
             if late := self.heartbeats.late():
                 return late
@@ -105,12 +108,48 @@ def test_slow_heartbeats_on_a_busy_machine_make_nobody_late(nodes):
     assert Slow(0.004, 2.0, nodes).found(60.0) == ()
 
 
+def slowed(bus: Slow, factor: float) -> None:
+    """From one period to the next by a third."""
+    while bus.beats_s < factor * 0.4:
+        bus.beats_s *= 4 / 3
+        bus._beat_s = {node: bus.now_s + 4 / 3 * (due_s - bus.now_s) for node, due_s in bus._beat_s.items()}
+        assert bus.found(bus.now_s + bus.beats_s) == ()
+
+
+def test_six_that_send_in_turn_and_become_slow_make_nobody_late():
+    bus = Slow(0.0, 0.4, (1, 2, 3, 4, 5, 6), in_turn=True)
+    assert bus.found(4.0) == ()
+    slowed(bus, 7.0)
+    assert bus.found(60.0) == ()
+
+
+def test_an_emulator_that_is_held_up_between_the_heartbeats_of_two_nodes_makes_nobody_late():
+    bus = Slow(0.0, 0.4, (1, 2), in_turn=True)
+    for _ in range(10):
+        assert bus.found(bus._beat_s[1] + 0.01) == ()
+        bus.now_s += 0.35  # nothing is heard
+        bus._beat_s = {node: due_s + 0.35 for node, due_s in bus._beat_s.items()}
+
+
 def test_one_node_is_found_among_slow_ones():
     bus = Slow(0.004, 2.0)
     bus.found(2.1)
     bus.nodes = (2,)
     assert bus.found(10.0) == (1,)
     assert bus.now_s < 2 * 2.0 + 0.25
+
+
+def test_one_of_six_that_send_in_turn_is_found():
+    """On a quiet machine after one and a half periods; where the others take more, after as much of theirs."""
+    for slower in (1.0, 2.5):
+        bus = Slow(0.0, 0.4, (1, 2, 3, 4, 5, 6), in_turn=True)
+        bus.found(2.0)
+        slowed(bus, slower)
+        bus.found(bus.now_s + 2 * bus.beats_s)
+        bus.nodes = tuple(node for node in bus.nodes if node != 3)
+        last_s = bus._beat_s[3] - bus.beats_s
+        assert bus.found(60.0) == (3,)
+        assert bus.now_s - last_s == pytest.approx(1.5 * bus.beats_s, abs=0.1 * slower)
 
 
 @pytest.mark.parametrize("nodes", [(1,), (1, 2)])
@@ -139,7 +178,7 @@ def test_who_was_late_is_said(memory, monkeypatch):
 
     monkeypatch.setattr(memory.bus, "recv", late)
     busy = (
-        r"encoder 1, 2 for 1.5 periods; this computer was busy for \d\.\d s, end other programs; else check its power"
+        r"encoder [12, ]+ for 1.5 periods; this computer was busy for \d\.\d s, end other programs; else check its power"
     )
     with pytest.raises(DeviceStale, match=busy):
         read_for(memory, 10.0)
