@@ -37,7 +37,7 @@ for stated, here in (
     assert stated in TEXT
     TEXT = TEXT.replace(stated, here)
 HIDDEN = ("soft-joint joint2 6e-6", "slack-drive joint3 3e-4", "encoder-eccentricity joint5 2e-5")
-CALIBRATED, PACE = 200, 8.0
+PACE = 8.0
 FAST_RAD_S, FAST_RAD_S2 = 20.0, 400.0  # of the arm in this process: readings are taken where it stands
 NOISE_M = 1e-5
 LOW, HIGH = np.array([-1.5, -2.2, 0.3, -2.2, -2.2, -2.0]), np.array([1.5, -0.7, 2.3, -0.4, 2.2, 2.0])
@@ -79,14 +79,14 @@ def tip_m(T_base_flange):
     return T_base_flange[:3, :3] @ POINT_M + T_base_flange[:3, 3]
 
 
-def calibrated(folder):
-    """A session folder of the world's readings, and the model that a diagnosis makes of it."""
+def calibrated(folder, rows):
+    """A session folder of the world's readings at so many poses, and the model that a diagnosis makes of it."""
     plain, rng = tomllib.loads(TEXT), np.random.default_rng(11)
     hidden = [by_hand(line, plain) for line in HIDDEN]
     world = World.from_rig(plain, q_rad=plain["motion"]["home_rad"], hidden=hidden)
     bench = DirectBench(world, 0.01, speed_rad_s=FAST_RAD_S, acceleration_rad_s2=FAST_RAD_S2)
     q_rad, position_m, t_s, side = [], [], [], []
-    for sent in drawn_rad(rng, CALIBRATED):
+    for sent in drawn_rad(rng, rows):
         side.append(np.sign(sent - bench.standing_rad))
         bench.move(sent)
         while not world.stands:
@@ -94,10 +94,10 @@ def calibrated(folder):
         q_rad.append(world.joints().q_rad)
         position_m.append(tip_m(world.T_base_flange()))
         t_s.append(world.time_s)
-    seen_m = TRACKER.apply(np.array(position_m)) + STANDS_M + rng.normal(0.0, NOISE_M, (CALIBRATED, 3))
+    seen_m = TRACKER.apply(np.array(position_m)) + STANDS_M + rng.normal(0.0, NOISE_M, (rows, 3))
     columns = {"t_s": np.array(t_s)} | {f"q{j + 1}_rad": column for j, column in enumerate(np.array(q_rad).T)}
     columns |= {f"approach{j + 1}": column for j, column in enumerate(np.array(side).T)}
-    columns |= {"payload_kg": np.zeros(CALIBRATED)}
+    columns |= {"payload_kg": np.zeros(rows)}
     columns |= dict(zip(("x_m", "y_m", "z_m"), seen_m.T, strict=True))
     (folder / "session").mkdir()
     (folder / "session" / "rig.toml").write_text(TEXT, encoding="utf-8")
@@ -177,9 +177,9 @@ def rms_error_m(reached_m, wanted_m):
 
 
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize("count", [20, pytest.param(200, marks=pytest.mark.endure)])
-def test_the_true_tool_reaches_the_corrected_poses_over_the_wires(wires, tmp_path, count):
-    calibrated(tmp_path)
+@pytest.mark.parametrize(("rows", "count"), [(100, 20), pytest.param(200, 200, marks=pytest.mark.endure)])
+def test_the_true_tool_reaches_the_corrected_poses_over_the_wires(wires, tmp_path, rows, count):
+    calibrated(tmp_path, rows)
     wanted_m, nominal_rad, via, poses = corrected(tmp_path, count)
     assert len(poses) >= COMMANDED * count
     wires.arm.connect()

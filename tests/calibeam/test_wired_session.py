@@ -87,6 +87,7 @@ def test_a_protective_stop_ends_the_session_and_keeps_the_samples(takes: Takes) 
     assert len(takes.recording().samples) >= 2
 
 
+@pytest.mark.endure  # daily: every device of a motion, test_device_faults.py; of a tracker, test_wired_tracker.py
 def test_a_silent_psd_box_stops_the_arm_and_is_named(takes: Takes) -> None:
     takes.trouble = (2, lambda: takes.emulation.ask("psd.silence", on=True))
     with pytest.raises(PartialResult, match="psd: no sample"):

@@ -98,6 +98,7 @@ def test_ctrl_c_in_mid_session_keeps_what_was_measured(takes: Takes) -> None:
     assert len(read(takes.path).samples) == 3
 
 
+@pytest.mark.endure  # daily: a lost tracker, test_wired_tracker.py; of the encoders alone, test_device_faults.py
 def test_a_lost_encoder_ends_the_session_and_is_named(takes: Takes) -> None:
     takes.trouble = (3, lambda: takes.emulation.ask("encoders.silence", node=3))
     with pytest.raises(PartialResult, match=r"encoder.* 3 .*samples kept in .*: 3;"):

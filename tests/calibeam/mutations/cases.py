@@ -95,7 +95,7 @@ def faults(pair: Pair, seed: int, ran: Ran) -> list[str]:
 def messages(ran: Ran) -> list[str]:
     """Sentences for a person about what is wrong: how the command ended, and devices that are not fit."""
     ended = re.split(r"(?m)^(?:error|stopped): ", ran.err)[1:]
-    return [each.strip() for each in ended] + [line for line in ran.out.splitlines() if " error " in line[:20]]
+    return [each.strip() for each in ended] + [line for line in ran.out.splitlines() if re.match(r"\S+ +error  ", line)]
 
 
 def main(words: list[str]) -> int:

@@ -4,6 +4,7 @@ A command that talks to devices reads its files and then finds no device, for in
 that would emulate a whole session stops at its output folder.
 """
 
+import os
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -31,13 +32,10 @@ MUTATORS: dict[str, tuple[Mutator, ...]] = {
 OTHERS = {"bus.csv": "lines", "lab.csv": "others' csv", "bag-mcap/bag-mcap.mcap": "binary"}  # of their suffix
 REFUSED = {"bad_utf8": ("toml", "json", "csv")}  # what no reader of these kinds may take
 SMALL = "--arms 500 --poses 2"  # of an error simulation
-DAILY, ENDURE = 8, 300
-SOME = 3  # daily, of a format whose first command is slow on a valid input
-FEW, FEWER, TWO = 2, 1, 1  # daily, where another command has read the format; of commands slow on a valid input
-SLOW = dict.fromkeys(("diagnose", "compare", "design", "simulate-errors", "iso9283"), FEWER) | {
-    "report": TWO,
-    "reconcile": TWO,
-}
+DAILY, ENDURE = 4, int(os.environ.get("SEEDS", "300"))
+SOME = 2  # daily, of a format whose first command is slow on a valid input
+FEW = 1  # daily, where another command has read the format
+SLOW = ("diagnose", "compare", "design", "simulate-errors", "iso9283", "report", "reconcile")  # on a valid input
 
 
 @dataclass(frozen=True)
@@ -70,7 +68,7 @@ class Pair:
             return 0
         if alike[0] is self:
             return SOME if self.command in SLOW else DAILY
-        return SLOW.get(self.command, FEW)
+        return FEW
 
     @cached_property
     def format(self) -> str:

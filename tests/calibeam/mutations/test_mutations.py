@@ -103,7 +103,7 @@ def ran_into(
 
 
 DAILY = [(pair, range(pair.daily)) for pair in TABLE if pair.daily]
-ENDURED = [(pair, range(first, first + CHUNK)) for pair in TABLE for first in range(0, ENDURE, CHUNK)]
+ENDURED = [(pair, range(first, min(first + CHUNK, ENDURE))) for pair in TABLE for first in range(0, ENDURE, CHUNK)]
 
 
 @pytest.mark.parametrize(("pair", "seeds"), DAILY, ids=[named(*one) for one in DAILY])

@@ -11,7 +11,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import pytest
@@ -61,9 +61,10 @@ class Seen:
             self.moved_s = float(moving[-1])
         return speed
 
-    def until_moving(self) -> None:
+    def until_moving(self, goes_on: Callable[[], bool], failed: Sequence[DeviceError] = ()) -> None:
+        """Ends the test at once, with its error, where the motion has ended instead."""
         while self.read()[-1] < 0.9 * SPEED_RAD_S:
-            pass
+            assert goes_on(), failed
 
     def until_standing(self, from_s: float) -> None:
         """Until no joint has moved for a while; not before this stamp."""
@@ -133,7 +134,7 @@ def moving(act: Callable[[], object]) -> tuple[threading.Thread, list[DeviceErro
 def test_a_control_child_that_is_killed_or_frozen(controller, control, seen, number, error, says) -> None:
     assert control._child is not None
     thread, failed = moving(lambda: control.move_joints(FAR, SPEED_RAD_S, 3.0))
-    seen.until_moving()
+    seen.until_moving(thread.is_alive, failed)
     begin_s = now_s(controller)
     os.kill(control._child.pid, number)
     seen.until_standing(begin_s)
@@ -151,7 +152,7 @@ def test_a_program_that_is_frozen(controller, control, seen) -> None:
     arguments = [controller.host, str(FAR.tolist()), str(SPEED_RAD_S)]
     client = subprocess.Popen([sys.executable, "-c", CLIENT, *arguments], stdout=subprocess.PIPE, text=True)
     try:
-        seen.until_moving()
+        seen.until_moving(lambda: client.poll() is None)
         begin_s = now_s(controller)
         os.kill(client.pid, signal.SIGSTOP)
         seen.until_standing(begin_s)
@@ -172,7 +173,7 @@ def test_a_program_that_is_frozen(controller, control, seen) -> None:
 def test_a_controller_that_is_frozen(process, controller, control, seen) -> None:
     """The stop waits in its dashboard before it goes on: it carries no motion of before the freeze to its end."""
     thread, failed = moving(lambda: control.move_joints(FAR, SPEED_RAD_S, 3.0))
-    seen.until_moving()
+    seen.until_moving(thread.is_alive, failed)
     begin_s = now_s(controller)
     os.kill(process.pid, signal.SIGSTOP)  # emulated time stands from here on
     try:
