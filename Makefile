@@ -34,10 +34,11 @@ coverage: $(READY) $(CLIENTS)/.ready
 	$(BIN)/coverage json --quiet -o out/coverage/coverage.json
 	$(BIN)/python tests/coverage_table.py out/coverage/coverage.json
 
-# What takes too long for every day: a million mutated inputs a codec, a hundred plugs pulled, mutated files for every
-# command, and the calculating tests again with other kernels of linear algebra and another number of threads.
+# What takes too long for every day: a million mutated inputs a codec, a hundred plugs pulled, a hundred mutated files a
+# command (SEEDS=300: as many), and the calculating tests again with other kernels of linear algebra, another number of
+# threads and other Pythons. Parts by PHASE=mutated, marked, calculating.
 endure: $(READY) $(CLIENTS)/.ready
-	$(BIN)/python tests/phases.py endure
+	$(if $(SEEDS),SEEDS=$(SEEDS) )$(BIN)/python tests/phases.py endure $(if $(PHASE),--phase $(PHASE))
 
 # Third-party clients that tests start as processes, in an environment of their own.
 clients: $(CLIENTS)/.ready

@@ -25,7 +25,7 @@ from tests.calibeam.mutations.table_mutators import with_member
 Change = Callable[[bytes], bytes]
 
 CHUNK = 100  # seeds of one test
-IN_TURN = 10  # runs of one process, every day; hundreds of each have a process of their own
+IN_TURN = 10  # runs of one process, every day; a hundred of each have a process of their own
 REAL = (  # through the installed console script as well: one of each way to end
     ("fit.toml|identify_tracker_--plan_fit.toml", 3),
     ("model.json|predict_model.json_tracker:samples.csv", 1),
@@ -116,7 +116,7 @@ def test_a_mutated_file_is_refused_in_one_message_or_read(
 
 @pytest.mark.endure
 @pytest.mark.parametrize(("pair", "seeds"), ENDURED, ids=[named(*one) for one in ENDURED])
-def test_so_are_hundreds_of_each(pair: Pair, seeds: range, server: Server, good: Path, tmp_path: Path) -> None:
+def test_so_are_a_hundred_of_each(pair: Pair, seeds: range, server: Server, good: Path, tmp_path: Path) -> None:
     found = ran_into(server, good, pair, seeds, tmp_path)
     assert not found, "\n".join(map(str, found))
 

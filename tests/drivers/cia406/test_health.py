@@ -177,7 +177,7 @@ def test_who_was_late_is_said(memory, monkeypatch):
         return recv(timeout)
 
     monkeypatch.setattr(memory.bus, "recv", late)
-    busy = r"encoder [12, ]+ for 1.5 periods; this computer was busy for \d\.\d s, end other programs; else check its power"
+    busy = r"encoder [12, ]+ for 1.5 periods; this computer was busy for \d\.\d s, end other programs; else check its"
     with pytest.raises(DeviceStale, match=busy):
         read_for(memory, 10.0)
 
