@@ -52,7 +52,7 @@ def test_errors_of_the_reference_arm_leave_a_folder(tmp_path, capsys):
 def test_a_robot_is_simulated_the_same_with_any_number_of_workers(capsys):
     told = []
     for workers in ("1", "2"):
-        options = ["--only", "link2.*", "joint*.zero", "--arms", "40000", "--poses", "2", "--workers", workers]
+        options = ["--only", "link2.*", "joint*.zero", "--arms", "10000", "--poses", "2", "--workers", workers]
         assert run(["simulate-errors", str(ROBOT), *options, "--json"]) == 0
         told.append(json.loads(capsys.readouterr().out))
     assert told[0] == told[1]
