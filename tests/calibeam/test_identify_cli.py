@@ -65,7 +65,7 @@ def written(where):
     joints = "".join(JOINT.format(a=a, alpha=alpha, d=d) for a, alpha, d in TABLE)
     where.mkdir()
     (where / "rig.toml").write_text(RIG.format(joints=joints))
-    q = rng.uniform(-2.0, 2.0, (120, 5))
+    q = rng.uniform(-2.0, 2.0, (90, 5))
     write_samples(where / "samples.csv", q, observed(q, rng))
     return where
 
