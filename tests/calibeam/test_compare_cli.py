@@ -26,7 +26,7 @@ def sessions(tmp_path_factory):
     """Of one motion: measured with a disc off centre, and simulated without, each with noise of its own."""
     folder = tmp_path_factory.mktemp("sessions")
     for name, defects in (("measured", ("encoder-eccentricity",)), ("simulated", ())):
-        case = conceal(Wanted("dual-psd", seed=7, defects=defects, enr=1.0, samples=160, places=3))
+        case = conceal(Wanted("dual-psd", seed=7, defects=defects, enr=1.0, samples=120, places=3))
         write_case(case, folder / name)
     return folder / "measured" / "recording", folder / "simulated" / "recording"
 
@@ -110,7 +110,7 @@ def test_rows_without_a_partner_are_told(sessions, tmp_path):
 
 
 def test_other_motions_are_refused(sessions, tmp_path, capsys):
-    write_case(conceal(Wanted("dual-psd", seed=8, defects=(), enr=1.0, samples=160, places=3)), tmp_path / "away")
+    write_case(conceal(Wanted("dual-psd", seed=8, defects=(), enr=1.0, samples=120, places=3)), tmp_path / "away")
     other = str(tmp_path / "away" / "recording")
     assert run(["compare", str(sessions[1]), other, "--out", str(tmp_path / "c.json")]) == 1
     assert "same motion" in capsys.readouterr().err

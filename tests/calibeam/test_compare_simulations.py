@@ -212,7 +212,7 @@ ANSWERS = {
     "rows": ("print('x_m,y_m,z_m\\n1,2,3')", "1 rows for 60 samples"),
     "nan": ("print('x_m,y_m,z_m'); print('1,nan,3\\n' * 60)", "row 1, column y_m: 'nan'"),
     "word": ("print('x_m,y_m,z_m'); print('1,two,3\\n' * 60)", "row 1, column y_m: 'two' is no number"),
-    "hang": ("import threading; threading.Event().wait()", "no answer within 0.5 s"),
+    "hang": ("import threading; threading.Event().wait()", "no answer within 0.1 s"),
 }
 
 
@@ -224,7 +224,7 @@ def test_a_program_that_answers_wrongly_is_one_message(program, off, tmp_path, c
         "--simulator",
         f"{sys.executable} {tmp_path / 'sim.py'}",
         "--timeout-s",
-        "0.5" if program == "hang" else "30",
+        "0.1" if program == "hang" else "30",
     ]
     assert run(["compare", str(off), *command, "--out", str(tmp_path / "c.json")]) == 1
     error = capsys.readouterr().err

@@ -14,6 +14,7 @@ RIGS = Path(__file__).parents[2] / "rigs"
 ROBOT, ARM = RIGS / "ur5e-dual-psd.toml", RIGS / "arm-cmm-reference.toml"
 
 
+@pytest.mark.usefixtures("bare_figures")
 def test_a_design_leaves_a_plan_a_page_and_figures(tmp_path, capsys):
     plan, page = tmp_path / "plan.toml", tmp_path / "design.html"
     options = ["--poses", "24", "--repeats", "3", "--candidates", "8", "--out", str(plan), "--report", str(page)]
@@ -27,7 +28,7 @@ def test_a_design_leaves_a_plan_a_page_and_figures(tmp_path, capsys):
 
 
 def test_a_design_says_what_it_promises(tmp_path, capsys):
-    options = ["--poses", "20", "--repeats", "2", "--candidates", "6", "--out", str(tmp_path / "plan.toml")]
+    options = ["--poses", "12", "--repeats", "2", "--candidates", "4", "--out", str(tmp_path / "plan.toml")]
     assert run(["design", str(ROBOT), *options]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "predicted error over the workspace (the beam" in said
@@ -51,7 +52,7 @@ def test_errors_of_the_reference_arm_leave_a_folder(tmp_path, capsys):
 def test_a_robot_is_simulated_the_same_with_any_number_of_workers(capsys):
     told = []
     for workers in ("1", "2"):
-        options = ["--only", "link2.*", "joint*.zero", "--arms", "40000", "--poses", "2", "--workers", workers]
+        options = ["--only", "link2.*", "joint*.zero", "--arms", "10000", "--poses", "2", "--workers", workers]
         assert run(["simulate-errors", str(ROBOT), *options, "--json"]) == 0
         told.append(json.loads(capsys.readouterr().out))
     assert told[0] == told[1]

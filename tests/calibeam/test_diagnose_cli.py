@@ -36,6 +36,7 @@ def test_the_file_and_its_pages_are_written(out):
     assert 'id="finding-1"' in page
 
 
+@pytest.mark.usefixtures("bare_figures")
 def test_the_report_of_the_session_takes_the_pages_up(folder, out, tmp_path):
     page = tmp_path / "report.html"
     assert run(["report", str(folder), "--diagnosis", str(out), "--out", str(page)]) == 0

@@ -23,6 +23,7 @@ def folder(tmp_path_factory):
     return where / "recording"
 
 
+@pytest.mark.usefixtures("bare_figures")
 def test_such_a_folder_is_identified_predicted_and_reported(folder, tmp_path, capsys):
     model, page = tmp_path / "model.json", tmp_path / "report.html"
     assert run(["identify", str(folder), "--out", str(model)]) == 0

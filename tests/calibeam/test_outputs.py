@@ -113,6 +113,7 @@ def test_an_older_result_of_the_same_kind_is_replaced_and_another_one_with_force
     assert msgspec.json.decode((tmp_path / "model.json").read_bytes())["kind"] == "calibeam-model"
 
 
+@pytest.mark.usefixtures("bare_figures")
 def test_every_kind_of_result_takes_the_place_of_its_older_self(made, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     calls = [

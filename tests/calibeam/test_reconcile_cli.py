@@ -39,6 +39,7 @@ def reconciled(tmp_path, measured):
     return json.loads((out / "reconcile.json").read_bytes()), out
 
 
+@pytest.mark.usefixtures("bare_figures")
 def test_a_zero_is_named_and_the_simulation_then_agrees(tmp_path):
     q_rad = poses()[:FEW]
     off_rad = np.array([0.0, 0.0, ZERO_RAD, 0.0, 0.0, 0.0])

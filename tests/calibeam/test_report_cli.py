@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -56,14 +57,28 @@ def write_folder(where, seed, n=90):
     return where
 
 
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A session and its model."""
+    at = tmp_path_factory.mktemp("made")
+    assert run(["identify", str(write_folder(at / "session", 3)), "--out", str(at / "model.json")]) == 0
+    return at
+
+
 @pytest.fixture
-def folder(tmp_path):
-    return write_folder(tmp_path / "session", 3)
+def folder(made, tmp_path):
+    return shutil.copytree(made / "session", tmp_path / "session")
 
 
-def test_a_session_of_positions_gets_its_report_and_its_model_the_same_one(folder, tmp_path, capsys):
-    model, out, anew = tmp_path / "model.json", tmp_path / "report.html", tmp_path / "deep" / "report.html"
-    assert run(["identify", str(folder), "--out", str(model)]) == 0
+@pytest.fixture
+def model(made, tmp_path):
+    """Of that session."""
+    (tmp_path / "last-year").mkdir()
+    return shutil.copy(made / "model.json", tmp_path / "last-year" / "model.json")
+
+
+def test_a_session_of_positions_gets_its_report_and_its_model_the_same_one(folder, model, tmp_path, capsys):
+    out, anew = tmp_path / "report.html", tmp_path / "deep" / "report.html"
     assert run(["report", str(folder), "--model", str(model), "--out", str(out)]) == 0
     capsys.readouterr()
     assert run(["report", str(folder), "--out", str(anew)]) == 0
@@ -109,13 +124,11 @@ def test_the_model_of_another_session_is_refused(folder, tmp_path, capsys):
     assert "give the model of this recording" in capsys.readouterr().err
 
 
-def test_a_script_reads_verdict_numbers_and_drift_on_one_line(folder, tmp_path, capsys):
+def test_a_script_reads_verdict_numbers_and_drift_on_one_line(folder, model, tmp_path, capsys):
     """Against the folder of a session, which here is the same one."""
-    session, out = tmp_path / "last-year", tmp_path / "report.html"
-    assert run(["identify", str(folder), "--out", str(session / "model.json")]) == 0
-    capsys.readouterr()
-    known = ["--model", str(session / "model.json")]
-    assert run(["report", str(folder), *known, "--against", str(session), "--out", str(out), "--json"]) == 0
+    out = tmp_path / "report.html"
+    known = ["--model", str(model), "--against", str(model.parent)]
+    assert run(["report", str(folder), *known, "--out", str(out), "--json"]) == 0
     (line,) = capsys.readouterr().out.splitlines()
     told = json.loads(line)
     assert (told["kind"], told["report"]) == ("calibeam-report", str(out))
@@ -126,9 +139,7 @@ def test_a_script_reads_verdict_numbers_and_drift_on_one_line(folder, tmp_path, 
     assert 'href="#drift"' in out.read_text()
 
 
-def test_an_earlier_calibration_is_a_model_a_folder_or_a_recording(folder, tmp_path):
-    model = tmp_path / "last-year" / "model.json"
-    assert run(["identify", str(folder), "--out", str(model)]) == 0
+def test_an_earlier_calibration_is_a_model_a_folder_or_a_recording(folder, model):
     by_file, by_folder, by_recording = (read_earlier_calibration(path) for path in (model, model.parent, folder))
     assert by_file.model == by_folder.model
     assert by_recording.model.chain == by_file.model.chain
@@ -136,9 +147,7 @@ def test_an_earlier_calibration_is_a_model_a_folder_or_a_recording(folder, tmp_p
     assert by_recording.recording is not None
 
 
-def test_an_arm_of_other_joints_is_not_compared(folder, tmp_path, capsys):
-    model = tmp_path / "model.json"
-    assert run(["identify", str(folder), "--out", str(model)]) == 0
+def test_an_arm_of_other_joints_is_not_compared(folder, model, tmp_path, capsys):
     told = json.loads(model.read_text())
     told["rig"]["text"] = told["rig"]["text"].replace(JOINT.format(a=0.4, alpha=0.0, d=0.0), "", 1)
     model.write_text(json.dumps(told))

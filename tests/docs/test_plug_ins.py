@@ -138,17 +138,19 @@ assert run(["export-model", f"{folder}/model.json", "--to", "pykdl", "--out", f"
 """
 
 
-@pytest.fixture
-def exported(installed: Path, tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def exported(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a session of heights over a tilted plate, and what the commands made of it."""
+    installed = tmp_path_factory.mktemp("site-packages")
+    zipfile.ZipFile(wheel).extractall(installed)
     rng = np.random.default_rng(3)
     q_rad = rng.uniform(-1.5, 1.5, (150, 6))
     true = RigArm.of_rig(parse_rig(LAB.replace("a_m = -0.425", f"a_m = {-0.425 - LONGER_M}"), "rig.toml"))
     normal = Rotation.from_rotvec([0.01, -0.02, 0.0]).apply([0.0, 0.0, 1.0])
     height_m = 0.7 + true.tip_m(q_rad) @ normal + rng.normal(0.0, 5e-6, len(q_rad))
     columns = {"t_s": np.arange(150.0)} | {f"q{j + 1}_rad": angle for j, angle in enumerate(q_rad.T)}
-    folder = tmp_path / "lab"
-    (folder / "session").mkdir(parents=True)
+    folder = tmp_path_factory.mktemp("lab")
+    (folder / "session").mkdir()
     (folder / "session" / "rig.toml").write_text(LAB, encoding="utf-8")
     write_csv(Samples(columns | {"height_m": height_m}, 6), folder / "session" / "samples.csv")
     in_a_fresh_interpreter(installed, COMMANDS, str(folder))

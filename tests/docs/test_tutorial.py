@@ -13,6 +13,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 COMMANDS = re.findall(r"^calibeam (.*)$", (DOCS / "tutorial.md").read_text(encoding="utf-8"), re.MULTILINE)
 
 
+@pytest.mark.usefixtures("bare_figures")
 def test_the_tutorial_leads_from_a_sheet_to_a_corrected_program(tmp_path, capsys, monkeypatch) -> None:
     monkeypatch.chdir(shutil.copytree(DOCS / "examples" / "lab", tmp_path / "tutorial"))
     assert [line.split()[0] for line in COMMANDS] == ["import", "identify", "report", "correct"]

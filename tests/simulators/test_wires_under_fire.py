@@ -221,7 +221,7 @@ def under_fire(name: str, count: int, seed: int) -> None:
 
 @pytest.mark.parametrize("name", CASES)
 def test_mutated_requests_raise_nothing_and_fill_no_memory(name: str) -> None:
-    under_fire(name, 400, seed=21)
+    under_fire(name, 200, seed=21)
 
 
 @pytest.mark.endure

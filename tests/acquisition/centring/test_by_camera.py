@@ -45,8 +45,8 @@ class Blind:
 
 def test_from_where_the_board_is_in_view_both_spots_come_onto_the_faces(camera_rig, camera_plain) -> None:
     """The benchmark in small: one world with zeros off by up to 2 deg."""
-    _, runs = coarse_aim.run(camera_rig, camera_plain, starts=4, seed=5)
-    assert [run.aim.aimed for run in runs] == [Aimed.LIT] * 4
+    _, runs = coarse_aim.run(camera_rig, camera_plain, starts=2, seed=5)
+    assert [run.aim.aimed for run in runs] == [Aimed.LIT] * 2
 
 
 def test_what_the_camera_does_not_see_is_said_and_nothing_moves(camera_rig, camera_plain) -> None:

@@ -16,7 +16,7 @@ from calibeam.learner import FittedLearner
 
 from .test_session import Kept
 
-OPTIONS = PlanOptions(centred=2, off_centre=2, repeats=0)
+OPTIONS = PlanOptions(centred=1, off_centre=2, repeats=0, roll_rad=(-1.0, 1.0))
 
 
 @pytest.fixture(scope="module")

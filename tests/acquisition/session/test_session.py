@@ -35,10 +35,14 @@ class Kept:
         self.events.append((kind, detail))
 
 
+SMALLEST = PlanOptions(centred=1, off_centre=3, repeats=1, roll_rad=(-1.0, 1.0))
+PLACES = (1, 2)  # of three: what is moved there and back says the same again
+
+
 def run(rig, bench, options: PlanOptions = SMALL) -> tuple[Summary, Kept]:
     kept = Kept()
     session = Session(bench, FittedLearner(rig), kept, options, np.array(rig.motion.home_rad))
-    return session.run(tuple(rig.placements)), kept
+    return session.run(PLACES), kept
 
 
 @pytest.fixture(scope="module")
@@ -46,9 +50,9 @@ def taken(rig, plain_rig) -> tuple[Summary, Kept]:
     return run(rig, direct_bench(rig, plain_rig, seed=6))
 
 
-def test_takes_every_place_in_both_orders(rig, taken) -> None:
+def test_takes_every_place_in_both_orders(taken) -> None:
     pairs = {(sample.placement, sample.first) for sample in taken[0].samples}
-    assert pairs == {(place, first) for place in rig.placements for first in (1, 2)}
+    assert pairs == {(place, first) for place in PLACES for first in (1, 2)}
     assert taken[0].skipped == 0
 
 
@@ -59,7 +63,7 @@ def test_once_a_block_has_light_a_pose_takes_a_motion_or_two(taken) -> None:
 
 def test_centred_poses_are_within_5_um(taken) -> None:
     centred = [sample.look.spots_m() for sample in taken[0].samples if sample.centred and sample.repeat is None]
-    assert len(centred) == 12
+    assert len(centred) == 8
     # The reading after the servo is a new one: 0.3 um of noise of the deciding look comes on top of the tolerance.
     assert np.max(np.abs(centred)) < 6e-6
 
@@ -88,7 +92,7 @@ def test_repeats_share_their_command_and_one_of_them_comes_from_the_other_side(t
     for sample in taken[0].samples:
         if sample.repeat is not None:
             groups.setdefault(sample.repeat, []).append(sample)
-    assert len(groups) == 6
+    assert len(groups) == 4
     for group in groups.values():
         first, again, opposite = group
         assert np.array_equal(first.look.cmd_rad, again.look.cmd_rad)
@@ -120,7 +124,7 @@ def test_a_row_has_the_columns_of_the_session_folder(taken) -> None:
 
 def test_every_centring_run_is_in_the_journal_with_its_trace(taken) -> None:
     runs = [detail for kind, detail in taken[1].events if kind == "centring"]
-    assert len(runs) >= 36
+    assert len(runs) >= 24
     for detail in runs:
         assert len(detail["spots_m"]) == len(detail["purpose"])
         assert detail["status"] == "CENTRED"
@@ -149,7 +153,7 @@ def test_a_fixture_taken_away_in_mid_session_is_light_lost_for_good(rig, bench_o
     kept = Thief()
     session = Session(bench, FittedLearner(rig), kept, SMALL, np.array(rig.motion.home_rad))
     with pytest.raises(NoLightError, match="check that the laser is on"):
-        session.run(tuple(rig.placements))
+        session.run(PLACES)
     assert len(kept.samples) == 7
 
 
@@ -178,17 +182,17 @@ def test_a_fixture_bumped_in_mid_session_is_found_again(rig, bench_of) -> None:
     class Bump(Kept):
         def sample(self, sample: Sample) -> None:
             super().sample(sample)
-            if len(self.samples) == 7:
+            if len(self.samples) == 3:
                 bench.world.place_fixture(bumped)
 
-    session = Session(bench, FittedLearner(rig), Bump(), SMALL, np.array(rig.motion.home_rad))
-    assert len(session.run((1,)).samples) > 12
+    session = Session(bench, FittedLearner(rig), Bump(), SMALLEST, np.array(rig.motion.home_rad))
+    assert len(session.run((1,)).samples) > 8
 
 
 def test_a_protective_stop_in_mid_session_keeps_what_was_taken(rig, bench_of) -> None:
     class Stops(DirectBench):
         def move(self, q_rad: np.ndarray) -> None:
-            if self.moves > 60:
+            if self.moves > 40:
                 raise DeviceRefused("robot: protective stop")
             super().move(q_rad)
 
@@ -196,7 +200,7 @@ def test_a_protective_stop_in_mid_session_keeps_what_was_taken(rig, bench_of) ->
     stopping = Stops(bench.world, bench.half_size_m)
     session = Session(stopping, FittedLearner(rig), kept, SMALL, np.array(rig.motion.home_rad))
     with pytest.raises(DeviceRefused):
-        session.run(tuple(rig.placements))
+        session.run(PLACES)
     assert len(kept.samples) > 5
 
 
@@ -221,7 +225,7 @@ def test_a_repeat_whose_way_is_not_free_is_left_out_and_the_session_goes_on(rig,
     def tell(now) -> None:
         bench.refusing = now.phase is Phase.REPEAT
 
-    session = Session(bench, FittedLearner(rig), kept, SMALL, np.array(rig.motion.home_rad), tell=tell)
+    session = Session(bench, FittedLearner(rig), kept, SMALLEST, np.array(rig.motion.home_rad), tell=tell)
     summary = session.run((1,))
     assert bench.refused == 1
     assert summary.skipped == 1

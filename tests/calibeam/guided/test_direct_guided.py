@@ -55,6 +55,14 @@ def taken() -> tuple[HandWorld, GuidedSummary, Journal]:
     return made, summary, journal
 
 
+@pytest.fixture(scope="module")
+def judge(taken) -> FittedJudge:
+    """Who has learned all of it."""
+    made = FittedJudge(RIG)
+    made.learn(taken[1].readings)
+    return made
+
+
 def reading(q_rad, target=Cone(1, (0.5, 0.1, 0.0))) -> Reading:  # noqa: B008 - frozen record
     return Reading(target, np.asarray(q_rad, dtype=float), 0.0, 0.0)
 
@@ -112,10 +120,8 @@ def test_cones_alone_say_that_the_size_of_the_arm_is_only_believed(taken) -> Non
     assert any("cones alone determine no length" in alarm for alarm in found.alarms)
 
 
-def test_a_reading_off_its_cone_is_doubted_once_the_arm_is_known(taken) -> None:
+def test_a_reading_off_its_cone_is_doubted_once_the_arm_is_known(taken, judge) -> None:
     _, summary, _ = taken
-    judge = FittedJudge(RIG)
-    judge.learn(summary.readings)
     last = [one for one in summary.readings if isinstance(one.target, Cone)][-1]
     assert judge.doubt([last]) is None
     pushed = reading(np.add(last.q_rad, [0, 5e-4, 0, 0, 0, 0]), last.target)
@@ -123,10 +129,8 @@ def test_a_reading_off_its_cone_is_doubted_once_the_arm_is_known(taken) -> None:
     assert judge.repeatability_m < 20e-6
 
 
-def test_a_bar_of_another_length_is_doubted(taken) -> None:
+def test_a_bar_of_another_length_is_doubted(taken, judge) -> None:
     _, summary, _ = taken
-    judge = FittedJudge(RIG)
-    judge.learn(summary.readings)
     ends = [one for one in summary.readings if isinstance(one.target, BarEnd)][:2]
     assert judge.doubt(ends) is None
     longer = reading(np.add(ends[1].q_rad, [5e-4, 0, 0, 0, 0, 0]), ends[1].target)

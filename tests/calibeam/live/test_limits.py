@@ -138,7 +138,7 @@ def test_a_header_that_is_not_complete_in_time_ends_the_connection(rig, begun: b
 
 
 def test_a_connection_is_closed_when_no_request_follows(rig) -> None:
-    with served(rig, request_s=2.0) as page:  # enough for the first request on a loaded machine
+    with served(rig, request_s=1.0) as page:  # enough for the first request on a loaded machine
         host, port = address(page)
         answer = ended(opened(page, f"HEAD / HTTP/1.1\r\nHost: {host}:{port}\r\n\r\n".encode()))
     assert answer.startswith(b"HTTP/1.1 200")

@@ -14,24 +14,24 @@ from calibeam.prove.seal import Layout, fingerprint, open_seal
 MIX = Mix(kinds=("one",), families=("tracker",), mechanism="encoder-eccentricity")
 
 
-def test_the_diagnosing_process_may_not_import_the_simulators() -> None:
+@pytest.fixture(scope="module")
+def loaded() -> subprocess.CompletedProcess[str]:
+    """A process with all that a diagnosis needs, which then asks for a simulator behind the bar."""
     script = (
-        "import sys; from calibeam.prove.blind import NoSimulators; sys.meta_path.insert(0, NoSimulators())\n"
-        "import calibeam.results.diagnosis, calibeam.prove.unseen, calibeam.prove.unseen\n"
+        "import sys, calibeam.prove.blind, calibeam.results.diagnosis, calibeam.prove.unseen\n"
+        "print([name for name in sys.modules if name.split('.')[0] == 'simulators'])\n"
+        "sys.meta_path.insert(0, calibeam.prove.blind.NoSimulators())\n"
         "import simulators.conceal.case"
     )
-    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False)
-    assert "may not import simulators" in result.stderr
+    return subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False)
 
 
-def test_what_a_diagnosis_needs_loads_no_simulator() -> None:
-    script = (
-        "import sys, calibeam.prove.blind, calibeam.results.diagnosis\n"
-        "import calibeam.prove.unseen, calibeam.prove.unseen\n"
-        "print([name for name in sys.modules if name.split('.')[0] == 'simulators'])"
-    )
-    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)
-    assert result.stdout.strip() == "[]"
+def test_the_diagnosing_process_may_not_import_the_simulators(loaded: subprocess.CompletedProcess[str]) -> None:
+    assert "may not import simulators" in loaded.stderr
+
+
+def test_what_a_diagnosis_needs_loads_no_simulator(loaded: subprocess.CompletedProcess[str]) -> None:
+    assert loaded.stdout.strip() == "[]"
 
 
 def test_the_diagnosing_process_gets_a_bare_environment() -> None:

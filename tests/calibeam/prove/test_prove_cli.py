@@ -30,6 +30,7 @@ def _told(recorded: Path) -> Iterator[bytes]:
             yield repr(record).encode()
 
 
+@pytest.mark.usefixtures("bare_figures")
 @pytest.mark.timeout(300)
 def test_a_plain_effect_is_found_named_and_better_where_nobody_measured(tmp_path: Path) -> None:
     proof = _proved(tmp_path / "p", "--kind", "one", "--mechanism", "encoder-eccentricity", "--cases", "1")

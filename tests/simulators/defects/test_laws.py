@@ -52,7 +52,12 @@ PHYSICS = {
     "unknown",
 }
 FAMILY = {instrument: family for family, instrument in INSTRUMENT.items()}
-EVERYWHERE = [(kind, instrument) for kind in MECHANISMS for instrument in kind.INSTRUMENTS]
+OF_EACH = [kind.INSTRUMENTS[k % len(kind.INSTRUMENTS)] for k, kind in enumerate(MECHANISMS)]
+EVERYWHERE = [  # daily: every mechanism at one instrument, which takes turns with the others; each session is a search
+    pytest.param(kind, instrument, marks=[] if instrument == one else pytest.mark.endure)
+    for kind, one in zip(MECHANISMS, OF_EACH, strict=True)
+    for instrument in kind.INSTRUMENTS
+]
 
 
 def name(value: object) -> str:
@@ -101,6 +106,10 @@ def test_it_names_its_place_in_the_words_of_the_interchange_format(kind: type[De
     assert kind.PHYSICS in PHYSICS
     assert (kind.PHYSICS == "unknown") == kind.KIND.startswith("outside-")
     assert bool(defect.figures) == (kind.PHYSICS != "unknown")
+
+
+def test_every_instrument_has_its_turn() -> None:
+    assert set(OF_EACH) == set(FAMILY)
 
 
 def test_names_are_unique() -> None:

@@ -1,6 +1,7 @@
 """Laws that every fault of streams keeps, and what each does to the streams of a session."""
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
@@ -25,12 +26,12 @@ Stream = Callable[..., StreamedSession]
 
 @pytest.fixture(scope="module")
 def case() -> Case:
-    return conceal(Wanted("dual-psd", seed=3, samples=60, places=3))
+    return conceal(Wanted("dual-psd", seed=3, samples=30, places=3))
 
 
 @pytest.fixture(scope="module")
 def with_fault(case: Case) -> Stream:
-    return lambda fault=None: streamed(case, fault, np.random.default_rng(8))
+    return cache(lambda fault=None: streamed(case, fault, np.random.default_rng(8)))
 
 
 @pytest.mark.parametrize("kind", FAULTS, ids=lambda kind: kind.KIND)

@@ -19,7 +19,7 @@ from simulators.world.world import World
 
 RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
 SEED = 5
-SETTLED_S = 2.0
+SETTLED_S = 1.0
 UNSEEN = {"outside-fan"}  # needs a fan: the emulated rig has none
 SHOWN = [kind for kind in MECHANISMS if "dual-psd" in kind.INSTRUMENTS and kind.KIND not in UNSEEN]
 # Both make the same poses of the same mechanics; what is left is rounding, and a load that leaves out its own bend.
