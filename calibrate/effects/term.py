@@ -125,11 +125,6 @@ class Effect(Protocol):
         ...
 
     @property
-    def mistaken_for(self) -> tuple[str, ...]:
-        """Names of physics that look alike."""
-        ...
-
-    @property
     def source(self) -> str:
         """Paper, section, manual page."""
         ...

@@ -70,7 +70,7 @@ class Heartbeats:
 
     def heard(self, node: int) -> None:
         if node in self._heard_s:
-            self._took_s[node] = self._alive_s - self._heard_s[node]
+            self._took_s[node] = max(self._alive_s - self._heard_s[node], self._period_s)
             self._heard_s[node] = self._alive_s
             self._since_any_s = self.busy_s = 0.0
 
@@ -86,8 +86,8 @@ class Heartbeats:
 
     def _expected_s(self, node: int) -> float:
         """The period in alive time, by the other nodes."""
-        slowest_s = max((took_s for other, took_s in self._took_s.items() if other != node), default=0.0)
-        return min(max(slowest_s, self._period_s), MOST / LATE * self._period_s)
+        others_s = (took_s for other, took_s in self._took_s.items() if other != node)
+        return min(max(others_s, default=self._period_s), MOST / LATE * self._period_s)
 
 
 EMERGENCIES_KEPT = 256
