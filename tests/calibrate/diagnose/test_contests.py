@@ -18,7 +18,7 @@ from calibrate.diagnose.session import session_of
 
 from .concealed import recording_of
 
-MEASURED, RANDOM = 60, 2
+MEASURED, RANDOM = 60, 1
 
 
 def told(folder):
@@ -76,7 +76,7 @@ def poses_like(recording, measured, rest, rng):
     ],
 )
 def test_twenty_chosen_poses_part_truth_and_rival_more_than_random_ones(seed, kind, physics, tmp_path):
-    wanted = {"family": "dual-psd", "seed": seed, "defects": (kind,), "enr": 0.6, "samples": 300}
+    wanted = {"family": "dual-psd", "seed": seed, "defects": (kind,), "enr": 0.6, "samples": 200}
     recording, rng = recording_of(tmp_path, **wanted), np.random.default_rng(seed)
     where = told(tmp_path)["port"]
     order = rng.permutation(len(recording.samples))

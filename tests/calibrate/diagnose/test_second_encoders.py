@@ -29,7 +29,7 @@ DAILY = ("slack-drive",)  # the others, and the report by their model: under end
 
 
 def diagnosed(folder, **wanted):
-    recording = recording_of(folder, family="tracker", samples=120, arm="ur5", **wanted)
+    recording = recording_of(folder, family="tracker", samples=80, arm="ur5", **wanted)
     found = diagnose_samples(recording.rig, recording.samples, np.random.default_rng(1))
     return found.physics
 

@@ -11,7 +11,7 @@ from calibrate.parameters import Parameter
 
 LOSSES = (Loss.SQUARE, Loss.HUBER, Loss.CAUCHY, Loss.STUDENT_T, Loss.student_t(2.0))
 ROBUST = LOSSES[1:]
-DRAWS = pytest.mark.parametrize("draws", [150, pytest.param(400, marks=pytest.mark.endure)])
+DRAWS = pytest.mark.parametrize("draws", [100, pytest.param(400, marks=pytest.mark.endure)])
 
 
 @dataclass(frozen=True)
