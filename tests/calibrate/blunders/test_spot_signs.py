@@ -20,7 +20,7 @@ def rig(request):
 
 @pytest.fixture
 def lit(sessions):
-    return sessions(61, n=90)
+    return sessions(61, n=45)
 
 
 def samples(lit, spots_m):
