@@ -6,6 +6,11 @@ from scipy.stats import binom
 from benchmarks import coverage
 
 
+@pytest.fixture(autouse=True)
+def _one_bench(monkeypatch, bench):
+    monkeypatch.setattr(coverage, "Bench", lambda _: bench)
+
+
 @pytest.mark.parametrize("sessions", [20, pytest.param(60, marks=pytest.mark.endure)])
 def test_intervals_keep_their_word(request, sessions):
     tally = coverage.run(request.config.rootpath / "rigs" / "ur5e-dual-psd.toml", sessions=sessions, seed=7)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig import load_rig
-from benchmarks.drawn_sessions import POSITION_SIGMA_M, SPOT_SIGMA_M, Bench
+from benchmarks.drawn_sessions import POSITION_SIGMA_M, SPOT_SIGMA_M
 from calibrate.dual_psd_rig import dual_psd_chain
 from calibrate.fit import solve
 from calibrate.identifiability import analyse
@@ -78,9 +78,9 @@ def test_no_rows_to_fit_is_no_proof(fitted):
 
 
 @pytest.fixture(scope="module")
-def dual_psd(request):
+def dual_psd(request, bench):
     rig_file = request.config.rootpath / "rigs" / "ur5e-dual-psd.toml"
-    session = Bench(rig_file).dual_psd(np.random.default_rng(5), 60)
+    session = bench.dual_psd(np.random.default_rng(5), 60)
     chain = dual_psd_chain(load_rig(rig_file), session.placement, session.first_psd)
     weights = np.tile(np.eye(4) / SPOT_SIGMA_M, (60, 1, 1))
     everything = Problem(chain, chain.parameters, session.q_rad, session.observed, weights)
