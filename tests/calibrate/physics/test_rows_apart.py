@@ -3,6 +3,8 @@
 Without a condition, it is predicted with the same sigma or a wider one, and never refused.
 """
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -30,11 +32,18 @@ def steady(fit, samples):
     return Samples(asked, samples.n_joints), warm
 
 
+@cache
+def asked_of(family, every_place):
+    """Terms of every physics; a whole arm is named as its longest link."""
+    _, fit, _ = known(family)
+    whole_arm = [t for t in terms_of(fit.drivers) if t.variant == "whole arm"]
+    return (*listed(fit, every_place=every_place), *whole_arm)
+
+
 def check_every_term_of(physics, family, *, every_place):
     model, fit, samples = known(family)
     asked, warm = steady(fit, samples)
-    whole_arm = [t for t in terms_of(fit.drivers) if t.variant == "whole arm"]  # named as its longest link is
-    for term in (*listed(fit, every_place=every_place), *whole_arm):
+    for term in asked_of(family, every_place):
         if term.physics != physics:
             continue
         whole, needs = carrying(model, fit, samples, term)
