@@ -57,7 +57,7 @@ FIGURES_M = {"ur10-leica-a": 0.449e-3, "ur10-leica-b": 0.421e-3, "ur10-leica-d":
 DRAWN_M = {"ur10-leica-a": 0.8e-3, "ur10-leica-b": 1.0e-3, "ur10-leica-d": 0.7e-3}
 
 
-OF_B = pytest.mark.parametrize(  # a and d: daily in tests/golden/test_real_robots.py
+OF_B = pytest.mark.parametrize(  # another one: daily in tests/golden/test_real_robots.py
     "name", [pytest.param(name, marks=() if name.endswith("b") else pytest.mark.endure) for name in FIGURES_M]
 )
 
@@ -105,6 +105,7 @@ def test_axis_4_of_the_ur5_is_11_6_mrad_out_of_parallel_to_axis_3_in_every_part_
     assert np.sqrt(np.mean(np.sum(misfit**2, axis=1))) > 0.4e-3
 
 
+@pytest.mark.endure  # daily: several kinds at once, in test_blunders_in_sessions.py
 def test_blunders_made_in_the_ur5_session_are_found_and_no_others(real):
     recording = real("ur5-tracker")
     samples = recording.samples
