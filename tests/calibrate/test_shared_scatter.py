@@ -20,7 +20,7 @@ from .conftest import spot_samples
 SEATING_RAD, OWN_RAD, PSD_M, ROWS = 10e-6, 2e-6, 2e-6, 60
 SOFT = ("joint2.angle", ("gravity_torque2",), "linear", None, "joint-compliance", "")
 BOTH = ("dual-psd", "encoder-difference")
-DRAWS = pytest.mark.parametrize("draws", [6, pytest.param(40, marks=pytest.mark.endure)])
+DRAWS = pytest.mark.parametrize("draws", [4, pytest.param(40, marks=pytest.mark.endure)])
 HELD = ("link*", "laser*", "psd2*", "placement*")  # known: nothing hides what the joints scatter
 
 

@@ -33,7 +33,9 @@ def mirrored(lit, *axes):
     return samples(lit, lit.spots_m * np.where(np.isin(np.arange(4), axes), -1.0, 1.0))
 
 
-@pytest.mark.parametrize("axes", [(0,), (1,), (2,), (3,), (0, 2)])
+@pytest.mark.parametrize(
+    "axes", [(0,), *(pytest.param((axis,), marks=pytest.mark.endure) for axis in (1, 2)), (3,), (0, 2)]
+)
 def test_every_axis_is_named_by_its_column(rig, lit, axes):
     found = mirrored_axes(rig, mirrored(lit, *axes))
     assert found.kind is BlunderKind.MIRRORED_AXIS

@@ -16,7 +16,7 @@ from simulators.conceal.case import conceal
 from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import FAMILIES, Family, Wanted
 
-SEED, SAMPLES = 5, 80
+SEED, SAMPLES = 5, 120
 JOINTS = 6
 
 

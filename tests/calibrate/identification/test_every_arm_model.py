@@ -50,7 +50,11 @@ def bars(session):
     return table(q[both], bar=np.ones(both.sum()), bar_end=end[both])
 
 
-@pytest.mark.parametrize("samples", [positions, wire, cones, pytest.param(bars, marks=pytest.mark.endure)])
+# Daily for wires and bars in one writing: test_identify.py.
+MORE = [pytest.param(samples, marks=pytest.mark.endure) for samples in (wire, bars)]
+
+
+@pytest.mark.parametrize("samples", [positions, cones, *MORE])
 def test_identified_predicted_and_exported_alike(rig, session, samples):
     seen, left, told = samples(session), {}, {}
     for model in ArmModel:

@@ -78,7 +78,8 @@ def test_the_published_error_of_b_is_of_a_lucky_split_which_no_arm_reaches_on_al
     assert rms.min() <= figure < rms.mean() <= 1.06 * figure
 
 
-@OF_B
+@pytest.mark.endure  # daily: tests/golden/test_real_robots.py
+@pytest.mark.parametrize("name", FIGURES_M)
 def test_the_identification_tells_the_unseen_error_and_finds_no_blunder_in_a_good_session(real, name):
     result = run(real(name), share=0.2)
     unseen = result.held_out[0]

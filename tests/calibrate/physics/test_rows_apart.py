@@ -78,7 +78,12 @@ def test_a_row_is_predicted_alike_alone_among_others_and_without_a_condition(phy
 
 
 @pytest.mark.endure
-@pytest.mark.parametrize("family", ["tracker", "dual-psd", "wire", "cones"])
+def test_so_it_is_at_every_link_that_grows_before_a_tracker():
+    check_every_term_of("link-thermal-growth", "tracker", every_place=True)
+
+
+@pytest.mark.endure
+@pytest.mark.parametrize("family", ["dual-psd", "wire", "cones"])
 @pytest.mark.parametrize("physics", NAMES)
 def test_so_it_is_at_every_kind_of_place_and_under_every_instrument(physics, family):
     check_every_term_of(physics, family, every_place=True)
