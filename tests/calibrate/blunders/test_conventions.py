@@ -47,7 +47,7 @@ def test_a_joint_counted_the_other_way_round_is_named(scene, joint):
 
 
 QUARTERS = [(2, 1), (3, 2), (4, -1)]
-MORE = [(5, 1), (6, 2), (2, -1)]
+MORE = [(5, 1), (6, 2), (2, -1)]  # daily: quarters of either sign and a half, above
 
 
 @pytest.mark.parametrize(

@@ -52,6 +52,7 @@ def test_a_healthy_session_is_strained_by_the_arm_alone_and_nothing_is_said(scen
 
 
 DAILY = [(w, 2 + i) for i, w in enumerate(WITNESSES)]
+# Daily for them: another joint by each instrument.
 MORE = [pytest.param(w, 2 + (i + 2) % 4, marks=pytest.mark.endure) for i, w in enumerate(WITNESSES)]
 
 

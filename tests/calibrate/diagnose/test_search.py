@@ -17,6 +17,7 @@ def names(found):
     return {(a.term.port.where, a.term.depends_on, a.term.physics) for a in found.state.accepted}
 
 
+# Daily for one between: a smaller and a larger one.
 @pytest.mark.parametrize("enr", [0.3, pytest.param(0.6, marks=pytest.mark.endure), 2.0])
 def test_one_effect_is_found_and_named(world, enr):
     right = 0
