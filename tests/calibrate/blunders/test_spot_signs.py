@@ -33,6 +33,7 @@ def mirrored(lit, *axes):
     return samples(lit, lit.spots_m * np.where(np.isin(np.arange(4), axes), -1.0, 1.0))
 
 
+# Daily for every axis: the first and the last.
 @pytest.mark.parametrize(
     "axes", [(0,), *(pytest.param((axis,), marks=pytest.mark.endure) for axis in (1, 2)), (3,), (0, 2)]
 )
