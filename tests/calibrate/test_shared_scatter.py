@@ -20,7 +20,7 @@ from .conftest import spot_samples
 SEATING_RAD, OWN_RAD, PSD_M, ROWS = 10e-6, 2e-6, 2e-6, 60
 SOFT = ("joint2.angle", ("gravity_torque2",), "linear", None, "joint-compliance", "")
 BOTH = ("dual-psd", "encoder-difference")
-DRAWS = pytest.mark.parametrize("draws", [10, pytest.param(40, marks=pytest.mark.endure)])
+DRAWS = pytest.mark.parametrize("draws", [4, pytest.param(40, marks=pytest.mark.endure)])
 HELD = ("link*", "laser*", "psd2*", "placement*")  # known: nothing hides what the joints scatter
 
 
@@ -52,9 +52,21 @@ def drawn(still):
     return draw
 
 
+@pytest.fixture(scope="module")
+def one(rig, drawn):
+    """The fit of one draw, of encoders on the links."""
+    return fitted(rig, drawn(1, OWN_RAD))
+
+
 def fitted(rig, samples):
     found = instruments_for_fit(rig, samples, FitPlan(schema=1, instruments=BOTH, hold=HELD))
     return settled_fit(found.weighting, found.start)
+
+
+@pytest.fixture(scope="module")
+def geometry(rig, drawn):
+    """The same draw as a diagnosis fits it."""
+    return fit_geometry(session_of(rig, drawn(1, OWN_RAD)))
 
 
 def away(fit):
@@ -97,8 +109,8 @@ def correlation(one, other):
     return float(np.sum(one * other) / np.sqrt(np.sum(one**2) * np.sum(other**2)))
 
 
-def test_whitened_spots_know_nothing_of_the_encoders_of_their_sample(rig, drawn):
-    fit = fitted(rig, drawn(1, OWN_RAD))
+def test_whitened_spots_know_nothing_of_the_encoders_of_their_sample(one):
+    fit = one
     problem, theta = fit.problem, fit.fit.theta
     block, witnessed = problem.blocks[0], problem.witnessed
     shared = witnessed.added(block, 0, witnessed.problem.misfit(problem.of_block(1, theta)))
@@ -106,8 +118,8 @@ def test_whitened_spots_know_nothing_of_the_encoders_of_their_sample(rig, drawn)
     assert abs(correlation(block.residual(problem.of_block(0, theta)), shared)) > 0.8
 
 
-def test_the_slope_of_whitened_rows_is_the_derivative_of_their_residual(rig, drawn):
-    fit = fitted(rig, drawn(1, OWN_RAD))
+def test_the_slope_of_whitened_rows_is_the_derivative_of_their_residual(one):
+    fit = one
     theta, slope = fit.fit.theta, fit.problem.jacobian(fit.fit.theta)
     for i in np.flatnonzero([p.free for p in fit.problem.parameters]):
         step = np.zeros(len(theta))
@@ -116,13 +128,13 @@ def test_the_slope_of_whitened_rows_is_the_derivative_of_their_residual(rig, dra
         assert_allclose(change / (2.0 * step[i]), slope[:, i], atol=1e-4 * np.abs(slope[:, i]).max() + 1e-9)
 
 
-def test_the_share_is_that_of_the_links(rig, drawn):
-    on_link = fitted(rig, drawn(1, OWN_RAD)).weighting.shares
+def test_the_share_is_that_of_the_links(rig, drawn, one, geometry):
+    on_link = one.weighting.shares
     in_front = fitted(rig, drawn(1, SEATING_RAD, on_link=False)).weighting.shares
     true = SEATING_RAD**2 / (SEATING_RAD**2 + OWN_RAD**2)
     assert abs(np.mean(on_link[:3]) - true) < 0.12  # the last joints have short levers
     assert np.mean(in_front[:3]) < 0.3
-    state = fit_geometry(session_of(rig, drawn(1, OWN_RAD)))
+    state = geometry
     assert abs(np.mean(state.noise.shared.share[:3]) - true) < 0.12
 
 
@@ -143,9 +155,9 @@ def test_joints_scatter_by_what_encoders_have_taken_out_and_by_what_is_left(rig,
     assert taken < 3.0 * sigma
 
 
-def test_each_instrument_pays_for_what_was_fitted_to_it(rig, drawn):
+def test_each_instrument_pays_for_what_was_fitted_to_it(geometry):
     """Zeros of the second encoders are all that their rows determine; the rest of geometry is the spots'."""
-    fit = fit_geometry(session_of(rig, drawn(1, OWN_RAD)))
+    fit = geometry
     names = [m.name for m in fit.session.measured]
     counts = np.array([m.problem.observed.size for m in fit.session.measured])
     fitted = dict(zip(names, counts * (1.0 - 1.0 / freedom(fit.problem, fit.values, fit.covariance)), strict=True))

@@ -43,7 +43,7 @@ def best(rows):
 
 @pytest.mark.parametrize("size", [(3e-6, 2e-6), (2e-5, 4e-7), (4e-7, 1e-5), (3e-6, 0.0), (0.0, 2e-6)])
 def test_the_largest_likelihood_is_found(size):
-    rows = drawn(*size)
+    rows = drawn(*size, n=80)
     found = estimate(rows)
     assert found.converged
     np.testing.assert_allclose(found.log_variance, best(rows), atol=1e-5)

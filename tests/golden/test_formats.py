@@ -57,6 +57,7 @@ def test_a_model_of_schema_1_predicts_as_frozen(frozen, tmp_path, name):
     assert column_differences(now, expected) == []
 
 
+@pytest.mark.usefixtures("bare_figures")
 def test_model_and_diagnosis_of_schema_1_go_into_a_report(tmp_path):
     files = ("--model", answers.MODELS / "wire.json", "--diagnosis", answers.FORMATS / "diagnosis.json")
     page = tmp_path / "report.html"
@@ -67,6 +68,7 @@ def test_model_and_diagnosis_of_schema_1_go_into_a_report(tmp_path):
     assert finding["physics"] in text
 
 
+@pytest.mark.usefixtures("bare_figures")
 def test_an_earlier_result_of_schema_1_is_compared_with(tmp_path):
     earlier, page = tmp_path / "earlier", tmp_path / "report.html"
     earlier.mkdir()

@@ -26,7 +26,12 @@ def test_20_unseen_poses_of_a_ur5_are_predicted_to_a_tenth_of_a_millimetre(froze
     assert found["max_m"] == pytest.approx(expected["max_m"], abs=LARGEST_M)
 
 
-@pytest.mark.parametrize("name", answers.ROBOTS)
+LARGEST = "ur10-leica-a"  # b and d, smaller ones of the same arm, are daily
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.endure if name == LARGEST else ()) for name in answers.ROBOTS]
+)
 def test_every_fifth_row_of_a_ur10_is_predicted_from_the_others_as_frozen(frozen, tmp_path, name):
     found, expected = answers.ur10(name, tmp_path), frozen("real")[name]
     assert (found["rows"], found["left_out"]) == (expected["rows"], expected["left_out"])

@@ -37,7 +37,8 @@ def test_an_arm_a_few_millimetres_beside_its_drawing_is_no_blunder(scene):
     assert judged(scene.q_rad, scene.position_m, None) is None
 
 
-@pytest.mark.parametrize("joint", range(1, 7))
+# Daily for the other joints: any set of joints, in test_joint_signs.py.
+@pytest.mark.parametrize("joint", [1, 3, *(pytest.param(joint, marks=pytest.mark.endure) for joint in (2, 4, 5, 6))])
 def test_a_joint_counted_the_other_way_round_is_named(scene, joint):
     found = judged(reversed_joint(scene.q_rad, joint), scene.position_m)
     assert found.kind is BlunderKind.JOINT_SIGN
@@ -45,7 +46,13 @@ def test_a_joint_counted_the_other_way_round_is_named(scene, joint):
     assert f"column q{joint}_rad" in found.says
 
 
-@pytest.mark.parametrize(("joint", "quarters"), [(2, 1), (3, 2), (4, -1), (5, 1), (6, 2), (2, -1)])
+QUARTERS = [(2, 1), (3, 2), (4, -1)]
+MORE = [(5, 1), (6, 2), (2, -1)]  # daily: quarters of either sign and a half, above
+
+
+@pytest.mark.parametrize(
+    ("joint", "quarters"), [*QUARTERS, *(pytest.param(*one, marks=pytest.mark.endure) for one in MORE)]
+)
 def test_a_zero_beside_by_quarters_of_a_turn_is_named_with_what_to_add(scene, joint, quarters):
     found = judged(turned(scene.q_rad, joint, quarters * np.pi / 2), scene.position_m)
     assert f"q{joint}_rad" in found.says

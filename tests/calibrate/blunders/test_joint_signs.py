@@ -32,9 +32,9 @@ def planar(q):
 def session(point=POINT, seed=3):
     """Angles in the sense of the rig, and what a tracker reads; the arm is a millimetre beside its drawing."""
     rng = np.random.default_rng(seed)
-    q = rng.uniform(-2.0, 2.0, (100, 6))
+    q = rng.uniform(-2.0, 2.0, (60, 6))
     T = flange(q, PLANAR + rng.normal(0.0, 1e-3, PLANAR.shape))
-    return q, T[:, :3, :3] @ point + T[:, :3, 3] + rng.normal(0.0, NOISE, (100, 3))
+    return q, T[:, :3, :3] @ point + T[:, :3, 3] + rng.normal(0.0, NOISE, (60, 3))
 
 
 def counted(q, *joints):

@@ -20,7 +20,7 @@ def near_the_axis(tmp_path_factory):
     """A target a tenth of a millimetre off the axis of joint 6, which sways across it by its angle: by what nobody
     can say, for 0.4 rad of the joint would do the same.
     """
-    drawn = recording_of(tmp_path_factory.mktemp("near"), family="tracker", seed=3, samples=120)
+    drawn = recording_of(tmp_path_factory.mktemp("near"), family="tracker", seed=3, samples=60)
     point_m = (1e-4, 0.0, 0.1)
     rig = structs.replace(drawn.rig, tool=structs.replace(drawn.rig.tool, point_m=point_m))
     q_rad = drawn.samples.joints()

@@ -75,20 +75,20 @@ def test_lack_of_fit_is_seen_where_poses_repeat(world):
 
 def test_a_driver_that_was_not_recorded_is_seen_by_its_lever(world):
     right = 0
-    for seed in range(10):
+    for seed in range(6):
         rng = np.random.default_rng(seed)
         hidden = np.random.default_rng(seed + 100)
         session = world.session(rng, [(world.at_joint(3, lambda d, h=hidden: h.normal(size=len(d.t_s))), 0.8)])
         right += diagnose(session, rng).verdict is Verdict.UNDECIDABLE
-    assert right == 10
+    assert right == 6
 
 
 def test_instrument_noise_is_not_taken_for_an_unrecorded_driver(world):
     alarms = 0
-    for seed in range(50):
+    for seed in range(34):
         rng = np.random.default_rng(seed)
         alarms += unrecorded(Bench(world.session(rng)), rng) is not None
-    assert alarms <= 3
+    assert alarms <= 2
 
 
 def test_terms_that_are_there_predict_and_others_do_not(world):
@@ -108,9 +108,9 @@ def test_terms_that_are_there_predict_and_others_do_not(world):
 
 
 def test_stated_sigmas_cover(world):
-    """Truth: one coefficient of known size, 95 % intervals, 200 sessions."""
+    """Truth: one coefficient of known size, 95 % intervals, 120 sessions."""
     inside = 0
-    for seed in range(200):
+    for seed in range(120):
         rng = np.random.default_rng(2000 + seed)
         session = world.session(rng)
         size = 0.3
@@ -120,7 +120,7 @@ def test_stated_sigmas_cover(world):
         bench = Bench(moved.refitted([refined(Bench(moved), term, np.zeros(0))]))
         (found,) = sizes_of(bench, 0).values()
         inside += abs(found.value - size) <= 1.96 * found.sigma
-    assert inside / 200 == pytest.approx(0.95, abs=0.035)
+    assert inside / 120 == pytest.approx(0.95, abs=0.035)
 
 
 def test_proof_reaches_the_floor(world):

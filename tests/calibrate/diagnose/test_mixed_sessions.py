@@ -10,7 +10,7 @@ CASES = [
     pytest.param(full_pose, 3, "encoder-eccentricity", marks=pytest.mark.endure),
     pytest.param(full_pose, 9, "worn-bearing", marks=pytest.mark.endure),  # daily: tests/golden
     (tracker_and_cones, 6, "soft-joint"),
-    pytest.param(spots_and_bar, 4, "encoder-eccentricity", marks=pytest.mark.endure),  # daily: tests/golden
+    pytest.param(spots_and_bar, 4, "encoder-eccentricity", marks=pytest.mark.endure),  # daily: tracker and cones
 ]
 
 
@@ -28,7 +28,8 @@ def test_the_effect_is_named_in_its_place(made, seed, defect, tmp_path):
             assert split.rms_after_m < 1.05 * split.rms_before_m, split.instrument
 
 
-@pytest.mark.parametrize("made", [pytest.param(full_pose, marks=pytest.mark.endure), tracker_and_cones])
+@pytest.mark.endure  # daily: a session in which nothing is hidden, in tests/golden
+@pytest.mark.parametrize("made", [full_pose, tracker_and_cones])
 def test_a_session_of_several_instruments_without_an_effect_is_consistent(made, tmp_path):
     recording, _ = made(tmp_path, seed=5 if made is tracker_and_cones else 6, samples=220)
     _, file = diagnose_recording(recording)

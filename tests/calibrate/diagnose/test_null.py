@@ -11,12 +11,12 @@ from calibrate.diagnose.tail import Tail
 
 # Nominal 5 %; three binomial sigmas of 200 sets on top would be 9.6 %: the bounds are those of the requirement.
 MOST = {"white": 0.06, "heavy": 0.06, "wander": 0.08}
-DAILY, ENDURED = 100, 200  # sets
+DAILY, ENDURED = 60, 200  # sets; daily for noise of every kind: heavy noise
 
 
 @pytest.mark.parametrize(
     ("noise", "sets"),
-    [("white", DAILY), ("heavy", DAILY), *(pytest.param(one, ENDURED, marks=pytest.mark.endure) for one in MOST)],
+    [("heavy", DAILY), *(pytest.param(one, ENDURED, marks=pytest.mark.endure) for one in MOST)],
 )
 def test_false_alarms_stay_below_the_bound(world, noise, sets):
     alarms = 0
@@ -40,11 +40,11 @@ def test_wander_is_measured_behind_geometry(world):
 @pytest.mark.parametrize("noise", ["white", "heavy"])
 def test_white_noise_is_seldom_said_to_wander(world, noise):
     wanders = 0
-    for seed in range(60):
+    for seed in range(40):
         rng = np.random.default_rng(seed)
         bench = Bench(world.session(rng, noise=noise))
         wanders += noise_law(bench.state.rows, bench.sight, bench.state.drivers.t_s, rng).wanders
-    assert wanders / 60 <= 0.15
+    assert wanders / 40 <= 0.15
 
 
 def test_drawn_noise_has_the_size_of_the_session_and_keeps_observations_whole(world):

@@ -17,7 +17,8 @@ def names(found):
     return {(a.term.port.where, a.term.depends_on, a.term.physics) for a in found.state.accepted}
 
 
-@pytest.mark.parametrize("enr", [0.3, 0.6, 2.0])
+# Daily for one between: a smaller and a larger one.
+@pytest.mark.parametrize("enr", [0.3, pytest.param(0.6, marks=pytest.mark.endure), 2.0])
 def test_one_effect_is_found_and_named(world, enr):
     right = 0
     for seed in range(10):
@@ -110,16 +111,16 @@ OUTSIDE = {
 def test_what_no_catalogue_holds_is_unknown_at_the_right_joint(world, kind):
     drivers, function = OUTSIDE[kind]
     right = 0
-    for seed in range(8):
+    for seed in range(4):
         rng = np.random.default_rng(seed)
         found = with_unknowns(search(world.session(rng, [(world.at_joint(3, function), 1.0)]), rng))
         unknown = [a.term for a in found.state.accepted if a.term.open]
         right += [(t.port.where, t.depends_on) for t in unknown] == [("joint3.angle", drivers)]
-    assert right >= 7
+    assert right == 4
 
 
 def test_a_name_that_fits_is_not_given_up_for_a_curve(world):
-    for seed in range(8):
+    for seed in range(4):
         rng = np.random.default_rng(seed)
         found = with_unknowns(search(world.session(rng, [(world.at_joint(2, sine(2)), 3.0)]), rng))
         assert names(found) == {("joint2.angle", ("q2",), "encoder-eccentricity")}

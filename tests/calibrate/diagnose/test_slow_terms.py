@@ -27,13 +27,13 @@ def slipped_for_ten_shots(world, rng, sigmas=25.0):
 
 def test_a_step_over_ten_shots_is_found_though_robust_weights_swallow_it(world):
     found = 0
-    for seed in range(6):
+    for seed in range(3):
         rng = np.random.default_rng(seed)
         session = slipped_for_ten_shots(world, rng)
         assert session.distrusted >= 8
         end = search(session, rng).state
         found += [a.term.key for a in end.accepted] == [slip(session, 2).key] and end.distrusted <= 2
-    assert found == 6
+    assert found == 3
 
 
 def test_trusted_again_wild_rows_propose_the_step(world):

@@ -53,7 +53,7 @@ def test_all_that_is_unknown_at_one_port_is_one_finding_with_its_drivers(world):
 def test_the_size_of_an_unknown_cause_is_what_the_readings_show(world):
     """Not that of its coefficients, which geometry and other terms share with it."""
     within = 0
-    for seed in range(8):
+    for seed in range(4):
         rng = np.random.default_rng(seed)
         session = moved_by(world, rng, 3, wavy, SIZE_RAD)
         found = with_unknowns(search(session, rng))
@@ -63,7 +63,7 @@ def test_the_size_of_an_unknown_cause_is_what_the_readings_show(world):
         within += 0.75 * true < size.value < 1.1 * true
         assert size.sigma < 0.2 * size.value
         assert "depends on q3: shows as" in said[0].says
-    assert within == 8
+    assert within == 4
 
 
 def test_names_that_balance_each_other_are_no_machine(world):

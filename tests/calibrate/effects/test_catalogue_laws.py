@@ -14,6 +14,7 @@ from calibrate.effects.catalogue import EFFECTS, missing_of
 from calibrate.effects.form import Form
 from calibrate.effects.ports import Place
 from calibrate.effects.term import UNITS, Shape
+from simulators.conceal.wanted import FAMILIES
 
 from .conftest import full_session
 
@@ -177,6 +178,11 @@ WITHOUT = {
 }
 
 
+# Of a wire and of cones nothing is dropped that a tracker does not have, too.
+MORE = [pytest.param(family, marks=pytest.mark.endure) for family in FAMILIES if family not in ("dual-psd", "tracker")]
+
+
+@pytest.mark.parametrize("fitted", ["dual-psd", "tracker", *MORE], indirect=True)
 @pytest.mark.parametrize("driver", WITHOUT)
 def test_a_dropped_driver_is_declared_missing_and_its_terms_are_gone(drivers, driver):
     nothing, physics = WITHOUT[driver]

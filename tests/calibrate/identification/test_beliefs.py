@@ -43,7 +43,7 @@ def bent(sessions, ur5e_truth):
             truth, off = ur5e_truth(np.random.default_rng(seed)), np.eye(4)
             off[:3, :3], off[:3, 3] = Rotation.from_rotvec(OFF_RAD).as_matrix(), OFF_M
             truth.psd2 = truth.psd2 @ off
-            drawn[seed] = sessions(seed, truth=truth)
+            drawn[seed] = sessions(seed, n=60, truth=truth)
         return drawn[seed]
 
     return get

@@ -50,12 +50,16 @@ def bars(session):
     return table(q[both], bar=np.ones(both.sum()), bar_end=end[both])
 
 
-@pytest.mark.parametrize("samples", [positions, wire, cones, pytest.param(bars, marks=pytest.mark.endure)])
+# Daily for wires and bars in one writing: test_identify.py.
+MORE = [pytest.param(samples, marks=pytest.mark.endure) for samples in (wire, bars)]
+
+
+@pytest.mark.parametrize("samples", [positions, cones, *MORE])
 def test_identified_predicted_and_exported_alike(rig, session, samples):
     seen, left, told = samples(session), {}, {}
     for model in ArmModel:
         own = written_as(rig, model)
-        result = identify(own, seen, rng=np.random.default_rng(1))
+        result = identify(own, seen, rng=np.random.default_rng(1), held_out_share=0.0)
         assert result.status in USABLE, model
         values = {p.name: float(v) for p, v in zip(result.parameters, result.theta, strict=True)}
         (instrument,) = result.instruments
@@ -74,7 +78,7 @@ def test_identified_predicted_and_exported_alike(rig, session, samples):
 
 
 def test_zeros_by_the_dual_psd_do_not_depend_on_the_writing_but_what_they_are_measured_from_does(rig, sessions):
-    session = sessions(7, n=100, repeats=8)
+    session = sessions(7, n=60, repeats=8)
     samples, found = spot_samples(session), {}
     for model in ArmModel:
         own = msgspec.structs.replace(rig, arm=convert(rig.arm, model).arm)

@@ -25,7 +25,7 @@ def left_out(rig, samples):
     return [blunder.rows for blunder in found.blunders]
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2, pytest.param(3, marks=pytest.mark.endure)])
 def test_no_row_of_a_dozen_good_ones_is_left_out(tmp_path, seed):
     assert left_out(*recorded(tmp_path, seed, 12)) == []
 

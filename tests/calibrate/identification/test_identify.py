@@ -12,7 +12,7 @@ from calibrate.identification.identify import identify
 from calibrate.predict import Predictor, predict
 from calibrate.uncertainty.fit_statistics import Alarm
 
-from .conftest import BAR_M, table
+from .conftest import BAR_M, Session, table
 
 TRACKER_M = 1e-5
 
@@ -44,9 +44,16 @@ def test_a_tracker_of_unknown_place_predicts_unseen_poses_to_a_fraction_of_its_n
     assert result.stated_noise.alarm is Alarm.NONE
 
 
-def test_links_without_tolerance_are_free_and_the_noise_is_found(rig, session):
+@pytest.fixture(scope="module")
+def untold(rig, ur5e_truth):
+    """A session before a tracker, and its answer by a rig file that says nothing of the drawing."""
+    session = Session(ur5e_truth(np.random.default_rng(5), zero_max=5e-3))
     rig, samples = tracked(rig, session, n=250)
-    result = run(msgspec.structs.replace(rig, tolerance=None), samples)
+    return session, run(msgspec.structs.replace(rig, tolerance=None), samples)
+
+
+def test_links_without_tolerance_are_free_and_the_noise_is_found(untold):
+    _, result = untold
     (noise,) = result.noise
     assert (noise.source, noise.found) == ("position", pytest.approx(TRACKER_M, rel=0.15))
     random, last = result.held_out
@@ -57,9 +64,8 @@ def test_links_without_tolerance_are_free_and_the_noise_is_found(rig, session):
         assert unseen.rms_distance_after_m < 2.2 * TRACKER_M
 
 
-def test_what_is_said_with_a_sigma_is_true(rig, session):
-    rig, samples = tracked(rig, session, n=250)
-    result = run(msgspec.structs.replace(rig, tolerance=None), samples, held_out_share=0.0)
+def test_what_is_said_with_a_sigma_is_true(rig, untold):
+    session, result = untold
     told = {e.name: e for e in result.estimates if e.value is not None}
     truth = {f"link{i + 1}.length": row[1] - rig.arm.joints[i].a_m for i, row in enumerate(session.truth.links)}
     for name in ("link2.length", "link3.length"):
@@ -110,7 +116,7 @@ CONES = np.array([[0.45, 0.1, 0.2], [0.2, -0.5, 0.35]])
 def test_cones_bring_all_tips_of_a_seat_together(rig, session):
     q, seat = seated(session, CONES, 40)
     q = q + session.rng.normal(0.0, 5e-6, q.shape)
-    result = run(rig, table(q, seat=seat))
+    result = run(rig, table(q, seat=seat), held_out_share=0.0)
     (instrument,) = result.instruments
     assert instrument.name == "seat"
     assert instrument.rms_distance_after_m < 2.5e-5
@@ -148,7 +154,7 @@ def test_a_bar_gives_the_scale_that_cones_do_not_have(rig, session):
         bar=np.concatenate([nothing, np.ones(m)]),
         bar_end=letters,
     )
-    result = run(rig, samples)
+    result = run(rig, samples, held_out_share=0.0)
     assert [i.name for i in result.instruments] == ["seat", "bar"]
     assert result.instruments[1].observations == m // 2 > 15
     assert all(i.rms_distance_after_m < i.rms_distance_before_m for i in result.instruments)

@@ -15,9 +15,9 @@ from calibrate.uncertainty.fit_statistics import Alarm
 
 from ..conftest import spot_samples
 
-# Beside the twenty of tests/golden. Zeros of a truth as far off as those of 25 and 29 have every pair of conventions
+# Beside those of tests/golden. Zeros of a truth as far off as those of 25 and 29 have every pair of conventions
 # tried, for seconds; of such truths the daily run has two, in test_few_samples_stay_honest.
-SEEDS, ENDURED = range(20, 25), range(25, 30)
+SEEDS, ENDURED = range(20, 23), range(23, 30)
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +74,7 @@ def test_between_crossing_axes_the_zero_is_the_whole_turn(rig, sessions, ur5e_tr
     """A link 4 that is tilted about its own axis is a joint 4 with another zero (alpha +90 deg: the same sense)."""
     truth = ur5e_truth(np.random.default_rng(7))
     truth.links[3, 3] = 2e-3
-    zero = run(rig, sessions(7, truth=truth)).zeros[3]
+    zero = run(rig, sessions(7, n=45, truth=truth)).zeros[3]
     assert abs(zero.value_rad - truth.zeros[3] - 2e-3) < 4.5 * zero.sigma_rad
 
 
@@ -101,7 +101,7 @@ def test_noise_of_joints_and_detectors_is_found_and_chi_square_agrees(results):
 
 
 def test_joints_without_noise_are_reported_as_not_to_be_told_from_none(rig, sessions):
-    session = sessions(8, joint_noise=0.0)
+    session = sessions(8, n=45, joint_noise=0.0)
     result = run(rig, session)
     assert result.noise_settled
     assert (noise(result, "joint").at_zero, noise(result, "psd").at_zero) == (True, False)
@@ -110,9 +110,10 @@ def test_joints_without_noise_are_reported_as_not_to_be_told_from_none(rig, sess
 
 
 def test_a_wrong_assumption_about_noise_changes_little_and_raises_an_alarm(rig, sessions):
-    right = run(rig, sessions(0))
+    session = sessions(0, n=45)
+    right = run(rig, session)
     stated = msgspec.structs.replace(rig.noise, joint_rad=2e-5, psd_m=5e-7)
-    wrong = run(msgspec.structs.replace(rig, noise=stated), sessions(0))
+    wrong = run(msgspec.structs.replace(rig, noise=stated), session)
     assert noise(wrong, "joint").found == pytest.approx(noise(right, "joint").found, rel=0.1)
     assert wrong.zeros[1].value_rad == pytest.approx(right.zeros[1].value_rad, abs=right.zeros[1].sigma_rad)
     assert wrong.stated_noise.alarm is not Alarm.NONE
@@ -128,7 +129,7 @@ def test_few_samples_stay_honest(rig, sessions, n):
 
 def test_one_placement_and_one_order_lose_no_honesty(rig, sessions):
     options = {"n": 30, "places": (2,), "orders": (1,), "spread": 0.3}
-    for seed in (0, 3, 4):
+    for seed in (0, 3):
         session = sessions(seed, **options)
         result = run(rig, session)
         assert all(abs(z) < 4.5 for z in deviations(result, session.truth))
@@ -158,7 +159,7 @@ def test_physics_that_the_model_lacks_is_seen_as_lack_of_fit(rig, sessions):
 
 
 def test_stated_sigmas_of_the_spots_are_used(rig, sessions):
-    session = sessions(4, psd_noise=3e-7)
+    session = sessions(4, n=45, psd_noise=3e-7)
     result = run(rig, session, sigma_m=3e-7)
     assert noise(result, "psd").believed == pytest.approx(3e-7)
     assert all(abs(z) < 4.5 for z in deviations(result, session.truth))
@@ -193,12 +194,12 @@ def test_the_sigma_of_the_measurement_is_that_with_the_rest_known_exactly():
 
 
 def test_same_samples_same_seed_same_answer(rig, sessions):
-    one, two = (run(rig, sessions(6), share=0.2) for _ in range(2))
+    one, two = (run(rig, sessions(6, n=30), share=0.2) for _ in range(2))
     np.testing.assert_array_equal(one.theta, two.theta)
     assert one.held_out == two.held_out
 
 
 def test_no_poses_are_refused(rig, sessions):
-    none = spot_samples(sessions(6)).take(np.array([], dtype=np.intp))
+    none = spot_samples(sessions(6, n=30)).take(np.array([], dtype=np.intp))
     with pytest.raises(DataError):
         identify(rig, none, rng=np.random.default_rng(0))

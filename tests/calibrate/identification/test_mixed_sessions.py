@@ -159,7 +159,7 @@ def test_tolerances_of_gains_second_face_and_device_reach_the_fit_as_beliefs(mix
 
 def test_refits_to_drawn_rows_of_all_instruments_agree_with_the_covariance(mixed):
     rig, samples = mixed
-    result = run(rig, samples, held_out_share=0.0, bootstrap_rounds=40)
+    result = run(rig, samples, held_out_share=0.0, bootstrap_rounds=20)
     drawn = result.evidence.bootstrap
     assert drawn.failed == 0
     of_data = [i for i, p in enumerate(result.parameters) if p.free and p.name.endswith(".zero")]

@@ -65,7 +65,7 @@ def test_middles_of_the_pairs_lose_an_equation_and_report_no_number(rig, exact):
     assert len(lost) >= 3
 
 
-@pytest.mark.parametrize("seeds", [8, pytest.param(20, marks=pytest.mark.endure)])
+@pytest.mark.parametrize("seeds", [4, pytest.param(20, marks=pytest.mark.endure)])
 def test_drawing_errors_are_in_the_sigma(rig, sessions, seeds):
     z = []
     for seed in range(seeds):

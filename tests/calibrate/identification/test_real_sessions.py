@@ -57,7 +57,12 @@ FIGURES_M = {"ur10-leica-a": 0.449e-3, "ur10-leica-b": 0.421e-3, "ur10-leica-d":
 DRAWN_M = {"ur10-leica-a": 0.8e-3, "ur10-leica-b": 1.0e-3, "ur10-leica-d": 0.7e-3}
 
 
-@pytest.mark.parametrize("name", FIGURES_M)
+OF_B = pytest.mark.parametrize(  # another one: daily in tests/golden/test_real_robots.py
+    "name", [pytest.param(name, marks=() if name.endswith("b") else pytest.mark.endure) for name in FIGURES_M]
+)
+
+
+@OF_B
 def test_a_ur10_before_a_tracker_of_unknown_place_is_predicted_as_well_as_by_the_best_of_all_arms(real, name):
     """Unknowns cost (1 + p/n) on unseen rows: 1.3 % for the 24 of the 632 rows of d, less for the others."""
     recording = real(name)
@@ -65,6 +70,7 @@ def test_a_ur10_before_a_tracker_of_unknown_place_is_predicted_as_well_as_by_the
     assert unseen_rms_m(recording).mean() <= 1.015 * best_of_all_arms_m(recording)
 
 
+@pytest.mark.endure  # daily: that no arm predicts b better, above
 def test_the_published_error_of_b_is_of_a_lucky_split_which_no_arm_reaches_on_all_rows(real):
     recording, figure = real("ur10-leica-b"), FIGURES_M["ur10-leica-b"]
     rms = unseen_rms_m(recording, 60)
@@ -72,6 +78,7 @@ def test_the_published_error_of_b_is_of_a_lucky_split_which_no_arm_reaches_on_al
     assert rms.min() <= figure < rms.mean() <= 1.06 * figure
 
 
+@pytest.mark.endure  # daily: tests/golden/test_real_robots.py
 @pytest.mark.parametrize("name", FIGURES_M)
 def test_the_identification_tells_the_unseen_error_and_finds_no_blunder_in_a_good_session(real, name):
     result = run(real(name), share=0.2)
@@ -82,6 +89,7 @@ def test_the_identification_tells_the_unseen_error_and_finds_no_blunder_in_a_goo
     assert result.blunders == ()
 
 
+@pytest.mark.endure  # daily: unseen poses of this arm, in tests/golden/test_real_robots.py
 def test_axis_4_of_the_ur5_is_11_6_mrad_out_of_parallel_to_axis_3_in_every_part_of_the_session(real):
     """So far, that a real arm is doubted first: nothing else in the model takes its place (docs/decisions/0007)."""
     recording = real("ur5-tracker")
@@ -98,6 +106,7 @@ def test_axis_4_of_the_ur5_is_11_6_mrad_out_of_parallel_to_axis_3_in_every_part_
     assert np.sqrt(np.mean(np.sum(misfit**2, axis=1))) > 0.4e-3
 
 
+@pytest.mark.endure  # daily: several kinds at once, in test_blunders_in_sessions.py
 def test_blunders_made_in_the_ur5_session_are_found_and_no_others(real):
     recording = real("ur5-tracker")
     samples = recording.samples

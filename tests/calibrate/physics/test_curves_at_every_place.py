@@ -65,15 +65,20 @@ def asked_of(fit):
     return [(port, ports[port]) for port in asked]
 
 
-def test_a_model_predicts_a_curve_at_the_very_place_where_it_was_found(geometry):
+@pytest.mark.parametrize(  # daily for all links: the first and the last
+    "spared", [("link2", "link3", "link4"), pytest.param((), marks=pytest.mark.endure)], ids=["some", "all"]
+)
+def test_a_model_predicts_a_curve_at_the_very_place_where_it_was_found(geometry, spared):
     recording, fit = geometry
     samples = recording.samples
     cleared = Cleared(samples, np.arange(len(samples)), ())
     (measured,) = fit.session.measured
     for port, component in asked_of(fit):
+        if port.where.startswith(spared):
+            continue
         curved = with_one(fit, port, component)
         (expected,) = curved.around.expected
-        model = model_of_fit(curved, fit, cleared, recording, "one curve")
+        model = structs.replace(model_of_fit(curved, fit, cleared, recording, "one curve"), covariance=None)
         found = predict_with_physics(model, samples, same_session=True).columns
         predicted = np.stack([found[name] for name in BY_NAME[measured.name].reads], axis=1)
         assert np.ptp(expected - fit.around.expected[0]) > 1e-8  # m: it is felt

@@ -34,6 +34,13 @@ def drawn(folder, family, seed):
     return case, Model(model_of_fit(fit, fit, cleared, recording, "geometry alone"), "with care", "", ())
 
 
+@pytest.fixture(scope="module")
+def tracked(tmp_path_factory):
+    """Folder of a tracker's session, its case and its model."""
+    folder = tmp_path_factory.mktemp("tracked")
+    return folder, *drawn(folder, "tracker", 7100)
+
+
 def errors_and_sigma(case, model, seed):
     """(posture, 3) true tip in the frame that lies best on the model less the model's, and its sigma."""
     rig, rng = case.drawn.true, np.random.default_rng(seed)
@@ -55,8 +62,8 @@ def _upon(points, onto):
     return out
 
 
-def test_the_robots_own_frame_leaves_out_where_the_base_stands(tmp_path):
-    case, model = drawn(tmp_path, "tracker", 7100)
+def test_the_robots_own_frame_leaves_out_where_the_base_stands(tracked):
+    _, case, model = tracked
     error, sigma, q = errors_and_sigma(case, model, 1)
     assert 0.5 < np.sqrt(np.mean((error / sigma) ** 2)) < 1.6
     assert np.max(sigma) < 1e-4
@@ -65,20 +72,20 @@ def test_the_robots_own_frame_leaves_out_where_the_base_stands(tmp_path):
     assert np.all(model.flange_sigma(q, frame="world")[:, :3].max(axis=1) > model.flange_sigma(q)[:, :3].max(axis=1))
 
 
-def test_a_model_without_effects_holds_the_joint_range_of_its_recording(tmp_path):
-    _, model = drawn(tmp_path, "tracker", 7100)
+def test_a_model_without_effects_holds_the_joint_range_of_its_recording(tracked):
+    folder, _, model = tracked
     arms = Arms.of(model.file, Options())
-    q_rad = read(tmp_path / "recording").samples.joints()
+    q_rad = read(folder / "recording").samples.joints()
     assert (arms.low_rad, arms.high_rad) == (pytest.approx(q_rad.min(axis=0)), pytest.approx(q_rad.max(axis=0)))
 
 
-def test_the_likelihood_of_a_diagnosed_model_names_the_law_it_is_of(tmp_path):
-    _, model = drawn(tmp_path, "tracker", 7100)
+def test_the_likelihood_of_a_diagnosed_model_names_the_law_it_is_of(tracked):
+    _, _, model = tracked
     assert model.file.fit.law == "student-t"
 
 
-def test_a_frame_of_another_name_is_refused(tmp_path):
-    _, model = drawn(tmp_path, "tracker", 7100)
+def test_a_frame_of_another_name_is_refused(tracked):
+    _, _, model = tracked
     with pytest.raises(ValueError, match="frame 'device': give one of robot, world"):
         model.tip_sigma(np.zeros(6), frame="device")
 

@@ -76,6 +76,7 @@ def test_a_missing_condition_is_named_and_widens_the_sigma(slack):
         assert model.flange_sigma(q[0]).shape == (1, 6)
 
 
+@pytest.mark.usefixtures("bare_figures")
 def test_the_report_of_a_model_with_physics_shows_what_is_left(slack, capsys):
     folder, _, model = slack
     out = folder / "report.html"

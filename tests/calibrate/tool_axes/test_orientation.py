@@ -47,7 +47,7 @@ def whitened(found, truth):
 
 
 def test_three_targets_determine_the_orientation_as_well_as_stated():
-    z = [whitened(three(ArmErrors(), seed), spanned()) for seed in range(20)]
+    z = [whitened(three(ArmErrors(), seed), spanned()) for seed in range(12)]
     assert 0.75 < np.sqrt(np.mean(np.square(z))) < 1.25
 
 
@@ -58,7 +58,7 @@ def test_the_last_zero_and_the_flange_s_own_turns_are_in_the_uncertainty_of_the_
 
 
 def test_a_6d_target_determines_its_own_axes_as_well_as_stated():
-    found = [six_d(ArmErrors(), seed) for seed in range(20)]
+    found = [six_d(ArmErrors(), seed) for seed in range(12)]
     z = [whitened(f, TURN.as_matrix()) for f in found]
     assert 0.75 < np.sqrt(np.mean(np.square(z))) < 1.25
     assert np.median([f.noise.turn_rad for f in found]) == pytest.approx(TURN_NOISE_RAD, rel=0.1)

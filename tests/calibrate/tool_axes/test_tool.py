@@ -87,7 +87,7 @@ def test_with_noise_the_errors_are_as_large_as_stated(arm, positions):
     q = turns(4, 5, 6)
     errors, flange = [], []
     truth = calibrated(arm, q, positions(q)).flange.T_device_flange
-    for seed in range(25):
+    for seed in range(15):
         found = calibrated(arm, q, positions(q, 20e-6, seed))
         errors.append((found.targets[0].point_m - TOOL) / found.targets[0].sigma_m)
         flange.append((found.flange.T_device_flange[:3, 3] - truth[:3, 3]) / found.flange.origin_sigma_m)

@@ -29,10 +29,15 @@ class Fitted:
 
 
 @pytest.fixture(scope="session")
-def fitted(request):
+def bench(request):
+    """One for all: the poses of its pool are looked for once."""
+    return Bench(request.config.rootpath / "rigs" / "ur5e-dual-psd.toml")
+
+
+@pytest.fixture(scope="session")
+def fitted(request, bench):
     """fitted(seed, poses, extra noise factor): the session and its fit under the stated noise."""
-    rig_file = request.config.rootpath / "rigs" / "ur5e-dual-psd.toml"
-    bench, rig = Bench(rig_file), load_rig(rig_file)
+    rig = load_rig(request.config.rootpath / "rigs" / "ur5e-dual-psd.toml")
 
     def get(seed, poses=40, noise=1.0):
         session = bench.tracker(np.random.default_rng(seed), poses)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig import load_rig
-from benchmarks.drawn_sessions import POSITION_SIGMA_M, SPOT_SIGMA_M, Bench
+from benchmarks.drawn_sessions import POSITION_SIGMA_M, SPOT_SIGMA_M
 from calibrate.dual_psd_rig import dual_psd_chain
 from calibrate.fit import solve
 from calibrate.identifiability import analyse
@@ -78,11 +78,11 @@ def test_no_rows_to_fit_is_no_proof(fitted):
 
 
 @pytest.fixture(scope="module")
-def dual_psd(request):
+def dual_psd(request, bench):
     rig_file = request.config.rootpath / "rigs" / "ur5e-dual-psd.toml"
-    session = Bench(rig_file).dual_psd(np.random.default_rng(5), 120)
+    session = bench.dual_psd(np.random.default_rng(5), 60)
     chain = dual_psd_chain(load_rig(rig_file), session.placement, session.first_psd)
-    weights = np.tile(np.eye(4) / SPOT_SIGMA_M, (120, 1, 1))
+    weights = np.tile(np.eye(4) / SPOT_SIGMA_M, (60, 1, 1))
     everything = Problem(chain, chain.parameters, session.q_rad, session.observed, weights)
     seen = analyse(everything.jacobian(solve(everything).theta), chain.parameters)
     return everything.with_parameters(reduced(chain.parameters, seen)), session.placement
@@ -93,7 +93,7 @@ def test_a_place_left_out_stands_where_its_own_rows_say_and_proves_the_arm(dual_
     theta = solve(problem).theta
     found = held_out(problem, by_place(placement), theta, misfit)
     assert found.proof is Proof.DONE
-    assert found.rows == 120
+    assert found.rows == 60
     assert {name.partition(".")[0] for name in found.refitted} == {"placement1", "placement2"}
     assert 0.8 < found.chi < 4.0
     bent = problem.with_parameters(tuple(replace(p, free=p.free and p.unit == "m") for p in problem.parameters))

@@ -38,6 +38,7 @@ def drawn(seed):
     return off | {f"link{link}.twist": 1e-4 * rng.standard_normal() for link in range(2, 6)}
 
 
+@pytest.mark.endure  # daily: a cause below, constants in test_constants.py
 def test_both_causes_stand_before_fourteen_constants(tmp_path):
     case = case_of(
         family="tracker", seed=4, arm="ur5", samples=200, defects=("soft-joint", "encoder-eccentricity"), enr=3.0

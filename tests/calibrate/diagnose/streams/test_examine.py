@@ -1,5 +1,6 @@
 """All finders together over the streams of one session: each fault is told as what it is, and nothing else is."""
 
+from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
@@ -14,9 +15,14 @@ from calibrate.diagnose.streams.to_file import USUAL
 from calibrate.diagnose.streams.track import Track
 
 
+@pytest.fixture(scope="module")
+def made():
+    return servo_scene(21, moves=10, stand_s=1.0)
+
+
 @pytest.fixture
-def scene():
-    return servo_scene(21, moves=14, stand_s=1.0)
+def scene(made):
+    return deepcopy(made)  # with a generator of its own
 
 
 def faults(report):
@@ -34,7 +40,7 @@ def test_healthy_devices_with_clocks_of_their_own_have_no_fault(scene):
         assert report.clocks[name].offset_s == pytest.approx(EPOCHS_S["joints"] - EPOCHS_S[name], abs=1e-4)
 
 
-@pytest.mark.parametrize(("device", "late_s"), [("encoders", 4e-3), ("spots", 2e-3), ("spots", -3e-3)])
+@pytest.mark.parametrize(("device", "late_s"), [("encoders", 4e-3), ("spots", -3e-3)])
 def test_readings_stamped_late_are_told_by_how_much(scene, device, late_s):
     """The host's stamps are no later by it, since the line is what it was."""
     devices = devices_of_scene(scene, {})
@@ -143,7 +149,8 @@ def test_without_joints_nothing_is_compared(scene):
     assert "no stream of joints" in report.unseen[0]
 
 
-def test_probabilities_are_never_zero(scene):
+def test_probabilities_are_never_zero():
+    scene = servo_scene(21, moves=6, stand_s=1.0)
     devices = devices_of_scene(scene, {"encoders": 0.0})
     own = devices["joints"].track
     devices["joints"] = replace(devices["joints"], track=Track("joints", "rad", own.time_s[::-1], own.values))
