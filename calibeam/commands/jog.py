@@ -72,21 +72,15 @@ def jog_command(
         Do not ask before moving.
 
     """
-    from calibeam.motion.by_hand import Agreement, move_by_hand
+    from calibeam.motion.by_hand import Agreement, checked_share, move_by_hand
 
     loaded = load_rig(rig)
-    if (
-        (joint is None) == (axis is None)
-        or (by_deg is None) == (by_mm is None)
-        or (joint is not None and by_deg is None)
-    ):
+    if (joint is None) == (axis is None) or (by_deg is None) == (by_mm is None) or None not in (joint, by_mm):
         raise TaskError("what to jog is missing; give --joint N --by-deg A, or --axis x|y|z with --by-mm or --by-deg")
     if abs(by_mm or 0.0) > LARGEST_MM or abs(by_deg or 0.0) > LARGEST_DEG:
         raise TaskError(f"a jog is at most {LARGEST_MM:.0f} mm or {LARGEST_DEG:.0f}°; use calibeam move")
     if joint is not None and not 1 <= joint <= loaded.n_joints:
         raise TaskError(f"--joint {joint}: the arm has joints 1 to {loaded.n_joints}")
-    if not 0.0 < speed <= 1.0:
-        raise TaskError(f"--speed {speed}: a share of the rig's speeds, above 0 and up to 1")
 
     def asked(solver: Solver, now_rad: Floats) -> list[Segment]:
         if joint is not None:
@@ -98,7 +92,7 @@ def jog_command(
         place = Place(f"axis {axis}", stepped(solver.flange(now_rad), shift, turn, tool=tool), np.eye(4))
         return [Segment(place.name, By.LINE, place)]
 
-    move_by_hand(loaded, model, asked, Agreement(out, yes, dry_run, speed), Console())
+    move_by_hand(loaded, model, asked, Agreement(out, yes, dry_run, checked_share(speed)), Console())
 
 
 def stepped(T_base_flange: Floats, shift_m: Floats, turn_rad: Floats, *, tool: bool) -> Floats:

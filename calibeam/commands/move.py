@@ -72,13 +72,11 @@ def move_command(
         Do not ask before moving.
 
     """
-    from calibeam.motion.by_hand import Agreement, move_by_hand
+    from calibeam.motion.by_hand import Agreement, checked_share, move_by_hand
 
     loaded = load_rig(rig)
     if sum((bool(joints_deg), task is not None, home)) != 1:
         raise TaskError("the target is missing; give one of --joints-deg, --task with --position, --home")
-    if not 0.0 < speed <= 1.0:
-        raise TaskError(f"--speed {speed}: a share of the rig's speeds, above 0 and up to 1")
     by = By.LINE if line else By.JOINTS
     place = _task_place(task, position) if task is not None else None
     target_rad = None if place is not None else _target_rad(loaded, joints_deg)
@@ -90,7 +88,7 @@ def move_command(
         name = "home" if home else "joints"
         return [Segment(name, by, Place(name, solver.flange(target_rad), np.eye(4)), posture_rad=target_rad)]
 
-    move_by_hand(loaded, model, asked, Agreement(out, yes, dry_run, speed), Console())
+    move_by_hand(loaded, model, asked, Agreement(out, yes, dry_run, checked_share(speed)), Console())
 
 
 def _task_place(task: Path, position: str | None) -> Place:

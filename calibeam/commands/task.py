@@ -5,7 +5,6 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from acquisition.errors import TaskError
 from acquisition.recording.rig import load_rig
 from calibeam.console import Console
 
@@ -58,12 +57,12 @@ def task_command(
         run: do not ask before moving.
 
     """
+    from calibeam.motion.by_hand import checked_share
     from calibeam.motion.task_by_hand import run_by_hand, teach_by_hand
 
-    if not 0.0 < speed <= 1.0:
-        raise TaskError(f"--speed {speed}: a share of the rig's speeds, above 0 and up to 1")
     loaded, console = load_rig(rig), Console()
     if action == "teach":
         teach_by_hand(loaded, task, out or task.with_name(f"{task.stem}-taught.toml"), poses, model, console)
     else:
-        run_by_hand(loaded, task, out or Path("out/task"), model, speed, console, dry=dry_run, yes=yes)
+        share = checked_share(speed)
+        run_by_hand(loaded, task, out or Path("out/task"), model, share, console, dry=dry_run, yes=yes)

@@ -18,7 +18,7 @@ from typing import TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.errors import InterruptedMotionError
+from acquisition.errors import InterruptedMotionError, TaskError
 from acquisition.motion.cell import Cell
 from acquisition.motion.gate import Gate
 from acquisition.motion.inverse.solve import Solver
@@ -137,6 +137,13 @@ def keys_of(gate: Gate) -> Generator[MotionKeys]:
 
 Floats = NDArray[np.float64]
 Asked = Callable[[Solver, Floats], list[Segment]]  # from where the arm stands to the motion
+
+
+def checked_share(speed: float) -> float:
+    """TaskError where it is no share of the rig's speeds."""
+    if not 0.0 < speed <= 1.0:
+        raise TaskError(f"--speed {speed}: a share of the rig's speeds, above 0 and up to 1")
+    return speed
 
 
 @dataclass(frozen=True)

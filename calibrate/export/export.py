@@ -85,7 +85,7 @@ FORMS: tuple[ExportForm, ...] = (
     ExportForm(name="matlab", suffix=".m", text=matlab_text, mark="% Identified by calibeam"),
     ExportForm(
         name="mjcf", suffix=".mjcf.xml", text=mjcf_text, mark="Identified by calibeam. m, rad, kg", springs=True
-    ),  # MuJoCo
+    ),
     ExportForm(
         name="kuka-mastering",
         suffix=".kuka-mastering.csv",
@@ -111,9 +111,7 @@ FORMS: tuple[ExportForm, ...] = (
         make=Make.FANUC,
         offsets=True,
     ),
-    ExportForm(
-        name="table", suffix=".table.csv", text=nominal_table_text, mark="# Nominal, correction, calibrated"
-    ),  # nominal, correction, calibrated
+    ExportForm(name="table", suffix=".table.csv", text=nominal_table_text, mark="# Nominal, correction, calibrated"),
 )
 # The words of FORMS, for the command line: what a help page lists and a shell completes before anything is loaded.
 FormName = Literal[

@@ -30,7 +30,7 @@ from drivers.cia406.health import NodeWatch
 from drivers.clock import Clock
 from drivers.device import Block, Channel, StreamDevice
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale
-from drivers.transports.can_bus import BusFaults, OpenBus, lost_as_device_lost, opened, received, shut_down
+from drivers.transports.can_bus import BusFault, BusFaults, OpenBus, lost_as_device_lost, opened, received, shut_down
 
 MAX_SYNC_HZ = 1000.0  # six encoders fill half of a bus of 1 Mbit/s
 SILENT_S = 0.5  # a node that answers no SYNC for so long is gone
@@ -83,6 +83,11 @@ class Cia406Encoders(StreamDevice[can.BusABC]):
     def emergencies(self) -> tuple[Emergency, ...]:
         """All that came, in order; the newest 256."""
         return self._watch.emergencies
+
+    @property
+    def bus_faults(self) -> tuple[BusFault, ...]:
+        """Error frames, in order; the newest 256."""
+        return self._faults.newest
 
     @property
     def slips(self) -> tuple[tuple[int, Slip], ...]:

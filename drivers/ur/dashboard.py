@@ -62,6 +62,11 @@ class UrDashboard:
         """Ends the running program; the arm brakes."""
         self._command("stop", "Stopped", min(STOP_TIMEOUT_S, self._timeout_s))
 
+    def unlock_protective_stop(self) -> None:
+        """Refused for the first 5 s. Find the cause before: the arm may move again afterwards."""
+        self._converse(["close safety popup"])
+        self._command("unlock protective stop", "Protective stop releasing")
+
     def power_on(self) -> None:
         self._command("power on", "Powering on")
 

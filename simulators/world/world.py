@@ -260,6 +260,10 @@ class World:
         """Where the beam strikes now, as a detector without noise reads it."""
         return self._spots(self._body.beam())
 
+    def true_joints_rad(self) -> Floats:
+        """(n,) true joint angles: reading + zero + repeatability."""
+        return self._body.true_rad()
+
     def T_base_flange(self) -> Floats:
         """The true flange pose, (4, 4)."""
         return self._body.T_base_flange()
