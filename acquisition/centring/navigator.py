@@ -149,8 +149,7 @@ class Navigator:
 
     def relearned(self) -> None:
         """The assumed rig was refitted: what was right at single poses before is now worse than the fit."""
-        T = self._learner.T_base_fixture(self._placement)
-        self._lit = [replace(pose, T_base_fixture=T) for pose in self._lit]
+        self._lit = [replace(pose, T_base_fixture=self._learner.T_base_fixture(self._placement)) for pose in self._lit]
 
     def _land(self, target: BeamTarget) -> Floats:
         """Reach light near the target; returns the fixture pose assumed there."""
