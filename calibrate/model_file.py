@@ -39,6 +39,9 @@ Fields = dict[Name, Statistic | Whole | Sentence | bool | None]
 ArmName = Annotated[str, msgspec.Meta(pattern="^(dh|mdh|local-poe)$")]
 About = dict[Name, tuple[Metres, ...]]
 SCHEMA, WITH_PHYSICS = 1, 2
+ROUNDED = (
+    1e-3  # of two sigmas: what rounding may add to a covariance of parameters that are nearly determined together only
+)
 MODEL = json_output("calibeam-model", "model.json")
 KIND = JsonKind("model.json", "give the model.json of an identification", "identify the recording again", DataError)
 
@@ -85,6 +88,11 @@ class Covariance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         size = len(self.names)
         if len(self.rows) != size or any(len(row) != size for row in self.rows):
             raise ValueError(f"covariance.rows is not square, {size} by {size}, as the {size} names are")
+        C = np.array(self.rows, dtype=np.float64).reshape(size, size)
+        sigma = np.sqrt(np.maximum(np.diag(C), 0.0))
+        bound = ROUNDED * np.outer(sigma, sigma)
+        if np.any(np.abs(C - C.T) > bound) or np.any(np.abs(C) - np.outer(sigma, sigma) > bound):
+            raise ValueError("covariance.rows: no covariance has such values")
 
 
 class LeftOut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -24,7 +24,8 @@ TWO_AT_A_TIME = ("-n", "2", "--dist", "loadfile")  # a file's tests share their 
 # Each worker takes one half in the order of the files, so that what a file shares is made once; whoever is through
 # takes from the other's rest.
 EVENLY = ("-n", "2", "--dist", "worksteal")
-ENDURING, MUTATIONS = ("-m", "endure", "--timeout", "3600"), "tests/calibeam/mutations"  # half of the time of all
+ANY_ORDER = ("-n", "2", "--dist", "load")  # tests of minutes, which share nothing
+MUTATIONS = "tests/calibeam/mutations"
 ON_WIRES = ("-m", "wired and not endure")
 CALCULATING = ("-m", "not endure and not wired", *EVENLY)
 PYTHONS = ("python3.11", "python3.12", "python3.13")
@@ -89,8 +90,9 @@ def endure() -> tuple[Phase, ...]:
     kernels = [("Haswell", "avx2", narrow), ("Zen", "avx2", {}), ("SkylakeX", "avx512f", {})]
     able = _processor_flags()
     return (
-        Phase("mutated files", (*ENDURING, "-n", "2", "--dist", "load", MUTATIONS)),
-        Phase("marked endure", (*ENDURING, f"--ignore={MUTATIONS}")),
+        Phase("mutated files", (*enduring("endure"), *ANY_ORDER, MUTATIONS)),
+        Phase("long calculations", (*enduring("endure and not wired"), *ANY_ORDER, f"--ignore={MUTATIONS}")),
+        Phase("long on wires", enduring("endure and wired")),
         Phase("calculating, 2 threads", CALCULATING, {"OPENBLAS_NUM_THREADS": "2"}),
         *(
             Phase(f"calculating, {name}", CALCULATING, {"OPENBLAS_CORETYPE": name, **more})
@@ -99,6 +101,10 @@ def endure() -> tuple[Phase, ...]:
         ),
         *(Phase(f"calculating, {name}", CALCULATING, interpreter=name) for name in other_pythons()),
     )
+
+
+def enduring(marked: str) -> tuple[str, ...]:
+    return ("-m", marked, "--timeout", "3600")
 
 
 def other_pythons() -> list[str]:

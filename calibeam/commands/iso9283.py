@@ -315,6 +315,5 @@ def _write_poses(path: Path, cube: CubeInReach) -> None:
     turn = Rotation.from_matrix(cube.T_base_tool[:, :3, :3]).as_rotvec()
     header = [*POSE_COLUMNS, *(f"q{j + 1}_rad" for j in range(cube.q_rad.shape[1]))]
     table = np.concatenate([cube.T_base_tool[:, :3, 3], turn, cube.q_rad], axis=1)
-    write_output(
-        path, csv_text([header, *(table.round(12) + 0.0).tolist()]), table_output(header, "table of poses")
-    )  # no -0.0
+    # no -0.0
+    write_output(path, csv_text([header, *(table.round(12) + 0.0).tolist()]), table_output(header, "table of poses"))

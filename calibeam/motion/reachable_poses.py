@@ -59,9 +59,8 @@ Floats = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
 TRIES = 40  # targets for each pose that is wanted: of a place out of reach none ever lands
-FUTILE = (
-    5 * TRIES
-)  # targets of a place of which none has landed: of a place that fills up in time, 1 in 170 comes to it
+# targets of a place of which none has landed: of a place that fills up in time, 1 in 170 comes to it
+FUTILE = 5 * TRIES
 BRANCHES = 2  # of one target, drawn at random
 TURN_RAD = np.pi  # angles of robots that may turn further are drawn within this: a second turn shows nothing new
 WAY_STEP_RAD = 0.05  # of the joint with the longest way, between the postures that are looked at

@@ -45,11 +45,8 @@ FEWEST_UNSEEN = 5
 FEW_ROWS = 0.05  # share of the unseen rows up to which they are listed
 SAME_POSE_RAD = 2e-3  # a servo comes back closer, and other poses are farther away
 BUILT = ("joint", "link", "psd")  # parameters of what a rig file states as built; where things stand is fitted
-QUANTITIES = {
-    spots.KIND.name: SPOTS,
-    position.KIND.name: POSITION,
-    wire.KIND.name: (WIRE,),
-}  # instrument -> lengths that it reads
+# instrument -> lengths that it reads
+QUANTITIES = {spots.KIND.name: SPOTS, position.KIND.name: POSITION, wire.KIND.name: (WIRE,)}
 
 
 class RowRecord(msgspec.Struct, frozen=True):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.files import shown
+from acquisition.recording.files.bounds import most_of
 from calibrate.correct.corrected import OK, Corrected, Wanted
 from calibrate.correct.rotations import FORMS, QUATERNION, VECTOR, RotationForm, pose
 from calibrate.errors import DataError
@@ -97,7 +98,10 @@ def _table(text: str, name: str) -> dict[str, Floats]:
         if len(cells) != len(header):
             raise DataError(f"{name} row {number} (line {line}): {len(cells)} cells where the header has {len(header)}")
         for column, cell in zip(header, cells, strict=True):
-            table[column].append(_number(cell.strip(), f"{name} row {number} (line {line}), {shown(column)}"))
+            value = _number(cell.strip(), where := f"{name} row {number} (line {line}), {shown(column)}")
+            if abs(value) > most_of(column):
+                raise DataError(f"{where}: {value:g} is beyond {most_of(column):g}; correct it, or leave it empty")
+            table[column].append(value)
     return {c: np.array(values) for c, values in table.items()}
 
 

@@ -12,9 +12,8 @@ from calibrate.effects.term import Size, Term, plain
 
 Floats = NDArray[np.float64]
 Functions = Callable[[Drivers, Floats], Floats]  # (pose, m) or (pose, width, m) for inner values (inner,)
-Exact = Callable[
-    [Drivers, Floats, Floats], Floats
-]  # (pose, 1 or width) for coefficients (m,) and inner values (inner,)
+# (pose, 1 or width) for coefficients (m,) and inner values (inner,)
+Exact = Callable[[Drivers, Floats, Floats], Floats]
 
 Believable = Callable[[Floats, Floats], bool]  # of coefficients (m,) and inner values (inner,)
 

@@ -61,9 +61,8 @@ def by_corrected(drivers: Drivers, by: By) -> Weighed | None:
     A coefficient of one of these, over the first, is a number of sigmas. None where they add nothing.
     """
     stated = by(drivers, carried(drivers)).sum(axis=2).ravel()
-    off = doubts(
-        drivers
-    )  # kept: a rig with one more mass stated has other uncertainties, but these columns keep their meaning
+    # kept: a rig with one more mass stated has other uncertainties, but these columns keep their meaning
+    off = doubts(drivers)
     each = by(drivers, off)
     each = each.reshape(-1, each.shape[2])
     along = stated @ each / max(float(stated @ stated), 1e-300)

@@ -19,9 +19,8 @@ def urdf_text(arm: IdentifiedArm) -> str:
     n = arm.rig.n_joints
     links = ["base", *(f"link{i}" for i in range(1, n + 1)), "flange"]
     lines = [f"  <!-- Identified by calibeam. m and rad; {arm.sign}. -->"]
-    lines += [
-        f"  <!-- {says.replace('--', '- -')} -->" for says in arm.not_carried
-    ]  # XML ends a comment at two hyphens
+    # XML ends a comment at two hyphens
+    lines += [f"  <!-- {says.replace('--', '- -')} -->" for says in arm.not_carried]
     for i, (low, high) in enumerate(arm.limits_rad, start=1):
         limit = f'<limit lower="{low!r}" upper="{high!r}" effort="0" velocity="{arm.rig.motion.speed_rad_s!r}"/>'
         lines += _joint(f"joint{i}", "revolute", (links[i - 1], links[i]), arm.parts[i - 1])

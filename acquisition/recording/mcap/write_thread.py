@@ -201,9 +201,8 @@ def _value(column: str, cell: float | int | str) -> float | int | str:
 
 T = TypeVar("T")
 
-LIMIT_BYTES = (
-    64 * 2**20
-)  # about five minutes of two PSDs, six encoders and a robot: a disk that stalls so long is broken
+# about five minutes of two PSDs, six encoders and a robot: a disk that stalls so long is broken
+LIMIT_BYTES = 64 * 2**20
 
 
 class Spool(Generic[T]):

@@ -75,6 +75,8 @@ def correct_program(
     options = replace(options, tool=tool)
     arms = Arms.of(model, options)
     _check(targets, dialect, options, name)
+    if not all((np.abs(T[..., :3, :]) <= LENGTH_M).all() for T in (base, tool) if T is not None):
+        raise DataError(f"{name}: a frame or tool has a number beyond {LENGTH_M / 1e3:g} km; correct it")
     wanted = _wanted(targets.literals, dialect, arms, base, near_rad, every)
     found = correct(model, replace(wanted, source=name), inverse_of, options)
     pieces, q_rad = list[tuple[int, int, str]](), found.q_rad.copy()

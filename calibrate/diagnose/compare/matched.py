@@ -150,9 +150,8 @@ def _off(pose: Floats, poses: Floats) -> Floats:
 def _reach(poses: Floats) -> float:
     """Rad of every joint within which a pose is the same: less than half the way to the poses around it."""
     apart = (_off(pose, poses) for pose in poses)
-    nearest = np.array(
-        [np.min(one, where=one > SAME_RAD, initial=np.inf) for one in apart]
-    )  # repeats are the same pose
+    # repeats are the same pose
+    nearest = np.array([np.min(one, where=one > SAME_RAD, initial=np.inf) for one in apart])
     nearest = nearest[np.isfinite(nearest)]
     if not len(nearest):
         return SAME_RAD

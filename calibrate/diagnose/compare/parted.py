@@ -79,6 +79,8 @@ def _judged(one: Difference, model: Predictor, pair: Pair, links: int) -> Parted
     if parts:
         rows = np.flatnonzero(np.any(beyond & good, axis=1))
         first = int(rows[0]) if len(rows) else int(np.flatnonzero(good.any(axis=1))[0])
+    scatter = scatter_of(own)
+    scatter = scatter[np.isfinite(scatter)]
     return Parted(
         one.link,
         one.unit,
@@ -94,7 +96,7 @@ def _judged(one: Difference, model: Predictor, pair: Pair, links: int) -> Parted
         parts,
         first,
         tuple(float(v) for v in np.nanmean(own, axis=0)),
-        float(np.nan_to_num(np.nanmedian(scatter_of(own)))),
+        float(np.median(scatter)) if len(scatter) else 0.0,
     )
 
 

@@ -66,7 +66,7 @@ def test_the_interactive_report_is_drawn_from_the_file_alone(tab, wire_and_posit
     assert wrong == []
 
 
-@pytest.mark.parametrize("which", ["spots_html", "session_html"])
+@pytest.mark.parametrize("which", [pytest.param("spots_html", marks=pytest.mark.endure), "session_html"])
 def test_labels_do_not_overlap_and_no_page_scrolls_sideways(browser, request, tmp_path, which):
     path = tmp_path / "report.html"
     path.write_text(request.getfixturevalue(which), encoding="utf-8")
