@@ -35,8 +35,8 @@ coverage: $(READY) $(CLIENTS)/.ready
 	$(BIN)/python tests/coverage_table.py out/coverage/coverage.json
 
 # What takes too long for every day: a million mutated inputs a codec, a hundred plugs pulled, a hundred mutated files a
-# command (SEEDS=300: as many), and the calculating tests again with other kernels of linear algebra, another number of
-# threads and other Pythons. Parts by PHASE=mutated, long, calculating.
+# command (SEEDS=300: as many), and calculations again with other kernels of linear algebra, another number of threads and
+# other Pythons. Parts by PHASE=mutated, long, rounding, python.
 endure: $(READY) $(CLIENTS)/.ready
 	$(if $(SEEDS),SEEDS=$(SEEDS) )$(BIN)/python tests/phases.py endure $(if $(PHASE),--phase $(PHASE))
 

@@ -28,6 +28,7 @@ ANY_ORDER = ("-n", "2", "--dist", "load")  # tests of minutes, which share nothi
 MUTATIONS = "tests/calibeam/mutations"
 ON_WIRES = ("-m", "wired and not endure")
 CALCULATING = ("-m", "not endure and not wired", *EVENLY)
+ROUNDING = (*CALCULATING, "tests/calibrate", "tests/golden")  # where a last digit may decide
 PYTHONS = ("python3.11", "python3.12", "python3.13")
 
 
@@ -80,7 +81,7 @@ def fast() -> tuple[Phase, ...]:
 
 
 def endure() -> tuple[Phase, ...]:
-    """The marked tests, then the calculating phase with other linear algebra, other vector units, other Pythons.
+    """The marked tests, then what rounds with other linear algebra and vector units, then other Pythons.
 
     OPENBLAS_CORETYPE chooses the kernels of OpenBLAS, NPY_DISABLE_CPU_FEATURES the loops of numpy, and NUMBA_CPU_NAME
     what numba compiles for: together they round as another processor does. Kernels that this processor cannot run are
@@ -93,9 +94,9 @@ def endure() -> tuple[Phase, ...]:
         Phase("mutated files", (*enduring("endure"), *ANY_ORDER, MUTATIONS)),
         Phase("long calculations", (*enduring("endure and not wired"), *ANY_ORDER, f"--ignore={MUTATIONS}")),
         Phase("long on wires", enduring("endure and wired")),
-        Phase("calculating, 2 threads", CALCULATING, {"OPENBLAS_NUM_THREADS": "2"}),
+        Phase("rounding, 2 threads", ROUNDING, {"OPENBLAS_NUM_THREADS": "2"}),
         *(
-            Phase(f"calculating, {name}", CALCULATING, {"OPENBLAS_CORETYPE": name, **more})
+            Phase(f"rounding, {name}", ROUNDING, {"OPENBLAS_CORETYPE": name, **more})
             for name, flag, more in kernels
             if flag in able
         ),
