@@ -39,9 +39,7 @@ Fields = dict[Name, Statistic | Whole | Sentence | bool | None]
 ArmName = Annotated[str, msgspec.Meta(pattern="^(dh|mdh|local-poe)$")]
 About = dict[Name, tuple[Metres, ...]]
 SCHEMA, WITH_PHYSICS = 1, 2
-ROUNDED = (
-    1e-3  # of two sigmas: what rounding may add to a covariance of parameters that are nearly determined together only
-)
+ROUNDED = 0.5  # of two sigmas: far more than rounding adds to values that are nearly determined together only
 MODEL = json_output("calibeam-model", "model.json")
 KIND = JsonKind("model.json", "give the model.json of an identification", "identify the recording again", DataError)
 
@@ -88,11 +86,6 @@ class Covariance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         size = len(self.names)
         if len(self.rows) != size or any(len(row) != size for row in self.rows):
             raise ValueError(f"covariance.rows is not square, {size} by {size}, as the {size} names are")
-        C = np.array(self.rows, dtype=np.float64).reshape(size, size)
-        sigma = np.sqrt(np.maximum(np.diag(C), 0.0))
-        bound = ROUNDED * np.outer(sigma, sigma)
-        if np.any(np.abs(C - C.T) > bound) or np.any(np.abs(C) - np.outer(sigma, sigma) > bound):
-            raise ValueError("covariance.rows: no covariance has such values")
 
 
 class LeftOut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -226,7 +219,19 @@ def write_model(path: Path, model: ModelFile) -> None:
 
 def read_model(path: Path) -> ModelFile:
     """Read model.json. DataError naming file, place and remedy where it is none or of another version."""
-    return read_json(path, KIND, ModelFile, _other, with_present_names)
+    model = read_json(path, KIND, ModelFile, _other, with_present_names)
+    if model.covariance is not None:
+        _check_covariance(path, model.covariance)
+    return model
+
+
+def _check_covariance(path: Path, covariance: Covariance) -> None:
+    C = np.array(covariance.rows, dtype=np.float64).reshape(2 * (len(covariance.names),))
+    sigma = np.sqrt(np.maximum(np.diag(C), 0.0))
+    most = np.outer(sigma, sigma)
+    for i, j in np.argwhere((np.abs(C) > (1.0 + ROUNDED) * most) | (np.abs(C - C.T) > ROUNDED * most))[:1].tolist():
+        at = f"covariance.rows[{i}][{j}], {shown(covariance.names[i])}"
+        raise DataError(f"{path}: {at}: no covariance is {C[i, j]:g}; identify the recording again")
 
 
 def _other(content: dict[str, Any]) -> str | None:
@@ -247,7 +252,7 @@ def covariance_record(parameters: tuple[Parameter, ...], covariance: NDArray[np.
         return None
     free = np.flatnonzero(np.diag(covariance) > 0.0)
     rows = covariance[np.ix_(free, free)]
-    return Covariance(tuple(parameters[i].name for i in free), tuple(map(tuple, rows.tolist())))
+    return Covariance(tuple(parameters[i].name for i in free), tuple(map(tuple, (0.5 * (rows + rows.T)).tolist())))
 
 
 def fields_of(record: "DataclassInstance") -> Fields:

@@ -72,7 +72,7 @@ def jog_command(
         Do not ask before moving.
 
     """
-    from calibeam.motion.by_hand import Agreement, checked_share, move_by_hand
+    from calibeam.motion.by_hand import Agreement, checked_speed, move_by_hand
 
     loaded = load_rig(rig)
     if (joint is None) == (axis is None) or (by_deg is None) == (by_mm is None) or None not in (joint, by_mm):
@@ -92,7 +92,7 @@ def jog_command(
         place = Place(f"axis {axis}", stepped(solver.flange(now_rad), shift, turn, tool=tool), np.eye(4))
         return [Segment(place.name, By.LINE, place)]
 
-    move_by_hand(loaded, model, asked, Agreement(out, yes, dry_run, checked_share(speed)), Console())
+    move_by_hand(loaded, model, asked, Agreement(out, yes, dry_run, checked_speed(speed)), Console())
 
 
 def stepped(T_base_flange: Floats, shift_m: Floats, turn_rad: Floats, *, tool: bool) -> Floats:

@@ -72,7 +72,7 @@ def move_command(
         Do not ask before moving.
 
     """
-    from calibeam.motion.by_hand import Agreement, checked_share, move_by_hand
+    from calibeam.motion.by_hand import Agreement, checked_speed, move_by_hand
 
     loaded = load_rig(rig)
     if sum((bool(joints_deg), task is not None, home)) != 1:
@@ -88,7 +88,7 @@ def move_command(
         name = "home" if home else "joints"
         return [Segment(name, by, Place(name, solver.flange(target_rad), np.eye(4)), posture_rad=target_rad)]
 
-    move_by_hand(loaded, model, asked, Agreement(out, yes, dry_run, checked_share(speed)), Console())
+    move_by_hand(loaded, model, asked, Agreement(out, yes, dry_run, checked_speed(speed)), Console())
 
 
 def _task_place(task: Path, position: str | None) -> Place:

@@ -57,12 +57,12 @@ def task_command(
         run: do not ask before moving.
 
     """
-    from calibeam.motion.by_hand import checked_share
+    from calibeam.motion.by_hand import checked_speed
     from calibeam.motion.task_by_hand import run_by_hand, teach_by_hand
 
     loaded, console = load_rig(rig), Console()
     if action == "teach":
         teach_by_hand(loaded, task, out or task.with_name(f"{task.stem}-taught.toml"), poses, model, console)
     else:
-        share = checked_share(speed)
+        share = checked_speed(speed)
         run_by_hand(loaded, task, out or Path("out/task"), model, share, console, dry=dry_run, yes=yes)

@@ -139,8 +139,8 @@ Floats = NDArray[np.float64]
 Asked = Callable[[Solver, Floats], list[Segment]]  # from where the arm stands to the motion
 
 
-def checked_share(speed: float) -> float:
-    """TaskError where it is no share of the rig's speeds."""
+def checked_speed(speed: float) -> float:
+    """The speed as a fraction of the rig's own, above 0 and up to 1. TaskError for another."""
     if not 0.0 < speed <= 1.0:
         raise TaskError(f"--speed {speed}: a share of the rig's speeds, above 0 and up to 1")
     return speed

@@ -33,7 +33,10 @@ class UrOutputs:
         self.close()
         try:
             self._io = importlib.import_module("rtde_io").RTDEIOInterface(self._host)
-        except RuntimeError as error:  # what ur_rtde raises for everything
+        except (
+            RuntimeError,
+            ImportError,
+        ) as error:  # what ur_rtde raises for all, if it is there
             raise DeviceLost(f"{self.place}: its outputs cannot be reached: {error}; check power and cable") from error
 
     def switch(self, bit: int, level: bool) -> None:

@@ -81,11 +81,8 @@ CALIBRATION = struct.Struct(">IB6d")  # for the manufacturer's own use: the wren
 TOOL_COMMUNICATION = struct.Struct(">IB?3i2f")
 TOOL_MODE = struct.Struct(">IB3B")
 NOT_CALIBRATED = 0  # the kinematics are those of the drawing
-CONTROLLER_BOX, UR5_TYPE, UR5_SUBTYPE = (
-    1,
-    1,
-    1,
-)  # 1: a UR5 (Universal_Robots_Client_Library); the other two are assumed, not verified
+# 1: a UR5 (Universal_Robots_Client_Library); the other two are assumed, not verified
+CONTROLLER_BOX, UR5_TYPE, UR5_SUBTYPE = 1, 1, 1
 JOINT_DEFAULTS, TOOL_DEFAULTS = (1.05, 1.4), (0.25, 1.2)  # URScript, movej and movel
 ZERO3, ZERO6 = [0.0] * 3, [0.0] * 6
 VOLTAGE_V, CURRENT_A = 48.0, 0.6

@@ -90,9 +90,14 @@ def rows(path):
         return list(csv.DictReader(file))
 
 
-def test_a_session_folder_becomes_a_model_that_predicts_unseen_poses_by_itself(identified, tmp_path):
+def test_a_session_folder_becomes_a_model_that_predicts_unseen_poses_by_itself(
+    identified, tmp_path, monkeypatch, request
+):
     model, out = tmp_path / "model.json", tmp_path / "predicted.csv"
-    shutil.copy(identified[0] / "model.json", model)  # away from its session
+    shutil.copy(identified[0] / "model.json", model)
+    monkeypatch.chdir(tmp_path)
+    (identified[0] / "session").rename(away := identified[0] / "elsewhere")  # a model holds all that it needs
+    request.addfinalizer(lambda: away.rename(identified[0] / "session"))
     assert "unseen rows (random 20% of the rows): " in identified[1]
     rng = np.random.default_rng(9)
     q = rng.uniform(-2.0, 2.0, (30, 5))

@@ -36,7 +36,7 @@ class Kept:
 
 
 SMALLEST = PlanOptions(centred=1, off_centre=3, repeats=1, roll_rad=(-1.0, 1.0))
-PLACES = (1, 2)  # of three: what is moved there and back says the same again
+PLACES = (1, 2)  # of three: moving there and back adds nothing
 
 
 def run(rig, bench, options: PlanOptions = SMALL) -> tuple[Summary, Kept]:
@@ -140,7 +140,7 @@ def test_no_fixture_is_light_lost_for_good(rig, bench_of) -> None:
         run(rig, Empty(bench.world, bench.half_size_m))
 
 
-@pytest.mark.endure  # daily: without a fixture from the start, below
+@pytest.mark.endure  # daily: without a fixture from the start, above
 def test_a_fixture_taken_away_in_mid_session_is_light_lost_for_good(rig, bench_of) -> None:
     bench = bench_of(2)
 

@@ -66,7 +66,7 @@ FOUND = (  # what mutations have shown once: file, change, command line, what is
         "model.json",
         lambda data: _negative_variance(data),
         "report tracker --model model.json",
-        "no covariance has such",
+        "no covariance is",
     ),
     ("bag-db3/metadata.yaml", lambda data: b"\xff" + data, BAG, "no ROS 2 bag that can be read"),
 )

@@ -85,9 +85,9 @@ def test_a_diagnosis_that_finds_nothing_gains_nothing(
     [
         pytest.param("tracker", "wrong-gear-ratio", marks=pytest.mark.endure),  # seconds
         ("tracker", "coupled-wrist"),
-        pytest.param("tracker", "unsettled", marks=pytest.mark.endure),  # daily: the coupled wrist
+        pytest.param("tracker", "unsettled", marks=pytest.mark.endure),
         ("dual-psd", "psd-gain"),
-        pytest.param("dual-psd", "psd-pincushion", marks=pytest.mark.endure),  # daily: the gain
+        pytest.param("dual-psd", "psd-pincushion", marks=pytest.mark.endure),
     ],
 )
 def test_the_true_size_has_the_name_and_the_sign_of_the_stated_one(

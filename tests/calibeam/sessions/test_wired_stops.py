@@ -44,7 +44,6 @@ def ten_ctrl_c(s: Staged) -> int:
     return s.process.wait(30.0)
 
 
-@pytest.mark.endure  # daily: of the driver, tests/drivers/ur/test_frozen.py; a person decides, test_wired_pause.py
 def test_a_killed_control_child_is_reported_and_a_person_decides() -> None:
     """And then ten Ctrl-C end what was gone on with."""
     with staged(RIG_FILE, time_scale=TIME_SCALE, travels=True) as s:

@@ -11,10 +11,8 @@ from calibrate.errors import DataError
 
 from .drawn_rigs import drawn
 
-DAILY, DAILY_ROWS = (
-    (2, 8),
-    40,
-)  # small and quick ones of the first ten, another in test_stages.py; the 300 are for `make endure`
+# small and quick ones of the first ten, another in test_stages.py; the 300 are for `make endure`
+DAILY, DAILY_ROWS = (2, 8), 40
 ENDURING, ROWS = 300, 2000
 PIECES = 30  # of the enduring ones, so that one that fails names its neighbourhood
 LONGEST = 1500  # characters of a refusal: several faults of a file may stand in it

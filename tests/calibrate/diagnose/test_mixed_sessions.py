@@ -28,8 +28,7 @@ def test_the_effect_is_named_in_its_place(made, seed, defect, tmp_path):
             assert split.rms_after_m < 1.05 * split.rms_before_m, split.instrument
 
 
-@pytest.mark.endure  # daily: a session in which nothing is hidden, in tests/golden
-@pytest.mark.parametrize("made", [full_pose, tracker_and_cones])
+@pytest.mark.parametrize("made", [pytest.param(full_pose, marks=pytest.mark.endure), tracker_and_cones])
 def test_a_session_of_several_instruments_without_an_effect_is_consistent(made, tmp_path):
     recording, _ = made(tmp_path, seed=5 if made is tracker_and_cones else 6, samples=220)
     _, file = diagnose_recording(recording)

@@ -11,7 +11,7 @@ from calibrate.diagnose.tail import Tail
 
 # Nominal 5 %; three binomial sigmas of 200 sets on top would be 9.6 %: the bounds are those of the requirement.
 MOST = {"white": 0.06, "heavy": 0.06, "wander": 0.08}
-DAILY, ENDURED = 60, 200  # sets; daily for noise of every kind: heavy noise
+DAILY, ENDURED = 60, 200  # sets; daily heavy noise alone
 
 
 @pytest.mark.parametrize(

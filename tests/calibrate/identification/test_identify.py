@@ -45,15 +45,15 @@ def test_a_tracker_of_unknown_place_predicts_unseen_poses_to_a_fraction_of_its_n
 
 
 @pytest.fixture(scope="module")
-def untold(rig, ur5e_truth):
-    """A session before a tracker, and its answer by a rig file that says nothing of the drawing."""
+def without_tolerance(rig, ur5e_truth):
+    """A session before a tracker, and its answer by a rig file without tolerances."""
     session = Session(ur5e_truth(np.random.default_rng(5), zero_max=5e-3))
     rig, samples = tracked(rig, session, n=250)
     return session, run(msgspec.structs.replace(rig, tolerance=None), samples)
 
 
-def test_links_without_tolerance_are_free_and_the_noise_is_found(untold):
-    _, result = untold
+def test_links_without_tolerance_are_free_and_the_noise_is_found(without_tolerance):
+    _, result = without_tolerance
     (noise,) = result.noise
     assert (noise.source, noise.found) == ("position", pytest.approx(TRACKER_M, rel=0.15))
     random, last = result.held_out
@@ -64,8 +64,8 @@ def test_links_without_tolerance_are_free_and_the_noise_is_found(untold):
         assert unseen.rms_distance_after_m < 2.2 * TRACKER_M
 
 
-def test_what_is_said_with_a_sigma_is_true(rig, untold):
-    session, result = untold
+def test_what_is_said_with_a_sigma_is_true(rig, without_tolerance):
+    session, result = without_tolerance
     told = {e.name: e for e in result.estimates if e.value is not None}
     truth = {f"link{i + 1}.length": row[1] - rig.arm.joints[i].a_m for i, row in enumerate(session.truth.links)}
     for name in ("link2.length", "link3.length"):

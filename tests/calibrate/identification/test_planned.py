@@ -19,11 +19,13 @@ AXES = ("x_m", "y_m", "z_m")
 
 @pytest.fixture(scope="module")
 def session(ur5e_truth):
-    return Session(ur5e_truth(np.random.default_rng(5), zero_max=5e-3))
+    """Makes one of its own for each table, which then does not depend on those before it."""
+    return lambda: Session(ur5e_truth(np.random.default_rng(5), zero_max=5e-3))
 
 
 @pytest.fixture(scope="module")
 def tracked(rig, session):
+    session = session()
     rig = msgspec.structs.replace(rig, noise=msgspec.structs.replace(rig.noise, position_m=NOISE_M))
     q = session.readings(150)
     return rig, table(q, **session.positions(q, NOISE_M))
@@ -37,7 +39,8 @@ def plain(tracked):
 
 @pytest.fixture(scope="module")
 def fresh(session):
-    q = session.readings(80)
+    session = session()
+    q = session.readings(230)[150:]  # behind those that are fitted
     return table(q, **session.positions(q, 0.0))
 
 
@@ -136,6 +139,7 @@ SENSES = np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
 
 @pytest.fixture(scope="module")
 def with_encoders(rig, session):
+    session = session()
     rig = msgspec.structs.replace(rig, noise=msgspec.structs.replace(rig.noise, position_m=NOISE_M))
     link = session.readings(150)
     q = link - SEATING_RAD * np.random.default_rng(4).standard_normal(link.shape)

@@ -100,13 +100,12 @@ def test_each_change_is_named_with_its_size_and_nothing_else(tmp_path, family):
     assert not wrong, "\n".join(wrong)
 
 
-@pytest.mark.endure  # daily: a tool and a joint zero that have moved, in test_beside_model.py
 @pytest.mark.parametrize(
     ("family", "samples", "some"),
     [
         ("dual-psd", 100, ("the laser",)),
-        ("dual-psd", 100, ("the fixture turned",)),
-        ("cones", 100, ("a cone",)),
+        pytest.param("dual-psd", 100, ("the fixture turned",), marks=pytest.mark.endure),
+        pytest.param("cones", 100, ("a cone",), marks=pytest.mark.endure),
     ],
 )
 def test_what_stands_around_the_arm_is_named_by_the_parameters_of_the_model(tmp_path, family, samples, some):

@@ -36,7 +36,6 @@ def ratio_and_share(folder, family, seed, samples):
     return float(ratio), inside_95(residual, sigma)
 
 
-@pytest.mark.endure  # daily: before a tracker, in test_predicted_with_physics.py
 def test_a_session_of_two_detectors_is_predicted_to_its_noise(tmp_path):
     ratio, inside = ratio_and_share(tmp_path, "dual-psd", 2012, 200)
     assert ratio < 1.15
