@@ -186,7 +186,7 @@ def _encoders(rig: Rig, clock: Clock) -> DeviceCheck:
     asked_hz = device.sync_hz if device.driver is EncoderDriver.CIA406 else 0.0  # others send at a pace of their own
     rate_hz, wrong = sample_rate(blocks, asked_hz)
     registers = {int(identity["node"]): int(identity["error_register"]) for identity in identities}
-    wrong = wrong or bus_trouble(blocks[-1], registers)
+    wrong = bus_trouble(blocks[-1], registers) or wrong
     mute = [k + 1 for k in range(q_rad.shape[1]) if np.isnan(q_rad[:, k]).all()]
     if mute:
         wrong = f"no answer from the encoder of joint {', '.join(map(str, mute))}: check node number, power and cable"

@@ -139,6 +139,7 @@ def test_six_that_send_in_turn_and_become_slow_make_nobody_late():
 
 def test_an_emulator_that_is_held_up_between_the_heartbeats_of_two_nodes_makes_nobody_late():
     bus = Slow(0.0, 0.4, (1, 2), in_turn=True)
+    bus.found(2.0)
     for _ in range(10):
         assert bus.found(bus._beat_s[1] + 0.01) == ()
         bus.now_s += 0.35  # nothing is heard
