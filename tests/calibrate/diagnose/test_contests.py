@@ -67,13 +67,12 @@ def poses_like(recording, measured, rest, rng):
     return NewPoses(q_rad[rest], np.where(q_rad[rest] > q_rad[rest - 1], 1.0, -1.0), np.array(like))
 
 
-@pytest.mark.endure  # daily: next poses, in test_doubt.py and tests/calibrate/physics/test_beside_model.py
 @pytest.mark.parametrize(
     ("seed", "kind", "physics"),
     [
-        (35, "worn-bearing", "axis-wobble"),
+        pytest.param(35, "worn-bearing", "axis-wobble", marks=pytest.mark.endure),
         (34, "soft-joint", "joint-compliance"),
-        (43, "psd-gain", "psd-gain"),
+        pytest.param(43, "psd-gain", "psd-gain", marks=pytest.mark.endure),
     ],
 )
 def test_twenty_chosen_poses_part_truth_and_rival_more_than_random_ones(seed, kind, physics, tmp_path):
