@@ -33,11 +33,9 @@ class UrOutputs:
         self.close()
         try:
             self._io = importlib.import_module("rtde_io").RTDEIOInterface(self._host)
-        except (
-            RuntimeError,
-            ImportError,
-        ) as error:  # what ur_rtde raises for all, if it is there
-            raise DeviceLost(f"{self.place}: its outputs cannot be reached: {error}; check power and cable") from error
+        except (RuntimeError, ImportError) as error:  # ur_rtde raises the first for everything
+            why = f"{self.place}: its outputs cannot be reached: {error}"
+            raise DeviceLost(f"{why}; check power and cable, and that ur_rtde is installed") from error
 
     def switch(self, bit: int, level: bool) -> None:
         """ValueError for a bit that no output has. DeviceRefused, DeviceLost."""
