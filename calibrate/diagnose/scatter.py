@@ -19,6 +19,7 @@ NU = 5.0  # degrees of freedom: a tenth less efficient than least squares on Gau
 TURNS = 20
 SETTLED = 1e-4  # of -2 log L per observation
 FLOOR = 1e-6  # of the assumed noise: perfect data have a scale, too
+ROUNDING = 1e-14  # of the largest variance: fewer rows than columns, or one bound to others, leave directions without
 LOG_RATIO = (-18.0, 18.0)  # of variance by joints over own variance, as assumed both
 
 
@@ -57,8 +58,7 @@ def likelihood_of(residual: Floats, covariance: Floats) -> tuple[float, Floats]:
 def _of_one_form(residual: Floats, own_sigma: Floats) -> Scatter:
     n, k = residual.shape
     z = residual / own_sigma
-    middle = np.median(np.abs(z), axis=0) / 0.6745 + FLOOR
-    form, last = np.diag(middle**2), np.inf
+    form, last = np.diag((np.median(np.abs(z), axis=0) / 0.6745 + FLOOR) ** 2), np.inf
     for _ in range(TURNS):
         L = np.linalg.cholesky(form)
         square = np.sum(np.linalg.solve(L, z.T) ** 2, axis=0)
@@ -66,7 +66,8 @@ def _of_one_form(residual: Floats, own_sigma: Floats) -> Scatter:
         if last - value < SETTLED * n:
             break
         last, weights = value, (NU + k) / (NU + square)
-        form = (weights[:, None] * z).T @ z / n + FLOOR**2 * np.eye(k)
+        form = (weights[:, None] * z).T @ z / n
+        form += max(FLOOR**2, ROUNDING * float(np.trace(form))) * np.eye(k)
     value, weights = likelihood_of(z, np.broadcast_to(form, (n, k, k)))
     covariance = form * own_sigma[:, :, None] * own_sigma[:, None, :]
     return Scatter(covariance, weights, value + 2.0 * float(np.sum(np.log(own_sigma))), k * (k + 1) // 2)

@@ -1,8 +1,8 @@
 """Open families at instruments: fringes and bumps of a detector's face, light that bends on its way to a device."""
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from calibrate.alignment import align
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.form import Floats, Form, Functions
 from calibrate.effects.gravity import point_of
@@ -10,6 +10,7 @@ from calibrate.effects.kind import Kind
 from calibrate.effects.ports import Place, Port
 from calibrate.effects.psd_terms import half_size_m, spot
 from calibrate.effects.term import Inner, Shape, Term
+from calibrate.errors import DataError
 from calibrate.sensors import spots
 from calibrate.sensors.kind import Trait
 
@@ -137,9 +138,11 @@ def _down(drivers: Drivers, name: str) -> Floats:
     seen = np.flatnonzero(drivers.of_session(drivers.readouts[name].seen))
     in_device = drivers.readouts[name].predicted[seen, :3]
     in_base = point_of(drivers, drivers.n_joints, drivers.rig.tool.point_m or (0.0, 0.0, 0.0))[seen]
-    turned = Rotation.align_vectors(in_device - in_device.mean(axis=0), in_base - in_base.mean(axis=0))[0]
-    g = drivers.gravity_m_s2
-    return np.asarray(turned.apply(g / max(float(np.linalg.norm(g)), 1e-9)), dtype=np.float64)
+    try:
+        turned = align(in_device, in_base).T_a_b[:3, :3]
+    except DataError:  # all places on a line: nothing says how the device stands, so no light bends
+        return np.zeros(3)
+    return turned @ drivers.gravity_m_s2 / max(float(np.linalg.norm(drivers.gravity_m_s2)), 1e-9)
 
 
 EFFECT = Kind(

@@ -144,6 +144,15 @@ def test_bent_light_falls_along_gravity_by_the_square_of_the_level_range():
     assert size == pytest.approx(level**2 / 2.0)
 
 
+def test_light_does_not_bend_where_targets_on_a_line_leave_the_device_s_tilt_open():
+    drivers = full_session("tracker").drivers
+    where = drivers.readouts["position"]
+    two = replace(where, seen=np.arange(len(where.seen)) < 2)
+    drivers = replace(drivers, readouts={"position": two})
+    term = next(t for t in READOUTS.terms(drivers) if t.variant == "towards gravity")
+    assert not np.any(term.basis(drivers, NOTHING))
+
+
 def test_splines_and_a_constant_span_every_cubic():
     x = np.linspace(-2.0, 1.0, 200)
     columns = np.concatenate([splines(full_session("tracker").drivers, x), np.ones((200, 1))], axis=1)

@@ -1,0 +1,15 @@
+"""Noise of an instrument from its residuals alone."""
+
+import numpy as np
+
+from calibrate.diagnose.scatter import scatter_of
+
+
+def test_columns_that_follow_others_have_a_noise_too() -> None:
+    """A line of targets: six columns of residuals that two numbers a row decide, and far beyond what was assumed."""
+    rng = np.random.default_rng(1)
+    residual = 300.0 * rng.standard_normal((60, 2)) @ rng.standard_normal((2, 6))
+    found = scatter_of(residual, np.zeros((60, 6, 1)), np.ones((60, 6)))
+    assert np.linalg.eigvalsh(found.covariance).min() > 0.0
+    spread = np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2)).mean(axis=0)
+    assert np.all(np.abs(np.log(spread / residual.std(axis=0))) < 0.3)
