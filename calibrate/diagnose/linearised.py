@@ -16,6 +16,8 @@ from calibrate.effects.term import Term
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
+WILD = 6.0  # sigmas
+
 
 @dataclass(frozen=True)
 class Accepted:
@@ -51,6 +53,15 @@ class Unseen:
     sample: Ints  # (observation,)
     misfit: Floats  # (observation, k) observed minus expected, in the instrument's unit
     whitened: Floats  # (observation, k) by the noise of the fit, without robust weights
+
+
+def tame(misfit: Floats, least: float) -> NDArray[np.bool_]:
+    """(observation,) that are not wild by the spread of all (observation, k), `least` at least: a gross error no model
+    is to blame for. Where each would be wild, the spread tells nothing, and none is.
+    """
+    spread = max(float(np.median(np.abs(misfit))) / 0.6745, least)
+    near = np.max(np.abs(misfit), axis=1) <= WILD * spread
+    return near | ~np.any(near)
 
 
 class State(Protocol):

@@ -78,7 +78,7 @@ class Processes:
     def _bound(self, gram: Floats, along: Floats, rss: float) -> Floats:
         """(curve,) gain with everything that the features can follow, and nothing paid but for scales."""
         k = gram.shape[1]
-        ridge = RIDGE * np.maximum(np.trace(gram, axis1=1, axis2=2) / max(k, 1), 1e-300)
+        ridge = RIDGE * np.maximum(np.abs(np.trace(gram, axis1=1, axis2=2)) / max(k, 1), 1e-200)
         solved = np.linalg.solve(gram + ridge[:, None, None] * np.eye(k), along[..., None])[..., 0]
         left = np.maximum(rss - np.einsum("ck,ck->c", along, solved), 1e-12 * rss)
         return np.asarray(self.rows * np.log(rss / left) - (self._drivers + 1) * np.log(self.rows))

@@ -11,7 +11,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from calibrate.diagnose.folds import splits_of, units
-from calibrate.diagnose.linearised import State, Unseen
+from calibrate.diagnose.linearised import State, Unseen, tame
 from calibrate.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 from calibrate.uncertainty.splits import Split
 
@@ -19,7 +19,6 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 ROUNDS = 500
-WILD = 6.0  # sigmas after the terms: a gross error, which no model is to blame for
 FEWEST_DOF = 20  # of repeats, for a floor
 EXCHANGES, BY_CHANCE = 300, 0.01
 POSITION = 3  # components of a reading that are lengths
@@ -64,7 +63,7 @@ def floors(state: State, samples: Ints, parameters: int) -> tuple[Floor, ...]:
     seen = _lengths(state.held_out(samples))
     total = sum(u.misfit[:, :POSITION].size for u in seen)
     for u in seen:
-        good = _tame(u.whitened)
+        good = tame(u.whitened, 1.0)
         misfit = u.misfit[:, :POSITION]
         if repeat is not None:
             within = _within(misfit[good], repeat[u.sample[good]])
@@ -100,13 +99,13 @@ def _compared(
     split: str, name: str, before: Sequence[Unseen], after: Sequence[Unseen], labels: Ints, rng: Generator
 ) -> HeldOut:
     mine = [(b, a) for b, a in zip(before, after, strict=True) if b.instrument == name]
-    tame = np.concatenate([_tame(a.whitened) for _, a in mine])
-    b = np.concatenate([u.misfit[:, :POSITION] for u, _ in mine])[tame]
-    a = np.concatenate([u.misfit[:, :POSITION] for _, u in mine])[tame]
-    label = labels[np.concatenate([u.sample for u, _ in mine])[tame]]
+    good = np.concatenate([tame(a.whitened, 1.0) for _, a in mine])
+    b = np.concatenate([u.misfit[:, :POSITION] for u, _ in mine])[good]
+    a = np.concatenate([u.misfit[:, :POSITION] for _, u in mine])[good]
+    label = labels[np.concatenate([u.sample for u, _ in mine])[good]]
     squares_b, squares_a = np.sum(b**2, axis=1), np.sum(a**2, axis=1)
     return HeldOut(
-        split, name, len(b), int(np.sum(~tame)), _rms(b), _rms(a), _interval(squares_b, squares_a, label, rng)
+        split, name, len(b), int(np.sum(~good)), _rms(b), _rms(a), _interval(squares_b, squares_a, label, rng)
     )
 
 
@@ -120,13 +119,6 @@ def _interval(before: Floats, after: Floats, label: Ints, rng: Generator) -> tup
     shares = 1.0 - a[drawn].sum(axis=1) / np.maximum(b[drawn].sum(axis=1), 1e-300)
     low, high = np.percentile(shares, [2.5, 97.5])
     return float(low), float(high)
-
-
-def _tame(whitened: Floats) -> NDArray[np.bool_]:
-    """Observations that are not wild, by the spread of their own."""
-    size = np.max(np.abs(whitened), axis=1)
-    middle = float(np.median(np.abs(whitened)) / 0.6745)
-    return size <= WILD * max(middle, 1.0)
 
 
 def _within(misfit: Floats, repeat: Ints) -> float | None:

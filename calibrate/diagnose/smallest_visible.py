@@ -59,7 +59,7 @@ def _is_middle(bench: Bench, i: int) -> bool:
 
 def _coefficients(block: Block, at: int, needed: float) -> Floats | None:
     """(k,) which together show the needed square; None where they show nothing."""
-    seen = np.diag(block.gram[at])
+    seen = np.maximum(np.diag(block.gram[at]), 0.0)  # below zero by rounding where geometry can be all of it
     if not np.any(seen > VISIBLE):
         return None
     size = block.size[at] * np.sqrt(seen)

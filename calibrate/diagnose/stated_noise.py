@@ -18,7 +18,7 @@ from scipy.spatial import KDTree
 from calibrate.blunders.same_posture import postures
 from calibrate.diagnose.fitted import Fitted
 from calibrate.diagnose.joint_scatter import innocent
-from calibrate.diagnose.linearised import Unseen
+from calibrate.diagnose.linearised import Unseen, tame
 from calibrate.diagnose.noise_of_fit import freedom
 from calibrate.diagnose.tail import Tail
 from calibrate.effects.term import Missing
@@ -33,7 +33,6 @@ Ints = NDArray[np.intp]
 MORE = 1.5  # times the stated noise: a statement is not more exact than that
 SIGMAS = 3.0  # of the mean square, by which it has to be beyond the statement
 WRONG_BY = 10.0  # statements of rig files are wrong by up to 8 (mismatch study, second set, lesson 14); beyond: physics
-WILD = 6.0  # of the usual misfit: rows that are named elsewhere
 CLOSE = 3  # rows from one repeat to the next, at most, that are close in time
 FEWEST_PAIRS = 8  # of repeats close in time
 LESS = 1.3  # times the scatter of repeats close in time: what is left is more than noise
@@ -114,16 +113,16 @@ def _found(
     name, misfit = unseen.instrument, unseen.misfit[:, quantity.part]
     stated = _stated(model, i, quantity)
     by = np.full_like(misfit, np.sqrt(np.mean(misfit**2))) if stated is None else stated
-    tame = _tame(misfit / np.maximum(by, 1e-300))
-    found = float(np.sqrt(larger * np.mean(misfit[tame] ** 2)))
+    good = tame(misfit / np.maximum(by, 1e-300), 1e-300)
+    found = float(np.sqrt(larger * np.mean(misfit[good] ** 2)))
     if stated is None:
         return NoiseFound(name, quantity.name, quantity.unit, None, found, None, None, Statement.ABSENT, (), ())
-    square = larger * np.mean((misfit[tame] / stated[tame]) ** 2, axis=1)
+    square = larger * np.mean((misfit[good] / stated[good]) ** 2, axis=1)
     mean, error = float(np.mean(square)), float(np.std(square) / np.sqrt(len(square)))
     times = float(np.sqrt(mean))
     answer, supports, opposes = Statement.AGREES, (), ()
     if times > MORE and mean - 1.0 > SIGMAS * error:
-        supports, opposes = _evidence(model, i, quantity, unseen, tame, rng)
+        supports, opposes = _evidence(model, i, quantity, unseen, good, rng)
         if supports + opposes and times > WRONG_BY:
             opposes = (f"no statement is wrong by more than {WRONG_BY:.0f} times", *opposes)
         noise = Statement.EXCEEDED if opposes or elsewhere else Statement.WRONG
@@ -166,15 +165,15 @@ def _levers(model: Fitted, i: int, quantity: Quantity) -> Floats:
 
 
 def _evidence(
-    model: Fitted, i: int, quantity: Quantity, unseen: Unseen, tame: NDArray[np.bool_], rng: Generator
+    model: Fitted, i: int, quantity: Quantity, unseen: Unseen, good: NDArray[np.bool_], rng: Generator
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """What supports that the scatter is noise, and what opposes it; nothing of either where rows are too few."""
-    misfit, sample, drivers = unseen.misfit[tame][:, quantity.part], unseen.sample[tame], model.drivers
+    misfit, sample, drivers = unseen.misfit[good][:, quantity.part], unseen.sample[good], model.drivers
     if len(misfit) < FEWEST:
         return (), ()
     told = [
         _close_in_time(misfit, np.array([]) if drivers.repeat is None else drivers.repeat[sample], sample),
-        _by_lever(*_whitened(model, i, quantity, misfit, tame), stated=model.session.rig.noise.joint_rad is not None),
+        _by_lever(*_whitened(model, i, quantity, misfit, good), stated=model.session.rig.noise.joint_rad is not None),
         _by_posture(misfit, drivers.q_rad[sample], sample, rng),
     ]
     given = [one for one in told if one is not None]
@@ -182,11 +181,11 @@ def _evidence(
 
 
 def _whitened(
-    model: Fitted, i: int, quantity: Quantity, misfit: Floats, tame: NDArray[np.bool_]
+    model: Fitted, i: int, quantity: Quantity, misfit: Floats, good: NDArray[np.bool_]
 ) -> tuple[Floats, Floats]:
     """Misfit (row, k) and levers (joint, row, k) by the noise as stated, which may be that of the joints."""
-    own = _own(model, i, quantity)[tame]
-    levers, joint_rad = _levers(model, i, quantity)[:, tame], model.session.rig.noise.joint_rad or 0.0
+    own = _own(model, i, quantity)[good]
+    levers, joint_rad = _levers(model, i, quantity)[:, good], model.session.rig.noise.joint_rad or 0.0
     form = joint_rad**2 * np.einsum("jok,jol->okl", levers, levers) + own[:, :, None] ** 2 * np.eye(own.shape[1])
     L = np.linalg.cholesky(form)
     return np.linalg.solve(L, misfit[..., None])[..., 0], np.linalg.solve(L, levers[..., None])[..., 0]
@@ -246,12 +245,6 @@ def neighbours(q_rad: Floats, sample: Ints) -> Ints:
 def _alike(z: Floats, near: Ints) -> float:
     """Mean product of a row and its neighbours."""
     return float(np.mean(np.sum(z * np.mean(z[near], axis=1), axis=1)))
-
-
-def _tame(z: Floats) -> NDArray[np.bool_]:
-    """(row,) that are not wild by their own spread."""
-    size = np.max(np.abs(z), axis=1)
-    return size <= WILD * max(float(np.median(np.abs(z))) / 0.6745, 1e-300)
 
 
 def _noun(kind: SensorKind, quantity: str) -> str:

@@ -26,9 +26,9 @@ class Tail:
     def p(self, value: float) -> float:
         """Probability of at least this value."""
         count, above = len(self.drawn), int(np.sum(self.drawn >= value))
-        if count == 0 or above >= ENOUGH or not np.isfinite(value):
-            return (above + 1) / (count + 1)
         tail = np.sort(self.drawn)[-max(ENOUGH, int(TAIL * count)) :]
+        if count == 0 or above >= ENOUGH or not np.all(np.isfinite([value, *tail])):
+            return (above + 1) / (count + 1)
         threshold, excess = tail[0], tail[1:] - tail[0]
         mean, variance = float(np.mean(excess)), float(np.var(excess))
         if variance <= 0.0 or mean <= 0.0:

@@ -83,3 +83,9 @@ def test_tail_is_empirical_in_the_middle_and_never_zero():
     drawn = np.arange(100.0)
     assert Tail(drawn).p(49.5) == pytest.approx(51 / 101)
     assert 0.0 < Tail(drawn).p(1e9) < 1e-4
+
+
+def test_draws_that_gain_nothing_at_all_leave_the_tail_empirical():
+    """Most draws without any gain, as where geometry takes everything that an entry could show."""
+    drawn = np.array([-np.inf] * 95 + [0.0, 1.0, 2.0, 3.0, 4.0])
+    assert Tail(drawn).p(10.0) == pytest.approx(1 / 101)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from calibrate.diagnose.linearised import tame
 from calibrate.diagnose.scatter import scatter_of
 
 
@@ -13,3 +14,12 @@ def test_columns_that_follow_others_have_a_noise_too() -> None:
     assert np.linalg.eigvalsh(found.covariance).min() > 0.0
     spread = np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2)).mean(axis=0)
     assert np.all(np.abs(np.log(spread / residual.std(axis=0))) < 0.3)
+
+
+def test_a_gross_error_is_not_tame_and_readings_of_which_each_seems_wild_all_are() -> None:
+    misfit = np.random.default_rng(2).standard_normal((40, 3))
+    misfit[7] *= 100.0
+    assert np.flatnonzero(~tame(misfit, 1.0)).tolist() == [7]
+    one_component = 1e-9 * misfit
+    one_component[:, 2] = 1.0
+    assert np.all(tame(one_component, 1e-300))

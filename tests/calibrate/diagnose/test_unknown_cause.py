@@ -105,6 +105,14 @@ def test_the_best_curve_is_the_best_of_all_curves(world):
         assert every.best(bench.sight.residual, all_of_them, least=float(gains.max()) + 0.1) is None
 
 
+def test_curves_of_which_geometry_leaves_nothing_explain_nothing(world):
+    bench = Bench(world.session(np.random.default_rng(5), [(world.at_joint(2, uneven), 0.5)]))
+    every = processes(bench, places_of(bench), 1)
+    rounding = np.full_like(every.gram, -1e-18)  # all that is left of the Gram matrices
+    taken = replace(every, gram=rounding, products=lambda r: 0.0 * every.products(r))
+    assert taken.best(bench.sight.residual, np.ones(len(every.gram), dtype=bool)) is None
+
+
 def test_terms_taken_out_come_back_into_what_a_curve_may_explain(world):
     rng = np.random.default_rng(4)
     session = world.session(rng, [(world.at_joint(3, uneven), 2.0)])
